@@ -1,5 +1,6 @@
-//! Comparators, and what loading an observation costs: one evaluation of each comparator of a lathe's picture with the photograph, at
-//! 128 and 512 pixels; and, at 512, every step from the file to comparators that are ready.
+//! Comparators, and what loading an observation costs: one evaluation of each comparator
+//! of a lathe's picture with the photograph, at 128 and 512 pixels; and, at 512, every
+//! step from the file to comparators that are ready.
 //!
 //!     cargo bench --bench compare -- "prepare" --quick
 
@@ -10,9 +11,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::render::{Camera, Channels, Contours, Frame};
 use pcadlang::vision::features::{Query, contour_features, observed, rendered};
 use pcadlang::vision::{
-    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    GradientDetector, Limits, Mask, MaskLikelihood, Region, RegionOptions, chamfer, contour_ratio, distance_transform,
-    gradient, nms, photo, region,
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
+    DepthMap, GradientDetector, Limits, Mask, MaskLikelihood, Region, RegionOptions, chamfer,
+    contour_ratio, distance_transform, gradient, nms, photo, region,
 };
 use std::hint::black_box;
 
@@ -32,14 +33,18 @@ fn chamfers() -> [(&'static str, ChamferOptions); 3] {
 /// The region comparator without and with its shading term.
 fn regions() -> [(&'static str, RegionOptions); 2] {
     let colours = RegionOptions::default();
-    [("colours", colours.clone()), ("colours and shading", RegionOptions { shading: 0.05, ..colours })]
+    [
+        ("colours", colours.clone()),
+        ("colours and shading", RegionOptions { shading: 0.05, ..colours }),
+    ]
 }
 
 /// Contours with contours.
 fn contours(c: &mut Criterion) {
     let map = GradientDetector::default().contours(&photograph(SIDE));
     for size in [128, SIDE] {
-        let contours = Contours::of(&vase().placed(pose(&mut 0.0)), &Camera::default_for(size, size));
+        let contours =
+            Contours::of(&vase().placed(pose(&mut 0.0)), &Camera::default_for(size, size));
         let elements = elements(&contours);
         for (name, options) in chamfers() {
             let chamfer = Chamfer::prepare(&map, size, size, &options).expect("a chamfer");
@@ -48,7 +53,8 @@ fn contours(c: &mut Criterion) {
                 b.iter(|| chamfer.log_likelihood_with(black_box(&elements), &mut scratch))
             });
         }
-        let ratio = ContourRatio::prepare(&map, size, size, &ContourRatioOptions::default()).expect("a ratio");
+        let ratio = ContourRatio::prepare(&map, size, size, &ContourRatioOptions::default())
+            .expect("a ratio");
         let mut scratch = contour_ratio::Scratch::default();
         c.bench_function(&format!("score/contour ratio at {size}"), |b| {
             b.iter(|| ratio.log_likelihood_with(black_box(&elements), &mut scratch))
@@ -64,14 +70,20 @@ fn contours(c: &mut Criterion) {
 fn pixels(c: &mut Criterion) {
     let photo = photograph(SIDE);
     for size in [128, SIDE] {
-        let frame = Frame::render(&vase().placed(pose(&mut 0.0)), &Camera::default_for(size, size), Channels::All);
+        let frame = Frame::render(
+            &vase().placed(pose(&mut 0.0)),
+            &Camera::default_for(size, size),
+            Channels::All,
+        );
         let seen: Vec<bool> = frame.mask().collect();
         let groups: Vec<u8> = seen.iter().copied().map(u8::from).collect();
         for (name, options) in regions() {
             let region = Region::prepare(&photo, size, size, &options).expect("a region");
             let mut scratch = region::Scratch::default();
             c.bench_function(&format!("score/region, {name} at {size}"), |b| {
-                b.iter(|| region.log_likelihood_with(black_box(&groups), &frame.normal, &mut scratch))
+                b.iter(|| {
+                    region.log_likelihood_with(black_box(&groups), &frame.normal, &mut scratch)
+                })
             });
         }
         let depth = DepthMap::new(size, size, frame.depth.clone()).expect("a depth map");
@@ -90,16 +102,22 @@ fn pixels(c: &mut Criterion) {
 /// From a file to contours.
 fn load(c: &mut Criterion) {
     let file = std::fs::read(picture("skier.jpg")).expect("a file");
-    c.bench_function("load/decode 344 x 425", |b| b.iter(|| photo::decode(black_box(&file), &Limits::default())));
+    c.bench_function("load/decode 344 x 425", |b| {
+        b.iter(|| photo::decode(black_box(&file), &Limits::default()))
+    });
     let photo = photograph(SIDE);
     c.bench_function("load/linear light", |b| b.iter(|| photo.linear(SIDE, SIDE)));
     let linear = photo.linear(SIDE, SIDE).rgb;
-    c.bench_function("load/gradient", |b| b.iter(|| gradient::colour_gradient(SIDE, SIDE, black_box(&linear), 1.6)));
+    c.bench_function("load/gradient", |b| {
+        b.iter(|| gradient::colour_gradient(SIDE, SIDE, black_box(&linear), 1.6))
+    });
     let slopes = gradient::colour_gradient(SIDE, SIDE, &linear, 1.6);
     c.bench_function("load/maxima", |b| b.iter(|| nms::suppress(black_box(&slopes), 0.0)));
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
     for (size, detector) in [(256, GradientDetector::default()), (SIDE, fine)] {
-        c.bench_function(&format!("load/detect at {size}"), |b| b.iter(|| detector.contours(black_box(&photo))));
+        c.bench_function(&format!("load/detect at {size}"), |b| {
+            b.iter(|| detector.contours(black_box(&photo)))
+        });
     }
     let drawn = fine.contours(&photo).to_image();
     c.bench_function("load/contour map", |b| b.iter(|| ContourMap::from_image(black_box(&drawn))));
@@ -111,7 +129,9 @@ fn prepare(c: &mut Criterion) {
     let map = GradientDetector::default().contours(&photo);
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
     let set: Vec<bool> = fine.contours(&photo).to_image().pixels().map(|p| p.0[0] > 0).collect();
-    c.bench_function("prepare/distance transform", |b| b.iter(|| distance_transform(SIDE, SIDE, black_box(&set))));
+    c.bench_function("prepare/distance transform", |b| {
+        b.iter(|| distance_transform(SIDE, SIDE, black_box(&set)))
+    });
     for (name, options) in chamfers() {
         c.bench_function(&format!("prepare/chamfer {name}"), |b| {
             b.iter(|| Chamfer::prepare(black_box(&map), SIDE, SIDE, &options))
@@ -126,7 +146,9 @@ fn prepare(c: &mut Criterion) {
             b.iter(|| Region::prepare(black_box(&photo), SIDE, SIDE, &options))
         });
     }
-    c.bench_function("prepare/features", |b| b.iter(|| Query::contours(&observed(black_box(&map)))));
+    c.bench_function("prepare/features", |b| {
+        b.iter(|| Query::contours(&observed(black_box(&map))))
+    });
 }
 
 criterion_group! { name = benches; config = short(); targets = contours, pixels, load, prepare }

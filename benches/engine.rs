@@ -1,6 +1,7 @@
-//! What a step costs: one transition of a regression with 10 and with 10,000 points, one update of a choice that reaches one
-//! point among 10 to 100,000, one sweep over such choices, one gradient, and one evaluation of the contour likelihood of
-//! `lathe.pcad` at 128 pixels. `cargo bench --bench engine -- update` runs those with a name.
+//! What a step costs: one transition of a regression with 10 and with 10,000 points, one
+//! update of a choice that reaches one point among 10 to 100,000, one sweep over such
+//! choices, one gradient, and one evaluation of the contour likelihood of `lathe.pcad` at
+//! 128 pixels. `cargo bench --bench engine -- update` runs those with a name.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::dist::Datum;
@@ -13,10 +14,13 @@ use std::hint::black_box;
 
 /// A line through `n` points, observed as one array or one by one.
 fn line(n: usize, one_by_one: bool) -> Model {
-    let y: Vec<String> =
-        (0..n).map(|i| format!("{:.3}", 1.5 * i as f64 / n as f64 - 0.5 + 0.1 * ((i * 7 % 11) as f64))).collect();
+    let y: Vec<String> = (0..n)
+        .map(|i| format!("{:.3}", 1.5 * i as f64 / n as f64 - 0.5 + 0.1 * ((i * 7 % 11) as f64)))
+        .collect();
     let observe = match one_by_one {
-        true => format!("for i in 0 .. {n} {{ observe normal(slope * x[i] + intercept, noise) = y[i] as y; }}"),
+        true => format!(
+            "for i in 0 .. {n} {{ observe normal(slope * x[i] + intercept, noise) = y[i] as y; }}"
+        ),
         false => "observe normal(slope * x + intercept, noise) = y as y;".to_owned(),
     };
     let text = format!(
@@ -47,24 +51,35 @@ fn transitions(c: &mut Criterion) {
         for (how, one_by_one) in [("array", false), ("loop", true)] {
             let model = line(n, one_by_one);
             let scope = || Scope { selector: Selector::All, pick: Pick::One };
-            let kernels: [(&str, Box<dyn Kernel>); 2] =
-                [("mh", Box::new(Mh::new(scope()))), ("drift", Box::new(Drift::new(scope(), Some(0.1))))];
+            let kernels: [(&str, Box<dyn Kernel>); 2] = [
+                ("mh", Box::new(Mh::new(scope()))),
+                ("drift", Box::new(Drift::new(scope(), Some(0.1)))),
+            ];
             for (name, mut kernel) in kernels {
                 let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
-                steps(c, &format!("linreg n={n} {how}: one {name} transition"), &mut trace, &mut *kernel);
+                steps(
+                    c,
+                    &format!("linreg n={n} {how}: one {name} transition"),
+                    &mut trace,
+                    &mut *kernel,
+                );
             }
         }
     }
 }
 
-/// A shipped model of the comparison with other languages: a flag for each point says whether it is an outlier.
+/// A shipped model of the comparison with other languages: a flag for each point says
+/// whether it is an outlier.
 fn flags(n: usize) -> Trace {
     let text = include_str!("peers/linreg.pcad");
     let text = text.split("infer {").next().unwrap_or(text);
     let at = |i: usize| ((i * 7919) % 1000) as f64 / 1000.0;
     let array = |f: &dyn Fn(usize) -> f64| Value::Array((0..n).map(f).collect());
     let model = Program::parse(text)
-        .map(|p| p.observe("x", array(&|i| -5.0 + 10.0 * at(i))).observe("y", array(&|i| 7.0 - 10.0 * at(i))))
+        .map(|p| {
+            p.observe("x", array(&|i| -5.0 + 10.0 * at(i)))
+                .observe("y", array(&|i| 7.0 - 10.0 * at(i)))
+        })
         .and_then(Program::compile)
         .unwrap_or_else(|e| panic!("{e}"));
     model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"))
@@ -108,19 +123,26 @@ fn value(j: &serde_json::Value) -> Value {
     }
 }
 
-/// One gradient of the log joint density by all continuous choices, in a draw from the prior.
+/// One gradient of the log joint density by all continuous choices, in a draw from the
+/// prior.
 fn gradient(c: &mut Criterion) {
     for (name, what) in [
         ("eight_schools", "schools, 10 coordinates"),
         ("gp_regr", "a Gaussian process at 11 points"),
         ("kidscore_momiq", "a regression with 434 points"),
     ] {
-        let file = |ending: &str| format!("{}/tests/posteriordb/{name}.{ending}", env!("CARGO_MANIFEST_DIR"));
-        let read = |ending: &str| std::fs::read_to_string(file(ending)).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let json: serde_json::Value = serde_json::from_str(&read("json")).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let file = |ending: &str| {
+            format!("{}/tests/posteriordb/{name}.{ending}", env!("CARGO_MANIFEST_DIR"))
+        };
+        let read = |ending: &str| {
+            std::fs::read_to_string(file(ending)).unwrap_or_else(|e| panic!("{name}: {e}"))
+        };
+        let json: serde_json::Value =
+            serde_json::from_str(&read("json")).unwrap_or_else(|e| panic!("{name}: {e}"));
         let program = Program::parse(&read("pcad")).unwrap_or_else(|e| panic!("{e}"));
         let items = program.interface().data;
-        let program = items.iter().fold(program, |p, d| p.observe(&d.name, value(&json["data"][&*d.name])));
+        let program =
+            items.iter().fold(program, |p, d| p.observe(&d.name, value(&json["data"][&*d.name])));
         let model = program.compile().unwrap_or_else(|e| panic!("{e}"));
         let trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
         let (targets, mut out) = (trace.all_targets().to_vec(), Vec::new());
@@ -134,9 +156,12 @@ fn gradient(c: &mut Criterion) {
     }
 }
 
-/// Proposes values that wander a little, so that everything that depends on the choice runs again.
+/// Proposes values that wander a little, so that everything that depends on the choice
+/// runs again.
 fn wander(c: &mut Criterion, what: &str, trace: &mut Trace, name: &str, around: f64) {
-    let Some(target) = name.parse().ok().and_then(|a| trace.find(&a)) else { panic!("no choice {name}") };
+    let Some(target) = name.parse().ok().and_then(|a| trace.find(&a)) else {
+        panic!("no choice {name}")
+    };
     let mut step = 0u64;
     c.bench_function(what, |b| {
         b.iter(|| {

@@ -1,5 +1,7 @@
-//! Drawing, stage by stage: making a mesh, posing a body, depth, all channels and contours, for a lathe of 2,000 triangles, the shipped
-//! human body and a mesh of 100,352 triangles at 64 to 512 pixels; and a body of 22 parts (2,420 triangles) of which some move.
+//! Drawing, stage by stage: making a mesh, posing a body, depth, all channels and
+//! contours, for a lathe of 2,000 triangles, the shipped human body and a mesh of 100,352
+//! triangles at 64 to 512 pixels; and a body of 22 parts (2,420 triangles) of which some
+//! move.
 //!
 //!     cargo bench --bench render -- "contours/human" --quick
 
@@ -25,7 +27,9 @@ fn drawn(c: &mut Criterion, name: &str, solid: &Solid, pose: &dyn Fn(&mut f64) -
         let camera = Camera::default_for(size, size);
         for (what, channels) in [("depth", Channels::Depth), ("frame", Channels::All)] {
             c.bench_function(&format!("{what}/{name} at {size}"), |b| {
-                b.iter(|| Frame::render(&solid.placed(pose(&mut step)), black_box(&camera), channels))
+                b.iter(|| {
+                    Frame::render(&solid.placed(pose(&mut step)), black_box(&camera), channels)
+                })
             });
         }
         c.bench_function(&format!("contours/{name} at {size}"), |b| {
@@ -52,7 +56,8 @@ fn profile(c: &mut Criterion) {
     });
 }
 
-/// The shipped body: posed and skinned with one joint moved and with all, and drawn as it stands.
+/// The shipped body: posed and skinned with one joint moved and with all, and drawn as it
+/// stands.
 fn person(c: &mut Criterion) {
     let rules = Rules::default();
     for lod in ["human.lod2", "human"] {
@@ -62,12 +67,19 @@ fn person(c: &mut Criterion) {
         let mut turned = |moved: usize| {
             step += 1e-4;
             let mut pose = rest.clone();
-            pose.iter_mut().rev().take(moved).for_each(|p| *p = JointPose::turned(DVec3::new(0.1 + step, 0.05, 0.02)));
+            pose.iter_mut()
+                .rev()
+                .take(moved)
+                .for_each(|p| *p = JointPose::turned(DVec3::new(0.1 + step, 0.05, 0.02)));
             pose
         };
         for (what, moved) in [("one joint", 1), ("all joints", rest.len())] {
             c.bench_function(&format!("posed/{lod}, {what}"), |b| {
-                b.iter_batched(|| turned(moved), |pose| body.posed(&pose, &rules), BatchSize::SmallInput)
+                b.iter_batched(
+                    || turned(moved),
+                    |pose| body.posed(&pose, &rules),
+                    BatchSize::SmallInput,
+                )
             });
         }
         let solid = body.posed(&turned(rest.len()), &rules).expect("a posed body");
@@ -78,10 +90,12 @@ fn person(c: &mut Criterion) {
     }
 }
 
-/// The contours of the body when the meshes of some of its parts are new, as when a joint moved.
+/// The contours of the body when the meshes of some of its parts are new, as when a joint
+/// moved.
 fn body(c: &mut Criterion) {
     let camera = Camera::default_for(128, 128);
-    let parts: Vec<_> = BODY.iter().map(|&(m, a, half, radius)| Arc::new(spindle(m, a, half, radius))).collect();
+    let parts: Vec<_> =
+        BODY.iter().map(|&(m, a, half, radius)| Arc::new(spindle(m, a, half, radius))).collect();
     let pose = Affine::new(DVec3::new(0.05, 0.02, 0.1), DVec3::new(0.1, 0.4, 0.05), DVec3::ONE);
     let view = |moved: &[usize], by: f32| {
         let solids: Vec<_> = (0..parts.len())
@@ -97,9 +111,13 @@ fn body(c: &mut Criterion) {
     };
     let all: Vec<usize> = (0..parts.len()).collect();
     let mut step = 0u32;
-    for (name, moved) in
-        [("nothing", &[][..]), ("a hand", &[11]), ("the chest", &[2]), ("an arm", &[7, 9, 11, 13]), ("all", &all)]
-    {
+    for (name, moved) in [
+        ("nothing", &[][..]),
+        ("a hand", &[11]),
+        ("the chest", &[2]),
+        ("an arm", &[7, 9, 11, 13]),
+        ("all", &all),
+    ] {
         let mut next = || {
             step += 1;
             view(moved, 1e-3 * (step % 97) as f32)

@@ -1,11 +1,11 @@
-//! How well regions that may be objects of revolution are found in photographs whose objects are
-//! known.
+//! How well regions that may be objects of revolution are found in photographs whose
+//! objects are known.
 //!
 //!     cargo run --release --example candidates -- FOLDER... [most=64] [size=128]
 //!
 //! A folder holds `image.png` and `mask.png`, the truth. Says for each the best overlap
-//! (intersection over union) of the first 1, 5 and 20 candidates and of all, how many there are,
-//! and the seconds; at last how many folders reach 0.8 and 0.9.
+//! (intersection over union) of the first 1, 5 and 20 candidates and of all, how many
+//! there are, and the seconds; at last how many folders reach 0.8 and 0.9.
 
 use pcadlang::vision::candidates::{CandidateOptions, candidates};
 use pcadlang::vision::{Limits, Mask, mask, photo};
@@ -15,7 +15,8 @@ use std::time::Instant;
 /// Of how many candidates the best overlap is said.
 const FIRST: [usize; 4] = [1, 5, 20, usize::MAX];
 
-/// What a folder gives: the best overlaps, how many candidates there are, and the seconds.
+/// What a folder gives: the best overlaps, how many candidates there are, and the
+/// seconds.
 struct Outcome {
     best: [f64; FIRST.len()],
     count: usize,
@@ -29,13 +30,16 @@ fn overlap(a: &Mask, b: &Mask) -> f64 {
 }
 
 fn look(folder: &Path, options: &CandidateOptions) -> Result<Outcome, String> {
-    let photo = photo::load(&folder.join("image.png"), &Limits::default()).map_err(|e| e.to_string())?;
+    let photo =
+        photo::load(&folder.join("image.png"), &Limits::default()).map_err(|e| e.to_string())?;
     let truth = mask::load(&folder.join("mask.png")).map_err(|e| e.to_string())?;
     let start = Instant::now();
     let found = candidates(&photo, options);
     let seconds = start.elapsed().as_secs_f64();
-    let overlaps: Vec<f64> =
-        found.iter().map(|c| overlap(&c.mask, &truth.resized(c.mask.width(), c.mask.height()))).collect();
+    let overlaps: Vec<f64> = found
+        .iter()
+        .map(|c| overlap(&c.mask, &truth.resized(c.mask.width(), c.mask.height())))
+        .collect();
     let best = FIRST.map(|n| overlaps.iter().take(n).copied().fold(0.0, f64::max));
     Ok(Outcome { best, count: found.len(), seconds })
 }
@@ -45,8 +49,12 @@ fn main() -> Result<(), String> {
     let mut folders = Vec::new();
     for argument in std::env::args().skip(1) {
         match argument.split_once('=') {
-            Some(("most", n)) => options.most = n.parse().map_err(|_| format!("{argument} is not a number"))?,
-            Some(("size", n)) => options.size = n.parse().map_err(|_| format!("{argument} is not a number"))?,
+            Some(("most", n)) => {
+                options.most = n.parse().map_err(|_| format!("{argument} is not a number"))?
+            }
+            Some(("size", n)) => {
+                options.size = n.parse().map_err(|_| format!("{argument} is not a number"))?
+            }
             _ => folders.push(PathBuf::from(argument)),
         }
     }
@@ -65,6 +73,11 @@ fn main() -> Result<(), String> {
         }
         seconds += o.seconds / folders.len() as f64;
     }
-    println!("of {}: at 0.8 {:?}, at 0.9 {:?}; {seconds:.3} s each", folders.len(), reached[0], reached[1]);
+    println!(
+        "of {}: at 0.8 {:?}, at 0.9 {:?}; {seconds:.3} s each",
+        folders.len(),
+        reached[0],
+        reached[1]
+    );
     Ok(())
 }

@@ -1,12 +1,17 @@
-//! What delayed acceptance gains: effective draws a second with and without a coarse first stage, for the same posterior.
+//! What delayed acceptance gains: effective draws a second with and without a coarse
+//! first stage, for the same posterior.
 //!
 //!     cargo run --release --example delayed_acceptance [-- DRAWS]
 //!
-//! The pose of a known object of revolution, its own clean contours observed by the distance both ways at 256 and 512 pixels; the first
-//! stage compares at 64 pixels. Once with a light mesh (2,000 triangles), once with a full one (100,000), whose first stage draws it with
-//! a coarser mesh as well (`detail` 1). Two chains from the truth; random walks of all pose variables at once, with steps so long that fewer and fewer are
-//! accepted. Prints, for each: the share accepted, milliseconds of processor time a step, the effective number of draws a second (the geometric mean
-//! over the five pose variables), the ratio of these, and that of accepted steps a second, which is less noisy. DRAWS: how many steps a chain (20,000).
+//! The pose of a known object of revolution, its own clean contours observed by the
+//! distance both ways at 256 and 512 pixels; the first stage compares at 64 pixels. Once
+//! with a light mesh (2,000 triangles), once with a full one (100,000), whose first stage
+//! draws it with a coarser mesh as well (`detail` 1). Two chains from the truth; random
+//! walks of all pose variables at once, with steps so long that fewer and fewer are
+//! accepted. Prints, for each: the share accepted, milliseconds of processor time a step,
+//! the effective number of draws a second (the geometric mean over the five pose
+//! variables), the ratio of these, and that of accepted steps a second, which is less
+//! noisy. DRAWS: how many steps a chain (20,000).
 
 mod clock;
 
@@ -61,7 +66,11 @@ fn program(step: &str, set: &[(&str, String)], map: ContourMap) -> Result<Model,
 /// The contours of the forced state.
 fn contours(set: &[(&str, String)]) -> Result<ContourMap, Box<dyn Error>> {
     let model = program("mh(one(@**))", set, ContourMap::new(SEEN, SEEN))?;
-    let mut trace = model.run(&RunOptions { steps: Some(0), ..RunOptions::default() }, 1, 1)?.chains.remove(0).last;
+    let mut trace = model
+        .run(&RunOptions { steps: Some(0), ..RunOptions::default() }, 1, 1)?
+        .chains
+        .remove(0)
+        .last;
     let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
     let view = trace.global("view", draws).ok_or("no view")?.map_err(|e| model.run_error(*e))?;
     let c = view.downcast::<ViewValue>().ok_or("no view")?.0.contours(SEEN);
@@ -69,19 +78,31 @@ fn contours(set: &[(&str, String)]) -> Result<ContourMap, Box<dyn Error>> {
     Ok(ContourMap { strength: vec![1.0; x.len()], x, y, tx, ty, ..ContourMap::new(SEEN, SEEN) })
 }
 
-/// What the chains give: the share of steps accepted, seconds a step, effective draws a second (the geometric mean over the pose's variables).
-fn measure(step: &str, set: &[(&str, String)], map: &ContourMap, draws: u64) -> Result<[f64; 3], Box<dyn Error>> {
+/// What the chains give: the share of steps accepted, seconds a step, effective draws a
+/// second (the geometric mean over the pose's variables).
+fn measure(
+    step: &str,
+    set: &[(&str, String)],
+    map: &ContourMap,
+    draws: u64,
+) -> Result<[f64; 3], Box<dyn Error>> {
     let set: Vec<_> = set.iter().cloned().chain([("draws", draws.to_string())]).collect();
     let model = program(step, &set, map.clone())?;
     let begun = process_seconds();
     let posterior = model.run(&RunOptions { seed: 1, ..RunOptions::default() }, CHAINS, CHAINS)?;
     let seconds = process_seconds() - begun;
     let kernels = || posterior.chains.iter().flat_map(|c| c.kernels.first());
-    let [accepted, proposals] = [kernels().map(|k| k.accepted).sum::<u64>(), kernels().map(|k| k.proposals).sum()];
+    let [accepted, proposals] =
+        [kernels().map(|k| k.accepted).sum::<u64>(), kernels().map(|k| k.proposals).sum()];
     let quantities = posterior.quantities();
-    let pose: Vec<f64> = quantities.iter().filter(|q| q.column.is_some()).map(|q| q.summary.ess_bulk.ln()).collect();
+    let pose: Vec<f64> =
+        quantities.iter().filter(|q| q.column.is_some()).map(|q| q.summary.ess_bulk.ln()).collect();
     let effective = (pose.iter().sum::<f64>() / pose.len() as f64).exp();
-    Ok([accepted as f64 / proposals as f64, seconds / (draws as f64 * CHAINS as f64), effective / seconds])
+    Ok([
+        accepted as f64 / proposals as f64,
+        seconds / (draws as f64 * CHAINS as f64),
+        effective / seconds,
+    ])
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -90,7 +111,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| mesh | coarse / fine | step | accepted, plain | delayed | ms a step, plain | delayed | ESS/s, plain | delayed | ratio | moves/s, ratio |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    for (mesh, sides, rings, detail) in [("2,000 triangles", 32, 32, 0.0), ("100,000", 224, 224, 1.0)] {
+    for (mesh, sides, rings, detail) in
+        [("2,000 triangles", 32, 32, 0.0), ("100,000", 224, 224, 1.0)]
+    {
         for fine in [256, 512] {
             let mut set = vec![
                 ("sides", format!("{sides}")),

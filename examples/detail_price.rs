@@ -1,13 +1,18 @@
-//! What levels of detail save, and what they cost in the score: triangles, time and the mean chamfer distance for several `detail`s.
+//! What levels of detail save, and what they cost in the score: triangles, time and the
+//! mean chamfer distance for several `detail`s.
 //!
 //!     cargo run --release --example detail_price [-- POSES]
 //!
-//! A lathe of the language (a new shape each time), the shipped body by its three assets (a new pose each time, skinned anew) and a mesh of
-//! 100,352 triangles (placed anew), at 128 and 256 pixels, before POSES (64) random poses that fill half to all of the picture. For each
-//! `detail` in pixels: triangles in the picture (median); processor time of an evaluation on one thread (making the shape, contours, and
-//! their mean distance from those of another pose; mean of 512, the best of three); the mean distance of contours from those with `detail`
-//! 0 (greatest); and how far rho, the mean distance from the contours of another pose, is from that with `detail` 0: median, 99th
-//! percentile, greatest. Distances in pixels, the last column in percent of the diagonal, as rho is given.
+//! A lathe of the language (a new shape each time), the shipped body by its three assets
+//! (a new pose each time, skinned anew) and a mesh of 100,352 triangles (placed anew), at
+//! 128 and 256 pixels, before POSES (64) random poses that fill half to all of the
+//! picture. For each `detail` in pixels: triangles in the picture (median); processor
+//! time of an evaluation on one thread (making the shape, contours, and their mean
+//! distance from those of another pose; mean of 512, the best of three); the mean
+//! distance of contours from those with `detail` 0 (greatest); and how far rho, the mean
+//! distance from the contours of another pose, is from that with `detail` 0: median, 99th
+//! percentile, greatest. Distances in pixels, the last column in percent of the diagonal,
+//! as rho is given.
 
 mod clock;
 #[path = "detail_price/subjects.rs"]
@@ -26,7 +31,9 @@ const DETAILS: [f64; 6] = [0.0, 0.05, 0.1, 0.25, 0.5, 1.0];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let poses: usize = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(64);
-    println!("| mesh | pixels | `detail` | triangles | µs | contours off | rho off: median | 99 % | most | most, % |");
+    println!(
+        "| mesh | pixels | `detail` | triangles | µs | contours off | rho off: median | 99 % | most | most, % |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for subject in Subject::all()? {
         let begun = processor_seconds();
@@ -67,7 +74,9 @@ fn measure(subject: &Subject, size: u32, poses: usize) -> Result<(), Box<dyn Err
         if exact.is_empty() {
             (exact_own, exact) = (own.clone(), rhos.clone());
         }
-        let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).collect::<Vec<f64>>();
+        let off = |a: &[f64], b: &[f64]| {
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).collect::<Vec<f64>>()
+        };
         let (own, off) = (off(&own, &exact_own), off(&rhos, &exact));
         let pixels = f64::from(size) * 2f64.sqrt() / 100.0;
         println!(
@@ -91,8 +100,15 @@ fn view(solid: &Solid, size: u32, detail: f64) -> View {
 /// The mean distance of a view's contours from others, in percent of the diagonal.
 fn rho(chamfer: &Chamfer, view: &View, size: u32) -> f64 {
     let c = view.contours(size);
-    let elements =
-        Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height };
+    let elements = Elements {
+        x: &c.x,
+        y: &c.y,
+        tx: &c.tx,
+        ty: &c.ty,
+        length: &c.length,
+        width: c.width,
+        height: c.height,
+    };
     chamfer.distance(&elements)
 }
 

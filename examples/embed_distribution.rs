@@ -1,4 +1,5 @@
-//! A distribution of the host, drawn, observed and followed by `hmc`: `cargo run --release --example embed_distribution`.
+//! A distribution of the host, drawn, observed and followed by `hmc`:
+//! `cargo run --release --example embed_distribution`.
 
 use pcadlang::host::{Datum, Distribution, Entry, Fault, Gradient, Host, Support, Type};
 use pcadlang::rng::Stream;
@@ -34,7 +35,9 @@ impl Distribution for Kumaraswamy {
     fn log_density(&self, x: &Datum) -> f64 {
         match x.num() {
             Some(x) if x > 0.0 && x < 1.0 => {
-                (self.a * self.b).ln() + (self.a - 1.0) * x.ln() + (self.b - 1.0) * (-x.powf(self.a)).ln_1p()
+                (self.a * self.b).ln()
+                    + (self.a - 1.0) * x.ln()
+                    + (self.b - 1.0) * (-x.powf(self.a)).ln_1p()
             }
             _ => f64::NEG_INFINITY,
         }
@@ -45,7 +48,10 @@ impl Distribution for Kumaraswamy {
         let power = x.powf(a);
         let rest = (b - 1.0) * power / (1.0 - power);
         let by_x = (a - 1.0) / x - rest * a / x;
-        Some(Gradient { x: vec![by_x], params: vec![1.0 / a + x.ln() - rest * x.ln(), 1.0 / b + (-power).ln_1p()] })
+        Some(Gradient {
+            x: vec![by_x],
+            params: vec![1.0 / a + x.ln() - rest * x.ln(), 1.0 / b + (-power).ln_1p()],
+        })
     }
 }
 
@@ -53,7 +59,11 @@ impl Distribution for Kumaraswamy {
 pub fn host() -> Host {
     let family = Entry::distribution("kumaraswamy", |args| {
         let (a, b) = (args.num(0)?, args.num(1)?);
-        if a > 0.0 && b > 0.0 { Ok(Kumaraswamy { a, b }) } else { Err(Fault::domain("`a` and `b` must be positive")) }
+        if a > 0.0 && b > 0.0 {
+            Ok(Kumaraswamy { a, b })
+        } else {
+            Err(Fault::domain("`a` and `b` must be positive"))
+        }
     })
     .argument("a", Type::Num, "The first shape, positive.")
     .argument("b", Type::Num, "The second shape, positive.")
@@ -61,7 +71,8 @@ pub fn host() -> Host {
     Host::new().with(family)
 }
 
-/// A share with this prior after 14 successes in 20, under an unknown shape: by a kernel with and one without gradients.
+/// A share with this prior after 14 successes in 20, under an unknown shape: by a kernel
+/// with and one without gradients.
 ///
 /// # Errors
 /// What is wrong with the program.

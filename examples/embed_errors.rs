@@ -2,7 +2,8 @@
 
 use pcadlang::{Model, Program};
 
-/// What an editor would show of a program: line, column, message and hint of each mistake.
+/// What an editor would show of a program: line, column, message and hint of each
+/// mistake.
 pub fn mistakes(text: &str) -> Vec<(usize, usize, String, Option<String>)> {
     let Err(e) = Model::from_text(text) else { return Vec::new() };
     let one = |d: &pcadlang::diag::Diagnostic| {
@@ -13,10 +14,12 @@ pub fn mistakes(text: &str) -> Vec<(usize, usize, String, Option<String>)> {
     e.diagnostics.iter().filter_map(one).collect()
 }
 
-/// What is wrong while it runs comes as a value too, and as text with the line it is about.
+/// What is wrong while it runs comes as a value too, and as text with the line it is
+/// about.
 pub fn while_running() -> Option<String> {
-    let program =
-        Program::parse("let xs = [1, 2, 3];\nassume i ~ uniform_discrete(3, 5);\nobserve normal(xs[i], 1) = 2;");
+    let program = Program::parse(
+        "let xs = [1, 2, 3];\nassume i ~ uniform_discrete(3, 5);\nobserve normal(xs[i], 1) = 2;",
+    );
     program.and_then(Program::compile).and_then(|m| m.simulate(1, 0)).err().map(|e| e.to_string())
 }
 

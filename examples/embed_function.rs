@@ -1,8 +1,11 @@
-//! A primitive of the host with incremental state and gradient, used by `hmc`: `cargo run --release --example embed_function`.
+//! A primitive of the host with incremental state and gradient, used by `hmc`:
+//! `cargo run --release --example embed_function`.
 //!
-//! A watt flows through a rod of many cells; a program infers their conductivities from temperatures. When some cells change, the
-//! sweep along the rod goes on from the first of them, from what was kept of the state before: that of the state it is in, also after a
-//! rejected proposal. `tests/embedding.rs` checks that incremental equals full, bit for bit.
+//! A watt flows through a rod of many cells; a program infers their conductivities from
+//! temperatures. When some cells change, the sweep along the rod goes on from the first
+//! of them, from what was kept of the state before: that of the state it is in, also
+//! after a rejected proposal. `tests/embedding.rs` checks that incremental equals full,
+//! bit for bit.
 
 use pcadlang::host::{Adjoint, Args, Entry, Fault, Host, Previous, Type};
 use pcadlang::{Error, Model, Program, RunOptions, Value};
@@ -10,12 +13,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The temperature at the far end, and what is kept: that after each cell.
-fn rod(a: &Args, previous: Option<Previous<'_, Vec<f64>>>, cells: &AtomicUsize) -> Result<(Value, Vec<f64>), Fault> {
+fn rod(
+    a: &Args,
+    previous: Option<Previous<'_, Vec<f64>>>,
+    cells: &AtomicUsize,
+) -> Result<(Value, Vec<f64>), Fault> {
     let (conductivity, start) = (a.array(0)?, a.num(1)?);
     if conductivity.iter().any(|k| k.is_nan() || *k <= 0.0) {
         return Err(a.outside(0, "positive"));
     }
-    // The cells before the first that changed are as they were, unless what they start from changed too.
+    // The cells before the first that changed are as they were, unless what they start
+    // from changed too.
     let known = previous.filter(|p| !p.changed(a, 1)).and_then(|p| {
         let changed = p.changed_elements(a, 0)?;
         Some(&p.state()[..changed.first().copied().unwrap_or(conductivity.len())])
@@ -30,7 +38,8 @@ fn rod(a: &Args, previous: Option<Previous<'_, Vec<f64>>>, cells: &AtomicUsize) 
     Ok((Value::Num(temperatures.last().copied().unwrap_or(start)), temperatures))
 }
 
-/// The adjoints of the arguments: the end moves with the start, and by 1 / k^2 with a conductivity.
+/// The adjoints of the arguments: the end moves with the start, and by 1 / k^2 with a
+/// conductivity.
 fn pull(a: &Args, _end: &Value, by: &Adjoint) -> Option<Vec<Adjoint>> {
     let conductivity = a.array(0).ok()?;
     let each = conductivity.iter().map(|k| by.number() / (k * k)).collect();
@@ -81,7 +90,10 @@ fn main() -> Result<(), Error> {
         let options = RunOptions { seed: 1, incremental, ..RunOptions::default() };
         let end = model.run(&options, 1, 1)?.quantity("end").map_or(f64::NAN, |q| q.summary.mean);
         let how = if incremental { "going on" } else { "from scratch" };
-        println!("{how}: the far end has {end:.2} degrees; {} cells were gone through", cells.load(Ordering::Relaxed));
+        println!(
+            "{how}: the far end has {end:.2} degrees; {} cells were gone through",
+            cells.load(Ordering::Relaxed)
+        );
     }
     Ok(())
 }

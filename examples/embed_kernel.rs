@@ -1,6 +1,8 @@
-//! A kernel of the host, called by name in `infer`: `cargo run --release --example embed_kernel`.
+//! A kernel of the host, called by name in `infer`:
+//! `cargo run --release --example embed_kernel`.
 //!
-//! It reflects one number about a point, which keeps volume and leads back: a jump between two modes that walks seldom make.
+//! It reflects one number about a point, which keeps volume and leads back: a jump
+//! between two modes that walks seldom make.
 
 use pcadlang::host::{Datum, Entry, Host, Type};
 use pcadlang::infer::{At, Kernel, Outcome, Scope, decide, recoverable};
@@ -26,7 +28,9 @@ impl Kernel for Reflect {
             return Ok(Outcome::default());
         }
         let target = targets[rng.index(targets.len())];
-        let Some(x) = trace.stored(target).and_then(|x| x.num()) else { return Ok(Outcome::default()) };
+        let Some(x) = trace.stored(target).and_then(|x| x.num()) else {
+            return Ok(Outcome::default());
+        };
         let change = Change::Set(Datum::Num(2.0 * self.about - x));
         // A place where the program has no value is a rejection, not the end of the run.
         let Some(weight) = recoverable(trace.propose(&[(target, change)], at.draws(0)))? else {
@@ -38,10 +42,12 @@ impl Kernel for Reflect {
 
 /// The host.
 pub fn host() -> Host {
-    let reflect = Entry::kernel("reflect", |call| Ok(Reflect { scope: call.scope(0)?, about: call.args().num(1)? }))
-        .argument("sel", Type::Selection, "Numbers; one of them moves.")
-        .optional("about", Type::Num, 0.0, "The point that it is reflected about.")
-        .about("Metropolis-Hastings by reflection of one number.");
+    let reflect = Entry::kernel("reflect", |call| {
+        Ok(Reflect { scope: call.scope(0)?, about: call.args().num(1)? })
+    })
+    .argument("sel", Type::Selection, "Numbers; one of them moves.")
+    .optional("about", Type::Num, 0.0, "The point that it is reflected about.")
+    .about("Metropolis-Hastings by reflection of one number.");
     Host::new().with(reflect)
 }
 

@@ -1,11 +1,14 @@
-//! A likelihood of the host, with gradient, without a sampler: `cargo run --release --example embed_likelihood`.
+//! A likelihood of the host, with gradient, without a sampler:
+//! `cargo run --release --example embed_likelihood`.
 //!
-//! For a comparator, which looks at a rendered view, see the example of `pcadlang::host::Seen`.
+//! For a comparator, which looks at a rendered view, see the example of
+//! `pcadlang::host::Seen`.
 
 use pcadlang::host::{Adjoint, Entry, Host, Likelihood, Type};
 use pcadlang::{Error, Program, RunOptions, Value};
 
-/// Numbers about a line, scored by Huber's loss: quadratic near it, linear far off, so that outliers pull less.
+/// Numbers about a line, scored by Huber's loss: quadratic near it, linear far off, so
+/// that outliers pull less.
 #[derive(Debug)]
 struct Huber {
     mean: Vec<f64>,
@@ -17,7 +20,11 @@ impl Huber {
     fn off(&self, observed: &Value) -> Result<Vec<f64>, String> {
         let xs = observed.numbers();
         if xs.len() != self.mean.len() {
-            return Err(format!("huber: {} numbers are observed, and there are {} means", xs.len(), self.mean.len()));
+            return Err(format!(
+                "huber: {} numbers are observed, and there are {} means",
+                xs.len(),
+                self.mean.len()
+            ));
         }
         Ok(xs.iter().zip(&self.mean).map(|(x, m)| (x - m) / self.scale).collect())
     }
@@ -35,7 +42,8 @@ impl Likelihood for Huber {
 
     /// By the arguments of `huber`: the means, and the scale, which is not followed.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
-        let by_mean = self.off(observed).ok()?.into_iter().map(|z| z.clamp(-1.0, 1.0) / self.scale).collect();
+        let by_mean =
+            self.off(observed).ok()?.into_iter().map(|z| z.clamp(-1.0, 1.0) / self.scale).collect();
         Some(Adjoint::List(vec![Adjoint::Array(by_mean), Adjoint::Unknown]))
     }
 
@@ -47,10 +55,12 @@ impl Likelihood for Huber {
 
 /// The host.
 pub fn host() -> Host {
-    let huber = Entry::likelihood("huber", |a| Ok(Huber { mean: a.array(0)?.to_vec(), scale: a.positive_or(1, 1.0)? }))
-        .argument("mean", Type::Array, "What is expected.")
-        .optional("scale", Type::Num, 1.0, "From how far off on the loss is linear.")
-        .about("Huber's loss as a log likelihood: no density over the data.");
+    let huber = Entry::likelihood("huber", |a| {
+        Ok(Huber { mean: a.array(0)?.to_vec(), scale: a.positive_or(1, 1.0)? })
+    })
+    .argument("mean", Type::Array, "What is expected.")
+    .optional("scale", Type::Num, 1.0, "From how far off on the loss is linear.")
+    .about("Huber's loss as a log likelihood: no density over the data.");
     Host::new().with(huber)
 }
 

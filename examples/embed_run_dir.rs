@@ -1,4 +1,5 @@
-//! A run into a folder, watched and ended from outside: `cargo run --release --example embed_run_dir [-- FOLDER]`.
+//! A run into a folder, watched and ended from outside:
+//! `cargo run --release --example embed_run_dir [-- FOLDER]`.
 
 use pcadlang::infer::draws::Sink;
 use pcadlang::infer::{Observer, Progress};
@@ -21,8 +22,9 @@ pub fn run(folder: &Path, most: u64) -> Result<usize, Box<dyn Error>> {
          infer { warmup 200 { drift(@x); } repeat 1000000 { drift(@x); } }",
     )?;
     let dir = RunDir::create(folder)?;
-    // Callbacks come from the chains' threads; a break ends the run at the next step, and so does `progress.cancelled`, which another
-    // thread or a signal handler may set at any time.
+    // Callbacks come from the chains' threads; a break ends the run at the next step, and
+    // so does `progress.cancelled`, which another thread or a signal handler may set at
+    // any time.
     let observer = Observer::new().on_step(move |_chain, steps, _trace| match steps < 200 + most {
         true => ControlFlow::Continue(()),
         false => ControlFlow::Break(()),

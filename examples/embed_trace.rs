@@ -1,4 +1,5 @@
-//! Trace operations by hand, and a Metropolis-Hastings loop of one's own: `cargo run --release --example embed_trace`.
+//! Trace operations by hand, and a Metropolis-Hastings loop of one's own:
+//! `cargo run --release --example embed_trace`.
 
 use pcadlang::Model;
 use pcadlang::rng::{Purpose, StreamKey};
@@ -10,14 +11,17 @@ pub fn chain(steps: u64) -> Result<Vec<f64>, Box<dyn Error>> {
     let model = Model::from_text("assume p ~ beta(2, 2); observe binomial(20, p) = 14 as heads;")?;
     let mut trace = model.simulate(1, 0)?;
     let p = trace.find(&"@p".parse()?).ok_or("no choice `p`")?;
-    let (key, values) = (StreamKey::new(1, 0, Purpose::KERNEL), StreamKey::new(1, 0, Purpose::VALUES));
+    let (key, values) =
+        (StreamKey::new(1, 0, Purpose::KERNEL), StreamKey::new(1, 0, Purpose::VALUES));
     let mut draws = Vec::new();
     for step in 0..steps {
         let mut rng = key.stream(step, 0, 0);
-        // Where the choice is in the unconstrained space, and the log Jacobian there: the density over that space has it as a factor.
+        // Where the choice is in the unconstrained space, and the log Jacobian there: the
+        // density over that space has it as a factor.
         let (y, jacobian) = trace.free(p).ok_or("`p` has no coordinate")?;
         let moved = vec![y[0] + 0.8 * rng.standard_normal()];
-        let weight = trace.propose(&[(p, Change::Free(moved))], Draws { key: values, step, lane: 0 })?;
+        let weight =
+            trace.propose(&[(p, Change::Free(moved))], Draws { key: values, step, lane: 0 })?;
         let ratio = weight.log_weight + weight.log_jacobian - jacobian;
         if rng.open_uniform().ln() < ratio {
             trace.commit()

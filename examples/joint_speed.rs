@@ -1,9 +1,10 @@
-//! What one joint's change costs on the shipped body: skinning and contours at 128 pixels, for each joint, beside a full redraw.
+//! What one joint's change costs on the shipped body: skinning and contours at 128
+//! pixels, for each joint, beside a full redraw.
 //!
 //!     cargo run --release --example joint_speed -- [LOD [JOINT]]     (such as human.lod2 hand_l; all if left out)
 //!
-//! Medians of processor-bound wall time on one thread, a full redraw and the joints by turns; ratios of one run mean something, single
-//! times depend on the machine.
+//! Medians of processor-bound wall time on one thread, a full redraw and the joints by
+//! turns; ratios of one run mean something, single times depend on the machine.
 
 mod shipped;
 
@@ -21,7 +22,8 @@ fn median(mut xs: Vec<f64>) -> f64 {
 fn main() -> Result<(), GeomError> {
     const REPEATS: usize = 201;
     let camera = Camera::default_for(128, 128);
-    let place = Affine::new(DVec3::new(0.0, -1.8, 0.0), DVec3::new(0.05, 0.5, 0.0), DVec3::splat(2.1));
+    let place =
+        Affine::new(DVec3::new(0.0, -1.8, 0.0), DVec3::new(0.05, 0.5, 0.0), DVec3::splat(2.1));
     let rules = Rules::default();
     let args: Vec<String> = std::env::args().skip(1).collect();
     let chosen = |i: usize, name: &str| args.get(i).is_none_or(|wanted| wanted == name);
@@ -34,16 +36,19 @@ fn main() -> Result<(), GeomError> {
             std::hint::black_box(view.contours(128).len());
             Ok(begun.elapsed().as_secs_f64() * 1e6)
         };
-        // The joint turns by a little more each time, so no result can be one from before.
+        // The joint turns by a little more each time, so no result can be one from
+        // before.
         let time = |joint: usize, from: usize, times: &mut Vec<f64>| -> Result<(), GeomError> {
             let mut pose = vec![JointPose::REST; joints.len()];
             for k in from..from + REPEATS {
-                pose[joint] = JointPose::turned(DVec3::new(0.1, 0.05, 0.02) * (1.0 + k as f64 * 1e-3));
+                pose[joint] =
+                    JointPose::turned(DVec3::new(0.1, 0.05, 0.02) * (1.0 + k as f64 * 1e-3));
                 times.push(draw(&pose)?);
             }
             Ok(())
         };
-        let wanted: Vec<usize> = (0..joints.len()).filter(|j| chosen(1, &joints[*j].name)).collect();
+        let wanted: Vec<usize> =
+            (0..joints.len()).filter(|j| chosen(1, &joints[*j].name)).collect();
         // The root moves every part: a full redraw.
         let (mut full, mut each) = (Vec::new(), vec![Vec::new(); wanted.len()]);
         for (i, (joint, times)) in wanted.iter().zip(&mut each).enumerate() {
@@ -57,7 +62,10 @@ fn main() -> Result<(), GeomError> {
             println!("  {:<12} {t:>6.0} us  {:>5.1} times less", joints[*j].name, full / t);
         }
         let mean = all.iter().sum::<f64>() / all.len() as f64;
-        println!("  a joint at random: {mean:.0} us, {:.1} times less than a full redraw", full / mean);
+        println!(
+            "  a joint at random: {mean:.0} us, {:.1} times less than a full redraw",
+            full / mean
+        );
         let ends = ["hand_l", "hand_r", "foot_l", "foot_r", "head"];
         let ends: Vec<f64> = wanted
             .iter()

@@ -1,4 +1,5 @@
-//! What a density with its gradient costs, the price of a leapfrog step: by a proposal and a reverse pass through the trace, and by a tape.
+//! What a density with its gradient costs, the price of a leapfrog step: by a proposal
+//! and a reverse pass through the trace, and by a tape.
 //!
 //!     cargo run --release --example leapfrog_cost
 //!
@@ -65,7 +66,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         if !tape.begin(&trace, &mut here) {
             return Err("the tape does not hold".into());
         }
-        let widths: Vec<usize> = targets.iter().map(|t| trace.free(*t).map_or(0, |(y, _)| y.len())).collect();
+        let widths: Vec<usize> =
+            targets.iter().map(|t| trace.free(*t).map_or(0, |(y, _)| y.len())).collect();
         let near = |i: usize| here.iter().map(move |y| y + 1e-3 * (i % 7) as f64);
         let mut gradient = Vec::new();
         let by_trace = cost(|i| {

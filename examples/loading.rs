@@ -1,10 +1,12 @@
-//! What loading an observation costs at 512 x 512 pixels, stage by stage, on the two shipped photographs and on one with noise.
+//! What loading an observation costs at 512 x 512 pixels, stage by stage, on the two
+//! shipped photographs and on one with noise.
 //!
 //!     cargo run --release --example loading [-- digest]
 //!
-//! Milliseconds of this thread's processor time and of wall time; the oriented chamfer and the contour ratio work on threads of their
-//! own, whose time only the second shows (`taskset -c 0` for what one core does alone). With
-//! `digest` each line has a number made from every bit of the result too, to see whether two versions agree.
+//! Milliseconds of this thread's processor time and of wall time; the oriented chamfer
+//! and the contour ratio work on threads of their own, whose time only the second shows
+//! (`taskset -c 0` for what one core does alone). With `digest` each line has a number
+//! made from every bit of the result too, to see whether two versions agree.
 
 mod clock;
 
@@ -14,8 +16,8 @@ use image::{DynamicImage, GrayImage, Luma, RgbImage};
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
 use pcadlang::vision::features::{Query, observed};
 use pcadlang::vision::{
-    ContourMap, ContourRatio, ContourRatioOptions, DepthMap, GradientDetector, Limits, Mask, Photo, Region,
-    RegionOptions, distance_transform, gradient, nms, photo,
+    ContourMap, ContourRatio, ContourRatioOptions, DepthMap, GradientDetector, Limits, Mask, Photo,
+    Region, RegionOptions, distance_transform, gradient, nms, photo,
 };
 use std::error::Error;
 use std::fmt::Debug;
@@ -23,7 +25,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Instant;
 
 const SIDE: u32 = 512;
-/// Runs of a stage that are timed together, since processor time is told in steps of some milliseconds: so many seconds of them.
+/// Runs of a stage that are timed together, since processor time is told in steps of some
+/// milliseconds: so many seconds of them.
 const TOGETHER: f64 = 0.03;
 
 /// Runs a stage many times and prints the mean, of two the less.
@@ -53,7 +56,8 @@ fn stage<T: Debug>(picture: &str, name: &str, digest: bool, mut run: impl FnMut(
 fn main() -> Result<(), Box<dyn Error>> {
     let digest = std::env::args().any(|a| a == "digest");
     println!("{:<43} {:>8} {:>8}", "", "proc. ms", "wall ms");
-    for (name, file) in [("cup", "coffee_cup.png"), ("skier", "skier.jpg"), ("noise", "skier.jpg")] {
+    for (name, file) in [("cup", "coffee_cup.png"), ("skier", "skier.jpg"), ("noise", "skier.jpg")]
+    {
         let file = format!("{}/examples/images/{file}", env!("CARGO_MANIFEST_DIR"));
         let bytes = std::fs::read(file)?;
         let whole = photo::decode(&bytes, &Limits::default())?;
@@ -61,7 +65,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         if name == "noise" {
             noisy(&mut rgb);
         } else {
-            stage(name, "file decoded (its own size)", digest, || photo::decode(&bytes, &Limits::default()).ok());
+            stage(name, "file decoded (its own size)", digest, || {
+                photo::decode(&bytes, &Limits::default()).ok()
+            });
         }
         picture(name, &Photo::from_rgb(rgb)?, digest)?;
     }
@@ -81,7 +87,9 @@ fn picture(name: &str, photo: &Photo, digest: bool) -> Result<(), Box<dyn Error>
     let stage = |what: &str, run: Work<'_>| stage(name, what, digest, run);
     stage("linear light", &mut || Box::new(photo.linear(SIDE, SIDE)));
     let linear = photo.linear(SIDE, SIDE).rgb;
-    stage("gradient of three channels", &mut || Box::new(gradient::colour_gradient(SIDE, SIDE, &linear, 1.6)));
+    stage("gradient of three channels", &mut || {
+        Box::new(gradient::colour_gradient(SIDE, SIDE, &linear, 1.6))
+    });
     let slopes = gradient::colour_gradient(SIDE, SIDE, &linear, 1.6);
     stage("maxima", &mut || Box::new(nms::suppress(&slopes, 0.0)));
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
@@ -124,8 +132,12 @@ fn compare(from: &str, map: &ContourMap, stage: &dyn Fn(&str, Work<'_>)) {
         ("chamfer, symmetric", ChamferOptions { symmetric: true, ..plain.clone() }),
         ("chamfer, oriented", ChamferOptions { oriented: Some(1.0), ..plain }),
     ] {
-        stage(&format!("{what}, map of {from}"), &mut || Box::new(Chamfer::prepare(map, SIDE, SIDE, &options)));
+        stage(&format!("{what}, map of {from}"), &mut || {
+            Box::new(Chamfer::prepare(map, SIDE, SIDE, &options))
+        });
     }
     let options = ContourRatioOptions::default();
-    stage(&format!("contour ratio, map of {from}"), &mut || Box::new(ContourRatio::prepare(map, SIDE, SIDE, &options)));
+    stage(&format!("contour ratio, map of {from}"), &mut || {
+        Box::new(ContourRatio::prepare(map, SIDE, SIDE, &options))
+    });
 }

@@ -1,4 +1,5 @@
-//! What one run of a network costs on one core: median, best and worst of 21 runs on an even grey picture.
+//! What one run of a network costs on one core: median, best and worst of 21 runs on an
+//! even grey picture.
 //!
 //!     cargo run --release --example network_time -- models/*.tflite
 

@@ -1,10 +1,12 @@
-//! Runs one model of a side-by-side benchmark of probabilistic languages and writes what it took.
+//! Runs one model of a side-by-side benchmark of probabilistic languages and writes what
+//! it took.
 //!
 //!     cargo run --release --example peer -- DATA.json OUT.json MODEL N BUDGET_S SEED
 //!
-//! The models are the programs in `benches/peers`; DATA holds the data sets by model (and size, where there are several). OUT gets
-//! the time at which sampling could start, the number of transitions after warm-up, the processor time they took on their one
-//! thread, and the draws.
+//! The models are the programs in `benches/peers`; DATA holds the data sets by model (and
+//! size, where there are several). OUT gets the time at which sampling could start, the
+//! number of transitions after warm-up, the processor time they took on their one thread,
+//! and the draws.
 
 mod clock;
 
@@ -57,7 +59,8 @@ fn value(j: &Json) -> Value {
 fn compile(text: &str, data: &Json) -> Result<Model, Box<dyn Error>> {
     let mut program = Program::parse(text)?;
     for item in program.interface().data {
-        let given = data.get(&item.name).ok_or_else(|| format!("the data have no `{}`", item.name))?;
+        let given =
+            data.get(&item.name).ok_or_else(|| format!("the data have no `{}`", item.name))?;
         program = program.observe(&item.name, value(given));
     }
     Ok(program.compile()?)
@@ -69,7 +72,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: peer DATA.json OUT.json MODEL N BUDGET_S SEED".into());
     };
     let data: Json = serde_json::from_str(&std::fs::read_to_string(data)?)?;
-    let (_, text, names) = MODELS.iter().find(|(m, ..)| m == name).ok_or_else(|| format!("no model `{name}`"))?;
+    let (_, text, names) =
+        MODELS.iter().find(|(m, ..)| m == name).ok_or_else(|| format!("no model `{name}`"))?;
     let given = &data[name.as_str()];
     let model = compile(text, given.get(n).unwrap_or(given))?;
     let budget: f64 = budget.parse()?;
@@ -84,9 +88,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let posterior = model.run(&options, 1, 1)?;
     let seen = clock.0.lock().map_err(|_| "the clock was lost")?;
     let timed: Vec<usize> = (0..seen.len()).filter(|i| !seen[*i].0.is_nan()).collect();
-    let (Some(first), Some(last)) = (timed.first(), timed.last()) else { return Err("no draws".into()) };
+    let (Some(first), Some(last)) = (timed.first(), timed.last()) else {
+        return Err("no draws".into());
+    };
     let mut draws = serde_json::Map::new();
-    let collected = posterior.scalars().into_iter().filter(|(name, _)| !name.starts_with("log_joint"));
+    let collected =
+        posterior.scalars().into_iter().filter(|(name, _)| !name.starts_with("log_joint"));
     for (name, q) in names.iter().zip(collected) {
         draws.insert((*name).to_owned(), json!([q.1[first + 1..=*last]]));
     }

@@ -1,5 +1,6 @@
-//! Known truth: people drawn from the prior of `human.pcad`, their own clean contours as the observation. How far from the
-//! truth do their joints end up, and how often do 90 % intervals hold it?
+//! Known truth: people drawn from the prior of `human.pcad`, their own clean contours as
+//! the observation. How far from the truth do their joints end up, and how often do 90 %
+//! intervals hold it?
 //!
 //! `cargo run --release --example pose_recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
@@ -45,8 +46,8 @@ impl Watch for Seen {
     }
 }
 
-/// The same with left and right exchanged where that is nearer to the truth: from behind, a body has nearly the contours it
-/// has from the front.
+/// The same with left and right exchanged where that is nearer to the truth: from behind,
+/// a body has nearly the contours it has from the front.
 fn either_way(seen: &Joints, truth: &Joints) -> Joints {
     let exchanged: Joints = seen
         .iter()
@@ -57,7 +58,8 @@ fn either_way(seen: &Joints, truth: &Joints) -> Joints {
         })
         .collect();
     let far = |j: &Joints| {
-        let apart = |(name, at): (&Arc<str>, &[f64; 3])| truth.get(name).map_or(0.0, |t| apart(at, t));
+        let apart =
+            |(name, at): (&Arc<str>, &[f64; 3])| truth.get(name).map_or(0.0, |t| apart(at, t));
         j.iter().map(apart).sum::<f64>()
     };
     if far(&exchanged) < far(seen) { exchanged } else { seen.clone() }
@@ -100,10 +102,12 @@ fn main() -> Result<(), pcadlang::Error> {
         let posterior = model.run(&options, 4, 2)?;
         let drawn = seen.0.lock().map(|mut all| std::mem::take(&mut *all)).unwrap_or_default();
         let at = |name: &str| truth.get(name).copied().unwrap_or([f64::NAN; 3]);
-        let torso = 0.5 * (apart(&at("l_shoulder"), &at("r_hip")) + apart(&at("r_shoulder"), &at("l_hip")));
+        let torso =
+            0.5 * (apart(&at("l_shoulder"), &at("r_hip")) + apart(&at("r_shoulder"), &at("l_hip")));
         let nearer: Vec<Joints> = drawn.iter().map(|j| either_way(j, &truth)).collect();
         let mut exchanged = Vec::new();
-        // Scene units a pixel in the plane z = 0, near enough for what is given in percent.
+        // Scene units a pixel in the plane z = 0, near enough for what is given in
+        // percent.
         let unit = 4.4 / f64::from(SIZE);
         let mut by_limb = Vec::new();
         let (mut case_held, mut case_asked) = (0, 0);
@@ -112,7 +116,9 @@ fn main() -> Result<(), pcadlang::Error> {
             let mut both = Vec::new();
             for side in ["l_", "r_"] {
                 let name = format!("{side}{limb}");
-                let of = |f: &dyn Fn(&Joints) -> Option<f64>| sorted(drawn.iter().filter_map(f).collect());
+                let of = |f: &dyn Fn(&Joints) -> Option<f64>| {
+                    sorted(drawn.iter().filter_map(f).collect())
+                };
                 let pixels = [0, 1].map(|i| of(&|j: &Joints| j.get(name.as_str()).map(|p| p[i])));
                 let behind = |j: &Joints| Some(j.get(name.as_str())?[2] - j.get("pelvis")?[2]);
                 let depth = of(&behind);
@@ -125,7 +131,9 @@ fn main() -> Result<(), pcadlang::Error> {
                 };
                 exchanged.push(apart(&[near(0), near(1), 0.0], &true_at) / torso);
                 case_depths.push((quantile(&depth, 0.5) - true_depth).abs() / unit / torso);
-                for (v, x) in [(&pixels[0], true_at[0]), (&pixels[1], true_at[1]), (&depth, true_depth)] {
+                for (v, x) in
+                    [(&pixels[0], true_at[0]), (&pixels[1], true_at[1]), (&depth, true_depth)]
+                {
                     case_asked += 1;
                     case_held += usize::from((quantile(v, 0.05)..=quantile(v, 0.95)).contains(&x));
                 }
@@ -134,11 +142,15 @@ fn main() -> Result<(), pcadlang::Error> {
             errors.extend(both);
         }
         (held, asked) = (held + case_held, asked + case_asked);
-        let own: Vec<f64> = all_errors.iter().flat_map(|e| e[e.len() - 2..].iter().copied()).collect();
+        let own: Vec<f64> =
+            all_errors.iter().flat_map(|e| e[e.len() - 2..].iter().copied()).collect();
         let within = own.iter().filter(|e| **e <= 0.2).count();
         let worst = posterior.quantities().iter().map(|q| q.summary.r_hat).fold(0.0, f64::max);
-        let best =
-            posterior.chains.iter().filter_map(|c| c.best.as_ref().map(|b| b.0)).fold(f64::NEG_INFINITY, f64::max);
+        let best = posterior
+            .chains
+            .iter()
+            .filter_map(|c| c.best.as_ref().map(|b| b.0))
+            .fold(f64::NEG_INFINITY, f64::max);
         println!(
             "{case:4}  {}  {:5.1}  {:9.1}  {:5.1}     {within:2} of {:2}      {case_held:2} of {case_asked:2}  {worst:5.2}  {best:8.1} ({score:.1})",
             by_limb.iter().map(|e| format!("{:8.1}", 100.0 * e)).collect::<String>(),
@@ -151,7 +163,8 @@ fn main() -> Result<(), pcadlang::Error> {
         all_exchanged.extend(exchanged);
     }
     for (name, q) in [("half", 0.5), ("3/4 ", 0.75)] {
-        let by_limb = all_errors.iter().map(|e| format!("{:8.1}", 100.0 * quantile(&sorted(e.clone()), q)));
+        let by_limb =
+            all_errors.iter().map(|e| format!("{:8.1}", 100.0 * quantile(&sorted(e.clone()), q)));
         let all = sorted(all_errors.concat());
         println!(
             "{name}  {}  {:5.1}  {:9.1}  {:5.1}",

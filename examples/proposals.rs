@@ -1,13 +1,15 @@
-//! The paper's figure (Kulkarni et al. 2014, section 4): chains with and without discriminative proposals on one photograph, log joint
-//! density against time.
+//! The paper's figure (Kulkarni et al. 2014, section 4): chains with and without
+//! discriminative proposals on one photograph, log joint density against time.
 //!
 //!     cargo run --release --example proposals -- human.pcad examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS] [CAMERA.json]
 //!     cargo run --release --example proposals -- lathe.pcad examples/images/table_lamp.png proposals.svg
 //!
-//! The same program with the same likelihood, one chain a thread: people with the jumps of `modes` (its search counts) and without them, both
-//! started from the prior; objects started from the best of 200 lathes that fill regions of the picture (finding these counts), and from the
-//! best of 200 draws from the prior, without annealing. Writes the figure, medians and quantiles as CSV beside it, and says when medians pass
-//! what the others end with.
+//! The same program with the same likelihood, one chain a thread: people with the jumps
+//! of `modes` (its search counts) and without them, both started from the prior; objects
+//! started from the best of 200 lathes that fill regions of the picture (finding these
+//! counts), and from the best of 200 draws from the prior, without annealing. Writes the
+//! figure, medians and quantiles as CSV beside it, and says when medians pass what the
+//! others end with.
 
 use pcadlang::Program;
 use pcadlang::infer::draws::{Column, DrawRow, Sink};
@@ -58,12 +60,14 @@ impl Sink for Recorder {
     }
 }
 
-/// A shipped program with a plan that records every step, with its proposals from the picture or without.
+/// A shipped program with a plan that records every step, with its proposals from the
+/// picture or without.
 fn program(name: &str, with: bool) -> Result<String, String> {
     let text = load::embedded(name).ok_or_else(|| format!("{name} is not shipped"))?;
     let plan = text.rfind("infer {").ok_or_else(|| format!("{name} has no plan"))?;
     let steps = "repeat 1000000 { moves(); collect log_joint(); }";
-    // Of people, after a short warm-up, in which steps learn their size and the search for modes takes the chain to one.
+    // Of people, after a short warm-up, in which steps learn their size and the search
+    // for modes takes the chain to one.
     let begin = match (name, with) {
         ("human.pcad", _) => "warmup 40 { moves(); }".to_owned(),
         ("lathe.pcad", true) => {
@@ -94,7 +98,8 @@ struct Job<'a> {
 /// The paths of all chains, and the seconds that finding regions took.
 fn paths(job: &Job, with: bool) -> Result<Vec<Vec<(f64, f64)>>, String> {
     let said = |e: pcadlang::Error| e.to_string();
-    let program = Program::parse(&program(job.name, with)?).and_then(|p| p.observe_file("photo", job.image));
+    let program =
+        Program::parse(&program(job.name, with)?).and_then(|p| p.observe_file("photo", job.image));
     let program = program.map_err(said)?;
     let program = match job.camera {
         Some(path) => {
@@ -108,10 +113,13 @@ fn paths(job: &Job, with: bool) -> Result<Vec<Vec<(f64, f64)>>, String> {
     let cost = if with && job.name == "lathe.pcad" { regions(job.image)? } else { 0.0 };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut all = Vec::new();
-    // As many at once as there are cores, so that each has one to itself and all have the same time.
+    // As many at once as there are cores, so that each has one to itself and all have the
+    // same time.
     for first in (0..job.chains).step_by(threads) {
-        let shared: Vec<Arc<Mutex<Path>>> = (first..job.chains.min(first + threads)).map(|_| Arc::default()).collect();
-        let sinks = shared.iter().map(|p| Box::new(Recorder(Arc::clone(p))) as Box<dyn Sink>).collect();
+        let shared: Vec<Arc<Mutex<Path>>> =
+            (first..job.chains.min(first + threads)).map(|_| Arc::default()).collect();
+        let sinks =
+            shared.iter().map(|p| Box::new(Recorder(Arc::clone(p))) as Box<dyn Sink>).collect();
         let time = Some(Duration::from_secs_f64(job.seconds));
         let options = RunOptions { seed: first as u64 + 1, time, ..RunOptions::default() };
         for chain in model.run_into(&options, threads, &Progress::default(), sinks).map_err(said)? {
@@ -134,8 +142,9 @@ fn regions(image: &str) -> Result<f64, String> {
 /// Quantiles over chains at each moment; before its first draw a chain is nowhere.
 fn quantiles(paths: &[Vec<(f64, f64)>], moments: &[f64]) -> Vec<[f64; 5]> {
     let at = |t: &f64| {
-        let value =
-            |p: &Vec<(f64, f64)>| p[..p.partition_point(|(s, _)| s <= t)].last().map_or(f64::NEG_INFINITY, |x| x.1);
+        let value = |p: &Vec<(f64, f64)>| {
+            p[..p.partition_point(|(s, _)| s <= t)].last().map_or(f64::NEG_INFINITY, |x| x.1)
+        };
         let mut here: Vec<f64> = paths.iter().map(value).collect();
         here.sort_by(f64::total_cmp);
         QUANTILES.map(|q| here[((here.len() - 1) as f64 * q).round() as usize])
@@ -149,20 +158,35 @@ fn figure(moments: &[f64], both: &[(&str, &str, Vec<[f64; 5]>)]) -> String {
     let ends = (moments[0].ln(), moments[moments.len() - 1].ln());
     // The scale is that of the later moments: starts from the prior are far below.
     let late = moments.len() / 3;
-    let shown = || both.iter().flat_map(|b| b.2[late..].iter().flatten()).copied().filter(|x| x.is_finite());
-    let (low, high) = (shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max));
+    let shown = || {
+        both.iter().flat_map(|b| b.2[late..].iter().flatten()).copied().filter(|x| x.is_finite())
+    };
+    let (low, high) =
+        (shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max));
     let x = |t: f64| left + (t.ln() - ends.0) / (ends.1 - ends.0) * (width - left - 20.0);
-    let y = |l: f64| height - bottom - ((l - low) / (high - low)).clamp(0.0, 1.0) * (height - bottom - 20.0);
+    let y = |l: f64| {
+        height - bottom - ((l - low) / (high - low)).clamp(0.0, 1.0) * (height - bottom - 20.0)
+    };
     let mut s = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
          font-family=\"system-ui, sans-serif\" font-size=\"12\"><rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n"
     );
     for t in [0.01f64, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].into_iter().filter(|t| t.ln() <= ends.1) {
-        let _ = writeln!(s, "<text x=\"{:.0}\" y=\"{}\" text-anchor=\"middle\">{t} s</text>", x(t), height - 20.0);
+        let _ = writeln!(
+            s,
+            "<text x=\"{:.0}\" y=\"{}\" text-anchor=\"middle\">{t} s</text>",
+            x(t),
+            height - 20.0
+        );
     }
     for i in 0..=4 {
         let l = low + (high - low) * f64::from(i) / 4.0;
-        let _ = writeln!(s, "<text x=\"{}\" y=\"{:.0}\" text-anchor=\"end\">{l:.0}</text>", left - 6.0, y(l) + 4.0);
+        let _ = writeln!(
+            s,
+            "<text x=\"{}\" y=\"{:.0}\" text-anchor=\"end\">{l:.0}</text>",
+            left - 6.0,
+            y(l) + 4.0
+        );
     }
     for (i, (name, colour, q)) in both.iter().enumerate() {
         let there: Vec<usize> = (0..q.len()).filter(|j| q[*j][2].is_finite()).collect();
@@ -170,7 +194,11 @@ fn figure(moments: &[f64], both: &[(&str, &str, Vec<[f64; 5]>)]) -> String {
         for (lo, hi) in [(0, 4), (1, 3)] {
             let up = there.iter().map(|j| point(*j, lo));
             let band: Vec<String> = up.chain(there.iter().rev().map(|j| point(*j, hi))).collect();
-            let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{colour}\" opacity=\"0.2\"/>", band.join(" "));
+            let _ = writeln!(
+                s,
+                "<polygon points=\"{}\" fill=\"{colour}\" opacity=\"0.2\"/>",
+                band.join(" ")
+            );
         }
         let line: Vec<String> = there.iter().map(|j| point(*j, 2)).collect();
         let _ = writeln!(
@@ -190,14 +218,17 @@ fn main() -> Result<(), String> {
     let [name, image, out, rest @ ..] = &args[..] else {
         return Err("usage: PROGRAM IMG OUT.svg [CHAINS] [SECONDS] [CAMERA.json]".into());
     };
-    let number = |i: usize, other: f64| rest.get(i).map_or(Ok(other), |x| x.parse::<f64>().map_err(|e| e.to_string()));
+    let number = |i: usize, other: f64| {
+        rest.get(i).map_or(Ok(other), |x| x.parse::<f64>().map_err(|e| e.to_string()))
+    };
     let (chains, seconds) = (number(0, 100.0)? as usize, number(1, 1.5)?);
     if chains == 0 || !(seconds > 0.01 && seconds < 1e6) {
         return Err("at least one chain and more than 0.01 seconds are needed".into());
     }
     let job = Job { name, image, camera: rest.get(2).map(String::as_str), chains, seconds };
-    let moments: Vec<f64> =
-        (0..MOMENTS).map(|i| 0.01 * (seconds / 0.01).powf(i as f64 / (MOMENTS - 1) as f64)).collect();
+    let moments: Vec<f64> = (0..MOMENTS)
+        .map(|i| 0.01 * (seconds / 0.01).powf(i as f64 / (MOMENTS - 1) as f64))
+        .collect();
     let with = quantiles(&paths(&job, true)?, &moments);
     let without = quantiles(&paths(&job, false)?, &moments);
     let mut csv = String::from(
@@ -215,11 +246,15 @@ fn main() -> Result<(), String> {
     );
     match passes {
         Some((t, _)) => {
-            println!("with them the median chain is there after {t:.2} s: {:.0} times sooner", seconds / t)
+            println!(
+                "with them the median chain is there after {t:.2} s: {:.0} times sooner",
+                seconds / t
+            )
         }
         None => println!("with them the median chain does not get there"),
     }
-    let both = [("with proposals from the picture", "#1f77b4", with), ("without", "#d62728", without)];
+    let both =
+        [("with proposals from the picture", "#1f77b4", with), ("without", "#d62728", without)];
     std::fs::write(out, figure(&moments, &both)).map_err(|e| format!("{out}: {e}"))?;
     std::fs::write(format!("{out}.csv"), csv).map_err(|e| format!("{out}.csv: {e}"))
 }

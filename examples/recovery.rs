@@ -1,5 +1,6 @@
-//! Known truth: scenes drawn from the prior of `lathe.pcad`, their own clean contours as the observation. How well are pose and
-//! profile recovered, and how often do 90 % intervals hold the truth?
+//! Known truth: scenes drawn from the prior of `lathe.pcad`, their own clean contours as
+//! the observation. How well are pose and profile recovered, and how often do 90 %
+//! intervals hold the truth?
 //!
 //! `cargo run --release --example recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
@@ -45,7 +46,8 @@ fn truth(trace: &mut Trace, column: &str) -> Option<f64> {
 /// Knots of the profile.
 const KNOTS: usize = 24;
 
-/// The radius at 51 heights from the bottom to the top, as fractions of the height; `get` reads a column.
+/// The radius at 51 heights from the bottom to the top, as fractions of the height; `get`
+/// reads a column.
 fn shape(get: &mut dyn FnMut(&str) -> f64) -> Vec<f64> {
     let h = get("H");
     let radii: Vec<f64> = (0..KNOTS).map(|i| get(&format!("r[{i}]")) / h).collect();
@@ -64,7 +66,9 @@ fn rms(a: &[f64], b: &[f64]) -> f64 {
 
 fn main() -> Result<(), pcadlang::Error> {
     let (cases, seconds) = (argument(1, 20), argument(2, 20));
-    println!("case    size       H  x and y       z   tilt    shape  held by 90 %  R-hat  log joint, best (truth)");
+    println!(
+        "case    size       H  x and y       z   tilt    shape  held by 90 %  R-hat  log joint, best (truth)"
+    );
     let blank = over(ContourMap::new(known_truth::SIZE, known_truth::SIZE))?;
     let (mut held, mut asked) = (0, 0);
     let mut errors: Vec<[f64; 6]> = Vec::new();
@@ -72,7 +76,11 @@ fn main() -> Result<(), pcadlang::Error> {
         let (mut t, map) = draw(&blank, case)?;
         let model = over(map)?;
         let score = score(&model, &t);
-        let options = RunOptions { seed: case + 1, time: Some(Duration::from_secs(seconds)), ..RunOptions::default() };
+        let options = RunOptions {
+            seed: case + 1,
+            time: Some(Duration::from_secs(seconds)),
+            ..RunOptions::default()
+        };
         let posterior = model.run(&options, 4, 2)?;
         let quantities = posterior.quantities();
         let mut found = |name: &str| -> f64 {
@@ -80,18 +88,22 @@ fn main() -> Result<(), pcadlang::Error> {
             q.map_or(f64::NAN, |q| q.summary.q50)
         };
         let mut known = |name: &str| truth(&mut t, name).unwrap_or(f64::NAN);
-        let distance = |names: &[&str], known: &mut dyn FnMut(&str) -> f64, found: &mut dyn FnMut(&str) -> f64| {
+        let distance = |names: &[&str],
+                        known: &mut dyn FnMut(&str) -> f64,
+                        found: &mut dyn FnMut(&str) -> f64| {
             names.iter().map(|n| (known(n) - found(n)).powi(2)).sum::<f64>().sqrt()
         };
         let z = "S_L/translate/z";
-        // How large it looks: what one picture tells, while height and distance trade against each other.
+        // How large it looks: what one picture tells, while height and distance trade
+        // against each other.
         let size = |get: &mut dyn FnMut(&str) -> f64| get("H") / (EYE - get(z));
         let e = [
             (size(&mut found) / size(&mut known) - 1.0).abs(),
             (found("H") / known("H") - 1.0).abs(),
             distance(&["S_L/translate/x", "S_L/translate/y"], &mut known, &mut found),
             distance(&[z], &mut known, &mut found),
-            distance(&["S_L/axis/x", "S_L/axis/y", "S_L/axis/z"], &mut known, &mut found).to_degrees(),
+            distance(&["S_L/axis/x", "S_L/axis/y", "S_L/axis/z"], &mut known, &mut found)
+                .to_degrees(),
             rms(&shape(&mut found), &shape(&mut known)),
         ];
         let (mut inside, mut all) = (0, 0);
@@ -103,8 +115,11 @@ fn main() -> Result<(), pcadlang::Error> {
         }
         (held, asked) = (held + inside, asked + all);
         let worst = quantities.iter().map(|q| q.summary.r_hat).fold(0.0, f64::max);
-        let best =
-            posterior.chains.iter().filter_map(|c| c.best.as_ref().map(|b| b.0)).fold(f64::NEG_INFINITY, f64::max);
+        let best = posterior
+            .chains
+            .iter()
+            .filter_map(|c| c.best.as_ref().map(|b| b.0))
+            .fold(f64::NEG_INFINITY, f64::max);
         println!(
             "{case:4}  {:5.1} %  {:4.1} %    {:5.3}   {:5.3}  {:4.1}°  {:6.4}      {inside:2} of {all:2}  {worst:5.2}  {best:8.1} ({score:.1})",
             100.0 * e[0],
@@ -129,6 +144,9 @@ fn main() -> Result<(), pcadlang::Error> {
             e[5]
         );
     }
-    println!("90 % intervals hold {held} of {asked} values ({:.0} %)", 100.0 * held as f64 / asked as f64);
+    println!(
+        "90 % intervals hold {held} of {asked} values ({:.0} %)",
+        100.0 * held as f64 / asked as f64
+    );
     Ok(())
 }

@@ -1,12 +1,16 @@
-//! How fast a new pose is drawn and scored, on the meshes and poses of a folder, beside a plain rasteriser written out below.
+//! How fast a new pose is drawn and scored, on the meshes and poses of a folder, beside a
+//! plain rasteriser written out below.
 //!
 //!     cargo run --release --example render_kit -- DATA_DIR [MESHES [SIZES [TASKS [PEERS]]]]     (lists with commas; all if left out)
 //!
-//! DATA_DIR holds `vase.bin`, `body.bin`, `dense.bin` (two u32 counts, float32 vertices, u32 triangles) and `poses.bin` (row-major
-//! 4 x 4 float32). The camera is at the origin and looks along -z, 45 degrees from top to bottom. Each evaluation has another pose.
-//! Prints one JSON line for each mesh, size and task: `depth`, `contour` (contour pieces, for us; contour pixels, for the plain one)
-//! `likelihood` (their mean distance from the contours of the last pose), and `likelihood_newmesh` (with other vertices each time
-//! too, whose normals are worked out each time; ours alone). `pcadlang_detail_…` are likelihoods with levels of detail.
+//! DATA_DIR holds `vase.bin`, `body.bin`, `dense.bin` (two u32 counts, float32 vertices,
+//! u32 triangles) and `poses.bin` (row-major 4 x 4 float32). The camera is at the origin
+//! and looks along -z, 45 degrees from top to bottom. Each evaluation has another pose.
+//! Prints one JSON line for each mesh, size and task: `depth`, `contour` (contour pieces,
+//! for us; contour pixels, for the plain one) `likelihood` (their mean distance from the
+//! contours of the last pose), and `likelihood_newmesh` (with other vertices each time
+//! too, whose normals are worked out each time; ours alone). `pcadlang_detail_…` are
+//! likelihoods with levels of detail.
 
 mod clock;
 #[path = "render_kit/plain.rs"]
@@ -37,7 +41,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [dir, choices @ ..] = &args[..] else {
         return Err("usage: render_kit DATA_DIR [MESHES [SIZES [TASKS [PEERS]]]]".into());
     };
-    let chosen = |i: usize, name: &str| choices.get(i).is_none_or(|list: &String| list.split(',').any(|n| n == name));
+    let chosen = |i: usize, name: &str| {
+        choices.get(i).is_none_or(|list: &String| list.split(',').any(|n| n == name))
+    };
     let dir = Path::new(dir);
     let poses: Vec<Pose> = words(&dir.join("poses.bin"))?
         .chunks_exact(16)
@@ -80,7 +86,8 @@ fn load(path: &Path) -> Result<Raw, Box<dyn Error>> {
     };
     let vertices = words.get(2..2 + 3 * n).ok_or_else(too_short)?;
     let triangles = words.get(2 + 3 * n..2 + 3 * (n + m)).ok_or_else(too_short)?;
-    let vertices = vertices.as_chunks().0.iter().map(|v: &[u32; 3]| v.map(f32::from_bits)).collect();
+    let vertices =
+        vertices.as_chunks().0.iter().map(|v: &[u32; 3]| v.map(f32::from_bits)).collect();
     Ok(Raw { vertices, triangles: triangles.as_chunks().0.to_vec() })
 }
 
@@ -126,7 +133,8 @@ impl Case<'_> {
 
 fn camera(size: u32) -> Camera {
     let half = 0.5 * f64::from(size);
-    let projection = Projection::Pinhole { focal_px: half / 22.5f64.to_radians().tan(), cx: half, cy: half };
+    let projection =
+        Projection::Pinhole { focal_px: half / 22.5f64.to_radians().tan(), cx: half, cy: half };
     let (right, up, forward) = (DVec3::X, DVec3::Y, DVec3::NEG_Z);
     Camera { eye: DVec3::ZERO, right, up, forward, width: size, height: size, projection }
 }
@@ -139,17 +147,33 @@ fn placed(solid: &Solid, pose: &Pose) -> Solid {
 }
 
 fn elements(c: &Contours) -> Elements<'_> {
-    Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
+    Elements {
+        x: &c.x,
+        y: &c.y,
+        tx: &c.tx,
+        ty: &c.ty,
+        length: &c.length,
+        width: c.width,
+        height: c.height,
+    }
 }
 
-fn ours(case: &Case<'_>, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) -> Result<(), Box<dyn Error>> {
+fn ours(
+    case: &Case<'_>,
+    solid: &Solid,
+    raw: &Raw,
+    poses: &[Pose],
+    last: &Pose,
+) -> Result<(), Box<dyn Error>> {
     let camera = camera(case.size);
     let at = |i: usize| placed(solid, &poses[i % poses.len()]);
     let depth = |i: usize| Frame::render(&at(i), &camera, Channels::Depth);
     let mut reference = Plain::new(raw, case.size as usize);
     let agreement = agreement(&depth(0).depth, reference.depth(&poses[0]));
     case.measure("pcadlang", "depth", &agreement, |i| drop(std::hint::black_box(depth(i))));
-    case.measure("pcadlang", "contour", "", |i| drop(std::hint::black_box(Contours::of(&at(i), &camera))));
+    case.measure("pcadlang", "contour", "", |i| {
+        drop(std::hint::black_box(Contours::of(&at(i), &camera)))
+    });
     let seen = Contours::of(&placed(solid, last), &camera);
     let observed = ContourMap {
         x: seen.x.clone(),
@@ -167,19 +191,24 @@ fn ours(case: &Case<'_>, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) 
     };
     case.measure("pcadlang", "likelihood", "", |i| likelihood(&at(i)));
     let Some(mesh) = solid.instances().first().map(|i| Arc::clone(&i.mesh)) else { return Ok(()) };
-    // Not the same work: meshes as coarse as leaves every vertex within so many pixels, and how far that takes the distance.
+    // Not the same work: meshes as coarse as leaves every vertex within so many pixels,
+    // and how far that takes the distance.
     let lasting = Solid::lasting((*mesh).clone());
     for (peer, detail) in [("pcadlang_detail_0.1", 0.1), ("pcadlang_detail_0.25", 0.25)] {
         if !(case.chosen)(peer, "likelihood") {
             continue;
         }
-        let view = |i: usize| View::with_detail(placed(&lasting, &poses[i % poses.len()]), camera, detail);
+        let view =
+            |i: usize| View::with_detail(placed(&lasting, &poses[i % poses.len()]), camera, detail);
         let rho = |c: &Contours| chamfer.distance(&elements(c)) * elements(c).diagonal() / 100.0;
-        let off = |i: usize| (rho(&view(i).contours(case.size)) - rho(&Contours::of(&at(i), &camera))).abs();
+        let off = |i: usize| {
+            (rho(&view(i).contours(case.size)) - rho(&Contours::of(&at(i), &camera))).abs()
+        };
         let mut off: Vec<f64> = (0..poses.len()).map(off).collect();
         off.sort_by(f64::total_cmp);
         let (median, most) = (off[off.len() / 2], off[off.len() - 1]);
-        let extra = format!(",\"distance_off_px_median\":{median:.3},\"distance_off_px_most\":{most:.3}");
+        let extra =
+            format!(",\"distance_off_px_median\":{median:.3},\"distance_off_px_most\":{most:.3}");
         case.measure(peer, "likelihood", &extra, |i| {
             let contours = view(i).contours(case.size);
             std::hint::black_box(chamfer.log_likelihood(&elements(&contours)));
@@ -189,7 +218,8 @@ fn ours(case: &Case<'_>, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) 
     case.measure("pcadlang", "likelihood_newmesh", "", |i| {
         let positions = shapes[i % shapes.len()].clone();
         let normals = normals(&positions, &mesh.topology.triangles);
-        let solid = Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::clone(&mesh.topology) }));
+        let solid =
+            Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::clone(&mesh.topology) }));
         likelihood(&placed(&solid, &poses[i % poses.len()]));
     });
     Ok(())
@@ -226,7 +256,8 @@ fn theirs(case: &Case<'_>, raw: &Raw, poses: &[Pose], last: &Pose) {
     });
 }
 
-/// How far a depth picture is from the reference: pixels of the mask, and the median of relative differences.
+/// How far a depth picture is from the reference: pixels of the mask, and the median of
+/// relative differences.
 fn agreement(depth: &[f32], reference: &[f32]) -> String {
     let pairs = || depth.iter().zip(reference);
     let mask = pairs().filter(|(a, b)| a.is_finite() != b.is_finite()).count();
@@ -235,5 +266,7 @@ fn agreement(depth: &[f32], reference: &[f32]) -> String {
     errors.sort_by(f32::total_cmp);
     let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
     let largest = errors.last().copied().unwrap_or(0.0);
-    format!(",\"mask_diff_px\":{mask},\"depth_err_median\":{median:e},\"depth_err_most\":{largest:e}")
+    format!(
+        ",\"mask_diff_px\":{mask},\"depth_err_median\":{median:e},\"depth_err_most\":{largest:e}"
+    )
 }

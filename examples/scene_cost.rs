@@ -1,10 +1,14 @@
-//! What one transition costs as a scene grows of which one object is uncertain: a vase whose pose drifts among boxes, balls and lathes that stand still.
+//! What one transition costs as a scene grows of which one object is uncertain: a vase
+//! whose pose drifts among boxes, balls and lathes that stand still.
 //!
 //!     cargo run --release --example scene_cost -- [N…] [nested|flat] [front|hidden] [contour|chamfer|both] [count=TRANSITIONS] [scale=S]
 //!
-//! The picture is that of the program at the truth, rendered; N counts the vase. `nested`: what stands still is a group of its own; `flat`: all objects
-//! are members of one group. `front`: the vase stands before the others; `hidden`: among them, so that half of them may stand before it. Without a scale the kernel
-//! learns it in a warm-up. Prints processor times of the one thread. For instructions, run it twice under callgrind with different `count` and take the difference.
+//! The picture is that of the program at the truth, rendered; N counts the vase.
+//! `nested`: what stands still is a group of its own; `flat`: all objects are members of
+//! one group. `front`: the vase stands before the others; `hidden`: among them, so that
+//! half of them may stand before it. Without a scale the kernel learns it in a warm-up.
+//! Prints processor times of the one thread. For instructions, run it twice under
+//! callgrind with different `count` and take the difference.
 
 mod clock;
 
@@ -37,7 +41,8 @@ struct Wanted {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut sizes: Vec<usize> = Vec::new();
-    let mut wanted = Wanted { flat: false, front: true, observe: "contour".into(), count: 3000, scale: None };
+    let mut wanted =
+        Wanted { flat: false, front: true, observe: "contour".into(), count: 3000, scale: None };
     for a in std::env::args().skip(1) {
         match a.as_str() {
             "nested" | "flat" => wanted.flat = a == "flat",
@@ -57,14 +62,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     for n in sizes {
         let (model, mut trace) = scene(n, &wanted)?;
         let pieces = view(&mut trace)?.0.contours(SIZE).len();
-        let scope = Scope { selector: Selector::Tag { name: "pose".into(), value: None }, pick: Pick::All };
+        let scope =
+            Scope { selector: Selector::Tag { name: "pose".into(), value: None }, pick: Pick::All };
         let mut kernel = Drift::new(scope, wanted.scale);
         run(&mut kernel, &mut trace, 0..WARM, true)?;
         let begun = processor_seconds();
         let moved = run(&mut kernel, &mut trace, WARM..WARM + wanted.count, false)?;
         let each = (processor_seconds() - begun) / wanted.count as f64 * 1e6;
         let times = each / *alone.get_or_insert(each);
-        println!("{n:>5} objects, {pieces:>5} pieces: {each:>8.1} us a transition, {times:>6.2} times, {moved} moved");
+        println!(
+            "{n:>5} objects, {pieces:>5} pieces: {each:>8.1} us a transition, {times:>6.2} times, {moved} moved"
+        );
         drop(model);
     }
     Ok(())
@@ -79,24 +87,37 @@ fn run(
 ) -> Result<u64, Box<dyn Error>> {
     let mut moved = 0;
     for step in steps {
-        let outcome = kernel.step(trace, &At { adapting, ..At::new(1, 0, step) }).map_err(|e| e.to_string())?;
+        let outcome = kernel
+            .step(trace, &At { adapting, ..At::new(1, 0, step) })
+            .map_err(|e| e.to_string())?;
         moved += u64::from(outcome.accepted);
     }
     Ok(moved)
 }
 
-/// A scene of so many objects that observes its own picture at the truth, and a trace at the truth.
+/// A scene of so many objects that observes its own picture at the truth, and a trace at
+/// the truth.
 fn scene(n: usize, wanted: &Wanted) -> Result<(Model, Trace), Box<dyn Error>> {
     let text = program(n, wanted);
     let over = |map: ContourMap| {
         let image = Value::object(ImageValue::contours(map, None));
-        Program::parse(&text)?.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile()
+        Program::parse(&text)?
+            .observe("photo", image)
+            .camera(Camera::default_for(SIZE, SIZE))
+            .compile()
     };
     let mut trace = over(ContourMap::new(SIZE, SIZE))?.simulate(1, 0)?;
     let truth = trace.constraints();
     let c = view(&mut trace)?.0.contours(SIZE);
     let [x, y, tx, ty] = [&c.x, &c.y, &c.tx, &c.ty].map(Clone::clone);
-    let model = over(ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(SIZE, SIZE) })?;
+    let model = over(ContourMap {
+        x,
+        y,
+        tx,
+        ty,
+        strength: vec![1.0; c.len()],
+        ..ContourMap::new(SIZE, SIZE)
+    })?;
     let (trace, _) = Trace::generate(model.code().clone(), truth, draws(), Default::default())?;
     Ok((model, trace))
 }
@@ -110,20 +131,33 @@ fn view(trace: &mut Trace) -> Result<ViewValue, Box<dyn Error>> {
     value.downcast::<ViewValue>().cloned().ok_or_else(|| "no view".into())
 }
 
-/// The program's text: what stands still is at random places in view, smaller the more there are.
+/// The program's text: what stands still is at random places in view, smaller the more
+/// there are.
 fn program(n: usize, wanted: &Wanted) -> String {
-    let mut text = String::from("include \"std/scene.pcad\" as scene;\ndata photo: image \"the picture\";\n");
+    let mut text =
+        String::from("include \"std/scene.pcad\" as scene;\ndata photo: image \"the picture\";\n");
     let mut random = StreamKey::new(7, 0, Purpose::PREDICT).stream(0, 0, 0);
     let mut things = String::new();
     for i in 1..n {
         let mut between = |low: f64, high: f64| low + (high - low) * random.uniform();
         let size = 0.9 / (n as f64).cbrt();
-        let (x, y, z) = (between(-1.9, 1.9), between(-1.9, 1.9), between(-2.0, if wanted.front { -0.5 } else { 1.0 }));
+        let (x, y, z) = (
+            between(-1.9, 1.9),
+            between(-1.9, 1.9),
+            between(-2.0, if wanted.front { -0.5 } else { 1.0 }),
+        );
         let turn = [between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)];
-        let _ = writeln!(things, "  {{ kind: {}, at: [{x}, {y}, {z}], turn: {turn:?}, size: {size} }},", i % 3);
+        let _ = writeln!(
+            things,
+            "  {{ kind: {}, at: [{x}, {y}, {z}], turn: {turn:?}, size: {size} }},",
+            i % 3
+        );
     }
-    let members =
-        if wanted.flat { "append(map(thing, things), vase)" } else { "[scene.group(map(thing, things)), vase]" };
+    let members = if wanted.flat {
+        "append(map(thing, things), vase)"
+    } else {
+        "[scene.group(map(thing, things)), vase]"
+    };
     let group = if n == 1 { "[vase]" } else { members };
     let _ = writeln!(
         text,

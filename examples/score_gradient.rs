@@ -1,9 +1,13 @@
-//! Does the gradient of a picture's score point where the score rises? For random poses of a lathe and of a body before the contours
-//! of another pose: the cosine between the gradient and central differences over half a pixel each way, and what a gradient costs.
+//! Does the gradient of a picture's score point where the score rises? For random poses
+//! of a lathe and of a body before the contours of another pose: the cosine between the
+//! gradient and central differences over half a pixel each way, and what a gradient
+//! costs.
 //!
-//! `cargo run --release --example score_gradient -- [POSES] [LIKELIHOOD]`, such as `200 "scene.contour(view)"`
+//! `cargo run --release --example score_gradient -- [POSES] [LIKELIHOOD]`, such as
+//! `200 "scene.contour(view)"`
 //!
-//! Coordinates are scaled so that what each one moves of the surface moves by half a pixel in the picture.
+//! Coordinates are scaled so that what each one moves of the surface moves by half a
+//! pixel in the picture.
 
 use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::value::Value;
@@ -45,7 +49,10 @@ fn compile(scene: &str, likelihood: &str, map: ContourMap) -> Result<Model> {
          observe {likelihood} = photo as picture;"
     );
     let image = Value::object(ImageValue::contours(map, None));
-    Ok(Program::parse(&text)?.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile()?)
+    Ok(Program::parse(&text)?
+        .observe("photo", image)
+        .camera(Camera::default_for(SIZE, SIZE))
+        .compile()?)
 }
 
 fn view(trace: &mut Trace) -> Option<ViewValue> {
@@ -61,7 +68,14 @@ fn draw(model: &Model, seed: u64) -> Result<Option<(Trace, ContourMap)>> {
         let inside = |v: &[f32]| v.iter().all(|x| (2.0..SIZE as f32 - 2.0).contains(x));
         if c.total_length() > 60.0 && inside(&c.x) && inside(&c.y) {
             let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
-            let map = ContourMap { strength: vec![1.0; x.len()], x, y, tx, ty, ..ContourMap::new(SIZE, SIZE) };
+            let map = ContourMap {
+                strength: vec![1.0; x.len()],
+                x,
+                y,
+                tx,
+                ty,
+                ..ContourMap::new(SIZE, SIZE)
+            };
             return Ok(Some((trace, map)));
         }
     }
@@ -80,7 +94,8 @@ impl System {
     fn new(mut trace: Trace) -> System {
         let selection = trace.select(&Selector::All);
         let targets = trace.targets(selection).to_vec();
-        let own: Vec<Vec<f64>> = targets.iter().map(|t| trace.free(*t).map_or(Vec::new(), |f| f.0)).collect();
+        let own: Vec<Vec<f64>> =
+            targets.iter().map(|t| trace.free(*t).map_or(Vec::new(), |f| f.0)).collect();
         System { trace, targets, sizes: own.iter().map(Vec::len).collect(), at: own.concat() }
     }
 
@@ -90,7 +105,8 @@ impl System {
             from += n;
             (*t, Change::Free(y[from - n..from].to_vec()))
         };
-        let changes: Vec<(Target, Change)> = self.targets.iter().zip(&self.sizes).map(part).collect();
+        let changes: Vec<(Target, Change)> =
+            self.targets.iter().zip(&self.sizes).map(part).collect();
         if self.trace.propose(&changes, draws()).is_err() {
             return f64::NAN;
         }
@@ -130,8 +146,10 @@ impl System {
         let half = |i: usize| {
             self.moved(i, small);
             let there = self.seen();
-            // The mean over what moves, weighted by how much: one hand counts as the whole body does.
-            let squares = here.iter().zip(&there).map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
+            // The mean over what moves, weighted by how much: one hand counts as the
+            // whole body does.
+            let squares =
+                here.iter().zip(&there).map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
             let (fourth, square) = squares.fold((0.0, 0.0), |(f, s), d| (f + d * d, s + d));
             0.5 * small / (fourth / square).sqrt()
         };
@@ -151,19 +169,25 @@ fn quartiles(mut all: Vec<f64>) -> [f64; 3] {
 
 fn main() -> Result<()> {
     let poses: u64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(200);
-    let likelihood = std::env::args().nth(2).unwrap_or(format!("scene.chamfer(view, sigma = 1, size = {SIZE})"));
+    let likelihood =
+        std::env::args().nth(2).unwrap_or(format!("scene.chamfer(view, sigma = 1, size = {SIZE})"));
     println!(
         "{likelihood}: cosine with differences of half a pixel (quartiles), cost of a gradient in evaluations of the score"
     );
     for (name, scene) in [("lathe", LATHE), ("body", BODY)] {
         let blank = compile(scene, &likelihood, ContourMap::new(SIZE, SIZE))?;
-        let (mut cosines, mut scores, mut gradients, mut coordinates) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        let (mut cosines, mut scores, mut gradients, mut coordinates) =
+            (Vec::new(), Vec::new(), Vec::new(), 0);
         for case in 0..poses {
             let Some((_, map)) = draw(&blank, case)? else { continue };
             let Some((pose, _)) = draw(&blank, case + 100_000)? else { continue };
             let model = compile(scene, &likelihood, map)?;
-            let rebuilt =
-                Trace::generate(std::sync::Arc::clone(model.code()), pose.constraints(), draws(), Default::default());
+            let rebuilt = Trace::generate(
+                std::sync::Arc::clone(model.code()),
+                pose.constraints(),
+                draws(),
+                Default::default(),
+            );
             let Ok((trace, _)) = rebuilt else { continue };
             let mut s = System::new(trace);
             coordinates = s.at.len();
@@ -182,7 +206,8 @@ fn main() -> Result<()> {
             let start = Instant::now();
             s.trace.gradient(&s.targets, 1.0, &mut found).map_err(|e| e.message.clone())?;
             gradients.push(start.elapsed().as_secs_f64());
-            let slopes: Vec<f64> = s.gradient()?.iter().zip(&halves).map(|(g, h)| g * 2.0 * h).collect();
+            let slopes: Vec<f64> =
+                s.gradient()?.iter().zip(&halves).map(|(g, h)| g * 2.0 * h).collect();
             cosines.push(cosine(&slopes, &differences));
         }
         let (n, [low, mid, high]) = (cosines.len(), quartiles(cosines));

@@ -1,9 +1,12 @@
-//! What one transition of a local choice costs as a program grows: outlier flags of a regression, hidden states of a chain.
+//! What one transition of a local choice costs as a program grows: outlier flags of a
+//! regression, hidden states of a chain.
 //!
 //!     cargo run --release --example transition_cost -- MODEL N TRANSITIONS [sweep]
 //!
-//! MODEL is `linreg` or `hmm` (programs of `benches/peers`, without their plans). Choices come at random, or by `sweep` one after the other. Prints processor times of the one thread, and
-//! memory. For instructions, run it twice under callgrind with different TRANSITIONS and take the difference.
+//! MODEL is `linreg` or `hmm` (programs of `benches/peers`, without their plans). Choices
+//! come at random, or by `sweep` one after the other. Prints processor times of the one
+//! thread, and memory. For instructions, run it twice under callgrind with different
+//! TRANSITIONS and take the difference.
 
 mod clock;
 
@@ -50,7 +53,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Steps of a kernel; how many moved the choice.
-fn run(kernel: &mut dyn Kernel, trace: &mut Trace, steps: std::ops::Range<u64>) -> Result<u64, Box<dyn Error>> {
+fn run(
+    kernel: &mut dyn Kernel,
+    trace: &mut Trace,
+    steps: std::ops::Range<u64>,
+) -> Result<u64, Box<dyn Error>> {
     let (mut moved, mut member, mut members) = (0, 0, 0);
     for step in steps {
         member += 1;
@@ -71,7 +78,8 @@ fn array(n: usize, f: impl Fn(usize) -> f64) -> Value {
 fn linreg(n: usize) -> Result<Model, Box<dyn Error>> {
     let at = |i: usize| ((i * 7919) % 1000) as f64 / 1000.0;
     let x = array(n, |i| -5.0 + 10.0 * at(i));
-    let y = array(n, |i| if i % 10 == 3 { ((i * 31) % 41) as f64 - 20.0 } else { 7.0 - 10.0 * at(i) });
+    let y =
+        array(n, |i| if i % 10 == 3 { ((i * 31) % 41) as f64 - 20.0 } else { 7.0 - 10.0 * at(i) });
     compile(include_str!("../benches/peers/linreg.pcad"), vec![("x", x), ("y", y)])
 }
 
@@ -80,13 +88,18 @@ fn hmm(n: usize) -> Result<Model, Box<dyn Error>> {
     let row = |k: usize| array(3, move |i| if i == k { 0.8 } else { 0.1 });
     let trans = Value::List(vec![row(0), row(1), row(2)].into());
     let (mu, probe) = (array(3, |i| 2.0 * i as f64 - 2.0), Value::Num((n / 2) as f64));
-    compile(include_str!("../benches/peers/hmm.pcad"), vec![("y", y), ("trans", trans), ("mu", mu), ("probe", probe)])
+    compile(
+        include_str!("../benches/peers/hmm.pcad"),
+        vec![("y", y), ("trans", trans), ("mu", mu), ("probe", probe)],
+    )
 }
 
 /// The model of a program; its plan is left out.
 fn compile(text: &str, data: Vec<(&str, Value)>) -> Result<Model, Box<dyn Error>> {
     let model = text.split("infer {").next().unwrap_or(text);
-    let program = data.into_iter().fold(Program::parse(model)?, |program, (name, value)| program.observe(name, value));
+    let program = data
+        .into_iter()
+        .fold(Program::parse(model)?, |program, (name, value)| program.observe(name, value));
     Ok(program.compile()?)
 }
 

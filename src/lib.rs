@@ -1,11 +1,14 @@
-//! `pcadlang`: a probabilistic CAD language. A program draws a scene from a prior; the engine samples the scenes that
-//! explain a photograph.
+//! `pcadlang`: a probabilistic CAD language. A program draws a scene from a prior; the
+//! engine samples the scenes that explain a photograph.
 //!
-//! [`Program`] and [`Model`] are the way in; [`trace::Trace`] is the engine's one data structure; [`host`] is how a program that embeds
-//! the language brings functions, distributions, likelihoods and kernels of its own. What is shown here follows semantic
-//! versioning, is used by the doc-tests, and is listed in `docs/embedding.md`; modules that are public for tests and tools only are hidden.
+//! [`Program`] and [`Model`] are the way in; [`trace::Trace`] is the engine's one data
+//! structure; [`host`] is how a program that embeds the language brings functions,
+//! distributions, likelihoods and kernels of its own. What is shown here follows semantic
+//! versioning, is used by the doc-tests, and is listed in `docs/embedding.md`; modules
+//! that are public for tests and tools only are hidden.
 //!
-//! Modules depend one way: `syntax`, `dist`, `geom`, `render` and `vision` know nothing of traces, `infer` knows nothing of pictures.
+//! Modules depend one way: `syntax`, `dist`, `geom`, `render` and `vision` know nothing
+//! of traces, `infer` knows nothing of pictures.
 #![doc = include_str!("guide.md")]
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]

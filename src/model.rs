@@ -18,7 +18,9 @@ pub use program::Program;
 
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap};
 use crate::infer::draws::Sink;
-use crate::infer::{ChainError, ChainResult, Progress, RunOptions, attempts, default_plan, run_chains};
+use crate::infer::{
+    ChainError, ChainResult, Progress, RunOptions, attempts, default_plan, run_chains,
+};
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::lower::{Compiled, Export, Report};
@@ -67,7 +69,8 @@ impl Model {
         &self.hash
     }
 
-    /// A hash of the files that the program reads by itself: the defaults of its `data` items.
+    /// A hash of the files that the program reads by itself: the defaults of its `data`
+    /// items.
     pub fn data_hash(&self) -> &str {
         &self.data_hash
     }
@@ -106,13 +109,15 @@ impl Model {
         &self.compiled.reports
     }
 
-    /// One draw from the prior, conditioned on nothing: observations are scored, not simulated.
+    /// One draw from the prior, conditioned on nothing: observations are scored, not
+    /// simulated.
     ///
     /// # Errors
     /// What the program does wrong.
     pub fn simulate(&self, seed: u64, index: u64) -> Result<Trace, Error> {
         let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: index, lane: 0 };
-        Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone()).map_err(|e| self.run_error(*e))
+        Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone())
+            .map_err(|e| self.run_error(*e))
     }
 
     /// Turns a failure while running into messages.
@@ -129,9 +134,13 @@ impl Model {
             ChainError::Start(StartError::Impossible(zero)) => {
                 let mut d = plain(format!("cannot start any chain: {zero}"));
                 for (i, term) in zero.terms.iter().take(5).enumerate() {
-                    let why = term.outside.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
+                    let why =
+                        term.outside.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
                     d = match i {
-                        0 => d.primary(term.span, format!("the log density of {} is -inf{why}", term.address)),
+                        0 => d.primary(
+                            term.span,
+                            format!("the log density of {} is -inf{why}", term.address),
+                        ),
                         _ => d.secondary(term.span, format!("so is that of {}{why}", term.address)),
                     };
                 }
@@ -139,7 +148,8 @@ impl Model {
                     d = d.note(format!("and {} more", zero.terms.len() - 5));
                 }
                 if !zero.drawn.is_empty() {
-                    let drawn: Vec<String> = zero.drawn.iter().map(|(a, v)| format!("{a} = {v}")).collect();
+                    let drawn: Vec<String> =
+                        zero.drawn.iter().map(|(a, v)| format!("{a} = {v}")).collect();
                     d = d.note(format!("in the last draw, {}", drawn.join(", ")));
                 }
                 d.hint(match zero.terms.first().is_some_and(|t| t.outside.is_some()) {
@@ -153,8 +163,8 @@ impl Model {
         Error { diagnostics: vec![d], sources: self.sources.clone() }
     }
 
-    /// The plan of inference: the program's first `infer` block, or the default plan; the second part is the text of the
-    /// default plan where that is used.
+    /// The plan of inference: the program's first `infer` block, or the default plan; the
+    /// second part is the text of the default plan where that is used.
     ///
     /// # Errors
     /// If the program cannot be run once, to see what choices it makes.
@@ -169,7 +179,8 @@ impl Model {
         };
         let mut draws: Vec<Trace> = (0..DRAWS_FOR_PLAN).filter_map(|i| drawn(i).ok()).collect();
         if draws.is_empty() {
-            // Draws may lead where the program has no value, such as a negative spread: the plan is of those that do not.
+            // Draws may lead where the program has no value, such as a negative spread:
+            // the plan is of those that do not.
             draws.push(attempts(ATTEMPTS_FOR_PLAN, drawn).map_err(|e| self.run_error(*e))?);
         }
         let text = default_plan(&mut draws);
@@ -183,15 +194,22 @@ impl Model {
         Ok((body.unwrap_or_default().into(), Some(text)))
     }
 
-    /// Runs chains and keeps their draws in memory. Draws depend on the seed, never on the number of threads.
+    /// Runs chains and keeps their draws in memory. Draws depend on the seed, never on
+    /// the number of threads.
     ///
     /// # Errors
     /// If a chain cannot start or the program fails.
-    pub fn run(&self, options: &RunOptions, chains: usize, threads: usize) -> Result<Posterior, Error> {
+    pub fn run(
+        &self,
+        options: &RunOptions,
+        chains: usize,
+        threads: usize,
+    ) -> Result<Posterior, Error> {
         let memories: Vec<Memory> = (0..chains.max(1)).map(|_| Memory::default()).collect();
         let sinks = memories.iter().map(|m| Box::new(m.clone()) as Box<dyn Sink>).collect();
         let results = self.run_into(options, threads, &Progress::default(), sinks)?;
-        let results = results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| self.chain_error(e))?;
+        let results =
+            results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| self.chain_error(e))?;
         Ok(Posterior { draws: memories.iter().map(Memory::draws).collect(), chains: results })
     }
 
@@ -207,8 +225,14 @@ impl Model {
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Vec<Result<ChainResult, ChainError>>, Error> {
         if options.time.is_some() && !clock::RUNS {
-            let d = Diagnostic::new(Severity::Error, "this platform has no clock, so a run cannot have a time limit");
-            return Err(Error { diagnostics: vec![d.hint("limit it by `steps`")], sources: self.sources.clone() });
+            let d = Diagnostic::new(
+                Severity::Error,
+                "this platform has no clock, so a run cannot have a time limit",
+            );
+            return Err(Error {
+                diagnostics: vec![d.hint("limit it by `steps`")],
+                sources: self.sources.clone(),
+            });
         }
         let (plan, _) = self.plan()?;
         Ok(run_chains(self.code(), &plan, options, threads, progress, sinks))

@@ -1,5 +1,5 @@
-//! Arithmetic that densities rest on: exact sums, stable functions in log space, a hash. All through `libm`, so that results are the
-//! same on every platform.
+//! Arithmetic that densities rest on: exact sums, stable functions in log space, a hash.
+//! All through `libm`, so that results are the same on every platform.
 
 mod column;
 mod exact;
@@ -18,8 +18,8 @@ pub use incomplete::{chi_square_tail, upper_gamma};
 pub use log_tails::{beta_tails, gamma_tails};
 pub use saddle::{deviance, stirling_error};
 pub use special::{
-    LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp,
-    log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
+    LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma,
+    log_diff_exp, log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
 };
 pub use tails::{bessel_deficit, log_scaled_i0, mills_ratio};
 

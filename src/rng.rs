@@ -1,7 +1,9 @@
-//! Counter-based random streams: Philox4x64-10 (Salmon, Moraes, Dror & Shaw 2011, "Parallel random numbers: as easy as 1, 2, 3").
+//! Counter-based random streams: Philox4x64-10 (Salmon, Moraes, Dror & Shaw 2011,
+//! "Parallel random numbers: as easy as 1, 2, 3").
 //!
-//! A stream is a function of a key (seed, chain, purpose) and a place (step, site, lane). Nothing is carried from one to the next,
-//! so the order in which numbers are asked for, and the number of threads, change nothing.
+//! A stream is a function of a key (seed, chain, purpose) and a place (step, site, lane).
+//! Nothing is carried from one to the next, so the order in which numbers are asked for,
+//! and the number of threads, change nothing.
 //!
 //! ```
 //! use pcadlang::rng::{Purpose, Stream, StreamKey};
@@ -53,10 +55,15 @@ impl StreamKey {
         StreamKey { seed, chain_and_purpose: u64::from(chain) << 32 | u64::from(purpose.0) }
     }
 
-    /// The stream of a place: a step, a site (the hash of an address), and a lane to tell alternatives apart. Costs nothing until
-    /// the first number is asked for.
+    /// The stream of a place: a step, a site (the hash of an address), and a lane to tell
+    /// alternatives apart. Costs nothing until the first number is asked for.
     pub fn stream(&self, step: u64, site: u64, lane: u64) -> Stream {
-        Stream { key: [self.seed, self.chain_and_purpose], counter: [0, step, site, lane], block: [0; 4], used: 4 }
+        Stream {
+            key: [self.seed, self.chain_and_purpose],
+            counter: [0, step, site, lane],
+            block: [0; 4],
+            used: 4,
+        }
     }
 }
 
@@ -73,11 +80,19 @@ pub struct Stream {
 fn philox(mut counter: [u64; 4], mut key: [u64; 2]) -> [u64; 4] {
     for round in 0..10 {
         if round > 0 {
-            key = [key[0].wrapping_add(0x9E37_79B9_7F4A_7C15), key[1].wrapping_add(0xBB67_AE85_84CA_A73B)];
+            key = [
+                key[0].wrapping_add(0x9E37_79B9_7F4A_7C15),
+                key[1].wrapping_add(0xBB67_AE85_84CA_A73B),
+            ];
         }
         let a = u128::from(counter[0]) * 0xD2E7_470E_E14C_6C93;
         let b = u128::from(counter[2]) * 0xCA5A_8263_9512_1157;
-        counter = [(b >> 64) as u64 ^ counter[1] ^ key[0], b as u64, (a >> 64) as u64 ^ counter[3] ^ key[1], a as u64];
+        counter = [
+            (b >> 64) as u64 ^ counter[1] ^ key[0],
+            b as u64,
+            (a >> 64) as u64 ^ counter[3] ^ key[1],
+            a as u64,
+        ];
     }
     counter
 }
@@ -128,8 +143,9 @@ impl Stream {
         (product >> 64) as usize
     }
 
-    /// The place of one of these weights, with probability in proportion to it; `total` is their sum, and weights of 0 are
-    /// never chosen but for the last where there is nothing else.
+    /// The place of one of these weights, with probability in proportion to it; `total`
+    /// is their sum, and weights of 0 are never chosen but for the last where there is
+    /// nothing else.
     #[inline]
     pub fn weighted(&mut self, weights: &[f64], total: f64) -> usize {
         let (mut u, mut last) = (self.uniform() * total, weights.len().saturating_sub(1));
@@ -221,7 +237,8 @@ mod tests {
         let expected = n as f64 / 20.0;
         let chi2: f64 = bins.iter().map(|b| (f64::from(*b) - expected).powi(2) / expected).sum();
         assert!(chi2 < 75.0, "chi-square with 19 degrees of freedom: {chi2}");
-        let lag: f64 = xs.windows(2).map(|w| (w[0] - 0.5) * (w[1] - 0.5)).sum::<f64>() * 12.0 / n as f64;
+        let lag: f64 =
+            xs.windows(2).map(|w| (w[0] - 0.5) * (w[1] - 0.5)).sum::<f64>() * 12.0 / n as f64;
         assert!(lag.abs() < 5.0 / (n as f64).sqrt(), "lag-1 correlation {lag}");
     }
 
@@ -246,8 +263,10 @@ mod tests {
 
     #[test]
     fn weights_of_zero_are_never_chosen() {
-        // Half of the products with the least of all doubles are rounded up to it: past every weight.
-        let (tiny, mut s) = (f64::from_bits(1), StreamKey::new(0, 0, Purpose::KERNEL).stream(1, 0, 0));
+        // Half of the products with the least of all doubles are rounded up to it: past
+        // every weight.
+        let (tiny, mut s) =
+            (f64::from_bits(1), StreamKey::new(0, 0, Purpose::KERNEL).stream(1, 0, 0));
         assert!((0..100).all(|_| s.weighted(&[0.0, tiny, 0.0], tiny) == 1));
         assert_eq!(s.weighted(&[0.0, 0.0], 0.0), 1, "there is nothing else");
     }
@@ -271,5 +290,6 @@ mod tests {
         assert_eq!(bits, GOLDEN, "{bits:#x?}");
     }
 
-    const GOLDEN: [u64; 4] = [0xbfd9147c3b1dce9e, 0xbffc04dbb2256d9a, 0x3fda26ea9e14562a, 0xbfd200e34a500ee6];
+    const GOLDEN: [u64; 4] =
+        [0xbfd9147c3b1dce9e, 0xbffc04dbb2256d9a, 0x3fda26ea9e14562a, 0xbfd200e34a500ee6];
 }

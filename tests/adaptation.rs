@@ -1,5 +1,6 @@
-//! Kernels learn in warm-up and not after it: from the end of warm-up on, what a checkpoint keeps of each kernel is the same bytes,
-//! but for what is no adaptation, and says why.
+//! Kernels learn in warm-up and not after it: from the end of warm-up on, what a
+//! checkpoint keeps of each kernel is the same bytes, but for what is no adaptation, and
+//! says why.
 
 use ciborium::Value;
 use pcadlang::infer::draws::{Column, DrawRow, KernelStats, Sink};
@@ -26,21 +27,24 @@ const BRANCHES: &str = "
     observe normal(x + z, 1) = 0.5 as y;
 ";
 
-const COUNTS: &str = "assume p ~ beta(2, 2); observe iid(flip(p), 6) = [true, true, false, true, true, true] as y;";
+const COUNTS: &str =
+    "assume p ~ beta(2, 2); observe iid(flip(p), 6) = [true, true, false, true, true, true] as y;";
 
 /// What of a kernel's state is left, and why the rest is no adaptation.
 #[derive(Clone, Copy, Debug)]
 enum Of {
     /// All of it is what was learnt, or there is none.
     All,
-    /// `hmc`, `mala`, `nuts`: not the habits of tapes (`memory.rs`), which say how a density is computed, not which.
+    /// `hmc`, `mala`, `nuts`: not the habits of tapes (`memory.rs`), which say how a
+    /// density is computed, not which.
     Trajectory,
     /// `optimize`: nothing but those habits.
     Nothing,
-    /// `temper`: not the replicas, which are states of the larger chain, and not the count of steps, by which pairs take turns.
+    /// `temper`: not the replicas, which are states of the larger chain, and not the
+    /// count of steps, by which pairs take turns.
     Ladder(&'static Of),
-    /// `smc`, `abc` with particles: not the log density and estimate of the accepted state, which belong to it, and not the sum of
-    /// estimates, which is a result.
+    /// `smc`, `abc` with particles: not the log density and estimate of the accepted
+    /// state, which belong to it, and not the sum of estimates, which is a result.
     Particles(&'static Of),
     /// `abc`: not the distance of the present state, which belongs to it.
     Distance(&'static Of),
@@ -65,7 +69,12 @@ const CASES: &[(&str, &str, &str, Of)] = &[
     ("delayed", MODEL, "delayed(drift(@a), @y);", Of::All),
     ("delayed", MODEL, "delayed(nuts(@a + @b), @y);", Of::Trajectory),
     ("temper", MODEL, "temper(drift(one(@**)), levels = 3);", Of::Ladder(&Of::All)),
-    ("temper", MODEL, "temper(nuts(@a + @b, max_depth = 3), levels = 3);", Of::Ladder(&Of::Trajectory)),
+    (
+        "temper",
+        MODEL,
+        "temper(nuts(@a + @b, max_depth = 3), levels = 3);",
+        Of::Ladder(&Of::Trajectory),
+    ),
     ("smc", MODEL, "smc(drift(one(@**)), particles = 5);", Of::Particles(&Of::All)),
     ("abc", COUNTS, "abc(drift(@p), eps = 0.5);", Of::Distance(&Of::All)),
     ("abc", COUNTS, "abc(drift(@p), eps = 0.5, particles = 6);", Of::Particles(&Of::All)),
@@ -78,7 +87,9 @@ const CASES: &[(&str, &str, &str, Of)] = &[
 fn bytes(v: &Value) -> Vec<u8> {
     match v {
         Value::Bytes(b) => b.clone(),
-        Value::Array(xs) => xs.iter().map(|x| u8::try_from(x.as_integer().unwrap()).unwrap()).collect(),
+        Value::Array(xs) => {
+            xs.iter().map(|x| u8::try_from(x.as_integer().unwrap()).unwrap()).collect()
+        }
         _ => panic!("no bytes: {v:?}"),
     }
 }
@@ -113,7 +124,8 @@ fn learnt(of: Of, state: &[u8]) -> Vec<Vec<u8>> {
         Of::Nothing => vec![],
         Of::Ladder(inner) => {
             let [kernels, _replicas, gaps, _rounds] = &parts(4)[..] else { unreachable!() };
-            let kernels = kernels.as_array().unwrap().iter().flat_map(|k| learnt(*inner, &bytes(k)));
+            let kernels =
+                kernels.as_array().unwrap().iter().flat_map(|k| learnt(*inner, &bytes(k)));
             kernels.chain([whole(gaps)]).collect()
         }
         Of::Particles(inner) => {
@@ -157,7 +169,8 @@ impl Sink for Keep {
 
 /// Neighbours that have nothing to do with the data.
 fn neighbours(model: &Model) -> Arc<dyn Banks> {
-    let all: Vec<_> = (0..12).filter_map(|i| model.simulate(9, i).ok()).map(|t| Latent::all(&t)).collect();
+    let all: Vec<_> =
+        (0..12).filter_map(|i| model.simulate(9, i).ok()).map(|t| Latent::all(&t)).collect();
     Arc::new(Neighbours::new(all.iter().take(3).cloned().collect(), &all))
 }
 
@@ -173,7 +186,9 @@ fn states(model: &Model, seed: u64, warmup: u64, steps: u64) -> Vec<(u64, Vec<Ve
         banks: Some(neighbours(model)),
         ..RunOptions::default()
     };
-    let done = model.run_into(&options, 1, &progress, vec![Box::new(sink)]).unwrap_or_else(|e| panic!("{e}"));
+    let done = model
+        .run_into(&options, 1, &progress, vec![Box::new(sink)])
+        .unwrap_or_else(|e| panic!("{e}"));
     done.into_iter().for_each(|c| drop(c.unwrap_or_else(|e| panic!("{}", model.chain_error(e)))));
     let of = |c: &Checkpoint| {
         let all = read(&c.to_bytes());
@@ -184,7 +199,9 @@ fn states(model: &Model, seed: u64, warmup: u64, steps: u64) -> Vec<(u64, Vec<Ve
 }
 
 fn model(text: &str, kernel: &str) -> Model {
-    let text = format!("{text} infer {{ warmup 200 {{ {kernel} }} repeat 200 {{ {kernel} collect 1; }} }}");
+    let text = format!(
+        "{text} infer {{ warmup 200 {{ {kernel} }} repeat 200 {{ {kernel} collect 1; }} }}"
+    );
     Program::parse(&text).and_then(Program::compile).unwrap_or_else(|e| panic!("{kernel}: {e}"))
 }
 
@@ -194,13 +211,19 @@ fn nothing_is_learnt_after_warm_up() {
     for (name, text, kernel, of) in CASES {
         let (warmup, steps) = (if *text == COUNTS { 60 } else { 200 }, 150);
         let all = states(&model(text, kernel), 3, warmup, steps);
-        let after: Vec<_> = all.iter().filter(|(step, _)| *step >= warmup).map(|(_, s)| learnt(*of, &s[0])).collect();
+        let after: Vec<_> = all
+            .iter()
+            .filter(|(step, _)| *step >= warmup)
+            .map(|(_, s)| learnt(*of, &s[0]))
+            .collect();
         assert!(after.len() as u64 > steps / 2, "{name}: {} checkpoints", after.len());
         let other = after.iter().position(|s| *s != after[0]);
         assert_eq!(other, None, "{kernel} goes on learning after warm-up; steps until then");
         // What does learn has learnt something: else nothing was seen here.
-        let before: Vec<_> = all.iter().filter(|(_, s)| !s.is_empty()).map(|(_, s)| learnt(*of, &s[0])).collect();
-        let learns = ["drift", "slice", "hmc", "mala", "nuts", "delayed", "temper", "smc", "abc"].contains(name);
+        let before: Vec<_> =
+            all.iter().filter(|(_, s)| !s.is_empty()).map(|(_, s)| learnt(*of, &s[0])).collect();
+        let learns = ["drift", "slice", "hmc", "mala", "nuts", "delayed", "temper", "smc", "abc"]
+            .contains(name);
         assert_eq!(learns, before.iter().any(|s| *s != after[0]), "{kernel}");
     }
 }
@@ -211,18 +234,23 @@ fn what_was_not_warmed_up_is_found_once() {
     for (name, text, kernel, of) in CASES.iter().filter(|(_, text, _, _)| *text != BRANCHES) {
         let all = states(&model(text, kernel), 3, 0, 60);
         // `abc` with particles finds its ladder as soon as one of them comes near enough.
-        let mut states: Vec<_> = all.iter().filter(|(step, _)| *step >= 1).map(|(_, s)| learnt(*of, &s[0])).collect();
-        let (count, most) = (states.len(), if kernel.contains("moves") || *name == "abc" { 2 } else { 1 });
+        let mut states: Vec<_> =
+            all.iter().filter(|(step, _)| *step >= 1).map(|(_, s)| learnt(*of, &s[0])).collect();
+        let (count, most) =
+            (states.len(), if kernel.contains("moves") || *name == "abc" { 2 } else { 1 });
         states.dedup();
         assert!(count > 30 && states.len() <= most, "{name}: {kernel} goes on learning");
     }
 }
 
-/// Where choices come and go, a metric is a function of what choices there are, whatever there was in between.
+/// Where choices come and go, a metric is a function of what choices there are, whatever
+/// there was in between.
 #[test]
 fn a_metric_depends_on_nothing_but_the_choices_there_are() {
-    let kernels = ["hmc($continuous, steps = 3); mh(@c);", "nuts($continuous, max_depth = 4); mh(@c);"];
-    // Of several seeds, since a branch may change just where a window ends, which leaves one state to tell a variance from.
+    let kernels =
+        ["hmc($continuous, steps = 3); mh(@c);", "nuts($continuous, max_depth = 4); mh(@c);"];
+    // Of several seeds, since a branch may change just where a window ends, which leaves
+    // one state to tell a variance from.
     for (kernel, seed) in kernels.iter().flat_map(|k| (0..6).map(move |seed| (*k, seed))) {
         let all = states(&model(BRANCHES, kernel), seed, 400, 150);
         let of = |step: u64| {
@@ -231,12 +259,18 @@ fn a_metric_depends_on_nothing_but_the_choices_there_are() {
             field(&adaptation, "learnt").as_map().unwrap().len()
         };
         // Nothing of it is lost again, by the choices that it is of.
-        assert!((1..550).all(|step| of(step) <= of(step + 1)) && of(400) > 1, "{kernel}: a metric is forgotten");
+        assert!(
+            (1..550).all(|step| of(step) <= of(step + 1)) && of(400) > 1,
+            "{kernel}: a metric is forgotten"
+        );
         let mut seen: Vec<(Value, Vec<Value>)> = Vec::new();
         for (_, states) in all.iter().filter(|(step, _)| *step >= 400) {
             let adaptation = read(&states[0]).as_array().unwrap()[0].clone();
-            let learnt = ["inverse_mass", "learnt", "step", "averaged"].map(|f| field(&adaptation, f).clone()).to_vec();
-            let mass: Vec<f64> = learnt[0].as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
+            let learnt = ["inverse_mass", "learnt", "step", "averaged"]
+                .map(|f| field(&adaptation, f).clone())
+                .to_vec();
+            let mass: Vec<f64> =
+                learnt[0].as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
             assert!(mass.iter().all(|m| m.is_finite() && *m > 0.0), "{kernel}: {mass:?}");
             let choices = field(&adaptation, "signature").clone();
             match seen.iter().find(|(other, _)| *other == choices) {
@@ -256,12 +290,16 @@ fn every_kernel_of_the_table_has_a_case() {
         assert!(CASES.iter().any(|c| c.0 == name), "`{name}`: add a case, or several");
     }
     for (name, _, kernel, _) in CASES {
-        assert!(kernel.starts_with(&format!("{name}(")), "the first kernel of `{kernel}` is no {name}");
+        assert!(
+            kernel.starts_with(&format!("{name}(")),
+            "the first kernel of `{kernel}` is no {name}"
+        );
     }
 }
 
-/// A structure that changes every few steps: the step size is learnt over all of them. Where each change began its learning again
-/// it stayed near a first guess, a fifth of the proposals was accepted, and two in five trajectories diverged.
+/// A structure that changes every few steps: the step size is learnt over all of them.
+/// Where each change began its learning again it stayed near a first guess, a fifth of
+/// the proposals was accepted, and two in five trajectories diverged.
 #[test]
 fn step_sizes_are_learnt_through_changes_of_structure() {
     let text = "let y = [-2.1, -1.9, -2.4, 1.8, 2.2, 2.5, 1.9, -2.2, 2.1, -1.8];

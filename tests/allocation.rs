@@ -1,6 +1,7 @@
 //! A transition of fixed structure allocates nothing once the trace has warmed up.
 //!
-//! Counting allocations takes an allocator, whose trait is unsafe; it only counts and passes on to the system's.
+//! Counting allocations takes an allocator, whose trait is unsafe; it only counts and
+//! passes on to the system's.
 
 use pcadlang::Model;
 use pcadlang::infer::{At, Gibbs, Hmc, Kernel, Mh, Nuts, Pick, Scope};
@@ -70,14 +71,20 @@ const CHAIN: &str = "let move = [[0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.
 
 #[test]
 fn transitions_of_fixed_structure_allocate_nothing() {
-    let kernels: [fn(Scope) -> Box<dyn Kernel>; 2] = [|s| Box::new(Gibbs::new(s)), |s| Box::new(Mh::new(s))];
+    let kernels: [fn(Scope) -> Box<dyn Kernel>; 2] =
+        [|s| Box::new(Gibbs::new(s)), |s| Box::new(Mh::new(s))];
     for make in kernels {
         for (text, tag) in [(REGRESSION, "flag"), (CHAIN, "state")] {
             let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
             let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
             let mut kernel = make(scope(tag));
             let count = allocations(&mut *kernel, &mut trace, 20_000);
-            assert_eq!(count, 0, "{} of ${tag}: {count} allocations in 20,000 steps", kernel.name());
+            assert_eq!(
+                count,
+                0,
+                "{} of ${tag}: {count} allocations in 20,000 steps",
+                kernel.name()
+            );
         }
     }
 }
@@ -90,7 +97,8 @@ fn redrawing_a_coefficient_that_all_points_read_allocates_nothing() {
     assert_eq!(count, 0, "{count} allocations in 2,000 steps");
 }
 
-const SCHOOLS: &str = "let y = [28, 8, -3, 7, -1, 1, 18, 12]; let sigma = [15, 10, 16, 11, 9, 11, 10, 18];
+const SCHOOLS: &str =
+    "let y = [28, 8, -3, 7, -1, 1, 18, 12]; let sigma = [15, 10, 16, 11, 9, 11, 10, 18];
     assume mu ~ normal(0, 5); assume tau ~ half_normal(5); assume e ~ iid(normal(0, 1), 8);
     observe normal(mu + tau * e, sigma) = y;";
 
@@ -104,10 +112,14 @@ fn schools(kernel: &mut dyn Kernel, steps: u64) -> u64 {
 fn leapfrog_steps_allocate_nothing() {
     let all = || Scope { selector: Selector::All, pick: Pick::All };
     let steps = 200;
-    // Steps so short that all are accepted: what a transition allocates is for its one proposal.
+    // Steps so short that all are accepted: what a transition allocates is for its one
+    // proposal.
     let of = |leaps: u32| schools(&mut Hmc::new(all(), leaps, Some(1e-3)), steps);
     let (few, many) = (of(2), of(40));
-    assert_eq!(few, many, "{few} allocations in {steps} transitions of 2 leapfrog steps, {many} in those of 40");
+    assert_eq!(
+        few, many,
+        "{few} allocations in {steps} transitions of 2 leapfrog steps, {many} in those of 40"
+    );
     assert!(few <= 40 * steps, "{few} allocations in {steps} transitions");
     let walk = schools(&mut Nuts::new(all(), 10), steps);
     assert!(walk <= 40 * steps, "{walk} allocations in {steps} transitions of nuts");

@@ -1,10 +1,11 @@
-//! What `docs/embedding.md` promises to hosts: every public item of it is used by a doc-test of its module, and in the page's table.
+//! What `docs/embedding.md` promises to hosts: every public item of it is used by a
+//! doc-test of its module, and in the page's table.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The promised API: a source file, the types of it that are promised (all public items if there are none), and where its doc-tests
-/// are besides.
+/// The promised API: a source file, the types of it that are promised (all public items
+/// if there are none), and where its doc-tests are besides.
 const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/model.rs", &[], &["src/guide.md", "src/host"]),
     ("src/model/program.rs", &[], &["src/guide.md", "src/host"]),
@@ -29,12 +30,24 @@ const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/trace/save.rs", &["SavedTrace", "SaveError", "Trace"], &["src/trace"]),
     ("src/trace/choices.rs", &["Target", "Selection"], &["src/trace"]),
     ("src/trace/propose.rs", &["Change", "Constraint", "Draws", "Weight"], &["src/trace"]),
-    ("src/trace/select.rs", &["Selector", "ChoiceKind", "Pattern", "PatternSegment"], &["src/trace"]),
+    (
+        "src/trace/select.rs",
+        &["Selector", "ChoiceKind", "Pattern", "PatternSegment"],
+        &["src/trace"],
+    ),
     ("src/trace/limits.rs", &["Limits"], &["src/trace", "src/guide.md"]),
     ("src/lang/address.rs", &["Address", "AddressSegment"], &["src/trace"]),
-    ("src/infer/kernel.rs", &["At", "Kernel", "Outcome", "Pick", "Scope", "decide", "recoverable"], &["src/infer"]),
+    (
+        "src/infer/kernel.rs",
+        &["At", "Kernel", "Outcome", "Pick", "Scope", "decide", "recoverable"],
+        &["src/infer"],
+    ),
     ("src/infer/observer.rs", &[], &["src/infer"]),
-    ("src/infer/plan/mod.rs", &["RunOptions", "Progress", "Watch", "ChainResult", "ChainError"], &["src/infer"]),
+    (
+        "src/infer/plan/mod.rs",
+        &["RunOptions", "Progress", "Watch", "ChainResult", "ChainError"],
+        &["src/infer"],
+    ),
     ("src/infer/plan/checkpoint.rs", &["Checkpoint"], &["src/infer"]),
     ("src/infer/state.rs", &["StateError"], &["src/infer"]),
     ("src/infer/draws.rs", &["Sink", "DrawRow", "KernelStats"], &["src/infer"]),
@@ -68,7 +81,11 @@ fn doc_tests(text: &str, is_markdown: bool) -> String {
     let (mut code, mut inside) = (String::new(), false);
     for line in text.lines() {
         let line = line.trim_start();
-        let doc = if is_markdown { Some(line) } else { line.strip_prefix("///").or(line.strip_prefix("//!")) };
+        let doc = if is_markdown {
+            Some(line)
+        } else {
+            line.strip_prefix("///").or(line.strip_prefix("//!"))
+        };
         let Some(doc) = doc.map(str::trim_start) else {
             inside = false;
             continue;
@@ -93,8 +110,10 @@ fn tests_under(path: &Path) -> String {
 /// The public items of a file: types and functions by name, methods as `Type::name`.
 fn items(text: &str, only: &[&str]) -> Vec<String> {
     let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
-    let word = |s: &str| s.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
-    let (mut found, mut owner, mut is_trait, mut hidden) = (Vec::new(), String::new(), false, false);
+    let word =
+        |s: &str| s.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let (mut found, mut owner, mut is_trait, mut hidden) =
+        (Vec::new(), String::new(), false, false);
     for line in text.lines() {
         if line.trim() == "#[doc(hidden)]" {
             hidden = true;
@@ -114,7 +133,8 @@ fn items(text: &str, only: &[&str]) -> Vec<String> {
         for kind in ["struct", "enum", "trait", "fn", "type"] {
             let Some(rest) = line.strip_prefix(&format!("pub {kind} ")) else { continue };
             let name = word(rest);
-            (owner, is_trait) = (if kind == "trait" { name.clone() } else { String::new() }, kind == "trait");
+            (owner, is_trait) =
+                (if kind == "trait" { name.clone() } else { String::new() }, kind == "trait");
             if !skipped && (only.is_empty() || only.contains(&&*name)) {
                 found.push(name);
             }
@@ -132,7 +152,8 @@ fn items(text: &str, only: &[&str]) -> Vec<String> {
     found
 }
 
-/// Whether code uses an item: a type as a word, a method as `.name` or `::name` or where it is implemented.
+/// Whether code uses an item: a type as a word, a method as `.name` or `::name` or where
+/// it is implemented.
 fn uses(code: &str, item: &str) -> bool {
     let name = item.rsplit("::").next().unwrap_or(item);
     let is_word = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
@@ -149,15 +170,24 @@ fn every_promised_item_is_used_by_a_doc_test_of_its_module() {
     for (file, only, besides) in PROMISED {
         let path = root().join(file);
         let text = read(&path);
-        let code: String =
-            std::iter::once(tests_under(&path)).chain(besides.iter().map(|p| tests_under(&root().join(p)))).collect();
+        let code: String = std::iter::once(tests_under(&path))
+            .chain(besides.iter().map(|p| tests_under(&root().join(p))))
+            .collect();
         let found = items(&text, only);
         for name in *only {
-            assert!(*name == "Trace" || found.iter().any(|f| f == name), "{file} has no public {name}");
+            assert!(
+                *name == "Trace" || found.iter().any(|f| f == name),
+                "{file} has no public {name}"
+            );
         }
         assert!(!found.is_empty(), "{file} has nothing public");
         count += found.len();
-        missing.extend(found.into_iter().filter(|item| !uses(&code, item)).map(|item| format!("{file}: {item}")));
+        missing.extend(
+            found
+                .into_iter()
+                .filter(|item| !uses(&code, item))
+                .map(|item| format!("{file}: {item}")),
+        );
     }
     assert!(missing.is_empty(), "no doc-test uses\n{}", missing.join("\n"));
     assert!(count > 200, "{count}");

@@ -1,15 +1,19 @@
-//! Choices that appear, vanish, or are asked for in some states only, where a wrong idea of what depends on what gives a wrong
-//! posterior without a sign of it. Each case was wrong once.
+//! Choices that appear, vanish, or are asked for in some states only, where a wrong idea
+//! of what depends on what gives a wrong posterior without a sign of it. Each case was
+//! wrong once.
 
 mod common;
 use common::*;
 use pcadlang::infer::RunOptions;
 
-/// A condition outside decides whether the one inside is asked for; both turn with `x`. Nothing tells of `x`, so its posterior is
-/// its prior. Kernels that keep to the present structure once took going up past 0.25 for a change of structure, and going down not.
+/// A condition outside decides whether the one inside is asked for; both turn with `x`.
+/// Nothing tells of `x`, so its posterior is its prior. Kernels that keep to the present
+/// structure once took going up past 0.25 for a change of structure, and going down not.
 #[test]
 fn conditions_that_turn_together_are_no_change_of_structure() {
-    for kernel in ["slice(@x)", "slice(@x, doubling = true)", "nuts(@x)", "mala(@x)", "elliptical(@x)"] {
+    for kernel in
+        ["slice(@x)", "slice(@x, doubling = true)", "nuts(@x)", "mala(@x)", "elliptical(@x)"]
+    {
         let text = format!(
             "assume d ~ categorical([1, 1, 1]);
              assume x ~ normal(0, 1);
@@ -24,7 +28,8 @@ fn conditions_that_turn_together_are_no_change_of_structure() {
     }
 }
 
-/// A value that only passes of a loop read, where a condition allows it; elsewhere it does not exist.
+/// A value that only passes of a loop read, where a condition allows it; elsewhere it
+/// does not exist.
 #[test]
 fn what_no_pass_asks_for_is_not_run() {
     let text = "assume k ~ categorical([1, 2, 3, 4]);
@@ -38,12 +43,14 @@ fn what_no_pass_asks_for_is_not_run() {
     };
     let total: f64 = (0..4).map(weight).sum();
     for k in 0..4 {
-        let share: Vec<f64> = draws["k"].iter().map(|x| f64::from(u8::from(*x == k as f64))).collect();
+        let share: Vec<f64> =
+            draws["k"].iter().map(|x| f64::from(u8::from(*x == k as f64))).collect();
         assert_mean(&format!("{k}"), &share, weight(k) / total, 0.1);
     }
 }
 
-/// What appears differs from what vanishes, in as many choices: the first stage of delayed acceptance has to see both.
+/// What appears differs from what vanishes, in as many choices: the first stage of
+/// delayed acceptance has to see both.
 #[test]
 fn delayed_acceptance_sees_which_choices_appear() {
     let text = "assume c ~ flip(0.5);
@@ -56,8 +63,8 @@ fn delayed_acceptance_sees_which_choices_appear() {
     assert_mean("c", &draws["c"], a / (a + b), 0.05);
 }
 
-/// A choice that the observation alone asks for appears, and nothing vanishes: the first stage pays nothing for it, so no such move
-/// may pass.
+/// A choice that the observation alone asks for appears, and nothing vanishes: the first
+/// stage pays nothing for it, so no such move may pass.
 #[test]
 fn delayed_acceptance_leaves_what_only_the_observation_asks_for() {
     let text = "assume c ~ flip(0.5);
@@ -69,7 +76,8 @@ fn delayed_acceptance_leaves_what_only_the_observation_asks_for() {
     assert_mean("c", &draws["c"], with / (with + without), 0.05);
 }
 
-/// The default plan moves the structure too, whatever the draw showed that the plan was made from.
+/// The default plan moves the structure too, whatever the draw showed that the plan was
+/// made from.
 #[test]
 fn the_default_plan_goes_where_other_choices_are() {
     let text = "assume x ~ normal(0, 1);
@@ -77,7 +85,8 @@ fn the_default_plan_goes_where_other_choices_are() {
          observe normal(m, 1) = 0.5 as y;";
     let options = RunOptions { seed: 6, steps: Some(8000), ..RunOptions::default() };
     let draws = run_with(text, &options, 2, 2);
-    let (up, down) = (0.5 * (normal_pdf(0.5, 2.0, 1.0) + normal_pdf(0.5, 0.0, 1.0)), normal_pdf(0.5, -1.0, 1.0));
+    let (up, down) =
+        (0.5 * (normal_pdf(0.5, 2.0, 1.0) + normal_pdf(0.5, 0.0, 1.0)), normal_pdf(0.5, -1.0, 1.0));
     let mean = (2.0 / std::f64::consts::PI).sqrt() * (up - down) / (up + down);
     assert_mean("x", &draws["x"], mean, 0.2);
 }

@@ -1,4 +1,5 @@
-//! The layers of `docs/architecture.md`: modules depend one way, and only the command prints.
+//! The layers of `docs/architecture.md`: modules depend one way, and only the command
+//! prints.
 
 use std::path::{Path, PathBuf};
 
@@ -51,18 +52,29 @@ fn modules_depend_one_way() {
         (
             "session",
             &[
-                "session", "bank", "Model", "model", "report", "infer", "trace", "lang", "syntax", "diag", "geom",
-                "platform", "render", "rng",
+                "session", "bank", "Model", "model", "report", "infer", "trace", "lang", "syntax",
+                "diag", "geom", "platform", "render", "rng",
             ],
         ),
-        ("bank", &["bank", "Model", "report", "infer", "trace", "lang", "dist", "render", "vision", "num", "rng"]),
+        (
+            "bank",
+            &[
+                "bank", "Model", "report", "infer", "trace", "lang", "dist", "render", "vision",
+                "num", "rng",
+            ],
+        ),
     ];
     let mut seen = 0;
     for (module, may) in allowed {
         for (path, text) in files(module) {
             for part in without_tests(&text).split("crate::").skip(1) {
-                let used: String = part.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-                assert!(used.is_empty() || may.contains(&&*used), "{}: {module} must not use {used}", path.display());
+                let used: String =
+                    part.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                assert!(
+                    used.is_empty() || may.contains(&&*used),
+                    "{}: {module} must not use {used}",
+                    path.display()
+                );
                 seen += 1;
             }
         }
@@ -78,11 +90,20 @@ fn only_the_command_prints_and_no_file_is_long() {
     assert!(paths.len() > 100);
     for path in paths {
         let text = std::fs::read_to_string(&path).unwrap();
-        assert!(text.lines().count() <= 600, "{} has {} lines", path.display(), text.lines().count());
+        assert!(
+            text.lines().count() <= 600,
+            "{} has {} lines",
+            path.display(),
+            text.lines().count()
+        );
         assert!(text.starts_with("//!"), "{} does not say what it is", path.display());
         let is_command = path.starts_with(root.join("cli")) || path.ends_with("main.rs");
         for print in ["println!(", "eprintln!(", "print!(", "dbg!("] {
-            assert!(is_command || !without_tests(&text).contains(print), "{} prints", path.display());
+            assert!(
+                is_command || !without_tests(&text).contains(print),
+                "{} prints",
+                path.display()
+            );
         }
     }
 }

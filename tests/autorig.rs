@@ -1,4 +1,5 @@
-//! The shipped animal: its mesh is made here, gets an armature in both ways, and is drawn from `autorig.pcad`.
+//! The shipped animal: its mesh is made here, gets an armature in both ways, and is drawn
+//! from `autorig.pcad`.
 //!
 //! `REGENERATE=1 cargo test --test autorig` rewrites `programs/data/dog.obj`.
 
@@ -60,7 +61,8 @@ fn dog() -> String {
             } else {
                 (b, rb, 90.0 * (ring - half) as f64 / half as f64)
             };
-            let (along, out) = (r * libm::sin(angle.to_radians()), r * libm::cos(angle.to_radians()));
+            let (along, out) =
+                (r * libm::sin(angle.to_radians()), r * libm::cos(angle.to_radians()));
             for k in 0..SIDES {
                 let turn = std::f64::consts::TAU * k as f64 / SIDES as f64;
                 put(at + axis * along + (u * libm::cos(turn) + v * libm::sin(turn)) * out);
@@ -73,7 +75,14 @@ fn dog() -> String {
             let _ = writeln!(s, "f {first} {} {}", at(0, k + 1), at(0, k));
             for ring in 0..RINGS - 1 {
                 let (lo, hi) = (ring, ring + 1);
-                let _ = writeln!(s, "f {} {} {} {}", at(lo, k), at(lo, k + 1), at(hi, k + 1), at(hi, k));
+                let _ = writeln!(
+                    s,
+                    "f {} {} {} {}",
+                    at(lo, k),
+                    at(lo, k + 1),
+                    at(hi, k + 1),
+                    at(hi, k)
+                );
             }
             let _ = writeln!(s, "f {last} {} {}", at(RINGS - 1, k), at(RINGS - 1, k + 1));
         }
@@ -86,15 +95,20 @@ fn dog() -> String {
 fn the_shipped_animal_is_the_one_made_here() {
     let made = dog();
     if std::env::var_os("REGENERATE").is_some() {
-        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/programs/data/dog.obj"), &made).unwrap();
+        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/programs/data/dog.obj"), &made)
+            .unwrap();
         return;
     }
     assert!(made.len() < 60_000);
-    assert!(embedded("data/dog.obj") == Some(&made), "programs/data/dog.obj: REGENERATE=1 cargo test --test autorig");
+    assert!(
+        embedded("data/dog.obj") == Some(&made),
+        "programs/data/dog.obj: REGENERATE=1 cargo test --test autorig"
+    );
     let mesh = obj::load(made.as_bytes()).unwrap();
     for t in &mesh.topology.triangles {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
-        let n = mesh.normals[t[0] as usize] + mesh.normals[t[1] as usize] + mesh.normals[t[2] as usize];
+        let n =
+            mesh.normals[t[0] as usize] + mesh.normals[t[1] as usize] + mesh.normals[t[2] as usize];
         assert!((b - a).cross(c - a).dot(n) > 0.0);
     }
 }
@@ -104,7 +118,8 @@ fn its_groups_become_its_limbs() {
     let mesh = obj::load(dog().as_bytes()).unwrap();
     let body = autorig::by_groups(&mesh).unwrap();
     let joints = body.rig().joints();
-    let parent = |name: &str| joints[body.rig().find(name).unwrap()].parent.map_or("", |p| &*joints[p].name);
+    let parent =
+        |name: &str| joints[body.rig().find(name).unwrap()].parent.map_or("", |p| &*joints[p].name);
     assert_eq!(joints.len(), 14);
     let expected = [
         ("neck", "chest"),
@@ -145,7 +160,18 @@ fn the_shipped_program_draws_it_both_ways() {
     let mut pictures = BTreeSet::new();
     for from in ["groups", "skeleton"] {
         let set = format!("from={from}");
-        f.succeeds(&["sample", "autorig.pcad", "--set", &set, "-n", "2", "--size", "64", "--out", "sheet.png"]);
+        f.succeeds(&[
+            "sample",
+            "autorig.pcad",
+            "--set",
+            &set,
+            "-n",
+            "2",
+            "--size",
+            "64",
+            "--out",
+            "sheet.png",
+        ]);
         pictures.insert(std::fs::read(f.path().join("sheet.png")).unwrap());
     }
     assert_eq!(pictures.len(), 2);
@@ -161,7 +187,13 @@ fn meshes_that_cannot_be_rigged_are_named_with_what_can_be_done() {
     );
     let run = |from: &str, says: &str| {
         let set = format!("from={from}");
-        f.refuses(&["run", "p.pcad", "--set", &set, "--steps", "5", "--warmup", "5", "--chains", "1", "--quiet"], says);
+        f.refuses(
+            &[
+                "run", "p.pcad", "--set", &set, "--steps", "5", "--warmup", "5", "--chains", "1",
+                "--quiet",
+            ],
+            says,
+        );
     };
     run("groups", "needs 2 to 256 groups in the mesh; it has 1");
     let d = f.run(&["run", "p.pcad", "--quiet"]);

@@ -1,4 +1,5 @@
-//! Files and settings that are wrong: exit code 1, a message that says what, nothing half written.
+//! Files and settings that are wrong: exit code 1, a message that says what, nothing half
+//! written.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -6,7 +7,8 @@ mod folder;
 use folder::{Folder, disc, png};
 use image::{GrayImage, RgbImage};
 
-const RUN: [&str; 9] = ["run", "p.pcad", "--steps", "5", "--warmup", "5", "--chains", "1", "--quiet"];
+const RUN: [&str; 9] =
+    ["run", "p.pcad", "--steps", "5", "--warmup", "5", "--chains", "1", "--quiet"];
 
 fn run<'a>(more: &[&'a str]) -> Vec<&'a str> {
     RUN.iter().copied().chain(more.iter().copied()).collect()
@@ -28,7 +30,10 @@ const MESH: &str = "include \"std/scene.pcad\" as scene; data m = mesh(\"x.obj\"
 
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0u32, |c, b| {
-        (0..8).fold(c ^ u32::from(*b), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 })
+        (0..8).fold(
+            c ^ u32::from(*b),
+            |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 },
+        )
     })
 }
 
@@ -79,7 +84,8 @@ fn pictures_that_are_none() {
 #[test]
 fn a_very_wide_picture_is_read() {
     let f = Folder::new("wide");
-    f.write("p.pcad", PHOTO).write("wide.png", png(GrayImage::from_fn(16384, 8, |x, _| image::Luma([(x / 64) as u8]))));
+    f.write("p.pcad", PHOTO)
+        .write("wide.png", png(GrayImage::from_fn(16384, 8, |x, _| image::Luma([(x / 64) as u8]))));
     f.succeeds(&["contours", "wide.png", "-o", "out.png", "--size", "64"]);
     assert!(f.exists("out.png"));
     f.succeeds(&run(&["--observe", "wide.png", "--out", "out"]));
@@ -101,7 +107,10 @@ fn cameras_that_are_none() {
         .write("text.json", "camera")
         .write("bin.json", [0xff, 0xfe, 0]);
     f.write("none.json", "{}").write("nan.json", "{\"width\": 1e999}");
-    f.refuses(&run(&["--camera", "missing.json", "--observe", "x.png"]), "cannot read missing.json");
+    f.refuses(
+        &run(&["--camera", "missing.json", "--observe", "x.png"]),
+        "cannot read missing.json",
+    );
     for file in ["empty.json", "list.json", "text.json", "bin.json", "none.json", "nan.json"] {
         f.refuses(&run(&["--camera", file, "--observe", "x.png"]), file);
         f.refuses(&["sample", "p.pcad", "--camera", file], file);
@@ -131,10 +140,15 @@ fn meshes_that_are_none() {
     }
     f.write("x.obj", [0x76, 0x20, 0xff, 0xfe]);
     f.refuses(&run(&[]), "not text");
-    // A face may name its corners' normals that are not there; a mesh that is well renders.
+    // A face may name its corners' normals that are not there; a mesh that is well
+    // renders.
     f.write("x.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//7 2//8 3//9\n");
     let d = f.run(&run(&["--out", "a"]));
-    assert!(d.code == 0 || d.code == 1 && d.err.starts_with("error") && !f.exists("a"), "{}", d.err);
+    assert!(
+        d.code == 0 || d.code == 1 && d.err.starts_with("error") && !f.exists("a"),
+        "{}",
+        d.err
+    );
     f.write("x.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     f.succeeds(&run(&["--out", "b"]));
     assert!(f.exists("b/best.obj") && f.exists("b/overlay.png"));
@@ -145,7 +159,9 @@ fn meshes_that_are_none() {
 fn objects_out_of_view() {
     let f = Folder::new("away");
     f.write("x.png", png(disc(32, 32, 16.0, 16.0, 9.0)));
-    for place in ["[50, 0, 0]", "[0, 0, 30]", "[0, 0, 8]", "[0, 0, -1e6]", "[1e15, 1e15, 0]", "[0, 0, 7.9]"] {
+    for place in
+        ["[50, 0, 0]", "[0, 0, 30]", "[0, 0, 8]", "[0, 0, -1e6]", "[1e15, 1e15, 0]", "[0, 0, 7.9]"]
+    {
         f.write(
             "p.pcad",
             format!(
@@ -211,26 +227,35 @@ fn recursion_without_end() {
 fn very_large_programs() {
     let f = Folder::new("large");
     let n = 100_000;
-    for (open, close) in
-        [("(", ")"), ("[", "]"), ("-", ""), ("{", "}"), ("if true { ", " } else { 0 }"), ("fn(x) { ", "}")]
-    {
+    for (open, close) in [
+        ("(", ")"),
+        ("[", "]"),
+        ("-", ""),
+        ("{", "}"),
+        ("if true { ", " } else { 0 }"),
+        ("fn(x) { ", "}"),
+    ] {
         f.write("p.pcad", format!("assume x = {}1{};", open.repeat(n), close.repeat(n)));
         f.refuses(&run(&[]), "");
         f.refuses(&["check", "p.pcad"], "");
     }
     f.write("p.pcad", format!("assume x = {};", "(".repeat(n)));
     f.refuses(&run(&[]), "");
-    // 5 MB of source are refused; a little less than 4 MiB is read, with a mistake at the end and without.
-    let comment =
-        "// a comment that says nothing in particular, to make the file large, again and again, line by line\n";
+    // 5 MB of source are refused; a little less than 4 MiB is read, with a mistake at the
+    // end and without.
+    let comment = "// a comment that says nothing in particular, to make the file large, again and again, line by line\n";
     f.write("p.pcad", comment.repeat(50_000));
     f.refuses(&run(&[]), "the file is too large");
-    let big = format!("{}assume x ~ normal(0, 1); observe normal(x, 1) = 1;\n", comment.repeat(40_000));
+    let big =
+        format!("{}assume x ~ normal(0, 1); observe normal(x, 1) = 1;\n", comment.repeat(40_000));
     f.write("p.pcad", &big);
     f.succeeds(&run(&["--out", "big"]));
     f.write("p.pcad", format!("{big}assume y = ;"));
     f.refuses(&run(&[]), "");
-    let sum = format!("assume x ~ normal(0, 1); let s = x{};\nobserve normal(s, 1) = 0;", " + 1".repeat(n));
+    let sum = format!(
+        "assume x ~ normal(0, 1); let s = x{};\nobserve normal(s, 1) = 0;",
+        " + 1".repeat(n)
+    );
     f.write("p.pcad", sum);
     let d = f.run(&run(&["--out", "sum"]));
     assert!(d.code == 0 || d.code == 1 && d.err.starts_with("error"), "{}", d.err);
@@ -285,6 +310,9 @@ fn folders_that_hold_something_else() {
         f.succeeds(&run(&["--out", "empty"]));
         assert!(f.files().iter().all(|n| !n.contains(".partial")), "{:?}", f.files());
     }
-    f.refuses(&["sample", "p.pcad", "--out", "missing/folder/sheet.png", "--camera", "none.json"], "none.json");
+    f.refuses(
+        &["sample", "p.pcad", "--out", "missing/folder/sheet.png", "--camera", "none.json"],
+        "none.json",
+    );
     f.refuses(&["contours", "file", "--out", "missing/map.png"], "file");
 }

@@ -1,8 +1,11 @@
-//! Every kernel is reversible: the joint counts of (state, next state) are symmetric, and the marginal is the posterior.
+//! Every kernel is reversible: the joint counts of (state, next state) are symmetric, and
+//! the marginal is the posterior.
 //!
-//! For a reversible chain in equilibrium the numbers of moves i to j and j to i have the same expectation, also for states
-//! lumped together, and the variance of their difference is at most that of independent moves. A mixture of reversible
-//! kernels is reversible, so a kernel that does not reach everything by itself is mixed with one that does.
+//! For a reversible chain in equilibrium the numbers of moves i to j and j to i have the
+//! same expectation, also for states lumped together, and the variance of their
+//! difference is at most that of independent moves. A mixture of reversible kernels is
+//! reversible, so a kernel that does not reach everything by itself is mixed with one
+//! that does.
 
 mod common;
 use common::*;
@@ -32,14 +35,17 @@ fn bin(x: f64, edges: &[f64]) -> usize {
 
 const DISCRETE: Case = Case {
     name: "discrete",
-    text: "assume a ~ categorical([0.2, 0.5, 0.3]); assume b ~ flip(if a == 1 { 0.7 } else { 0.2 });
+    text:
+        "assume a ~ categorical([0.2, 0.5, 0.3]); assume b ~ flip(if a == 1 { 0.7 } else { 0.2 });
            observe normal(a + (if b { 1 } else { 0 }), 0.7) = 1.5;",
     collect: "a, b",
     cell: |d, i| d["a"][i] as usize * 2 + d["b"][i] as usize,
     mass: || {
         let p = |a: usize, b: usize| {
             let pb = if a == 1 { 0.7 } else { 0.2 };
-            [0.2, 0.5, 0.3][a] * if b == 1 { pb } else { 1.0 - pb } * normal_pdf(1.5, (a + b) as f64, 0.7)
+            [0.2, 0.5, 0.3][a]
+                * if b == 1 { pb } else { 1.0 - pb }
+                * normal_pdf(1.5, (a + b) as f64, 0.7)
         };
         normalised((0..6).map(|i| p(i / 2, i % 2)).collect())
     },
@@ -60,8 +66,12 @@ const STRUCTURE: Case = Case {
     mass: || {
         let gamma = |b: f64| if b > 0.0 { b * (-b).exp() } else { 0.0 };
         let f = |x: f64| 0.6 * (0.3 * gamma(x) + 0.7 * gamma(x - 1.0)) * normal_pdf(2.0, x, 1.0);
-        let mut w: Vec<f64> = (0..3).map(|a| 0.4 * [0.25, 0.5, 0.25][a] * normal_pdf(2.0, a as f64, 1.0)).collect();
-        w.extend([(0.0, 1.0), (1.0, 1.7), (1.7, 2.5), (2.5, 14.0)].map(|(a, b)| integrate(f, a, b, 2000)));
+        let mut w: Vec<f64> =
+            (0..3).map(|a| 0.4 * [0.25, 0.5, 0.25][a] * normal_pdf(2.0, a as f64, 1.0)).collect();
+        w.extend(
+            [(0.0, 1.0), (1.0, 1.7), (1.7, 2.5), (2.5, 14.0)]
+                .map(|(a, b)| integrate(f, a, b, 2000)),
+        );
         normalised(w)
     },
 };
@@ -76,7 +86,8 @@ const SURROGATE: Case = Case {
     ..STRUCTURE
 };
 
-/// The text of a model in which x is beta or gamma as c has it, and the masses of c and where x is.
+/// The text of a model in which x is beta or gamma as c has it, and the masses of c and
+/// where x is.
 const BETA_OR_GAMMA: fn() -> Vec<f64> = || {
     let beta = |x: f64| if x > 0.0 && x < 1.0 { 12.0 * x * (1.0 - x) * (1.0 - x) } else { 0.0 };
     let gamma = |x: f64| x * (-x).exp();
@@ -84,7 +95,9 @@ const BETA_OR_GAMMA: fn() -> Vec<f64> = || {
         let f = |x: f64| if c { 0.4 * beta(x) } else { 0.6 * gamma(x) } * normal_pdf(0.8, x, 0.5);
         integrate(f, lo, hi, 2000)
     };
-    let parts = |c: bool| [(0.0, 0.4), (0.4, 0.8), (0.8, if c { 1.0 } else { 9.0 })].map(|(a, b)| cell(a, b, c));
+    let parts = |c: bool| {
+        [(0.0, 0.4), (0.4, 0.8), (0.8, if c { 1.0 } else { 9.0 })].map(|(a, b)| cell(a, b, c))
+    };
     normalised([parts(false), parts(true)].concat())
 };
 
@@ -92,7 +105,8 @@ fn beta_or_gamma(d: &Draws, i: usize) -> usize {
     d["c"][i] as usize * 3 + bin(d["x"][i], &[0.4, 0.8])
 }
 
-/// The same name in both branches: two addresses, `@x/a` and `@x/a#2`, of which there is always one.
+/// The same name in both branches: two addresses, `@x/a` and `@x/a#2`, of which there is
+/// always one.
 const SAME_NAME: Case = Case {
     name: "same name",
     text: "assume c ~ flip(0.4);
@@ -103,8 +117,8 @@ const SAME_NAME: Case = Case {
     mass: BETA_OR_GAMMA,
 };
 
-/// The same address in both states of c, by way of two functions that are called at one place: one choice goes and another of
-/// another support comes, at `@x/f/a` both.
+/// The same address in both states of c, by way of two functions that are called at one
+/// place: one choice goes and another of another support comes, at `@x/f/a` both.
 const SHARED: Case = Case {
     name: "shared address",
     text: "assume c ~ flip(0.4);
@@ -116,7 +130,8 @@ const SHARED: Case = Case {
     mass: BETA_OR_GAMMA,
 };
 
-/// One choice whose support moves with another: what is outside of it there has density zero.
+/// One choice whose support moves with another: what is outside of it there has density
+/// zero.
 const MOVING: Case = Case {
     name: "moving support",
     text: "assume c ~ flip(0.4); let d = if c { beta(2, 3) } else { gamma(2, 1) };
@@ -135,8 +150,9 @@ const FINITE_SUPPORT: Case = Case {
     collect: "n, k",
     cell: |d, i| [0, 1, 3][d["n"][i] as usize] + d["k"][i] as usize,
     mass: || {
-        let p =
-            |n: usize, k: usize| [0.3, 0.3, 0.4][n] / (n + 1) as f64 * normal_pdf(0.4, k as f64 - 0.5 * n as f64, 1.0);
+        let p = |n: usize, k: usize| {
+            [0.3, 0.3, 0.4][n] / (n + 1) as f64 * normal_pdf(0.4, k as f64 - 0.5 * n as f64, 1.0)
+        };
         normalised(vec![p(0, 0), p(1, 0), p(1, 1), p(2, 0), p(2, 1), p(2, 2)])
     },
 };
@@ -151,7 +167,9 @@ const SUPPORT: Case = Case {
         let cell = |lo: f64, hi: f64, a: f64, b: f64| {
             integrate(|p1| integrate(like, a, b.min(p1).max(a), 200) / p1, lo, hi, 200)
         };
-        let row = |lo, hi| [(0.0, 0.15), (0.15, 0.3), (0.3, 0.5), (0.5, 1.0)].map(|(a, b)| cell(lo, hi, a, b));
+        let row = |lo, hi| {
+            [(0.0, 0.15), (0.15, 0.3), (0.3, 0.5), (0.5, 1.0)].map(|(a, b)| cell(lo, hi, a, b))
+        };
         normalised([row(0.5, 0.75), row(0.75, 1.0)].concat())
     },
 };
@@ -169,7 +187,8 @@ const GAUSSIAN: Case = Case {
             };
             integrate(inner, a0, a1, 600)
         };
-        let row = |a0, a1| [(-8.0, 0.0), (0.0, 1.0), (1.0, 9.0)].map(|(b0, b1)| cell(a0, a1, b0, b1));
+        let row =
+            |a0, a1| [(-8.0, 0.0), (0.0, 1.0), (1.0, 9.0)].map(|(b0, b1)| cell(a0, a1, b0, b1));
         normalised([row(-5.0, -0.5), row(-0.5, 0.5), row(0.5, 1.2), row(1.2, 6.0)].concat())
     },
 };
@@ -199,7 +218,8 @@ const MAPS: Case = Case {
     },
 };
 
-/// Two labels that share an observation, one with a prior that depends on a number, and a number whose prior has a label in it.
+/// Two labels that share an observation, one with a prior that depends on a number, and a
+/// number whose prior has a label in it.
 const MIXTURE: Case = Case {
     name: "mixture",
     text: "assume s ~ gamma(2, 1); assume a ~ flip(0.3); assume b ~ categorical([0.2, 0.5, 0.3]);
@@ -207,7 +227,9 @@ const MIXTURE: Case = Case {
            observe normal(m + b, 0.7) = 1.5; observe flip(s / (s + 1)) = true;",
     collect: "s, a, b, m",
     cell: |d, i| {
-        (bin(d["s"][i], &[1.5]) * 2 + d["a"][i] as usize) * 6 + d["b"][i] as usize * 2 + bin(d["m"][i], &[0.5])
+        (bin(d["s"][i], &[1.5]) * 2 + d["a"][i] as usize) * 6
+            + d["b"][i] as usize * 2
+            + bin(d["m"][i], &[0.5])
     },
     mass: || {
         let cell = |s0: f64, s1: f64, a: usize, b: usize, m0: f64, m1: f64| {
@@ -234,7 +256,8 @@ const MIXTURE: Case = Case {
     },
 };
 
-/// The number of elements of an array depends on a choice: with another number they are all drawn anew.
+/// The number of elements of an array depends on a choice: with another number they are
+/// all drawn anew.
 const ELEMENTS: Case = Case {
     name: "elements",
     text: "assume n ~ categorical([0.5, 0.3, 0.2]); assume z ~ iid(gamma(1, 1), n + 1);
@@ -243,7 +266,9 @@ const ELEMENTS: Case = Case {
     cell: |d, i| d["n"][i] as usize * 2 + bin(d["sum(z)"][i], &[1.4]),
     mass: || {
         // A sum of n + 1 exponentials is gamma(n + 1, 1).
-        let f = |n: usize, x: f64| [0.5, 0.3, 0.2][n] * [1.0, x, x * x / 2.0][n] * (-x).exp() * normal_pdf(1.5, x, 0.8);
+        let f = |n: usize, x: f64| {
+            [0.5, 0.3, 0.2][n] * [1.0, x, x * x / 2.0][n] * (-x).exp() * normal_pdf(1.5, x, 0.8)
+        };
         let row = |n| [(0.0, 1.4), (1.4, 10.0)].map(|(a, b)| integrate(|x| f(n, x), a, b, 2000));
         normalised([row(0), row(1), row(2)].concat())
     },
@@ -265,7 +290,8 @@ const SHARED_GROUPS: Case = Case {
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             let p = 0.5 * if b == 1 { 0.3 } else { 0.7 };
             for (lo, hi) in [(0.0, 1.3), (1.3, 10.0)] {
-                let f = |m: f64| prior(m) * near(m, 1.0) * if a == b { near(m, 2.2) } else { other };
+                let f =
+                    |m: f64| prior(m) * near(m, 1.0) * if a == b { near(m, 2.2) } else { other };
                 w.push(p * integrate(f, lo, hi, 2000));
             }
         }
@@ -281,12 +307,14 @@ const COUNTS: Case = Case {
     cell: |d, i| (d["n"][i] as usize).min(4) * 3 + (d["k"][i] as usize).min(2),
     mass: || {
         let mut w = vec![0.0; 15];
-        let choose = |n: u32, k: u32| (0..k).map(|i| f64::from(n - i) / f64::from(i + 1)).product::<f64>();
+        let choose =
+            |n: u32, k: u32| (0..k).map(|i| f64::from(n - i) / f64::from(i + 1)).product::<f64>();
         let mut poisson = (-2.0f64).exp();
         for n in 0..30u32 {
             for k in 0..=n {
                 let p = choose(n, k) * 0.6f64.powi(k as i32) * 0.4f64.powi((n - k) as i32);
-                w[(n.min(4) * 3 + k.min(2)) as usize] += poisson * p * normal_pdf(1.5, f64::from(k), 1.0);
+                w[(n.min(4) * 3 + k.min(2)) as usize] +=
+                    poisson * p * normal_pdf(1.5, f64::from(k), 1.0);
             }
             poisson *= 2.0 / f64::from(n + 1);
         }
@@ -316,7 +344,10 @@ fn balanced(case: &Case, kernel: &str, steps: usize) {
             let (there, back) = (counts[i][j], counts[j][i]);
             moves += there + back;
             let bound = 5.0 * (there + back).sqrt() + 5.0;
-            assert!((there - back).abs() < bound, "{what}: {i} to {j} {there} times, back {back} times");
+            assert!(
+                (there - back).abs() < bound,
+                "{what}: {i} to {j} {there} times, back {back} times"
+            );
         }
     }
     assert!(moves > 0.01 * steps as f64, "{what}: the chain hardly moves");
@@ -324,8 +355,12 @@ fn balanced(case: &Case, kernel: &str, steps: usize) {
         let here: Vec<f64> = states.iter().map(|s| f64::from(u8::from(*s == i))).collect();
         let (m, se) = (mean(&here), standard_error(&here));
         assert!(se < 0.03, "{what}: run longer, se {se}");
-        // A cell that is hardly ever visited has no honest standard error: a thousandth is as near as it gets.
-        assert!((m - expected).abs() < 5.0 * se + 1e-3, "{what}: cell {i} has {m} (se {se}), expected {expected}");
+        // A cell that is hardly ever visited has no honest standard error: a thousandth
+        // is as near as it gets.
+        assert!(
+            (m - expected).abs() < 5.0 * se + 1e-3,
+            "{what}: cell {i} has {m} (se {se}), expected {expected}"
+        );
     }
 }
 
@@ -359,7 +394,8 @@ fn one_address_in_two_branches() {
     for c in [true, false] {
         let mut trace = model.simulate(1, 0).unwrap();
         trace.set("@c", c, Default::default()).unwrap();
-        let names: Vec<String> = trace.choices().into_iter().map(|(a, _, _)| a.to_string()).collect();
+        let names: Vec<String> =
+            trace.choices().into_iter().map(|(a, _, _)| a.to_string()).collect();
         assert_eq!(names, ["@c", "@x/f/a"]);
     }
     all_balanced(&SHARED, 20_000, kernels::balance::SHARED);
@@ -410,7 +446,8 @@ fn gaussian_choices() {
     all_balanced(&GAUSSIAN, 20_000, kernels::balance::GAUSSIAN);
 }
 
-/// Neighbours that have nothing to do with the data, and few of them: the density of the proposal is in the ratio.
+/// Neighbours that have nothing to do with the data, and few of them: the density of the
+/// proposal is in the ratio.
 #[test]
 fn proposals_from_wrong_neighbours() {
     for case in [
@@ -431,9 +468,10 @@ fn proposals_from_wrong_neighbours() {
     all_balanced(&STRUCTURE, 20_000, kernels::balance::NEIGHBOURS_OF_SOME);
 }
 
-/// Getting it right (Geweke 2004): data drawn anew given the parameters, then the parameters moved given the data, by turns.
-/// Then parameters and data follow the joint prior, whose moments are known. Data are choices that are drawn by `block`,
-/// which takes them from their prior given the rest.
+/// Getting it right (Geweke 2004): data drawn anew given the parameters, then the
+/// parameters moved given the data, by turns. Then parameters and data follow the joint
+/// prior, whose moments are known. Data are choices that are drawn by `block`, which
+/// takes them from their prior given the rest.
 #[test]
 fn parameters_and_data_by_turns() {
     for kernel in kernels::BY_TURNS {
@@ -445,7 +483,8 @@ fn parameters_and_data_by_turns() {
              infer {{ repeat 30000 {{ {k}; block(@y); collect s, m, w, y[0] * y[1], m * m, s * s; }} }}"
         );
         let d = run(&text, 7, 2);
-        // gamma(3, rate 3): mean 1, mean square 4/3; beta(2, 2): mean 1/2, mean square 3/10.
+        // gamma(3, rate 3): mean 1, mean square 4/3; beta(2, 2): mean 1/2, mean square
+        // 3/10.
         assert_mean(&format!("{kernel} s"), &d["s"], 1.0, 0.15);
         assert_mean(&format!("{kernel} s^2"), &d["s * s"], 4.0 / 3.0, 0.4);
         assert_mean(&format!("{kernel} m"), &d["m"], 0.0, 0.25);
@@ -455,8 +494,8 @@ fn parameters_and_data_by_turns() {
     }
 }
 
-/// Simulation-based calibration (Talts et al. 2018): parameters from the prior, data from them, and the rank of the
-/// parameter among posterior draws is uniform.
+/// Simulation-based calibration (Talts et al. 2018): parameters from the prior, data from
+/// them, and the rank of the parameter among posterior draws is uniform.
 fn calibrated(runs: usize) {
     use pcadlang::rng::{Purpose, StreamKey};
     let (bins, thinned) = (8usize, 63usize);

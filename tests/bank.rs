@@ -44,8 +44,10 @@ fn small(name: &str) -> Folder {
     f
 }
 
-const LEARN: [&str; 8] = ["learn", "small.pcad", "-n", "40", "--features-size", "64", "-o", "small.bank"];
-const RUN: [&str; 8] = ["run", "small.pcad", "--observe", "disc.png", "--chains", "2", "--out", "out"];
+const LEARN: [&str; 8] =
+    ["learn", "small.pcad", "-n", "40", "--features-size", "64", "-o", "small.bank"];
+const RUN: [&str; 8] =
+    ["run", "small.pcad", "--observe", "disc.png", "--chains", "2", "--out", "out"];
 
 /// The program with these contours observed.
 fn model(f: &Folder, contours: ContourMap) -> Model {
@@ -55,7 +57,9 @@ fn model(f: &Folder, contours: ContourMap) -> Model {
 
 /// Some contour, so that the program can be run.
 fn line() -> ContourMap {
-    let picture = image::GrayImage::from_fn(64, 64, |i, j| image::Luma([if i == 32 && j > 8 { 255 } else { 0 }]));
+    let picture = image::GrayImage::from_fn(64, 64, |i, j| {
+        image::Luma([if i == 32 && j > 8 { 255 } else { 0 }])
+    });
     ContourMap::from_image(&picture)
 }
 
@@ -94,7 +98,10 @@ fn a_bank_is_the_same_on_any_number_of_threads_and_so_are_draws_from_it() {
     let summary: serde_json::Value = serde_json::from_str(&f.read("a/summary.json")).unwrap();
     let kernels = summary["kernels"].as_array().unwrap();
     let knn = kernels.iter().find(|k| k["name"].as_str().unwrap().starts_with("knn")).unwrap();
-    assert!(knn["proposals"].as_u64().unwrap() > 30 && knn["accepted"].as_u64().unwrap() > 0, "{knn}");
+    assert!(
+        knn["proposals"].as_u64().unwrap() > 30 && knn["accepted"].as_u64().unwrap() > 0,
+        "{knn}"
+    );
 }
 
 #[test]
@@ -113,7 +120,9 @@ fn entries_come_back_and_the_nearest_picture_of_an_entry_is_its_own() {
         assert_eq!(names.len(), if deep { 5 } else { 4 }, "{names:?}");
         waists += usize::from(deep);
         let values = latents.iter().map(|c| (c.hash, Constraint::Stored(c.stored.clone())));
-        let (mut t, _) = Trace::generate(Arc::clone(m.code()), values, Draws::default(), Limits::default()).unwrap();
+        let (mut t, _) =
+            Trace::generate(Arc::clone(m.code()), values, Draws::default(), Limits::default())
+                .unwrap();
         let coordinates = |t: &Trace, hash: u64| {
             let at = t.all_targets().iter().find(|c| t.address_hash(**c) == hash).unwrap();
             t.free(*at).map(|(y, _)| y)
@@ -124,11 +133,14 @@ fn entries_come_back_and_the_nearest_picture_of_an_entry_is_its_own() {
         let features = bank.header().features.of(&view).unwrap();
         assert_eq!(features, bank.features(i).unwrap(), "entry {i}");
         assert_eq!(bank.nearest(&Query::new(features), 3).unwrap()[0], (i, 0.0));
-        // As an observed picture: contour points without lengths, and moved about a little to find a better fit.
+        // As an observed picture: contour points without lengths, and moved about a
+        // little to find a better fit.
         let c: Arc<Contours> = view.contours(64);
         let (tx, ty, strength) = (c.tx.clone(), c.ty.clone(), vec![1.0; c.len()]);
-        let map = ContourMap { width: 64, height: 64, x: c.x.clone(), y: c.y.clone(), tx, ty, strength };
-        let near = bank.nearest(&Query::contours(&pcadlang::vision::features::observed(&map)), 3).unwrap();
+        let map =
+            ContourMap { width: 64, height: 64, x: c.x.clone(), y: c.y.clone(), tx, ty, strength };
+        let near =
+            bank.nearest(&Query::contours(&pcadlang::vision::features::observed(&map)), 3).unwrap();
         assert_eq!(near[0].0, i);
     }
     assert!((8..32).contains(&waists), "{waists} of 40 have a waist");
@@ -170,7 +182,10 @@ fn banks_that_do_not_fit_are_refused() {
     f.write("bare.pcad", "assume x ~ normal(0, 1); observe normal(x, 1) = 0;");
     f.refuses(&["learn", "bare.pcad", "-o", "bare.bank"], "the program has nothing to draw");
     f.refuses(&["learn", "small.pcad", "-o", "k.bank", "--features", "keypoints"], "no landmarks");
-    f.refuses(&["learn", "small.pcad", "-o", "no/such/folder.bank"], "cannot write no/such/folder.bank");
+    f.refuses(
+        &["learn", "small.pcad", "-o", "no/such/folder.bank"],
+        "cannot write no/such/folder.bank",
+    );
 }
 
 fn refused(f: &Folder, says: &str) {
@@ -192,8 +207,15 @@ fn features_may_come_from_a_command() {
     f.succeeds(&[&LEARN[..], &["--features-from", command]].concat());
     let bank = Bank::open(&f.path().join("small.bank")).unwrap();
     let features = bank.features(0).unwrap();
-    assert!(features.len() == 3 && features[0] > 100.0 && features[1..] == [0.5, 1e-3], "{features:?}");
-    refused(&f, "give it again: --features-from 'sh detector.sh {png}'".trim_start_matches("give it again: "));
+    assert!(
+        features.len() == 3 && features[0] > 100.0 && features[1..] == [0.5, 1e-3],
+        "{features:?}"
+    );
+    refused(
+        &f,
+        "give it again: --features-from 'sh detector.sh {png}'"
+            .trim_start_matches("give it again: "),
+    );
     f.succeeds(&[&RUN[..], &["--features-from", command, "--quiet"]].concat());
     f.write("detector.sh", "echo nothing");
     f.refuses(&[&LEARN[..], &["--features-from", command]].concat(), "must print finite numbers");
@@ -201,23 +223,40 @@ fn features_may_come_from_a_command() {
     f.refuses(&[&LEARN[..], &["--features-from", command]].concat(), "it failed");
 }
 
-/// Keypoints: where the landmarks of a scene are seen, that scene is the nearest, also when half of them are missing.
+/// Keypoints: where the landmarks of a scene are seen, that scene is the nearest, also
+/// when half of them are missing.
 #[test]
 fn a_bank_of_bodies_is_searched_by_keypoints() {
     let f = Folder::new("bank_bodies");
-    f.succeeds(&["learn", "human.pcad", "-n", "30", "--features", "keypoints", "-o", "human.bank", "--quiet"]);
+    f.succeeds(&[
+        "learn",
+        "human.pcad",
+        "-n",
+        "30",
+        "--features",
+        "keypoints",
+        "-o",
+        "human.bank",
+        "--quiet",
+    ]);
     let bank = Bank::open(&f.path().join("human.bank")).unwrap();
-    let Features::Keypoints { names } = &bank.header().features else { panic!("{:?}", bank.header()) };
+    let Features::Keypoints { names } = &bank.header().features else {
+        panic!("{:?}", bank.header())
+    };
     assert!(names.iter().any(|n| n == "nose") && names.len() > 10, "{names:?}");
     for i in [0, 7, 29] {
         let features = bank.features(i).unwrap();
         assert_eq!(features.len(), 2 * names.len());
         let pixels = |x: f32| f64::from(x) * 64.0 + 32.0;
-        let point = |(n, at): (&String, &[f32])| Keypoint::new(n.as_str(), [pixels(at[0]), pixels(at[1])], 0.8);
-        let seen: Vec<Keypoint> = names.iter().zip(features.chunks(2)).map(point).step_by(2).collect();
+        let point = |(n, at): (&String, &[f32])| {
+            Keypoint::new(n.as_str(), [pixels(at[0]), pixels(at[1])], 0.8)
+        };
+        let seen: Vec<Keypoint> =
+            names.iter().zip(features.chunks(2)).map(point).step_by(2).collect();
         let seen = Value::object(KeypointsValue(Keypoints::new(seen).unwrap()));
         let photo = Value::object(ImageValue::contours(line(), None));
-        let program = Program::open("human.pcad").unwrap().observe("photo", photo).observe("points", seen);
+        let program =
+            Program::open("human.pcad").unwrap().observe("photo", photo).observe("points", seen);
         let m = program.compile().unwrap();
         bank.check(m.hash()).unwrap();
         let query = Observed::of(&m).query(&bank.header().features, None).unwrap();
@@ -228,7 +267,10 @@ fn a_bank_of_bodies_is_searched_by_keypoints() {
         assert!(matches!(bank.nearest(&contours, 5), Err(BankError::Command(_))));
     }
     let bare = Program::open("human.pcad").unwrap().without_data().compile().unwrap();
-    assert!(matches!(Observed::of(&bare).query(&bank.header().features, None), Err(BankError::Observed(_))));
+    assert!(matches!(
+        Observed::of(&bare).query(&bank.header().features, None),
+        Err(BankError::Observed(_))
+    ));
 }
 
 /// What is wrong with a kernel's arguments is said before a chain begins, with its place.
@@ -244,9 +286,20 @@ fn a_bank_that_is_not_there_is_an_error_at_the_kernel() {
     };
     let none = || -> Option<Arc<dyn Banks>> { Some(Arc::new(Neighbours::default())) };
     let missing = error("knn(@**, bank = \"b\")", None).unwrap();
-    assert!(missing.contains("\"b\" is not known to this run") && missing.contains("knn(@**"), "{missing}");
-    assert!(error("knn(@**, bank = \"b\", k = 0)", none()).unwrap().contains("whole number from 1"));
-    assert!(error("knn(@**, bank = \"b\", k = k)", none()).unwrap().contains("whole number from 1"));
+    assert!(
+        missing.contains("\"b\" is not known to this run") && missing.contains("knn(@**"),
+        "{missing}"
+    );
+    assert!(
+        error("knn(@**, bank = \"b\", k = 0)", none()).unwrap().contains("whole number from 1")
+    );
+    assert!(
+        error("knn(@**, bank = \"b\", k = k)", none()).unwrap().contains("whole number from 1")
+    );
     assert!(error("knn(@**, bank = k)", none()).unwrap().contains("must be a string"));
-    assert_eq!(error("knn(@**, bank = \"b\")", none()), None, "no neighbours: draws from the prior");
+    assert_eq!(
+        error("knn(@**, bank = \"b\")", none()),
+        None,
+        "no neighbours: draws from the prior"
+    );
 }

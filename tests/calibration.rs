@@ -1,8 +1,9 @@
-//! Kernels and shipped programs draw from the posterior of data simulated from the model: simulation-based calibration
-//! (Talts et al. 2018) and Geweke's joint distribution test (2004). Planted errors are found in
-//! `tests/planted_errors.rs`.
+//! Kernels and shipped programs draw from the posterior of data simulated from the model:
+//! simulation-based calibration (Talts et al. 2018) and Geweke's joint distribution test
+//! (2004). Planted errors are found in `tests/planted_errors.rs`.
 //!
-//! The checks fail a right sampler once in a thousand; seeds are fixed. The slow ones: `cargo test --release -- --ignored`.
+//! The checks fail a right sampler once in a thousand; seeds are fixed. The slow ones:
+//! `cargo test --release -- --ignored`.
 
 mod common;
 use common::kernels::{CALIBRATED, RANKED, RANKED_ON_COUNTS};
@@ -26,17 +27,23 @@ enum Check {
 fn passes(name: &str, model: &Model, check: Check) {
     let (plan, _) = model.plan().unwrap_or_else(|e| panic!("{e}"));
     let progress = Progress::default();
-    let options = RunOptions { seed: 1, banks: Some(Arc::new(wrong_neighbours(model))), ..RunOptions::default() };
+    let options = RunOptions {
+        seed: 1,
+        banks: Some(Arc::new(wrong_neighbours(model))),
+        ..RunOptions::default()
+    };
     let sampler = PlanSampler { plan: &plan, options, progress: &progress };
     let (Check::Ranks(replicates, steps) | Check::Turns(replicates, steps)) = check;
     let settings = Settings { replicates, steps, seed: 1, threads: 2, ..Settings::default() };
     match check {
         Check::Ranks(..) => {
-            let said = sbc(model.code(), &sampler, &settings).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            let said =
+                sbc(model.code(), &sampler, &settings).unwrap_or_else(|e| panic!("{name}: {e:?}"));
             assert!(said.passes(), "{name}: {said:#?}");
         }
         Check::Turns(..) => {
-            let said = geweke(model.code(), &sampler, &settings).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            let said = geweke(model.code(), &sampler, &settings)
+                .unwrap_or_else(|e| panic!("{name}: {e:?}"));
             assert!(said.passes(), "{name}: {said:#?}");
         }
     }
@@ -98,12 +105,14 @@ fn shipped_with(name: &str, rows: usize) -> Model {
     let path = format!("{}/calibration-{name}.csv", env!("CARGO_TARGET_TMPDIR"));
     let text: String = (0..rows).map(|i| format!("{i},{i}\n")).collect();
     std::fs::write(&path, format!("x,y\n{text}")).unwrap();
-    let program = Program::open(name).and_then(|p| p.observe_file("d", &path)).and_then(Program::compile);
+    let program =
+        Program::open(name).and_then(|p| p.observe_file("d", &path)).and_then(Program::compile);
     program.unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// Both checks at length of a program, with little data: a plan that is long enough for the data it comes with needs not be for
-/// whatever its prior makes of as many rows. Minutes each: `LONG=1 cargo test --release --test calibration -- --ignored`.
+/// Both checks at length of a program, with little data: a plan that is long enough for
+/// the data it comes with needs not be for whatever its prior makes of as many rows.
+/// Minutes each: `LONG=1 cargo test --release --test calibration -- --ignored`.
 fn at_length(name: &str, model: &Model, steps: Option<u64>, turns: Option<u64>) {
     if std::env::var_os("LONG").is_some() {
         passes(name, model, Check::Ranks(200, steps));
@@ -167,10 +176,31 @@ fn scenes() -> Vec<(&'static str, Model)> {
     let depths = "scene.relative_depth(view, 1.5, share = 0.8, sd = 0.3, outlier = 0.3) = seen";
     vec![
         ("relative depth", scene("data seen = json()", depths, metres)),
-        ("keypoints", scene("data seen = keypoints()", "scene.keypoints(view, sd = 10, outlier = 0.3) = seen", points)),
+        (
+            "keypoints",
+            scene(
+                "data seen = keypoints()",
+                "scene.keypoints(view, sd = 10, outlier = 0.3) = seen",
+                points,
+            ),
+        ),
         ("region", scene("data seen: image", region, photo)),
-        ("mask", scene("data seen = mask()", "scene.mask(view, eps_in = 0.3, eps_out = 0.3, size = 16) = seen", mask)),
-        ("depth", scene("data seen = depth()", "scene.depth(view, sd = 0.5, outlier = 0.4, size = 16) = seen", depth)),
+        (
+            "mask",
+            scene(
+                "data seen = mask()",
+                "scene.mask(view, eps_in = 0.3, eps_out = 0.3, size = 16) = seen",
+                mask,
+            ),
+        ),
+        (
+            "depth",
+            scene(
+                "data seen = depth()",
+                "scene.depth(view, sd = 0.5, outlier = 0.4, size = 16) = seen",
+                depth,
+            ),
+        ),
     ]
 }
 

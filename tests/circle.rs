@@ -1,7 +1,9 @@
-//! A disc of unknown place and size, seen as contours: MCMC against integration of the same likelihood over a grid.
+//! A disc of unknown place and size, seen as contours: MCMC against integration of the
+//! same likelihood over a grid.
 //!
-//! The far camera makes a sphere nearly a disc. The likelihood is taken from the trace itself at every point of the grid, so
-//! that what is tested is the chain: kernels, increments and their weights with a renderer inside.
+//! The far camera makes a sphere nearly a disc. The likelihood is taken from the trace
+//! itself at every point of the grid, so that what is tested is the chain: kernels,
+//! increments and their weights with a renderer inside.
 
 mod common;
 use common::*;
@@ -17,7 +19,8 @@ use pcadlang::{Model, Program};
 const BOX: [(f64, f64); 3] = [(-0.1, 0.5), (-0.5, 0.1), (0.6, 1.2)];
 const SIDE: u32 = 48;
 
-/// The contour of a disc with centre (0.2, -0.2) and radius 0.9, in pixels; y points down in a picture.
+/// The contour of a disc with centre (0.2, -0.2) and radius 0.9, in pixels; y points down
+/// in a picture.
 fn observed() -> ImageValue {
     let unit = f64::from(SIDE) / 4.4;
     let (cx, cy, r) = (24.0 + 0.2 * unit, 24.0 + 0.2 * unit, 0.9 * unit);
@@ -39,10 +42,12 @@ const WALK: &str = "mix { 0.5 => drift(one(@**)); 0.4 => drift(@**); 0.1 => mh(o
 
 /// The same walks, a coarse picture deciding first.
 const DELAYED: [&str; 2] = ["1500 { WALK }", "repeat 3 { DELAYED }"];
-const DELAYED_WALK: &str = "mix { 0.5 => delayed(drift(one(@**)), @picture); 0.4 => delayed(drift(@**), @picture);
+const DELAYED_WALK: &str =
+    "mix { 0.5 => delayed(drift(one(@**)), @picture); 0.4 => delayed(drift(@**), @picture);
     0.1 => delayed(mh(one(@**)), @picture); }";
 
-/// Steps along the slope of the picture's score, with nothing else to keep the chain right.
+/// Steps along the slope of the picture's score, with nothing else to keep the chain
+/// right.
 const SLOPES: [&str; 2] = ["300 { hmc($continuous, steps = 4); }", "hmc($continuous, steps = 4);"];
 
 /// What decides first where anything does: a third of the pixels, another spread.
@@ -51,8 +56,11 @@ const COARSE: &str = "scene.chamfer(view, sigma = 1.5, size = 16)";
 fn model(likelihood: &str, [warmup, step]: [&str; 2], steps: usize) -> Model {
     let kernels = |s: &str| s.replace("DELAYED", DELAYED_WALK).replace("WALK", WALK);
     let (warmup, step) = (kernels(warmup), kernels(step));
-    let priors: String =
-        ["x", "y", "r"].iter().zip(BOX).map(|(name, (a, b))| format!("assume {name} ~ uniform({a}, {b});\n")).collect();
+    let priors: String = ["x", "y", "r"]
+        .iter()
+        .zip(BOX)
+        .map(|(name, (a, b))| format!("assume {name} ~ uniform({a}, {b});\n"))
+        .collect();
     let text = format!(
         "include \"std/scene.pcad\" as scene;
          data photo: image;
@@ -76,12 +84,14 @@ fn model(likelihood: &str, [warmup, step]: [&str; 2], steps: usize) -> Model {
 /// Means and variances of x, y and r by the midpoint rule with n points a side.
 fn by_grid(model: &Model, n: usize) -> [(f64, f64); 3] {
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
-    let targets: Vec<Target> = ["@x", "@y", "@r"].map(|name| find(&trace, name)).into_iter().collect();
+    let targets: Vec<Target> =
+        ["@x", "@y", "@r"].map(|name| find(&trace, name)).into_iter().collect();
     let at = |d: usize, i: usize| BOX[d].0 + (BOX[d].1 - BOX[d].0) * (i as f64 + 0.5) / n as f64;
     let mut points = Vec::with_capacity(n * n * n);
     for i in 0..n * n * n {
         let p = [at(0, i / (n * n)), at(1, i / n % n), at(2, i % n)];
-        let changes: Vec<_> = targets.iter().zip(p).map(|(t, x)| (*t, Change::Set(Datum::Num(x)))).collect();
+        let changes: Vec<_> =
+            targets.iter().zip(p).map(|(t, x)| (*t, Change::Set(Datum::Num(x)))).collect();
         trace.propose(&changes, Streams::default()).unwrap();
         trace.commit();
         points.push((p, trace.log_likelihood()));
@@ -91,7 +101,9 @@ fn by_grid(model: &Model, n: usize) -> [(f64, f64); 3] {
     let z: f64 = weights.iter().sum();
     std::array::from_fn(|d| {
         let m = points.iter().zip(&weights).map(|((p, _), w)| p[d] * w).sum::<f64>() / z;
-        let v = points.iter().zip(&weights).map(|((p, _), w)| (p[d] - m) * (p[d] - m) * w).sum::<f64>() / z;
+        let v =
+            points.iter().zip(&weights).map(|((p, _), w)| (p[d] - m) * (p[d] - m) * w).sum::<f64>()
+                / z;
         (m, v)
     })
 }
@@ -103,7 +115,8 @@ fn find(trace: &pcadlang::trace::Trace, name: &str) -> Target {
 
 fn agrees(likelihood: &str, plan: [&str; 2], n: usize, steps: usize) {
     let model = model(likelihood, plan, steps);
-    // What the grid does not see is about what a grid with two thirds of its points sees differently.
+    // What the grid does not see is about what a grid with two thirds of its points sees
+    // differently.
     let (grid, coarse) = (by_grid(&model, n), by_grid(&model, n * 2 / 3));
     let options = RunOptions { seed: 3, ..RunOptions::default() };
     let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{e}"));
@@ -112,7 +125,10 @@ fn agrees(likelihood: &str, plan: [&str; 2], n: usize, steps: usize) {
         let (m, v) = grid[d];
         let sd = v.sqrt();
         let width = BOX[d].1 - BOX[d].0;
-        assert!(sd > 0.3 * width / n as f64, "{likelihood}: the grid is too coarse for {name}, sd {sd}");
+        assert!(
+            sd > 0.3 * width / n as f64,
+            "{likelihood}: the grid is too coarse for {name}, sd {sd}"
+        );
         assert!(sd < 0.27 * width, "{likelihood}: {name} is not informed, sd {sd}");
         let xs = &draws[name];
         let squares: Vec<f64> = xs.iter().map(|x| (x - m) * (x - m)).collect();
@@ -121,7 +137,10 @@ fn agrees(likelihood: &str, plan: [&str; 2], n: usize, steps: usize) {
         {
             let (got, se) = (mean(xs), standard_error(xs));
             let bound = 5.0 * se + 1.5 * (expected - coarse).abs();
-            assert!(bound < 0.5 * scale, "{likelihood}: {what} of {name} is not sharp: {bound} for {scale}");
+            assert!(
+                bound < 0.5 * scale,
+                "{likelihood}: {what} of {name} is not sharp: {bound} for {scale}"
+            );
             assert!(
                 (got - expected).abs() < bound,
                 "{likelihood}: {what} of {name} {got}, grid {expected}, bound {bound}"
@@ -142,7 +161,12 @@ fn chamfer_agrees_with_a_grid() {
 
 #[test]
 fn contour_ratio_agrees_with_a_grid() {
-    agrees("scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.01)", WALKS, 15, 4000);
+    agrees(
+        "scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.01)",
+        WALKS,
+        15,
+        4000,
+    );
 }
 
 #[test]
@@ -153,14 +177,22 @@ fn hamiltonian_steps_leave_the_posterior_as_it_is() {
 #[test]
 fn a_coarse_first_stage_leaves_the_posterior_as_it_is() {
     agrees("scene.chamfer(view, sigma = 1, size = 48)", DELAYED, 15, 4000);
-    agrees("scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.01)", DELAYED, 15, 4000);
+    agrees(
+        "scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.01)",
+        DELAYED,
+        15,
+        4000,
+    );
 }
 
 #[test]
 fn a_trace_says_what_is_approximate() {
     let model = model("scene.chamfer(view, sigma = 1, size = 48)", WALKS, 1);
     let trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(trace.approximations(), ["scene.chamfer: rendered at 48 pixels in single precision"]);
+    assert_eq!(
+        trace.approximations(),
+        ["scene.chamfer: rendered at 48 pixels in single precision"]
+    );
 }
 
 #[test]
@@ -168,6 +200,11 @@ fn a_trace_says_what_is_approximate() {
 fn all_likelihoods_agree_with_a_fine_grid() {
     agrees("scene.chamfer(view, sigma = 0.7, size = 48)", WALKS, 36, 60_000);
     agrees("scene.chamfer(view, sigma = 0.7, symmetric = true, size = 48)", WALKS, 36, 60_000);
-    agrees("scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.02)", WALKS, 36, 60_000);
+    agrees(
+        "scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.02)",
+        WALKS,
+        36,
+        60_000,
+    );
     agrees("scene.chamfer(view, sigma = 0.7, size = 48)", DELAYED, 36, 60_000);
 }

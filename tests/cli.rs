@@ -1,7 +1,8 @@
 //! Sessions with the command, word for word, and the same draws on any number of threads.
 //!
-//! `INSTA_UPDATE=always cargo test --test cli` accepts what the command says now: read it first as a user would. Times are
-//! not in these texts: where a session prints some, they are replaced.
+//! `INSTA_UPDATE=always cargo test --test cli` accepts what the command says now: read it
+//! first as a user would. Times are not in these texts: where a session prints some, they
+//! are replaced.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -45,13 +46,17 @@ fn check_of_every_shipped_program() {
 #[test]
 fn check_of_mistakes() {
     let f = Folder::new("check_mistakes");
-    f.write("good.pcad", "param n: int = 3 \"how many\"; assume x ~ normal(0, n); observe normal(x, 1) = 2;");
+    f.write(
+        "good.pcad",
+        "param n: int = 3 \"how many\"; assume x ~ normal(0, n); observe normal(x, 1) = 2;",
+    );
     f.write("bad.pcad", "assume x ~ nomal(0, 1);\nobserve normal(y, 1) = 2;\n");
     f.write("worse.pcad", "assume x = ;\nlet 3 = 4;\n");
-    let text: Vec<String> = [&["check", "good.pcad", "bad.pcad", "worse.pcad"][..], &["check", "coin.pcat"]]
-        .iter()
-        .map(|a| session(&f, a))
-        .collect();
+    let text: Vec<String> =
+        [&["check", "good.pcad", "bad.pcad", "worse.pcad"][..], &["check", "coin.pcat"]]
+            .iter()
+            .map(|a| session(&f, a))
+            .collect();
     snapshot("check_mistakes", &text.join("\n"));
 }
 
@@ -76,7 +81,9 @@ fn doc() {
     );
     let f = Folder::new("doc_all");
     let all = f.succeeds(&["doc"]).out;
-    assert!(all.contains("**`normal(") && all.contains("## Constants") && all.lines().count() > 100);
+    assert!(
+        all.contains("**`normal(") && all.contains("## Constants") && all.lines().count() > 100
+    );
 }
 
 #[test]
@@ -105,7 +112,9 @@ fn help() {
 fn programs_are_formatted_in_place() {
     let f = Folder::new("fmt");
     std::fs::create_dir(f.path().join("more")).unwrap();
-    f.write("ugly.pcad", "let  a=1 ; // one\n").write("good.pcad", "let a = 1;\n").write("more/deep.pcad", "f( 1,2 );");
+    f.write("ugly.pcad", "let  a=1 ; // one\n")
+        .write("good.pcad", "let a = 1;\n")
+        .write("more/deep.pcad", "f( 1,2 );");
     f.write("bad.pcad", "let a = ;\n").write("notes.txt", "let  a=1 ;");
     let said: Vec<String> = [
         &["fmt", "--check", "."][..],
@@ -121,8 +130,14 @@ fn programs_are_formatted_in_place() {
     snapshot("fmt", &said.join("\n"));
     assert_eq!(f.read("ugly.pcad"), "let a = 1; // one\n");
     assert_eq!(f.read("more/deep.pcad"), "f(1, 2);\n");
-    assert_eq!((f.read("bad.pcad"), f.read("notes.txt")), ("let a = ;\n".into(), "let  a=1 ;".into()));
-    assert_eq!(f.files(), ["bad.pcad", "good.pcad", "more/", "more/deep.pcad", "notes.txt", "ugly.pcad"]);
+    assert_eq!(
+        (f.read("bad.pcad"), f.read("notes.txt")),
+        ("let a = ;\n".into(), "let  a=1 ;".into())
+    );
+    assert_eq!(
+        f.files(),
+        ["bad.pcad", "good.pcad", "more/", "more/deep.pcad", "notes.txt", "ugly.pcad"]
+    );
 }
 
 #[test]
@@ -136,7 +151,11 @@ fn standard_input_is_formatted() {
     assert_eq!(fmt("let  a=1 ;", &["--check"]).status.code(), Some(1));
     let bad = fmt("let a = ;", &[]);
     assert!(bad.status.code() == Some(1) && bad.stdout.is_empty());
-    assert!(String::from_utf8_lossy(&bad.stderr).contains("<stdin>:1:9"), "{}", String::from_utf8_lossy(&bad.stderr));
+    assert!(
+        String::from_utf8_lossy(&bad.stderr).contains("<stdin>:1:9"),
+        "{}",
+        String::from_utf8_lossy(&bad.stderr)
+    );
 }
 
 /// Checked again when an included file changes, until the user ends it.
@@ -146,7 +165,8 @@ fn watched_programs_are_checked_again() {
     use std::process::{Command, Stdio};
     use std::time::Duration;
     let f = Folder::new("watch");
-    f.write("main.pcad", "include \"part.pcad\"; assume x ~ normal(width, 1);").write("part.pcad", "let with = 1;");
+    f.write("main.pcad", "include \"part.pcad\"; assume x ~ normal(width, 1);")
+        .write("part.pcad", "let with = 1;");
     let out = std::fs::File::create(f.path().join("out")).unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_pcadlang"))
         .args(["check", "--watch", "main.pcad"])
@@ -161,11 +181,17 @@ fn watched_programs_are_checked_again() {
             f.read("out").contains(text)
         })
     };
-    assert!(comes("Watching 2 files") && !f.read("out").contains("no mistakes"), "{}", f.read("out"));
+    assert!(
+        comes("Watching 2 files") && !f.read("out").contains("no mistakes"),
+        "{}",
+        f.read("out")
+    );
     f.write("part.pcad", "let width = 1;");
     assert!(comes("main.pcad: no mistakes found"), "{}", f.read("out"));
     assert!(f.read("out").contains("Changed: part.pcad"));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
@@ -173,20 +199,36 @@ fn watched_programs_are_checked_again() {
 fn completions_and_manual_pages_know_every_command() {
     let f = Folder::new("manual");
     let help = f.succeeds(&["--help"]).out;
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    let commands: Vec<&str> =
-        commands.filter_map(|line| line.split_whitespace().next()).filter(|c| *c != "help").collect();
-    assert!(commands.contains(&"run") && commands.contains(&"fmt") && commands.len() > 10, "{commands:?}");
+    let commands = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty());
+    let commands: Vec<&str> = commands
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|c| *c != "help")
+        .collect();
+    assert!(
+        commands.contains(&"run") && commands.contains(&"fmt") && commands.len() > 10,
+        "{commands:?}"
+    );
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let script = f.succeeds(&["completions", shell]).out;
-        assert!(commands.iter().all(|c| script.contains(c)) && script.contains("observe"), "{shell}:\n{script}");
+        assert!(
+            commands.iter().all(|c| script.contains(c)) && script.contains("observe"),
+            "{shell}:\n{script}"
+        );
     }
     // Programs complete to files.
     let zsh = f.succeeds(&["completions", "zsh"]).out;
-    assert!(zsh.lines().any(|line| line.contains(":program -- ") && line.contains(":_files")), "{zsh}");
+    assert!(
+        zsh.lines().any(|line| line.contains(":program -- ") && line.contains(":_files")),
+        "{zsh}"
+    );
     let page = f.succeeds(&["man"]).out;
     assert!(
-        page.contains(".TH pcadlang 1") && commands.iter().all(|c| page.contains(&format!("pcadlang\\-{c}(1)"))),
+        page.contains(".TH pcadlang 1")
+            && commands.iter().all(|c| page.contains(&format!("pcadlang\\-{c}(1)"))),
         "{page}"
     );
     f.succeeds(&["man", "--out", "pages"]);
@@ -198,20 +240,28 @@ fn completions_and_manual_pages_know_every_command() {
                 && page.contains("pcadlang 0."),
             "{page}"
         );
-        assert!(page.contains(&format!("pcadlang {command}")), "the synopsis says how it is called: {page}");
+        assert!(
+            page.contains(&format!("pcadlang {command}")),
+            "the synopsis says how it is called: {page}"
+        );
     }
     assert_eq!(f.files().len(), commands.len() + 2, "{:?}", f.files());
 }
 
-/// Plans on data simulated from their programs: exit code 0 where they pass, 1 where not and where nothing can be simulated.
+/// Plans on data simulated from their programs: exit code 0 where they pass, 1 where not
+/// and where nothing can be simulated.
 #[test]
 fn checks_by_simulation() {
     let f = Folder::new("simulation");
     let args = ["--replicates", "20", "--steps", "200", "--seed", "3", "--threads", "2"];
     let both = f.succeeds(&[&["check", "--sbc", "--geweke", "coin.pcad"][..], &args].concat());
-    for says in
-        ["coin.pcad: simulation-based calibration", "coin.pcad: Geweke's joint", "@heads", "log joint", "seed 3"]
-    {
+    for says in [
+        "coin.pcad: simulation-based calibration",
+        "coin.pcad: Geweke's joint",
+        "@heads",
+        "log joint",
+        "seed 3",
+    ] {
         assert!(both.out.contains(says), "{says:?} is not in\n{}", both.out);
     }
     // A plan that never moves keeps the prior: wrong for any data that say something.
@@ -220,15 +270,35 @@ fn checks_by_simulation() {
         "assume x ~ normal(0, 1); observe normal(x, 0.1) = [1, 1, 1] as y;
          infer { repeat 100 { drift(@x, 1000000); collect x; } }",
     );
-    let d = f.run(&["check", "--sbc", "stuck.pcad", "--replicates", "60", "--steps", "100", "--seed", "3"]);
-    assert!(d.code == 1 && d.out.contains("FAILS") && d.err.contains("1 of 1 programs fail"), "{}{}", d.out, d.err);
+    let d = f.run(&[
+        "check",
+        "--sbc",
+        "stuck.pcad",
+        "--replicates",
+        "60",
+        "--steps",
+        "100",
+        "--seed",
+        "3",
+    ]);
+    assert!(
+        d.code == 1 && d.out.contains("FAILS") && d.err.contains("1 of 1 programs fail"),
+        "{}{}",
+        d.out,
+        d.err
+    );
     f.write("soft.pcad", "assume x ~ normal(0, 1); factor(-x * x) as soft;");
     let soft = f.run(&["check", "--geweke", "soft.pcad"]);
-    assert!(soft.code == 1 && soft.err.contains("@soft is a factor, which has no sampler"), "{}", soft.err);
+    assert!(
+        soft.code == 1 && soft.err.contains("@soft is a factor, which has no sampler"),
+        "{}",
+        soft.err
+    );
     assert_eq!(f.files(), ["soft.pcad", "stuck.pcad"]);
 }
 
-/// What would be observed again: the table, the file, and the same whatever the number of threads.
+/// What would be observed again: the table, the file, and the same whatever the number of
+/// threads.
 #[test]
 fn predictive_checks() {
     let f = Folder::new("predictive");
@@ -237,7 +307,9 @@ fn predictive_checks() {
     f.succeeds(&[&args[..], &["b", "--threads", "2"]].concat());
     assert_eq!(f.read("a/predictive.csv"), f.read("b/predictive.csv"));
     assert!(
-        one.out.contains("@y") && one.out.contains("tail") && one.out.contains("from the posterior"),
+        one.out.contains("@y")
+            && one.out.contains("tail")
+            && one.out.contains("from the posterior"),
         "{}",
         one.out
     );
@@ -247,10 +319,17 @@ fn predictive_checks() {
     assert!(head.starts_with("chain,draw,@y.mean,@y.sd,@y.min,@y.max,@y[0],"), "{head}");
     assert!(lines.all(|l| l.split(',').count() == head.split(',').count()));
     let prior = f.succeeds(&["predict", "linreg.pcad", "--prior", "-n", "50", "--out", "c"]);
-    assert!(prior.out.contains("50 draws from the prior") && f.read("c/predictive.csv").lines().count() == 51);
+    assert!(
+        prior.out.contains("50 draws from the prior")
+            && f.read("c/predictive.csv").lines().count() == 51
+    );
     f.write("soft.pcad", "assume x ~ normal(0, 1); factor(-x * x) as soft;");
     let soft = f.run(&["predict", "soft.pcad", "--prior"]);
-    assert!(soft.code == 1 && soft.err.contains("none of the program's observations has a sampler"), "{}", soft.err);
+    assert!(
+        soft.code == 1 && soft.err.contains("none of the program's observations has a sampler"),
+        "{}",
+        soft.err
+    );
 }
 
 /// Exit code 2 is for what the command line itself gets wrong.
@@ -300,13 +379,16 @@ fn timeless(json: &str) -> serde_json::Value {
 #[test]
 fn a_run_of_the_coin() {
     let f = Folder::new("coin");
-    let quiet = f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--quiet", "--out", "a"]);
+    let quiet =
+        f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--quiet", "--out", "a"]);
     assert_eq!((quiet.out.as_str(), quiet.err.as_str()), ("", ""), "--quiet says nothing");
-    let json = f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--json", "--out", "b"]);
+    let json =
+        f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--json", "--out", "b"]);
     assert_eq!(json.out.lines().count(), 1, "--json is one line: {}", json.out);
     snapshot("coin_json", &serde_json::to_string_pretty(&timeless(&json.out)).unwrap());
     snapshot("coin_notes", &json.err);
-    let inside = |name: &String| name.contains("inference.zarr/") && !name.ends_with("inference.zarr/");
+    let inside =
+        |name: &String| name.contains("inference.zarr/") && !name.ends_with("inference.zarr/");
     let files: Vec<String> = f.files().into_iter().filter(|name| !inside(name)).collect();
     snapshot("coin_files", &files.join("\n"));
     assert_eq!(draws(&f, "a", 4), draws(&f, "b", 4));
@@ -316,7 +398,11 @@ fn a_run_of_the_coin() {
     // The table ends with a line of time.
     let plain = f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200"]);
     assert!(plain.out.contains("heads") && plain.out.contains("seed 1, 4 chains"), "{}", plain.out);
-    assert!(plain.out.trim_end().ends_with("runs/coin") && f.exists("runs/coin/report.html"), "{}", plain.out);
+    assert!(
+        plain.out.trim_end().ends_with("runs/coin") && f.exists("runs/coin/report.html"),
+        "{}",
+        plain.out
+    );
     f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--quiet"]);
     assert!(f.exists("runs/coin-2/report.html"));
     // Another seed, other draws.
@@ -333,13 +419,15 @@ fn draws(f: &Folder, dir: &str, chains: usize) -> Vec<String> {
     (1..=chains).map(chain).collect()
 }
 
-/// The shipped program on a small picture: the same draws, bit for bit, whatever computes them.
+/// The shipped program on a small picture: the same draws, bit for bit, whatever computes
+/// them.
 #[test]
 fn the_lathe_draws_the_same_on_any_number_of_threads() {
     let f = Folder::new("lathe");
     f.write("disc.png", png(disc(64, 48, 34.0, 22.0, 15.0)));
     let run = |out: &str, more: &[&str]| {
-        let mut args = vec!["run", "lathe.pcad", "--observe", "disc.png", "--set", "size=48", "--chains", "2"];
+        let mut args =
+            vec!["run", "lathe.pcad", "--observe", "disc.png", "--set", "size=48", "--chains", "2"];
         args.extend(["--steps", "60", "--warmup", "60", "--seed", "5", "--quiet", "--out", out]);
         args.extend(more);
         f.succeeds(&args);
@@ -356,11 +444,14 @@ fn the_lathe_draws_the_same_on_any_number_of_threads() {
     run("lens", &["--set", "known=false", "--set", "steep=60"]);
     let summary: serde_json::Value = serde_json::from_str(&f.read("lens/summary.json")).unwrap();
     let choices = summary["choices"].as_array().unwrap();
-    assert!(choices.iter().any(|c| c["address"].as_str().is_some_and(|a| a.contains("longer"))), "{choices:?}");
+    assert!(
+        choices.iter().any(|c| c["address"].as_str().is_some_and(|a| a.contains("longer"))),
+        "{choices:?}"
+    );
 }
 
-/// A wide cup seen from above in perspective: where the starts of the shipped program have its tilt, they have its height and
-/// place, too.
+/// A wide cup seen from above in perspective: where the starts of the shipped program
+/// have its tilt, they have its height and place, too.
 #[test]
 fn starts_of_the_lathe_are_seen_in_perspective() {
     let f = Folder::new("starts");
@@ -374,9 +465,20 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
     let text = pcadlang::lang::load::embedded("lathe.pcad").unwrap();
     let (model, plan) = text.split_once("infer {").unwrap();
     let (from, _) = plan.split_once("from = ").unwrap().1.split_once("));").unwrap();
-    let starts = format!("infer {{ init(best_of(1, from = {from})); collect H, S_L.axis, S_L.translate; }}");
+    let starts =
+        format!("infer {{ init(best_of(1, from = {from})); collect H, S_L.axis, S_L.translate; }}");
     f.write("starts.pcad", format!("{model}{starts}"));
-    f.succeeds(&["run", "starts.pcad", "--observe", "cup/mask.png", "--chains", "100", "--quiet", "--out", "starts"]);
+    f.succeeds(&[
+        "run",
+        "starts.pcad",
+        "--observe",
+        "cup/mask.png",
+        "--chains",
+        "100",
+        "--quiet",
+        "--out",
+        "starts",
+    ]);
     let mut near = Vec::new();
     for chain in draws(&f, "starts", 100) {
         let (names, row) = chain.split_once('\n').unwrap();
@@ -396,8 +498,8 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
     assert!((height - 0.9).abs() < 0.15 && (y - 0.2).abs() < 0.05, "{height} {y} {near:?}");
 }
 
-/// Chains that cannot leave their mode: each mode has the probability of its mass, however many chains fell there, and
-/// `keypoints.json` weighs it by that.
+/// Chains that cannot leave their mode: each mode has the probability of its mass,
+/// however many chains fell there, and `keypoints.json` weighs it by that.
 #[test]
 fn modes_have_their_probabilities() {
     let f = Folder::new("probabilities");
@@ -411,26 +513,36 @@ fn modes_have_their_probabilities() {
     f.write("two.pcad", program.as_bytes());
     let said = f.succeeds(&["run", "two.pcad", "--chains", "6", "--seed", "4", "--out", "two"]);
     assert!(
-        said.out.contains("the chains are in 2 different modes") && said.out.contains("probability"),
+        said.out.contains("the chains are in 2 different modes")
+            && said.out.contains("probability"),
         "{}",
         said.out
     );
     let summary: serde_json::Value = serde_json::from_str(&f.read("two/summary.json")).unwrap();
     let modes = summary["modes"].as_array().unwrap();
     let far = |m: &serde_json::Value| m["quantities"]["far"][0].as_f64().unwrap();
-    assert_eq!((modes.len(), far(&modes[0]), far(&modes[1])), (2, 1.0, 0.0), "the most probable first");
+    assert_eq!(
+        (modes.len(), far(&modes[0]), far(&modes[1])),
+        (2, 1.0, 0.0),
+        "the most probable first"
+    );
     let probability = modes[0]["probability"].as_f64().unwrap();
     assert!((probability - 0.7).abs() < 0.03, "{probability}");
     let evidence = |i: usize| modes[i]["log_evidence"][0].as_f64().unwrap();
     assert!((evidence(0) - evidence(1) - (7f64 / 3.0).ln()).abs() < 0.2, "{modes:?}");
     assert_eq!(modes[0]["by_evidence"], true);
-    assert!((modes[0]["share"].as_f64().unwrap() - 0.7).abs() > 0.1, "chains fell otherwise: {}", modes[0]["share"]);
+    assert!(
+        (modes[0]["share"].as_f64().unwrap() - 0.7).abs() > 0.1,
+        "chains fell otherwise: {}",
+        modes[0]["share"]
+    );
     let keypoints: serde_json::Value = serde_json::from_str(&f.read("two/keypoints.json")).unwrap();
     let x = keypoints["scene"]["nose"][0].as_f64().unwrap();
     assert!((x - (2.0 * probability - 1.0)).abs() < 0.03, "{x} {probability}");
 }
 
-/// Chains that never move stay where they began: a picture of each mode, and a warning that they do not draw the same.
+/// Chains that never move stay where they began: a picture of each mode, and a warning
+/// that they do not draw the same.
 #[test]
 fn modes_that_chains_stay_in_are_shown() {
     let f = Folder::new("modes");
@@ -444,8 +556,19 @@ fn modes_that_chains_stay_in_are_shown() {
     };
     let run = |name: &str, spread: &str| {
         f.write(&format!("{name}.pcad"), program(spread).as_bytes());
-        f.succeeds(&["run", &format!("{name}.pcad"), "--chains", "3", "--seed", "1", "--quiet", "--out", name]);
-        let agreement: serde_json::Value = serde_json::from_str(&f.read(&format!("{name}/run.json"))).unwrap();
+        f.succeeds(&[
+            "run",
+            &format!("{name}.pcad"),
+            "--chains",
+            "3",
+            "--seed",
+            "1",
+            "--quiet",
+            "--out",
+            name,
+        ]);
+        let agreement: serde_json::Value =
+            serde_json::from_str(&f.read(&format!("{name}/run.json"))).unwrap();
         (
             agreement["agreement"].as_f64().unwrap(),
             f.read(&format!("{name}/summary.json")).contains("of the pixels they cover"),
@@ -467,7 +590,8 @@ fn sheets_of_the_prior() {
     assert_eq!(f.files(), ["contours.png", "disc.png"]);
 }
 
-/// People are found, written so that `--keypoints` reads them, and drawn; a network that is none is refused.
+/// People are found, written so that `--keypoints` reads them, and drawn; a network that
+/// is none is refused.
 #[cfg(feature = "models")]
 #[test]
 fn people_in_photographs() {
@@ -501,13 +625,25 @@ fn an_interrupted_run_keeps_its_draws() {
     use std::time::Duration;
     let f = Folder::new("interrupted");
     let mut child = Command::new(env!("CARGO_BIN_EXE_pcadlang"))
-        .args(["run", "linreg.pcad", "--time", "300s", "--warmup", "10", "--out", "out", "--chains", "2"])
+        .args([
+            "run",
+            "linreg.pcad",
+            "--time",
+            "300s",
+            "--warmup",
+            "10",
+            "--out",
+            "out",
+            "--chains",
+            "2",
+        ])
         .current_dir(f.path())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let under_way = |f: &Folder| f.exists("out/chain-2.csv") && f.read("out/chain-2.csv").lines().count() > 20;
+    let under_way =
+        |f: &Folder| f.exists("out/chain-2.csv") && f.read("out/chain-2.csv").lines().count() > 20;
     for _ in 0..600 {
         if under_way(&f) {
             break;
@@ -516,17 +652,22 @@ fn an_interrupted_run_keeps_its_draws() {
     }
     assert!(under_way(&f), "draws are written as they come");
     assert!(f.read("out/run.json").contains("\"running\""));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
     assert_eq!(child.wait().unwrap().code(), Some(3));
     assert!(f.read("out/run.json").contains("\"interrupted\""));
     assert!(f.exists("out/report.html") && f.exists("out/summary.json"));
     let rows = draws(&f, "out", 2);
     let columns = rows[0].lines().next().unwrap().split(',').count();
-    assert!(rows.iter().all(|r| r.ends_with('\n') && r.lines().all(|l| l.split(',').count() == columns)));
+    assert!(
+        rows.iter()
+            .all(|r| r.ends_with('\n') && r.lines().all(|l| l.split(',').count() == columns))
+    );
 }
 
-/// What `run --explain` says of a scene with something to skip: a choice that nothing asks for, one that no kernel names, an object that is out
-/// of the picture.
+/// What `run --explain` says of a scene with something to skip: a choice that nothing
+/// asks for, one that no kernel names, an object that is out of the picture.
 #[test]
 fn explained() {
     let f = Folder::new("explained");
@@ -548,14 +689,20 @@ observe normal(level, 1) = 0.5 as height;
 infer { warmup 20 { drift(one($place)); } repeat 60 { drift(one($place)); block($place + @radius); mh(@far); collect radius; } }
 ",
     );
-    let job = ["run", "balls.pcad", "--observe", "disc.png", "--chains", "1", "--explain", "--out", "a"];
+    let job =
+        ["run", "balls.pcad", "--observe", "disc.png", "--chains", "1", "--explain", "--out", "a"];
     let done = f.succeeds(&job);
     let lines = done.out.lines().skip_while(|l| !l.starts_with("modelled"));
-    let said: Vec<&str> =
-        lines.take_while(|l| !["warning:", "note:", "seed "].iter().any(|s| l.starts_with(s))).collect();
+    let said: Vec<&str> = lines
+        .take_while(|l| !["warning:", "note:", "seed "].iter().any(|s| l.starts_with(s)))
+        .collect();
     snapshot("explained", said.join("\n").trim_end());
     let json: serde_json::Value = serde_json::from_str(&f.read("a/explained.json")).unwrap();
-    let radius = json["choices"].as_array().unwrap().iter().find(|c| c["address"] == "@radius").unwrap();
-    assert_eq!((&radius["choices"], &radius["kernels"][0]), (&1.into(), &"block($place + @radius)".into()));
+    let radius =
+        json["choices"].as_array().unwrap().iter().find(|c| c["address"] == "@radius").unwrap();
+    assert_eq!(
+        (&radius["choices"], &radius["kernels"][0]),
+        (&1.into(), &"block($place + @radius)".into())
+    );
     assert_eq!(radius["one_proposal_draws"]["meshes_drawn"], 1);
 }

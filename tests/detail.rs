@@ -1,9 +1,12 @@
-//! What levels of detail do to the score, on a lathe, the shipped body and a dense mesh, over fixed poses.
+//! What levels of detail do to the score, on a lathe, the shipped body and a dense mesh,
+//! over fixed poses.
 //!
-//! Two bounds. Of the contours themselves: their mean distance from those of meshes as they are is at most `detail`, in every pose. Of
-//! rho, the mean distance from the contours of another pose: at most three times `detail` in 49 of 50, where `detail` is at most half a
-//! pixel. It is a mean over what is seen, so a fold that appears or is hidden counts with its distance from the other contours, not with
-//! how far anything moved.
+//! Two bounds. Of the contours themselves: their mean distance from those of meshes as
+//! they are is at most `detail`, in every pose. Of rho, the mean distance from the
+//! contours of another pose: at most three times `detail` in 49 of 50, where `detail` is
+//! at most half a pixel. It is a mean over what is seen, so a fold that appears or is
+//! hidden counts with its distance from the other contours, not with how far anything
+//! moved.
 
 #[path = "../examples/detail_price/subjects.rs"]
 mod subjects;
@@ -26,12 +29,20 @@ fn contours(solid: &Solid, detail: f64) -> Arc<Contours> {
 /// Mean distances from some contours, in pixels.
 fn to(c: &Contours) -> impl Fn(&Contours) -> f64 {
     let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
-    let map = ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(SIZE, SIZE) };
+    let map =
+        ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(SIZE, SIZE) };
     let chamfer = Chamfer::prepare(&map, SIZE, SIZE, &ChamferOptions::default()).unwrap();
     let pixels = f64::from(SIZE) * 2f64.sqrt() / 100.0;
     move |c| {
-        let elements =
-            Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height };
+        let elements = Elements {
+            x: &c.x,
+            y: &c.y,
+            tx: &c.tx,
+            ty: &c.ty,
+            length: &c.length,
+            width: c.width,
+            height: c.height,
+        };
         chamfer.distance(&elements) * pixels
     }
 }
@@ -48,20 +59,23 @@ fn the_score_is_off_by_no_more_than_the_detail_allows() {
             for i in 0..POSES {
                 let c = contours(&solids[i], detail);
                 let other = &distances[(i + 1) % POSES];
-                // Contours are kept as a grid of distances, so those of a pose from themselves are not quite 0.
+                // Contours are kept as a grid of distances, so those of a pose from
+                // themselves are not quite 0.
                 own.push(distances[i](&c) - distances[i](&exact[i]));
                 off.push((other(&c) - other(&exact[i])).abs());
             }
             [&mut own, &mut off].into_iter().for_each(|list| list.sort_by(f64::total_cmp));
             let (own, off) = (own[POSES - 1] / detail, off[POSES * 99 / 100 - 1] / detail);
-            report += &format!("{} {detail}: contours {own:.3}, rho {off:.3} of it\n", subject.name);
+            report +=
+                &format!("{} {detail}: contours {own:.3}, rho {off:.3} of it\n", subject.name);
             assert!(own <= 1.0 && off <= 3.0, "{report}");
         }
     }
     println!("{report}");
 }
 
-/// Three balls and a vase in front, all by the state alone: what was drawn on the way there, and by which thread, leaves no trace.
+/// Three balls and a vase in front, all by the state alone: what was drawn on the way
+/// there, and by which thread, leaves no trace.
 #[test]
 fn the_level_depends_on_the_state_and_not_on_the_way_there() {
     use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
@@ -76,7 +90,8 @@ fn the_level_depends_on_the_state_and_not_on_the_way_there() {
          assume view = scene.render(scene.group([scene.group(balls), vase]), detail = 0.5);
          observe scene.contour(view) = photo;";
     let circle = (0..200).map(|i| f64::from(i) * std::f64::consts::TAU / 200.0);
-    let point = |f: fn(f64) -> f64, r: f32| circle.clone().map(|a| r * f(a) as f32).collect::<Vec<f32>>();
+    let point =
+        |f: fn(f64) -> f64, r: f32| circle.clone().map(|a| r * f(a) as f32).collect::<Vec<f32>>();
     let (x, y) = (point(f64::cos, 30.0), point(f64::sin, 30.0));
     let [x, y] = [x, y].map(|v| v.into_iter().map(|v| v + 64.0).collect());
     let [tx, ty] = [point(f64::sin, 1.0), point(f64::cos, -1.0)];
@@ -95,10 +110,16 @@ fn the_level_depends_on_the_state_and_not_on_the_way_there() {
         (trace.log_joint().to_bits(), view.triangles(SIZE), view.contours(SIZE).as_ref().clone())
     };
     let place = [0.2, 0.5];
-    let direct = std::thread::scope(|s| s.spawn(|| at(&mut model.simulate(1, 0).unwrap(), place)).join().unwrap());
+    let direct = std::thread::scope(|s| {
+        s.spawn(|| at(&mut model.simulate(1, 0).unwrap(), place)).join().unwrap()
+    });
     let mut trace = model.simulate(2, 0).unwrap();
     let mut levels = Vec::new();
-    for way in [vec![[0.0, -12.0]], vec![[0.1, 3.0], [0.2, 2.9]], vec![[-9.0, 0.5], [0.2, 0.6], [0.21, 0.6]]] {
+    for way in [
+        vec![[0.0, -12.0]],
+        vec![[0.1, 3.0], [0.2, 2.9]],
+        vec![[-9.0, 0.5], [0.2, 0.6], [0.21, 0.6]],
+    ] {
         for step in way {
             levels.push(at(&mut trace, step).1);
         }

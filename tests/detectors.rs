@@ -71,7 +71,10 @@ fn programs_name_their_detector() {
     let model = open(&f, PROGRAM).compile().unwrap_or_else(|e| panic!("{e}"));
     let [plain, by_trees, by_none, smoother] =
         ["plain", "by_trees", "by_none", "smoother"].map(|name| contours(&model, name));
-    assert!(plain.0 > 50 && by_trees.0 > 15 && smoother.0 > 20, "{plain:?} {by_trees:?} {smoother:?}");
+    assert!(
+        plain.0 > 50 && by_trees.0 > 15 && smoother.0 > 20,
+        "{plain:?} {by_trees:?} {smoother:?}"
+    );
     assert!(plain == by_none && plain != by_trees && by_trees != smoother);
     // Another file is another input.
     let hash = model.data_hash().to_owned();
@@ -87,15 +90,21 @@ fn a_run_has_a_detector_where_the_program_names_none() {
     let plain = open(&f, PROGRAM).compile().unwrap_or_else(|e| panic!("{e}"));
     let chosen = open(&f, PROGRAM).detector(forest()).compile().unwrap_or_else(|e| panic!("{e}"));
     let by_trees = contours(&plain, "by_trees");
-    for (name, expected) in [("plain", by_trees), ("by_trees", by_trees), ("by_none", contours(&plain, "by_none"))] {
+    for (name, expected) in
+        [("plain", by_trees), ("by_trees", by_trees), ("by_none", contours(&plain, "by_none"))]
+    {
         assert_eq!(contours(&chosen, name), expected, "{name}");
     }
-    // The photograph itself, and one that a host gives; the value that was given stays what it was, once it was looked at.
+    // The photograph itself, and one that a host gives; the value that was given stays
+    // what it was, once it was looked at.
     assert_eq!(contours(&chosen, "photo"), by_trees);
-    let grey = pcadlang::vision::photo::decode(&png(disc(96, 96, 48.0, 48.0, 24.0)), &Default::default()).unwrap();
+    let grey =
+        pcadlang::vision::photo::decode(&png(disc(96, 96, 48.0, 48.0, 24.0)), &Default::default())
+            .unwrap();
     let given = Value::object(ImageValue::photo(Photo::from_rgb(grey.rgb().clone()).unwrap()));
     let before = seen(&given);
-    let model = open(&f, PROGRAM).detector(forest()).observe("photo", given.clone()).compile().unwrap();
+    let model =
+        open(&f, PROGRAM).detector(forest()).observe("photo", given.clone()).compile().unwrap();
     assert_eq!((contours(&model, "photo"), seen(&given)), (by_trees, before));
     assert_ne!(by_trees, before);
 }
@@ -115,8 +124,14 @@ fn mistakes_are_shown() {
         ("detector(\"nothing.onnx\")", "cannot read"),
         ("detector(\"model.yml\", logits = true)", "a structured forest has no options"),
         ("detector(\"net.onnx\", spread = 0)", "`spread` must be above 0"),
-        ("detector(\"net.onnx\", output = 0)", "`output` must be a name in quotes or a number from 1"),
-        ("detector(\"net.onnx\", mean = [1, 2])", "`mean` must be a literal number or a list of three"),
+        (
+            "detector(\"net.onnx\", output = 0)",
+            "`output` must be a name in quotes or a number from 1",
+        ),
+        (
+            "detector(\"net.onnx\", mean = [1, 2])",
+            "`mean` must be a literal number or a list of three",
+        ),
         ("detector(\"net.onnx\", colours = \"grey\")", "`colours` must be \"rgb\" or \"bgr\""),
         ("detector(\"net.onnx\", white = 1, white = 2)", "`white` is given twice"),
         ("detector(\"net.onnx\", size = 2)", "detector has no option `size`"),
@@ -133,14 +148,20 @@ fn mistakes_are_shown() {
 fn the_command_takes_a_detector() {
     let f = folder("detectors_command");
     f.succeeds(&["contours", "ball.png", "-o", "plain.png"]);
-    let said = f.succeeds(&["contours", "ball.png", "-o", "trees.png", "--edges", "model.yml.gz"]).out;
+    let said =
+        f.succeeds(&["contours", "ball.png", "-o", "trees.png", "--edges", "model.yml.gz"]).out;
     assert!(said.contains("contour points in 96 x 96 pixels"), "{said}");
-    assert_ne!(std::fs::read(f.path().join("plain.png")).unwrap(), std::fs::read(f.path().join("trees.png")).unwrap());
+    assert_ne!(
+        std::fs::read(f.path().join("plain.png")).unwrap(),
+        std::fs::read(f.path().join("trees.png")).unwrap()
+    );
     let run = ["run", "run.pcad", "--observe", "ball.png", "--chains", "1", "--quiet"];
     f.succeeds(&[&run[..], &["--out", "a"]].concat());
     f.succeeds(&[&run[..], &["--out", "b", "--edges", "model.yml.gz"]].concat());
     f.succeeds(&[&run[..], &["--out", "c", "--edges", "model.yml"]].concat());
-    let record = |name: &str| serde_json::from_str::<serde_json::Value>(&f.read(&format!("{name}/run.json"))).unwrap();
+    let record = |name: &str| {
+        serde_json::from_str::<serde_json::Value>(&f.read(&format!("{name}/run.json"))).unwrap()
+    };
     // Times are in lines that begin with `#`.
     let draws = |name: &str| {
         let text = f.read(&format!("{name}/chain-1.csv"));
@@ -150,8 +171,14 @@ fn the_command_takes_a_detector() {
     assert_ne!(record("a")["inputs_hash"], record("b")["inputs_hash"]);
     assert_ne!(draws("a"), draws("b"));
     assert_eq!(draws("b"), draws("c"), "the same forest, packed and not");
-    f.refuses(&[&run[..], &["--out", "d", "--edges", "model.yml, colours = 3"]].concat(), "must be \"rgb\" or \"bgr\"");
-    f.refuses(&[&run[..], &["--out", "d", "--edges", "model.yml, bgr"]].concat(), "give options by name");
+    f.refuses(
+        &[&run[..], &["--out", "d", "--edges", "model.yml, colours = 3"]].concat(),
+        "must be \"rgb\" or \"bgr\"",
+    );
+    f.refuses(
+        &[&run[..], &["--out", "d", "--edges", "model.yml, bgr"]].concat(),
+        "give options by name",
+    );
     f.refuses(
         &[&run[..], &["--out", "d", "--edges", "model.yml, bgr); data e = csv(\"x\""]].concat(),
         "options of a detector",

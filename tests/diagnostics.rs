@@ -1,6 +1,9 @@
-//! The diagnostics against ArviZ's own numbers on stored draws (`data/arviz_summary.py` makes them).
+//! The diagnostics against ArviZ's own numbers on stored draws (`data/arviz_summary.py`
+//! makes them).
 
-use pcadlang::infer::diagnostics::{ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, r_hat, summary};
+use pcadlang::infer::diagnostics::{
+    ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, r_hat, summary,
+};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -45,7 +48,9 @@ impl Case {
 fn check(case: &str, what: &str, ours: f64, theirs: Option<f64>) {
     match theirs {
         None => assert!(ours.is_nan(), "{case}: {what} is {ours}, not NaN"),
-        Some(t) => assert!((ours - t).abs() <= 1e-9 * t.abs(), "{case}: {what} is {ours}, ArviZ has {t}"),
+        Some(t) => {
+            assert!((ours - t).abs() <= 1e-9 * t.abs(), "{case}: {what} is {ours}, ArviZ has {t}")
+        }
     }
 }
 
@@ -60,9 +65,11 @@ fn summary_equals_arviz() {
         check(&c.name, "q95", s.q95, c.q95);
         check(&c.name, "mcse_mean", s.mcse_mean, c.mcse_mean);
         if c.name == "tiny scale" {
-            // ArviZ takes squares below 1e-15 for constant: ours is that of the same draws in another unit.
+            // ArviZ takes squares below 1e-15 for constant: ours is that of the same
+            // draws in another unit.
             let unit = 2f64.powi(40);
-            let large: Vec<Vec<f64>> = c.draws().iter().map(|d| d.iter().map(|x| x * unit).collect()).collect();
+            let large: Vec<Vec<f64>> =
+                c.draws().iter().map(|d| d.iter().map(|x| x * unit).collect()).collect();
             check(&c.name, "mcse_sd", s.mcse_sd * unit, Some(summary(&large).mcse_sd));
         } else {
             check(&c.name, "mcse_sd", s.mcse_sd, c.mcse_sd);
@@ -70,7 +77,8 @@ fn summary_equals_arviz() {
         check(&c.name, "ess_bulk", s.ess_bulk, c.ess_bulk);
         check(&c.name, "ess_tail", s.ess_tail, c.ess_tail);
         if c.name == "each chain constant" {
-            // Nothing varies within the chains: ArviZ's number is one over a rounding error, ours is none.
+            // Nothing varies within the chains: ArviZ's number is one over a rounding
+            // error, ours is none.
             assert!(s.r_hat.is_nan(), "{}", s.r_hat);
         } else {
             check(&c.name, "r_hat", s.r_hat, c.r_hat);
@@ -94,7 +102,8 @@ fn single_diagnostics_equal_arviz_and_the_summary() {
         ] {
             assert_eq!(single.to_bits(), whole.to_bits(), "{}: {what}", c.name);
         }
-        // arviz.rhat splits before it folds, which is the same where no middle draw falls out.
+        // arviz.rhat splits before it folds, which is the same where no middle draw falls
+        // out.
         if x[0].len().is_multiple_of(2) && c.name != "each chain constant" {
             check(&c.name, "r_hat", s.r_hat, c.r_hat_split);
         }
@@ -103,7 +112,8 @@ fn single_diagnostics_equal_arviz_and_the_summary() {
 
 #[test]
 fn only_ranks_matter_to_the_bulk() {
-    let x: Vec<Vec<f64>> = fixture().into_iter().find(|c| c.name.starts_with("autocorrelated, 4")).unwrap().draws();
+    let x: Vec<Vec<f64>> =
+        fixture().into_iter().find(|c| c.name.starts_with("autocorrelated, 4")).unwrap().draws();
     let y: Vec<Vec<f64>> = x.iter().map(|c| c.iter().map(|v| (3.0 * v).exp()).collect()).collect();
     assert_eq!(ess_bulk(&x), ess_bulk(&y));
     assert_ne!(ess_mean(&x), ess_mean(&y));
@@ -117,7 +127,11 @@ fn the_order_of_chains_does_not_matter() {
         x.reverse();
         let r = summary(&x);
         for (a, b) in [(s.ess_bulk, r.ess_bulk), (s.ess_tail, r.ess_tail), (s.mcse_sd, r.mcse_sd)] {
-            assert!((a - b).abs() <= 1e-9 * a.abs() || a.is_nan() && b.is_nan(), "{}: {a} {b}", c.name);
+            assert!(
+                (a - b).abs() <= 1e-9 * a.abs() || a.is_nan() && b.is_nan(),
+                "{}: {a} {b}",
+                c.name
+            );
         }
     }
 }

@@ -1,7 +1,9 @@
-//! Log densities and special functions against a table made with 60 digits, and against statrs.
+//! Log densities and special functions against a table made with 60 digits, and against
+//! statrs.
 //!
-//! Inputs are taken as doubles, so all of the difference is this crate's. The tolerance is relative to the value, with a floor for
-//! values near 0, where terms of the size of 1 to 100 have cancelled.
+//! Inputs are taken as doubles, so all of the difference is this crate's. The tolerance
+//! is relative to the value, with a floor for values near 0, where terms of the size of 1
+//! to 100 have cancelled.
 
 mod common;
 use common::families::{datum, made};
@@ -25,7 +27,8 @@ fn function(name: &str, p: &[f64]) -> f64 {
     }
 }
 
-/// Whether two values agree to a relative error with an absolute floor; infinities must be the same.
+/// Whether two values agree to a relative error with an absolute floor; infinities must
+/// be the same.
 fn agree(got: f64, expected: f64, relative: f64, floor: f64) -> bool {
     got == expected || (got - expected).abs() <= relative * expected.abs() + floor
 }
@@ -64,7 +67,11 @@ fn statrs_agrees_on_ordinary_parameters() {
     use statrs::distribution::{Continuous, Discrete};
     let check = |d: Dist, x: f64, expected: f64| {
         let got = d.log_density_num(x);
-        assert!(agree(got, expected, 1e-10, 1e-10), "{} at {x}: {got} against {expected}", d.name());
+        assert!(
+            agree(got, expected, 1e-10, 1e-10),
+            "{} at {x}: {got} against {expected}",
+            d.name()
+        );
     };
     for i in 1..40u32 {
         let x = f64::from(i) * 0.37;
@@ -75,8 +82,16 @@ fn statrs_agrees_on_ordinary_parameters() {
         check(made("beta", &[0.7, 3.5]), u, s::Beta::new(0.7, 3.5).unwrap().ln_pdf(u));
         check(made("gamma", &[2.5, 1.5]), x, s::Gamma::new(2.5, 1.5).unwrap().ln_pdf(x));
         check(made("exponential", &[0.4]), x, s::Exp::new(0.4).unwrap().ln_pdf(x));
-        check(made("student_t", &[4.0, 1.0, 2.0]), x, s::StudentsT::new(1.0, 2.0, 4.0).unwrap().ln_pdf(x));
-        check(made("binomial", &[60.0, 0.3]), k, s::Binomial::new(0.3, 60).unwrap().ln_pmf(u64::from(i)));
+        check(
+            made("student_t", &[4.0, 1.0, 2.0]),
+            x,
+            s::StudentsT::new(1.0, 2.0, 4.0).unwrap().ln_pdf(x),
+        );
+        check(
+            made("binomial", &[60.0, 0.3]),
+            k,
+            s::Binomial::new(0.3, 60).unwrap().ln_pmf(u64::from(i)),
+        );
         check(made("poisson", &[12.5]), k, s::Poisson::new(12.5).unwrap().ln_pmf(u64::from(i)));
     }
 }

@@ -1,4 +1,5 @@
-//! Distributions in programs: matrices, mixtures, sorted values, improper priors, stored white noise; errors a program can see.
+//! Distributions in programs: matrices, mixtures, sorted values, improper priors, stored
+//! white noise; errors a program can see.
 
 mod common;
 use common::*;
@@ -14,9 +15,18 @@ fn error(text: &str) -> String {
 }
 
 /// The mean of `x` under a kernel against quadrature of the posterior density.
-fn check(name: &str, model: &str, kernel: &str, density: impl Fn(f64) -> f64, range: [f64; 2], tolerance: f64) {
+fn check(
+    name: &str,
+    model: &str,
+    kernel: &str,
+    density: impl Fn(f64) -> f64,
+    range: [f64; 2],
+    tolerance: f64,
+) {
     let kernel = if kernel.ends_with('}') { kernel.to_owned() } else { format!("{kernel};") };
-    let text = format!("{model} infer {{ warmup 3000 {{ {kernel} }} repeat 60000 {{ {kernel} collect x; }} }}");
+    let text = format!(
+        "{model} infer {{ warmup 3000 {{ {kernel} }} repeat 60000 {{ {kernel} collect x; }} }}"
+    );
     let [a, b] = range;
     let z = integrate(&density, a, b, 20_000);
     let m = integrate(|x| x * density(x), a, b, 20_000) / z;
@@ -31,7 +41,8 @@ fn scalars_by_moves_in_unconstrained_space() {
     check("below a bound", model, "drift(@x)", truncated, [-9.0, 0.5], 0.03);
     let model = "assume x ~ truncated_normal(0, 1, -1, 0.5); observe normal(x, 2) = 3;";
     check("between bounds", model, "drift(@x)", truncated, [-1.0, 0.5], 0.02);
-    // Two modes, one on either side of the cut at pi: a walk on the circle goes from one to the other.
+    // Two modes, one on either side of the cut at pi: a walk on the circle goes from one
+    // to the other.
     let circle = |x: f64| (2.0 * (x - 3.0).cos()).exp() * normal(x.sin(), 0.0, 0.3);
     let model = "assume x ~ von_mises(3, 2); observe normal(sin(x), 0.3) = 0;";
     let pi = std::f64::consts::PI;
@@ -40,10 +51,25 @@ fn scalars_by_moves_in_unconstrained_space() {
     let model = "assume x ~ flat(); observe normal(x, 0.5) = 20;";
     check("flat", model, "drift(@x)", |x| normal(x, 20.0, 0.5), [15.0, 25.0], 0.03);
     // Redrawing is refused, which leaves the rest of the plan right.
-    check("flat", model, "mix { 0.2 => mh(@x); 0.8 => drift(@x); }", |x| normal(x, 20.0, 0.5), [15.0, 25.0], 0.03);
+    check(
+        "flat",
+        model,
+        "mix { 0.2 => mh(@x); 0.8 => drift(@x); }",
+        |x| normal(x, 20.0, 0.5),
+        [15.0, 25.0],
+        0.03,
+    );
     let mixture = |x: f64| (normal(x, -2.0, 0.5) + 3.0 * normal(x, 1.0, 1.0)) * normal(0.0, x, 2.0);
-    let model = "assume x ~ mixture([1, 3], [normal(-2, 0.5), normal(1, 1)]); observe normal(x, 2) = 0;";
-    check("a mixture", model, "mix { 0.5 => mh(@x); 0.5 => drift(@x); }", mixture, [-9.0, 9.0], 0.05);
+    let model =
+        "assume x ~ mixture([1, 3], [normal(-2, 0.5), normal(1, 1)]); observe normal(x, 2) = 0;";
+    check(
+        "a mixture",
+        model,
+        "mix { 0.5 => mh(@x); 0.5 => drift(@x); }",
+        mixture,
+        [-9.0, 9.0],
+        0.05,
+    );
 }
 
 #[test]
@@ -52,7 +78,10 @@ fn correlations_are_learnt() {
     let pairs = [(1.0, 0.8), (-1.2, -1.0), (0.3, 0.6), (0.9, 1.1)];
     let likelihood = |r: f64| {
         let v = 1.0 - r * r;
-        pairs.iter().map(|(a, b)| (-(a * a - 2.0 * r * a * b + b * b) / (2.0 * v)).exp() / v.sqrt()).product::<f64>()
+        pairs
+            .iter()
+            .map(|(a, b)| (-(a * a - 2.0 * r * a * b + b * b) / (2.0 * v)).exp() / v.sqrt())
+            .product::<f64>()
     };
     let z = integrate(likelihood, -0.99999, 0.99999, 20_000);
     let m = integrate(|r| r * likelihood(r), -0.99999, 0.99999, 20_000) / z;
@@ -60,7 +89,9 @@ fn correlations_are_learnt() {
         for i in 0 .. 4 { observe mv_normal([0, 0], chol = l) = [[1, 0.8], [-1.2, -1], [0.3, 0.6], [0.9, 1.1]][i]; }
         assume r = l[1][0];";
     for kernel in ["drift(@l)", "mh(@l)"] {
-        let text = format!("{model} infer {{ warmup 2000 {{ {kernel}; }} repeat 40000 {{ {kernel}; collect r; }} }}");
+        let text = format!(
+            "{model} infer {{ warmup 2000 {{ {kernel}; }} repeat 40000 {{ {kernel}; collect r; }} }}"
+        );
         assert_mean(kernel, &run(&text, 21, 2)["r"], m, 0.03);
     }
 }
@@ -76,7 +107,8 @@ fn whole_matrices_are_observed_and_forced() {
     assert!((log(&format!("observe lkj(2, 1) = [{one}, {one}];")) - 0.25f64.ln()).abs() < 1e-12);
     assert_eq!(log("observe lkj(2, 1) = [[1, 0], [0.6, 0.9]];"), f64::NEG_INFINITY);
     assert!((log("observe multinomial(3, [1, 1]) = [1, 2];") - 0.375f64.ln()).abs() < 1e-12);
-    // The standard Wishart distribution with two degrees of freedom at the unit matrix, times 2^2 for the factor.
+    // The standard Wishart distribution with two degrees of freedom at the unit matrix,
+    // times 2^2 for the factor.
     let expected = -1.0 - (4.0 * std::f64::consts::PI).ln() + 4f64.ln();
     let got = log("observe wishart(2, [[1, 0], [0, 1]]) = [[1, 0], [0, 1]];");
     assert!((got - expected).abs() < 1e-12, "{got} against {expected}");
@@ -89,7 +121,8 @@ fn whole_matrices_are_observed_and_forced() {
 
 #[test]
 fn white_noise_behind_vectors_moves_with_its_scale() {
-    // s ~ exponential(1), v = s z: with z marginalised, y = v + noise has variance s^2 + 0.25 in each of two places.
+    // s ~ exponential(1), v = s z: with z marginalised, y = v + noise has variance s^2 +
+    // 0.25 in each of two places.
     let likelihood = |s: f64| {
         let sd = (s * s + 0.25).sqrt();
         (-s).exp() * normal_pdf(1.0, 0.0, sd) * normal_pdf(-2.0, 0.0, sd)
@@ -105,7 +138,8 @@ fn white_noise_behind_vectors_moves_with_its_scale() {
 
 #[test]
 fn sorted_values_stay_sorted() {
-    // Two sorted normal means, each seen once: by symmetry the mean of the greater of two independent posteriors.
+    // Two sorted normal means, each seen once: by symmetry the mean of the greater of two
+    // independent posteriors.
     let text = "assume m ~ ordered(normal(0, 1), 2); assume low = m[0]; assume high = m[1];
         observe normal(low, 1) = 0; observe normal(high, 1) = 0;
         infer { warmup 2000 { drift(@m); } repeat 40000 { drift(@m); collect low, high; } }";
@@ -124,12 +158,16 @@ fn errors_say_what_was_expected() {
     let e = error("observe mixture([1, 1], [normal(0, 1), 3]) = 0;");
     assert!(e.contains("mixture: `components` must be an array of distributions"), "{e}");
     let e = error("observe ordered(poisson(1), 2) = [0, 1];");
-    assert!(e.contains("ordered: d must be a distribution of continuous numbers, got poisson"), "{e}");
+    assert!(
+        e.contains("ordered: d must be a distribution of continuous numbers, got poisson"),
+        "{e}"
+    );
     let e = error("observe truncated_normal(0, 1, [2, 3], 2.5) = [2.2, 3];");
     assert!(e.contains("must be below hi, got 3 and 2.5 (element 1)"), "{e}");
 }
 
-/// A flat choice in a branch can neither appear nor vanish in a proposal: the chain stays where it began.
+/// A flat choice in a branch can neither appear nor vanish in a proposal: the chain stays
+/// where it began.
 #[test]
 fn improper_choices_neither_come_nor_go() {
     let text = "assume b ~ flip(0.5); assume x = if b { f ~ flat(); f } else { 0 }; observe normal(x, 1) = 0;

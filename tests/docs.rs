@@ -1,4 +1,5 @@
-//! The reference in `docs/language.md` is what the table of built-ins says, and the README's program runs.
+//! The reference in `docs/language.md` is what the table of built-ins says, and the
+//! README's program runs.
 //!
 //! `REGENERATE=1 cargo test --test docs` rewrites the reference.
 
@@ -12,22 +13,32 @@ fn the_reference_is_up_to_date() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/language.md");
     let text = std::fs::read_to_string(path).unwrap();
     let guide = text.split(START).next().unwrap().trim_end();
-    let expected = format!("{guide}\n\n{START}\n# Reference\n\n{}", doc::reference(&Table::default()));
+    let expected =
+        format!("{guide}\n\n{START}\n# Reference\n\n{}", doc::reference(&Table::default()));
     if std::env::var_os("REGENERATE").is_some() {
         std::fs::write(path, &expected).unwrap();
         return;
     }
-    assert!(text == expected, "docs/language.md is out of date: REGENERATE=1 cargo test --test docs");
+    assert!(
+        text == expected,
+        "docs/language.md is out of date: REGENERATE=1 cargo test --test docs"
+    );
 }
 
 #[test]
 fn the_programs_of_the_readme_run() {
-    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    let readme =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
     let start = readme.find("    // line.pcad").expect("the README shows line.pcad");
-    let program: String =
-        readme[start..].lines().take_while(|l| l.starts_with("    ")).map(|l| format!("{}\n", &l[4..])).collect();
+    let program: String = readme[start..]
+        .lines()
+        .take_while(|l| l.starts_with("    "))
+        .map(|l| format!("{}\n", &l[4..]))
+        .collect();
     let model = Model::from_text(&program).unwrap_or_else(|e| panic!("{e}"));
-    let posterior = model.run(&RunOptions { seed: 1, ..RunOptions::default() }, 2, 2).unwrap_or_else(|e| panic!("{e}"));
+    let posterior = model
+        .run(&RunOptions { seed: 1, ..RunOptions::default() }, 2, 2)
+        .unwrap_or_else(|e| panic!("{e}"));
     let slope = posterior.quantity("slope").unwrap().summary;
     assert!((slope.mean - 1.98).abs() < 0.1, "{}", slope.mean);
 }

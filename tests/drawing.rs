@@ -1,5 +1,6 @@
-//! Contours and depth of groups of parts, some of which move: the same bits as when they were compared with an earlier, plainer
-//! implementation, and the same whatever was drawn before.
+//! Contours and depth of groups of parts, some of which move: the same bits as when they
+//! were compared with an earlier, plainer implementation, and the same whatever was drawn
+//! before.
 
 use glam::{DVec3, Vec3};
 use pcadlang::geom::{Affine, Mesh, Solid};
@@ -30,10 +31,12 @@ impl Uniform {
     }
 }
 
-/// A surface of revolution about y, at times open at an end, at times with creases, somewhere about the origin.
+/// A surface of revolution about y, at times open at an end, at times with creases,
+/// somewhere about the origin.
 fn part(random: &mut Uniform) -> Arc<Mesh> {
     let (rings, sides) = (4 + random.below(5) as u32, 5 + random.below(9) as u32);
-    let (radius, half, ends) = (random.between(0.1, 0.6), random.between(0.1, 0.9), random.below(3));
+    let (radius, half, ends) =
+        (random.between(0.1, 0.6), random.between(0.1, 0.9), random.below(3));
     let place = Affine::new(random.vector(0.8), random.vector(2.0), DVec3::ONE);
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
@@ -68,7 +71,8 @@ fn camera(random: &mut Uniform) -> Camera {
     match random.below(4) {
         0 => {
             let (cx, cy) = (random.between(0.3, 0.7) * f64::from(width), 0.5 * f64::from(height));
-            camera.projection = Projection::Orthographic { units_per_pixel: random.between(0.01, 0.06), cx, cy };
+            camera.projection =
+                Projection::Orthographic { units_per_pixel: random.between(0.01, 0.06), cx, cy };
         }
         // Among the parts: the near plane cuts some.
         1 => camera.eye.z = random.between(-0.5, 2.0),
@@ -91,7 +95,10 @@ fn group(meshes: &[Arc<Mesh>], by: Affine) -> Solid {
 /// Every bit of the contours, in order.
 fn bits(c: &Contours) -> Vec<u32> {
     let lists = [&c.x, &c.y, &c.tx, &c.ty, &c.length];
-    [c.width, c.height].into_iter().chain(lists.into_iter().flatten().map(|v| v.to_bits())).collect()
+    [c.width, c.height]
+        .into_iter()
+        .chain(lists.into_iter().flatten().map(|v| v.to_bits()))
+        .collect()
 }
 
 /// Fowler, Noll and Vo's hash (FNV-1a) over words.
@@ -112,8 +119,9 @@ fn contours_and_depth_are_as_they_were() {
         let frame = Frame::render(&solid, &camera, Channels::Depth);
         depth = hash(frame.depth.iter().map(|d| d.to_bits()), depth);
     }
-    // Taken when vertices were first kept in single precision and lines of edges that are specks left out. Of the implementation
-    // before, no covered pixel differs in the mask or by more than 1e-5 in depth (of 581,404), and 5 pieces are gone (0.34 pixels).
+    // Taken when vertices were first kept in single precision and lines of edges that are
+    // specks left out. Of the implementation before, no covered pixel differs in the mask
+    // or by more than 1e-5 in depth (of 581,404), and 5 pieces are gone (0.34 pixels).
     assert_eq!(
         (pieces, format!("{contours:016x}"), format!("{depth:016x}")),
         (92_683, "3d50e83d679654a9".into(), "4513baf456a94dfc".into())
@@ -145,10 +153,13 @@ fn what_was_drawn_before_changes_nothing() {
             // By turns through a view and at once.
             let here = match random.next() < 0.5 {
                 true => Contours::of(&solid, &camera),
-                false => (*View::new(solid.clone(), camera).contours(camera.width.max(camera.height))).clone(),
+                false => (*View::new(solid.clone(), camera)
+                    .contours(camera.width.max(camera.height)))
+                .clone(),
             };
             // Another thread has drawn nothing before.
-            let there = std::thread::scope(|s| s.spawn(|| Contours::of(&solid, &camera)).join().unwrap());
+            let there =
+                std::thread::scope(|s| s.spawn(|| Contours::of(&solid, &camera)).join().unwrap());
             assert_eq!(bits(&here), bits(&there));
             // A view with a frame looks into the frame's depth.
             let view = View::new(solid, camera);
@@ -174,5 +185,8 @@ fn a_part_that_moves_there_and_back_gives_the_first_picture() {
     let copy = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
     assert_ne!(bits(&first), bits(&moved));
     assert_eq!(bits(&first), bits(&copy));
-    assert!(first.len() > 100 && meshes.iter().all(|m| m.positions.iter().all(|p: &Vec3| p.is_finite())));
+    assert!(
+        first.len() > 100
+            && meshes.iter().all(|m| m.positions.iter().all(|p: &Vec3| p.is_finite()))
+    );
 }

@@ -1,4 +1,5 @@
-//! The examples of embedding, each run for what it promises, and what else a host relies on.
+//! The examples of embedding, each run for what it promises, and what else a host relies
+//! on.
 
 #![allow(dead_code)]
 
@@ -24,8 +25,8 @@ mod embed_run_dir;
 #[path = "../examples/embed_trace.rs"]
 mod embed_trace;
 
-/// A primitive of the host, under `hmc` and kernels that reject: with its state and from scratch every draw is the same to the last
-/// bit, and its state saves most of the work.
+/// A primitive of the host, under `hmc` and kernels that reject: with its state and from
+/// scratch every draw is the same to the last bit, and its state saves most of the work.
 #[test]
 fn a_primitive_with_state_gives_the_same_draws_as_without() {
     let (host, cells) = embed_function::host();
@@ -34,12 +35,16 @@ fn a_primitive_with_state_gives_the_same_draws_as_without() {
         cells.store(0, Ordering::Relaxed);
         let options = RunOptions { seed: 3, incremental, ..RunOptions::default() };
         let posterior = model.run(&options, 2, 2).unwrap();
-        let accepted: u64 = posterior.chains.iter().flat_map(|c| &c.kernels).map(|k| k.accepted).sum();
-        let proposed: u64 = posterior.chains.iter().flat_map(|c| &c.kernels).map(|k| k.proposals).sum();
+        let accepted: u64 =
+            posterior.chains.iter().flat_map(|c| &c.kernels).map(|k| k.accepted).sum();
+        let proposed: u64 =
+            posterior.chains.iter().flat_map(|c| &c.kernels).map(|k| k.proposals).sum();
         assert!(accepted > 500 && accepted < proposed - 500, "{accepted} of {proposed}");
         let rows: Vec<_> = posterior.draws.iter().flat_map(|d| d.rows.clone()).collect();
-        let bits: Vec<u64> =
-            rows.iter().flat_map(|r| r.values.iter().chain([&r.log_joint]).map(|x| x.to_bits())).collect();
+        let bits: Vec<u64> = rows
+            .iter()
+            .flat_map(|r| r.values.iter().chain([&r.log_joint]).map(|x| x.to_bits()))
+            .collect();
         let end = posterior.quantity("end").unwrap().summary.mean;
         assert!((end - 53.0).abs() < 0.3, "{end}");
         (bits, cells.load(Ordering::Relaxed))
@@ -49,7 +54,8 @@ fn a_primitive_with_state_gives_the_same_draws_as_without() {
     assert!(few * 4 < many, "{few} cells of {many}");
 }
 
-/// The gradient that `hmc` follows is that of differences, and the tape's density that of the trace.
+/// The gradient that `hmc` follows is that of differences, and the tape's density that of
+/// the trace.
 #[test]
 fn the_gradient_of_a_primitive_is_that_of_differences() {
     let (host, _) = embed_function::host();
@@ -70,7 +76,11 @@ fn the_gradient_of_a_primitive_is_that_of_differences() {
                 w.log_joint + w.log_jacobian
             };
             let slope = (density(1e-5) - density(-1e-5)) / 2e-5;
-            assert!((slope - gradient[place]).abs() < 1e-5 * (1.0 + slope.abs()), "{slope} {}", gradient[place]);
+            assert!(
+                (slope - gradient[place]).abs() < 1e-5 * (1.0 + slope.abs()),
+                "{slope} {}",
+                gradient[place]
+            );
             place += 1;
         }
     }
@@ -78,14 +88,15 @@ fn the_gradient_of_a_primitive_is_that_of_differences() {
     assert!(place >= 44);
 }
 
-/// What is kept is that of the state: after a rejection the one before, in a fork that of the fork. Were another kept, the sum below,
-/// which trusts it, would be wrong.
+/// What is kept is that of the state: after a rejection the one before, in a fork that of
+/// the fork. Were another kept, the sum below, which trusts it, would be wrong.
 #[test]
 fn state_goes_back_with_a_rejected_proposal_and_along_with_a_fork() {
     let trusting = Entry::incremental("trusting", |a, previous: Option<Previous<f64>>| {
         let x = a.num(0)?;
         let steps = match previous {
-            // The value before, less the argument before, plus the one now: exact for whole numbers, if both are of one state.
+            // The value before, less the argument before, plus the one now: exact for
+            // whole numbers, if both are of one state.
             Some(p) => p.state() - p.argument(0).numbers()[0] + x,
             None => x,
         };
@@ -94,20 +105,34 @@ fn state_goes_back_with_a_rejected_proposal_and_along_with_a_fork() {
     .argument("x", Type::Num, "A whole number.");
     let text = "assume x ~ poisson(20); assume y ~ poisson(20);
                 observe normal(trusting(x) - trusting(y), 3) = 4; let apply = trusting; observe normal(apply(x), 9) = 20;";
-    let model = Program::parse(text).unwrap().host(&Host::new().with(trusting)).unwrap().compile().unwrap();
+    let model =
+        Program::parse(text).unwrap().host(&Host::new().with(trusting)).unwrap().compile().unwrap();
     let mut trace = model.simulate(1, 0).unwrap();
     let mut fork = trace.clone();
     let mut kernel = Mh::new(Scope { selector: Selector::All, pick: Pick::One });
     let (mut accepted, mut twin) = (0, Mh::new(Scope { selector: Selector::All, pick: Pick::One }));
     let from_scratch = |trace: &Trace| {
-        let again = Trace::generate(model.code().clone(), trace.constraints(), Draws::default(), Default::default());
+        let again = Trace::generate(
+            model.code().clone(),
+            trace.constraints(),
+            Draws::default(),
+            Default::default(),
+        );
         again.unwrap().0.log_joint()
     };
     for step in 0..2000 {
         accepted += kernel.step(&mut trace, &At::new(1, 0, step)).unwrap().accepted;
         twin.step(&mut fork, &At::new(2, 0, step)).unwrap();
-        assert_eq!(trace.log_joint().to_bits(), from_scratch(&trace).to_bits(), "after step {step}");
-        assert_eq!(fork.log_joint().to_bits(), from_scratch(&fork).to_bits(), "after step {step} of the fork");
+        assert_eq!(
+            trace.log_joint().to_bits(),
+            from_scratch(&trace).to_bits(),
+            "after step {step}"
+        );
+        assert_eq!(
+            fork.log_joint().to_bits(),
+            from_scratch(&fork).to_bits(),
+            "after step {step} of the fork"
+        );
     }
     assert!((300..1700).contains(&accepted), "{accepted}");
 }
@@ -124,13 +149,19 @@ fn a_kernel_of_the_host_runs_by_name_and_is_checked_like_any_other() {
     let share = embed_kernel::share_on_the_right().unwrap();
     assert!((share - 0.8).abs() < 0.02, "{share}");
     let compile = |kernel: &str| {
-        let text = format!("assume x ~ normal(0, 1); observe normal(x, 1) = 1; infer {{ repeat 9 {{ {kernel}; }} }}");
+        let text = format!(
+            "assume x ~ normal(0, 1); observe normal(x, 1) = 1; infer {{ repeat 9 {{ {kernel}; }} }}"
+        );
         let program = Program::parse(&text).unwrap().host(&embed_kernel::host()).unwrap();
         program.compile().and_then(|m| m.run(&RunOptions::default(), 1, 1))
     };
     assert!(compile("reflect(@x, about = 2)").is_ok());
     let message = |kernel| compile(kernel).err().map(|e| e.to_string()).unwrap_or_default();
-    assert!(message("reflekt(@x)").contains("did you mean `reflect`?"), "{}", message("reflekt(@x)"));
+    assert!(
+        message("reflekt(@x)").contains("did you mean `reflect`?"),
+        "{}",
+        message("reflekt(@x)")
+    );
     assert!(message("reflect(@x, abuot = 2)").contains("did you mean `about`?"));
     assert!(message("reflect(@x, about = true)").contains("`about` must be a number"));
 }
@@ -142,32 +173,42 @@ fn a_kernel_of_the_host_applies_another() {
         fn name(&self) -> String {
             "twice".into()
         }
-        fn step(&mut self, trace: &mut Trace, at: &At) -> pcadlang::trace::TraceResult<pcadlang::infer::Outcome> {
+        fn step(
+            &mut self,
+            trace: &mut Trace,
+            at: &At,
+        ) -> pcadlang::trace::TraceResult<pcadlang::infer::Outcome> {
             let mut all = self.0.step(trace, &at.within(0))?;
             all.add(self.0.step(trace, &at.within(1))?);
             Ok(all)
         }
     }
-    let twice = Entry::kernel("twice", |call: &mut pcadlang::host::KernelCall| Ok(Twice(call.kernel(0)?)));
+    let twice =
+        Entry::kernel("twice", |call: &mut pcadlang::host::KernelCall| Ok(Twice(call.kernel(0)?)));
     let host = Host::new().with(twice.argument("move", Type::Kernel, "The inner kernel."));
     let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 1; infer { repeat 100 { twice(mh(@x)); } }";
     let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
-    assert_eq!(model.run(&RunOptions::default(), 1, 1).unwrap().chains[0].kernels[0].proposals, 200);
+    assert_eq!(
+        model.run(&RunOptions::default(), 1, 1).unwrap().chains[0].kernels[0].proposals,
+        200
+    );
 }
 
 #[test]
 fn a_distribution_of_the_host_gives_the_same_posterior_with_and_without_its_gradient() {
-    let (with, without) =
-        (embed_distribution::share("hmc(@**, steps = 5)"), embed_distribution::share("drift(one(@**))"));
+    let (with, without) = (
+        embed_distribution::share("hmc(@**, steps = 5)"),
+        embed_distribution::share("drift(one(@**))"),
+    );
     let ((p, b), (q, c)) = (with.unwrap(), without.unwrap());
     assert!((p - q).abs() < 0.01 && (b - c).abs() < 0.05, "p {p} {q}, b {b} {c}");
-    let text =
-        "assume xs ~ iid(kumaraswamy(2, 5), 3); observe normal(sum(xs), 1) = 1; infer { repeat 9 { drift(@xs); } }";
+    let text = "assume xs ~ iid(kumaraswamy(2, 5), 3); observe normal(sum(xs), 1) = 1; infer { repeat 9 { drift(@xs); } }";
     let program = Program::parse(text).unwrap().host(&embed_distribution::host()).unwrap();
     assert!(program.compile().unwrap().run(&RunOptions::default(), 1, 1).is_ok());
     let text = "assume x ~ kumaraswamy(-1, 5); observe normal(x, 1) = 1;";
     let program = Program::parse(text).unwrap().host(&embed_distribution::host()).unwrap();
-    let e = program.compile().unwrap().simulate(1, 0).err().map(|e| e.to_string()).unwrap_or_default();
+    let e =
+        program.compile().unwrap().simulate(1, 0).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(e.contains("must be positive") && e.contains("1:12"), "{e}");
 }
 
@@ -231,10 +272,13 @@ fn names_that_clash_or_are_none_are_errors() {
 }
 
 fn embedded_distribution() -> Entry {
-    Entry::distribution("d", |_| Err::<pcadlang::dist::Normal, _>(pcadlang::host::Fault::domain("none")))
+    Entry::distribution("d", |_| {
+        Err::<pcadlang::dist::Normal, _>(pcadlang::host::Fault::domain("none"))
+    })
 }
 
-/// A density that is not a number is impossible, and a host's family may draw anything: no type is guessed for it.
+/// A density that is not a number is impossible, and a host's family may draw anything:
+/// no type is guessed for it.
 #[test]
 fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
     use pcadlang::host::{Datum, Distribution, Gradient, Support};
@@ -258,16 +302,20 @@ fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
             None
         }
     }
-    let host = Host::new().with(Entry::distribution("odd", |_| Ok(Odd)).argument("n", Type::Num, "Anything."));
-    let text =
-        "assume x ~ odd(1); observe normal(x[0] + x[1], 1) = 1; infer { init(best_of(20)); repeat 500 { drift(@x); } }";
+    let host = Host::new().with(Entry::distribution("odd", |_| Ok(Odd)).argument(
+        "n",
+        Type::Num,
+        "Anything.",
+    ));
+    let text = "assume x ~ odd(1); observe normal(x[0] + x[1], 1) = 1; infer { init(best_of(20)); repeat 500 { drift(@x); } }";
     let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
     let posterior = model.run(&RunOptions::default(), 1, 1).unwrap();
     let x = posterior.quantity("x[0]").unwrap().chains.concat();
     assert!(x.iter().all(|x| *x >= 0.0) && x.iter().any(|a| *a != x[0]));
 }
 
-/// A point of the unconstrained space says nothing of the discrete part of a value: `knn` draws such a value from its prior.
+/// A point of the unconstrained space says nothing of the discrete part of a value: `knn`
+/// draws such a value from its prior.
 #[test]
 fn neighbours_do_not_move_what_is_in_part_discrete() {
     use pcadlang::host::{Datum, Distribution, Gradient, Support};
@@ -297,7 +345,11 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
             None
         }
     }
-    let host = Host::new().with(Entry::distribution("toss", |_| Ok(Toss)).argument("n", Type::Num, "Anything."));
+    let host = Host::new().with(Entry::distribution("toss", |_| Ok(Toss)).argument(
+        "n",
+        Type::Num,
+        "Anything.",
+    ));
     let text = "assume x ~ toss(1); observe normal(x[0], 1) = 0.5;";
     let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
     let scenes: Vec<_> = (0..5).map(|i| Latent::all(&model.simulate(2, i).unwrap())).collect();
@@ -312,9 +364,12 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
     }
     assert!(accepted > 1000 && (1700..2300).contains(&ones), "{accepted} accepted, {ones} ones");
 
-    // Kernels that move along coordinates leave it alone: there is no way back to the part that has none.
+    // Kernels that move along coordinates leave it alone: there is no way back to the
+    // part that has none.
     let x = |t: &Trace| format!("{:?}", t.value(t.all_targets()[0]));
-    let is_one = |t: &Trace| t.value(t.all_targets()[0]).element(1).is_some_and(|v| v.same(&Value::Num(1.0)));
+    let is_one = |t: &Trace| {
+        t.value(t.all_targets()[0]).element(1).is_some_and(|v| v.same(&Value::Num(1.0)))
+    };
     let mut trace = (0..50).map(|i| model.simulate(1, i).unwrap()).find(is_one).unwrap();
     let before = x(&trace);
     let all = || Scope { selector: Selector::All, pick: Pick::All };
@@ -330,13 +385,16 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
 #[test]
 fn names_made_at_run_time_are_the_entry_s_own() {
     let host = (0..3).fold(Host::new(), |h, i| {
-        h.with(Entry::function(format!("f{i}"), move |a| Ok(Value::Num(a.num(0)? + f64::from(i)))).argument(
-            format!("x{i}"),
-            Type::Num,
-            format!("Number {i}."),
-        ))
+        h.with(
+            Entry::function(format!("f{i}"), move |a| Ok(Value::Num(a.num(0)? + f64::from(i))))
+                .argument(format!("x{i}"), Type::Num, format!("Number {i}.")),
+        )
     });
-    let model = Program::parse("let y = f2(x2 = 3); observe normal(y, 1) = 5;").unwrap().host(&host).unwrap().compile();
+    let model = Program::parse("let y = f2(x2 = 3); observe normal(y, 1) = 5;")
+        .unwrap()
+        .host(&host)
+        .unwrap()
+        .compile();
     let trace = model.unwrap().simulate(0, 0).unwrap();
     assert_eq!(trace.observed().len(), 1);
     assert!(host.doc("f1").unwrap().contains("Number 1."));

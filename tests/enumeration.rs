@@ -1,12 +1,16 @@
-//! Random programs with answers by enumeration: whatever a kernel does, it leaves the posterior as it is.
+//! Random programs with answers by enumeration: whatever a kernel does, it leaves the
+//! posterior as it is.
 //!
-//! A program is made at random ([`generate`]), its executions are enumerated by an interpreter of trees that shares nothing with
-//! the engine ([`execute`]), and each of a number of plans is started many times in exact draws from that posterior and must end
-//! in exact draws ([`check`]). A first look at few draws picks what seems off; only what a second look at many new draws says
-//! decides, so a right kernel fails with a chance below 1e-9 a plan. What is off by little in many programs shows where the
-//! draws of all programs are pooled.
+//! A program is made at random ([`generate`]), its executions are enumerated by an
+//! interpreter of trees that shares nothing with the engine ([`execute`]), and each of a
+//! number of plans is started many times in exact draws from that posterior and must end
+//! in exact draws ([`check`]). A first look at few draws picks what seems off; only what
+//! a second look at many new draws says decides, so a right kernel fails with a chance
+//! below 1e-9 a plan. What is off by little in many programs shows where the draws of all
+//! programs are pooled.
 //!
-//! `ENUMERATED=30000 FIRST=1000 cargo test --release --test enumeration -- --ignored --nocapture` checks other programs.
+//! `ENUMERATED=30000 FIRST=1000 cargo test --release --test enumeration -- --ignored --nocapture`
+//! checks other programs.
 
 #[path = "enumeration/check.rs"]
 mod check;
@@ -101,7 +105,9 @@ impl Tally {
 
     fn plan(&mut self, seed: u64, text: &str, posterior: &Arc<Posterior>, plan: &Plan) {
         self.plans += 1;
-        let wrong = |what: &str| format!("seed {seed}: {}\n{what}\n{text}{}", plan.statements, plan.kernels);
+        let wrong = |what: &str| {
+            format!("seed {seed}: {}\n{what}\n{text}{}", plan.statements, plan.kernels)
+        };
         match check(text, posterior, plan, plan.first_look(), seed) {
             Said::Refused(why) => {
                 let why = why.split_once(": ").map_or(why.clone(), |(_, w)| w.to_owned());
@@ -111,7 +117,8 @@ impl Tally {
             Said::Counted(counts, pooled, moved) => {
                 let e = self.classes.entry(plan.class.clone()).or_default();
                 e.0.merge(&pooled);
-                (e.1, e.2) = (e.1 + 1, e.2 + u64::from(moved > 0.0 || posterior.likeliest() > 0.999));
+                (e.1, e.2) =
+                    (e.1 + 1, e.2 + u64::from(moved > 0.0 || posterior.likeliest() > 0.999));
                 if counts.p_value().0 < SUSPICIOUS {
                     self.second_looks += 1;
                     match check(text, posterior, plan, SECOND_LOOK, seed ^ 0x5eed_5eed) {
@@ -172,15 +179,23 @@ fn tally(seeds: impl Iterator<Item = u64>) -> Tally {
 
 fn judge(all: &Tally) {
     all.report();
-    assert!(all.wrong.is_empty(), "{}", all.wrong.iter().take(5).cloned().collect::<Vec<_>>().join("\n----\n"));
+    assert!(
+        all.wrong.is_empty(),
+        "{}",
+        all.wrong.iter().take(5).cloned().collect::<Vec<_>>().join("\n----\n")
+    );
     for (class, (pooled, ..)) in &all.classes {
         // Beyond 6 with a chance of 1e-9 if many tables make it normal.
-        assert!(pooled.z() < 6.0, "{class}: draws of all programs together are off by z = {:.1}", pooled.z());
+        assert!(
+            pooled.z() < 6.0,
+            "{class}: draws of all programs together are off by z = {:.1}",
+            pooled.z()
+        );
     }
 }
 
-/// Every way in which updates take short cuts gives what running the program again from the start gives: what the update weighs,
-/// what appears and vanishes, where it fails.
+/// Every way in which updates take short cuts gives what running the program again from
+/// the start gives: what the update weighs, what appears and vanishes, where it fails.
 fn updates_agree(seed: u64) -> u64 {
     let (program, integration) = generate::program(seed);
     let Some(posterior) = Posterior::of(&program, integration) else { return 0 };
@@ -192,7 +207,8 @@ fn updates_agree(seed: u64) -> u64 {
         let (state, _) = posterior.draw(&mut rng);
         let made = |incremental: bool| {
             let draws = Draws { key, step: i, lane: 0 };
-            let made = Trace::generate(model.code().clone(), state.clone(), draws, Limits::default());
+            let made =
+                Trace::generate(model.code().clone(), state.clone(), draws, Limits::default());
             let (mut trace, _) = made.unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
             trace.set_incremental(incremental);
             trace
@@ -234,27 +250,38 @@ fn short_cuts_of_updates_agree_with_running_everything_again() {
     assert!(compared > 10_000, "{compared}");
 }
 
-/// Geweke's joint distribution test of a random program whose observations have joint conditions, with discrete choices summed
-/// out; `None` if it has none, if there are observations by chance, or if what is to be summed out is refused.
+/// Geweke's joint distribution test of a random program whose observations have joint
+/// conditions, with discrete choices summed out; `None` if it has none, if there are
+/// observations by chance, or if what is to be summed out is refused.
 fn joint_distribution_stays(seed: u64) -> Option<()> {
     let (program, integration) = generate::program(seed);
     let posterior = Posterior::of(&program, integration)?;
     let text = program.to_string();
     let joint = text.lines().any(|l| l.trim_start().starts_with("observe") && l.contains(" and "));
     let sites: Vec<&str> = posterior.discrete.keys().map(String::as_str).take(3).collect();
-    if !joint || !posterior.has_continuous || sites.len() < 2 || text.contains("factor") || text.contains("{ observe") {
+    if !joint
+        || !posterior.has_continuous
+        || sites.len() < 2
+        || text.contains("factor")
+        || text.contains("{ observe")
+    {
         return None;
     }
     let kernels = format!(
         "hmc($continuous, steps = 3, marginal = {}); gibbs(each($finite)); mh(one(@**)); slice(one($continuous));",
         sites.join(" + ")
     );
-    let model =
-        Model::from_text(&format!("{text}infer {{ warmup 30 {{ {kernels} }} repeat 60 {{ {kernels} }} }}")).ok()?;
+    let model = Model::from_text(&format!(
+        "{text}infer {{ warmup 30 {{ {kernels} }} repeat 60 {{ {kernels} }} }}"
+    ))
+    .ok()?;
     let (plan, _) = model.plan().ok()?;
     let progress = Progress::default();
-    let sampler =
-        PlanSampler { plan: &plan, options: RunOptions { seed, ..RunOptions::default() }, progress: &progress };
+    let sampler = PlanSampler {
+        plan: &plan,
+        options: RunOptions { seed, ..RunOptions::default() },
+        progress: &progress,
+    };
     let settings = Settings { replicates: 60, seed, threads: 2, ..Settings::default() };
     let said = geweke(model.code(), &sampler, &settings).ok()?;
     assert!(said.passes(), "seed {seed}: {said:#?}\n{text}");
@@ -292,8 +319,14 @@ fn plans_that_were_wrong_once() {
     let mut all = Tally::default();
     for (seed, statements) in ONCE_WRONG {
         let (program, integration) = generate::program(seed);
-        let posterior = Posterior::of(&program, integration).unwrap_or_else(|| panic!("{seed} is not enumerated"));
-        all.plan(seed, &program.to_string(), &Arc::new(posterior), &Plan::of("once wrong", statements));
+        let posterior = Posterior::of(&program, integration)
+            .unwrap_or_else(|| panic!("{seed} is not enumerated"));
+        all.plan(
+            seed,
+            &program.to_string(),
+            &Arc::new(posterior),
+            &Plan::of("once wrong", statements),
+        );
     }
     judge(&all);
     assert!(all.refused.is_empty(), "{:?}", all.refused);
@@ -306,8 +339,8 @@ fn many_random_programs_keep_their_posterior() {
     judge(&tally(first..first + number("ENUMERATED", 3000)));
 }
 
-/// Not an exact test: long chains of the default plan from the prior come near the posterior, so it reaches all states. Some mix
-/// slowly.
+/// Not an exact test: long chains of the default plan from the prior come near the
+/// posterior, so it reaches all states. Some mix slowly.
 #[test]
 #[ignore = "minutes"]
 fn default_plans_reach_the_posterior() {

@@ -1,10 +1,13 @@
-//! Each program in `programs/errors/<phase>/` holds one kind of mistake; what the user is told is in `tests/snapshots`.
+//! Each program in `programs/errors/<phase>/` holds one kind of mistake; what the user is
+//! told is in `tests/snapshots`.
 //!
-//! A new file becomes a test by itself. `INSTA_UPDATE=always cargo test --test errors` accepts the messages as they are:
-//! read them first as someone would who wrote that program.
+//! A new file becomes a test by itself. `INSTA_UPDATE=always cargo test --test errors`
+//! accepts the messages as they are: read them first as someone would who wrote that
+//! program.
 //!
-//! `parse` is what the grammar refuses, `name` and `type` what compiling refuses, `runtime` what a short run of one chain
-//! meets. Programs in folders below these are there to be included.
+//! `parse` is what the grammar refuses, `name` and `type` what compiling refuses,
+//! `runtime` what a short run of one chain meets. Programs in folders below these are
+//! there to be included.
 
 use pcadlang::diag::{Diagnostic, IntoDiagnostic, SourceMap, render};
 use pcadlang::syntax::parse;
@@ -27,7 +30,8 @@ fn parsing(path: &Path) -> Error {
     let text = std::fs::read_to_string(path).unwrap();
     let mut sources = SourceMap::new();
     let id = sources.add(&path.file_name().unwrap().to_string_lossy(), &text);
-    let diagnostics: Vec<Diagnostic> = parse(&text, id).1.into_iter().map(IntoDiagnostic::into_diagnostic).collect();
+    let diagnostics: Vec<Diagnostic> =
+        parse(&text, id).1.into_iter().map(IntoDiagnostic::into_diagnostic).collect();
     Error { diagnostics, sources }
 }
 
@@ -57,7 +61,12 @@ fn message(path: &Path, diagnose: Diagnose) -> String {
     let Error { diagnostics, sources } = diagnose(path);
     assert!(!diagnostics.is_empty(), "{} is taken for correct", path.display());
     for diagnostic in &diagnostics {
-        assert!(diagnostic.labels.iter().any(|l| l.primary), "{}: no place: {}", path.display(), diagnostic.message);
+        assert!(
+            diagnostic.labels.iter().any(|l| l.primary),
+            "{}: no place: {}",
+            path.display(),
+            diagnostic.message
+        );
     }
     render(&sources, &diagnostics, false)
 }
@@ -112,9 +121,16 @@ fn the_catalogue_is_up_to_date() {
             let program = std::fs::read_to_string(&path).unwrap();
             let said = message(&path, diagnose);
             let lines = |s: &str| {
-                s.trim_end().lines().map(|l| format!("    {l}").trim_end().to_owned() + "\n").collect::<String>()
+                s.trim_end()
+                    .lines()
+                    .map(|l| format!("    {l}").trim_end().to_owned() + "\n")
+                    .collect::<String>()
             };
-            text += &format!("\n### {name}\n\n{}\n```text\n{}\n```\n", lines(&program), said.trim_end());
+            text += &format!(
+                "\n### {name}\n\n{}\n```text\n{}\n```\n",
+                lines(&program),
+                said.trim_end()
+            );
         }
     }
     let path = root.join("docs/mistakes.md");
@@ -123,5 +139,8 @@ fn the_catalogue_is_up_to_date() {
         return;
     }
     let there = std::fs::read_to_string(path).unwrap();
-    assert!(there == text, "docs/mistakes.md is out of date: REGENERATE=1 cargo test --test errors");
+    assert!(
+        there == text,
+        "docs/mistakes.md is out of date: REGENERATE=1 cargo test --test errors"
+    );
 }

@@ -1,4 +1,5 @@
-//! `pcadlang evaluate` on small datasets: both layouts, resumption, cases that fail, and that the truth has no influence.
+//! `pcadlang evaluate` on small datasets: both layouts, resumption, cases that fail, and
+//! that the truth has no influence.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -35,7 +36,9 @@ fn folders(f: &Folder) {
     for name in ["data", "data/a", "data/b", "data/notes"] {
         std::fs::create_dir(f.path().join(name)).unwrap();
     }
-    f.write("p.pcad", PROGRAM).write("data/README.md", "a dataset").write("data/notes/truth.txt", "x");
+    f.write("p.pcad", PROGRAM)
+        .write("data/README.md", "a dataset")
+        .write("data/notes/truth.txt", "x");
     f.write("data/a/image.png", picture(9.0))
         .write("data/b/image.png", picture(12.0))
         .write("data/b/camera.json", CAMERA);
@@ -53,7 +56,8 @@ fn people(f: &Folder, poison: &Value) {
         }
         p
     };
-    let all = json!({ "format": poison, "people": [person("two"), person("one")], "truth": poison });
+    let all =
+        json!({ "format": poison, "people": [person("two"), person("one")], "truth": poison });
     f.write("people/annotations.json", all.to_string());
 }
 
@@ -69,7 +73,11 @@ fn json_of(f: &Folder, name: &str) -> Value {
 }
 
 fn draws(f: &Folder, dir: &str) -> String {
-    f.read(&format!("{dir}/chain-1.csv")).lines().filter(|l| !l.starts_with('#')).map(|l| format!("{l}\n")).collect()
+    f.read(&format!("{dir}/chain-1.csv"))
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|l| format!("{l}\n"))
+        .collect()
 }
 
 fn modified(f: &Folder, name: &str) -> std::time::SystemTime {
@@ -89,15 +97,28 @@ fn a_folder_for_each_case() {
     assert_eq!(d.out, f.read("out/table.md"));
     assert!(d.out.starts_with("| case | status |") && d.out.lines().count() == 4, "{}", d.out);
     let e = json_of(&f, "out/evaluation.json");
-    assert_eq!((&e["program"], &e["seed"], &e["layout"]), (&json!("p.pcad"), &json!(1), &json!("folders")));
-    assert_eq!(e["settings"], json!({ "chains": 2, "steps": 20, "warmup": 10, "time": null, "incremental": true }));
+    assert_eq!(
+        (&e["program"], &e["seed"], &e["layout"]),
+        (&json!("p.pcad"), &json!(1), &json!("folders"))
+    );
+    assert_eq!(
+        e["settings"],
+        json!({ "chains": 2, "steps": 20, "warmup": 10, "time": null, "incremental": true })
+    );
     for (i, name) in ["a", "b"].iter().enumerate() {
         let row = &e["cases"][i];
-        assert_eq!((&row["case"], &row["status"], &row["error"]), (&json!(name), &json!("done"), &Value::Null));
-        assert!(row["seconds"].as_f64() <= row["wall_seconds"].as_f64() && row["seconds"].as_f64() > Some(0.0));
+        assert_eq!(
+            (&row["case"], &row["status"], &row["error"]),
+            (&json!(name), &json!("done"), &Value::Null)
+        );
+        assert!(
+            row["seconds"].as_f64() <= row["wall_seconds"].as_f64()
+                && row["seconds"].as_f64() > Some(0.0)
+        );
         assert!(row["best_log_joint"].is_f64() && row["draws"].as_u64() > Some(0), "{row}");
         assert_eq!(row["steps"], json!(40), "of both chains; the program has no warm-up");
-        for file in ["depth.npy", "normals.npy", "mask.png", "best.obj", "report.html", "run.json"] {
+        for file in ["depth.npy", "normals.npy", "mask.png", "best.obj", "report.html", "run.json"]
+        {
             assert!(f.exists(&format!("out/{name}/{file}")), "{name}/{file}");
         }
     }
@@ -115,14 +136,18 @@ fn a_folder_for_each_case() {
     run(&["--camera", "data/b/camera.json"], "b");
 }
 
-/// What lies beside a picture is not even opened: a reader of a pipe without a writer would wait for ever.
+/// What lies beside a picture is not even opened: a reader of a pipe without a writer
+/// would wait for ever.
 #[cfg(unix)]
 #[test]
 fn the_truth_in_a_folder_is_not_opened() {
     let f = Folder::new("evaluate_truth");
     folders(&f);
     for truth in ["gt.npz", "mask.png", "depth16.png", "meta.json", "mesh.obj"] {
-        let made = std::process::Command::new("mkfifo").arg(f.path().join("data/a").join(truth)).status().unwrap();
+        let made = std::process::Command::new("mkfifo")
+            .arg(f.path().join("data/a").join(truth))
+            .status()
+            .unwrap();
         assert!(made.success());
     }
     assert_eq!(evaluate(&f, &["data", "--out", "out", "--only", "a", "--quiet"]).code, 0);
@@ -158,18 +183,24 @@ fn people_and_their_predictions() {
 #[test]
 fn other_fields_of_annotations_have_no_influence() {
     let mut all = Vec::new();
-    for (i, poison) in
-        [json!({ "l_hip": [1, 2, 2] }), json!("not what is expected"), json!(-1e300), json!([[{ "image": "x.png" }]])]
-            .iter()
-            .enumerate()
+    for (i, poison) in [
+        json!({ "l_hip": [1, 2, 2] }),
+        json!("not what is expected"),
+        json!(-1e300),
+        json!([[{ "image": "x.png" }]]),
+    ]
+    .iter()
+    .enumerate()
     {
         let f = Folder::new(&format!("evaluate_poison_{i}"));
         people(&f, poison);
         let d = evaluate(&f, &["people", "--out", "out", "--quiet"]);
         assert_eq!((d.code, d.out.as_str(), d.err.as_str()), (0, "", ""));
         let mut run = json_of(&f, "out/one/run.json");
-        let of_the_clock = |k: &&String| k.contains("seconds") || ["chains", "begun"].contains(&k.as_str());
-        let keys: Vec<String> = run.as_object().unwrap().keys().filter(of_the_clock).cloned().collect();
+        let of_the_clock =
+            |k: &&String| k.contains("seconds") || ["chains", "begun"].contains(&k.as_str());
+        let keys: Vec<String> =
+            run.as_object().unwrap().keys().filter(of_the_clock).cloned().collect();
         keys.iter().for_each(|k| run[k] = Value::Null);
         let files: Vec<String> = f.files().into_iter().filter(|n| n.starts_with("out")).collect();
         all.push((draws(&f, "out/one"), draws(&f, "out/two"), run, files));
@@ -182,18 +213,43 @@ fn other_fields_of_annotations_have_no_influence() {
 fn keypoints_of_a_detector() {
     let f = Folder::new("evaluate_detected");
     people(&f, &json!(null));
-    f.write("found.json", r#"{"one": {"keypoints": {"hip": [41.5, 3]}, "seconds": 1}, "two": {"keypoints": null}}"#);
-    let args =
-        ["evaluate", "d.pcad", "people", "--keypoints", "found.json", "--steps", "20", "--chains", "1", "--out", "out"];
+    f.write(
+        "found.json",
+        r#"{"one": {"keypoints": {"hip": [41.5, 3]}, "seconds": 1}, "two": {"keypoints": null}}"#,
+    );
+    let args = [
+        "evaluate",
+        "d.pcad",
+        "people",
+        "--keypoints",
+        "found.json",
+        "--steps",
+        "20",
+        "--chains",
+        "1",
+        "--out",
+        "out",
+    ];
     let d = f.succeeds(&args);
-    assert!(d.err.contains("note: no keypoints for two: it runs on its picture alone"), "{}", d.err);
+    assert!(
+        d.err.contains("note: no keypoints for two: it runs on its picture alone"),
+        "{}",
+        d.err
+    );
     assert!(!d.err.contains("detected in one"), "{}", d.err);
-    let x = |case: &str| json_of(&f, &format!("out/{case}/summary.json"))["quantities"]["x"]["mean"].as_f64().unwrap();
+    let x = |case: &str| {
+        json_of(&f, &format!("out/{case}/summary.json"))["quantities"]["x"]["mean"]
+            .as_f64()
+            .unwrap()
+    };
     assert!((x("one") - 41.5).abs() < 1e-3 && x("two").abs() < 1e-3, "{} {}", x("one"), x("two"));
     let run = json_of(&f, "out/one/run.json");
     assert_eq!(run["observe"], json!(["photo=people/one.png", "keypoints=found.json#one"]));
     // Another person in the file changes nothing for this one.
-    f.write("found.json", r#"{"one": {"keypoints": {"hip": [41.5, 3]}, "seconds": 1}, "three": {}}"#);
+    f.write(
+        "found.json",
+        r#"{"one": {"keypoints": {"hip": [41.5, 3]}, "seconds": 1}, "three": {}}"#,
+    );
     assert!(f.succeeds(&args).err.contains("1/2 two: already done\n2/2 one: already done"));
     f.write("found.json", r#"{"one": {"keypoints": {"hip": [0, 3]}}}"#);
     f.refuses(&args, "one was run with different settings: picture, camera or keypoints");
@@ -217,7 +273,11 @@ fn what_is_done_is_not_done_again() {
     let (before, files) = (f.read("out/evaluation.json"), f.files());
     let times = ["out/a/run.json", "out/b/run.json"].map(|n| modified(&f, n));
     let d = evaluate(&f, &all);
-    assert!(d.err.ends_with("1/2 a: already done\n2/2 b: already done\n") && d.code == 0, "{}", d.err);
+    assert!(
+        d.err.ends_with("1/2 a: already done\n2/2 b: already done\n") && d.code == 0,
+        "{}",
+        d.err
+    );
     assert_eq!((f.read("out/evaluation.json"), f.files()), (before, files));
     assert_eq!(["out/a/run.json", "out/b/run.json"].map(|n| modified(&f, n)), times);
     // One that is gone, and one that was stopped, are done again.
@@ -230,17 +290,30 @@ fn what_is_done_is_not_done_again() {
     assert_eq!((draws(&f, "out/a"), draws(&f, "out/b")), (a, b));
     // One case of them anew: the other stays in the table.
     let d = evaluate(&f, &["data", "--out", "out", "--only", "a", "--fresh"]);
-    assert!(!d.err.contains("before") && d.out.contains("| a ") && d.out.contains("| b "), "{}{}", d.err, d.out);
+    assert!(
+        !d.err.contains("before") && d.out.contains("| a ") && d.out.contains("| b "),
+        "{}{}",
+        d.err,
+        d.out
+    );
 }
 
 #[test]
 fn other_settings_are_an_error_that_names_them() {
     let f = Folder::new("evaluate_other");
     folders(&f);
-    let base = ["evaluate", "p.pcad", "data", "--out", "out", "--steps", "20", "--warmup", "10", "--chains", "2"];
+    let base = [
+        "evaluate", "p.pcad", "data", "--out", "out", "--steps", "20", "--warmup", "10",
+        "--chains", "2",
+    ];
     f.succeeds(&base);
-    let with = |more: &[&'static str]| base.iter().copied().chain(more.iter().copied()).collect::<Vec<_>>();
-    f.refuses(&with(&["--seed", "2"]), "out/a was run with different settings: seed (was 1, now 2)");
+    let with = |more: &[&'static str]| {
+        base.iter().copied().chain(more.iter().copied()).collect::<Vec<_>>()
+    };
+    f.refuses(
+        &with(&["--seed", "2"]),
+        "out/a was run with different settings: seed (was 1, now 2)",
+    );
     f.refuses(&with(&["--set", "sd=2"]), "program, --set");
     f.refuses(
         &with(&["--time", "3s", "--no-incremental"]),
@@ -266,7 +339,10 @@ fn a_case_that_fails_does_not_stop_the_rest() {
     assert!(d.err.contains("1/2 a: failed\nerror: data/a/image.png: "), "{}", d.err);
     assert!(d.err.ends_with("error: 1 of 2 cases failed: a\n"), "{}", d.err);
     let e = json_of(&f, "out/evaluation.json");
-    assert_eq!((&e["cases"][0]["status"], &e["cases"][1]["status"]), (&json!("failed"), &json!("done")));
+    assert_eq!(
+        (&e["cases"][0]["status"], &e["cases"][1]["status"]),
+        (&json!("failed"), &json!("done"))
+    );
     assert!(e["cases"][0]["error"].as_str().unwrap().contains("data/a/image.png"));
     assert!(d.out.contains("| failed ") && d.out.contains("* a: data/a/image.png: "), "{}", d.out);
     assert_eq!(json_of(&f, "out/a/run.json")["state"], "failed");
@@ -287,21 +363,28 @@ fn a_case_that_fails_does_not_stop_the_rest() {
 fn what_is_no_dataset_leaves_nothing() {
     let f = Folder::new("evaluate_refused");
     folders(&f);
-    let refuses =
-        |f: &Folder, dataset: &str, says: &str| f.refuses(&["evaluate", "p.pcad", dataset, "--out", "out"], says);
+    let refuses = |f: &Folder, dataset: &str, says: &str| {
+        f.refuses(&["evaluate", "p.pcad", dataset, "--out", "out"], says)
+    };
     std::fs::create_dir(f.path().join("empty")).unwrap();
     refuses(&f, "empty", "empty: not a dataset");
     refuses(&f, "nowhere", "cannot read nowhere: ");
     refuses(&f, "data/a", "data/a: not a dataset");
     let d = f.run(&["evaluate", "p.pcad", "data/a", "--out", "out"]);
     assert!(d.err.contains("hint: this is a single case"), "{}", d.err);
-    f.refuses(&["evaluate", "p.pcad", "data", "--out", "out", "--only", "aa"], "data: there is no case \"aa\"");
+    f.refuses(
+        &["evaluate", "p.pcad", "data", "--out", "out", "--only", "aa"],
+        "data: there is no case \"aa\"",
+    );
     f.refuses(
         &["evaluate", "p.pcad", "data", "--out", "data"],
         "data is not empty and is not the folder of an evaluation",
     );
     f.refuses(&["evaluate", "p.pcad", "data", "--out", "out", "--set", "x=1"], "x");
-    f.refuses(&["evaluate", "coin.pcad", "data", "--out", "out"], "the program observes no item of kind `image`");
+    f.refuses(
+        &["evaluate", "coin.pcad", "data", "--out", "out"],
+        "the program observes no item of kind `image`",
+    );
     let people = |text: &str| {
         f.write("empty/annotations.json", text);
     };
@@ -310,9 +393,18 @@ fn what_is_no_dataset_leaves_nothing() {
         ("{\"images\": []}", "missing field `people`"),
         ("{\"people\": []}", "empty: not a dataset"),
         ("{\"people\": [{\"id\": 3, \"image\": \"x.png\"}]}", "expected a string"),
-        ("{\"people\": [{\"id\": \"a\", \"image\": \"../x.png\"}]}", "is not a file in the same folder"),
-        ("{\"people\": [{\"id\": \"../a\", \"image\": \"x.png\"}]}", "cannot be used as a folder name"),
-        ("{\"people\": [{\"id\": \"table.md\", \"image\": \"x.png\"}]}", "cannot be used as a folder name"),
+        (
+            "{\"people\": [{\"id\": \"a\", \"image\": \"../x.png\"}]}",
+            "is not a file in the same folder",
+        ),
+        (
+            "{\"people\": [{\"id\": \"../a\", \"image\": \"x.png\"}]}",
+            "cannot be used as a folder name",
+        ),
+        (
+            "{\"people\": [{\"id\": \"table.md\", \"image\": \"x.png\"}]}",
+            "cannot be used as a folder name",
+        ),
         (
             "{\"people\": [{\"id\": \"a\", \"image\": \"x\"}, {\"id\": \"a\", \"image\": \"y\"}]}",
             "the case a occurs twice",
@@ -341,7 +433,9 @@ fn an_interrupted_evaluation_goes_on_later() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let under_way = |f: &Folder| f.exists("out/a/chain-2.csv") && f.read("out/a/chain-2.csv").lines().count() > 20;
+    let under_way = |f: &Folder| {
+        f.exists("out/a/chain-2.csv") && f.read("out/a/chain-2.csv").lines().count() > 20
+    };
     for _ in 0..600 {
         if under_way(&f) {
             break;
@@ -350,8 +444,14 @@ fn an_interrupted_evaluation_goes_on_later() {
     }
     assert!(under_way(&f));
     let status = |i: usize| json_of(&f, "out/evaluation.json")["cases"][i]["status"].clone();
-    assert_eq!((status(0), status(1)), (json!("pending"), json!("pending")), "readable before the first case ends");
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(
+        (status(0), status(1)),
+        (json!("pending"), json!("pending")),
+        "readable before the first case ends"
+    );
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
     assert_eq!(child.wait().unwrap().code(), Some(3));
     assert_eq!((status(0), status(1)), (json!("interrupted"), json!("pending")));
     assert!(f.read("out/table.md").contains("| interrupted |") && !f.exists("out/b"));

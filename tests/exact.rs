@@ -1,10 +1,11 @@
-//! Kernels against exact answers: conjugate, enumerable, recursive, changing-structure and open-universe models.
+//! Kernels against exact answers: conjugate, enumerable, recursive, changing-structure
+//! and open-universe models.
 
 mod common;
 use common::*;
 
-/// x ~ normal(0, 1), observe normal(x, 0.5) = 2: mean 1.600, variance 0.200. (Leaving the prior out of the ratio, as an
-/// early engine did, gives 1.333 and 0.167.)
+/// x ~ normal(0, 1), observe normal(x, 0.5) = 2: mean 1.600, variance 0.200. (Leaving the
+/// prior out of the ratio, as an early engine did, gives 1.333 and 0.167.)
 fn conjugate_normal(kernel: &str) {
     let stmt = if kernel.ends_with('}') { kernel.to_owned() } else { format!("{kernel};") };
     let text = format!(
@@ -27,7 +28,8 @@ fn conjugate_normal_by_every_kernel() {
     kernels::exact::CONJUGATE.iter().for_each(|k| conjugate_normal(k));
 }
 
-/// The mean of a component and the labels of three points: a mixture, and a chain in which labels follow each other.
+/// The mean of a component and the labels of three points: a mixture, and a chain in
+/// which labels follow each other.
 #[test]
 fn labels_are_summed_out() {
     let y = [0.3, 1.6, 2.4];
@@ -47,7 +49,11 @@ fn labels_are_summed_out() {
         };
         let total = sum(&|_, _| 1.0);
         for kernel in kernels::exact::SUMMED_OUT {
-            let prior = if chain { "if i == 0 { 0.4 } else { if z[i - 1] { 0.8 } else { 0.2 } }" } else { "0.4" };
+            let prior = if chain {
+                "if i == 0 { 0.4 } else { if z[i - 1] { 0.8 } else { 0.2 } }"
+            } else {
+                "0.4"
+            };
             let k = if kernel.ends_with(';') { (*kernel).to_owned() } else { format!("{kernel};") };
             let text = format!(
                 "let y = {y:?}; assume m ~ normal(1, 2);
@@ -64,7 +70,8 @@ fn labels_are_summed_out() {
     }
 }
 
-/// Two stages of acceptance, the first by a surrogate with another mean and width; by hand and by a kernel of the program.
+/// Two stages of acceptance, the first by a surrogate with another mean and width; by
+/// hand and by a kernel of the program.
 #[test]
 fn surrogates_leave_the_posterior_as_it_is() {
     for kernel in kernels::exact::DELAYED {
@@ -80,7 +87,9 @@ fn surrogates_leave_the_posterior_as_it_is() {
 /// 20,000 draws by slices of two modes, one narrow, follow the distribution as a whole.
 #[test]
 fn slices_have_the_right_distribution() {
-    let density = |x: f64| normal_pdf(x, 0.0, 3.0) * (0.4 * normal_pdf(x, -2.0, 0.3) + 0.6 * normal_pdf(x, 2.0, 1.0));
+    let density = |x: f64| {
+        normal_pdf(x, 0.0, 3.0) * (0.4 * normal_pdf(x, -2.0, 0.3) + 0.6 * normal_pdf(x, 2.0, 1.0))
+    };
     let (low, cells) = (-5.0, 3000);
     let width = 13.0 / cells as f64;
     let mut reached = vec![0.0];
@@ -122,7 +131,8 @@ fn beta_binomial() {
     }
 }
 
-/// The support of p2 depends on p1: p1 ~ uniform(.5, 1), p2 ~ uniform(0, p1), observe flip(p2) = false.
+/// The support of p2 depends on p1: p1 ~ uniform(.5, 1), p2 ~ uniform(0, p1), observe
+/// flip(p2) = false.
 #[test]
 fn support_that_depends_on_another_choice() {
     let z = integrate(|p1| 1.0 - p1 / 2.0, 0.5, 1.0, 200);
@@ -146,8 +156,11 @@ fn recursion_against_enumeration() {
     let z: f64 = (0..60).map(|a| weight(f64::from(a))).sum();
     let expected = (0..60).map(|a| f64::from(a) * weight(f64::from(a))).sum::<f64>() / z;
     for kernel in kernels::exact::RECURSION.iter().copied() {
-        let kernel =
-            if kernel.contains('#') { "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }" } else { kernel };
+        let kernel = if kernel.contains('#') {
+            "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }"
+        } else {
+            kernel
+        };
         let k = if kernel.starts_with("mix") { kernel.to_owned() } else { format!("{kernel};") };
         let text = format!(
             "fn geom(p) {{ s ~ flip(p); if s {{ 1 + geom(p) }} else {{ 0 }} }}
@@ -181,7 +194,8 @@ fn branches_with_choices_of_their_own() {
     }
 }
 
-/// A hidden Markov chain by a loop that reads its own container, against forward-backward.
+/// A hidden Markov chain by a loop that reads its own container, against
+/// forward-backward.
 #[test]
 fn hidden_markov_model() {
     let obs = [0.2, 1.1, 2.3, 1.9, 0.4];
@@ -194,13 +208,15 @@ fn hidden_markov_model() {
     }
     for t in 1..n {
         for s in 0..3 {
-            forward[t][s] = (0..3).map(|r| forward[t - 1][r] * trans[r][s]).sum::<f64>() * like(s, obs[t]);
+            forward[t][s] =
+                (0..3).map(|r| forward[t - 1][r] * trans[r][s]).sum::<f64>() * like(s, obs[t]);
         }
     }
     let mut backward = vec![[1.0; 3]; n];
     for t in (0..n - 1).rev() {
         for r in 0..3 {
-            backward[t][r] = (0..3).map(|s| trans[r][s] * like(s, obs[t + 1]) * backward[t + 1][s]).sum();
+            backward[t][r] =
+                (0..3).map(|s| trans[r][s] * like(s, obs[t + 1]) * backward[t + 1][s]).sum();
         }
     }
     let exact: Vec<f64> = (0..n)
@@ -226,14 +242,18 @@ fn hidden_markov_model() {
     }
 }
 
-/// Partitions of three points under a Dirichlet process by stick-breaking and mem, against the five partitions.
+/// Partitions of three points under a Dirichlet process by stick-breaking and mem,
+/// against the five partitions.
 #[test]
 fn open_universe_with_mem() {
     let y = [-1.0, -0.5, 2.0];
     // Marginal density of a group: points given a centre ~ normal(0, 2), noise 1.
     let group = |points: &[f64]| {
         integrate(
-            |m| normal_pdf(m, 0.0, 2.0) * points.iter().map(|p| normal_pdf(*p, m, 1.0)).product::<f64>(),
+            |m| {
+                normal_pdf(m, 0.0, 2.0)
+                    * points.iter().map(|p| normal_pdf(*p, m, 1.0)).product::<f64>()
+            },
             -15.0,
             15.0,
             3000,
@@ -264,7 +284,8 @@ fn open_universe_with_mem() {
     }
 }
 
-/// Elliptical slice with a non-zero mean and full covariance, and a mean that depends on a choice of the block.
+/// Elliptical slice with a non-zero mean and full covariance, and a mean that depends on
+/// a choice of the block.
 #[test]
 fn elliptical_slice_with_full_covariance() {
     // Prior N([1, -1], [[2, .9], [.9, 1]]), observe x0 + x1 = 1.5 with sd 0.5.
@@ -292,7 +313,8 @@ fn elliptical_slice_with_full_covariance() {
     assert_mean("a", &d["a"], 2.0 / 2.25, 0.05);
 }
 
-/// A gp over five points, its bandwidth unknown: whitened and centred forms agree with quadrature over the bandwidth.
+/// A gp over five points, its bandwidth unknown: whitened and centred forms agree with
+/// quadrature over the bandwidth.
 #[test]
 fn gaussian_process_with_unknown_bandwidth() {
     let text = |centred: bool, kernel: &str| {
@@ -307,7 +329,10 @@ fn gaussian_process_with_unknown_bandwidth() {
     let centred = run(&text(true, "elliptical(@f); drift(@l);"), 37, 2);
     let (mw, mc) = (mean(&white["l"]), mean(&centred["l"]));
     let se = (standard_error(&white["l"]).powi(2) + standard_error(&centred["l"]).powi(2)).sqrt();
-    assert!(se < 0.02 && (mw - mc).abs() < 5.0 * se, "bandwidth: whitened {mw}, centred {mc}, se {se}");
+    assert!(
+        se < 0.02 && (mw - mc).abs() < 5.0 * se,
+        "bandwidth: whitened {mw}, centred {mc}, se {se}"
+    );
     // Quadrature over l of the three-dimensional Gaussian marginal.
     let y = [0.5, 0.9, 0.2];
     let at = [0.0, 0.5, 1.0];
@@ -319,14 +344,16 @@ fn gaussian_process_with_unknown_bandwidth() {
                 m[i][j] = (-d * d / (2.0 * l * l)).exp() + if i == j { 0.09 + 1e-6 } else { 0.0 };
             }
         }
-        let det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+        let det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
+            - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
             + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
         let minor = |r: usize, c: usize| {
             let (a, b) = ((r + 1) % 3, (r + 2) % 3);
             let (p, q) = ((c + 1) % 3, (c + 2) % 3);
             m[a][p] * m[b][q] - m[a][q] * m[b][p]
         };
-        let quad: f64 = (0..3).map(|i| (0..3).map(|j| y[i] * minor(j, i) / det * y[j]).sum::<f64>()).sum();
+        let quad: f64 =
+            (0..3).map(|i| (0..3).map(|j| y[i] * minor(j, i) / det * y[j]).sum::<f64>()).sum();
         (-0.5 * quad).exp() / det.sqrt()
     };
     let z = integrate(marginal, 0.2, 2.0, 2000);
@@ -334,7 +361,8 @@ fn gaussian_process_with_unknown_bandwidth() {
     assert_mean("bandwidth", &white["l"], expected, 0.1);
 }
 
-/// Predictions and what no observation asks for are drawn from the prior given the rest, and never proposed.
+/// Predictions and what no observation asks for are drawn from the prior given the rest,
+/// and never proposed.
 #[test]
 fn predictions_are_drawn_anew_and_not_proposed() {
     let d = run(
@@ -349,10 +377,14 @@ fn predictions_are_drawn_anew_and_not_proposed() {
     assert_mean("unused", &d["unused"], 10.0, 0.1);
     let lag: f64 = d["unused"].windows(2).map(|w| (w[0] - 10.0) * (w[1] - 10.0)).sum::<f64>()
         / d["unused"].iter().map(|x| (x - 10.0) * (x - 10.0)).sum::<f64>();
-    assert!(lag.abs() < 0.03, "draws of what nothing asks for are independent, lag-1 correlation {lag}");
+    assert!(
+        lag.abs() < 0.03,
+        "draws of what nothing asks for are independent, lag-1 correlation {lag}"
+    );
 }
 
-/// Two far modes: an annealed population ends in each as often as its mass says, which no chain of small steps does.
+/// Two far modes: an annealed population ends in each as often as its mass says, which no
+/// chain of small steps does.
 #[test]
 fn a_population_settles_by_mass() {
     let draws = run(
@@ -373,7 +405,8 @@ fn a_population_settles_by_mass() {
     assert!((right - 0.7).abs() < 0.08, "{right}");
 }
 
-/// Two modes far apart, 0.3 N(-4, 0.5) + 0.7 N(4, 0.5): replica exchange crosses between them, the kernel inside does not.
+/// Two modes far apart, 0.3 N(-4, 0.5) + 0.7 N(4, 0.5): replica exchange crosses between
+/// them, the kernel inside does not.
 #[test]
 fn replica_exchange_weighs_modes_that_are_far_apart() {
     let text = |kernel: &str| {
@@ -398,7 +431,8 @@ fn optimize_finds_the_mode() {
         1,
         1,
     );
-    // The mode of exp(-(a^2 + (b - a)^2 / 0.01 + (a + 3 b - 2)^2 / 0.25) / 2) by solving its two linear equations.
+    // The mode of exp(-(a^2 + (b - a)^2 / 0.01 + (a + 3 b - 2)^2 / 0.25) / 2) by solving
+    // its two linear equations.
     let (p, q, r) = (1.0 + 100.0 + 4.0, -100.0 + 12.0, 100.0 + 36.0);
     let (u, v) = (8.0, 24.0);
     let det = p * r - q * q;
@@ -406,8 +440,9 @@ fn optimize_finds_the_mode() {
     assert!((d["b"][0] - (p * v - q * u) / det).abs() < 1e-5, "{}", d["b"][0]);
 }
 
-/// Two modes of different weights: a search finds both, jumps between them keep the posterior, and one that goes by a surrogate
-/// which sees neither keeps it, too (it has to ask for the choice: one that nothing asks for is not there).
+/// Two modes of different weights: a search finds both, jumps between them keep the
+/// posterior, and one that goes by a surrogate which sees neither keeps it, too (it has
+/// to ask for the choice: one that nothing asks for is not there).
 #[test]
 fn jumps_between_modes_keep_their_weights() {
     let density = |x: f64| normal_pdf(x, 0.5, 2.0) * normal_pdf(9.0, x * x, 1.0);
@@ -425,7 +460,12 @@ fn jumps_between_modes_keep_their_weights() {
         let positive: Vec<f64> = x.iter().map(|x| f64::from(u8::from(*x > 0.0))).collect();
         assert_mean(kernel, &positive, right / all, 0.02);
         let squares: Vec<f64> = x.iter().map(|x| x * x).collect();
-        assert_mean(kernel, &squares, integrate(|x| x * x * density(x), -9.0, 9.0, 4000) / all, 0.05);
+        assert_mean(
+            kernel,
+            &squares,
+            integrate(|x| x * x * density(x), -9.0, 9.0, 4000) / all,
+            0.05,
+        );
         let moved = x.windows(2).filter(|w| w[0] != w[1]).count() as f64 / x.len() as f64;
         assert!(moved > accepted, "{kernel}: {moved} of its proposals are accepted");
     }
@@ -445,7 +485,8 @@ fn modes_that_mirror_each_other_are_both_visited() {
     assert_mean("mirrored modes", &positive, 0.5, 0.02);
 }
 
-/// The search goes by surrogates, whose mode is 1; the chain climbs on from there to the observation's own.
+/// The search goes by surrogates, whose mode is 1; the chain climbs on from there to the
+/// observation's own.
 #[test]
 fn a_search_by_surrogates_ends_at_the_mode_of_the_observations() {
     let d = run(
@@ -457,7 +498,8 @@ fn a_search_by_surrogates_ends_at_the_mode_of_the_observations() {
     assert!((d["x"][0] - 200.0 / 101.0).abs() < 1e-5, "{}", d["x"][0]);
 }
 
-/// Annealed particles estimate the evidence, here known, and their states are draws from the posterior.
+/// Annealed particles estimate the evidence, here known, and their states are draws from
+/// the posterior.
 #[test]
 fn particles_give_the_evidence() {
     let kernel = kernels::exact::SIMULATED[0];
@@ -467,7 +509,8 @@ fn particles_give_the_evidence() {
     .unwrap_or_else(|e| panic!("{e}"));
     let options = pcadlang::infer::RunOptions { seed: 2, ..Default::default() };
     let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{e}"));
-    let x = posterior.scalars().into_iter().find(|(n, _)| n == "x").map(|(_, x)| x).unwrap_or_default();
+    let x =
+        posterior.scalars().into_iter().find(|(n, _)| n == "x").map(|(_, x)| x).unwrap_or_default();
     assert_mean("x by smc", &x, 1.6, 0.1);
     let expected = normal_pdf(2.0, 0.0, 1.25f64.sqrt()).ln();
     for chain in &posterior.chains {
@@ -481,19 +524,29 @@ fn particles_find_both_modes() {
     let text = "assume c ~ flip(0.4);
          assume x = if c { a ~ normal(1, 1); a } else { b ~ normal(-1, 1); d ~ normal(0, 1); b + d };
          observe normal(x, 1) = 0.5; ";
-    let d = run(&format!("{text} infer {{ repeat 3000 {{ {}; collect c; }} }}", kernels::exact::SIMULATED[1]), 1, 2);
-    let (yes, no) = (0.4 * normal_pdf(0.5, 1.0, 2f64.sqrt()), 0.6 * normal_pdf(0.5, -1.0, 3f64.sqrt()));
+    let d = run(
+        &format!(
+            "{text} infer {{ repeat 3000 {{ {}; collect c; }} }}",
+            kernels::exact::SIMULATED[1]
+        ),
+        1,
+        2,
+    );
+    let (yes, no) =
+        (0.4 * normal_pdf(0.5, 1.0, 2f64.sqrt()), 0.6 * normal_pdf(0.5, -1.0, 3f64.sqrt()));
     assert_mean("c by smc", &d["c"], yes / (yes + no), 0.06);
 }
 
-/// No likelihood: a coin that shows heads in so many of ten flips, by simulating. With the number itself observed and `eps`
-/// below one the posterior is exact.
+/// No likelihood: a coin that shows heads in so many of ten flips, by simulating. With
+/// the number itself observed and `eps` below one the posterior is exact.
 #[test]
 fn simulated_data_stand_in_for_the_likelihood() {
     let text = "assume p ~ beta(1, 1); observe binomial(10, p) = 7;";
     for (kernel, warmup, steps) in [(2, 500, 120_000), (3, 2, 12_000)] {
         let kernel = kernels::exact::SIMULATED[kernel];
-        let infer = format!("infer {{ warmup {warmup} {{ {kernel}; }} repeat {steps} {{ {kernel}; collect p; }} }}");
+        let infer = format!(
+            "infer {{ warmup {warmup} {{ {kernel}; }} repeat {steps} {{ {kernel}; collect p; }} }}"
+        );
         let d = run(&format!("{text} {infer}"), 1, 2);
         assert_mean(&format!("p by {kernel}"), &d["p"], 8.0 / 12.0, 0.03);
         let squares: Vec<f64> = d["p"].iter().map(|p| p * p).collect();
@@ -501,7 +554,8 @@ fn simulated_data_stand_in_for_the_likelihood() {
     }
 }
 
-/// The share of simulated data that come near enough is estimated without bias: 7 heads of 10 have a probability of 1 / 11.
+/// The share of simulated data that come near enough is estimated without bias: 7 heads
+/// of 10 have a probability of 1 / 11.
 #[test]
 fn falling_tolerances_give_the_probability_of_the_data() {
     let kernel = kernels::exact::SIMULATED[3];
@@ -524,7 +578,8 @@ fn choices_vanish_with_the_density_that_they_had() {
             "assume k ~ categorical([1, 1, 1]); x ~ normal(2 * k, 1); observe normal(if k == 0 {{ x }} else {{ 0.5 }}, 1) = 1;
              infer {{ warmup 500 {{ {kernel}; }} repeat 60000 {{ {kernel}; mh(one(@x)); collect k; }} }}"
         );
-        let first: Vec<f64> = run(&text, 1, 2)["k"].iter().map(|k| f64::from(u8::from(*k == 0.0))).collect();
+        let first: Vec<f64> =
+            run(&text, 1, 2)["k"].iter().map(|k| f64::from(u8::from(*k == 0.0))).collect();
         assert_mean(kernel, &first, there / (there + 2.0 * gone), 0.02);
     }
 }

@@ -1,5 +1,5 @@
-//! The example of every built-in runs: expressions have the value that stands beside them, programs are drawn from, scored,
-//! and their plans run.
+//! The example of every built-in runs: expressions have the value that stands beside
+//! them, programs are drawn from, scored, and their plans run.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -48,7 +48,8 @@ fn compiled(f: &Folder, text: &str) -> Result<Model, String> {
 
 /// The names that a program gives at its top level.
 fn names(text: &str) -> impl Iterator<Item = &str> {
-    let named = text.lines().filter_map(|line| line.strip_prefix("let ").or(line.strip_prefix("assume ")));
+    let named =
+        text.lines().filter_map(|line| line.strip_prefix("let ").or(line.strip_prefix("assume ")));
     named.filter_map(|rest| rest.split_whitespace().next())
 }
 
@@ -63,8 +64,12 @@ fn is_seen(value: &Value) -> Result<(), String> {
 
 /// An expression has the value that is said.
 fn evaluates(f: &Folder, text: &str, value: &str) -> Result<(), String> {
-    let mut trace = compiled(f, &format!("let shown = {text};"))?.simulate(1, 0).map_err(|e| e.to_string())?;
-    let shown = trace.global("shown", Draws::default()).ok_or("it has no value")?.map_err(|e| format!("{e:?}"))?;
+    let mut trace =
+        compiled(f, &format!("let shown = {text};"))?.simulate(1, 0).map_err(|e| e.to_string())?;
+    let shown = trace
+        .global("shown", Draws::default())
+        .ok_or("it has no value")?
+        .map_err(|e| format!("{e:?}"))?;
     if shown.to_string() == value { is_seen(&shown) } else { Err(format!("{text} // {shown}")) }
 }
 
@@ -76,8 +81,10 @@ fn runs(f: &Folder, b: &Builtin, text: &str) -> Result<(), String> {
         return Err(format!("its score is {}", trace.log_joint()));
     }
     for name in names(text) {
-        let value = trace.global(name, Draws::default()).ok_or_else(|| format!("there is no {name}"))?;
-        is_seen(&value.map_err(|e| format!("{name}: {e:?}"))?).map_err(|e| format!("{name}: {e}"))?;
+        let value =
+            trace.global(name, Draws::default()).ok_or_else(|| format!("there is no {name}"))?;
+        is_seen(&value.map_err(|e| format!("{name}: {e:?}"))?)
+            .map_err(|e| format!("{name}: {e}"))?;
     }
     if !text.contains("infer ") || b.is_planned() {
         return Ok(());
@@ -91,7 +98,17 @@ fn runs(f: &Folder, b: &Builtin, text: &str) -> Result<(), String> {
 /// A bank is of one program, and the command brings it along.
 fn runs_with_a_bank(f: &Folder, text: &str) {
     f.write("knn.pcad", whole(text));
-    f.succeeds(&["learn", "knn.pcad", "-n", "20", "--features-size", "32", "-o", "balls.bank", "--quiet"]);
+    f.succeeds(&[
+        "learn",
+        "knn.pcad",
+        "-n",
+        "20",
+        "--features-size",
+        "32",
+        "-o",
+        "balls.bank",
+        "--quiet",
+    ]);
     f.succeeds(&["run", "knn.pcad", "--chains", "1", "--out", "knn", "--quiet"]);
     assert!(f.read("knn/chain-1.csv").lines().count() > 50);
 }
@@ -106,7 +123,9 @@ fn every_example_runs() {
         let done = match b.example().map(|example| (example, expression(example))) {
             None => Err("it has no example".to_owned()),
             Some((example, _))
-                if b.name.starts_with(char::is_alphabetic) && b.name != "neg" && !example.contains(&name) =>
+                if b.name.starts_with(char::is_alphabetic)
+                    && b.name != "neg"
+                    && !example.contains(&name) =>
             {
                 Err("its example does not use it".to_owned())
             }

@@ -1,5 +1,5 @@
-//! The targets of `fuzz/` on seeds, on every input that once went wrong, and on seeds with some bytes changed; and the seeds for
-//! longer sittings.
+//! The targets of `fuzz/` on seeds, on every input that once went wrong, and on seeds
+//! with some bytes changed; and the seeds for longer sittings.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -66,7 +66,8 @@ fn files(dir: &Path, ending: &str) -> Vec<PathBuf> {
 }
 
 fn read(path: impl AsRef<Path>) -> Vec<u8> {
-    std::fs::read(root().join(path.as_ref())).unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
+    std::fs::read(root().join(path.as_ref()))
+        .unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
 }
 
 fn encoded(picture: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
@@ -83,7 +84,10 @@ fn pictures() -> Vec<Vec<u8>> {
         encoded(rgb, ImageFormat::Jpeg),
         encoded(GrayImage::from_fn(9, 7, |x, y| Luma([(x * y) as u8])), ImageFormat::Png),
         encoded(GrayImage::from_fn(9, 7, |x, y| Luma([(x * y) as u8])), ImageFormat::Jpeg),
-        encoded(RgbaImage::from_fn(5, 3, |x, y| image::Rgba([9, 200, x as u8, y as u8 * 99])), ImageFormat::Png),
+        encoded(
+            RgbaImage::from_fn(5, 3, |x, y| image::Rgba([9, 200, x as u8, y as u8 * 99])),
+            ImageFormat::Png,
+        ),
         encoded(DynamicImage::ImageLuma16(deep), ImageFormat::Png),
     ]
 }
@@ -95,7 +99,13 @@ static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let model = Program::parse(text).and_then(Program::compile).unwrap();
     let f = folder::Folder::new("fuzz_bank");
     let path = f.path().join("x.bank");
-    let how = Learn { name: "x", count: 3, seed: 1, threads: 1, features: Features::Contours { size: 16 } };
+    let how = Learn {
+        name: "x",
+        count: 3,
+        seed: 1,
+        threads: 1,
+        features: Features::Contours { size: 16 },
+    };
     learn(&model, &how, &path, &AtomicU64::new(0)).unwrap();
     std::fs::read(path).unwrap()
 });
@@ -120,7 +130,8 @@ fn bodies() -> Vec<Vec<u8>> {
         (document, buffer)
     };
     let (mut within, buffer) = document();
-    within["buffers"][0]["uri"] = format!("data:application/octet-stream;base64,{}", gltf::base64(&buffer)).into();
+    within["buffers"][0]["uri"] =
+        format!("data:application/octet-stream;base64,{}", gltf::base64(&buffer)).into();
     let (mut beside, _) = document();
     beside["buffers"][0]["uri"] = "x.bin".into();
     let (inside, buffer) = document();
@@ -153,7 +164,9 @@ const PEOPLE: [&str; 3] = [
 fn people() -> Vec<Vec<u8>> {
     let landmarks = [r#"{"x": 0.1, "y": 0.2, "z": 0, "visibility": 0.9}"#; 33].join(", ");
     let coco = ["10, 20, 0.9"; 17].join(", ");
-    let one = format!("{{\"image_id\": 1, \"category_id\": 1, \"id\": 7, \"keypoints\": [{coco}], \"score\": 0.5}}");
+    let one = format!(
+        "{{\"image_id\": 1, \"category_id\": 1, \"id\": 7, \"keypoints\": [{coco}], \"score\": 0.5}}"
+    );
     let images = r#"[{"id": 1, "file_name": "000001.jpg", "width": 64, "height": 48}]"#;
     let made = [
         format!("[{one}]"),
@@ -175,12 +188,18 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
         "gltf" => bodies(),
         "rig" => vec![
             RIG.into(),
-            [RIG.replace("\"joints\"", "\"morphs\": \"m\", \"joints\"").as_bytes(), b"\0", MORPHS.as_bytes()].concat(),
+            [
+                RIG.replace("\"joints\"", "\"morphs\": \"m\", \"joints\"").as_bytes(),
+                b"\0",
+                MORPHS.as_bytes(),
+            ]
+            .concat(),
         ],
         "image" => pictures(),
         "array" => {
             let npy = |descr: &str, shape: &str, body: &[u8]| {
-                let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+                let header =
+                    format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
                 let length = (header.len() as u16).to_le_bytes();
                 [b"\x93NUMPY\x01\0", &length[..], header.as_bytes(), body].concat()
             };
@@ -194,7 +213,11 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
         "camera" => texts(&CAMERAS),
         "trace" => {
             let model = targets::traced();
-            (0..5).map(|i| serde_json::to_vec(&model.simulate(i, 0).unwrap().save(model.hash())).unwrap()).collect()
+            (0..5)
+                .map(|i| {
+                    serde_json::to_vec(&model.simulate(i, 0).unwrap().save(model.hash())).unwrap()
+                })
+                .collect()
         }
         "bank" => vec![A_BANK.clone()],
         "checkpoint" => targets::checkpoints(None).into_iter().step_by(9).collect(),
@@ -233,7 +256,8 @@ fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
             2 => bytes[at] = next(x) as u8,
             3 => bytes[at] ^= 1 << (next(x) % 8),
             _ => {
-                let piece = bytes[at..(at + next(x) % 12).min(seed.len().max(at)).min(bytes.len())].to_vec();
+                let piece = bytes[at..(at + next(x) % 12).min(seed.len().max(at)).min(bytes.len())]
+                    .to_vec();
                 let to = next(x) % bytes.len();
                 bytes.splice(to..to, piece);
             }
@@ -242,7 +266,8 @@ fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
     bytes
 }
 
-/// Each target takes its seeds, and each seed is good: what is changed of it goes further than the first check.
+/// Each target takes its seeds, and each seed is good: what is changed of it goes further
+/// than the first check.
 #[test]
 fn seeds() {
     use pcadlang::geom::{FileFrame, gltf::load, obj};
@@ -257,8 +282,10 @@ fn seeds() {
             let good = match name {
                 "obj" => obj::load(seed).is_ok(),
                 // One has its buffer beside it.
-                "gltf" => load(seed, &FileFrame::default(), &|_| Err("beside".into()))
-                    .map_or_else(|e| e.to_string().contains("beside"), |loaded| loaded.mesh().is_ok()),
+                "gltf" => load(seed, &FileFrame::default(), &|_| Err("beside".into())).map_or_else(
+                    |e| e.to_string().contains("beside"),
+                    |loaded| loaded.mesh().is_ok(),
+                ),
                 "image" => photo::decode(seed, &Limits::default()).is_ok(),
                 "array" => depth::decode(seed, 1.0, &Limits::default()).is_ok(),
                 "camera" => Camera::from_json(text()).is_ok(),

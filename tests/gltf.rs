@@ -1,4 +1,5 @@
-//! glTF files: the shipped body written with a skin and read back, scenes of every kind of primitive, and what is refused.
+//! glTF files: the shipped body written with a skin and read back, scenes of every kind
+//! of primitive, and what is refused.
 
 #[path = "common/gltf.rs"]
 mod files;
@@ -53,7 +54,8 @@ fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
 fn the_shipped_body_comes_back_and_moves_alike() {
     let body = body();
     let identity = json!({});
-    // Files with other axes and units, and one that an exporter has put right by a node above.
+    // Files with other axes and units, and one that an exporter has put right by a node
+    // above.
     let turned = json!({ "rotation": [-std::f64::consts::FRAC_1_SQRT_2, 0, 0, std::f64::consts::FRAC_1_SQRT_2], "scale": [0.01, 0.01, 0.01] });
     let to_z = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y);
     let to_x = DMat3::from_cols(-DVec3::Y, DVec3::X, DVec3::Z);
@@ -68,15 +70,29 @@ fn the_shipped_body_comes_back_and_moves_alike() {
     for (what, to_file, root, up, unit) in cases {
         let file = skinned(&body, to_file, root);
         let frame = FileFrame::new(up, unit).unwrap();
-        let back = load(&file, &frame, &none).unwrap_or_else(|e| panic!("{what}: {e}")).armature().unwrap();
+        let back = load(&file, &frame, &none)
+            .unwrap_or_else(|e| panic!("{what}: {e}"))
+            .armature()
+            .unwrap();
         let (rig, known) = (back.rig(), body.rig());
         assert_eq!(rig.joints().len(), known.joints().len());
         for j in known.joints() {
             let found = &rig.joints()[rig.find(&j.name).unwrap()];
-            let name = |rig: &pcadlang::geom::armature::Rig, j: Option<usize>| j.map(|p| rig.joints()[p].name.clone());
-            assert!((found.head - j.head).length() < 1e-5, "{what}: {} is at {}, not {}", j.name, found.head, j.head);
+            let name = |rig: &pcadlang::geom::armature::Rig, j: Option<usize>| {
+                j.map(|p| rig.joints()[p].name.clone())
+            };
+            assert!(
+                (found.head - j.head).length() < 1e-5,
+                "{what}: {} is at {}, not {}",
+                j.name,
+                found.head,
+                j.head
+            );
             assert_eq!(name(rig, found.parent), name(known, j.parent), "{what}");
-            let children = known.joints().iter().filter(|c| c.parent.map(|p| &known.joints()[p].name) == Some(&j.name));
+            let children = known
+                .joints()
+                .iter()
+                .filter(|c| c.parent.map(|p| &known.joints()[p].name) == Some(&j.name));
             let heads: Vec<DVec3> = children.map(|c| c.head).collect();
             if !heads.is_empty() {
                 let mean = heads.iter().sum::<DVec3>() / heads.len() as f64;
@@ -133,7 +149,9 @@ fn strips_fans_and_the_rest() {
         let p = |v: u32| m.positions[v as usize];
         m.triangles.iter().map(|t| (p(t[1]) - p(t[0])).cross(p(t[2]) - p(t[0])).z / 2.0).sum()
     };
-    for (mode, order) in [(5, &[][..]), (5, &[0, 1, 2, 3]), (6, &[0, 1, 3, 2]), (4, &[0, 1, 2, 2, 1, 3])] {
+    for (mode, order) in
+        [(5, &[][..]), (5, &[0, 1, 2, 3]), (6, &[0, 1, 3, 2]), (4, &[0, 1, 2, 2, 1, 3])]
+    {
         let (w, d) = square(mode, order);
         let m = read(&glb(w, d)).unwrap();
         assert_eq!((m.triangles.len(), area(&m), &*m.names[0]), (2, 1.0, "sq"), "mode {mode}");
@@ -145,7 +163,8 @@ fn strips_fans_and_the_rest() {
     let (w, d) = square(4, &[0, 1, 9]);
     assert_eq!(read(&glb(w, d)).unwrap_err(), "mesh `sq` uses vertex 9, but it has 4");
 
-    // Transforms of nodes add up, a mirror keeps the outside out, and what the scene leaves out is left out.
+    // Transforms of nodes add up, a mirror keeps the outside out, and what the scene
+    // leaves out is left out.
     let (w, mut d) = square(5, &[]);
     d["nodes"] = json!([
         { "children": [1], "translation": [0, 0, 5] },
@@ -167,7 +186,8 @@ fn buffers_lie_anywhere() {
     let beside = |path: &str| if path == "a b.bin" { Ok(bytes.clone()) } else { none(path) };
     assert_eq!(load(d.to_string().as_bytes(), &FileFrame::default(), &beside).unwrap(), inside);
     assert_eq!(read(d.to_string().as_bytes()).unwrap_err(), "cannot read a b.bin");
-    d["buffers"][0]["uri"] = format!("data:application/octet-stream;base64,{}", files::base64(&bytes)).into();
+    d["buffers"][0]["uri"] =
+        format!("data:application/octet-stream;base64,{}", files::base64(&bytes)).into();
     assert_eq!(read(d.to_string().as_bytes()).unwrap(), inside);
     d["buffers"][0]["uri"] = "https://example.org/a.bin".into();
     assert!(read(d.to_string().as_bytes()).unwrap_err().ends_with("only files are supported"));
@@ -211,8 +231,9 @@ fn what_cannot_be_read_is_said() {
         supported, not 1.0"
     );
     assert_eq!(
-        fails(&|d| d["nodes"] =
-            json!([{ "mesh": 0 }, { "name": "a", "children": [2] }, { "name": "b", "children": [1] }])),
+        fails(
+            &|d| d["nodes"] = json!([{ "mesh": 0 }, { "name": "a", "children": [2] }, { "name": "b", "children": [1] }])
+        ),
         "the glTF file's nodes have a cycle: b -> a -> b"
     );
     assert_eq!(
@@ -220,7 +241,9 @@ fn what_cannot_be_read_is_said() {
         "node `node_0` refers to the missing \
         mesh 4"
     );
-    assert!(fails(&|d| d["nodes"][0]["scale"] = json!([1e200, 1e200, 1e200])).contains("is not finite"));
+    assert!(
+        fails(&|d| d["nodes"][0]["scale"] = json!([1e200, 1e200, 1e200])).contains("is not finite")
+    );
     assert!(read(b"glTF").unwrap_err().contains("truncated"));
     assert!(read(b"{").unwrap_err().starts_with("cannot read the glTF file: EOF"));
 }
@@ -228,12 +251,15 @@ fn what_cannot_be_read_is_said() {
 /// A square on two joints, with a hat on the second, and what its weights are.
 fn two(weights: &[[f32; 8]; 4]) -> (Vec<u8>, Value) {
     let (mut w, mut d) = square(5, &[]);
-    let half = |from: usize| weights.iter().flat_map(|v| v[from..from + 4].to_vec()).collect::<Vec<f32>>();
+    let half =
+        |from: usize| weights.iter().flat_map(|v| v[from..from + 4].to_vec()).collect::<Vec<f32>>();
     let joints = w.bytes("VEC4", &[0, 1, 2, 0].repeat(4));
     let more = w.bytes("VEC4", &[3, 4, 0, 0].repeat(4));
     let (first, second) = (w.floats("VEC4", &half(0)), w.floats("VEC4", &half(4)));
     let attributes = &mut d["meshes"][0]["primitives"][0]["attributes"];
-    for (name, a) in [("JOINTS_0", joints), ("JOINTS_1", more), ("WEIGHTS_0", first), ("WEIGHTS_1", second)] {
+    for (name, a) in
+        [("JOINTS_0", joints), ("JOINTS_1", more), ("WEIGHTS_0", first), ("WEIGHTS_1", second)]
+    {
         attributes[name] = a.into();
     }
     d["nodes"] = json!([
@@ -294,17 +320,25 @@ fn broken_skins_are_refused() {
         "mesh `sq` has a skin, but no weights (JOINTS_0 and WEIGHTS_0)"
     );
     assert_eq!(
-        fails(&[[0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]; 4], &|d| d["skins"][0]["joints"] = json!([1])),
+        fails(&[[0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]; 4], &|d| d["skins"][0]["joints"] =
+            json!([1])),
         "vertex 0 of mesh `sq` is moved by joint 1, but its skin has 1 joints"
     );
-    assert_eq!(fails(&rows, &|d| d["skins"][0]["joints"] = json!([])), "skin 0 of the glTF file has no joints");
+    assert_eq!(
+        fails(&rows, &|d| d["skins"][0]["joints"] = json!([])),
+        "skin 0 of the glTF file has no joints"
+    );
     assert_eq!(fails(&rows, &|d| d["skins"] = json!([])), "the glTF file has no skin 0");
     assert!(fails(&rows, &|d| d["nodes"][2]["children"] = json!([3, 1])).contains("a cycle: "));
     assert_eq!(
         fails(&rows, &|d| d["skins"][0]["inverseBindMatrices"] = 0.into()),
         "accessor 0 of the glTF file must be of type MAT4, not VEC3"
     );
-    let flat = read(&glb_file::write(&cuboid(DVec3::ONE).unwrap())).unwrap().armature().unwrap_err().to_string();
+    let flat = read(&glb_file::write(&cuboid(DVec3::ONE).unwrap()))
+        .unwrap()
+        .armature()
+        .unwrap_err()
+        .to_string();
     assert!(flat.contains("has no skin"), "{flat}");
 }
 
@@ -343,13 +377,18 @@ fn programs_read_them_with_options() {
     let other = program(&filled("5")).observe_file("crate", &path("other.obj")).unwrap();
     assert!((likelihood(other) - best).abs() < 1e-9);
 
-    let fails = |data: &str| match program(&format!("data d = {data};\nassume x ~ normal(0, 1);")).compile() {
+    let fails = |data: &str| match program(&format!("data d = {data};\nassume x ~ normal(0, 1);"))
+        .compile()
+    {
         Ok(_) => panic!("{data} compiles"),
         Err(e) => e.to_string(),
     };
     for (data, says) in [
         (r#"mesh("box.glb", up = "w")"#, "`up` must be \"x\", \"y\" or \"z\", not \"w\""),
-        (r#"mesh("box.glb", unit = 0)"#, "the unit of a file must be a positive number of metres, got 0"),
+        (
+            r#"mesh("box.glb", unit = 0)"#,
+            "the unit of a file must be a positive number of metres, got 0",
+        ),
         (r#"mesh("box.glb", unit = 1, unit = 2)"#, "`unit` is given twice"),
         (r#"mesh("box.glb", scale = 2)"#, "mesh has no option `scale`"),
         (r#"csv("box.glb", up = "z")"#, "csv has no option `up`"),
@@ -367,7 +406,10 @@ fn programs_read_them_with_options() {
     // Options are looked at also where another file is given.
     let wrong = program("data d = mesh(\"box.glb\", unit = -1);\nassume x ~ normal(0, 1);");
     let said = wrong.observe_file("d", &path("other.obj")).unwrap().compile().unwrap_err();
-    assert!(said.to_string().contains("`unit`") || said.to_string().contains("the unit of a file"), "{said}");
+    assert!(
+        said.to_string().contains("`unit`") || said.to_string().contains("the unit of a file"),
+        "{said}"
+    );
 }
 
 /// xorshift, so that the mutations are the same everywhere.
@@ -394,7 +436,8 @@ fn no_bytes_make_it_stumble() {
                 2 => file.truncate(at.max(1)),
                 // Numbers of the document, which stays JSON.
                 _ => {
-                    let digits: Vec<usize> = (20..file.len()).filter(|i| file[*i].is_ascii_digit()).collect();
+                    let digits: Vec<usize> =
+                        (20..file.len()).filter(|i| file[*i].is_ascii_digit()).collect();
                     if let Some(i) = digits.get(next(&mut state) % digits.len().max(1)) {
                         file[*i] = b'0' + (next(&mut state) % 10) as u8;
                     }

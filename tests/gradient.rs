@@ -1,5 +1,6 @@
-//! Gradients through traces against central differences of the log joint density in the unconstrained space: the built-ins,
-//! the distributions and their transforms, structure, scenes.
+//! Gradients through traces against central differences of the log joint density in the
+//! unconstrained space: the built-ins, the distributions and their transforms, structure,
+//! scenes.
 
 #[path = "common/tape.rs"]
 mod tape;
@@ -36,11 +37,17 @@ fn check(text: &str) {
     for seed in 0..4 {
         let mut trace = model.simulate(seed, 0).unwrap_or_else(|e| panic!("{text}\n{e}"));
         compare(&mut trace, text);
-        // White noise moves with its prior, and supports with their bounds: both stay with the trace.
-        let stays = ["whitened", "f ~ gp(", "uniform(a", "uniform(u", "half_cauchy(a", "a - s", "lo = a"];
-        let noise = text.contains("gp(") && !text.contains("centred") && text.contains("assume x ~ ");
+        // White noise moves with its prior, and supports with their bounds: both stay
+        // with the trace.
+        let stays =
+            ["whitened", "f ~ gp(", "uniform(a", "uniform(u", "half_cauchy(a", "a - s", "lo = a"];
+        let noise =
+            text.contains("gp(") && !text.contains("centred") && text.contains("assume x ~ ");
         let told = tape::compare_tape(&mut trace, text);
-        assert!(told.points > 0 || noise || stays.iter().any(|s| text.contains(s)), "{text}: {told:?}");
+        assert!(
+            told.points > 0 || noise || stays.iter().any(|s| text.contains(s)),
+            "{text}: {told:?}"
+        );
     }
 }
 
@@ -114,7 +121,9 @@ fn functions_of_numbers() {
         "x - y",
         "step(x) * y + x",
     ] {
-        check(&format!("assume x ~ normal(0.3, 1); assume y ~ normal(-0.2, 1); factor(-(({f}) - 0.5) ** 2);"));
+        check(&format!(
+            "assume x ~ normal(0.3, 1); assume y ~ normal(-0.2, 1); factor(-(({f}) - 0.5) ** 2);"
+        ));
     }
 }
 
@@ -245,13 +254,17 @@ fn covariances() {
         "sq_exp(2, s) * periodic(1.3, l)",
     ] {
         for choice in [
-            format!("assume f ~ gp(mean = m, cov = {cov}, at = {at}); observe normal(f, 0.3) = [1, 2, 0, 1, 1];"),
+            format!(
+                "assume f ~ gp(mean = m, cov = {cov}, at = {at}); observe normal(f, 0.3) = [1, 2, 0, 1, 1];"
+            ),
             format!("observe gp(mean = m, cov = {cov} + white(0.2), at = {at}) = [1, 2, 0, 1, 1];"),
             format!(
                 "assume f ~ gp(mean = m, cov = {cov} + white(0.2), at = {at}, centred = true); observe normal(f, 0.3) = [1, 2, 0, 1, 1];"
             ),
         ] {
-            check(&format!("assume l ~ gamma(9, 9); assume s ~ gamma(9, 9); assume m ~ normal(0, 1); {choice}"));
+            check(&format!(
+                "assume l ~ gamma(9, 9); assume s ~ gamma(9, 9); assume m ~ normal(0, 1); {choice}"
+            ));
         }
     }
     for p in [
@@ -265,7 +278,8 @@ fn covariances() {
     }
 }
 
-/// Distributions that are values, drawn from and observed, by what their covariance is made of.
+/// Distributions that are values, drawn from and observed, by what their covariance is
+/// made of.
 #[test]
 fn covariances_of_distributions_as_values() {
     let of = "assume l ~ gamma(9, 9); assume s ~ gamma(9, 9); assume m ~ normal(0, 1); assume r ~ uniform(-0.8, 0.8);";
@@ -288,13 +302,17 @@ fn covariances_of_distributions_as_values() {
     }
     for d in [chol, cov] {
         let whitened = d.replace("mv_normal(", "mv_normal(whitened = true, mean = ");
-        check(&format!("{of} let d = {whitened}; assume x ~ d; observe normal(x, 0.5) = [1, 2, 0];"));
+        check(&format!(
+            "{of} let d = {whitened}; assume x ~ d; observe normal(x, 0.5) = [1, 2, 0];"
+        ));
     }
     check(&format!(
         "{of} assume x ~ {}; observe normal(x, 0.5) = [1, 2, 0];",
         gp.replace("gp(", "gp(centred = true, ")
     ));
-    check(&format!("{of} let ds = [{gp}, {chol}]; observe ds[1] = [1, 2, 0]; observe ds[0] = [0.1, 0.2, 1.1];"));
+    check(&format!(
+        "{of} let ds = [{gp}, {chol}]; observe ds[1] = [1, 2, 0]; observe ds[0] = [0.1, 0.2, 1.1];"
+    ));
 }
 
 #[test]
@@ -367,8 +385,12 @@ fn bodies_with_detected_joints() {
         observe scene.keypoints(view, sd = 4, outlier = 0.1) = points as joints;
         observe scene.relative_depth(view, s, share = 0.7, sd = 0.2, outlier = 0.2)
           = { nose: [0, 0, -0.2], l_wrist: [0.1, 0.4, 0.3], l_knee: [0, 0, -0.3], r_hip: [0, 0, 0.1] } as depths;"#;
-    let model =
-        Program::parse(text).unwrap().observe_file("points", file.to_str().unwrap()).unwrap().compile().unwrap();
+    let model = Program::parse(text)
+        .unwrap()
+        .observe_file("points", file.to_str().unwrap())
+        .unwrap()
+        .compile()
+        .unwrap();
     for seed in 0..3 {
         let mut trace = model.simulate(seed, 0).unwrap();
         compare(&mut trace, "a body");
@@ -387,7 +409,11 @@ fn what_has_no_derivative_says_so() {
 }
 
 fn find(trace: &Trace, name: &str) -> Option<Target> {
-    trace.choices().iter().find(|c| c.0.to_string() == format!("@{name}")).and_then(|c| trace.find(&c.0))
+    trace
+        .choices()
+        .iter()
+        .find(|c| c.0.to_string() == format!("@{name}"))
+        .and_then(|c| trace.find(&c.0))
 }
 
 /// A contour map of a disc, 64 pixels wide.
@@ -416,7 +442,9 @@ fn mask() -> Value {
 }
 
 fn depth() -> Value {
-    let depth = (0..256 * 256).map(|i| if inside(i) { 7.0 + i as f32 * 1e-5 } else { f32::INFINITY }).collect();
+    let depth = (0..256 * 256)
+        .map(|i| if inside(i) { 7.0 + i as f32 * 1e-5 } else { f32::INFINITY })
+        .collect();
     Value::object(DepthValue::new(DepthMap::new(256, 256, depth).unwrap()))
 }
 
@@ -426,7 +454,9 @@ fn photo() -> Value {
         let base = if inside(y * 256 + x) { [150, 60, 50] } else { [70, 110, 140] };
         image::Rgb(base.map(|b: u32| (b + noise) as u8))
     };
-    Value::object(ImageValue::photo(Photo::from_rgb(image::RgbImage::from_fn(256, 256, colour)).unwrap()))
+    Value::object(ImageValue::photo(
+        Photo::from_rgb(image::RgbImage::from_fn(256, 256, colour)).unwrap(),
+    ))
 }
 
 #[test]
@@ -436,7 +466,10 @@ fn pictures_pull_where_their_score_rises() {
     for (likelihood, seen) in [
         ("scene.chamfer(view, sigma = s, size = 64)", Value::object(disc())),
         ("scene.chamfer(rough, sigma = s, size = 64)", Value::object(disc())),
-        ("scene.chamfer(view, sigma = s, size = 64, mode = \"sum\", symmetric = true)", Value::object(disc())),
+        (
+            "scene.chamfer(view, sigma = s, size = 64, mode = \"sum\", symmetric = true)",
+            Value::object(disc()),
+        ),
         ("scene.contour(view, size = 64, sd = 2, truncate = 9)", Value::object(disc())),
         ("scene.mask(view, size = 256)", mask()),
         ("scene.depth(view, size = 256, sd = 0.5)", depth()),
@@ -459,10 +492,12 @@ fn pictures_pull_where_their_score_rises() {
              observe {likelihood} = photo as picture;"
         );
         let program = Program::parse(&text).unwrap().observe("photo", seen);
-        let model = program.camera(Camera::default_for(64, 64)).compile().unwrap_or_else(|e| panic!("{e}"));
+        let model =
+            program.camera(Camera::default_for(64, 64)).compile().unwrap_or_else(|e| panic!("{e}"));
         let mut trace = model.simulate(1, 0).unwrap();
         let at = |trace: &mut Trace, values: &[(&str, f64)]| {
-            let set = |(name, v): &(&str, f64)| Some((find(trace, name)?, Change::Set(Datum::Num(*v))));
+            let set =
+                |(name, v): &(&str, f64)| Some((find(trace, name)?, Change::Set(Datum::Num(*v))));
             let changes: Vec<(Target, Change)> = values.iter().filter_map(set).collect();
             trace.propose(&changes, draws()).unwrap();
             trace.commit();
@@ -473,7 +508,9 @@ fn pictures_pull_where_their_score_rises() {
         // Without an observation that asks for it there is no s.
         let targets: Vec<Target> = here.iter().filter_map(|(name, _)| find(&trace, name)).collect();
         let (mut all, mut prior) = (Vec::new(), Vec::new());
-        trace.gradient(&targets, 1.0, &mut all).unwrap_or_else(|e| panic!("{likelihood}: {}", e.message));
+        trace
+            .gradient(&targets, 1.0, &mut all)
+            .unwrap_or_else(|e| panic!("{likelihood}: {}", e.message));
         trace.gradient(&targets, 0.0, &mut prior).unwrap();
         let (mut dot, mut found, mut slopes) = (0.0, 0.0, 0.0);
         for k in 0..targets.len() {
@@ -502,7 +539,10 @@ fn pictures_pull_where_their_score_rises() {
         let ratio = (found / slopes).sqrt();
         // Pixels are in or out: their sums go by steps.
         let least = if likelihood.contains("256") { 0.95 } else { 0.98 };
-        assert!(cosine > least && (0.8..1.25).contains(&ratio), "{likelihood}: cosine {cosine}, length {ratio}");
+        assert!(
+            cosine > least && (0.8..1.25).contains(&ratio),
+            "{likelihood}: cosine {cosine}, length {ratio}"
+        );
     }
 }
 
@@ -564,7 +604,9 @@ fn truncated_and_flat() {
         "flat(lo = a)",
         "flat(hi = a)",
     ] {
-        let told = format!("{of} assume v ~ {d}; observe normal(v, 0.7) = 0.4; factor(-(a - s * 0) ** 2);");
+        let told = format!(
+            "{of} assume v ~ {d}; observe normal(v, 0.7) = 0.4; factor(-(a - s * 0) ** 2);"
+        );
         check(&told);
     }
     check(&format!(

@@ -1,8 +1,10 @@
-//! A newcomer goes through the guide: every file of its chapters is written, every command typed, in the order of the text and in
-//! one folder that holds nothing else but the lamp's picture. What the commands say must be what the guide shows.
+//! A newcomer goes through the guide: every file of its chapters is written, every
+//! command typed, in the order of the text and in one folder that holds nothing else but
+//! the lamp's picture. What the commands say must be what the guide shows.
 //!
-//! In the guide, `title=NAME` after a block's language names the file it is; a `diff` block is an edit of the file `from`. Below a command is what it says:
-//! `...` stands for any lines, `[..]` for any text within one, `? N` for the exit code N.
+//! In the guide, `title=NAME` after a block's language names the file it is; a `diff`
+//! block is an edit of the file `from`. Below a command is what it says: `...` stands for
+//! any lines, `[..]` for any text within one, `? N` for the exit code N.
 #![cfg(unix)]
 
 #[path = "common/folder.rs"]
@@ -43,7 +45,9 @@ fn agree(shown: &[&str], said: &[&str]) -> bool {
     match shown.split_first() {
         None => said.is_empty(),
         Some((&"...", rest)) => (0..=said.len()).any(|skip| agree(rest, &said[skip..])),
-        Some((line, rest)) => said.split_first().is_some_and(|(s, more)| fits(line, s.trim_end()) && agree(rest, more)),
+        Some((line, rest)) => said
+            .split_first()
+            .is_some_and(|(s, more)| fits(line, s.trim_end()) && agree(rest, more)),
     }
 }
 
@@ -63,7 +67,8 @@ fn gaps_fit() {
 
 /// Types the commands of a block.
 fn type_in(block: &Block, folder: &Path, place: &str) {
-    let path = format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap_or_default());
+    let path =
+        format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap_or_default());
     let typed = format!("\n{}", block.text);
     for session in typed.split("\n$ ").skip(1) {
         let mut lines: Vec<&str> = session.trim_end().lines().collect();
@@ -79,7 +84,8 @@ fn type_in(block: &Block, folder: &Path, place: &str) {
         // On a busy machine a run may take long enough to say how far it is.
         let phases = ["starts, ", "warm-up, ", "sampling, ", "finishing, "];
         let is_progress = |l: &&str| phases.iter().any(|p| l.starts_with(p));
-        let right = agree(&lines, &said.trim_end().lines().filter(|l| !is_progress(l)).collect::<Vec<_>>());
+        let right =
+            agree(&lines, &said.trim_end().lines().filter(|l| !is_progress(l)).collect::<Vec<_>>());
         assert!(right, "{place}: `{command}` says\n{said}\nthe guide shows\n{}", lines.join("\n"));
         assert_eq!(done.status.code(), Some(code), "{place}: `{command}`\n{said}");
     }
@@ -90,7 +96,10 @@ fn edit(text: &str, diff: &str, place: &str) -> String {
     let mut text = text.to_owned();
     for hunk in diff.split("@@\n").skip(1) {
         let lines = |sign: char| -> String {
-            hunk.lines().filter(|l| l.starts_with([' ', sign])).map(|l| format!("{}\n", &l[1..])).collect()
+            hunk.lines()
+                .filter(|l| l.starts_with([' ', sign]))
+                .map(|l| format!("{}\n", &l[1..]))
+                .collect()
         };
         let (old, new) = (lines('-'), lines('+'));
         assert_eq!(text.matches(&old).count(), 1, "{place}: the file has not this once:\n{old}");
@@ -108,7 +117,8 @@ fn every_chapter() {
     std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_pcadlang"), at.join("bin/pcadlang")).unwrap();
     std::fs::copy(root.join("examples/images/table_lamp.png"), at.join("table_lamp.png")).unwrap();
     let pages = std::fs::read_dir(root.join("docs/guide")).unwrap().map(|f| f.unwrap().path());
-    let mut chapters: Vec<PathBuf> = pages.filter(|p| p.file_name().unwrap() != "README.md").collect();
+    let mut chapters: Vec<PathBuf> =
+        pages.filter(|p| p.file_name().unwrap() != "README.md").collect();
     chapters.sort();
     assert_eq!(chapters.len(), 10);
     for chapter in chapters {
@@ -120,7 +130,8 @@ fn every_chapter() {
             match (language, block.option("title")) {
                 ("console", _) => type_in(&block, at, &place),
                 ("diff", Some(title)) => {
-                    let from = std::fs::read_to_string(at.join(block.option("from").unwrap())).unwrap();
+                    let from =
+                        std::fs::read_to_string(at.join(block.option("from").unwrap())).unwrap();
                     std::fs::write(at.join(title), edit(&from, &block.text, &place)).unwrap();
                 }
                 (_, Some(title)) => std::fs::write(at.join(title), &block.text).unwrap(),

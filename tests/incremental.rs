@@ -1,5 +1,6 @@
-//! The same chain, bit for bit, by increments and by running everything again: every shipped program, and random ones. Programs
-//! that look at a picture do so at a few pixels and for a few steps, since running everything again draws everything anew.
+//! The same chain, bit for bit, by increments and by running everything again: every
+//! shipped program, and random ones. Programs that look at a picture do so at a few
+//! pixels and for a few steps, since running everything again draws everything anew.
 
 #[path = "common/programs.rs"]
 mod programs;
@@ -11,16 +12,31 @@ use pcadlang::infer::RunOptions;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-fn chains(program: impl Fn() -> Program, incremental: bool, steps: u64, warmup: u64) -> Vec<(String, Vec<u64>)> {
+fn chains(
+    program: impl Fn() -> Program,
+    incremental: bool,
+    steps: u64,
+    warmup: u64,
+) -> Vec<(String, Vec<u64>)> {
     let model = program().compile().unwrap_or_else(|e| panic!("{e}"));
-    let options =
-        RunOptions { seed: 5, steps: Some(steps), warmup: Some(warmup), incremental, ..RunOptions::default() };
+    let options = RunOptions {
+        seed: 5,
+        steps: Some(steps),
+        warmup: Some(warmup),
+        incremental,
+        ..RunOptions::default()
+    };
     let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{e}"));
-    posterior.scalars().into_iter().map(|(n, xs)| (n, xs.into_iter().map(f64::to_bits).collect())).collect()
+    posterior
+        .scalars()
+        .into_iter()
+        .map(|(n, xs)| (n, xs.into_iter().map(f64::to_bits).collect()))
+        .collect()
 }
 
 fn same(what: &str, program: impl Fn() -> Program, steps: u64, warmup: u64) {
-    let (some, all) = (chains(&program, true, steps, warmup), chains(&program, false, steps, warmup));
+    let (some, all) =
+        (chains(&program, true, steps, warmup), chains(&program, false, steps, warmup));
     assert!(!some.is_empty(), "{what}: nothing is recorded");
     assert!(some == all, "{what}: increments and full re-execution give different chains");
 }
@@ -38,7 +54,8 @@ fn shipped_programs() {
     }
 }
 
-/// A shipped program that looks at a picture, at `size` pixels if it says at how many, and at what else is given.
+/// A shipped program that looks at a picture, at `size` pixels if it says at how many,
+/// and at what else is given.
 fn same_of_picture(name: &str, size: Option<u32>, given: &[(&str, &str)], steps: u64, warmup: u64) {
     let open = || {
         let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
@@ -101,7 +118,8 @@ fn shipped_animal() {
     same_of_picture("autorig.pcad", Some(48), &[SKIER], 20, 20);
 }
 
-/// A branch with choices of its own that one computation lets go of and the parameters of a choice take up.
+/// A branch with choices of its own that one computation lets go of and the parameters of
+/// a choice take up.
 #[test]
 fn branches_that_change_hands() {
     for kernel in ["gibbs(one($finite))", "mh(one(@**))"] {

@@ -1,5 +1,5 @@
-//! Kernels that keep a state, a distance or a second trace between steps: with other data they go over to those, and a surrogate
-//! saves evaluations of what it stands for.
+//! Kernels that keep a state, a distance or a second trace between steps: with other data
+//! they go over to those, and a surrogate saves evaluations of what it stands for.
 
 use pcadlang::Model;
 use pcadlang::host::Datum;
@@ -12,7 +12,8 @@ fn scope() -> Scope {
     Scope { selector: Selector::All, pick: Pick::All }
 }
 
-/// The mean of `x` after the data have become 2, with steps before that under the program's own.
+/// The mean of `x` after the data have become 2, with steps before that under the
+/// program's own.
 fn under_new_data(kernel: &mut dyn Kernel, steps: u64) -> f64 {
     let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = -3;").unwrap();
     let mut trace: Trace = model.simulate(1, 0).unwrap();
@@ -34,7 +35,8 @@ fn under_new_data(kernel: &mut dyn Kernel, steps: u64) -> f64 {
     sum / steps as f64
 }
 
-/// Kernels that keep states or distances between steps go over to other data with the trace.
+/// Kernels that keep states or distances between steps go over to other data with the
+/// trace.
 #[test]
 fn other_data_reach_what_is_kept() {
     let walk = || -> Box<dyn Kernel> { Box::new(Drift::new(scope(), Some(1.0))) };
@@ -42,13 +44,14 @@ fn other_data_reach_what_is_kept() {
     assert!((mean - 1.0).abs() < 0.1, "temper: {mean}");
     let mean = under_new_data(&mut Smc::new(walk(), 10, Selector::Nothing, Span::default()), 2000);
     assert!((mean - 1.0).abs() < 0.1, "smc: {mean}");
-    let mean = under_new_data(&mut Abc::new(Box::new(Mh::new(scope())), 0.5, Span::default()), 60_000);
+    let mean =
+        under_new_data(&mut Abc::new(Box::new(Mh::new(scope())), 0.5, Span::default()), 60_000);
     // Data drawn within 0.5 of 2 are 2 - 1 / 12 in the mean.
     assert!((mean - 0.96).abs() < 0.08, "abc: {mean}");
 }
 
-/// The observation runs once for what the surrogate lets through, and not at all for the rest; with and without incremental
-/// updates the chain is the same.
+/// The observation runs once for what the surrogate lets through, and not at all for the
+/// rest; with and without incremental updates the chain is the same.
 #[test]
 fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
     let text = "assume x ~ normal(0, 3); let far = 1000 * sin(x / 1000);
@@ -73,14 +76,18 @@ fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
         (states, accepted, evaluated)
     };
     let (states, accepted, evaluated) = run(true);
-    assert!(accepted > 100 && (accepted as usize..1000).contains(&evaluated), "{accepted}, {evaluated}");
+    assert!(
+        accepted > 100 && (accepted as usize..1000).contains(&evaluated),
+        "{accepted}, {evaluated}"
+    );
     assert_eq!(states, run(false).0);
 }
 
 /// What was proposed and neither kept nor undone has no say in a step.
 #[test]
 fn the_surrogate_does_not_follow_what_is_pending() {
-    let text = "assume x ~ normal(0, 1); observe normal(x, 0.5) = 1 with coarse = normal(x, 1) as y;";
+    let text =
+        "assume x ~ normal(0, 1); observe normal(x, 0.5) = 1 with coarse = normal(x, 1) as y;";
     let mut trace: Trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
     let at = Selector::Address(Pattern::exact(&trace.observations()[0].0));
     let kernel = || Delayed::new(Box::new(Mh::new(scope())), at.clone(), Span::default());
@@ -98,7 +105,8 @@ fn the_surrogate_does_not_follow_what_is_pending() {
 /// While the likelihood is annealed, both stages take it at its power.
 #[test]
 fn both_stages_take_the_likelihood_at_its_power() {
-    let text = "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2 with coarse = normal(x, 0.8) as y;";
+    let text =
+        "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2 with coarse = normal(x, 0.8) as y;";
     let mut trace: Trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
     let at = Selector::Address(Pattern::exact(&trace.observations()[0].0));
     let mut kernel = Delayed::new(Box::new(Drift::new(scope(), Some(1.0))), at, Span::default());

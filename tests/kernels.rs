@@ -1,5 +1,5 @@
-//! `docs/kernels.json` and `docs/kernels.md` say which tests run which kernels: made from the lists the tests themselves read
-//! (`tests/common/kernels.rs`).
+//! `docs/kernels.json` and `docs/kernels.md` say which tests run which kernels: made from
+//! the lists the tests themselves read (`tests/common/kernels.rs`).
 //!
 //! `REGENERATE=1 cargo test --test kernels` rewrites both.
 
@@ -9,7 +9,8 @@ use pcadlang::lang::builtins::Table;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
-/// The kernels of the language, in the order of its reference, and whether this version runs them.
+/// The kernels of the language, in the order of its reference, and whether this version
+/// runs them.
 fn kernels() -> Vec<(String, bool)> {
     let table = Table::default();
     let kernels = table.iter().filter(|b| b.section == "Kernels");
@@ -18,10 +19,14 @@ fn kernels() -> Vec<(String, bool)> {
 
 fn machine_readable() -> String {
     let row = |(kernel, runs): &(String, bool)| {
-        let proofs: Map<String, Value> = PROOFS.iter().map(|p| (p.name.to_owned(), json!(p.runs(kernel)))).collect();
+        let proofs: Map<String, Value> =
+            PROOFS.iter().map(|p| (p.name.to_owned(), json!(p.runs(kernel)))).collect();
         json!({ "kernel": kernel, "available": runs, "tests": proofs })
     };
-    let tests = PROOFS.iter().map(|p| (p.name.to_owned(), json!({ "shows": p.shows, "file": p.file }))).collect();
+    let tests = PROOFS
+        .iter()
+        .map(|p| (p.name.to_owned(), json!({ "shows": p.shows, "file": p.file })))
+        .collect();
     let all = json!({ "tests": Value::Object(tests), "kernels": kernels().iter().map(row).collect::<Vec<_>>() });
     serde_json::to_string_pretty(&all).unwrap() + "\n"
 }
@@ -35,10 +40,12 @@ fn readable() -> String {
     let _ = writeln!(s, "| kernel | {} |", names.join(" | "));
     let _ = writeln!(s, "| --- |{}", " --- |".repeat(names.len()));
     for (kernel, _) in kernels().iter().filter(|(_, runs)| *runs) {
-        let cells: Vec<&str> = PROOFS.iter().map(|p| if p.runs(kernel) { "✓" } else { "" }).collect();
+        let cells: Vec<&str> =
+            PROOFS.iter().map(|p| if p.runs(kernel) { "✓" } else { "" }).collect();
         let _ = writeln!(s, "| `{kernel}` | {} |", cells.join(" | "));
     }
-    let planned: Vec<String> = kernels().iter().filter(|(_, runs)| !runs).map(|(k, _)| format!("`{k}`")).collect();
+    let planned: Vec<String> =
+        kernels().iter().filter(|(_, runs)| !runs).map(|(k, _)| format!("`{k}`")).collect();
     if !planned.is_empty() {
         let _ = writeln!(s, "\nParsed and checked but not run yet: {}.", planned.join(", "));
     }
@@ -69,9 +76,14 @@ fn the_table_says_what_the_tests_run() {
 fn every_kernel_that_runs_is_proved_in_two_ways_at_least() {
     // `optimize` is not a sampler: it has tests of its own.
     let special = ["optimize"];
-    for (kernel, _) in kernels().into_iter().filter(|(k, runs)| *runs && !special.contains(&k.as_str())) {
+    for (kernel, _) in
+        kernels().into_iter().filter(|(k, runs)| *runs && !special.contains(&k.as_str()))
+    {
         let by: Vec<&str> = PROOFS.iter().filter(|p| p.runs(&kernel)).map(|p| p.name).collect();
-        assert!(by.len() >= 2, "{kernel} is in {by:?} only: add it to lists of tests/common/kernels.rs");
+        assert!(
+            by.len() >= 2,
+            "{kernel} is in {by:?} only: add it to lists of tests/common/kernels.rs"
+        );
     }
     assert!(!PROOFS.iter().any(|p| p.runs("h") || p.runs("nothing")), "names are whole words");
 }

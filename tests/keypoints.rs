@@ -7,7 +7,9 @@ use folder::{Folder, disc, png};
 use pcadlang::lang::builtins::scene::{ImageValue, KeypointsValue};
 use pcadlang::lang::value::Value;
 use pcadlang::vision::Photo;
-use pcadlang::vision::keypoints::{Detection, Keypoint, KeypointLikelihood, KeypointOptions, Keypoints, People};
+use pcadlang::vision::keypoints::{
+    Detection, Keypoint, KeypointLikelihood, KeypointOptions, Keypoints, People,
+};
 use pcadlang::{Model, Program, RunOptions};
 
 /// A bar with two ends that can be moved in the picture plane.
@@ -44,7 +46,9 @@ fn model(joints: Option<&str>) -> Model {
 
 #[test]
 fn no_detections_have_the_log_density_zero() {
-    for m in [model(None), model(Some("{\"keypoints\": null}")), model(Some("{\"l_eye\": [1, 2, 0.5]}"))] {
+    for m in
+        [model(None), model(Some("{\"keypoints\": null}")), model(Some("{\"l_eye\": [1, 2, 0.5]}"))]
+    {
         let t = m.simulate(1, 0).unwrap();
         assert_eq!(t.log_likelihood(), 0.0);
         assert!(!t.is_pseudo());
@@ -59,10 +63,17 @@ fn programs_read_landmarks() {
         assume x ~ normal(both[\"hand#2\"][0] + both.elbow[1], 1);
         observe normal(both[\"elbow#2\"][1], 1) = 3;";
     let t = Model::from_text(text).unwrap_or_else(|e| panic!("{e}")).simulate(1, 0).unwrap();
-    assert!((t.log_likelihood() + 0.5 * f64::ln(std::f64::consts::TAU)).abs() < 1e-12, "{}", t.log_likelihood());
+    assert!(
+        (t.log_likelihood() + 0.5 * f64::ln(std::f64::consts::TAU)).abs() < 1e-12,
+        "{}",
+        t.log_likelihood()
+    );
     let wrong = text.replace("{ hand: [0, 2, 0]", "{ hand: [0, 2]");
     let said = Model::from_text(&wrong).unwrap().simulate(1, 0).unwrap_err().to_string();
-    assert!(said.contains("scene.landmarks: `points` must be a record of points [x, y, z]"), "{said}");
+    assert!(
+        said.contains("scene.landmarks: `points` must be a record of points [x, y, z]"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -72,7 +83,8 @@ fn the_likelihood_is_that_of_the_projected_landmarks() {
     let by = KeypointLikelihood::new(440.0, 220.0, 0.0, &KeypointOptions::default()).unwrap();
     for seed in 0..5 {
         let t = m.simulate(seed, 0).unwrap();
-        let find = |n: &str| t.choices().into_iter().find(|(a, ..)| a.to_string().contains(n)).unwrap().1;
+        let find =
+            |n: &str| t.choices().into_iter().find(|(a, ..)| a.to_string().contains(n)).unwrap().1;
         let (Value::Num(x), Value::Num(y)) = (find("x"), find("y")) else { panic!("two numbers") };
         let at = |dy: f64| Some([220.0 + 100.0 * x, 110.0 - 100.0 * (y + dy)]);
         let expected = by.log_density(&Detection::new([250.0, 20.0], 1.0), at(1.0))
@@ -84,8 +96,10 @@ fn the_likelihood_is_that_of_the_projected_landmarks() {
 #[test]
 fn pixels_shares_and_other_sizes_of_the_picture_agree() {
     let likelihood = |k: Keypoints| {
-        let p =
-            Program::parse(BAR).unwrap().observe("photo", photo()).observe("points", Value::object(KeypointsValue(k)));
+        let p = Program::parse(BAR)
+            .unwrap()
+            .observe("photo", photo())
+            .observe("points", Value::object(KeypointsValue(k)));
         p.compile().unwrap().simulate(3, 0).unwrap().log_likelihood()
     };
     let of = |joints: [(&str, f64, f64); 2]| {
@@ -99,7 +113,8 @@ fn pixels_shares_and_other_sizes_of_the_picture_agree() {
             format!("{{\"x\": {}, \"y\": {}, \"visibility\": 0.75}}", x / 440.0, y / 220.0)
         })
         .collect();
-    let shares = People::parse(format!("{{\"pose_landmarks\": [{}]}}", list.join(", ")).as_bytes()).unwrap();
+    let shares =
+        People::parse(format!("{{\"pose_landmarks\": [{}]}}", list.join(", ")).as_bytes()).unwrap();
     let shares = shares.pick(None, None).unwrap();
     let known = |n: &&Keypoint| ["nose", "l_ankle"].contains(&&*n.name);
     assert!(shares.is_normalised());
@@ -129,11 +144,25 @@ fn the_posterior_is_that_of_a_normal_mean() {
     let precision = 1.0 + 2.0 / (s * s);
     let (mean, sd) = ((0.5 + 0.42) / (s * s) / precision, precision.sqrt().recip());
     let x = p.quantity("x").unwrap().summary;
-    assert!((x.mean - mean).abs() < 0.2 * sd && (x.sd / sd - 1.0).abs() < 0.15, "{x:?} {mean} {sd}");
+    assert!(
+        (x.mean - mean).abs() < 0.2 * sd && (x.sd / sd - 1.0).abs() < 0.15,
+        "{x:?} {mean} {sd}"
+    );
 }
 
-const RUN: [&str; 11] =
-    ["run", "bar.pcad", "--observe", "anna.png", "--steps", "300", "--warmup", "300", "--chains", "2", "--quiet"];
+const RUN: [&str; 11] = [
+    "run",
+    "bar.pcad",
+    "--observe",
+    "anna.png",
+    "--steps",
+    "300",
+    "--warmup",
+    "300",
+    "--chains",
+    "2",
+    "--quiet",
+];
 
 fn run<'a>(more: &[&'a str]) -> Vec<&'a str> {
     RUN.iter().copied().chain(more.iter().copied()).collect()
@@ -142,7 +171,10 @@ fn run<'a>(more: &[&'a str]) -> Vec<&'a str> {
 fn folder(name: &str) -> Folder {
     let f = Folder::new(name);
     f.write("bar.pcad", BAR).write("anna.png", picture());
-    f.write("one.json", "{\"nose\": [270, 40, 0.9], \"l_ankle\": [262, 236, 0.9], \"l_eye\": [1, 1, 1]}");
+    f.write(
+        "one.json",
+        "{\"nose\": [270, 40, 0.9], \"l_ankle\": [262, 236, 0.9], \"l_eye\": [1, 1, 1]}",
+    );
     f.write(
         "many.json",
         "{\"bert\": {\"keypoints\": {\"nose\": [100, 20]}}, \"anna\": {\"keypoints\": {\"nose\": [270, 40], \"l_ankle\": [262, 236]}}}",
@@ -158,27 +190,45 @@ fn a_run_leaves_where_the_joints_are() {
     f.succeeds(&run(&["--observe", "points=many.json#anna", "--out", "c", "--threads", "2"]));
     f.succeeds(&run(&["--keypoints", "many.json#bert", "--out", "d"]));
     f.succeeds(&run(&["--out", "e"]));
-    let json =
-        |dir: &str| -> serde_json::Value { serde_json::from_str(&f.read(&format!("{dir}/keypoints.json"))).unwrap() };
+    let json = |dir: &str| -> serde_json::Value {
+        serde_json::from_str(&f.read(&format!("{dir}/keypoints.json"))).unwrap()
+    };
     let number = |v: &serde_json::Value| v.as_f64().unwrap();
     let (a, b, c) = (json("a"), json("b"), json("c"));
-    assert_eq!(a.as_object().unwrap().keys().collect::<Vec<_>>(), ["keypoints", "body", "scene", "best", "seconds"]);
-    // Without an offset the joints are the scene's own; the camera shows 4.4 units over 440 pixels.
+    assert_eq!(
+        a.as_object().unwrap().keys().collect::<Vec<_>>(),
+        ["keypoints", "body", "scene", "best", "seconds"]
+    );
+    // Without an offset the joints are the scene's own; the camera shows 4.4 units over
+    // 440 pixels.
     assert_eq!(a["keypoints"], a["body"]);
     let (own, scene) = (&a["body"]["nose"], &a["scene"]["nose"]);
     assert!((number(&own[0]) - 220.0 - 100.0 * number(&scene[0])).abs() < 0.5, "{own} {scene}");
     assert!((110.0 - number(&own[1]) - 100.0 * number(&scene[1])).abs() < 0.5, "{own} {scene}");
     for of in [&a, &b] {
         let nose = &of["keypoints"]["nose"];
-        assert!((number(&nose[0]) - 266.0).abs() < 6.0 && (number(&nose[1]) - 38.0).abs() < 6.0, "{nose}");
+        assert!(
+            (number(&nose[0]) - 266.0).abs() < 6.0 && (number(&nose[1]) - 38.0).abs() < 6.0,
+            "{nose}"
+        );
         // Two detections of a spread of 1.5 percent of the diagonal.
         let sd = 0.015 * f64::hypot(440.0, 220.0) / f64::sqrt(2.0);
         assert!((number(&nose[2]) / sd - 1.0).abs() < 0.5, "{nose} {sd}");
         let best = &of["best"]["l_ankle"];
-        assert!((number(&best[0]) - 266.0).abs() < 6.0 && (number(&best[1]) - 238.0).abs() < 6.0, "{best}");
-        assert_eq!((of["keypoints"].as_object().unwrap().len(), of["best"].as_object().unwrap().len()), (2, 2));
+        assert!(
+            (number(&best[0]) - 266.0).abs() < 6.0 && (number(&best[1]) - 238.0).abs() < 6.0,
+            "{best}"
+        );
+        assert_eq!(
+            (of["keypoints"].as_object().unwrap().len(), of["best"].as_object().unwrap().len()),
+            (2, 2)
+        );
     }
-    assert_eq!((&b["keypoints"], &b["best"]), (&c["keypoints"], &c["best"]), "the same on any number of threads");
+    assert_eq!(
+        (&b["keypoints"], &b["best"]),
+        (&c["keypoints"], &c["best"]),
+        "the same on any number of threads"
+    );
     assert!((number(&json("d")["keypoints"]["nose"][0]) - 100.0).abs() < 12.0);
     assert!(number(&json("e")["keypoints"]["nose"][2]) > 50.0, "the prior alone");
     assert!(number(&json("a")["seconds"]) > 0.0);
@@ -191,15 +241,17 @@ fn a_run_leaves_where_the_joints_are() {
     assert!(!f.exists("a/keypoints.json"), "nothing of an earlier run stays");
 }
 
-/// Errors that no detection tells of: the same draws, and wider intervals of joints and of the body's own.
+/// Errors that no detection tells of: the same draws, and wider intervals of joints and
+/// of the body's own.
 #[test]
 fn systematic_errors_widen_what_is_said_and_nothing_else() {
     let f = folder("keypoints_systematic");
     f.succeeds(&run(&["--keypoints", "one.json", "--out", "a"]));
     f.write("bar.pcad", BAR.replace("sd = sd)", "sd = sd, systematic = 2)"));
     f.succeeds(&run(&["--keypoints", "one.json", "--out", "b"]));
-    let json =
-        |dir: &str| -> serde_json::Value { serde_json::from_str(&f.read(&format!("{dir}/keypoints.json"))).unwrap() };
+    let json = |dir: &str| -> serde_json::Value {
+        serde_json::from_str(&f.read(&format!("{dir}/keypoints.json"))).unwrap()
+    };
     let (a, b) = (json("a"), json("b"));
     assert_eq!((&a["best"], &a["scene"]), (&b["best"], &b["scene"]), "the density is as it was");
     let error = 0.02 * f64::hypot(440.0, 220.0);
@@ -219,7 +271,9 @@ fn the_means_are_those_of_the_collected_draws() {
         let text = f.read(chain);
         let mut rows = text.lines().filter(|l| !l.starts_with('#'));
         let header: Vec<&str> = rows.next().unwrap().split(',').collect();
-        let at = |name: &str| header.iter().position(|h| *h == name).unwrap_or_else(|| panic!("{header:?}"));
+        let at = |name: &str| {
+            header.iter().position(|h| *h == name).unwrap_or_else(|| panic!("{header:?}"))
+        };
         for row in rows {
             let cells: Vec<f64> = row.split(',').map(|c| c.parse().unwrap()).collect();
             sum = [sum[0] + cells[at("x")], sum[1] + cells[at("y")]];
@@ -237,14 +291,26 @@ fn the_means_are_those_of_the_collected_draws() {
 #[test]
 fn what_is_said_of_keypoints_that_are_wrong() {
     let f = folder("keypoints_wrong");
-    f.write("cut.json", "{\"nose\": [1, 2").write("nan.json", "{\"nose\": [NaN, 2]}").write("odd.json", "[1, 2]");
-    f.write("tail.json", "{\"nose\": [1, 2], \"l_ankel\": [3, 4]}").write("sure.json", "{\"nose\": [1, 2, 7]}");
+    f.write("cut.json", "{\"nose\": [1, 2")
+        .write("nan.json", "{\"nose\": [NaN, 2]}")
+        .write("odd.json", "[1, 2]");
+    f.write("tail.json", "{\"nose\": [1, 2], \"l_ankel\": [3, 4]}")
+        .write("sure.json", "{\"nose\": [1, 2, 7]}");
     f.write("wide.json", "{\"keypoints\": {\"nose\": [1, 2]}, \"width\": 100, \"height\": 900}");
     f.write("mp.json", "{\"pose_landmarks\": [{\"x\": 0, \"y\": 0}]}");
-    f.write("coco.json", "{\"annotations\": [{\"id\": 3, \"image_id\": 4, \"keypoints\": [1, 2, 3]}]}");
+    f.write(
+        "coco.json",
+        "{\"annotations\": [{\"id\": 3, \"image_id\": 4, \"keypoints\": [1, 2, 3]}]}",
+    );
     f.write("others.json", "{\"bert\": {\"keypoints\": null}, \"carl\": {\"keypoints\": null}}");
-    f.write("none.pcad", "data photo: image; assume x ~ normal(0, 1); observe normal(x, 1) = photo.width;");
-    f.write("needs.pcad", "data joints: keypoints; assume x ~ normal(0, 1); observe normal(x, 1) = joints.count;");
+    f.write(
+        "none.pcad",
+        "data photo: image; assume x ~ normal(0, 1); observe normal(x, 1) = photo.width;",
+    );
+    f.write(
+        "needs.pcad",
+        "data joints: keypoints; assume x ~ normal(0, 1); observe normal(x, 1) = joints.count;",
+    );
     f.write(
         "two.pcad",
         "data a = keypoints(); data b = keypoints(); assume x ~ normal(0, 1); observe normal(x, 1) = a.count + b.count;",
@@ -292,7 +358,8 @@ fn the_people_of_the_development_pictures_are_found_by_their_files() {
             joints.join(", ")
         ),
     );
-    let (file, picture) = (file.to_string_lossy().into_owned(), picture.to_string_lossy().into_owned());
+    let (file, picture) =
+        (file.to_string_lossy().into_owned(), picture.to_string_lossy().into_owned());
     f.succeeds(&[
         "run",
         "p.pcad",

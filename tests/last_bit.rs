@@ -1,6 +1,7 @@
-//! Updates stop where a value comes out as it was, and that means to the last bit: numbers one unit in the last place apart, 0
-//! and -0, numbers and NaN are others. Each way a value goes from a choice to a score, by increments, against running the
-//! whole program.
+//! Updates stop where a value comes out as it was, and that means to the last bit:
+//! numbers one unit in the last place apart, 0 and -0, numbers and NaN are others. Each
+//! way a value goes from a choice to a score, by increments, against running the whole
+//! program.
 
 use pcadlang::host::{Entry, Host, Previous, Type};
 use pcadlang::infer::RunOptions;
@@ -35,8 +36,14 @@ const WAYS: &[(&str, &str)] = &[
     ("mem of an array", "let f = mem(fn(a) { a[0] }); let o = f([x, 1]);"),
     ("mem of two", "let f = mem(fn(a, b) { b }); let o = f(1, x);"),
     ("a branch", "assume c ~ flip(0.5); let o = if c { [x][0] } else { x * 1 };"),
-    ("a condition on the number", "let o = if x > 0.3 { 0.30000000000000004 } else { if x == 0 { x } else { 0.3 } };"),
-    ("a container", "for i in 0 .. 3 { let t = x * i; if i == 1 { observe normal(far(t), 3) = 1; } } let o = x;"),
+    (
+        "a condition on the number",
+        "let o = if x > 0.3 { 0.30000000000000004 } else { if x == 0 { x } else { 0.3 } };",
+    ),
+    (
+        "a container",
+        "for i in 0 .. 3 { let t = x * i; if i == 1 { observe normal(far(t), 3) = 1; } } let o = x;",
+    ),
     ("what a loop goes over", "for k in [x] { observe normal(far(k), 3) = 1; } let o = 1;"),
     ("a parameter of a choice", "assume y ~ normal(far(x), 9); let o = y;"),
     ("a parameter of elements", "assume y ~ iid(normal(far(x), 9), 3); let o = y[1];"),
@@ -73,22 +80,29 @@ fn put(t: &mut Trace, address: &str, v: Value) -> String {
     }
 }
 
-/// Sets an address to values in turn, by increments, by running everything, and from scratch.
+/// Sets an address to values in turn, by increments, by running everything, and from
+/// scratch.
 fn compare(what: &str, model: &Model, address: &str, values: &[Value]) {
     let start = || model.simulate(1, 0).unwrap_or_else(|e| panic!("{what}: {e}"));
     let (mut some, mut all) = (start(), start());
     all.set_incremental(false);
     let mut seen = Vec::new();
     for (i, v) in values.iter().enumerate() {
-        let (by_some, by_all) = (put(&mut some, address, v.clone()), put(&mut all, address, v.clone()));
+        let (by_some, by_all) =
+            (put(&mut some, address, v.clone()), put(&mut all, address, v.clone()));
         assert_eq!(by_some, by_all, "{what}: {address} = {v:?}, the value number {i}");
         let again = some.rerun().unwrap_or_else(|e| panic!("{what}: {e}"));
-        assert_eq!(by_some, format!("{:x}", again.log_joint().to_bits()), "{what}: {address} = {v:?}, from scratch");
+        assert_eq!(
+            by_some,
+            format!("{:x}", again.log_joint().to_bits()),
+            "{what}: {address} = {v:?}, from scratch"
+        );
         seen.push(by_some);
     }
     seen.sort();
     seen.dedup();
-    // 0.3, its neighbours, 0 and -0 are told apart; -0 and the largest number below it need not be.
+    // 0.3, its neighbours, 0 and -0 are told apart; -0 and the largest number below it
+    // need not be.
     assert!(seen.len() >= 4, "{what}: scores do not tell the values apart: {seen:?}");
 }
 
@@ -99,7 +113,8 @@ fn numbers() -> Vec<Value> {
 #[test]
 fn equal_means_to_the_last_bit() {
     for (what, way) in WAYS {
-        let text = format!("{FAR} {way} observe normal(far(o), 3) = 1; observe normal(odd(o), 3) = 2;");
+        let text =
+            format!("{FAR} {way} observe normal(far(o), 3) = 1; observe normal(odd(o), 3) = 2;");
         let model = Model::from_text(&text).unwrap_or_else(|e| panic!("{what}: {e}"));
         compare(what, &model, "@x", &numbers());
     }
@@ -108,9 +123,12 @@ fn equal_means_to_the_last_bit() {
 /// Elements of choices, whole vectors, and observed values.
 #[test]
 fn elements_and_observed_values_too() {
-    let text = format!("{FAR} assume v ~ iid(normal(0, 5), 3); observe normal(far(v[1]) + x, 3) = 1;");
+    let text =
+        format!("{FAR} assume v ~ iid(normal(0, 5), 3); observe normal(far(v[1]) + x, 3) = 1;");
     compare("an element", &Model::from_text(&text).unwrap(), "@v[1]", &numbers());
-    let text = format!("{FAR} assume v ~ mv_normal([0, 0], [[9, 1], [1, 9]]); observe normal(far(v[1]) + x, 3) = 1;");
+    let text = format!(
+        "{FAR} assume v ~ mv_normal([0, 0], [[9, 1], [1, 9]]); observe normal(far(v[1]) + x, 3) = 1;"
+    );
     let vectors: Vec<Value> = VALUES.iter().map(|x| Value::array(vec![1.0, *x])).collect();
     compare("a vector", &Model::from_text(&text).unwrap(), "@v", &vectors);
     // A narrow density, so that a unit in the last place shows.
@@ -121,14 +139,22 @@ fn elements_and_observed_values_too() {
         .iter()
         .map(|v| {
             put(&mut t, "@y", v.clone());
-            assert_eq!(t.log_joint().to_bits(), t.rerun().unwrap().log_joint().to_bits(), "observed {v:?}");
+            assert_eq!(
+                t.log_joint().to_bits(),
+                t.rerun().unwrap().log_joint().to_bits(),
+                "observed {v:?}"
+            );
             t.log_joint().to_bits()
         })
         .collect();
-    assert!(scores[0] != scores[1] && scores[0] == scores[2] && scores[0] != scores[3], "{scores:?}");
+    assert!(
+        scores[0] != scores[1] && scores[0] == scores[2] && scores[0] != scores[3],
+        "{scores:?}"
+    );
 }
 
-/// Values of finite choices that lead to numbers one unit apart: weighed beside the trace, by updates, and from scratch.
+/// Values of finite choices that lead to numbers one unit apart: weighed beside the
+/// trace, by updates, and from scratch.
 #[test]
 fn short_ways_tell_them_apart() {
     let ways = [
@@ -138,7 +164,12 @@ fn short_ways_tell_them_apart() {
         "let o = if f { table[k] } else { table[k] * 1 };",
     ];
     for way in ways {
-        for kernel in ["gibbs(one($finite))", "mh(one($finite))", "gibbs(@k); mh(@f)", "drift(@k); mh(one(@**))"] {
+        for kernel in [
+            "gibbs(one($finite))",
+            "mh(one($finite))",
+            "gibbs(@k); mh(@f)",
+            "drift(@k); mh(one(@**))",
+        ] {
             let text = format!(
                 "{FAR} let table = [0.3, 0.30000000000000004, 0.29999999999999993, 0, -0];
                  assume k ~ categorical([1, 1, 1, 1, 1]); assume f ~ flip(0.5); {way}
@@ -150,7 +181,10 @@ fn short_ways_tell_them_apart() {
                 let options = RunOptions { seed: 5, incremental, ..RunOptions::default() };
                 let done = model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}\n{text}"));
                 let rows = done.draws.iter().flat_map(|d| d.rows.clone());
-                rows.map(|r| (r.log_joint.to_bits(), r.values.iter().map(|x| x.to_bits()).collect())).collect()
+                rows.map(|r| {
+                    (r.log_joint.to_bits(), r.values.iter().map(|x| x.to_bits()).collect())
+                })
+                .collect()
             };
             let (some, all): (Vec<(u64, Vec<u64>)>, _) = (chain(true), chain(false));
             assert!(some == all, "{text}");
@@ -162,7 +196,8 @@ fn short_ways_tell_them_apart() {
     }
 }
 
-/// A host's function that goes on from its last evaluation is told of a change by the last bit.
+/// A host's function that goes on from its last evaluation is told of a change by the
+/// last bit.
 #[test]
 fn functions_of_a_host_see_the_last_bit() {
     let kept = Entry::incremental("kept", |a, previous: Option<Previous<f64>>| {
@@ -175,6 +210,8 @@ fn functions_of_a_host_see_the_last_bit() {
     .argument("x", Type::Num, "What is kept.")
     .argument("y", Type::Num, "The rest.");
     let text = format!("{FAR} observe normal(far(kept(x, 2)), 3) = 1;");
-    let model = Program::parse(&text).and_then(|p| p.host(&Host::new().with(kept))).and_then(Program::compile);
+    let model = Program::parse(&text)
+        .and_then(|p| p.host(&Host::new().with(kept)))
+        .and_then(Program::compile);
     compare("a function of a host", &model.unwrap_or_else(|e| panic!("{e}")), "@x", &numbers());
 }

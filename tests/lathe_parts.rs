@@ -1,4 +1,5 @@
-//! The number of parts of a lathe is drawn from its posterior: against probabilities found by quadrature over the very pictures.
+//! The number of parts of a lathe is drawn from its posterior: against probabilities
+//! found by quadrature over the very pictures.
 
 mod common;
 use common::{assert_mean, integrate};
@@ -25,8 +26,8 @@ observe scene.chamfer(view, sigma = 1, symmetric = true, size = 48) = photo as d
 
 fn model(text: &str, map: ContourMap) -> Model {
     let image = Value::object(ImageValue::contours(map, None));
-    let program =
-        Program::parse(text).and_then(|p| p.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile());
+    let program = Program::parse(text)
+        .and_then(|p| p.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile());
     program.unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -40,7 +41,9 @@ fn shown(trace: &mut Trace) -> ContourMap {
 
 fn set(trace: &mut Trace, values: &[(&str, Value)]) {
     for (address, value) in values {
-        trace.set(address, value.clone(), Draws::default()).unwrap_or_else(|e| panic!("{address}: {e:?}"));
+        trace
+            .set(address, value.clone(), Draws::default())
+            .unwrap_or_else(|e| panic!("{address}: {e:?}"));
     }
 }
 
@@ -57,19 +60,31 @@ fn the_second_part_comes_and_goes_as_its_posterior_says() {
         t.log_likelihood().exp() / 0.4
     };
     let one = 0.7 * integrate(|r| density(r, None), 0.3, 0.7, 80);
-    let two = 0.3 * integrate(|r| integrate(|s| density(r, Some(s)), 0.3, 0.7, 40) / 0.4, 0.3, 0.7, 40);
+    let two =
+        0.3 * integrate(|r| integrate(|s| density(r, Some(s)), 0.3, 0.7, 40) / 0.4, 0.3, 0.7, 40);
     let expected = two / (one + two);
     assert!((0.1..0.9).contains(&expected), "{expected}: a test of nothing");
-    for kernels in ["mh(@two); drift(one($continuous));", "gibbs(@two); drift(one($continuous));", "mh(one(@**));"] {
-        let plan = format!("{MODEL}infer {{ warmup 500 {{ {kernels} }} repeat 12000 {{ {kernels} collect two; }} }}");
+    for kernels in [
+        "mh(@two); drift(one($continuous));",
+        "gibbs(@two); drift(one($continuous));",
+        "mh(one(@**));",
+    ] {
+        let plan = format!(
+            "{MODEL}infer {{ warmup 500 {{ {kernels} }} repeat 12000 {{ {kernels} collect two; }} }}"
+        );
         let posterior = model(&plan, map.clone()).run(&RunOptions::default(), 2, 2).unwrap();
-        let draws: Vec<f64> =
-            posterior.scalars().into_iter().filter(|(n, _)| n == "two").flat_map(|(_, v)| v).collect();
+        let draws: Vec<f64> = posterior
+            .scalars()
+            .into_iter()
+            .filter(|(n, _)| n == "two")
+            .flat_map(|(_, v)| v)
+            .collect();
         assert_mean(kernels, &draws, expected, 0.12);
     }
 }
 
-/// What the shipped program does at its own prior: parts come and go, and the weights are those of a run from scratch.
+/// What the shipped program does at its own prior: parts come and go, and the weights are
+/// those of a run from scratch.
 #[test]
 fn the_shipped_program_makes_and_removes_a_part() {
     let text = embedded("lathe_parts.pcad").unwrap();

@@ -1,4 +1,5 @@
-//! Programs that would take more memory, stack or time than there is: an error at a place, with what to do about it.
+//! Programs that would take more memory, stack or time than there is: an error at a
+//! place, with what to do about it.
 
 use pcadlang::infer::Progress;
 use pcadlang::lang::value::Value;
@@ -11,7 +12,9 @@ use std::time::{Duration, Instant};
 
 /// The error of one draw of a program.
 fn error_within(text: &str, limits: Limits) -> String {
-    let drawn = Program::parse(text).and_then(|p| p.limits(limits).compile()).and_then(|m| m.simulate(1, 0));
+    let drawn = Program::parse(text)
+        .and_then(|p| p.limits(limits).compile())
+        .and_then(|m| m.simulate(1, 0));
     drawn.map(|_| ()).expect_err(text).to_string()
 }
 
@@ -22,7 +25,9 @@ fn says(text: &str, part: &str) {
 
 /// A value made in so many steps, each from the one before.
 fn grown(step: &str, from: &str, times: &str) -> String {
-    format!("let v = fold(fn(a, i) {{ {step} }}, {from}, 0 .. {times}); observe normal(0, 1) = len(v);")
+    format!(
+        "let v = fold(fn(a, i) {{ {step} }}, {from}, 0 .. {times}); observe normal(0, 1) = len(v);"
+    )
 }
 
 #[test]
@@ -31,7 +36,10 @@ fn values_that_are_nested_too_deep() {
         says(&grown(step, "[\"x\"]", "100000"), "nested more than 200 deep");
     }
     let observed = |d: &str| format!("let d = {d}; observe d = 3;");
-    says(&observed("fold(fn(d, i) { iid(d, 1) }, normal(0, 1), 0 .. 20000)"), "more than 200 nested distributions");
+    says(
+        &observed("fold(fn(d, i) { iid(d, 1) }, normal(0, 1), 0 .. 20000)"),
+        "more than 200 nested distributions",
+    );
     let mixture = "fold(fn(d, i) { mixture([1, 1], [d, normal(0, 1)]) }, normal(0, 1), 0 .. 20000)";
     says(&observed(mixture), "more than 200 nested distributions");
     let sum = "let c = fold(fn(c, i) { c + white(1) }, white(1), 0 .. 20000); observe gp(0, c, [0, 1]) = [1, 2];";
@@ -48,14 +56,28 @@ fn values_that_are_too_large() {
     says(&grown("concat(a, a)", "[1, 2]", "60"), "concat: an array of 16777216 elements");
     says(&grown("concat(a, a)", "\"ab\"", "60"), "concat: an array of 16777216 elements");
     says(&grown("a + a", "\"ab\"", "60"), "an array of 16777216 elements");
-    says("let v = fill(zeros(1e7), 1e7); observe normal(0, 1) = len(v);", "more than 10000000 elements");
-    says("let v = diag(zeros(1e6)); observe normal(0, 1) = len(v);", "diag: an array of 1000000000000 elements");
-    says("let v = outer(zeros(1e6), ones(1e6)); observe normal(0, 1) = len(v);", "outer: an array of");
+    says(
+        "let v = fill(zeros(1e7), 1e7); observe normal(0, 1) = len(v);",
+        "more than 10000000 elements",
+    );
+    says(
+        "let v = diag(zeros(1e6)); observe normal(0, 1) = len(v);",
+        "diag: an array of 1000000000000 elements",
+    );
+    says(
+        "let v = outer(zeros(1e6), ones(1e6)); observe normal(0, 1) = len(v);",
+        "outer: an array of",
+    );
     let column = "map(fn(i) { [i] }, 0 .. 5000)";
-    let product = format!("let c = {column}; let v = matmul(c, [zeros(5000)]); observe normal(0, 1) = len(v);");
+    let product = format!(
+        "let c = {column}; let v = matmul(c, [zeros(5000)]); observe normal(0, 1) = len(v);"
+    );
     says(&product, "matmul: an array of 25000000 elements");
     says("let v = 0 .. 1e12; observe normal(0, 1) = len(v);", "an array of 1000000000000 elements");
-    says("v ~ iid(normal(0, 1), 1e9); observe normal(0, 1) = v[0];", "iid: an array of 1000000000 elements");
+    says(
+        "v ~ iid(normal(0, 1), 1e9); observe normal(0, 1) = v[0];",
+        "iid: an array of 1000000000 elements",
+    );
     says("observe iid(iid(normal(0, 1), 1e5), 1e5) = 1;", "iid: more than 10000000 parts");
     let mixture = "fold(fn(d, i) { mixture([1, 1], [d, d]) }, normal(0, 1), 0 .. 60)";
     says(&format!("let d = {mixture}; observe d = 3;"), "mixture: more than 10000000 parts");
@@ -69,11 +91,16 @@ fn solids_that_are_too_large() {
     says(&format!("{scene}let s = {doubled}; observe normal(0, 1) = s.height;"), "at most 100000");
     let limits = Limits { elements: 10_000_000, ..Limits::default() };
     let spheres = "map(fn(i) { scene.sphere(1 + i, sides = 1024) }, 0 .. 100)";
-    let e = error_within(&format!("{scene}let s = scene.group({spheres}); observe normal(0, 1) = s.height;"), limits);
+    let e = error_within(
+        &format!("{scene}let s = scene.group({spheres}); observe normal(0, 1) = s.height;"),
+        limits,
+    );
     assert!(e.contains("more than 10000000 elements") && e.contains("--limit elements=N"), "{e}");
     // Placed again and again, it is as it should be.
     let moved = "fold(fn(s, i) { scene.affine(translate = [0.001, 0, 0]) * s }, scene.sphere(1), 0 .. 5000)";
-    let text = format!("{scene}let s = {moved}; assume x ~ normal(0, 1); observe normal(x, 1) = s.height;");
+    let text = format!(
+        "{scene}let s = {moved}; assume x ~ normal(0, 1); observe normal(x, 1) = s.height;"
+    );
     assert!(Model::from_text(&text).and_then(|m| m.simulate(1, 0)).is_ok());
 }
 
@@ -87,7 +114,8 @@ fn limits_can_be_set_and_say_how() {
     assert!(e.contains("beyond 1000 nodes") && e.contains("--limit nodes=N"), "{e}");
     let e = error_within(wide, Limits::default().with("operations", 5000).unwrap());
     assert!(e.contains("more than 5000 operations") && e.contains("--limit operations=N"), "{e}");
-    let arrays = "let v = map(fn(i) { sum(zeros(1000) + i) }, 0 .. 1000); observe normal(sum(v), 1) = 0;";
+    let arrays =
+        "let v = map(fn(i) { sum(zeros(1000) + i) }, 0 .. 1000); observe normal(sum(v), 1) = 0;";
     let e = error_within(arrays, Limits::default().with("elements", 100_000).unwrap());
     assert!(e.contains("more than 100000 elements") && e.contains("--limit elements=N"), "{e}");
     for text in [wide, arrays] {
@@ -98,7 +126,8 @@ fn limits_can_be_set_and_say_how() {
 }
 
 /// An evaluation that takes far longer than anybody waits.
-const LONG: &str = "fn f(a) { sum(map(fn(i) { sum(map(fn(j) { i * j + a }, 0 .. 1000)) }, 0 .. 1000000)) }
+const LONG: &str =
+    "fn f(a) { sum(map(fn(i) { sum(map(fn(j) { i * j + a }, 0 .. 1000)) }, 0 .. 1000000)) }
     assume x ~ normal(0, 1); observe normal(f(x), 1) = 0; infer { repeat 100 { mh(@x); } }";
 
 #[test]
@@ -120,7 +149,9 @@ fn an_evaluation_ends_when_somebody_asks() {
         std::thread::sleep(Duration::from_millis(100));
         cancelled.store(true, Ordering::Relaxed);
     });
-    let results = model.run_into(&RunOptions::default(), 1, &progress, vec![Box::new(Memory::default())]).unwrap();
+    let results = model
+        .run_into(&RunOptions::default(), 1, &progress, vec![Box::new(Memory::default())])
+        .unwrap();
     assert!(results.iter().all(Result::is_err), "it cannot have come to an end");
 }
 
@@ -149,7 +180,10 @@ fn a_search_for_modes_ends_when_time_is_up() {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
     let options = RunOptions { time: Some(Duration::from_millis(400)), ..RunOptions::default() };
     let posterior = model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}"));
-    assert!(posterior.chains[0].warmup == 1 && posterior.chains[0].seconds < 10.0, "the search took all time");
+    assert!(
+        posterior.chains[0].warmup == 1 && posterior.chains[0].seconds < 10.0,
+        "the search took all time"
+    );
     // The likeliest draw of those that there was time for, at least.
     let Value::Num(x) = posterior.chains[0].last.get("@x").unwrap() else { panic!("not a number") };
     assert!((x - 200.0 / 101.0).abs() < 1.0, "{x}");
@@ -161,7 +195,8 @@ fn a_run_may_have_all_the_time_there_is() {
     let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 0;
         infer { warmup 1 { modes(@x, tries = 8); } repeat 5000 { mh(@x); collect x; } }";
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
-    let options = RunOptions { time: Some(Duration::MAX), steps: Some(5000), ..RunOptions::default() };
+    let options =
+        RunOptions { time: Some(Duration::MAX), steps: Some(5000), ..RunOptions::default() };
     assert_eq!(model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}")).chains[0].steps, 5000);
 }
 
@@ -170,15 +205,20 @@ fn a_run_may_have_all_the_time_there_is() {
 fn observations_that_may_be_slow_are_stopped_sooner() {
     let stop = Stop::when(Arc::new(AtomicBool::new(true))).after(Duration::ZERO);
     let limits = Limits { stop, ..Limits::default() };
-    let text =
-        |d: &str| format!("assume x ~ normal(0, 1); let d = normal(x, 1); for i in 0 .. 40 {{ observe {d} = i; }}");
-    let plain = Program::parse(&text("normal(x, 1)")).and_then(|p| p.limits(limits.clone()).compile());
+    let text = |d: &str| {
+        format!(
+            "assume x ~ normal(0, 1); let d = normal(x, 1); for i in 0 .. 40 {{ observe {d} = i; }}"
+        )
+    };
+    let plain =
+        Program::parse(&text("normal(x, 1)")).and_then(|p| p.limits(limits.clone()).compile());
     plain.and_then(|m| m.simulate(1, 0)).map(drop).unwrap_or_else(|e| panic!("{e}"));
     let e = error_within(&text("d"), limits);
     assert!(e.contains("stopped in the middle of an evaluation"), "{e}");
 }
 
-/// A host has a flag of its own, which ends a run as well; what is left can be looked at although the flag is still set.
+/// A host has a flag of its own, which ends a run as well; what is left can be looked at
+/// although the flag is still set.
 #[test]
 fn a_host_may_stop_evaluations_by_a_flag_of_its_own() {
     let text = "fn f(n) { sum(map(fn(i) { sum(map(fn(j) { i * j }, 0 .. 1000)) }, 0 .. n)) }
@@ -186,12 +226,15 @@ fn a_host_may_stop_evaluations_by_a_flag_of_its_own() {
         infer { repeat 1000000000 { mh(@x); collect x; } }";
     let flag = Arc::new(AtomicBool::new(false));
     let stop = Stop::when(Arc::clone(&flag)).after(Duration::ZERO);
-    let options = RunOptions { limits: Limits { stop, ..Limits::default() }, ..RunOptions::default() };
+    let options =
+        RunOptions { limits: Limits { stop, ..Limits::default() }, ..RunOptions::default() };
     std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(200));
         flag.store(true, Ordering::Relaxed);
     });
-    let posterior = Model::from_text(text).and_then(|m| m.run(&options, 1, 1)).unwrap_or_else(|e| panic!("{e}"));
+    let posterior = Model::from_text(text)
+        .and_then(|m| m.run(&options, 1, 1))
+        .unwrap_or_else(|e| panic!("{e}"));
     assert!(posterior.chains[0].draws > 0);
     let large = posterior.chains[0].last.clone().global("large", Draws::default());
     assert!(matches!(large, Some(Ok(Value::Num(x))) if x > 0.0), "{large:?}");
@@ -200,7 +243,10 @@ fn a_host_may_stop_evaluations_by_a_flag_of_its_own() {
 #[test]
 fn kernels_that_call_themselves() {
     let text = "kernel k(n) { k(n); } assume x ~ normal(0, 1); observe normal(x, 1) = 0; infer { repeat 10 { k(1); } }";
-    let e = Model::from_text(text).and_then(|m| m.run(&RunOptions::default(), 1, 1)).unwrap_err().to_string();
+    let e = Model::from_text(text)
+        .and_then(|m| m.run(&RunOptions::default(), 1, 1))
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("more than 200 deep") && e.contains("<program>:1:"), "{e}");
 }
 
@@ -213,8 +259,9 @@ fn starts_that_would_never_be_done() {
     };
     let options = RunOptions { time: Some(Duration::from_millis(300)), ..RunOptions::default() };
     for n in ["1e12", "1e300"] {
-        let posterior =
-            Model::from_text(&text(n)).and_then(|m| m.run(&options, 1, 1)).unwrap_or_else(|e| panic!("{e}"));
+        let posterior = Model::from_text(&text(n))
+            .and_then(|m| m.run(&options, 1, 1))
+            .unwrap_or_else(|e| panic!("{e}"));
         assert!(posterior.chains[0].draws > 0);
     }
 }

@@ -1,5 +1,6 @@
-//! What stopped or misled people in their first hour: every run opens elsewhere, data in the forms that people have them, messages that
-//! name what is wrong, names typed as people type them.
+//! What stopped or misled people in their first hour: every run opens elsewhere, data in
+//! the forms that people have them, messages that name what is wrong, names typed as
+//! people type them.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -30,7 +31,8 @@ fn chain(f: &Folder, name: &str) -> (String, Vec<Vec<f64>>) {
     (names, lines.map(|l| l.split(',').map(number).collect()).collect())
 }
 
-/// Chains end with equally many draws and the same columns, however far each came in its time and whatever came and went in it.
+/// Chains end with equally many draws and the same columns, however far each came in its
+/// time and whatever came and went in it.
 #[test]
 fn chains_of_a_run_have_one_form() {
     let f = Folder::new("one-form");
@@ -39,37 +41,79 @@ fn chains_of_a_run_have_one_form() {
         observe normal(sum(w), 2) = 5;
         infer { warmup 50 { mh(one(@**)); } repeat 400 { mh(one(@**)); collect k, w; } }";
     f.write("parts.pcad", program);
-    let all = |dir: &str| (1..=4).map(|c| chain(&f, &format!("{dir}/chain-{c}.csv"))).collect::<Vec<_>>();
+    let all =
+        |dir: &str| (1..=4).map(|c| chain(&f, &format!("{dir}/chain-{c}.csv"))).collect::<Vec<_>>();
     f.succeeds(&["run", "parts.pcad", "--chains", "4", "--quiet", "--out", "steps"]);
     let chains = all("steps");
-    assert!(chains.iter().all(|(names, draws)| *names == chains[0].0 && draws.len() == 400), "{}", chains[0].0);
+    assert!(
+        chains.iter().all(|(names, draws)| *names == chains[0].0 && draws.len() == 400),
+        "{}",
+        chains[0].0
+    );
     let most = chains.iter().flat_map(|(_, draws)| draws).map(|d| d[6] as usize).max().unwrap();
     let ws: String = (1..=most).map(|i| format!("w.{i},")).collect();
     assert!(most > 3 && chains[0].0.ends_with(&format!("k,{ws}log_lik.1")), "{}", chains[0].0);
     for draw in chains.iter().flat_map(|(_, draws)| draws) {
         let (k, w) = (draw[6] as usize, &draw[7..7 + most]);
-        assert!(w[..k].iter().all(|x| x.is_finite()) && w[k..].iter().all(|x| x.is_nan()), "{draw:?}");
-        // The log density of what is observed, whatever its structure; and the joint's part.
+        assert!(
+            w[..k].iter().all(|x| x.is_finite()) && w[k..].iter().all(|x| x.is_nan()),
+            "{draw:?}"
+        );
+        // The log density of what is observed, whatever its structure; and the joint's
+        // part.
         assert!((draw[draw.len() - 1] - draw[4]).abs() < 1e-9, "{draw:?}");
     }
-    // In a limit of time chains come to numbers of draws of their own: the files have as many as all have, all are kept.
-    f.succeeds(&["run", "parts.pcad", "--chains", "4", "--time", "700ms", "--quiet", "--out", "time"]);
+    // In a limit of time chains come to numbers of draws of their own: the files have as
+    // many as all have, all are kept.
+    f.succeeds(&[
+        "run",
+        "parts.pcad",
+        "--chains",
+        "4",
+        "--time",
+        "700ms",
+        "--quiet",
+        "--out",
+        "time",
+    ]);
     let chains = all("time");
-    assert!(chains.iter().all(|(names, draws)| *names == chains[0].0 && draws.len() == chains[0].1.len()));
+    assert!(
+        chains
+            .iter()
+            .all(|(names, draws)| *names == chains[0].0 && draws.len() == chains[0].1.len())
+    );
     let run = json(&f, "time/run.json");
-    let made: Vec<u64> = run["chains"].as_array().unwrap().iter().map(|c| c["draws"].as_u64().unwrap()).collect();
+    let made: Vec<u64> =
+        run["chains"].as_array().unwrap().iter().map(|c| c["draws"].as_u64().unwrap()).collect();
     assert_eq!(chains[0].1.len() as u64, *made.iter().min().unwrap());
     for (c, n) in (1..).zip(&made) {
         let whole = format!("time/draws-{c}.csv");
         let kept = if f.exists(&whole) { whole } else { format!("time/chain-{c}.csv") };
-        let rows = f.read(&kept).lines().filter(|l| !l.starts_with('#') && !l.starts_with("lp__")).count();
+        let rows =
+            f.read(&kept).lines().filter(|l| !l.starts_with('#') && !l.starts_with("lp__")).count();
         assert_eq!(rows as u64, *n, "{kept}");
     }
     // It goes on from all that it had.
-    f.succeeds(&["run", "parts.pcad", "--chains", "4", "--time", "1200ms", "--quiet", "--resume", "--out", "time"]);
+    f.succeeds(&[
+        "run",
+        "parts.pcad",
+        "--chains",
+        "4",
+        "--time",
+        "1200ms",
+        "--quiet",
+        "--resume",
+        "--out",
+        "time",
+    ]);
     let again = all("time");
-    assert!(again[0].1.len() > chains[0].1.len() && again.iter().all(|c| c.1.len() == again[0].1.len()));
-    assert!(again.iter().zip(&chains).all(|(new, old)| new.1[0][..6] == old.1[0][..6]), "the first draws stay");
+    assert!(
+        again[0].1.len() > chains[0].1.len() && again.iter().all(|c| c.1.len() == again[0].1.len())
+    );
+    assert!(
+        again.iter().zip(&chains).all(|(new, old)| new.1[0][..6] == old.1[0][..6]),
+        "the first draws stay"
+    );
 }
 
 #[test]
@@ -93,8 +137,9 @@ fn who_reads_may_go_away() {
 fn zeros_and_ones_are_truth_values() {
     let f = Folder::new("zeros");
     f.write("d.csv", "y\n1\n0\n1\n1\n");
-    let program =
-        |observe: &str| format!("data d = csv(\"d.csv\"); assume p ~ beta(1, 1); {observe} predict q ~ flip(p);");
+    let program = |observe: &str| {
+        format!("data d = csv(\"d.csv\"); assume p ~ beta(1, 1); {observe} predict q ~ flip(p);")
+    };
     // beta(1, 1) and 3 of 4: beta(4, 2), whose mean is 2/3.
     let forms = [
         "observe flip(p) = d.y;",
@@ -106,12 +151,17 @@ fn zeros_and_ones_are_truth_values() {
         f.write("bits.pcad", program(form));
         let out = format!("out{i}");
         f.succeeds(&["run", "bits.pcad", "--seed", "2", "--quiet", "--out", &out]);
-        let mean = json(&f, &format!("{out}/summary.json"))["quantities"]["p"]["mean"].as_f64().unwrap();
+        let mean =
+            json(&f, &format!("{out}/summary.json"))["quantities"]["p"]["mean"].as_f64().unwrap();
         assert!((mean - 2.0 / 3.0).abs() < 0.02, "{form}: {mean}");
     }
     f.write("bits.pcad", program("observe flip(p) = [1, 0, 2, 1];"));
     let d = f.run(&["run", "bits.pcad", "--out", "no"]);
-    assert!(d.code == 1 && d.err.contains("the observed value 2 is outside the support"), "{}", d.err);
+    assert!(
+        d.code == 1 && d.err.contains("the observed value 2 is outside the support"),
+        "{}",
+        d.err
+    );
 }
 
 /// What no choice can give is named, with its place and the support.
@@ -142,12 +192,21 @@ fn data_outside_of_a_support_are_named() {
     ] {
         f.write("x.pcad", format!("assume x ~ normal(0, 1);\n{observe}\n"));
         let d = f.run(&["run", "x.pcad", "--out", "out"]);
-        assert!(d.code == 1 && d.err.contains(says) && d.err.contains("x.pcad:2:"), "{observe}: {}", d.err);
-        assert!(d.err.contains("check the data") && !d.err.contains("use a wider prior"), "{}", d.err);
+        assert!(
+            d.code == 1 && d.err.contains(says) && d.err.contains("x.pcad:2:"),
+            "{observe}: {}",
+            d.err
+        );
+        assert!(
+            d.err.contains("check the data") && !d.err.contains("use a wider prior"),
+            "{}",
+            d.err
+        );
     }
 }
 
-/// A spread that may be negative: the program has no value there, and samples where it has one.
+/// A spread that may be negative: the program has no value there, and samples where it
+/// has one.
 #[test]
 fn spreads_that_may_be_negative_are_sampled() {
     let f = Folder::new("negative");
@@ -166,14 +225,20 @@ fn spreads_that_may_be_negative_are_sampled() {
 #[test]
 fn what_does_not_move_has_no_r_hat_and_a_reason() {
     let f = Folder::new("still");
-    f.write("x.pcad", "assume x ~ normal(0, 1); assume c = 3; infer { repeat 100 { collect x, c; } }");
+    f.write(
+        "x.pcad",
+        "assume x ~ normal(0, 1); assume c = 3; infer { repeat 100 { collect x, c; } }",
+    );
     f.succeeds(&["run", "x.pcad", "--quiet", "--out", "out"]);
     let (summary, run) = (json(&f, "out/summary.json"), json(&f, "out/run.json"));
     let quantity = |name: &str| &summary["quantities"][name];
     assert!(quantity("x")["r_hat"].is_null() && quantity("c")["r_hat"].is_null());
     assert!(quantity("x")["r_hat_reason"].as_str().unwrap().contains("different values"));
     assert_eq!(quantity("c")["r_hat_reason"], "it never moved");
-    assert!(run["r_hat_max"].is_null() && run["r_hat_max_reason"].as_str().unwrap().contains("different values"));
+    assert!(
+        run["r_hat_max"].is_null()
+            && run["r_hat_max_reason"].as_str().unwrap().contains("different values")
+    );
 }
 
 #[test]
@@ -184,7 +249,9 @@ fn names_are_found_as_people_type_them() {
     f.succeeds(&["run", "own", "--quiet", "--out", "out"]);
     let d = f.run(&["run", "nothing.pcad"]);
     assert!(d.code == 1 && d.err.contains("shipped programs are coin.pcad"), "{}", d.err);
-    assert!(f.run(&["run", "lathes.pcad"]).err.contains("did you mean the shipped program lathe.pcad?"));
+    assert!(
+        f.run(&["run", "lathes.pcad"]).err.contains("did you mean the shipped program lathe.pcad?")
+    );
     for (words, name) in [
         ("logistic", "expit("),
         ("sigmoid", "expit("),
@@ -198,30 +265,60 @@ fn names_are_found_as_people_type_them() {
     }
 }
 
-/// Each draw that was kept can be drawn again, and the prompt takes up where the run ended.
+/// Each draw that was kept can be drawn again, and the prompt takes up where the run
+/// ended.
 #[test]
 fn runs_are_opened_again() {
     let f = Folder::new("again");
     let before = "param size = 0.3; assume x ~ normal(0, 0.5); observe normal(x, 0.1) = 0.4 as y;";
-    f.write("ball.pcad", ball(before, "warmup 100 { drift(@x); } repeat 500 { drift(@x); collect x; }"));
-    f.succeeds(&["run", "ball.pcad", "--set", "size=0.5", "--chains", "2", "--keep", "20", "--quiet", "--out", "out"]);
-    let kept: Vec<Value> = f.read("out/traces.jsonl").lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    f.write(
+        "ball.pcad",
+        ball(before, "warmup 100 { drift(@x); } repeat 500 { drift(@x); collect x; }"),
+    );
+    f.succeeds(&[
+        "run",
+        "ball.pcad",
+        "--set",
+        "size=0.5",
+        "--chains",
+        "2",
+        "--keep",
+        "20",
+        "--quiet",
+        "--out",
+        "out",
+    ]);
+    let kept: Vec<Value> =
+        f.read("out/traces.jsonl").lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     assert!((10..=20).contains(&kept.len()), "{}", kept.len());
     let list = f.succeeds(&["show", "out"]).out;
-    assert!(list.starts_with("pcadlang run ball.pcad --set size=0.5 --seed 1 --chains 2"), "{list}");
+    assert!(
+        list.starts_with("pcadlang run ball.pcad --set size=0.5 --seed 1 --chains 2"),
+        "{list}"
+    );
     assert!(list.contains("\n3: chain 1, draw ") && list.contains("@x"), "{list}");
     // The third state is the draw that it says: its choice is that of the file of draws.
     let (_, draws) = chain(&f, "out/chain-1.csv");
     let draw = kept[2]["draw"].as_u64().unwrap() as usize;
     let said = f.succeeds(&["show", "out", "--draw", "3"]).out;
-    let x: f64 =
-        said.lines().find(|l| l.starts_with("@x ")).unwrap().split_whitespace().nth(1).unwrap().parse().unwrap();
+    let x: f64 = said
+        .lines()
+        .find(|l| l.starts_with("@x "))
+        .unwrap()
+        .split_whitespace()
+        .nth(1)
+        .unwrap()
+        .parse()
+        .unwrap();
     assert!((x - draws[draw - 1][6]).abs() < 1e-3, "{said}: {:?}", draws[draw - 1]);
     for (n, name) in [("1", "a.png"), ("2", "b.png"), ("3", "c.obj"), ("4", "d.glb")] {
         f.succeeds(&["show", "out", "--draw", n, "-o", name]);
         assert!(f.exists(name), "{name}");
     }
-    assert_ne!(std::fs::read(f.path().join("a.png")).unwrap(), std::fs::read(f.path().join("b.png")).unwrap());
+    assert_ne!(
+        std::fs::read(f.path().join("a.png")).unwrap(),
+        std::fs::read(f.path().join("b.png")).unwrap()
+    );
     // The settings of the run are applied: a ball of 0.5, not of 0.3.
     let highest = f
         .read("c.obj")
@@ -233,7 +330,12 @@ fn runs_are_opened_again() {
     f.refuses(&["show", "out", "-o", "x.bmp"], "must end in .png, .obj or .glb");
     f.refuses(&["show", "."], "is not the folder of a run");
     let mut prompt = assert_cmd::Command::cargo_bin("pcadlang").unwrap();
-    let done = prompt.current_dir(f.path()).args(["repl", "out"]).write_stdin("size\nx\n").output().unwrap();
+    let done = prompt
+        .current_dir(f.path())
+        .args(["repl", "out"])
+        .write_stdin("size\nx\n")
+        .output()
+        .unwrap();
     let said = String::from_utf8_lossy(&done.stdout).into_owned();
     let best = json(&f, "out/best.trace.json");
     let lines: Vec<&str> = said.lines().collect();
@@ -245,7 +347,8 @@ fn runs_are_opened_again() {
 #[test]
 fn runs_are_compared() {
     let f = Folder::new("compared");
-    let before = "param at = 0.4; param size = 0.3; assume x ~ normal(0, 0.5); assume same ~ normal(0, 1);
+    let before =
+        "param at = 0.4; param size = 0.3; assume x ~ normal(0, 0.5); assume same ~ normal(0, 1);
          observe normal(x, 0.1) = at; observe normal(same, 1) = 0;";
     let plan = "warmup 100 { drift(one(@**)); } repeat 500 { repeat 5 { drift(one(@**)); } collect x, same; }";
     f.write("ball.pcad", ball(before, plan));
@@ -254,7 +357,9 @@ fn runs_are_compared() {
     let d = f.succeeds(&["compare", "a", "b", "-o", "both.png"]);
     assert!(d.out.contains("only A: -\nonly B: --set at=-0.4\n"), "{}", d.out);
     let rows: Vec<Vec<&str>> = d.out.lines().map(|l| l.split_whitespace().collect()).collect();
-    let row = |name: &str| rows.iter().position(|r| r.first() == Some(&name)).unwrap_or_else(|| panic!("{}", d.out));
+    let row = |name: &str| {
+        rows.iter().position(|r| r.first() == Some(&name)).unwrap_or_else(|| panic!("{}", d.out))
+    };
     let apart = |name: &str| rows[row(name)][5].parse::<f64>().unwrap();
     assert!(row("x") < row("same") && apart("x") > 5.0 && apart("same") < 0.3, "{}", d.out);
     let sheet = image::open(f.path().join("both.png")).unwrap();
@@ -268,7 +373,8 @@ fn runs_are_compared() {
 fn what_is_outside_and_what_is_replaced_is_said() {
     let f = Folder::new("outside-picture");
     let program = |x: f64| {
-        let before = format!("let size = 0.5; assume x ~ normal({x}, 0.01); observe normal(x, 1) = {x};");
+        let before =
+            format!("let size = 0.5; assume x ~ normal({x}, 0.01); observe normal(x, 1) = {x};");
         ball(&before, "repeat 50 { drift(@x); }")
     };
     let run = |x: f64| {
@@ -276,13 +382,18 @@ fn what_is_outside_and_what_is_replaced_is_said() {
         f.succeeds(&["run", "ball.pcad", "--chains", "2", "--out", "out"])
     };
     let (within, beyond) = (run(0.0), run(2.4));
-    assert!(!within.out.contains("outside of the picture") && !within.err.contains("is replaced"), "{}", within.err);
+    assert!(
+        !within.out.contains("outside of the picture") && !within.err.contains("is replaced"),
+        "{}",
+        within.err
+    );
     assert!(beyond.out.contains("most of the best scene is outside the picture"), "{}", beyond.out);
     assert!(beyond.err.contains("note: replacing the earlier run in out"), "{}", beyond.err);
     f.succeeds(&["run", "ball.pcad", "--chains", "2", "--out", "fresh"]);
 }
 
-/// What a program draws by name is in the table and the files, under the names that the program has.
+/// What a program draws by name is in the table and the files, under the names that the
+/// program has.
 #[test]
 fn what_is_drawn_by_name_is_recorded() {
     let f = Folder::new("drawn-by-name");
@@ -291,25 +402,29 @@ fn what_is_drawn_by_name_is_recorded() {
         for t in 1 .. 3 { z[t] ~ normal(z[t - 1], 0.5); observe normal(z[t], 0.3) = y[t]; }
         w ~ normal(z[2], 1);";
     f.write("walk.pcad", program);
-    let done = f.succeeds(&["run", "walk.pcad", "--steps", "200", "--warmup", "100", "--out", "walk"]);
+    let done =
+        f.succeeds(&["run", "walk.pcad", "--steps", "200", "--warmup", "100", "--out", "walk"]);
     for name in ["z[0] ", "z[1] ", "z[2] ", "w "] {
         assert!(done.out.lines().any(|l| l.starts_with(name)), "{name}: {}", done.out);
     }
     let (names, _) = chain(&f, "walk/chain-1.csv");
     assert!(names.contains("z.1,z.2,z.3,w,log_lik.1"), "{names}");
-    // One address for each element, wherever it is drawn; two draws of one element are found.
+    // One address for each element, wherever it is drawn; two draws of one element are
+    // found.
     let all = f.read("walk/best.trace.json");
     assert!(!all.contains("z#2"), "{all}");
     f.write("twice.pcad", format!("{program} for t in 0 .. 2 {{ z[t] ~ normal(0, 1); }}"));
     f.refuses(&["run", "twice.pcad"], "is drawn twice");
 }
 
-/// A number of components with a label for each point: it samples, and the run says what keeps it from moving.
+/// A number of components with a label for each point: it samples, and the run says what
+/// keeps it from moving.
 #[test]
 fn structure_that_does_not_move_is_named() {
     let f = Folder::new("structure");
-    let points: Vec<String> =
-        (0..60).map(|i| format!("{:.2}", f64::from(i % 2) * 5.0 + f64::from(i * 37 % 60) / 40.0)).collect();
+    let points: Vec<String> = (0..60)
+        .map(|i| format!("{:.2}", f64::from(i % 2) * 5.0 + f64::from(i * 37 % 60) / 40.0))
+        .collect();
     let start = format!(
         "let ys = [{}]; assume k ~ uniform_discrete(1, 5);
          assume mu = map(fn(i) {{ m ~ normal(0, 5); m }}, 0 .. k);",
@@ -334,10 +449,14 @@ fn structure_that_does_not_move_is_named() {
 fn checks_look_into_files() {
     let f = Folder::new("checks");
     f.write("d.csv", "age,height\n1,70\n2,82\n");
-    let with = |column: &str| format!("data d = csv(\"d.csv\"); observe normal(80, 9) = d.{column};");
+    let with =
+        |column: &str| format!("data d = csv(\"d.csv\"); observe normal(80, 9) = d.{column};");
     f.write("good.pcad", with("height"));
     f.write("bad.pcad", with("heigth"));
-    f.write("asks.pcad", "data d = csv(\"d.csv\"); assume x = if has(d, \"z\") { d.z } else { 0 };");
+    f.write(
+        "asks.pcad",
+        "data d = csv(\"d.csv\"); assume x = if has(d, \"z\") { d.z } else { 0 };",
+    );
     f.succeeds(&["check", "good.pcad"]);
     f.succeeds(&["check", "asks.pcad"]);
     f.refuses(&["check", "bad.pcad"], "the record has no field `heigth`");

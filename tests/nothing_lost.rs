@@ -1,5 +1,5 @@
-//! Runs that are killed, interrupted, or left without room: what is on the disk stays readable, and with `--resume` the same draws
-//! come out as without a break.
+//! Runs that are killed, interrupted, or left without room: what is on the disk stays
+//! readable, and with `--resume` the same draws come out as without a break.
 #![cfg(unix)]
 
 #[path = "common/folder.rs"]
@@ -27,7 +27,16 @@ const PROGRAM: &str = "
 
 fn run(folder: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(BINARY);
-    command.current_dir(folder).args(["run", "model.pcad", "--chains", "2", "--threads", "2", "--seed", "3"]);
+    command.current_dir(folder).args([
+        "run",
+        "model.pcad",
+        "--chains",
+        "2",
+        "--threads",
+        "2",
+        "--seed",
+        "3",
+    ]);
     command.args(["--checkpoint", "10ms", "--out", "out"]).args(more);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
@@ -53,7 +62,8 @@ fn draws(folder: &Path, chain: u32) -> Vec<String> {
     text.lines().filter(|l| !l.starts_with('#')).map(str::to_owned).collect()
 }
 
-/// Asserts that what a run left at any moment can be read; gives the number of checkpoints.
+/// Asserts that what a run left at any moment can be read; gives the number of
+/// checkpoints.
 fn readable(folder: &Path) -> usize {
     let out = folder.join("out");
     let Ok(run) = std::fs::read(out.join("run.json")) else { return 0 };
@@ -85,7 +95,8 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.success());
 }
 
-/// Kills a run at `kills` moments, going on with it each time, and asserts that in the end it is the run without a break.
+/// Kills a run at `kills` moments, going on with it each time, and asserts that in the
+/// end it is the run without a break.
 fn killed(name: &str, kills: usize, steps: &str) {
     let whole = with_program(&format!("{name}-whole"));
     done(&run(whole.path(), &["--steps", steps]).output().unwrap());
@@ -93,8 +104,10 @@ fn killed(name: &str, kills: usize, steps: &str) {
     let (mut left, mut with_checkpoints, mut pause) = (kills, 0, 7_u64);
     while left > 0 {
         let mut child = run(broken.path(), &["--steps", steps, "--resume"]).spawn().unwrap();
-        // Moments without a pattern: the low bits of a congruential generator's high part.
-        pause = pause.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        // Moments without a pattern: the low bits of a congruential generator's high
+        // part.
+        pause =
+            pause.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         std::thread::sleep(Duration::from_millis(pause >> 33 & 127));
         child.kill().unwrap();
         let output = child.wait_with_output().unwrap();
@@ -107,7 +120,10 @@ fn killed(name: &str, kills: usize, steps: &str) {
             left -= 1;
         }
     }
-    assert!(with_checkpoints * 2 > kills, "only {with_checkpoints} of {kills} kills came after a checkpoint");
+    assert!(
+        with_checkpoints * 2 > kills,
+        "only {with_checkpoints} of {kills} kills came after a checkpoint"
+    );
     done(&run(broken.path(), &["--steps", steps, "--resume"]).output().unwrap());
     compare(whole.path(), broken.path());
 }
@@ -116,11 +132,16 @@ fn compare(whole: &Path, broken: &Path) {
     for chain in [1, 2] {
         let (a, b) = (draws(whole, chain), draws(broken, chain));
         assert_eq!(a.len(), b.len(), "chain {chain}");
-        assert_eq!(a.iter().zip(&b).position(|(a, b)| a != b), None, "chain {chain}: the first line that differs");
+        assert_eq!(
+            a.iter().zip(&b).position(|(a, b)| a != b),
+            None,
+            "chain {chain}: the first line that differs"
+        );
     }
     let summary = |folder: &Path| -> serde_json::Value {
         let mut all: serde_json::Value =
-            serde_json::from_slice(&std::fs::read(folder.join("out/summary.json")).unwrap()).unwrap();
+            serde_json::from_slice(&std::fs::read(folder.join("out/summary.json")).unwrap())
+                .unwrap();
         let object = all.as_object_mut().unwrap();
         for q in object["quantities"].as_object_mut().unwrap().values_mut() {
             q.as_object_mut().unwrap().remove("ess_per_second");
@@ -158,7 +179,10 @@ fn interrupted_by_a_signal() {
         let text = said(&output);
         if !output.status.success() {
             assert_eq!(output.status.code(), Some(3), "{text}");
-            assert!(text.contains("to resume, repeat the command with --resume --out out"), "{text}");
+            assert!(
+                text.contains("to resume, repeat the command with --resume --out out"),
+                "{text}"
+            );
             assert_eq!(readable(folder.path()), 2);
         }
         done(&run(folder.path(), &["--steps", "30000", "--resume"]).output().unwrap());
@@ -195,7 +219,8 @@ fn what_belongs_to_another_run_is_refused() {
     bytes[last] ^= 1;
     std::fs::write(&file, bytes).unwrap();
     refused(&["--resume", "--steps", "600"], "chain-2.checkpoint: the checkpoint is damaged");
-    std::fs::write(folder.path().join("model.pcad"), PROGRAM.replace("flip(0.5)", "flip(0.4)")).unwrap();
+    std::fs::write(folder.path().join("model.pcad"), PROGRAM.replace("flip(0.5)", "flip(0.4)"))
+        .unwrap();
     refused(&["--resume", "--steps", "600"], "it has a different program");
 }
 
@@ -211,7 +236,8 @@ fn draws_that_are_gone_are_told() {
     assert!(said(&output).contains("chain-1.csv: it has"), "{}", said(&output));
 }
 
-/// A limit of the system on the size of files stands in for a full disk: writing fails in the middle of a line.
+/// A limit of the system on the size of files stands in for a full disk: writing fails in
+/// the middle of a line.
 #[test]
 fn a_full_disk() {
     let whole = with_program("full-whole");
@@ -223,7 +249,8 @@ fn a_full_disk() {
         .map(|a| a.to_str().unwrap().to_owned())
         .collect();
     let script = format!("trap '' XFSZ; ulimit -f 64; exec {}", words.join(" "));
-    let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
+    let output =
+        Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
     assert!(said(&output).contains("cannot write draws"), "{}", said(&output));
     readable(folder.path());
@@ -258,7 +285,11 @@ fn a_vanished_input() {
     assert!(folder.path().join("out/overlay.png").exists(), "what was there is kept");
     std::fs::copy(folder.path().join("out/overlay.png"), folder.path().join("cup.png")).unwrap();
     let output = command(&["--resume"]);
-    assert!(said(&output).contains("it has a different picture, camera or keypoints"), "{}", said(&output));
+    assert!(
+        said(&output).contains("it has a different picture, camera or keypoints"),
+        "{}",
+        said(&output)
+    );
 }
 
 /// The largest resident memory of a run of so many draws, in KiB.
@@ -271,7 +302,8 @@ fn peak(name: &str, draws: u32) -> u64 {
     let mut child = run(folder.path(), &["--steps", &(draws / 2).to_string()]).spawn().unwrap();
     let mut peak = 0;
     while child.try_wait().unwrap().is_none() {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+        let status =
+            std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
         let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
         peak = line.and_then(|l| l.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(peak);
         std::thread::sleep(Duration::from_millis(20));

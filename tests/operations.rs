@@ -1,4 +1,5 @@
-//! Traces by address: updates and the way back, choices that appear and vanish against enumeration, projections, errors.
+//! Traces by address: updates and the way back, choices that appear and vanish against
+//! enumeration, projections, errors.
 
 mod common;
 use common::normal_pdf;
@@ -25,7 +26,11 @@ fn bits(t: &Trace) -> Vec<String> {
     let choices = t.choices().into_iter().map(|(a, v, s)| format!("{a} {v:?} {:x}", s.to_bits()));
     let observed = t.observed().into_iter().map(|o| format!("{} {:?}", o.address, o.value));
     let stored = t.constraints().into_iter().map(|c| format!("{c:?}"));
-    choices.chain(observed).chain(stored).chain([format!("{:x}", t.log_joint().to_bits())]).collect()
+    choices
+        .chain(observed)
+        .chain(stored)
+        .chain([format!("{:x}", t.log_joint().to_bits())])
+        .collect()
 }
 
 const MANY: &str = "assume c ~ flip(0.4); assume n ~ categorical([0.2, 0.3, 0.5]);
@@ -38,7 +43,8 @@ const MANY: &str = "assume c ~ flip(0.4); assume n ~ categorical([0.2, 0.3, 0.5]
     for i in 0 .. 3 { observe normal(f[i], 0.5) = i as point; }
     observe normal(x + sum(z) + w[n], 1) = [1, 2] as y;";
 
-/// An update to what an update discarded leads back to the same trace, bit for bit, whatever appeared and vanished.
+/// An update to what an update discarded leads back to the same trace, bit for bit,
+/// whatever appeared and vanished.
 #[test]
 fn what_was_discarded_leads_back() {
     let updates = [
@@ -48,7 +54,11 @@ fn what_was_discarded_leads_back() {
         given(&[("@n", 2.0.into()), ("@z[1]", 0.7.into()), ("@w[2]", 1.0.into())]),
         given(&[("@c", true.into()), ("@x/a", 0.5.into()), ("@extra", 9.0.into())]),
         given(&[("@f", Value::array(vec![0.1, 0.2, 0.3])), ("@length", 0.3.into())]),
-        given(&[("@point[1]", (-4.0).into()), ("@y", Value::array(vec![0.0, 5.0])), ("@m", 1.0.into())]),
+        given(&[
+            ("@point[1]", (-4.0).into()),
+            ("@y", Value::array(vec![0.0, 5.0])),
+            ("@m", 1.0.into()),
+        ]),
     ];
     let mut t = trace(MANY);
     let mut moved = 0;
@@ -70,7 +80,10 @@ fn what_was_discarded_leads_back() {
         for (address, value) in update {
             let Given::Value(value) = value else { continue };
             let text = format!("{:?}", t.get(&address.to_string()).unwrap());
-            assert!(address.to_string() == "@f" || text == format!("{value:?}"), "{address}: {text}");
+            assert!(
+                address.to_string() == "@f" || text == format!("{value:?}"),
+                "{address}: {text}"
+            );
         }
         let back = t.update(&there.discarded, draws(1000 + step)).unwrap();
         assert_eq!(back.weight.log_joint, -there.weight.log_joint, "step {step}");
@@ -89,7 +102,8 @@ fn what_was_discarded_leads_back() {
     assert!(moved > 40);
 }
 
-/// The weight of an update is that of the new state over the old one less what was drawn, term by term.
+/// The weight of an update is that of the new state over the old one less what was drawn,
+/// term by term.
 #[test]
 fn weights_are_those_of_enumeration() {
     let mut t = trace(
@@ -102,21 +116,36 @@ fn weights_are_those_of_enumeration() {
         let old = 0.7 * [0.25, 0.75][k as usize] * normal_pdf(0.8, k, 0.5);
         assert!((t.log_joint() - old.ln()).abs() < 1e-12);
         for a in [-1.0, 0.4, 3.0] {
-            let one = t.update(&given(&[("@c", true.into()), ("@x/a", a.into())]), draws(2)).unwrap();
+            let one =
+                t.update(&given(&[("@c", true.into()), ("@x/a", a.into())]), draws(2)).unwrap();
             let new = 0.3 * normal_pdf(a, 1.0, 2.0) * normal_pdf(0.8, a, 0.5);
-            assert!((one.log_weight - (new / old).ln()).abs() < 1e-12, "given: {} for {}", one.log_weight, new / old);
+            assert!(
+                (one.log_weight - (new / old).ln()).abs() < 1e-12,
+                "given: {} for {}",
+                one.log_weight,
+                new / old
+            );
             assert_eq!((one.weight.appeared, one.weight.vanished), (1, 1));
-            assert_eq!(one.discarded.iter().map(|d| d.0.to_string()).collect::<Vec<_>>(), ["@c", "@x/k"]);
+            assert_eq!(
+                one.discarded.iter().map(|d| d.0.to_string()).collect::<Vec<_>>(),
+                ["@c", "@x/k"]
+            );
         }
         let other = t.update(&given(&[("@c", true.into()), ("@y", 2.0.into())]), draws(3)).unwrap();
         let Value::Num(a) = t.get("@x/a").unwrap() else { panic!("not a number") };
         let new = 0.3 * normal_pdf(2.0, a, 0.5);
-        assert!((other.log_weight - (new / old).ln()).abs() < 1e-12, "drawn: {} for {}", other.log_weight, new / old);
+        assert!(
+            (other.log_weight - (new / old).ln()).abs() < 1e-12,
+            "drawn: {} for {}",
+            other.log_weight,
+            new / old
+        );
         t.rollback();
     }
 }
 
-/// The mean of the exponential of the weights of updates whose branch is drawn is the ratio of the evidences.
+/// The mean of the exponential of the weights of updates whose branch is drawn is the
+/// ratio of the evidences.
 #[test]
 fn drawn_branches_are_importance_weighted() {
     let mut t = trace(
@@ -125,11 +154,15 @@ fn drawn_branches_are_importance_weighted() {
     );
     t.set("@c", false, draws(0)).unwrap();
     let n = 20_000;
-    let weights: Vec<f64> =
-        (0..n).map(|step| t.update(&given(&[("@c", true.into())]), draws(step)).unwrap().log_weight.exp()).collect();
+    let weights: Vec<f64> = (0..n)
+        .map(|step| t.update(&given(&[("@c", true.into())]), draws(step)).unwrap().log_weight.exp())
+        .collect();
     let expected = 0.3 * normal_pdf(0.8, 1.0, 5f64.sqrt()) / (0.7 * normal_pdf(0.8, 0.5, 1.0));
     let (mean, sd) = (common::mean(&weights), common::variance(&weights).sqrt());
-    assert!((mean - expected).abs() < 5.0 * sd / (n as f64).sqrt() && sd < expected, "{mean} for {expected}");
+    assert!(
+        (mean - expected).abs() < 5.0 * sd / (n as f64).sqrt() && sd < expected,
+        "{mean} for {expected}"
+    );
 }
 
 /// Parts add up to the whole.
@@ -155,7 +188,8 @@ fn projections_sum_to_the_joint() {
             sum += one;
         }
         assert!((sum - t.log_joint()).abs() < 1e-9);
-        let kinds = [pcadlang::trace::ChoiceKind::Continuous, pcadlang::trace::ChoiceKind::Discrete];
+        let kinds =
+            [pcadlang::trace::ChoiceKind::Continuous, pcadlang::trace::ChoiceKind::Discrete];
         let prior: f64 = kinds.map(|k| t.project(&Selector::Kind(k))).iter().sum();
         assert!((prior - t.log_prior()).abs() < 1e-9, "observations have no kinds");
     }
@@ -185,7 +219,11 @@ fn wrong_addresses_and_values_are_told() {
     );
     let before = bits(&t);
     for (address, value, said) in [
-        ("@slpe", Value::Num(1.0), "the trace has no choice or observation `@slpe`; did you mean `@slope`?"),
+        (
+            "@slpe",
+            Value::Num(1.0),
+            "the trace has no choice or observation `@slpe`; did you mean `@slope`?",
+        ),
         ("@sen", Value::Num(1.0), "did you mean `@seen`?"),
         ("@pose[arn]/bone/r", Value::Num(1.0), "did you mean `@pose[arm]/bone/r`?"),
         ("@z[2]", Value::Num(1.0), "did you mean `@z["),

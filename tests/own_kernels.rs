@@ -1,4 +1,5 @@
-//! Kernels that programs declare, against exact answers: their proposals, auxiliary variables and maps.
+//! Kernels that programs declare, against exact answers: their proposals, auxiliary
+//! variables and maps.
 
 mod common;
 use common::*;
@@ -18,7 +19,8 @@ fn proposals_of_the_program_are_paid_for() {
     assert_mean("own kernel, variance", &squares, 0.2, 0.03);
 }
 
-/// The same for a choice with which others appear and vanish, and for several choices at computed addresses.
+/// The same for a choice with which others appear and vanish, and for several choices at
+/// computed addresses.
 #[test]
 fn proposals_of_the_program_change_structure() {
     let d = run(
@@ -37,8 +39,8 @@ fn proposals_of_the_program_change_structure() {
     assert_mean("c", &d["c"], yes / (yes + no), 0.03);
 }
 
-/// Maps of choices by a rule: with a Jacobian that is not 1, of a switch with which choices appear, and of an element picked at
-/// random.
+/// Maps of choices by a rule: with a Jacobian that is not 1, of a switch with which
+/// choices appear, and of an element picked at random.
 #[test]
 fn maps_of_the_program_are_paid_for() {
     let d = run(
@@ -67,7 +69,8 @@ fn maps_of_the_program_are_paid_for() {
     assert_mean("c by maps", &d["c"], yes / (yes + no), 0.03);
 }
 
-/// Choices that are proposed beside a map, a whitened vector among them, against the exact posterior of a linear model.
+/// Choices that are proposed beside a map, a whitened vector among them, against the
+/// exact posterior of a linear model.
 #[test]
 fn proposals_beside_a_map_are_paid_for() {
     let d = run(
@@ -88,7 +91,9 @@ fn proposals_beside_a_map_are_paid_for() {
     let k = [[1.0, 0.0, 0.0], [0.0, 1.0, c], [0.0, c, 1.0]];
     let (h, y) = ([[1.0, 1.0, 0.0], [1.0, 0.0, -1.0]], [2.0, 0.3]);
     let kh = |i: usize, o: usize| (0..3).map(|j| k[i][j] * h[o][j]).sum::<f64>();
-    let g = |o: usize, p: usize| (0..3).map(|i| h[o][i] * kh(i, p)).sum::<f64>() + if o == p { 0.25 } else { 0.0 };
+    let g = |o: usize, p: usize| {
+        (0..3).map(|i| h[o][i] * kh(i, p)).sum::<f64>() + if o == p { 0.25 } else { 0.0 }
+    };
     let det = g(0, 0) * g(1, 1) - g(0, 1) * g(1, 0);
     let w = [(g(1, 1) * y[0] - g(0, 1) * y[1]) / det, (g(0, 0) * y[1] - g(1, 0) * y[0]) / det];
     for (i, name) in ["s", "f[0]", "f[1]"].iter().enumerate() {
@@ -103,17 +108,24 @@ fn proposals_beside_a_map_are_paid_for() {
     assert_mean("variance of s", &squares, v(0), 0.06);
 }
 
-/// A map that does not lead back, or whose derivatives cannot be known, ends the run with the reason.
+/// A map that does not lead back, or whose derivatives cannot be known, ends the run with
+/// the reason.
 #[test]
 fn maps_that_are_no_involutions_are_caught() {
     let wrong = [
-        ("propose u ~ lognormal(0, 0.5); propose @x = value(@x) * u;", "applied twice, it takes @x from"),
+        (
+            "propose u ~ lognormal(0, 0.5); propose @x = value(@x) * u;",
+            "applied twice, it takes @x from",
+        ),
         (
             "propose u ~ normal(0, 1); propose @x = value(@x) + u; propose u = -2 * u;",
             "applied twice, it takes @x from",
         ),
         ("propose @x = 1;", "applied twice, it takes @x from"),
-        ("propose u ~ normal(0, 1); propose @x = twice - value(@x);", "use only choices and constants"),
+        (
+            "propose u ~ normal(0, 1); propose @x = twice - value(@x);",
+            "use only choices and constants",
+        ),
         ("propose @x ~ normal(0, 1); propose @x = 1;", "gets a new value twice"),
         ("propose @x = -value(@x); propose @x ~ normal(0, 1);", "proposed twice"),
     ];
@@ -122,13 +134,18 @@ fn maps_that_are_no_involutions_are_caught() {
             "assume x ~ normal(1, 1); assume twice = 2 * x; observe normal(x, 1) = 1;
              kernel bad() {{ {body} }} infer {{ repeat 50 {{ bad(); }} }}"
         );
-        let run = pcadlang::Model::from_text(&text).unwrap_or_else(|e| panic!("{e}")).run(&Default::default(), 1, 1);
+        let run = pcadlang::Model::from_text(&text).unwrap_or_else(|e| panic!("{e}")).run(
+            &Default::default(),
+            1,
+            1,
+        );
         let said = run.err().map(|e| e.to_string()).unwrap_or_default();
         assert!(said.contains(expected), "{body}: {said}");
     }
 }
 
-/// A vector that is stored as white noise, proposed by its value together with the scale of its prior: the noise's volume changes.
+/// A vector that is stored as white noise, proposed by its value together with the scale
+/// of its prior: the noise's volume changes.
 #[test]
 fn proposals_of_whitened_vectors_are_paid_for() {
     let text = |moves: &str| {
@@ -145,7 +162,8 @@ fn proposals_of_whitened_vectors_are_paid_for() {
              infer {{ warmup 2000 {{ {moves} }} repeat 60000 {{ {moves} collect s, f[0], f[1]; }} }}"
         )
     };
-    // f given s is normal, so s has a density in closed form; f's mean is an integral over it.
+    // f given s is normal, so s has a density in closed form; f's mean is an integral
+    // over it.
     let expected = |of: &dyn Fn(f64, [f64; 2]) -> f64| -> f64 {
         let at = |s: f64| {
             let cov = |a: f64, b: f64| s * s * (-0.5 * ((a - b) / 0.7).powi(2)).exp();
@@ -173,7 +191,8 @@ fn proposals_of_whitened_vectors_are_paid_for() {
     }
 }
 
-/// An auxiliary variable whose distribution depends on the state is paid for, too: each of its values is a proposal of its own.
+/// An auxiliary variable whose distribution depends on the state is paid for, too: each
+/// of its values is a proposal of its own.
 #[test]
 fn auxiliary_variables_of_proposals_are_paid_for() {
     let d = run(
@@ -191,7 +210,8 @@ fn auxiliary_variables_of_proposals_are_paid_for() {
     assert_mean("variance", &squares, 0.2, 0.03);
 }
 
-/// Starts that a kernel of the program proposes: the best of them, wherever the prior is; and what is no such kernel.
+/// Starts that a kernel of the program proposes: the best of them, wherever the prior is;
+/// and what is no such kernel.
 #[test]
 fn starts_are_proposed_by_a_kernel() {
     let text = |from: &str| {
@@ -213,12 +233,14 @@ fn starts_are_proposed_by_a_kernel() {
         ("drift(@x)", "`from` takes a kernel declared in the program"),
     ] {
         let model = pcadlang::Model::from_text(&text(from)).unwrap_or_else(|e| panic!("{e}"));
-        let e = model.run(&Default::default(), 1, 1).err().map(|e| e.to_string()).unwrap_or_default();
+        let e =
+            model.run(&Default::default(), 1, 1).err().map(|e| e.to_string()).unwrap_or_default();
         assert!(e.contains(said), "{from}: {e}");
     }
 }
 
-/// A body that reads choices alone is played while the new state is pending, any other once it is taken up: the same draws.
+/// A body that reads choices alone is played while the new state is pending, any other
+/// once it is taken up: the same draws.
 #[test]
 fn ways_back_are_the_same_however_they_are_found() {
     let draws = |here: &str| {
@@ -233,7 +255,11 @@ fn ways_back_are_the_same_however_they_are_found() {
              }}
              infer {{ repeat 2000 {{ step(); collect x, f[1]; }} }}"
         );
-        let text = if here == "value(@x)" { text.replace("0.5 * values", "0.5 * value(@f)") } else { text };
+        let text = if here == "value(@x)" {
+            text.replace("0.5 * values", "0.5 * value(@f)")
+        } else {
+            text
+        };
         run(&text, 1, 2)
     };
     assert_eq!(draws("value(@x)"), draws("(0.5 * twice)"));

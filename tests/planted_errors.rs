@@ -1,9 +1,11 @@
-//! The checks by simulation themselves: right kernels pass, planted errors are found, programs that cannot be simulated are
-//! refused with the reason.
+//! The checks by simulation themselves: right kernels pass, planted errors are found,
+//! programs that cannot be simulated are refused with the reason.
 
 use pcadlang::Model;
 use pcadlang::dist::Datum;
-use pcadlang::infer::calibration::{CalibrationError, KernelSampler, PlanSampler, Settings, geweke, sbc};
+use pcadlang::infer::calibration::{
+    CalibrationError, KernelSampler, PlanSampler, Settings, geweke, sbc,
+};
 use pcadlang::infer::{At, Kernel, Mh, Outcome, Pick, Progress, RunOptions, Scope};
 use pcadlang::lang::value::Value;
 use pcadlang::rng::Stream;
@@ -42,13 +44,15 @@ impl Kernel for LogWalk {
         let target = trace.targets(all)[0];
         let Value::Num(x) = trace.value(target) else { return Ok(Outcome::default()) };
         let step = rng.standard_normal();
-        let weight = trace.propose(&[(target, Change::Set(Datum::Num(x * libm::exp(step))))], at.draws(0))?;
+        let weight = trace
+            .propose(&[(target, Change::Set(Datum::Num(x * libm::exp(step))))], at.draws(0))?;
         let hastings = if self.hastings { step } else { 0.0 };
         Ok(decide(trace, weight.log_weight + hastings, &mut rng))
     }
 }
 
-/// Prior resimulation that accepts too readily: the ratio at the power of a quarter, as if data said less than they do.
+/// Prior resimulation that accepts too readily: the ratio at the power of a quarter, as
+/// if data said less than they do.
 struct Eager;
 
 impl Kernel for Eager {
@@ -72,7 +76,8 @@ fn looped(kernel: fn() -> Box<dyn Kernel>, every: u64) -> KernelSampler<fn() -> 
 const RIGHT: fn() -> Box<dyn Kernel> = || Box::new(LogWalk { hastings: true });
 const WRONG: fn() -> Box<dyn Kernel> = || Box::new(LogWalk { hastings: false });
 const EAGER: fn() -> Box<dyn Kernel> = || Box::new(Eager);
-const MH: fn() -> Box<dyn Kernel> = || Box::new(Mh::new(Scope { selector: Selector::All, pick: Pick::One }));
+const MH: fn() -> Box<dyn Kernel> =
+    || Box::new(Mh::new(Scope { selector: Selector::All, pick: Pick::One }));
 
 fn settings(replicates: usize) -> Settings {
     Settings { replicates, seed: 11, threads: 2, ..Settings::default() }
@@ -82,7 +87,9 @@ fn settings(replicates: usize) -> Settings {
 fn sbc_tells_right_kernels_from_planted_errors() {
     let m = model(GAMMA);
     for (kernel, right) in [(RIGHT, true), (MH, true), (WRONG, false), (EAGER, false)] {
-        let said = sbc(m.code(), &looped(kernel, 12), &Settings { steps: Some(480), ..settings(300) }).unwrap();
+        let said =
+            sbc(m.code(), &looped(kernel, 12), &Settings { steps: Some(480), ..settings(300) })
+                .unwrap();
         assert_eq!(said.rows.iter().map(|r| &*r.name).collect::<Vec<_>>(), ["@s", "log joint"]);
         assert_eq!(said.passes(), right, "{}: {said:?}", kernel().name());
         assert_eq!(said.rows[0].counts.iter().sum::<u32>(), 300);
@@ -99,7 +106,8 @@ fn geweke_tells_right_kernels_from_planted_errors() {
     }
 }
 
-/// Structure that comes and goes, discrete choices, arrays: the plan of a program passes both.
+/// Structure that comes and goes, discrete choices, arrays: the plan of a program passes
+/// both.
 #[test]
 fn plans_with_changing_structure_pass() {
     let m = model(
@@ -111,10 +119,16 @@ fn plans_with_changing_structure_pass() {
     );
     let (plan, _) = m.plan().unwrap();
     let progress = Progress::default();
-    let sampler =
-        PlanSampler { plan: &plan, options: RunOptions { seed: 2, ..RunOptions::default() }, progress: &progress };
+    let sampler = PlanSampler {
+        plan: &plan,
+        options: RunOptions { seed: 2, ..RunOptions::default() },
+        progress: &progress,
+    };
     let ranks = sbc(m.code(), &sampler, &Settings { steps: Some(1600), ..settings(50) }).unwrap();
-    assert!(ranks.passes() && ranks.rows.iter().any(|r| r.name == "@x/b") && ranks.rows.len() == 7, "{ranks:?}");
+    assert!(
+        ranks.passes() && ranks.rows.iter().any(|r| r.name == "@x/b") && ranks.rows.len() == 7,
+        "{ranks:?}"
+    );
     let joint = geweke(m.code(), &sampler, &settings(40)).unwrap();
     assert!(joint.passes() && joint.turns == 79, "{joint:?}");
 }
@@ -124,7 +138,10 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let m = model(GAMMA);
     let on = |threads| {
         let s = Settings { threads, ..settings(24) };
-        let (a, b) = (sbc(m.code(), &looped(MH, 2), &s).unwrap(), geweke(m.code(), &looped(MH, 2), &s).unwrap());
+        let (a, b) = (
+            sbc(m.code(), &looped(MH, 2), &s).unwrap(),
+            geweke(m.code(), &looped(MH, 2), &s).unwrap(),
+        );
         format!("{a:?} {b:?}")
     };
     assert_eq!(on(1), on(3));

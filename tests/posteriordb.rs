@@ -1,5 +1,7 @@
-//! Six posteriors of posteriordb with the default plan: means and mean squares against the reference, |z| < 4 at more than 400
-//! effective draws of each parameter. `cargo test --release --test posteriordb -- --include-ignored --nocapture` prints times.
+//! Six posteriors of posteriordb with the default plan: means and mean squares against
+//! the reference, |z| < 4 at more than 400 effective draws of each parameter.
+//! `cargo test --release --test posteriordb -- --include-ignored --nocapture` prints
+//! times.
 
 use pcadlang::infer::RunOptions;
 use pcadlang::infer::diagnostics::{ess_bulk, ess_mean, mcse_mean, r_hat};
@@ -32,7 +34,10 @@ fn read(name: &str) -> (Model, Json) {
 fn passes(name: &str) {
     let (model, json) = read(name);
     let (_, plan) = model.plan().unwrap_or_else(|e| panic!("{e}"));
-    assert!(plan.is_some_and(|p| p.contains("nuts")), "{name}: the default plan should follow the gradient");
+    assert!(
+        plan.is_some_and(|p| p.contains("nuts")),
+        "{name}: the default plan should follow the gradient"
+    );
     let begun = std::time::Instant::now();
     let options = RunOptions { seed: 1, ..RunOptions::default() };
     let posterior = model.run(&options, 4, 2).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -46,27 +51,42 @@ fn passes(name: &str) {
             }
             None => parameter.clone(),
         };
-        let q = quantities.iter().find(|q| q.name == ours).unwrap_or_else(|| panic!("{name}: no {ours}"));
+        let q = quantities
+            .iter()
+            .find(|q| q.name == ours)
+            .unwrap_or_else(|| panic!("{name}: no {ours}"));
         let (mean, sd) = (reference["mean"].as_f64().unwrap(), reference["sd"].as_f64().unwrap());
         let noise = reference["mcse_mean"].as_f64().unwrap_or(0.0);
-        let squares: Vec<Vec<f64>> = q.chains.iter().map(|c| c.iter().map(|x| x * x).collect()).collect();
+        let squares: Vec<Vec<f64>> =
+            q.chains.iter().map(|c| c.iter().map(|x| x * x).collect()).collect();
         // The reference draws' error of a square, as if they were normal.
         let noise_square = noise * (4.0 * mean * mean + 2.0 * sd * sd).sqrt() / sd;
-        for (chains, expected, noise, what) in
-            [(&q.chains, mean, noise, "mean"), (&squares, mean * mean + sd * sd, noise_square, "mean square")]
-        {
+        for (chains, expected, noise, what) in [
+            (&q.chains, mean, noise, "mean"),
+            (&squares, mean * mean + sd * sd, noise_square, "mean square"),
+        ] {
             let all: Vec<f64> = chains.concat();
             let m = all.iter().sum::<f64>() / all.len() as f64;
             let z = (m - expected) / mcse_mean(chains).hypot(noise);
-            assert!(z.abs() < 4.0, "{name}: the {what} of {parameter} is {m}, expected {expected} (z = {z:.2})");
-            assert!(ess_mean(chains) > 400.0, "{name}: {what} of {parameter}: ess {}", ess_mean(chains));
+            assert!(
+                z.abs() < 4.0,
+                "{name}: the {what} of {parameter} is {m}, expected {expected} (z = {z:.2})"
+            );
+            assert!(
+                ess_mean(chains) > 400.0,
+                "{name}: {what} of {parameter}: ess {}",
+                ess_mean(chains)
+            );
             worst = worst.max(z.abs());
         }
         least = least.min(ess_bulk(&q.chains));
         assert!(r_hat(&q.chains) < 1.01, "{name}: R-hat of {parameter} is {}", r_hat(&q.chains));
     }
     let seconds = begun.elapsed().as_secs_f64();
-    println!("{name}: largest |z| {worst:.2}, least bulk ess {least:.0}, {seconds:.1} s, {:.0} ess/s", least / seconds);
+    println!(
+        "{name}: largest |z| {worst:.2}, least bulk ess {least:.0}, {seconds:.1} s, {:.0} ess/s",
+        least / seconds
+    );
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! What published models need, with answers known otherwise: recurrences, truncation, flat priors on half-lines, order among unlike
-//! priors, mixtures written out.
+//! What published models need, with answers known otherwise: recurrences, truncation,
+//! flat priors on half-lines, order among unlike priors, mixtures written out.
 
 use pcadlang::infer::diagnostics::mcse_mean;
 use pcadlang::lang::value::Value;
@@ -19,7 +19,9 @@ fn log_joint(model: &Model, values: &[(&str, f64)]) -> f64 {
 /// The mean of a quantity under the default plan is this, within four standard errors.
 fn has_mean(text: &str, expected: &[(&str, f64)]) {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
-    let posterior = model.run(&RunOptions { seed: 3, ..RunOptions::default() }, 4, 2).unwrap_or_else(|e| panic!("{e}"));
+    let posterior = model
+        .run(&RunOptions { seed: 3, ..RunOptions::default() }, 4, 2)
+        .unwrap_or_else(|e| panic!("{e}"));
     for (name, expected) in expected {
         let quantities = posterior.quantities();
         let q = quantities.iter().find(|q| q.name == *name).unwrap_or_else(|| panic!("no {name}"));
@@ -27,7 +29,10 @@ fn has_mean(text: &str, expected: &[(&str, f64)]) {
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         let (error, z) = (mcse_mean(&q.chains), (mean - expected) / mcse_mean(&q.chains));
         println!("{name}: {mean}, exactly {expected}, z = {z:.2}");
-        assert!(z.abs() < 4.0 && error < 0.1 * expected.abs(), "{text}\n{name}: {mean} +- {error}, exactly {expected}");
+        assert!(
+            z.abs() < 4.0 && error < 0.1 * expected.abs(),
+            "{text}\n{name}: {mean} +- {error}, exactly {expected}"
+        );
     }
 }
 
@@ -41,7 +46,8 @@ fn over_a_grid(from: f64, to: f64, log_weight: impl Fn(f64) -> f64) -> f64 {
     weights.iter().enumerate().map(|(i, w)| w * at(i as i32)).sum::<f64>() / sum
 }
 
-/// An ARMA(1, 1) series with mu = 0.4, phi = 0.7, theta = -0.3, and normal errors of sd 0.5.
+/// An ARMA(1, 1) series with mu = 0.4, phi = 0.7, theta = -0.3, and normal errors of sd
+/// 0.5.
 fn series(n: usize) -> Vec<f64> {
     let mut rng = StreamKey::new(11, 0, Purpose::VALUES).stream(0, 0, 0);
     let (mut y, mut last) = (Vec::new(), 0.0);
@@ -56,16 +62,22 @@ fn series(n: usize) -> Vec<f64> {
 
 fn arma(y: &[f64]) -> Model {
     let text = include_str!("published/arma11.pcad");
-    let program = Program::parse(text).unwrap_or_else(|e| panic!("{e}")).observe("y", Value::array(y.to_vec()));
+    let program = Program::parse(text)
+        .unwrap_or_else(|e| panic!("{e}"))
+        .observe("y", Value::array(y.to_vec()));
     program.compile().unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[test]
 fn a_recurrence_scores_as_its_equations_say() {
-    let normal = |x: f64, mean: f64, sd: f64| -0.5 * ((x - mean) / sd).powi(2) - sd.ln() - 0.918_938_533_204_672_8;
+    let normal = |x: f64, mean: f64, sd: f64| {
+        -0.5 * ((x - mean) / sd).powi(2) - sd.ln() - 0.918_938_533_204_672_8
+    };
     let y = series(30);
     let model = arma(&y);
-    for (mu, phi, theta, sigma) in [(0.4, 0.7, -0.3, 0.5), (0.0, -0.2, 0.9, 1.5), (1.0, 0.99, 0.1, 0.05)] {
+    for (mu, phi, theta, sigma) in
+        [(0.4, 0.7, -0.3, 0.5), (0.0, -0.2, 0.9, 1.5), (1.0, 0.99, 0.1, 0.05)]
+    {
         let mut expected = normal(mu, 0.0, 10.0) + normal(phi, 0.0, 2.0) + normal(theta, 0.0, 2.0);
         expected += -(std::f64::consts::PI * 2.5 / 2.0 * (1.0 + (sigma / 2.5f64).powi(2))).ln();
         let mut err = y[0] - (mu + phi * mu);
@@ -74,7 +86,8 @@ fn a_recurrence_scores_as_its_equations_say() {
             err = y[t] - (mu + phi * y[t - 1] + theta * err);
             expected += normal(err, 0.0, sigma);
         }
-        let found = log_joint(&model, &[("@mu", mu), ("@phi", phi), ("@theta", theta), ("@sigma", sigma)]);
+        let found =
+            log_joint(&model, &[("@mu", mu), ("@phi", phi), ("@theta", theta), ("@sigma", sigma)]);
         assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} is not {expected}");
     }
 }
@@ -85,7 +98,8 @@ fn a_recurrence_is_inferred_with_gradients() {
     let model = arma(&y);
     let (_, plan) = model.plan().unwrap_or_else(|e| panic!("{e}"));
     assert!(plan.is_some_and(|p| p.contains("nuts")));
-    let options = RunOptions { seed: 1, steps: Some(400), warmup: Some(400), ..RunOptions::default() };
+    let options =
+        RunOptions { seed: 1, steps: Some(400), warmup: Some(400), ..RunOptions::default() };
     let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{e}"));
     for (name, truth) in [("phi", 0.7), ("theta", -0.3), ("sigma", 0.5)] {
         let s = posterior.quantity(name).unwrap().summary;
@@ -93,7 +107,8 @@ fn a_recurrence_is_inferred_with_gradients() {
     }
 }
 
-/// What is left of an exponential is an exponential: the posterior is gamma(2 + 4, 1 + 2.6).
+/// What is left of an exponential is an exponential: the posterior is gamma(2 + 4, 1 +
+/// 2.6).
 #[test]
 fn truncated_waiting_times() {
     has_mean(
@@ -104,14 +119,17 @@ fn truncated_waiting_times() {
 
 #[test]
 fn counts_without_zeros() {
-    let log_weight = |rate: f64| rate.ln() - rate + 10.0 * rate.ln() - 5.0 * rate - 5.0 * (-(-rate).exp_m1()).ln();
+    let log_weight = |rate: f64| {
+        rate.ln() - rate + 10.0 * rate.ln() - 5.0 * rate - 5.0 * (-(-rate).exp_m1()).ln()
+    };
     has_mean(
         "assume rate ~ gamma(2, 1); observe truncated(poisson(rate), lo = 1) = [1, 2, 1, 4, 2] as counts;",
         &[("rate", over_a_grid(1e-6, 20.0, log_weight))],
     );
 }
 
-/// Under a flat prior of the deviation, the variance is inv_gamma((n - 1) / 2, sum of squares / 2).
+/// Under a flat prior of the deviation, the variance is inv_gamma((n - 1) / 2, sum of
+/// squares / 2).
 #[test]
 fn flat_priors_of_half_lines() {
     let y = [0.3, -1.2, 0.8, 1.9, -0.4, 0.1, -1.1, 0.6, 1.3];
@@ -143,7 +161,8 @@ fn unlike_priors_in_order() {
 #[test]
 fn mixtures_written_out_are_mixtures() {
     let of = "assume a ~ normal(0, 1); assume s ~ gamma(2, 1);";
-    let built_in = format!("{of} observe mixture([0.3, 0.7], [normal(a, s), cauchy(0, 1)]) = 0.8 as y;");
+    let built_in =
+        format!("{of} observe mixture([0.3, 0.7], [normal(a, s), cauchy(0, 1)]) = 0.8 as y;");
     let written = format!(
         "{of} factor(log_sum_exp([log(0.3) + log_density(normal(a, s), 0.8), log(0.7) + log_density(cauchy(0, 1), 0.8)]));"
     );
@@ -168,10 +187,17 @@ fn the_programs_run() {
         let model = Model::from_text(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
         let (_, plan) = model.plan().unwrap_or_else(|e| panic!("{e}"));
         assert!(plan.is_some_and(|p| p.contains("nuts")), "{}", file.display());
-        let options = RunOptions { seed: 2, steps: Some(100), warmup: Some(100), ..RunOptions::default() };
-        let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+        let options =
+            RunOptions { seed: 2, steps: Some(100), warmup: Some(100), ..RunOptions::default() };
+        let posterior =
+            model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
         for q in posterior.quantities() {
-            assert!(q.chains.iter().flatten().all(|x| x.is_finite()), "{}: {}", file.display(), q.name);
+            assert!(
+                q.chains.iter().flatten().all(|x| x.is_finite()),
+                "{}: {}",
+                file.display(),
+                q.name
+            );
         }
         seen += 1;
     }

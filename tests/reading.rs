@@ -1,4 +1,5 @@
-//! What a program may read: below its own folder, what is built in, and what the command line names.
+//! What a program may read: below its own folder, what is built in, and what the command
+//! line names.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -16,7 +17,9 @@ fn two_folders(name: &str) -> Folder {
     for dir in ["own", "own/parts", "other", "other/deep"] {
         std::fs::create_dir(f.path().join(dir)).unwrap();
     }
-    f.write("other/x.csv", "a,b\n1,2\n").write("other/part.pcad", "let secret = 1;").write("own/y.csv", "a,b\n1,2\n");
+    f.write("other/x.csv", "a,b\n1,2\n")
+        .write("other/part.pcad", "let secret = 1;")
+        .write("own/y.csv", "a,b\n1,2\n");
     f
 }
 
@@ -74,7 +77,10 @@ fn the_command_line_widens() {
     let f = two_folders("reading_wider");
     let both = "include \"../other/part.pcad\" as part; data t = csv(\"../other/x.csv\");";
     allowed(&f, both, &["--allow-read", "other"]);
-    f.refuses(&[&CHECK[..], &["--allow-read", "other/deep"]].concat(), "cannot read own/../other/part.pcad");
+    f.refuses(
+        &[&CHECK[..], &["--allow-read", "other/deep"]].concat(),
+        "cannot read own/../other/part.pcad",
+    );
     f.refuses(
         &[&CHECK[..], &["--allow-read", "missing"]].concat(),
         "cannot read missing: no such \
@@ -109,7 +115,8 @@ fn symbolic_links_are_followed_before_they_are_judged() {
     std::fs::remove_file(at("own/y.csv")).unwrap();
     symlink("../other/x.csv", at("own/y.csv")).unwrap();
     refused(&f, "data t = csv(\"y.csv\");", "other");
-    // A program that is a link is named on the command line; its folder is where the link is.
+    // A program that is a link is named on the command line; its folder is where the link
+    // is.
     f.write("other/p2.pcad", "data t = csv(\"parts/z.csv\");");
     symlink("../other/p2.pcad", at("own/p2.pcad")).unwrap();
     f.succeeds(&["check", "own/p2.pcad"]);
@@ -135,16 +142,32 @@ fn files_that_files_name_are_bounded_alike() {
     refused(&f, "data body = armature(\"out.rig.json\");", "other");
     allowed(&f, "data body = armature(\"out.rig.json\");", &["--allow-read", "other"]);
     let gltf = |uri: &str| {
-        format!("{{\"asset\": {{\"version\": \"2.0\"}}, \"buffers\": [{{\"byteLength\": 1, \"uri\": \"{uri}\"}}]}}")
+        format!(
+            "{{\"asset\": {{\"version\": \"2.0\"}}, \"buffers\": [{{\"byteLength\": 1, \"uri\": \"{uri}\"}}]}}"
+        )
     };
     f.write("own/m.gltf", gltf("..%2Fother%2Fa.obj"));
     refused(&f, "data m = mesh(\"m.gltf\");", "other");
     // A file named on the command line may name others below its folder, and no others.
-    f.write("own/p.pcad", "data body: armature; assume x ~ normal(0, 1); observe normal(x, 1) = 1;");
+    f.write(
+        "own/p.pcad",
+        "data body: armature; assume x ~ normal(0, 1); observe normal(x, 1) = 1;",
+    );
     f.write("other/b.rig.json", rig("a.obj"))
         .write("other/c.rig.json", rig("../secret.obj"))
         .write("secret.obj", triangle);
-    let run = ["run", "own/p.pcad", "--steps", "5", "--chains", "1", "--quiet", "--out", "out", "--observe"];
+    let run = [
+        "run",
+        "own/p.pcad",
+        "--steps",
+        "5",
+        "--chains",
+        "1",
+        "--quiet",
+        "--out",
+        "out",
+        "--observe",
+    ];
     f.succeeds(&[&run[..], &["body=other/b.rig.json"]].concat());
     let d = f.run(&[&run[..], &["body=other/c.rig.json"]].concat());
     assert!(d.code == 1 && d.err.contains(OUTSIDE), "{}", d.err);
@@ -180,23 +203,39 @@ fn the_library_does_the_same() {
     assert!(Program::open_allowing(path, &[other.join("none")]).is_err());
     // What is read later may be allowed later.
     f.write("own/p.pcad", "data t = csv(\"../other/x.csv\");");
-    assert!(Program::open(path).and_then(Program::compile).map_err(why).unwrap_err().contains(OUTSIDE));
-    assert!(Program::open(path).and_then(|p| p.allow_read(&other)).and_then(Program::compile).is_ok());
-    // What was allowed stays allowed when the program is edited, and when another takes its place.
+    assert!(
+        Program::open(path).and_then(Program::compile).map_err(why).unwrap_err().contains(OUTSIDE)
+    );
+    assert!(
+        Program::open(path).and_then(|p| p.allow_read(&other)).and_then(Program::compile).is_ok()
+    );
+    // What was allowed stays allowed when the program is edited, and when another takes
+    // its place.
     let wider = Program::open_allowing(path, &[&other]).unwrap();
     assert!(wider.edited("include \"../other/part.pcad\" as part;").is_ok());
-    f.write("own/parts/q.pcad", "include \"../../other/part.pcad\" as part;").write("own/shared.pcad", "let x = 1;");
+    f.write("own/parts/q.pcad", "include \"../../other/part.pcad\" as part;")
+        .write("own/shared.pcad", "let x = 1;");
     let next = f.path().join("own/parts/q.pcad");
     let next = next.to_str().unwrap();
     assert!(wider.replaced(next).is_ok() && Program::open(path).unwrap().replaced(next).is_err());
     assert!(wider.written_as(next).is_ok());
     // A program that is only text reads nothing, and observes what it is given.
-    let text = format!("data t = csv(\"{}\"); assume x ~ normal(0, 1);", other.join("x.csv").display());
-    assert!(Program::parse(&text).and_then(Program::compile).map_err(why).unwrap_err().contains(OUTSIDE));
-    let given = Program::parse(&text).and_then(|p| p.observe_file("t", other.join("x.csv").to_str().unwrap()));
+    let text =
+        format!("data t = csv(\"{}\"); assume x ~ normal(0, 1);", other.join("x.csv").display());
+    assert!(
+        Program::parse(&text)
+            .and_then(Program::compile)
+            .map_err(why)
+            .unwrap_err()
+            .contains(OUTSIDE)
+    );
+    let given = Program::parse(&text)
+        .and_then(|p| p.observe_file("t", other.join("x.csv").to_str().unwrap()));
     assert!(given.and_then(Program::compile).is_ok());
     let photo = f.write("x.png", png(disc(8, 8, 4.0, 4.0, 2.0))).path().join("x.png");
     let program = Program::parse("data photo: image; assume x ~ normal(0, 1);").unwrap();
-    assert!(program.observe_file("photo", photo.to_str().unwrap()).and_then(Program::compile).is_ok());
+    assert!(
+        program.observe_file("photo", photo.to_str().unwrap()).and_then(Program::compile).is_ok()
+    );
     assert!(Program::parse(&text).unwrap().observe("t", Value::Unit).compile().is_ok());
 }

@@ -1,7 +1,9 @@
-//! A newcomer reads the README: its commands are typed in a folder that holds nothing but the pictures they name, its
-//! program is written and run, and the commands it lists are tried on the runs that these leave.
+//! A newcomer reads the README: its commands are typed in a folder that holds nothing but
+//! the pictures they name, its program is written and run, and the commands it lists are
+//! tried on the runs that these leave.
 //!
-//! The guide's chapters and the recorded session of docs/repl.md are played by `guide` and `repl`.
+//! The guide's chapters and the recorded session of docs/repl.md are played by `guide`
+//! and `repl`.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -62,8 +64,10 @@ fn the_commands_run_as_they_are_written() {
 fn the_first_program_does_what_is_shown() {
     let f = Folder::new("readme-line");
     let start = README.find("    // line.pcad").expect("the page shows line.pcad");
-    let text: Vec<&str> =
-        README[start..].lines().map_while(|l| l.strip_prefix("    ").or(l.is_empty().then_some(""))).collect();
+    let text: Vec<&str> = README[start..]
+        .lines()
+        .map_while(|l| l.strip_prefix("    ").or(l.is_empty().then_some("")))
+        .collect();
     f.write("line.pcad", text.join("\n"));
     let done = f.succeeds(&["run", "line.pcad", "--seed", "1"]);
     // Means and intervals as they are printed on the page; times are the machine's.

@@ -1,6 +1,8 @@
-//! The prompt: the recording in docs/repl.md word for word, scripts that are piped in, and a real pseudo-terminal.
+//! The prompt: the recording in docs/repl.md word for word, scripts that are piped in,
+//! and a real pseudo-terminal.
 //!
-//! `REGENERATE=1 cargo test --test repl` writes what the recorded session says now into the page: read it first.
+//! `REGENERATE=1 cargo test --test repl` writes what the recorded session says now into
+//! the page: read it first.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -16,7 +18,8 @@ fn piped(f: &Folder, args: &[&str], script: &str) -> Done {
     c.current_dir(f.path()).env("NO_COLOR", "1").timeout(Duration::from_secs(120));
     let o = c.arg("repl").args(args).write_stdin(script).output().unwrap();
     let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
-    let d = Done { code: o.status.code().unwrap_or(-1), out: text(&o.stdout), err: text(&o.stderr) };
+    let d =
+        Done { code: o.status.code().unwrap_or(-1), out: text(&o.stdout), err: text(&o.stderr) };
     assert!(!d.err.contains("panicked"), "{}", d.err);
     d
 }
@@ -27,7 +30,10 @@ const CONTINUED: &str = "    > ";
 /// What was typed in a recording.
 fn typed(recording: &str) -> String {
     let line = |l: &str| {
-        let text = l.strip_prefix(PROMPT).or_else(|| l.strip_prefix(CONTINUED)).or(Some("").filter(|_| l == "pcad>"))?;
+        let text = l
+            .strip_prefix(PROMPT)
+            .or_else(|| l.strip_prefix(CONTINUED))
+            .or(Some("").filter(|_| l == "pcad>"))?;
         Some(format!("{text}\n"))
     };
     recording.lines().filter_map(line).collect()
@@ -48,10 +54,15 @@ fn the_recorded_session_replays() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/repl.md");
     let text = std::fs::read_to_string(&page).unwrap();
     let parts = parts(&text);
-    let recorded: Vec<&str> = parts.iter().filter(|(r, _)| *r).map(|(_, p)| p["text\n".len()..].trim_end()).collect();
+    let recorded: Vec<&str> =
+        parts.iter().filter(|(r, _)| *r).map(|(_, p)| p["text\n".len()..].trim_end()).collect();
     assert!(recorded.len() > 3, "the page has {} recordings", recorded.len());
     let f = Folder::new("repl_recorded");
-    let d = piped(&f, &["--transcript", "--graphics", "file", "--seed", "1"], &typed(&recorded.join("\n")));
+    let d = piped(
+        &f,
+        &["--transcript", "--graphics", "file", "--seed", "1"],
+        &typed(&recorded.join("\n")),
+    );
     assert_eq!(d.code, 0, "{}", d.err);
     // As many entries to each part as it had.
     let mut said = d.out.lines().peekable();
@@ -78,7 +89,11 @@ fn the_recorded_session_replays() {
     for (was, is) in recorded.iter().zip(&now) {
         assert!(was == is, "the recording says\n{was}\n\nand the session\n{is}");
     }
-    assert!(f.exists("vase.png") && f.exists("vase.pcad") && f.exists("vase.trace.json"), "{:?}", f.files());
+    assert!(
+        f.exists("vase.png") && f.exists("vase.pcad") && f.exists("vase.trace.json"),
+        "{:?}",
+        f.files()
+    );
 }
 
 #[test]
@@ -93,13 +108,21 @@ fn scripts_end_at_the_first_error() {
     assert_eq!((good.code, good.err.as_str()), (0, ""), "{}", good.out);
     assert!(good.out.lines().any(|l| l == "1") && !good.out.contains("pcad>"), "{}", good.out);
     let saved = f.read("better.pcad");
-    assert_eq!(saved, "assume p ~ beta(1, 1); observe binomial(10, p) = 7 as heads;\nlet odds = p / (1 - p);\n");
+    assert_eq!(
+        saved,
+        "assume p ~ beta(1, 1); observe binomial(10, p) = 7 as heads;\nlet odds = p / (1 - p);\n"
+    );
     let loaded = piped(&f, &[], ":load better\np\nodds");
     assert!(loaded.code == 0 && loaded.out.ends_with("0.5\n1\n"), "{}{}", loaded.out, loaded.err);
     assert!(f.run(&["check", "better.pcad"]).code == 0, "what is saved is a program");
     let bad = piped(&f, &["coin.pcad"], "p * 2\nq * 2\n:save never\n");
     assert_eq!(bad.code, 1);
-    assert!(bad.err.contains("unknown name `q`") && bad.out.lines().count() == 1, "{}{}", bad.out, bad.err);
+    assert!(
+        bad.err.contains("unknown name `q`") && bad.out.lines().count() == 1,
+        "{}{}",
+        bad.out,
+        bad.err
+    );
     assert!(!f.exists("never.pcad"));
     let open = piped(&f, &[], "fn f(x) {\n");
     assert!(open.code == 1 && open.err.contains("`{`"), "an entry that is cut off: {}", open.err);
@@ -108,7 +131,8 @@ fn scripts_end_at_the_first_error() {
     assert_eq!(piped(&f, &["--set", "n=3"], "").code, 2, "nothing to set without a program");
 }
 
-/// The program goes through the user's editor, and comes back; what is in the way of a file is said.
+/// The program goes through the user's editor, and comes back; what is in the way of a
+/// file is said.
 #[cfg(unix)]
 #[test]
 fn programs_are_edited_and_saved() {
@@ -129,10 +153,14 @@ fn programs_are_edited_and_saved() {
     f.write("theirs.pcad", "let x = 1;\n");
     let said = session("true", "let y = 2\n:save theirs\n:save! theirs\n:save theirs\n");
     assert!(said.contains("theirs.pcad exists\n  = hint: `:save! theirs` overwrites it"), "{said}");
-    assert!(said.matches("theirs.pcad, theirs.trace.json").count() == 2 && f.read("theirs.pcad").contains("y = 2"));
+    assert!(
+        said.matches("theirs.pcad, theirs.trace.json").count() == 2
+            && f.read("theirs.pcad").contains("y = 2")
+    );
 }
 
-/// A run is opened by its folder, at the start and from another session; `:undo` goes back.
+/// A run is opened by its folder, at the start and from another session; `:undo` goes
+/// back.
 #[test]
 fn runs_are_loaded() {
     let f = Folder::new("repl_runs");
@@ -144,13 +172,15 @@ fn runs_are_loaded() {
     assert_eq!(said.code, 0, "{}", said.err);
     let p = best.out.lines().last().unwrap();
     assert!(
-        said.out.contains(&format!("\n{p}\nundone: :load runs/coin\n")) && said.out.ends_with("1\n"),
+        said.out.contains(&format!("\n{p}\nundone: :load runs/coin\n"))
+            && said.out.ends_with("1\n"),
         "{}",
         said.out
     );
 }
 
-/// The photograph that is observed is what the scene is shown over; `run`'s ways to give it work.
+/// The photograph that is observed is what the scene is shown over; `run`'s ways to give
+/// it work.
 #[test]
 fn a_photograph_is_given_as_to_run() {
     let f = Folder::new("repl_photo");
@@ -158,12 +188,22 @@ fn a_photograph_is_given_as_to_run() {
     let args = ["lathe.pcad", "--observe", "disc.png", "--set", "size=48"];
     let d = piped(&f, &args, ":render over.png\n:infer mh(one(@**)) 20\n:render\n");
     assert_eq!(d.code, 0, "{}", d.err);
-    assert!(d.out.contains("over.png: 768 x 576 pixels") && d.out.contains("render.png: "), "{}", d.out);
+    assert!(
+        d.out.contains("over.png: 768 x 576 pixels") && d.out.contains("render.png: "),
+        "{}",
+        d.out
+    );
     let none = piped(&f, &["lathe.pcad"], ":render prior.png\n");
-    assert!(none.code == 0 && none.out.contains("is not given") && f.exists("prior.png"), "{}{}", none.out, none.err);
+    assert!(
+        none.code == 0 && none.out.contains("is not given") && f.exists("prior.png"),
+        "{}{}",
+        none.out,
+        none.err
+    );
 }
 
-/// A real terminal: editing, completion, lines that go on, history, Ctrl-C in and out of an evaluation, colours, pictures.
+/// A real terminal: editing, completion, lines that go on, history, Ctrl-C in and out of
+/// an evaluation, colours, pictures.
 #[cfg(unix)]
 #[test]
 fn on_a_terminal() {
@@ -171,12 +211,16 @@ fn on_a_terminal() {
     let f = Folder::new("repl_terminal");
     let start = |more: &[&str]| -> PtySession {
         let mut c = std::process::Command::new(env!("CARGO_BIN_EXE_pcadlang"));
-        c.current_dir(f.path()).env_clear().env("TERM", "xterm-256color").env("COLORTERM", "truecolor");
+        c.current_dir(f.path())
+            .env_clear()
+            .env("TERM", "xterm-256color")
+            .env("COLORTERM", "truecolor");
         c.env("XDG_STATE_HOME", f.path().join("state")).env("COLUMNS", "80").arg("repl").args(more);
         spawn_with_options(c, Options::new().timeout_ms(Some(60_000))).unwrap()
     };
     let mut p = start(&[]);
-    // A prompt is drawn anew with every key; a new one comes where the terminal is told to mark what is pasted. What is typed before is lost.
+    // A prompt is drawn anew with every key; a new one comes where the terminal is told
+    // to mark what is pasted. What is typed before is lost.
     let ready = |p: &mut PtySession| {
         p.exp_string("\u{1b}[?2004h").unwrap();
         p.exp_string("pcad> ").unwrap();

@@ -1,5 +1,5 @@
-//! Chains that are broken off and go on from a checkpoint are those without a break, bit for bit: every kernel and statement,
-//! every shipped program, random programs.
+//! Chains that are broken off and go on from a checkpoint are those without a break, bit
+//! for bit: every kernel and statement, every shipped program, random programs.
 
 #[path = "common/breaks.rs"]
 mod breaks;
@@ -13,14 +13,21 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 fn options(steps: u64, warmup: u64) -> RunOptions {
-    RunOptions { seed: 3, steps: Some(steps), warmup: Some(warmup), sites: true, ..RunOptions::default() }
+    RunOptions {
+        seed: 3,
+        steps: Some(steps),
+        warmup: Some(warmup),
+        sites: true,
+        ..RunOptions::default()
+    }
 }
 
 fn of_text(text: &str) -> Model {
     Model::from_text(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Numbers, truth values and a branch with a choice of its own, some of them observed coarsely too.
+/// Numbers, truth values and a branch with a choice of its own, some of them observed
+/// coarsely too.
 const MODEL: &str = "
     assume a ~ normal(0, 1); assume b ~ beta(2, 3); assume c ~ flip(0.4); assume k ~ categorical([1, 2, 3]);
     assume x = if c { inner ~ normal(1, 1); inner + a } else { a * 2 };
@@ -110,7 +117,8 @@ fn kernels_are_told_apart_by_their_arguments() {
 #[test]
 fn shipped_programs() {
     for name in ["coin.pcad", "linreg.pcad", "mixture.pcad", "crp.pcad", "geometric.pcad"] {
-        let model = Program::open(name).and_then(Program::compile).unwrap_or_else(|e| panic!("{e}"));
+        let model =
+            Program::open(name).and_then(Program::compile).unwrap_or_else(|e| panic!("{e}"));
         same_after_breaks(name, &model, &options(200, 150), 20);
     }
 }
@@ -123,7 +131,8 @@ fn shipped_programs_of_pictures() {
         ("two_people.pcad", "photo", "skier.jpg"),
     ] {
         let path = format!("{}/examples/images/{file}", env!("CARGO_MANIFEST_DIR"));
-        let program = Program::open(name).and_then(|p| p.set("size", "48").observe_file(data, &path));
+        let program =
+            Program::open(name).and_then(|p| p.set("size", "48").observe_file(data, &path));
         let model = program.and_then(Program::compile).unwrap_or_else(|e| panic!("{e}"));
         same_after_breaks(name, &model, &options(60, 60), 8);
     }

@@ -1,4 +1,5 @@
-//! Sessions as a front end has them: what is entered, what is said, and that nothing changes where something is wrong.
+//! Sessions as a front end has them: what is entered, what is said, and that nothing
+//! changes where something is wrong.
 
 use pcadlang::Program;
 use pcadlang::session::{Reply, Session, Trouble};
@@ -17,7 +18,9 @@ predict next ~ normal(slope * 4 + intercept, noise);
 ";
 
 fn session(text: &str) -> Session {
-    Session::open(Program::named("<session>", text).unwrap(), 1, Stop::default()).unwrap_or_else(|e| panic!("{e}")).0
+    Session::open(Program::named("<session>", text).unwrap(), 1, Stop::default())
+        .unwrap_or_else(|e| panic!("{e}"))
+        .0
 }
 
 fn line() -> Session {
@@ -40,7 +43,12 @@ fn refuses(s: &mut Session, text: &str) -> String {
 
 /// Program, choices and log joint density, to the last bit.
 fn state(s: &Session) -> (String, Vec<String>, u64) {
-    let choices = s.trace().choices().into_iter().map(|(a, v, p)| format!("{a} {v:?} {:x}", p.to_bits())).collect();
+    let choices = s
+        .trace()
+        .choices()
+        .into_iter()
+        .map(|(a, v, p)| format!("{a} {v:?} {:x}", p.to_bits()))
+        .collect();
     (s.text().to_owned(), choices, s.trace().log_joint().to_bits())
 }
 
@@ -55,7 +63,13 @@ fn what_people_type_is_understood() {
     says(&mut s, "for k in [\"a\", \"b\"] { t[k] ~ normal(0, 1); observe normal(t[k], 1) = 2; }");
     for (address, ..) in s.trace().choices() {
         assert!(says(&mut s, &format!(":why {address}")).starts_with(&format!("{address} = ")));
-        says(&mut s, &format!(":set {address} {}", if address.to_string() == "@wide" { "true" } else { "0.5" }));
+        says(
+            &mut s,
+            &format!(
+                ":set {address} {}",
+                if address.to_string() == "@wide" { "true" } else { "0.5" }
+            ),
+        );
     }
     let help = says(&mut s, ":help");
     for word in ["help", "?", ":?", ":h"] {
@@ -113,7 +127,8 @@ fn an_error_leaves_everything_as_it_was() {
         ("export slope to \"no/such/folder/x.txt\"", "x.txt"),
         ("let fine = 2; sample [1][3];", "3"),
     ] {
-        let said = s.enter(text).map_or_else(|e| e.to_string(), |r| format!("(accepted) {}", r.text));
+        let said =
+            s.enter(text).map_or_else(|e| e.to_string(), |r| format!("(accepted) {}", r.text));
         if !said.contains(why) || said.starts_with("(accepted)") || state(&s) != before {
             wrong += &format!("{text}: {why:?} is not in\n{said}\n");
         }
@@ -147,7 +162,8 @@ fn looking_changes_nothing() {
     assert_ne!(says(&mut s, "next"), says(&mut s, "next"), "a prediction is drawn each time");
 }
 
-/// What is assumed is drawn at once, although nothing is observed, and stays while the program grows.
+/// What is assumed is drawn at once, although nothing is observed, and stays while the
+/// program grows.
 #[test]
 fn a_program_grows_and_its_choices_stay() {
     let mut s = Session::new(7, Stop::default()).unwrap();
@@ -211,11 +227,13 @@ fn flips_say_what_they_do() {
         let said = says(&mut s, ["(none)", ":flip @slope", ":flip @wide", ":flip @**"][1 + i % 3]);
         let last = said.lines().last().unwrap();
         let change = said.lines().find(|l| l.starts_with("log joint")).unwrap();
-        let [old, new] =
-            [0, 1].map(|k| change["log joint ".len()..].split([' ', '(']).filter(|w| *w != "->").nth(k).unwrap());
+        let [old, new] = [0, 1].map(|k| {
+            change["log joint ".len()..].split([' ', '(']).filter(|w| *w != "->").nth(k).unwrap()
+        });
         let shown = pcadlang::report::number;
         assert_eq!(old, shown(f64::from_bits(before.2)), "{said}");
-        let ratio: f64 = last.split("log ratio ").nth(1).unwrap().split(')').next().unwrap().parse().unwrap();
+        let ratio: f64 =
+            last.split("log ratio ").nth(1).unwrap().split(')').next().unwrap().parse().unwrap();
         if last.starts_with("accepted") {
             assert_eq!(new, shown(s.trace().log_joint()), "{said}");
             kept += 1;
@@ -224,7 +242,10 @@ fn flips_say_what_they_do() {
             assert_eq!(state(&s), before);
             left += 1;
         }
-        assert_eq!(s.trace().log_joint().to_bits(), s.trace().rerun().unwrap().log_joint().to_bits());
+        assert_eq!(
+            s.trace().log_joint().to_bits(),
+            s.trace().rerun().unwrap().log_joint().to_bits()
+        );
     }
     assert!(kept > 3 && left > 3, "{kept} {left}");
 }
@@ -234,7 +255,10 @@ fn why_names_what_depends_on_a_choice() {
     let mut s = line();
     says(&mut s, ":set @wide true");
     let wide = says(&mut s, ":why @wide");
-    assert!(wide.contains("@noise/n") && wide.contains("may appear or vanish") && wide.contains("@y"), "{wide}");
+    assert!(
+        wide.contains("@noise/n") && wide.contains("may appear or vanish") && wide.contains("@y"),
+        "{wide}"
+    );
     let n = says(&mut s, ":why @noise/n");
     assert!(n.contains("depends on @wide") && n.contains("used by noise"), "{n}");
 }
@@ -243,7 +267,10 @@ fn why_names_what_depends_on_a_choice() {
 fn inference_in_the_background_leaves_the_state_until_it_is_asked_for() {
     let mut s = line();
     let before = state(&s);
-    assert_eq!(says(&mut s, ":infer mh(one(@**)) 400 &"), "run 1 in the background: mh(one(@**))\n");
+    assert_eq!(
+        says(&mut s, ":infer mh(one(@**)) 400 &"),
+        "run 1 in the background: mh(one(@**))\n"
+    );
     assert_eq!(state(&s), before);
     assert!(says(&mut s, ":trace").contains("@slope"));
     assert!(refuses(&mut s, ":infer 10").contains("run 1"));
@@ -253,7 +280,10 @@ fn inference_in_the_background_leaves_the_state_until_it_is_asked_for() {
     assert_eq!(s.background(), Some((1, true)));
     assert_eq!(state(&s), before, "waiting is not taking over");
     let stopped = says(&mut s, ":stop");
-    assert!(stopped.starts_with("run 1 is the state now") && stopped.contains("accepted"), "{stopped}");
+    assert!(
+        stopped.starts_with("run 1 is the state now") && stopped.contains("accepted"),
+        "{stopped}"
+    );
     assert_ne!(state(&s), before);
     assert!(says(&mut s, ":plot slope").starts_with("slope: 400 draws, mean "));
     assert!(refuses(&mut s, ":plot slop").contains("did you mean `slope`?"));
@@ -292,11 +322,19 @@ fn what_belongs_to_another_program_is_not_taken_over() {
     assert!(says(&mut s, ":stop").starts_with("run 2"));
 }
 
-/// The same lines with the same seed are the same session; no stream of random numbers is used twice.
+/// The same lines with the same seed are the same session; no stream of random numbers is
+/// used twice.
 #[test]
 fn sessions_replay() {
-    let lines =
-        [":flip @slope", ":infer mh(one(@**)) 100", ":infer mh(one(@**)) 100", ":trace", "next", ":draw", ":trace"];
+    let lines = [
+        ":flip @slope",
+        ":infer mh(one(@**)) 100",
+        ":infer mh(one(@**)) 100",
+        ":trace",
+        "next",
+        ":draw",
+        ":trace",
+    ];
     let run = || {
         let mut s = line();
         lines.map(|l| says(&mut s, l))
@@ -320,7 +358,9 @@ fn plans_of_all_kinds_run() {
             .contains("12 steps after 10 of warm-up")
     );
     assert_eq!(s.text(), text, "a block without a name is no part of the program");
-    assert!(says(&mut s, ":infer { repeat 5 { gibbs(@wide); } }").starts_with("infer { … }: 5 steps"));
+    assert!(
+        says(&mut s, ":infer { repeat 5 { gibbs(@wide); } }").starts_with("infer { … }: 5 steps")
+    );
     says(&mut s, "kernel both() { mh(one(@**)); drift(one($continuous)); }");
     assert!(says(&mut s, ":infer both() 3").starts_with("both(): 6 steps"));
     assert!(says(&mut s, ":infer nuts($continuous, max_depth = 3) 4").contains("4 steps"));
@@ -329,7 +369,8 @@ fn plans_of_all_kinds_run() {
 #[test]
 fn what_is_stopped_changes_nothing_but_inference_keeps_its_draws() {
     let stop = Arc::new(AtomicBool::new(false));
-    let open = Session::open(Program::named("<session>", LINE).unwrap(), 1, Stop::when(Arc::clone(&stop)));
+    let open =
+        Session::open(Program::named("<session>", LINE).unwrap(), 1, Stop::when(Arc::clone(&stop)));
     let mut s = open.unwrap_or_else(|e| panic!("{e}")).0;
     let before = state(&s);
     let interrupted = |s: &mut Session, text: &str| {
@@ -402,7 +443,10 @@ fn names_are_bound_again_and_forgotten() {
     // Observations and kernels by their names.
     says(&mut s, "observe normal(slope, 1) = [1, 2] as y");
     let observed = says(&mut s, ":trace");
-    assert!(observed.matches("@y").count() == 1 && s.text().matches(" as y").count() == 1, "{observed}");
+    assert!(
+        observed.matches("@y").count() == 1 && s.text().matches(" as y").count() == 1,
+        "{observed}"
+    );
     says(&mut s, "kernel both() { drift(@slope); }");
     says(&mut s, "kernel both() { drift(@intercept); }");
     assert_eq!(s.text().matches("kernel both").count(), 1);
@@ -416,7 +460,10 @@ fn names_are_bound_again_and_forgotten() {
     }
     assert!(!s.text().contains("three") && !s.text().contains("observe"), "{}", s.text());
     let why = refuses(&mut s, "forget slope");
-    assert!(why.contains("`double` uses `slope`") && why.contains("forget `double` first"), "{why}");
+    assert!(
+        why.contains("`double` uses `slope`") && why.contains("forget `double` first"),
+        "{why}"
+    );
     says(&mut s, "forget double");
     says(&mut s, ":undo");
     assert!(s.text().contains("let double"));
@@ -426,7 +473,8 @@ fn names_are_bound_again_and_forgotten() {
 fn what_was_undone_is_done_again() {
     let mut s = line();
     let mut states = vec![state(&s)];
-    for text in ["let double = 2 * slope", ":set @slope 2.25", ":infer drift(one($continuous)) 50"] {
+    for text in ["let double = 2 * slope", ":set @slope 2.25", ":infer drift(one($continuous)) 50"]
+    {
         says(&mut s, text);
         states.push(state(&s));
     }
@@ -448,7 +496,10 @@ fn inference_says_how_far_it_is_and_what_it_found() {
     let mut s = line();
     let said = says(&mut s, ":infer drift(one($continuous)) 200");
     let head = said.lines().nth(1).unwrap();
-    assert_eq!(head.split_whitespace().collect::<Vec<_>>(), ["quantity", "mean", "sd", "5%", "95%", "ess"]);
+    assert_eq!(
+        head.split_whitespace().collect::<Vec<_>>(),
+        ["quantity", "mean", "sd", "5%", "95%", "ess"]
+    );
     assert!(said.lines().any(|l| l.starts_with("slope ")) && said.contains("log joint "), "{said}");
     // A warm-up without end: there are no draws, and both say why.
     says(&mut s, ":infer { warmup 1000000000 { drift(@slope); } repeat 5 { drift(@slope); } } &");
@@ -469,7 +520,10 @@ fn inference_says_how_far_it_is_and_what_it_found() {
         std::thread::sleep(Duration::from_millis(5));
     }
     let said = says(&mut s, ":plot slope");
-    assert!(said.starts_with("run 3: sampling, ") && said.contains(" of 1000000000\nslope: "), "{said}");
+    assert!(
+        said.starts_with("run 3: sampling, ") && said.contains(" of 1000000000\nslope: "),
+        "{said}"
+    );
     says(&mut s, ":drop");
 }
 
@@ -502,8 +556,11 @@ fn a_front_end_is_asked_for_what_a_session_cannot_do() {
     let at = |name: &str| folder.join(name).display().to_string();
     std::fs::write(at("other.pcad"), "assume theirs ~ normal(0, 1);").unwrap();
     let mut s = line();
-    let asked = |s: &mut Session, text: &str| s.enter(text).unwrap_or_else(|e| panic!("{e}")).request;
-    let Some(Request::Confirm { question, then }) = asked(&mut s, &format!(":save {}", at("other"))) else {
+    let asked =
+        |s: &mut Session, text: &str| s.enter(text).unwrap_or_else(|e| panic!("{e}")).request;
+    let Some(Request::Confirm { question, then }) =
+        asked(&mut s, &format!(":save {}", at("other")))
+    else {
         panic!("a file of somebody else is overwritten")
     };
     assert!(question.contains("other.pcad exists"), "{question}");
@@ -513,7 +570,10 @@ fn a_front_end_is_asked_for_what_a_session_cannot_do() {
     // What it wrote itself it writes again.
     assert_eq!(asked(&mut s, &format!(":save {}", at("other"))), None);
     std::fs::write(folder.join("run/run.json"), "{}").unwrap();
-    assert_eq!(asked(&mut s, &format!(":load {}", at("run"))), Some(Request::Open(folder.join("run"))));
+    assert_eq!(
+        asked(&mut s, &format!(":load {}", at("run"))),
+        Some(Request::Open(folder.join("run")))
+    );
     std::fs::remove_dir_all(&folder).unwrap();
 
     // An edited text replaces the program; choices stay.
@@ -535,21 +595,31 @@ fn a_front_end_is_asked_for_what_a_session_cannot_do() {
     assert_eq!(state(&s), before);
 }
 
-/// Values without bounds on paper are a line on the screen, and what cannot be built is an error.
+/// Values without bounds on paper are a line on the screen, and what cannot be built is
+/// an error.
 #[test]
 fn huge_values_are_no_trouble() {
     let mut s = Session::new(1, Stop::default()).unwrap();
     says(&mut s, "let big = 0 .. 3000000");
     assert!(says(&mut s, "big").contains("3000000 in all"));
     says(&mut s, "let a = [\"x\", 1]");
-    for (name, inner) in [("b", "a"), ("c", "b"), ("d", "c"), ("e", "d"), ("f", "e"), ("g", "f"), ("h", "g")] {
-        says(&mut s, &format!("let {name} = [{inner}, {inner}, {inner}, {inner}, {inner}, {inner}, {inner}, {inner}]"));
+    for (name, inner) in
+        [("b", "a"), ("c", "b"), ("d", "c"), ("e", "d"), ("f", "e"), ("g", "f"), ("h", "g")]
+    {
+        says(
+            &mut s,
+            &format!(
+                "let {name} = [{inner}, {inner}, {inner}, {inner}, {inner}, {inner}, {inner}, {inner}]"
+            ),
+        );
     }
     assert!(says(&mut s, "h").chars().count() < 2100);
     let before = state(&s);
     refuses(&mut s, "fn f(n) { a ~ normal(0, 1); a + f(n + 1) } let deep = f(0)");
     assert_eq!(state(&s), before);
-    assert!(refuses(&mut s, "let many = map(fn(i) { i + 1 }, 0 .. 5000000)").contains("grew beyond"));
+    assert!(
+        refuses(&mut s, "let many = map(fn(i) { i + 1 }, 0 .. 5000000)").contains("grew beyond")
+    );
     assert!(refuses(&mut s, "let most = 0 .. 1000000000000").contains("too long"));
     assert_eq!(state(&s), before);
     assert!(says(&mut s, "1e300 * 1").contains("1e300"));
@@ -585,7 +655,9 @@ fn params_are_set_in_the_text() {
 
 #[test]
 fn a_program_without_its_data_is_its_prior() {
-    let program = Program::named("p", "data ys: csv; assume a ~ normal(0, 1); observe normal(a, 1) = ys.y;").unwrap();
+    let program =
+        Program::named("p", "data ys: csv; assume a ~ normal(0, 1); observe normal(a, 1) = ys.y;")
+            .unwrap();
     let (mut s, said) = Session::open(program, 1, Stop::default()).unwrap();
     assert!(said.text.contains("`ys` is not given"), "{}", said.text);
     assert!(says(&mut s, ":trace").contains("@a"));
@@ -613,14 +685,29 @@ fn words_are_completed_where_they_stand() {
             && has(&s, ":flip ", "one")
             && has(&s, ":flip ", "$fast")
     );
-    assert!(has(&s, ":set xs[0] ex", "exp") && !has(&s, ":set ", "exp") && !has(&s, ":why ", "exp"));
-    assert!(has(&s, ":help obs", "observe") && has(&s, ":doc :fl", ":flip") && has(&s, ":doc m", "mh"));
+    assert!(
+        has(&s, ":set xs[0] ex", "exp") && !has(&s, ":set ", "exp") && !has(&s, ":why ", "exp")
+    );
+    assert!(
+        has(&s, ":help obs", "observe") && has(&s, ":doc :fl", ":flip") && has(&s, ":doc m", "mh")
+    );
     assert_eq!(words(&s, ":flip @xs[").1, ["@xs[0]", "@xs[1]", "@xs[2]"]);
     assert_eq!(words(&s, "force @se").1, ["@seen"]);
     assert_eq!(words(&s, ":trace $fa").1, ["$fast"]);
-    assert!(has(&s, "let y = sp", "spin") && has(&s, "obs", "observe") && has(&s, "let v = scene.ren", "scene.render"));
-    assert!(has(&s, "spin(1, sp", "speed = ") && has(&s, "spin(1, sp", "spin") && !has(&s, "spin(1); sp", "speed = "));
-    assert!(has(&s, "assume z ~ normal(0, ", "sd = ") && has(&s, ":infer nuts($continuous, max", "max_depth = "));
+    assert!(
+        has(&s, "let y = sp", "spin")
+            && has(&s, "obs", "observe")
+            && has(&s, "let v = scene.ren", "scene.render")
+    );
+    assert!(
+        has(&s, "spin(1, sp", "speed = ")
+            && has(&s, "spin(1, sp", "spin")
+            && !has(&s, "spin(1); sp", "speed = ")
+    );
+    assert!(
+        has(&s, "assume z ~ normal(0, ", "sd = ")
+            && has(&s, ":infer nuts($continuous, max", "max_depth = ")
+    );
     assert!(has(&s, ":doc norm", "normal") && !has(&s, "f(\"norm", "normal"));
     assert!(has(&s, ":infer mh", "mh"));
     let folder = std::env::temp_dir().join(format!("pcadlang-complete-{}", std::process::id()));
@@ -629,8 +716,14 @@ fn words_are_completed_where_they_stand() {
         std::fs::write(folder.join(name), "").unwrap();
     }
     let at = folder.display().to_string();
-    assert_eq!(words(&s, &format!(":load {at}/")).1, [format!("{at}/inner/"), format!("{at}/one.pcad")]);
-    assert_eq!(words(&s, &format!("data d = csv(\"{at}/t")).1, [format!("{at}/three.csv"), format!("{at}/two.png")]);
+    assert_eq!(
+        words(&s, &format!(":load {at}/")).1,
+        [format!("{at}/inner/"), format!("{at}/one.pcad")]
+    );
+    assert_eq!(
+        words(&s, &format!("data d = csv(\"{at}/t")).1,
+        [format!("{at}/three.csv"), format!("{at}/two.png")]
+    );
     assert_eq!(words(&s, &format!("include \"{at}/o")).1, [format!("{at}/one.pcad")]);
     std::fs::remove_dir_all(&folder).unwrap();
     says(&mut s, ":infer mh(one(@**)) 5");
@@ -705,7 +798,8 @@ fn scenes_are_seen() {
     assert!(refuses(&mut Session::new(1, Stop::default()).unwrap(), ":render").contains("no view"));
 }
 
-/// Names that are asked for by nobody but the session are kept up to date as observations are.
+/// Names that are asked for by nobody but the session are kept up to date as observations
+/// are.
 #[test]
 fn shipped_programs_are_at_home() {
     for name in [
@@ -719,8 +813,10 @@ fn shipped_programs_are_at_home() {
         "human_kth.pcad",
     ] {
         let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
-        let mut s = Session::open(program, 1, Stop::default()).unwrap_or_else(|e| panic!("{name}: {e}")).0;
-        let addresses: Vec<String> = s.trace().choices().iter().map(|(a, ..)| a.to_string()).collect();
+        let mut s =
+            Session::open(program, 1, Stop::default()).unwrap_or_else(|e| panic!("{name}: {e}")).0;
+        let addresses: Vec<String> =
+            s.trace().choices().iter().map(|(a, ..)| a.to_string()).collect();
         assert!(!addresses.is_empty(), "{name} has no choices");
         for (i, a) in addresses.iter().cycle().step_by(7).take(12).enumerate() {
             if s.trace().find(&a.parse().unwrap()).is_some() {
@@ -731,6 +827,10 @@ fn shipped_programs_are_at_home() {
             assert_eq!(now.to_bits(), anew.to_bits(), "{name} {a}: {now} {anew}");
         }
         says(&mut s, ":infer mh(one(@**)) 30");
-        assert_eq!(s.trace().log_joint().to_bits(), s.trace().rerun().unwrap().log_joint().to_bits(), "{name}");
+        assert_eq!(
+            s.trace().log_joint().to_bits(),
+            s.trace().rerun().unwrap().log_joint().to_bits(),
+            "{name}"
+        );
     }
 }

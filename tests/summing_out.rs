@@ -1,12 +1,17 @@
-//! Choices that are summed out of what Hamiltonian kernels see, against quadrature: conditions on several of them, tables, `mem`,
-//! observations that come and go, values that the program has not, structure that depends on what moves.
+//! Choices that are summed out of what Hamiltonian kernels see, against quadrature:
+//! conditions on several of them, tables, `mem`, observations that come and go, values
+//! that the program has not, structure that depends on what moves.
 
 mod common;
 use common::*;
 
-/// One choice and one datum of the program below; joint conditions are met off the diagonal of values only.
-const KERNELS: [&str; 3] =
-    ["nuts(@effect, marginal = %)", "hmc(@effect, steps = 5, marginal = %)", "mala(@effect, marginal = %)"];
+/// One choice and one datum of the program below; joint conditions are met off the
+/// diagonal of values only.
+const KERNELS: [&str; 3] = [
+    "nuts(@effect, marginal = %)",
+    "hmc(@effect, steps = 5, marginal = %)",
+    "mala(@effect, marginal = %)",
+];
 
 fn effects(sites: usize, y: &[f64], kernel: &str) -> Draws {
     let text = format!(
@@ -52,8 +57,13 @@ fn joint_conditions_in_every_grouping() {
         assert_spread(&k, &draws, &y);
     }
     // What is left is moved by gibbs.
-    for (summed, rest) in [("@a", "@b"), ("@b", "@a"), ("@a[0] + @b[0] + @a[3]", "@a + @b"), ("@a + @b[1]", "@b")] {
-        let k = format!("{}; gibbs(each({rest})); gibbs(each(@a + @b))", KERNELS[1].replace('%', summed));
+    for (summed, rest) in
+        [("@a", "@b"), ("@b", "@a"), ("@a[0] + @b[0] + @a[3]", "@a + @b"), ("@a + @b[1]", "@b")]
+    {
+        let k = format!(
+            "{}; gibbs(each({rest})); gibbs(each(@a + @b))",
+            KERNELS[1].replace('%', summed)
+        );
         assert_effect(&k, &effects(6, &y, &k), &y);
     }
 }
@@ -79,14 +89,22 @@ fn three_truth_values_and_a_table() {
              infer {{ warmup 300 {{ {k}; }} repeat 4000 {{ {k}; collect effect, c; }} }}"
         );
         let d = run(&text, 3, 2);
-        let density = |e: f64| normal_pdf(e, 0.0, 2.0) * (normal_pdf(2.0, e, 0.5) + 7.0 * normal_pdf(2.0, 0.0, 0.5));
+        let density = |e: f64| {
+            normal_pdf(e, 0.0, 2.0) * (normal_pdf(2.0, e, 0.5) + 7.0 * normal_pdf(2.0, 0.0, 0.5))
+        };
         let z = integrate(density, -14.0, 14.0, 20_000);
         let on = |e: f64| normal_pdf(e, 0.0, 2.0) * normal_pdf(2.0, e, 0.5);
         assert_mean(&k, &d["effect"], integrate(|e| e * density(e), -14.0, 14.0, 20_000) / z, 0.4);
         // The place that matters has c[0] and c[2] but not c[1].
-        let there: Vec<f64> =
-            (0..d["c[0]"].len()).map(|i| d["c[0]"][i] * (1.0 - d["c[1]"][i]) * d["c[2]"][i]).collect();
-        assert_mean(&format!("{k}: the place"), &there, integrate(on, -14.0, 14.0, 20_000) / z, 0.15);
+        let there: Vec<f64> = (0..d["c[0]"].len())
+            .map(|i| d["c[0]"][i] * (1.0 - d["c[1]"][i]) * d["c[2]"][i])
+            .collect();
+        assert_mean(
+            &format!("{k}: the place"),
+            &there,
+            integrate(on, -14.0, 14.0, 20_000) / z,
+            0.15,
+        );
     }
 }
 
@@ -101,7 +119,8 @@ fn observations_that_come_and_go() {
              infer {{ warmup 300 {{ {k}; }} repeat 4000 {{ {k}; collect x, z; }} }}"
         )
     };
-    let one = |x: f64| normal_pdf(1.0, x, 0.5) + normal_pdf(-1.0, x, 0.5) * normal_pdf(0.0, 0.0, 1.0);
+    let one =
+        |x: f64| normal_pdf(1.0, x, 0.5) + normal_pdf(-1.0, x, 0.5) * normal_pdf(0.0, 0.0, 1.0);
     let density = |x: f64| normal_pdf(x, 0.0, 1.0) * one(x) * one(x);
     let z = integrate(density, -8.0, 8.0, 4000);
     let up = integrate(|x| density(x) * normal_pdf(1.0, x, 0.5) / one(x), -8.0, 8.0, 4000) / z;
@@ -112,7 +131,8 @@ fn observations_that_come_and_go() {
     }
 }
 
-/// Whether `b` is asked for depends on what moves: a move that leaves it behind could not come back.
+/// Whether `b` is asked for depends on what moves: a move that leaves it behind could not
+/// come back.
 #[test]
 fn structure_that_depends_on_what_moves() {
     let text = "assume z ~ flip(0.4); assume x ~ normal(0, 1); assume b ~ normal(0, 1);
@@ -149,8 +169,9 @@ fn what_is_read_depends_on_what_moves() {
     };
     let sum = |g: &dyn Fn(f64, bool, bool) -> f64| -> f64 {
         let all = [(false, false), (false, true), (true, false), (true, true)];
-        let of =
-            |a: f64, b: f64| all.map(|(p, q)| integrate(|x| g(x, p, q) * f(x, p, q), a, b, 4000)).iter().sum::<f64>();
+        let of = |a: f64, b: f64| {
+            all.map(|(p, q)| integrate(|x| g(x, p, q) * f(x, p, q), a, b, 4000)).iter().sum::<f64>()
+        };
         // Inside of the edges, where the density jumps.
         of(-8.0, 0.5 - 1e-12) + of(0.5 + 1e-12, 8.0)
     };
@@ -174,7 +195,10 @@ fn components_of_a_function_with_mem() {
     // The evidence of data that share a component.
     let evidence = |all: &[f64]| {
         integrate(
-            |m| normal_pdf(m, 0.0, 2.0) * all.iter().map(|y| normal_pdf(*y, m, 1.0)).product::<f64>(),
+            |m| {
+                normal_pdf(m, 0.0, 2.0)
+                    * all.iter().map(|y| normal_pdf(*y, m, 1.0)).product::<f64>()
+            },
             -14.0,
             14.0,
             4000,
@@ -183,23 +207,31 @@ fn components_of_a_function_with_mem() {
     let (mut total, mut first, mut together) = (0.0, 0.0, 0.0);
     for k in 0..8usize {
         let label = |i: usize| k >> i & 1;
-        let of = |c: usize| -> Vec<f64> { (0..3).filter(|i| label(*i) == c).map(|i| y[i]).collect() };
+        let of =
+            |c: usize| -> Vec<f64> { (0..3).filter(|i| label(*i) == c).map(|i| y[i]).collect() };
         let prior: f64 = (0..3).map(|i| [0.25, 0.75][label(i)]).product();
-        let w = prior * [0, 1].map(|c| if of(c).is_empty() { 1.0 } else { evidence(&of(c)) }).iter().product::<f64>();
+        let w = prior
+            * [0, 1]
+                .map(|c| if of(c).is_empty() { 1.0 } else { evidence(&of(c)) })
+                .iter()
+                .product::<f64>();
         total += w;
         first += w * label(0) as f64;
         together += w * f64::from(u8::from(label(0) == label(1)));
     }
     let d = run(&text, 4, 2);
     assert_mean("label", &d["z[0]"], first / total, 0.3);
-    let same: Vec<f64> = d["z[0]"].iter().zip(&d["z[1]"]).map(|(a, b)| f64::from(u8::from(a == b))).collect();
+    let same: Vec<f64> =
+        d["z[0]"].iter().zip(&d["z[1]"]).map(|(a, b)| f64::from(u8::from(a == b))).collect();
     assert_mean("together", &same, together / total, 0.2);
 }
 
 /// For one value of the choice the program has no value where x is not positive.
 #[test]
 fn values_that_the_program_has_not() {
-    for k in ["nuts(@x, marginal = @z)", "hmc(@x, steps = 4, marginal = @z)", "mala(@x, marginal = @z)"] {
+    for k in
+        ["nuts(@x, marginal = @z)", "hmc(@x, steps = 4, marginal = @z)", "mala(@x, marginal = @z)"]
+    {
         let text = format!(
             "assume z ~ flip(0.5); assume x ~ normal(0, 1);
              observe normal(0, if z {{ 1 }} else {{ x }}) = 0.5;
@@ -241,7 +273,11 @@ fn what_cannot_be_summed_out_is_an_error() {
             "{program} assume s ~ normal(0, 1); observe normal(m + s, 0.5) = 2;
              infer {{ repeat 10 {{ nuts(@s, marginal = $discrete); collect s; }} }}"
         );
-        let e = pcadlang::Model::from_text(&text).unwrap().run(&Default::default(), 1, 1).unwrap_err().to_string();
+        let e = pcadlang::Model::from_text(&text)
+            .unwrap()
+            .run(&Default::default(), 1, 1)
+            .unwrap_err()
+            .to_string();
         assert!(e.contains("cannot be summed out") && e.contains(says), "{says}: {e}");
     }
 }

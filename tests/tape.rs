@@ -1,5 +1,6 @@
-//! Tapes of densities against the traces they were recorded from: the programs of the benchmarks and the posteriors of posteriordb,
-//! and what happens when conditions, structure or other choices change.
+//! Tapes of densities against the traces they were recorded from: the programs of the
+//! benchmarks and the posteriors of posteriordb, and what happens when conditions,
+//! structure or other choices change.
 
 #[path = "common/tape.rs"]
 mod tape;
@@ -45,7 +46,10 @@ fn text(text: &str) -> Model {
 #[test]
 fn posteriors_of_posteriordb() {
     for name in ["eight_schools", "kidscore_momiq", "gp_regr", "gauss_mix", "arK", "blr"] {
-        let json = std::fs::read_to_string(format!("{}/tests/posteriordb/{name}.json", env!("CARGO_MANIFEST_DIR")));
+        let json = std::fs::read_to_string(format!(
+            "{}/tests/posteriordb/{name}.json",
+            env!("CARGO_MANIFEST_DIR")
+        ));
         let json: Json = serde_json::from_str(&json.unwrap()).unwrap();
         check(&model(&format!("tests/posteriordb/{name}.pcad"), &json["data"]), name);
     }
@@ -97,7 +101,8 @@ fn a_parameter_outside_its_domain_is_for_a_proposal_to_tell() {
 
 #[test]
 fn a_tape_holds_until_something_else_is_committed() {
-    let model = text("assume x ~ normal(0, 1); assume y ~ normal(x, 1); observe normal(y, 1) = 0.5;");
+    let model =
+        text("assume x ~ normal(0, 1); assume y ~ normal(x, 1); observe normal(y, 1) = 0.5;");
     let mut trace = model.simulate(1, 0).unwrap();
     let all = trace.all_targets().to_vec();
     let set = |trace: &mut Trace, i: usize, x: f64| {

@@ -1,4 +1,5 @@
-//! Traces: what re-runs, equality of incremental and full updates, save and load, structure that comes and goes.
+//! Traces: what re-runs, equality of incremental and full updates, save and load,
+//! structure that comes and goes.
 
 mod common;
 use common::*;
@@ -10,7 +11,8 @@ use pcadlang::trace::{Change, Draws as Streams, Limits, Selector, Trace};
 fn trace(text: &str, seed: u64) -> (Model, Trace) {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
     let draws = Streams { key: StreamKey::new(seed, 0, Purpose::START), step: 0, lane: 0 };
-    let t = Trace::simulate(model.code().clone(), draws, Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+    let t = Trace::simulate(model.code().clone(), draws, Limits::default())
+        .unwrap_or_else(|e| panic!("{e}"));
     (model, t)
 }
 
@@ -86,8 +88,8 @@ fn program(text: &str) -> String {
     )
 }
 
-/// After any sequence of proposals, commits and roll-backs, a run from scratch with the same choices has the same score to
-/// the last bit and the same set of choices.
+/// After any sequence of proposals, commits and roll-backs, a run from scratch with the
+/// same choices has the same score to the last bit and the same set of choices.
 #[test]
 fn increments_equal_a_run_from_scratch() {
     for (name, text) in PROGRAMS {
@@ -101,8 +103,9 @@ fn increments_equal_a_run_from_scratch() {
                     break;
                 }
                 let n = 1 + (step % 3) as usize;
-                let mut chosen: Vec<_> =
-                    (0..n).map(|i| targets[(step as usize * 7 + i * 3 + seed as usize) % targets.len()]).collect();
+                let mut chosen: Vec<_> = (0..n)
+                    .map(|i| targets[(step as usize * 7 + i * 3 + seed as usize) % targets.len()])
+                    .collect();
                 chosen.sort();
                 chosen.dedup();
                 let before = (t.log_joint().to_bits(), addresses(&t));
@@ -124,20 +127,29 @@ fn increments_equal_a_run_from_scratch() {
                 }
                 if step % 5 == 0 {
                     let fresh = t.rerun().unwrap_or_else(|e| panic!("{name}: {e}"));
-                    assert_eq!(addresses(&fresh), addresses(&t), "{name}: choices, seed {seed} step {step}");
+                    assert_eq!(
+                        addresses(&fresh),
+                        addresses(&t),
+                        "{name}: choices, seed {seed} step {step}"
+                    );
                     assert_eq!(
                         fresh.log_joint().to_bits(),
                         t.log_joint().to_bits(),
                         "{name}: joint, seed {seed} step {step}"
                     );
-                    assert_eq!(fresh.log_likelihood().to_bits(), t.log_likelihood().to_bits(), "{name}: likelihood");
+                    assert_eq!(
+                        fresh.log_likelihood().to_bits(),
+                        t.log_likelihood().to_bits(),
+                        "{name}: likelihood"
+                    );
                 }
             }
         }
     }
 }
 
-/// The same seed gives the same draws on one thread and on two, incrementally and by full re-execution, bit for bit.
+/// The same seed gives the same draws on one thread and on two, incrementally and by full
+/// re-execution, bit for bit.
 #[test]
 fn draws_do_not_depend_on_threads_or_increments() {
     for (name, text) in PROGRAMS {
@@ -159,7 +171,8 @@ fn draws_do_not_depend_on_threads_or_increments() {
     }
 }
 
-/// A saved trace loads to the same score to the last bit, and is refused by another program.
+/// A saved trace loads to the same score to the last bit, and is refused by another
+/// program.
 #[test]
 fn saved_traces_load_bit_for_bit() {
     for (name, text) in PROGRAMS {
@@ -181,7 +194,8 @@ fn saved_choices_occur_in_the_program() {
         let (model, t) = trace(text, 2);
         let load = |saved: &serde_json::Value| {
             let saved = serde_json::from_value(saved.clone()).unwrap();
-            Trace::load(model.code().clone(), model.hash(), &saved, Limits::default()).map_err(|e| e.to_string())
+            Trace::load(model.code().clone(), model.hash(), &saved, Limits::default())
+                .map_err(|e| e.to_string())
         };
         let mut saved = serde_json::to_value(t.save(model.hash())).unwrap();
         assert!(load(&saved).is_ok(), "{text}");
@@ -220,7 +234,8 @@ fn addresses_are_paths() {
     let mut got = addresses(&t);
     got.sort();
     assert_eq!(got, expected);
-    let mut observed: Vec<String> = t.observations().into_iter().map(|(a, _)| a.to_string()).collect();
+    let mut observed: Vec<String> =
+        t.observations().into_iter().map(|(a, _)| a.to_string()).collect();
     observed.sort();
     assert_eq!(observed, ["@named", "@obs#1[0]", "@obs#1[1]", "@obs#2"]);
 }
@@ -257,20 +272,26 @@ fn a_change_reruns_only_what_depends_on_it() {
     let a = t.find(&t.choices()[0].0).unwrap();
     t.watch();
     t.propose(&[(a, Change::Set(pcadlang::dist::Datum::Num(0.25)))], at(1)).unwrap();
-    let ran: Vec<&str> = t.executed().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
+    let ran: Vec<&str> =
+        t.executed().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
     t.commit();
     for expected in ["a * 2", "left > 1000", "normal(left, 1)"] {
         assert_eq!(ran.iter().filter(|r| **r == expected).count(), 1, "{expected} in {ran:?}");
     }
-    // The comparison came out equal: what depends on it did not run; nor did anything of b.
-    assert!(!ran.iter().any(|r| r.contains("right") || r.contains("b * 3") || r.contains("gate")), "{ran:?}");
+    // The comparison came out equal: what depends on it did not run; nor did anything of
+    // b.
+    assert!(
+        !ran.iter().any(|r| r.contains("right") || r.contains("b * 3") || r.contains("gate")),
+        "{ran:?}"
+    );
 }
 
 /// Who watches sees what a move executes, also where the move could be made without.
 #[test]
 fn moves_are_seen_by_who_watches() {
     use pcadlang::infer::{At, Gibbs, Kernel, Pick, Scope};
-    let (_, mut t) = trace("assume f ~ flip(0.5); observe normal(if f { 1 } else { 0 }, 1) = 0.5;", 1);
+    let (_, mut t) =
+        trace("assume f ~ flip(0.5); observe normal(if f { 1 } else { 0 }, 1) = 0.5;", 1);
     let mut kernel = Gibbs::new(Scope { selector: Selector::All, pick: Pick::One });
     let mut moves = 0;
     for step in 0..40 {
@@ -286,7 +307,8 @@ fn moves_are_seen_by_who_watches() {
     assert!(moves > 5, "{moves}");
 }
 
-/// With n conditionally independent observations, changing one local choice executes the same few operations at any n.
+/// With n conditionally independent observations, changing one local choice executes the
+/// same few operations at any n.
 #[test]
 fn work_does_not_grow_with_the_trace() {
     let executed = |n: usize| {
@@ -308,7 +330,8 @@ fn work_does_not_grow_with_the_trace() {
     assert_eq!(few, executed(1000));
 }
 
-/// What branches needed that were left is used again: a chain may change its structure as often as it likes.
+/// What branches needed that were left is used again: a chain may change its structure as
+/// often as it likes.
 #[test]
 fn storage_of_branches_is_used_again() {
     let model = Model::from_text(
@@ -317,7 +340,8 @@ fn storage_of_branches_is_used_again() {
     )
     .unwrap_or_else(|e| panic!("{e}"));
     let limits = Limits { nodes: 100, ..Limits::default() };
-    let mut t = Trace::simulate(model.code().clone(), at(0), limits).unwrap_or_else(|e| panic!("{e}"));
+    let mut t =
+        Trace::simulate(model.code().clone(), at(0), limits).unwrap_or_else(|e| panic!("{e}"));
     let c = t.find(&"@c".parse().unwrap()).unwrap();
     for step in 0..1000u64 {
         let set = [(c, Change::Set(pcadlang::dist::Datum::Bool(step % 2 == 0)))];
@@ -340,7 +364,12 @@ fn what_a_map_ran_over_is_let_go() {
          assume y = if c { sum(map(fn(x) { x * 2 }, w)) } else { 0 }; observe normal(y, 1) = 1;",
         1,
     );
-    let moves = [("@c", Bool(true), 4), ("@w[0]", Num(0.7), 4), ("@w[1]", Num(-0.2), 4), ("@c", Bool(false), 1)];
+    let moves = [
+        ("@c", Bool(true), 4),
+        ("@w[0]", Num(0.7), 4),
+        ("@w[1]", Num(-0.2), 4),
+        ("@c", Bool(false), 1),
+    ];
     for (step, (name, value, choices)) in (0..).zip(moves) {
         let target = t.find(&name.parse().unwrap()).unwrap();
         t.propose(&[(target, Change::Set(value))], at(step)).unwrap_or_else(|e| panic!("{e}"));
@@ -349,7 +378,8 @@ fn what_a_map_ran_over_is_let_go() {
     }
 }
 
-/// Gradients are those of the state to the last bit, whatever was built and let go on the way there.
+/// Gradients are those of the state to the last bit, whatever was built and let go on the
+/// way there.
 #[test]
 fn gradients_do_not_depend_on_the_past() {
     let (_, mut t) = trace(
@@ -375,7 +405,10 @@ fn gradients_do_not_depend_on_the_past() {
 /// The surrogate of an observation is scored on demand and is no part of the joint.
 #[test]
 fn surrogates_are_not_part_of_the_joint() {
-    let (_, mut t) = trace("assume x ~ normal(0, 1); observe normal(x, 1) = 2 with coarse = normal(x, 3) as y;", 1);
+    let (_, mut t) = trace(
+        "assume x ~ normal(0, 1); observe normal(x, 1) = 2 with coarse = normal(x, 3) as y;",
+        1,
+    );
     let (_, plain) = trace("assume x ~ normal(0, 1); observe normal(x, 1) = 2 as y;", 1);
     assert_eq!(t.log_joint().to_bits(), plain.log_joint().to_bits());
     let y = t.observations()[0].0.clone();
@@ -396,14 +429,21 @@ fn runaway_programs_are_stopped() {
         let e = Trace::simulate(model.code().clone(), at(0), Limits::default()).err();
         e.unwrap_or_else(|| panic!("{text} runs")).to_string()
     };
-    assert!(fails("fn f(x) { 1 + f(x) } observe normal(f(0), 1) = 0;").contains("nested more than"));
     assert!(
-        fails("for t in 0 .. 3 { s[t] ~ normal(s[t], 1); observe normal(s[t], 1) = 0; }").contains("depends on itself")
+        fails("fn f(x) { 1 + f(x) } observe normal(f(0), 1) = 0;").contains("nested more than")
     );
-    assert!(fails("for i in 0 .. 3 { t[1] ~ normal(0, 1); } observe normal(t[1], 1) = 0;").contains("twice"));
+    assert!(
+        fails("for t in 0 .. 3 { s[t] ~ normal(s[t], 1); observe normal(s[t], 1) = 0; }")
+            .contains("depends on itself")
+    );
+    assert!(
+        fails("for i in 0 .. 3 { t[1] ~ normal(0, 1); } observe normal(t[1], 1) = 0;")
+            .contains("twice")
+    );
 }
 
-/// Going over to a saved state is the same as building it, whatever structure lies between.
+/// Going over to a saved state is the same as building it, whatever structure lies
+/// between.
 #[test]
 fn restored_states_are_the_saved_ones() {
     for (name, text) in PROGRAMS {
@@ -429,7 +469,8 @@ fn restored_states_are_the_saved_ones() {
     }
 }
 
-/// Two functions called at one place draw at one address, `@x/f/z[0]`: whichever is there is found by it, after moves that were kept and moves that were not.
+/// Two functions called at one place draw at one address, `@x/f/z[0]`: whichever is there
+/// is found by it, after moves that were kept and moves that were not.
 #[test]
 fn choices_are_found_by_their_addresses_as_branches_change() {
     use pcadlang::infer::{At, Kernel, Mh, Pick, Scope};
@@ -443,17 +484,25 @@ fn choices_are_found_by_their_addresses_as_branches_change() {
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
     let mut kernel = Mh::new(Scope { selector: Selector::All, pick: Pick::One });
     for step in 0..200 {
-        let accepted = kernel.step(&mut trace, &At::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}")).accepted;
+        let accepted = kernel
+            .step(&mut trace, &At::new(1, 0, step))
+            .unwrap_or_else(|e| panic!("{e}"))
+            .accepted;
         let draws = Streams { key: StreamKey::new(1, 0, Purpose::PREDICT), step, lane: 0 };
         assert!(trace.global("x", draws).is_some_and(|x| x.is_ok()));
         for t in trace.all_targets().to_vec() {
             let address = trace.address(t);
-            assert_eq!(trace.find(&address), Some(t), "step {step} (accepted {accepted}): {address}");
+            assert_eq!(
+                trace.find(&address),
+                Some(t),
+                "step {step} (accepted {accepted}): {address}"
+            );
         }
     }
 }
 
-/// What reads a number is not told where it turns into something else: that is an error, never an old value.
+/// What reads a number is not told where it turns into something else: that is an error,
+/// never an old value.
 #[test]
 fn a_number_that_turns_into_an_array_is_an_error() {
     let text = "assume k ~ flip(0.5); assume x ~ normal(if k { [0, 1] } else { 0 }, 1);

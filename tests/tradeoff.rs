@@ -1,4 +1,5 @@
-//! `pcadlang tradeoff` on small cases of each kind of truth: tables, resumption, presets and what `run` makes of them.
+//! `pcadlang tradeoff` on small cases of each kind of truth: tables, resumption, presets
+//! and what `run` makes of them.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -7,7 +8,8 @@ use folder::{Folder, disc, png};
 use serde_json::{Value, json};
 
 /// A normal mean with a known posterior: mean 1.6, variance 0.2.
-const MEAN: &str = "param n: int = 100; data d: json; assume x ~ normal(0, 1); observe normal(x, 0.5) = d.y;
+const MEAN: &str =
+    "param n: int = 100; data d: json; assume x ~ normal(0, 1); observe normal(x, 0.5) = d.y;
     infer { warmup 50 { drift(@x); } repeat n { drift(@x); collect x; } }";
 
 fn table(f: &Folder) -> Vec<Value> {
@@ -31,7 +33,9 @@ fn cases(f: &Folder, all: &[(&str, f64)]) {
 }
 
 fn tradeoff(f: &Folder, more: &[&str]) -> folder::Done {
-    f.run(&[&["tradeoff", "mean.pcad", "--cases", "cases", "--settings", "few.json"], more].concat())
+    f.run(
+        &[&["tradeoff", "mean.pcad", "--cases", "cases", "--settings", "few.json"], more].concat(),
+    )
 }
 
 #[test]
@@ -40,7 +44,10 @@ fn more_draws_are_nearer_to_the_reference() {
     mean_cases(&f);
     // One that is better still, for comparison only.
     f.write("more.json", r#"{"compare": true, "base": {"chains": 4, "n": 60000}}"#);
-    let done = tradeoff(&f, &["--seeds", "4", "--settings", "more.json", "--presets", "mean.quality.json"]);
+    let done = tradeoff(
+        &f,
+        &["--seeds", "4", "--settings", "more.json", "--presets", "mean.quality.json"],
+    );
     assert_eq!(done.code, 0, "{}", done.err);
     let rows = table(&f);
     let of = |setting: &str| {
@@ -53,13 +60,20 @@ fn more_draws_are_nearer_to_the_reference() {
     assert!(errors[2] < 0.1 && of("chains=2").1.unwrap() > 0.0);
     assert!(of("chains=4 n=60000").0 < errors[2]);
     let csv = f.read("tradeoff/table.csv");
-    assert!(csv.starts_with("setting,end,seconds,error,low,high,cases,runs,failed,ess_per_second,front"), "{csv}");
+    assert!(
+        csv.starts_with(
+            "setting,end,seconds,error,low,high,cases,runs,failed,ess_per_second,front"
+        ),
+        "{csv}"
+    );
     let plot = f.read("tradeoff/plot.svg");
     assert!(plot.contains("reference posterior") && plot.contains("accurate</text>"));
 
     // What was found is used by name, and what is typed wins.
     let run = |more: &[&str]| {
-        let done = f.run(&[&["run", "mean.pcad", "--observe", "d=cases/a/d.json", "--out", "r"], more].concat());
+        let done = f.run(
+            &[&["run", "mean.pcad", "--observe", "d=cases/a/d.json", "--out", "r"], more].concat(),
+        );
         assert_eq!(done.code, 0, "{}", done.err);
         let run: Value = serde_json::from_str(&f.read("r/run.json")).unwrap();
         (run["set"].clone(), run["settings"]["chains"].clone(), done.err)
@@ -67,7 +81,9 @@ fn more_draws_are_nearer_to_the_reference() {
     let (set, chains, said) = run(&["--quality", "accurate"]);
     assert_eq!((set, chains), (json!({ "n": "20000" }), json!(2)));
     assert!(
-        said.contains("note: --quality accurate: --set n=20000 --chains 2, from mean.quality.json (error 0."),
+        said.contains(
+            "note: --quality accurate: --set n=20000 --chains 2, from mean.quality.json (error 0."
+        ),
         "{said}"
     );
     assert_eq!(run(&["--quality", "accurate", "--set", "n=10"]).0, json!({ "n": "10" }));
@@ -82,7 +98,8 @@ fn what_was_run_is_not_run_again() {
     assert_eq!(tradeoff(&f, &["--only", "a"]).code, 0);
     let before = f.read("tradeoff/runs.jsonl");
     // Half a line, as a power cut leaves it.
-    std::fs::write(f.path().join("tradeoff/runs.jsonl"), format!("{before}{{\"setting\": \"chai")).unwrap();
+    std::fs::write(f.path().join("tradeoff/runs.jsonl"), format!("{before}{{\"setting\": \"chai"))
+        .unwrap();
     f.write("few.json", r#"{"base": {"chains": 2}, "vary": {"n": [2, 100, 20000, 50]}}"#);
     let again = tradeoff(&f, &["--only", "a"]);
     assert_eq!(again.code, 0, "{}", again.err);
@@ -104,7 +121,11 @@ fn what_was_run_is_not_run_again() {
     // Other cases, another program, another answer: what is there is of something else.
     let refused = |more: &[&str], what: &str| {
         let done = tradeoff(&f, more);
-        assert!(done.code == 1 && done.err.contains(&format!("{what} has changed")), "{}", done.err);
+        assert!(
+            done.code == 1 && done.err.contains(&format!("{what} has changed")),
+            "{}",
+            done.err
+        );
         assert_eq!(f.read("tradeoff/runs.jsonl"), after);
     };
     refused(&[], "cases");
@@ -128,8 +149,8 @@ fn a_short_budget_leaves_out_settings_and_says_so() {
     cases(&f, &[("c", 0.5), ("d", 1.0), ("e", 1.5), ("f", -2.0)]);
     let none = tradeoff(&f, &["--budget", "1ms", "--jobs", "1"]);
     assert!(none.code == 1 && none.err.contains("the budget ran out"), "{}", none.err);
-    // Twenty-four runs that are thought to take eleven seconds each; four minutes are enough for all settings on three cases, half of
-    // them on six.
+    // Twenty-four runs that are thought to take eleven seconds each; four minutes are
+    // enough for all settings on three cases, half of them on six.
     let half = tradeoff(&f, &["--budget", "4m", "--jobs", "1"]);
     assert!(half.code == 0 && half.err.contains("round 2 of"), "{}", half.err);
     let ends: Vec<Value> = table(&f).into_iter().filter(|r| r["end"] == true).collect();
@@ -166,9 +187,13 @@ fn surfaces_and_joints_are_scored() {
     let done = f.run(&["tradeoff", "ball.pcad", "--cases", "cases", "--settings", "s.json"]);
     assert_eq!(done.code, 0, "{}", done.err);
     let rows = table(&f);
-    let end = rows.iter().find(|r| r["setting"] == "chains=2 tries=400" && r["end"] == true).unwrap();
+    let end =
+        rows.iter().find(|r| r["setting"] == "chains=2 tries=400" && r["end"] == true).unwrap();
     // The ball seen in perspective is a little nearer than in the formula above.
-    assert!(end["error"].as_f64().unwrap() < 0.05 && end["scores"]["iou"].as_f64().unwrap() > 0.85, "{end}");
+    assert!(
+        end["error"].as_f64().unwrap() < 0.05 && end["scores"]["iou"].as_f64().unwrap() > 0.85,
+        "{end}"
+    );
     assert_eq!(end["scores"]["n_mse"], json!(2.0), "no normals are known");
 
     // People: a program without joints finds none.
@@ -179,7 +204,16 @@ fn surfaces_and_joints_are_scored() {
         "people/annotations.json",
         json!({ "people": [{ "id": "one", "image": "one.png", "keypoints": joints }] }).to_string(),
     );
-    let done = f.run(&["tradeoff", "ball.pcad", "--cases", "people", "--settings", "s.json", "--out", "joints"]);
+    let done = f.run(&[
+        "tradeoff",
+        "ball.pcad",
+        "--cases",
+        "people",
+        "--settings",
+        "s.json",
+        "--out",
+        "joints",
+    ]);
     assert_eq!(done.code, 0, "{}", done.err);
     let all: Value = serde_json::from_str(&f.read("joints/tradeoff.json")).unwrap();
     assert_eq!(all["rows"][0]["scores"], json!({ "error": 1.0, "joints": 2.0, "missed": 2.0 }));
@@ -189,14 +223,26 @@ fn surfaces_and_joints_are_scored() {
 fn mistakes_are_said_before_anything_runs() {
     let f = Folder::new("tradeoff_mistakes");
     mean_cases(&f);
-    f.write("bad.json", r#"{"vary": {"m": [1]}}"#).write("worse.json", r#"{"vary": {"chains": [0]}}"#);
+    f.write("bad.json", r#"{"vary": {"m": [1]}}"#)
+        .write("worse.json", r#"{"vary": {"chains": [0]}}"#);
     let fails = |settings: &str, cases: &str| {
-        let done = f.run(&["tradeoff", "mean.pcad", "--cases", cases, "--settings", settings, "--out", "t"]);
+        let done = f.run(&[
+            "tradeoff",
+            "mean.pcad",
+            "--cases",
+            cases,
+            "--settings",
+            settings,
+            "--out",
+            "t",
+        ]);
         assert_eq!(done.code, 1);
         assert!(!f.path().join("t").exists());
         done.err
     };
-    assert!(fails("bad.json", "cases").contains("--set m: the program has no parameter of this name"));
+    assert!(
+        fails("bad.json", "cases").contains("--set m: the program has no parameter of this name")
+    );
     assert!(
         fails("worse.json", "cases")
             .contains("worse.json: `chains` cannot be 0: expected a whole number from 1 to 1024")
@@ -204,7 +250,11 @@ fn mistakes_are_said_before_anything_runs() {
     std::fs::create_dir_all(f.path().join("empty/x")).unwrap();
     f.write("empty/x/image.png", png(disc(48, 32, 24.0, 16.0, 9.0)));
     let none = fails("few.json", "empty");
-    assert!(none.contains("observes no item of kind `image`") || none.contains("no case has ground truth"), "{none}");
+    assert!(
+        none.contains("observes no item of kind `image`")
+            || none.contains("no case has ground truth"),
+        "{none}"
+    );
     let unknown = f.run(&["tradeoff", "mean.pcad", "--cases", "cases"]);
     assert!(unknown.err.contains("mean.settings.json does not exist"), "{}", unknown.err);
 }

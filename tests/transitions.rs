@@ -1,6 +1,8 @@
-//! One transition from an exact draw: the end is distributed as the start, and pairs (start, end) are as frequent as (end, start).
-//! Exact tests with fixed seeds, of what only long chains would show otherwise: the acceptance of doubling in `slice`, the choice
-//! of a place within trajectories of `nuts`, the metric of Hamiltonian kernels. A right kernel fails one with a chance of 1e-6.
+//! One transition from an exact draw: the end is distributed as the start, and pairs
+//! (start, end) are as frequent as (end, start). Exact tests with fixed seeds, of what
+//! only long chains would show otherwise: the acceptance of doubling in `slice`, the
+//! choice of a place within trajectories of `nuts`, the metric of Hamiltonian kernels. A
+//! right kernel fails one with a chance of 1e-6.
 
 use ciborium::Value as Cbor;
 use pcadlang::Model;
@@ -87,7 +89,9 @@ fn steps_mass(x: f64) -> f64 {
     let normal = |x: f64| standard().cdf(x / 2.0);
     let mut from = f64::NEG_INFINITY;
     STEPS
-        .map(|(to, weight)| weight * (normal(x.min(to)) - normal(x.min(std::mem::replace(&mut from, to)))))
+        .map(|(to, weight)| {
+            weight * (normal(x.min(to)) - normal(x.min(std::mem::replace(&mut from, to))))
+        })
         .iter()
         .sum()
 }
@@ -113,10 +117,13 @@ const DENSITIES: [Density; 2] = [
     },
 ];
 
-/// Slice sampling, doubling or stepping out, over two modes of different widths and over steps.
+/// Slice sampling, doubling or stepping out, over two modes of different widths and over
+/// steps.
 #[test]
 fn slices_of_two_modes() {
-    for (d, doubling, width) in [(0, true, 0.3), (0, true, 3.0), (0, false, 1.5), (1, true, 0.3), (1, false, 0.5)] {
+    for (d, doubling, width) in
+        [(0, true, 0.3), (0, true, 3.0), (0, false, 1.5), (1, true, 0.3), (1, false, 0.5)]
+    {
         let d = &DENSITIES[d];
         let (mut trace, mut rng) = (trace(d.text), Uniform(7));
         let mut kernel = Slice::new(all(), Some(width), doubling);
@@ -139,25 +146,37 @@ fn slices_of_two_modes() {
     }
 }
 
-/// Numbers of one scale and one of another, so that trajectories are long and their energy goes up and down.
-const GAUSSIAN: &str =
-    "assume a ~ iid(normal(0, 1), 5); assume b ~ normal(0, 8); observe normal(0 * (sum(a) + b), 1) = 0;";
+/// Numbers of one scale and one of another, so that trajectories are long and their
+/// energy goes up and down.
+const GAUSSIAN: &str = "assume a ~ iid(normal(0, 1), 5); assume b ~ normal(0, 8); observe normal(0 * (sum(a) + b), 1) = 0;";
 
-/// A kernel with a step size and inverse masses put in the place of what it would learn: those of `a`, that of `b`.
+/// A kernel with a step size and inverse masses put in the place of what it would learn:
+/// those of `a`, that of `b`.
 fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5], f64)) -> K {
     put(trace, &[("@a", Value::array(vec![0.1; 5])), ("@b", 0.2.into())]);
     kernel.step(trace, &At::new(1, 0, 0)).unwrap();
     let mut state: Cbor = ciborium::from_reader(&kernel.save(trace)[..]).unwrap();
     let adaptation = state.as_array_mut().unwrap()[0].as_map_mut().unwrap();
-    let sizes =
-        adaptation.iter().find(|(k, _)| k.as_text() == Some("signature")).unwrap().1.as_array().unwrap().clone();
+    let sizes = adaptation
+        .iter()
+        .find(|(k, _)| k.as_text() == Some("signature"))
+        .unwrap()
+        .1
+        .as_array()
+        .unwrap()
+        .clone();
     // By address: `b` is one, the elements of `a` are the others, in order.
     let b = trace.address_hash(trace.find(&"@b".parse().unwrap()).unwrap());
-    let (mut rest, is_b) = (masses.0.into_iter(), |s: &Cbor| s.as_array().unwrap()[0] == Cbor::from(b));
+    let (mut rest, is_b) =
+        (masses.0.into_iter(), |s: &Cbor| s.as_array().unwrap()[0] == Cbor::from(b));
     let masses: Vec<Cbor> = sizes
         .iter()
         .flat_map(|s| {
-            if is_b(s) { vec![masses.1] } else { rest.by_ref().take(if sizes.len() == 2 { 5 } else { 1 }).collect() }
+            if is_b(s) {
+                vec![masses.1]
+            } else {
+                rest.by_ref().take(if sizes.len() == 2 { 5 } else { 1 }).collect()
+            }
         })
         .map(Cbor::Float)
         .collect();
@@ -175,7 +194,8 @@ fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5]
     kernel
 }
 
-/// From draws of the Gaussian, so many transitions: the places of all of `a`, of `b`, of the length of `a` among their distributions.
+/// From draws of the Gaussian, so many transitions: the places of all of `a`, of `b`, of
+/// the length of `a` among their distributions.
 fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count: u64) {
     let mut rng = Uniform(11);
     let (mut bins, mut accepted) = ([[0; 16]; 3], 0);
@@ -184,8 +204,11 @@ fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count:
         let a: Vec<f64> = (0..5).map(|_| rng.normal()).collect();
         put(trace, &[("@a", Value::array(a)), ("@b", (8.0 * rng.normal()).into())]);
         accepted += kernel.step(trace, &At::new(5, 0, i)).unwrap().accepted;
-        let (Ok(Value::Array(a)), Ok(Value::Num(b))) = (trace.get("@a"), trace.get("@b")) else { panic!("no numbers") };
-        let mut count = |list: usize, place: f64| bins[list][((place * 16.0) as usize).min(15)] += 1;
+        let (Ok(Value::Array(a)), Ok(Value::Num(b))) = (trace.get("@a"), trace.get("@b")) else {
+            panic!("no numbers")
+        };
+        let mut count =
+            |list: usize, place: f64| bins[list][((place * 16.0) as usize).min(15)] += 1;
         a.iter().for_each(|z| count(0, standard().cdf(*z)));
         count(1, standard().cdf(b / 8.0));
         count(2, length.cdf(a.iter().map(|z| z * z).sum()));
@@ -197,7 +220,8 @@ fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count:
     }
 }
 
-/// A step so long that the weights of places along a trajectory differ much: the choice among them shows.
+/// A step so long that the weights of places along a trajectory differ much: the choice
+/// among them shows.
 #[test]
 fn places_of_a_trajectory_are_chosen_by_their_weights() {
     let mut t = trace(GAUSSIAN);
@@ -207,7 +231,8 @@ fn places_of_a_trajectory_are_chosen_by_their_weights() {
     }
 }
 
-/// Inverse masses far from 1 and from each other, which leave the density as it is, whatever they are.
+/// Inverse masses far from 1 and from each other, which leave the density as it is,
+/// whatever they are.
 #[test]
 fn metrics_leave_the_density_as_it_is() {
     let mut t = trace(GAUSSIAN);
@@ -225,15 +250,19 @@ fn metrics_leave_the_density_as_it_is() {
 fn metrics_learn_variances() {
     let text = "assume x ~ normal(0, 0.05); assume y ~ normal(0, 0.3); assume z ~ normal(0, 1.5);
                 observe normal(0 * (x + y + z), 1) = 0;";
-    for mut kernel in [Box::new(Nuts::new(all(), 8)) as Box<dyn Kernel>, Box::new(Hmc::new(all(), 10, None))] {
+    for mut kernel in
+        [Box::new(Nuts::new(all(), 8)) as Box<dyn Kernel>, Box::new(Hmc::new(all(), 10, None))]
+    {
         let mut t = trace(text);
         for i in 0..1000 {
             kernel.step(&mut t, &At { adapting: true, ..At::new(2, 0, i) }).unwrap();
         }
         let state: Cbor = ciborium::from_reader(&kernel.save(&t)[..]).unwrap();
         let adaptation = state.as_array().unwrap()[0].as_map().unwrap().clone();
-        let learnt = &adaptation.iter().find(|(k, _)| k.as_text() == Some("inverse_mass")).unwrap().1;
-        let mut learnt: Vec<f64> = learnt.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
+        let learnt =
+            &adaptation.iter().find(|(k, _)| k.as_text() == Some("inverse_mass")).unwrap().1;
+        let mut learnt: Vec<f64> =
+            learnt.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
         // Whatever order choices are in.
         learnt.sort_by(f64::total_cmp);
         for (found, variance) in learnt.iter().zip([0.0025, 0.09, 2.25]) {

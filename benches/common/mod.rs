@@ -1,4 +1,5 @@
-//! What several benchmarks draw and compare: shapes from plain to fine, poses, a photograph, contours as comparators take them.
+//! What several benchmarks draw and compare: shapes from plain to fine, poses, a
+//! photograph, contours as comparators take them.
 
 // Every benchmark uses some of it.
 #![allow(dead_code)]
@@ -26,13 +27,15 @@ pub fn short() -> Criterion {
         .measurement_time(Duration::from_millis(1000))
 }
 
-/// A closed surface of revolution (two triangles for each vertex but the last ring's); `bulge` is the profile's parameter.
+/// A closed surface of revolution (two triangles for each vertex but the last ring's);
+/// `bulge` is the profile's parameter.
 pub fn lathe(bulge: f32, rings: u32, sides: u32) -> Mesh {
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
     for ring in 0..rings {
         let t = ring as f32 / (rings - 1) as f32;
-        let radius = if ring == 0 || ring == rings - 1 { 0.0 } else { 0.6 + bulge * (5.0 * t).sin() };
+        let radius =
+            if ring == 0 || ring == rings - 1 { 0.0 } else { 0.6 + bulge * (5.0 * t).sin() };
         for side in 0..sides {
             let angle = std::f32::consts::TAU * side as f32 / sides as f32;
             positions.push(Vec3::new(radius * angle.sin(), 2.0 * t - 1.0, radius * angle.cos()));
@@ -63,7 +66,8 @@ pub fn pose(step: &mut f64) -> Affine {
     Affine::new(DVec3::new(0.1, -0.1, *step), DVec3::new(0.4 + *step, 0.3, 0.1), DVec3::splat(1.2))
 }
 
-/// Where a shipped human body stands before the default camera, turned by so much (radians).
+/// Where a shipped human body stands before the default camera, turned by so much
+/// (radians).
 pub fn standing(turn: f64) -> Affine {
     Affine::new(DVec3::new(0.0, -1.8, 0.0), DVec3::new(0.05, 0.5 + turn, 0.0), DVec3::splat(2.1))
 }
@@ -76,10 +80,19 @@ pub fn picture(name: &str) -> std::path::PathBuf {
 /// The skier at `side` by `side` pixels.
 pub fn photograph(side: u32) -> Photo {
     let photo = photo::load(&picture("skier.jpg"), &Limits::default()).expect("a photograph");
-    Photo::from_rgb(resize(photo.rgb(), side, side, FilterType::Triangle)).expect("a photograph with pixels")
+    Photo::from_rgb(resize(photo.rgb(), side, side, FilterType::Triangle))
+        .expect("a photograph with pixels")
 }
 
 /// Contours as comparators take them.
 pub fn elements(c: &Contours) -> Elements<'_> {
-    Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
+    Elements {
+        x: &c.x,
+        y: &c.y,
+        tx: &c.tx,
+        ty: &c.ty,
+        length: &c.length,
+        width: c.width,
+        height: c.height,
+    }
 }

@@ -3,7 +3,8 @@
 use glam::Vec3;
 use pcadlang::geom::Mesh;
 
-/// The parts of a standing figure: middle, direction of the long axis, half its length, radius.
+/// The parts of a standing figure: middle, direction of the long axis, half its length,
+/// radius.
 pub const BODY: [([f32; 3], [f32; 3], f32, f32); 22] = [
     ([0.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.35, 0.32),
     ([0.0, 0.35, 0.02], [0.0, 1.0, 0.0], 0.35, 0.30),
@@ -39,7 +40,9 @@ pub fn spindle(middle: [f32; 3], axis: [f32; 3], half: f32, radius: f32) -> Mesh
         let t = std::f32::consts::PI * (ring as f32 / (rings + 1) as f32 - 0.5);
         for side in 0..sides {
             let a = std::f32::consts::TAU * side as f32 / sides as f32;
-            positions.push(middle + axis * half * t.sin() + (u * a.cos() + v * a.sin()) * (radius * t.cos()));
+            positions.push(
+                middle + axis * half * t.sin() + (u * a.cos() + v * a.sin()) * (radius * t.cos()),
+            );
         }
     }
     positions.push(middle + axis * half);

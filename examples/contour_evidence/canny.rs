@@ -1,5 +1,5 @@
-//! A plain edge detector, so that the comparison does not depend on the library's: smoothed colour gradients, ridges with
-//! sub-pixel offsets, hysteresis.
+//! A plain edge detector, so that the comparison does not depend on the library's:
+//! smoothed colour gradients, ridges with sub-pixel offsets, hysteresis.
 
 use pcadlang::vision::contour_map::ContourMap;
 

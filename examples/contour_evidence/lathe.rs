@@ -1,4 +1,5 @@
-//! Random lathe objects under the paper's prior, and their masks through the data set's camera.
+//! Random lathe objects under the paper's prior, and their masks through the data set's
+//! camera.
 
 /// Numbers in 0..1.
 pub struct Numbers(pub u64);
@@ -24,7 +25,8 @@ impl Numbers {
 pub struct Lathe {
     radius: f64,
     knots: [f64; 12],
-    /// Scale, three rotations, three translations, each as a number in 0..1 of its prior's range.
+    /// Scale, three rotations, three translations, each as a number in 0..1 of its
+    /// prior's range.
     pose: [f64; 7],
 }
 
@@ -75,7 +77,8 @@ impl Lathe {
             let k = (u as usize).min(10);
             let f = u - k as f64;
             let f = f * f * (3.0 - 2.0 * f);
-            let r = (self.radius + self.knots[k] * (1.0 - f) + self.knots[k + 1] * f).exp().min(1.5);
+            let r =
+                (self.radius + self.knots[k] * (1.0 - f) + self.knots[k + 1] * f).exp().min(1.5);
             let ring: Vec<(f64, f64)> = (0..24)
                 .map(|j| {
                     let (sin, cos) = (f64::from(j) * std::f64::consts::TAU / 24.0).sin_cos();
@@ -85,7 +88,10 @@ impl Lathe {
                     let (px, py) = (cz * px - sz * py, sz * px + cz * py);
                     let depth = 8.0 - (s * pz + shift[2]);
                     let half = size as f64 / 2.0;
-                    (half + focal * (s * px + shift[0]) / depth, half - focal * (s * py + shift[1]) / depth)
+                    (
+                        half + focal * (s * px + shift[0]) / depth,
+                        half - focal * (s * py + shift[1]) / depth,
+                    )
                 })
                 .collect();
             fill(&ring, size, &mut mask);
@@ -112,7 +118,8 @@ fn fill(ring: &[(f64, f64)], size: usize, mask: &mut [bool]) {
             left = left.min(x);
             right = right.max(x);
         }
-        let (a, b) = ((left + 0.5).max(0.0) as usize, (right + 0.5).clamp(0.0, size as f64) as usize);
+        let (a, b) =
+            ((left + 0.5).max(0.0) as usize, (right + 0.5).clamp(0.0, size as f64) as usize);
         if a < b {
             mask[row * size + a..row * size + b].fill(true);
         }

@@ -1,6 +1,7 @@
-//! Does the true outline beat wrong ones? For each picture of `../shared/data/objects`, the outline of the true mask against
-//! 2,000 random lathe outlines, and against the best of them after a hill climb that may not come near the truth. A wrong
-//! outline overlaps the true mask by less than 0.7. Prints a table and a measure of speed.
+//! Does the true outline beat wrong ones? For each picture of `../shared/data/objects`,
+//! the outline of the true mask against 2,000 random lathe outlines, and against the best
+//! of them after a hill climb that may not come near the truth. A wrong outline overlaps
+//! the true mask by less than 0.7. Prints a table and a measure of speed.
 
 mod canny;
 mod lathe;
@@ -18,7 +19,8 @@ type Score = Box<dyn FnMut(&Elements<'_>) -> f64>;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
         .join(std::env::args().nth(1).unwrap_or("../shared/data/objects".into()));
-    let mut cases: Vec<_> = std::fs::read_dir(folder)?.filter_map(|e| Some(e.ok()?.path())).collect();
+    let mut cases: Vec<_> =
+        std::fs::read_dir(folder)?.filter_map(|e| Some(e.ok()?.path())).collect();
     cases.retain(|c| c.join("mask.png").exists() && c.join("image.png").exists());
     cases.sort();
     let full = std::env::args().nth(2).is_some();
@@ -38,8 +40,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 wrong.push((Outline::of(&mask, size), lathe));
             }
         }
-        print!("{:14} {:5} edges", case.file_name().unwrap_or_default().to_string_lossy(), map.x.len());
-        for (i, (name, mut score)) in comparators(&map, size as u32, full)?.into_iter().enumerate() {
+        print!(
+            "{:14} {:5} edges",
+            case.file_name().unwrap_or_default().to_string_lossy(),
+            map.x.len()
+        );
+        for (i, (name, mut score)) in comparators(&map, size as u32, full)?.into_iter().enumerate()
+        {
             let own = score(&true_outline.elements());
             let clock = Instant::now();
             let mut order: Vec<(f64, usize)> =
@@ -71,7 +78,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         println!();
     }
-    println!("truth beats: the best of 2,000 random wrong outlines; the best after climbing (of {})", cases.len());
+    println!(
+        "truth beats: the best of 2,000 random wrong outlines; the best after climbing (of {})",
+        cases.len()
+    );
     for (name, random, climbed, micros) in wins {
         println!("{name:40} {random:3} {climbed:3}   {micros:.0} us an evaluation");
     }
@@ -84,15 +94,24 @@ fn comparators(
     full: bool,
 ) -> Result<Vec<(String, Score)>, Box<dyn std::error::Error>> {
     let mut all: Vec<(String, Score)> = Vec::new();
-    let chamfer = |name: &str, o: ChamferOptions| -> Result<(String, Score), Box<dyn std::error::Error>> {
-        let c = Chamfer::prepare(map, size, size, &o)?;
-        let mut scratch = Scratch::default();
-        Ok((name.to_string(), Box::new(move |e: &Elements<'_>| c.log_likelihood_with(e, &mut scratch)) as Score))
-    };
-    let ratio = |name: &str, o: ContourRatioOptions| -> Result<(String, Score), Box<dyn std::error::Error>> {
+    let chamfer =
+        |name: &str, o: ChamferOptions| -> Result<(String, Score), Box<dyn std::error::Error>> {
+            let c = Chamfer::prepare(map, size, size, &o)?;
+            let mut scratch = Scratch::default();
+            Ok((
+                name.to_string(),
+                Box::new(move |e: &Elements<'_>| c.log_likelihood_with(e, &mut scratch)) as Score,
+            ))
+        };
+    let ratio = |name: &str,
+                 o: ContourRatioOptions|
+     -> Result<(String, Score), Box<dyn std::error::Error>> {
         let c = ContourRatio::prepare(map, size, size, &o)?;
         let mut scratch = contour_ratio::Scratch::default();
-        Ok((name.to_string(), Box::new(move |e: &Elements<'_>| c.log_likelihood_with(e, &mut scratch)) as Score))
+        Ok((
+            name.to_string(),
+            Box::new(move |e: &Elements<'_>| c.log_likelihood_with(e, &mut scratch)) as Score,
+        ))
     };
     let (co, ro) = (ChamferOptions::default, ContourRatioOptions::default);
     all.push(chamfer("one-sided chamfer", co())?);

@@ -1,4 +1,5 @@
-//! Silhouettes as sub-pixel outlines: a blurred mask and its half level by marching squares.
+//! Silhouettes as sub-pixel outlines: a blurred mask and its half level by marching
+//! squares.
 
 use pcadlang::vision::elements::Elements;
 
@@ -50,7 +51,15 @@ impl Outline {
     /// For the comparators.
     pub fn elements(&self) -> Elements<'_> {
         let (width, height) = (self.size as u32, self.size as u32);
-        Elements { x: &self.x, y: &self.y, tx: &self.tx, ty: &self.ty, length: &self.length, width, height }
+        Elements {
+            x: &self.x,
+            y: &self.y,
+            tx: &self.tx,
+            ty: &self.ty,
+            length: &self.length,
+            width,
+            height,
+        }
     }
 }
 

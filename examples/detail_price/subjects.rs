@@ -38,13 +38,17 @@ impl Subject {
     pub fn at(&self, i: usize) -> Result<Solid, GeomError> {
         let mut rng = Uniform(i as u64 + 1);
         let size = rng.between(0.5, 1.0);
-        let turn = DVec3::new(rng.between(-0.5, 0.5), rng.between(-3.0, 3.0), rng.between(-0.4, 0.4));
-        let shift = DVec3::new(rng.between(-0.2, 0.2), rng.between(-0.2, 0.2), rng.between(-1.0, 1.0));
+        let turn =
+            DVec3::new(rng.between(-0.5, 0.5), rng.between(-3.0, 3.0), rng.between(-0.4, 0.4));
+        let shift =
+            DVec3::new(rng.between(-0.2, 0.2), rng.between(-0.2, 0.2), rng.between(-1.0, 1.0));
         let (solid, unit) = match &self.make {
             Make::Lathe => (vase(&mut rng)?, 1.9),
             Make::Mesh(solid) => (solid.clone(), 1.4),
             Make::Body(body) => {
-                let mut joint = |_| JointPose::turned(DVec3::from_array([0; 3].map(|_| rng.between(-0.25, 0.25))));
+                let mut joint = |_| {
+                    JointPose::turned(DVec3::from_array([0; 3].map(|_| rng.between(-0.25, 0.25))))
+                };
                 let pose: Vec<JointPose> = (0..body.rig().joints().len()).map(&mut joint).collect();
                 let middle = Affine::new(DVec3::new(0.0, -0.85, 0.0), DVec3::ZERO, DVec3::ONE);
                 (body.posed(&pose, &Rules::default())?.placed(middle), 2.0)
@@ -70,10 +74,14 @@ fn vase(rng: &mut Uniform) -> Result<Solid, GeomError> {
 pub fn dense() -> Result<Mesh, GeomError> {
     let (rows, columns) = (225u32, 224u32);
     let point = |row: u32, column: u32| {
-        let (a, b) =
-            (std::f32::consts::PI * row as f32 / rows as f32, std::f32::consts::TAU * column as f32 / columns as f32);
-        let way = Vec3::new(libm::sinf(a) * libm::cosf(b), libm::cosf(a), libm::sinf(a) * libm::sinf(b));
-        let lumps = libm::sinf(4.0 * way.x + 1.0) * libm::sinf(5.0 * way.y) * libm::sinf(3.0 * way.z + 2.0);
+        let (a, b) = (
+            std::f32::consts::PI * row as f32 / rows as f32,
+            std::f32::consts::TAU * column as f32 / columns as f32,
+        );
+        let way =
+            Vec3::new(libm::sinf(a) * libm::cosf(b), libm::cosf(a), libm::sinf(a) * libm::sinf(b));
+        let lumps =
+            libm::sinf(4.0 * way.x + 1.0) * libm::sinf(5.0 * way.y) * libm::sinf(3.0 * way.z + 2.0);
         way * (1.0 + 0.25 * lumps + 0.03 * libm::sinf(17.0 * way.x) * libm::sinf(19.0 * way.y))
     };
     let mut positions = vec![point(0, 0)];
@@ -89,7 +97,9 @@ pub fn dense() -> Result<Mesh, GeomError> {
         for column in 0..columns {
             let [a, b] = [column, column + 1].map(|c| at(row, c));
             let [d, c] = [column, column + 1].map(|c| at(row + 1, c));
-            triangles.extend([[a, b, c], [a, c, d]].into_iter().filter(|t| t[0] != t[1] && t[1] != t[2]));
+            triangles.extend(
+                [[a, b, c], [a, c, d]].into_iter().filter(|t| t[0] != t[1] && t[1] != t[2]),
+            );
         }
     }
     let parts = vec![0; triangles.len()];

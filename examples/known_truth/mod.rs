@@ -1,4 +1,5 @@
-//! What the examples of recovery share: a shipped program observing clean contours, those of one of its own draws.
+//! What the examples of recovery share: a shipped program observing clean contours, those
+//! of one of its own draws.
 
 use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::load::embedded;
@@ -14,15 +15,21 @@ use std::sync::Arc;
 pub const SIZE: u32 = 256;
 
 /// Where values are drawn that no observation asks for.
-pub const DRAWS: fn() -> Draws = || Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
+pub const DRAWS: fn() -> Draws =
+    || Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
 
 /// A number from the command line.
 pub fn argument(i: usize, default: u64) -> u64 {
     std::env::args().nth(i).and_then(|a| a.parse().ok()).unwrap_or(default)
 }
 
-/// A program over a contour map, with these parameters and those of the command line after the first two arguments.
-pub fn compile(program: &str, settings: &[(&str, &str)], map: ContourMap) -> Result<Model, pcadlang::Error> {
+/// A program over a contour map, with these parameters and those of the command line
+/// after the first two arguments.
+pub fn compile(
+    program: &str,
+    settings: &[(&str, &str)],
+    map: ContourMap,
+) -> Result<Model, pcadlang::Error> {
     let image = Value::object(ImageValue::contours(map, None));
     let program = Program::parse(embedded(program).unwrap_or_default())?
         .observe("photo", image)
@@ -30,7 +37,12 @@ pub fn compile(program: &str, settings: &[(&str, &str)], map: ContourMap) -> Res
         .set("clean", "true");
     let given: Vec<String> = std::env::args().skip(3).collect();
     let given = given.iter().filter_map(|s| s.split_once('='));
-    settings.iter().copied().chain(given).fold(program, |p, (name, value)| p.set(name, value)).compile()
+    settings
+        .iter()
+        .copied()
+        .chain(given)
+        .fold(program, |p, (name, value)| p.set(name, value))
+        .compile()
 }
 
 /// A draw from the prior that lies within the picture: its trace and contours.
@@ -64,7 +76,8 @@ pub fn global(trace: &mut Trace, name: &str) -> Value {
 
 /// The log joint density of a draw under another observation.
 pub fn score(model: &Model, truth: &Trace) -> f64 {
-    let rebuilt = Trace::generate(Arc::clone(model.code()), truth.constraints(), DRAWS(), Default::default());
+    let rebuilt =
+        Trace::generate(Arc::clone(model.code()), truth.constraints(), DRAWS(), Default::default());
     rebuilt.map_or(f64::NAN, |(t, _)| t.log_joint())
 }
 

@@ -1,5 +1,5 @@
-//! The plain way, as the peers have it: edge functions pixel by pixel, contours where depth jumps or bends, the mean of the distance
-//! transform at contour pixels.
+//! The plain way, as the peers have it: edge functions pixel by pixel, contours where
+//! depth jumps or bends, the mean of the distance transform at contour pixels.
 
 use super::{Pose, Raw};
 use pcadlang::vision::distance_transform::distance_transform;
@@ -32,7 +32,8 @@ impl<'a> Plain<'a> {
         let size = self.size as u32;
         let map = distance_transform(size, size, self.contour(pose));
         let at = |i: usize| ((i % self.size) as f32 + 0.5, (i / self.size) as f32 + 0.5);
-        self.distance = (0..self.size * self.size).map(|i| map.sample(at(i).0, at(i).1).0).collect();
+        self.distance =
+            (0..self.size * self.size).map(|i| map.sample(at(i).0, at(i).1).0).collect();
     }
 
     /// Depth along the viewing axis, infinite off the object.
@@ -41,9 +42,18 @@ impl<'a> Plain<'a> {
         let focal = half / 22.5f32.to_radians().tan();
         self.depth.fill(f32::INFINITY);
         for (to, v) in self.points.iter_mut().zip(&self.raw.vertices) {
-            let row = |r: usize| pose[4 * r] * v[0] + pose[4 * r + 1] * v[1] + pose[4 * r + 2] * v[2] + pose[4 * r + 3];
+            let row = |r: usize| {
+                pose[4 * r] * v[0]
+                    + pose[4 * r + 1] * v[1]
+                    + pose[4 * r + 2] * v[2]
+                    + pose[4 * r + 3]
+            };
             let inverse = -1.0 / row(2);
-            *to = [half - 0.5 + focal * row(0) * inverse, half - 0.5 - focal * row(1) * inverse, inverse];
+            *to = [
+                half - 0.5 + focal * row(0) * inverse,
+                half - 0.5 - focal * row(1) * inverse,
+                inverse,
+            ];
         }
         for t in &self.raw.triangles {
             let [a, b, c] = t.map(|i| self.points[i as usize]);
@@ -59,7 +69,9 @@ impl<'a> Plain<'a> {
             for y in top..=bottom {
                 let mut u = ax * (left as f32 - c[0]) + ay * (y as f32 - c[1]);
                 let mut v = bx * (left as f32 - c[0]) + by * (y as f32 - c[1]);
-                for pixel in &mut self.depth[y as usize * size + left as usize..=y as usize * size + right as usize] {
+                for pixel in &mut self.depth
+                    [y as usize * size + left as usize..=y as usize * size + right as usize]
+                {
                     let w = 1.0 - u - v;
                     if u >= 0.0 && v >= 0.0 && w >= 0.0 {
                         let d = 1.0 / (u * a[2] + v * b[2] + w * c[2]);

@@ -7,9 +7,13 @@ use std::sync::Arc;
 
 /// A human body: `human.lod2` (coarse), `human.lod1` or `human`.
 pub fn human(lod: &str) -> Result<Arc<Armature>, GeomError> {
-    let file = |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
+    let file =
+        |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
     let rig = rig_from_json(file("rig.json"))?;
     let mesh = obj::indexed(file("obj"))?;
     let morphs = morphs_from_json(file("morphs.json"), &rig.rig)?;
-    Ok(Arc::new(Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences)?.with_morphs(morphs)?))
+    Ok(Arc::new(
+        Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences)?
+            .with_morphs(morphs)?,
+    ))
 }

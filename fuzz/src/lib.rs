@@ -1,6 +1,8 @@
-//! What fuzzing tries, one function a target: whatever the bytes, a result or an error, no panic, and what was read can be used.
+//! What fuzzing tries, one function a target: whatever the bytes, a result or an error,
+//! no panic, and what was read can be used.
 //!
-//! `tests/fuzz.rs` compiles these functions as well and runs them on seeds and on every input that once went wrong.
+//! `tests/fuzz.rs` compiles these functions as well and runs them on seeds and on every
+//! input that once went wrong.
 
 use pcadlang::bank::Bank;
 use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
@@ -31,7 +33,8 @@ fn data(kind: &str, file: &str, bytes: &[u8], beside: &[u8]) -> bool {
     load(kind, file, bytes, &Options::default(), &|_| Ok(beside.to_vec())).is_ok()
 }
 
-/// A program's text: every mistake can be shown, and what has none is printed and read back the same.
+/// A program's text: every mistake can be shown, and what has none is printed and read
+/// back the same.
 pub fn program_text(bytes: &[u8]) {
     let mut sources = SourceMap::new();
     let Ok(file) = sources.add_bytes("fuzz.pcad", bytes) else { return };
@@ -62,7 +65,13 @@ pub fn program(bytes: &[u8]) {
 
 fn run(model: &Model) {
     let time = Some(Duration::from_millis(500));
-    let options = RunOptions { steps: Some(20), warmup: Some(10), time, limits: small(), ..RunOptions::default() };
+    let options = RunOptions {
+        steps: Some(20),
+        warmup: Some(10),
+        time,
+        limits: small(),
+        ..RunOptions::default()
+    };
     match model.run(&options, 1, 1) {
         Ok(posterior) => {
             let last = &posterior.chains[0].last;
@@ -75,7 +84,13 @@ fn run(model: &Model) {
 
 /// Limits under which a program takes a fraction of a second.
 fn small() -> Limits {
-    Limits { depth: 200, nodes: 20_000, elements: 1_000_000, operations: 100_000, ..Limits::default() }
+    Limits {
+        depth: 200,
+        nodes: 20_000,
+        elements: 1_000_000,
+        operations: 100_000,
+        ..Limits::default()
+    }
 }
 
 /// What a saved trace gives when loaded is saved as the same.
@@ -113,7 +128,8 @@ pub fn gltf(bytes: &[u8]) {
     data("armature", "x.gltf", bytes, &beside);
 }
 
-/// A rig file, then a zero byte, then the file beside it, which stands for its mesh and its morphs.
+/// A rig file, then a zero byte, then the file beside it, which stands for its mesh and
+/// its morphs.
 pub fn rig(bytes: &[u8]) {
     let (rig, beside) = match bytes.iter().position(|b| *b == 0) {
         Some(i) => (&bytes[..i], &bytes[i + 1..]),
@@ -156,7 +172,8 @@ pub fn array(bytes: &[u8]) {
     }
 }
 
-/// A camera: what is read has numbers that are finite, and is written and read back the same.
+/// A camera: what is read has numbers that are finite, and is written and read back the
+/// same.
 pub fn camera(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Camera::from_json(text) {
@@ -194,7 +211,8 @@ pub fn trace(bytes: &[u8]) {
     reload(traced(), &saved);
 }
 
-/// The program whose chains go on from checkpoints: kernels that remember much, statements within statements.
+/// The program whose chains go on from checkpoints: kernels that remember much,
+/// statements within statements.
 const BROKEN_OFF: &str = "
 assume m ~ normal(0, 5); assume s ~ half_normal(2); assume c ~ flip(0.5);
 assume d = if c { e ~ normal(0, 1); e } else { 0 };
@@ -282,11 +300,14 @@ pub fn checkpoint(bytes: &[u8]) {
     }
 }
 
-/// A bank: its header, every kind of entry, and a search. The hash of the header is put right, or nothing would get past it.
+/// A bank: its header, every kind of entry, and a search. The hash of the header is put
+/// right, or nothing would get past it.
 pub fn bank(bytes: &[u8]) {
     let mut bytes = bytes.to_vec();
-    let header =
-        bytes.get(40..48).and_then(|w| w.try_into().ok()).map_or(usize::MAX, |w| u64::from_le_bytes(w) as usize);
+    let header = bytes
+        .get(40..48)
+        .and_then(|w| w.try_into().ok())
+        .map_or(usize::MAX, |w| u64::from_le_bytes(w) as usize);
     if let Some(hash) = bytes.get(header..).map(fnv1a)
         && let Some(place) = bytes.get_mut(48..56)
     {
@@ -352,7 +373,9 @@ pub fn network(bytes: &[u8]) {
 /// A picture that forests look at.
 fn looked_at() -> &'static Photo {
     static PHOTO: OnceLock<Photo> = OnceLock::new();
-    let read = || photo::decode(include_bytes!("../../examples/images/table_lamp.png"), &Pixels::default());
+    let read = || {
+        photo::decode(include_bytes!("../../examples/images/table_lamp.png"), &Pixels::default())
+    };
     PHOTO.get_or_init(|| read().unwrap_or_else(|e| panic!("{e}")).shrunk(48))
 }
 

@@ -1,4 +1,5 @@
-//! The networks with which `pcadlang` finds people: unmodified files of MediaPipe, under the Apache License 2.0.
+//! The networks with which `pcadlang` finds people: unmodified files of MediaPipe, under
+//! the Apache License 2.0.
 
 #![no_std]
 

@@ -19,7 +19,8 @@ pub struct TestProgram {
 /// What the copy lacks.
 const LEFT_OUT: [&str; 3] = ["target", ".git", "mutants"];
 
-/// Copies the project but for some files, which are written otherwise; files that are as they were are left alone.
+/// Copies the project but for some files, which are written otherwise; files that are as
+/// they were are left alone.
 pub fn copy(from: &Path, to: &Path, without: &[PathBuf]) -> Result<(), Failure> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from)? {
@@ -52,7 +53,10 @@ type Places = BTreeMap<PathBuf, Vec<(Range<usize>, usize)>>;
 
 fn write(root: &Path, copy: &Path, mutants: &[Mutant]) -> Result<Places, Failure> {
     let mut by_file: BTreeMap<&Path, Vec<(usize, &Mutant)>> = BTreeMap::new();
-    mutants.iter().enumerate().for_each(|(id, m)| by_file.entry(&m.file).or_default().push((id, m)));
+    mutants
+        .iter()
+        .enumerate()
+        .for_each(|(id, m)| by_file.entry(&m.file).or_default().push((id, m)));
     let mut places = Places::new();
     for (file, own) in by_file {
         let (text, at) = rewritten(&std::fs::read_to_string(file)?, &own);
@@ -76,7 +80,10 @@ fn cargo(copy: &Path, args: &[&str]) -> Result<(bool, Vec<Value>), Failure> {
         .env("CARGO_TARGET_DIR", copy.join("target"))
         .stderr(Stdio::inherit())
         .output()?;
-    let lines = String::from_utf8_lossy(&out.stdout).lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
+    let lines = String::from_utf8_lossy(&out.stdout)
+        .lines()
+        .filter_map(|l| serde_json::from_str(l).ok())
+        .collect();
     Ok((out.status.success(), lines))
 }
 
@@ -86,7 +93,10 @@ fn blamed(messages: &[Value], places: &Places) -> (BTreeSet<usize>, Vec<String>)
     for m in messages.iter().map(|m| &m["message"]).filter(|m| m["level"] == "error") {
         let mut found = false;
         for span in m["spans"].as_array().into_iter().flatten() {
-            let (Some(file), Some(at)) = (span["file_name"].as_str(), span["byte_start"].as_u64()) else { continue };
+            let (Some(file), Some(at)) = (span["file_name"].as_str(), span["byte_start"].as_u64())
+            else {
+                continue;
+            };
             let inside = |(range, _): &&(Range<usize>, usize)| range.contains(&(at as usize));
             let all = places.get(Path::new(file)).into_iter().flatten().filter(inside);
             // The innermost one.
@@ -102,8 +112,13 @@ fn blamed(messages: &[Value], places: &Places) -> (BTreeSet<usize>, Vec<String>)
     (out, others)
 }
 
-/// Builds the tests; mutants that do not compile go. Those are kept in a file, so that another run builds nothing again.
-pub fn build(root: &Path, copy: &Path, mutants: &mut Vec<Mutant>) -> Result<Vec<TestProgram>, Failure> {
+/// Builds the tests; mutants that do not compile go. Those are kept in a file, so that
+/// another run builds nothing again.
+pub fn build(
+    root: &Path,
+    copy: &Path,
+    mutants: &mut Vec<Mutant>,
+) -> Result<Vec<TestProgram>, Failure> {
     let list = copy.join("do-not-compile.txt");
     let mut known = std::fs::read_to_string(&list).unwrap_or_default();
     loop {

@@ -59,7 +59,10 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
                 if name != "tests" {
                     open.push(path);
                 }
-            } else if path.extension().is_some_and(|e| e == "rs") && !name.ends_with("tests") && name != "testing" {
+            } else if path.extension().is_some_and(|e| e == "rs")
+                && !name.ends_with("tests")
+                && name != "testing"
+            {
                 all.push(path);
             }
         }
@@ -71,8 +74,14 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn of_file(root: &Path, file: &Path, into: &mut Vec<(u64, Mutant)>) -> Result<(), Failure> {
     let text = std::fs::read_to_string(file)?;
     let syntax = syn::parse_file(&text).map_err(|e| format!("{}: {e}", file.display()))?;
-    let mut finder =
-        Finder { file, name: within(root, file), text: &text, function: String::new(), seen: HashMap::new(), into };
+    let mut finder = Finder {
+        file,
+        name: within(root, file),
+        text: &text,
+        function: String::new(),
+        seen: HashMap::new(),
+        into,
+    };
     finder.visit_file(&syntax);
     Ok(())
 }
@@ -88,16 +97,25 @@ struct Finder<'a> {
 
 /// FNV-1a, then mixed: the same on any machine.
 fn hash(text: &str) -> u64 {
-    let h = text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
+    let h = text
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
     let h = (h ^ (h >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
     h ^ (h >> 33)
 }
 
 impl Finder<'_> {
     /// `seldom` divides the chance to be chosen.
-    fn add(&mut self, whole: Span, change: &str, replaced: Vec<(Range<usize>, String)>, seldom: u64) {
+    fn add(
+        &mut self,
+        whole: Span,
+        change: &str,
+        replaced: Vec<(Range<usize>, String)>,
+        seldom: u64,
+    ) {
         let range = whole.byte_range();
-        let snippet: String = self.text[range.clone()].split_whitespace().collect::<Vec<_>>().join(" ");
+        let snippet: String =
+            self.text[range.clone()].split_whitespace().collect::<Vec<_>>().join(" ");
         let snippet: String = snippet.chars().take(70).collect();
         let base = format!("{} {}: `{snippet}`: {change}", self.name, self.function);
         let n = self.seen.entry(base.clone()).or_default();
@@ -105,7 +123,8 @@ impl Finder<'_> {
         let key = if *n == 1 { base } else { format!("{base} ({n})") };
         let order = (hash(&key) / 8).saturating_mul(seldom);
         let line = whole.start().line;
-        self.into.push((order, Mutant { file: self.file.to_path_buf(), line, key, range, replaced }));
+        self.into
+            .push((order, Mutant { file: self.file.to_path_buf(), line, key, range, replaced }));
     }
 }
 
@@ -218,9 +237,21 @@ impl<'ast> Visit<'ast> for Finder<'_> {
 
     fn visit_expr_method_call(&mut self, e: &'ast syn::ExprMethodCall) {
         let name = e.method.to_string();
-        let pairs = [("min", "max"), ("max", "min"), ("any", "all"), ("all", "any"), ("cos", "sin"), ("sin", "cos")];
+        let pairs = [
+            ("min", "max"),
+            ("max", "min"),
+            ("any", "all"),
+            ("all", "any"),
+            ("cos", "sin"),
+            ("sin", "cos"),
+        ];
         if let Some((_, other)) = pairs.iter().find(|(n, _)| *n == name) {
-            self.add(e.span(), &format!("{name} to {other}"), vec![(e.method.span().byte_range(), (*other).into())], 1);
+            self.add(
+                e.span(),
+                &format!("{name} to {other}"),
+                vec![(e.method.span().byte_range(), (*other).into())],
+                1,
+            );
         }
         visit::visit_expr_method_call(self, e);
     }
@@ -232,7 +263,9 @@ impl<'ast> Visit<'ast> for Finder<'_> {
                 .ok()
                 .map(|v| if v == 0.0 { 1.0 } else { 1.5 * v })
                 .map(|v| format!("{v:?}{}", f.suffix())),
-            Lit::Int(i) => i.base10_parse::<u64>().ok().map(|v| format!("{}{}", v.wrapping_add(1), i.suffix())),
+            Lit::Int(i) => {
+                i.base10_parse::<u64>().ok().map(|v| format!("{}{}", v.wrapping_add(1), i.suffix()))
+            }
             Lit::Bool(b) => Some((!b.value).to_string()),
             _ => None,
         };

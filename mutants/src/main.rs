@@ -1,11 +1,13 @@
-//! Mutation testing by schemata: many small errors are built into one copy of the library, each behind a number, and the tests run
-//! once for each number. What no test notices is a survivor: a test is missing, or the error makes no difference.
+//! Mutation testing by schemata: many small errors are built into one copy of the
+//! library, each behind a number, and the tests run once for each number. What no test
+//! notices is a survivor: a test is missing, or the error makes no difference.
 //!
 //!     cargo run --release --manifest-path mutants/Cargo.toml -- [--mutants N] [--minutes M] [--patience SECONDS] [--jobs J]
 //!         [--work DIR]
 //!
-//! Run from the project's root. Results are kept in `mutants/results.jsonl`, one line a mutant, and what is there is not run again: a
-//! run that was stopped goes on. A mutant is known by its file, function and text, so edits elsewhere leave it as it is.
+//! Run from the project's root. Results are kept in `mutants/results.jsonl`, one line a
+//! mutant, and what is there is not run again: a run that was stopped goes on. A mutant
+//! is known by its file, function and text, so edits elsewhere leave it as it is.
 
 #![forbid(unsafe_code)]
 
@@ -21,7 +23,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// What is mutated.
-const FOLDERS: [&str; 6] = ["src/infer", "src/trace", "src/dist", "src/rng", "src/render", "src/vision"];
+const FOLDERS: [&str; 6] =
+    ["src/infer", "src/trace", "src/dist", "src/rng", "src/render", "src/vision"];
 
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -35,8 +38,13 @@ struct Options {
 }
 
 fn options() -> Result<Options, Failure> {
-    let mut o =
-        Options { mutants: 480, minutes: 24 * 60, patience: 3600, jobs: 1, work: PathBuf::from("target/mutants") };
+    let mut o = Options {
+        mutants: 480,
+        minutes: 24 * 60,
+        patience: 3600,
+        jobs: 1,
+        work: PathBuf::from("target/mutants"),
+    };
     let mut args = std::env::args().skip(1);
     while let Some(name) = args.next() {
         let value = args.next().ok_or_else(|| format!("{name} needs a value"))?;
@@ -66,7 +74,8 @@ fn main() -> Result<(), Failure> {
     let copy = if o.work.is_absolute() { o.work.clone() } else { root.join(&o.work) };
     let mut mutants = find::select(&root, &FOLDERS, o.mutants)?;
     println!("{} mutants chosen", mutants.len());
-    let rewritten: Vec<PathBuf> = mutants.iter().map(|m| m.file.clone()).chain([root.join("src/lib.rs")]).collect();
+    let rewritten: Vec<PathBuf> =
+        mutants.iter().map(|m| m.file.clone()).chain([root.join("src/lib.rs")]).collect();
     build::copy(&root, &copy, &rewritten)?;
     let tests = build::build(&root, &copy, &mut mutants)?;
     println!("{} of them compile; {} test programs", mutants.len(), tests.len());

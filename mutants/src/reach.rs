@@ -17,9 +17,13 @@ pub struct Reached {
     pub unnamed: Vec<bool>,
 }
 
-/// Runs all test programs that pass without a mutant, the quick ones first. What a program came by is kept beside the copy's builds, until
-/// it is built anew.
-pub fn reached(copy: &Path, tests: &[TestProgram], mutants: usize) -> Result<Vec<Reached>, Failure> {
+/// Runs all test programs that pass without a mutant, the quick ones first. What a
+/// program came by is kept beside the copy's builds, until it is built anew.
+pub fn reached(
+    copy: &Path,
+    tests: &[TestProgram],
+    mutants: usize,
+) -> Result<Vec<Reached>, Failure> {
     let mut all = Vec::new();
     for test in tests {
         // The library and the command have the same name.
@@ -35,7 +39,9 @@ pub fn reached(copy: &Path, tests: &[TestProgram], mutants: usize) -> Result<Vec
         for file in std::fs::read_dir(&folder)? {
             for line in std::fs::read_to_string(file?.path())?.lines() {
                 let Some((id, name)) = line.split_once('\t') else { continue };
-                let Some(id) = id.parse::<usize>().ok().filter(|id| *id < mutants) else { continue };
+                let Some(id) = id.parse::<usize>().ok().filter(|id| *id < mutants) else {
+                    continue;
+                };
                 if name.is_empty() || name == "main" {
                     r.unnamed[id] = true;
                 } else {

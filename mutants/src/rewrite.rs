@@ -1,9 +1,11 @@
-//! A file with its mutants built in: `(if on(7) { changed } else { as it was })`, within each other where they are.
+//! A file with its mutants built in: `(if on(7) { changed } else { as it was })`, within
+//! each other where they are.
 
 use crate::find::Mutant;
 use std::ops::Range;
 
-/// The text of a file with these mutants, given with their numbers, and where each ended up.
+/// The text of a file with these mutants, given with their numbers, and where each ended
+/// up.
 pub fn rewritten(text: &str, mutants: &[(usize, &Mutant)]) -> (String, Vec<(Range<usize>, usize)>) {
     let mut r = Rewrite { text, out: String::with_capacity(text.len() * 2), places: Vec::new() };
     let mut sorted = mutants.to_vec();
@@ -19,8 +21,14 @@ struct Rewrite<'a> {
 }
 
 impl Rewrite<'_> {
-    /// Writes a range with the mutants in it, sorted, outer ones first; some parts are replaced, and mutants there left out.
-    fn range(&mut self, range: Range<usize>, mutants: &[(usize, &Mutant)], replaced: &[(Range<usize>, String)]) {
+    /// Writes a range with the mutants in it, sorted, outer ones first; some parts are
+    /// replaced, and mutants there left out.
+    fn range(
+        &mut self,
+        range: Range<usize>,
+        mutants: &[(usize, &Mutant)],
+        replaced: &[(Range<usize>, String)],
+    ) {
         let mut at = range.start;
         let mut rest = mutants;
         loop {
@@ -28,7 +36,9 @@ impl Rewrite<'_> {
             let next = rest.iter().position(|(_, m)| m.range.start >= at);
             let mutant = next.map(|i| (i, rest[i]));
             match (next_part, mutant) {
-                (Some((part, new)), m) if m.is_none_or(|(_, (_, m))| part.start <= m.range.start) => {
+                (Some((part, new)), m)
+                    if m.is_none_or(|(_, (_, m))| part.start <= m.range.start) =>
+                {
                     self.out.push_str(&self.text[at..part.start]);
                     self.out.push_str(new);
                     at = part.end;
@@ -38,16 +48,21 @@ impl Rewrite<'_> {
                 }
                 (_, Some((i, (id, m)))) => {
                     self.out.push_str(&self.text[at..m.range.start]);
-                    let inside: Vec<(usize, &Mutant)> =
-                        rest[i + 1..].iter().filter(|(_, o)| o.range.end <= m.range.end).copied().collect();
+                    let inside: Vec<(usize, &Mutant)> = rest[i + 1..]
+                        .iter()
+                        .filter(|(_, o)| o.range.end <= m.range.end)
+                        .copied()
+                        .collect();
                     let begin = self.out.len();
                     self.out.push_str(&format!("(if crate::mutation::on({id}) {{ "));
                     // What is replaced must not be hidden by another mutant about it.
                     let beside = |o: &Mutant| {
-                        let meets = |r: &Range<usize>| o.range.start < r.end && r.start < o.range.end;
+                        let meets =
+                            |r: &Range<usize>| o.range.start < r.end && r.start < o.range.end;
                         !m.replaced.iter().any(|(r, _)| meets(r))
                     };
-                    let others: Vec<_> = inside.iter().filter(|(_, o)| beside(o)).copied().collect();
+                    let others: Vec<_> =
+                        inside.iter().filter(|(_, o)| beside(o)).copied().collect();
                     self.range(m.range.clone(), &others, &m.replaced);
                     self.out.push_str(" } else { ");
                     self.range(m.range.clone(), &inside, &[]);
@@ -70,7 +85,8 @@ impl Rewrite<'_> {
         replaced: &[(Range<usize>, String)],
         done: &Range<usize>,
     ) {
-        let later: Vec<_> = replaced.iter().filter(|(r, _)| r.start > done.start).cloned().collect();
+        let later: Vec<_> =
+            replaced.iter().filter(|(r, _)| r.start > done.start).cloned().collect();
         self.range(range, mutants, &later);
     }
 }

@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 /// More tests than these are run as a whole program.
 const SINGLE: usize = 60;
 
-/// Runs what is not known yet, until there is no time left. A mutant that `patience` of tests have not caught is given up.
+/// Runs what is not known yet, until there is no time left. A mutant that `patience` of
+/// tests have not caught is given up.
 pub fn all(
     copy: &Path,
     mutants: &[Mutant],
@@ -51,8 +52,14 @@ pub fn all(
     failed.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
-/// What catches a mutant: single tests that come by it, then whole programs where others may.
-fn one(copy: &Path, id: usize, reached: &[Reached], patience: Duration) -> Result<Option<String>, Failure> {
+/// What catches a mutant: single tests that come by it, then whole programs where others
+/// may.
+fn one(
+    copy: &Path,
+    id: usize,
+    reached: &[Reached],
+    patience: Duration,
+) -> Result<Option<String>, Failure> {
     let few = |r: &&Reached| r.tests[id].len() <= SINGLE;
     let until = Instant::now() + patience;
     for r in reached.iter().filter(|r| !r.tests[id].is_empty()).filter(few) {
@@ -91,7 +98,9 @@ fn fails(copy: &Path, id: usize, r: &Reached, tests: Vec<&str>) -> Result<Option
     if let Some(out) = child.stdout.take() {
         std::thread::spawn(move || {
             for line in BufReader::new(out).lines().map_while(Result::ok) {
-                if let Some(name) = line.strip_prefix("test ").and_then(|l| l.strip_suffix(" ... FAILED")) {
+                if let Some(name) =
+                    line.strip_prefix("test ").and_then(|l| l.strip_suffix(" ... FAILED"))
+                {
                     let _ = send.send(name.to_owned());
                 }
             }

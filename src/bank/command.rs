@@ -1,4 +1,5 @@
-//! Features from a detector of the user's own: a command that reads a picture and prints numbers.
+//! Features from a detector of the user's own: a command that reads a picture and prints
+//! numbers.
 
 use super::BankError;
 use crate::report::pictures::png;
@@ -22,27 +23,36 @@ impl Drop for Temporary {
     }
 }
 
-/// Runs a command on a picture and reads the numbers it prints, separated by white space or commas. The words of the command
-/// are its program and arguments (no shell reads them); in each, `{png}` stands for the picture's file.
+/// Runs a command on a picture and reads the numbers it prints, separated by white space
+/// or commas. The words of the command are its program and arguments (no shell reads
+/// them); in each, `{png}` stands for the picture's file.
 ///
 /// # Errors
 /// If it cannot be run, fails, or prints anything but finite numbers.
 pub(super) fn features(command: &str, picture: &RgbImage) -> Result<Vec<f32>, BankError> {
     let wrong = |what: String| BankError::Command(format!("`{command}`: {what}"));
     if !command.contains(PICTURE) {
-        return Err(wrong(format!("the command must contain `{PICTURE}` where the picture's file goes")));
+        return Err(wrong(format!(
+            "the command must contain `{PICTURE}` where the picture's file goes"
+        )));
     }
     if cfg!(target_family = "wasm") {
         return Err(wrong("commands cannot be run on this platform".into()));
     }
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    let file = Temporary(std::env::temp_dir().join(format!("pcadlang-{}-{number}.png", std::process::id())));
+    let file = Temporary(
+        std::env::temp_dir().join(format!("pcadlang-{}-{number}.png", std::process::id())),
+    );
     let bytes = png(picture).map_err(|e| wrong(e.to_string()))?;
-    std::fs::write(&file.0, bytes).map_err(|e| wrong(format!("cannot write {}: {e}", file.0.display())))?;
+    std::fs::write(&file.0, bytes)
+        .map_err(|e| wrong(format!("cannot write {}: {e}", file.0.display())))?;
     let path = file.0.to_string_lossy();
     let mut words = command.split_whitespace().map(|w| w.replace(PICTURE, &path));
     let program = words.next().unwrap_or_default();
-    let done = Command::new(&program).args(words).output().map_err(|e| wrong(format!("cannot run {program}: {e}")))?;
+    let done = Command::new(&program)
+        .args(words)
+        .output()
+        .map_err(|e| wrong(format!("cannot run {program}: {e}")))?;
     if !done.status.success() {
         let said = String::from_utf8_lossy(&done.stderr);
         let last = said.lines().last().unwrap_or_default();

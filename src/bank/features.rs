@@ -48,16 +48,26 @@ impl Features {
             }
             Features::Keypoints { .. } => {
                 let (width, height) = (view.camera().width, view.camera().height);
-                let at: Vec<_> = ViewValue(Arc::clone(view)).landmarks(width, height).map(|(_, at)| at).collect();
+                let at: Vec<_> = ViewValue(Arc::clone(view))
+                    .landmarks(width, height)
+                    .map(|(_, at)| at)
+                    .collect();
                 match at.is_empty() {
-                    true => Err(BankError::Observed("the scene has no landmarks; use other features".into())),
+                    true => Err(BankError::Observed(
+                        "the scene has no landmarks; use other features".into(),
+                    )),
                     false => Ok(features::keypoint_features(&at, width, height)),
                 }
             }
             Features::Command { command, size } => {
                 let f = view.frame(*size);
-                let drawn =
-                    Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal, part: &f.part };
+                let drawn = Drawn {
+                    width: f.width,
+                    height: f.height,
+                    depth: &f.depth,
+                    normal: &f.normal,
+                    part: &f.part,
+                };
                 command::features(command, &shaded(&drawn))
             }
         }
@@ -98,7 +108,15 @@ impl Features {
 }
 
 fn elements(c: &Contours) -> Elements<'_> {
-    Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
+    Elements {
+        x: &c.x,
+        y: &c.y,
+        tx: &c.tx,
+        ty: &c.ty,
+        length: &c.length,
+        width: c.width,
+        height: c.height,
+    }
 }
 
 /// What a run observes that features can be found of.
@@ -109,23 +127,28 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// What a program is given: the first of its pictures, and the first of its sets of keypoints that has any.
+    /// What a program is given: the first of its pictures, and the first of its sets of
+    /// keypoints that has any.
     pub fn of(model: &Model) -> Observed {
         // What is given is a constant of the program.
-        let first = |fits: fn(&Value) -> bool| model.code().consts.iter().find(|v| fits(v)).cloned();
+        let first =
+            |fits: fn(&Value) -> bool| model.code().consts.iter().find(|v| fits(v)).cloned();
         Observed {
             image: first(|v| v.downcast::<ImageValue>().is_some()),
             keypoints: first(|v| v.downcast::<KeypointsValue>().is_some_and(|k| !k.0.is_empty())),
         }
     }
 
-    /// The observed picture's features; `detector` is the command that the user trusts to find them, where one is needed.
+    /// The observed picture's features; `detector` is the command that the user trusts to
+    /// find them, where one is needed.
     ///
     /// # Errors
     /// If what they are of is not observed, or a command fails.
     pub fn query(&self, features: &Features, detector: Option<&str>) -> Result<Query, BankError> {
         let image = self.image.as_ref().and_then(|v| v.downcast::<ImageValue>());
-        let missing = |what: &str| BankError::Observed(format!("it is searched by {what}, but the run observes none"));
+        let missing = |what: &str| {
+            BankError::Observed(format!("it is searched by {what}, but the run observes none"))
+        };
         match features {
             Features::Contours { .. } => {
                 let image = image.ok_or_else(|| missing("the contours of a picture"))?;
@@ -134,7 +157,8 @@ impl Observed {
             Features::Keypoints { names } => {
                 let seen = self.keypoints.as_ref().and_then(|v| v.downcast::<KeypointsValue>());
                 let seen = &seen.ok_or_else(|| missing("keypoints"))?.0;
-                let size = match (seen.size().or(image.map(ImageValue::size)), seen.is_normalised()) {
+                let size = match (seen.size().or(image.map(ImageValue::size)), seen.is_normalised())
+                {
                     (Some(size), _) => size,
                     (None, true) => (1, 1),
                     (None, false) => {
@@ -143,11 +167,13 @@ impl Observed {
                     }
                 };
                 let find = |name: &String| seen.points().iter().find(|p| *p.name == **name);
-                let at: Vec<_> = names.iter().map(|n| find(n).map(|p| seen.position(p, size))).collect();
+                let at: Vec<_> =
+                    names.iter().map(|n| find(n).map(|p| seen.position(p, size))).collect();
                 if at.iter().all(Option::is_none) {
                     return Err(missing("keypoints present in the scene"));
                 }
-                let sure: Vec<f64> = names.iter().map(|n| find(n).map_or(0.0, |p| p.confidence)).collect();
+                let sure: Vec<f64> =
+                    names.iter().map(|n| find(n).map_or(0.0, |p| p.confidence)).collect();
                 Ok(Query::keypoints(&at, &sure, size.0, size.1))
             }
             Features::Command { command, size } => {
@@ -157,7 +183,8 @@ impl Observed {
                     );
                     return Err(BankError::Observed(what));
                 }
-                let photo = image.and_then(ImageValue::as_photo).ok_or_else(|| missing("a photograph"))?;
+                let photo =
+                    image.and_then(ImageValue::as_photo).ok_or_else(|| missing("a photograph"))?;
                 Ok(Query::new(command::features(command, photo.shrunk(*size).rgb())?))
             }
         }

@@ -11,8 +11,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 type Found = Result<Arc<Neighbours>, String>;
 
-/// Answers the kernels of a run from bank files: a path is looked for as it is, then beside the program,
-/// where the program may read.
+/// Answers the kernels of a run from bank files: a path is looked for as it is, then
+/// beside the program, where the program may read.
 #[derive(Debug)]
 pub struct BankFiles {
     program: String,
@@ -24,8 +24,9 @@ pub struct BankFiles {
 }
 
 impl BankFiles {
-    /// For runs of a program with its data. `folder` is where the program is; `detector` the command that banks with features
-    /// from outside may run: none is run that the user has not named.
+    /// For runs of a program with its data. `folder` is where the program is; `detector`
+    /// the command that banks with features from outside may run: none is run that the
+    /// user has not named.
     pub fn new(model: &Model, folder: &Path, detector: Option<String>) -> BankFiles {
         BankFiles {
             program: model.hash().to_owned(),

@@ -61,7 +61,9 @@ impl Preamble {
         let mut b = [0; START as usize];
         b[..8].copy_from_slice(MAGIC);
         b[8..12].copy_from_slice(&VERSION.to_le_bytes());
-        for (i, x) in [self.count, self.width, self.table, self.header, self.hash].iter().enumerate() {
+        for (i, x) in
+            [self.count, self.width, self.table, self.header, self.hash].iter().enumerate()
+        {
             b[16 + 8 * i..24 + 8 * i].copy_from_slice(&x.to_le_bytes());
         }
         b
@@ -72,7 +74,9 @@ impl Preamble {
     /// # Errors
     /// If it is not that of a whole bank of this version.
     pub fn decode(b: &[u8], length: u64) -> Result<Preamble, BankError> {
-        let word = |i: usize| b.get(i..i + 8).and_then(|w| w.try_into().ok()).map_or(0, u64::from_le_bytes);
+        let word = |i: usize| {
+            b.get(i..i + 8).and_then(|w| w.try_into().ok()).map_or(0, u64::from_le_bytes)
+        };
         if b.get(..8) != Some(MAGIC) {
             return Err(BankError::NoBank);
         }
@@ -83,12 +87,30 @@ impl Preamble {
         if found != VERSION {
             return Err(BankError::Version { found, expected: VERSION });
         }
-        let p = Preamble { count: word(16), width: word(24), table: word(32), header: word(40), hash: word(48) };
-        let features = p.count.checked_mul(p.width).and_then(|n| n.checked_mul(4)).and_then(|n| n.checked_add(START));
-        let table = p.count.checked_add(1).and_then(|n| n.checked_mul(8)).and_then(|n| n.checked_add(p.table));
-        let fits = features.is_some_and(|end| end <= p.table) && table == Some(p.header) && p.header < length;
+        let p = Preamble {
+            count: word(16),
+            width: word(24),
+            table: word(32),
+            header: word(40),
+            hash: word(48),
+        };
+        let features = p
+            .count
+            .checked_mul(p.width)
+            .and_then(|n| n.checked_mul(4))
+            .and_then(|n| n.checked_add(START));
+        let table = p
+            .count
+            .checked_add(1)
+            .and_then(|n| n.checked_mul(8))
+            .and_then(|n| n.checked_add(p.table));
+        let fits = features.is_some_and(|end| end <= p.table)
+            && table == Some(p.header)
+            && p.header < length;
         if !fits || p.count == 0 {
-            return Err(BankError::Damaged("it is truncated, or its parts are inconsistent".into()));
+            return Err(BankError::Damaged(
+                "it is truncated, or its parts are inconsistent".into(),
+            ));
         }
         Ok(p)
     }
@@ -100,15 +122,22 @@ mod tests {
 
     #[test]
     fn preambles_come_back_and_nonsense_is_refused() {
-        let p = Preamble { count: 3, width: 5, table: 64 + 60 + 7, header: 64 + 60 + 7 + 32, hash: 9 };
+        let p =
+            Preamble { count: 3, width: 5, table: 64 + 60 + 7, header: 64 + 60 + 7 + 32, hash: 9 };
         assert_eq!(Preamble::decode(&p.encode(), 1000).unwrap(), p);
-        assert!(matches!(Preamble::decode(&p.encode(), 163), Err(BankError::Damaged(_))), "no room for a header");
+        assert!(
+            matches!(Preamble::decode(&p.encode(), 163), Err(BankError::Damaged(_))),
+            "no room for a header"
+        );
         assert!(matches!(Preamble::decode(&p.encode()[..40], 40), Err(BankError::Damaged(_))));
         assert!(matches!(Preamble::decode(b"PNG", 3), Err(BankError::NoBank)));
         let huge = Preamble { count: u64::MAX, width: u64::MAX, ..p };
         assert!(matches!(Preamble::decode(&huge.encode(), 1000), Err(BankError::Damaged(_))));
         let mut other = p.encode();
         other[8] = 7;
-        assert!(matches!(Preamble::decode(&other, 1000), Err(BankError::Version { found: 7, expected: VERSION })));
+        assert!(matches!(
+            Preamble::decode(&other, 1000),
+            Err(BankError::Version { found: 7, expected: VERSION })
+        ));
     }
 }

@@ -1,4 +1,5 @@
-//! Making a bank: scenes from the prior, on several threads, each a function of the seed and its number alone.
+//! Making a bank: scenes from the prior, on several threads, each a function of the seed
+//! and its number alone.
 
 use super::write::BankWriter;
 use super::{BankError, Entry, Features, Named, as_view, picture};
@@ -15,7 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Entries that are drawn before they are written.
 const BLOCK: u64 = 256;
-/// How often a draw may fail because the program has no value there before that is an error.
+/// How often a draw may fail because the program has no value there before that is an
+/// error.
 const RETRIES: u64 = 100;
 
 /// What a bank is made of.
@@ -33,15 +35,19 @@ pub struct Learn<'a> {
     pub features: Features,
 }
 
-/// Draws scenes from the prior and writes their latents and features to a file; `done` counts them as they come. The program
-/// may lack its data: what is observed is not asked.
+/// Draws scenes from the prior and writes their latents and features to a file; `done`
+/// counts them as they come. The program may lack its data: what is observed is not
+/// asked.
 ///
 /// # Errors
-/// If the program fails or has no picture, a detector fails, or the file cannot be written.
+/// If the program fails or has no picture, a detector fails, or the file cannot be
+/// written.
 pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Result<(), BankError> {
     let prior = Trace::prior(Arc::clone(model.code()), model.limits().clone());
     let operand = picture(&mut prior.clone(), draws(how.seed, 0, 0)).ok_or_else(|| {
-        BankError::Observed("the program has nothing to draw: no top-level name is a view or a solid".into())
+        BankError::Observed(
+            "the program has nothing to draw: no top-level name is a view or a solid".into(),
+        )
     })?;
     let (_, first) = one(&prior, operand, how, 0)?;
     let features = how.features.clone().named(&first);
@@ -75,12 +81,20 @@ fn draws(seed: u64, i: u64, attempt: u64) -> Draws {
 }
 
 /// The latents of entry `i`, and its scene.
-fn one(prior: &Trace, operand: Operand, how: &Learn, i: u64) -> Result<(Vec<Named>, Arc<View>), BankError> {
-    let (latents, value) =
-        attempts(RETRIES, |attempt| prior.clone().imagine(&[operand], draws(how.seed, i, attempt), drawn))
-            .map_err(BankError::Run)?;
+fn one(
+    prior: &Trace,
+    operand: Operand,
+    how: &Learn,
+    i: u64,
+) -> Result<(Vec<Named>, Arc<View>), BankError> {
+    let (latents, value) = attempts(RETRIES, |attempt| {
+        prior.clone().imagine(&[operand], draws(how.seed, i, attempt), drawn)
+    })
+    .map_err(BankError::Run)?;
     let view = value.as_ref().and_then(|v| as_view(v, None)).ok_or_else(|| {
-        BankError::Observed(format!("entry {i}: the picture is neither a view nor a solid in this scene"))
+        BankError::Observed(format!(
+            "entry {i}: the picture is neither a view nor a solid in this scene"
+        ))
     })?;
     Ok((latents, view))
 }

@@ -1,8 +1,10 @@
-//! Banks: scenes drawn from a program's prior, each with its latents and with features of its picture, in a file. They tell the
-//! kernel `knn` which scenes look like the observed picture (Kulkarni et al. 2014, section 3: q_data).
+//! Banks: scenes drawn from a program's prior, each with its latents and with features of
+//! its picture, in a file. They tell the kernel `knn` which scenes look like the observed
+//! picture (Kulkarni et al. 2014, section 3: q_data).
 //!
-//! `learn` makes a bank, `Bank` reads one, `BankFiles` answers a run. Features are `vision`'s, proposals `infer`'s; here is
-//! what joins them. Invariants: entry `i` is a function of program, seed and `i`; a file is whole or absent.
+//! `learn` makes a bank, `Bank` reads one, `BankFiles` answers a run. Features are
+//! `vision`'s, proposals `infer`'s; here is what joins them. Invariants: entry `i` is a
+//! function of program, seed and `i`; a file is whole or absent.
 
 mod command;
 mod error;

@@ -1,4 +1,5 @@
-//! Reading a bank: features block by block, latents of chosen entries only, so that it need not fit into memory.
+//! Reading a bank: features block by block, latents of chosen entries only, so that it
+//! need not fit into memory.
 
 use super::format::{Header, Preamble, START};
 use super::record::{decode, latents};
@@ -45,10 +46,13 @@ impl Bank {
         if fnv1a(&text) != preamble.hash {
             return Err(BankError::Damaged("its header is altered or truncated".into()));
         }
-        let header: Header = serde_json::from_slice(&text).map_err(|e| BankError::Damaged(e.to_string()))?;
-        let hash = |(h, name): &(String, String)| Some((u64::from_str_radix(h, 16).ok()?, name.clone()));
+        let header: Header =
+            serde_json::from_slice(&text).map_err(|e| BankError::Damaged(e.to_string()))?;
+        let hash =
+            |(h, name): &(String, String)| Some((u64::from_str_radix(h, 16).ok()?, name.clone()));
         let addresses: Option<Vec<_>> = header.addresses.iter().map(hash).collect();
-        let addresses = addresses.ok_or_else(|| BankError::Damaged("an address has no hash".into()))?;
+        let addresses =
+            addresses.ok_or_else(|| BankError::Damaged("an address has no hash".into()))?;
         Ok(Bank { file: Mutex::new(file), preamble, header, addresses })
     }
 
@@ -105,7 +109,9 @@ impl Bank {
             return Err(BankError::Damaged(format!("no entry {i} among {}", self.len())));
         }
         let both = self.read(self.preamble.table + 8 * i as u64, 16)?;
-        let word = |k: usize| both.get(k..k + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_le_bytes);
+        let word = |k: usize| {
+            both.get(k..k + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_le_bytes)
+        };
         let (from, to) = (word(0), word(8));
         if from > to || to > self.preamble.table || to - from > LONGEST {
             return Err(BankError::Damaged(format!("the offset of entry {i} is wrong")));
@@ -120,18 +126,22 @@ impl Bank {
     pub fn latents(&self, i: usize) -> Result<Vec<Named>, BankError> {
         let (from, to) = self.place(i)?;
         let bytes = self.read(from, to - from)?;
-        decode(&bytes, &self.addresses).ok_or_else(|| BankError::Damaged(format!("entry {i} cannot be read")))
+        decode(&bytes, &self.addresses)
+            .ok_or_else(|| BankError::Damaged(format!("entry {i} cannot be read")))
     }
 
-    /// The `k` entries whose pictures are most like a picture, the nearest first, each with its squared distance.
+    /// The `k` entries whose pictures are most like a picture, the nearest first, each
+    /// with its squared distance.
     ///
     /// # Errors
     /// If the picture has another number of features, or the file cannot be read.
     pub fn nearest(&self, query: &Query, k: usize) -> Result<Vec<(usize, f32)>, BankError> {
         let (width, count) = (self.preamble.width, self.preamble.count);
         if query.len() as u64 != width {
-            let message =
-                format!("the observed picture has {} features, but those of the bank have {width}", query.len());
+            let message = format!(
+                "the observed picture has {} features, but those of the bank have {width}",
+                query.len()
+            );
             return Err(BankError::Command(message));
         }
         let rows = (BLOCK / (4 * width).max(1)).max(1);

@@ -1,8 +1,10 @@
 //! The latents of one entry, and their bytes in a file (little-endian):
 //!
-//! the number of choices (u32), then for each the index of its address in the header's table (u32), its stored value, and its
-//! unconstrained coordinates: their number (u32; the largest: they are the stored numbers) and the numbers (f64). A value is a tag
-//! (u8), then: 0 a truth value (u8); 1 a number (f64); 2 numbers (u32, f64 each); 3 values (u32, each a value).
+//! the number of choices (u32), then for each the index of its address in the header's
+//! table (u32), its stored value, and its unconstrained coordinates: their number (u32;
+//! the largest: they are the stored numbers) and the numbers (f64). A value is a tag
+//! (u8), then: 0 a truth value (u8); 1 a number (f64); 2 numbers (u32, f64 each); 3
+//! values (u32, each a value).
 
 use crate::dist::Datum;
 use crate::infer::{Latent, Latents};
@@ -10,7 +12,8 @@ use std::sync::Arc;
 
 /// In place of a number of coordinates: they are the stored numbers themselves.
 const SAME: u32 = u32::MAX;
-/// Values within values in a file that is read: more are no value that a distribution draws.
+/// Values within values in a file that is read: more are no value that a distribution
+/// draws.
 const DEEPEST: u32 = 8;
 
 /// A choice of a scene.
@@ -64,7 +67,9 @@ pub(super) fn encode(choices: &[Named], mut index: impl FnMut(&Named) -> u32, ou
 fn is_same(stored: &Datum, y: &[f64]) -> bool {
     match stored {
         Datum::Num(x) => y.len() == 1 && x.to_bits() == y[0].to_bits(),
-        Datum::Vec(xs) => xs.len() == y.len() && xs.iter().zip(y).all(|(a, b)| a.to_bits() == b.to_bits()),
+        Datum::Vec(xs) => {
+            xs.len() == y.len() && xs.iter().zip(y).all(|(a, b)| a.to_bits() == b.to_bits())
+        }
         _ => false,
     }
 }
@@ -89,7 +94,8 @@ fn encode_datum(d: &Datum, out: &mut Vec<u8>) {
     }
 }
 
-/// Reads the choices back; `None` if these are no bytes of an entry. Addresses of the table come with their hashes.
+/// Reads the choices back; `None` if these are no bytes of an entry. Addresses of the
+/// table come with their hashes.
 pub(super) fn decode(mut bytes: &[u8], addresses: &[(u64, String)]) -> Option<Vec<Named>> {
     let b = &mut bytes;
     let count = u32(b)?;
@@ -152,7 +158,8 @@ mod tests {
             stored,
             free,
         };
-        let nested = Datum::List(Arc::from([Datum::Bool(true), Datum::List(Arc::from([Datum::Num(1.0)]))]));
+        let nested =
+            Datum::List(Arc::from([Datum::Bool(true), Datum::List(Arc::from([Datum::Num(1.0)]))]));
         let all = [
             named(0, Datum::Num(-0.0), Some(vec![-0.0])),
             named(1, Datum::Num(0.3), Some(vec![-0.8472978603872037])),
@@ -161,7 +168,8 @@ mod tests {
             named(4, nested, None),
             named(5, Datum::Vec(Arc::from([])), None),
         ];
-        let addresses: Vec<(u64, String)> = all.iter().map(|c| (c.hash, c.address.clone())).collect();
+        let addresses: Vec<(u64, String)> =
+            all.iter().map(|c| (c.hash, c.address.clone())).collect();
         let mut bytes = Vec::new();
         encode(&all, |c| c.hash as u32, &mut bytes);
         assert_eq!(decode(&bytes, &addresses).as_deref(), Some(&all[..]));
@@ -178,7 +186,8 @@ mod tests {
         bytes.push(2);
         bytes.extend(u32::MAX.to_le_bytes());
         assert_eq!(decode(&bytes, &[(0, String::new())]), None);
-        let deep: Vec<u8> = [1, 0, 0, 0, 0, 0, 0, 0].into_iter().chain([3, 1, 0, 0, 0].repeat(100_000)).collect();
+        let deep: Vec<u8> =
+            [1, 0, 0, 0, 0, 0, 0, 0].into_iter().chain([3, 1, 0, 0, 0].repeat(100_000)).collect();
         assert_eq!(decode(&deep, &[(0, String::new())]), None);
     }
 }

@@ -7,7 +7,8 @@ use crate::render::{Camera, View};
 use crate::trace::{Draws, Trace};
 use std::sync::Arc;
 
-/// Where a program keeps its picture: the last top-level name that is a view, or else the last that is a solid.
+/// Where a program keeps its picture: the last top-level name that is a view, or else the
+/// last that is a solid.
 pub fn picture(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
     let mut solid = None;

@@ -9,7 +9,8 @@ use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A bank on its way to its file. Dropped before [`BankWriter::finish`], it leaves nothing.
+/// A bank on its way to its file. Dropped before [`BankWriter::finish`], it leaves
+/// nothing.
 pub(super) struct BankWriter {
     file: File,
     partial: PathBuf,
@@ -26,7 +27,8 @@ pub(super) struct BankWriter {
 }
 
 impl BankWriter {
-    /// Begins a bank of so many entries with so many features each, under another name beside its own.
+    /// Begins a bank of so many entries with so many features each, under another name
+    /// beside its own.
     ///
     /// # Errors
     /// If the file cannot be made.
@@ -59,8 +61,9 @@ impl BankWriter {
         for e in entries {
             if e.features.len() as u64 != self.width {
                 let (got, first) = (e.features.len(), self.width);
-                let message =
-                    format!("a picture has {got} features, but the first had {first}; all must have the same number");
+                let message = format!(
+                    "a picture has {got} features, but the first had {first}; all must have the same number"
+                );
                 return Err(BankError::Command(message));
             }
             e.features.iter().for_each(|x| features.extend(x.to_le_bytes()));
@@ -90,17 +93,34 @@ impl BankWriter {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(mut self, name: &str, program: &str, seed: u64, features: Features) -> Result<(), BankError> {
+    pub fn finish(
+        mut self,
+        name: &str,
+        program: &str,
+        seed: u64,
+        features: Features,
+    ) -> Result<(), BankError> {
         self.places.push(self.end);
         let table: Vec<u8> = self.places.iter().flat_map(|p| p.to_le_bytes()).collect();
         let addresses = std::mem::take(&mut self.addresses);
-        let header = Header { name: name.to_owned(), program: program.to_owned(), seed, features, addresses };
+        let header = Header {
+            name: name.to_owned(),
+            program: program.to_owned(),
+            seed,
+            features,
+            addresses,
+        };
         let text = serde_json::to_vec(&header).map_err(std::io::Error::from)?;
         let at = self.end + table.len() as u64;
         self.put(self.end, &table)?;
         self.put(at, &text)?;
-        let preamble =
-            Preamble { count: self.count, width: self.width, table: self.end, header: at, hash: fnv1a(&text) };
+        let preamble = Preamble {
+            count: self.count,
+            width: self.width,
+            table: self.end,
+            header: at,
+            hash: fnv1a(&text),
+        };
         self.put(0, &preamble.encode())?;
         std::fs::rename(&self.partial, &self.path)?;
         self.done = true;

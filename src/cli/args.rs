@@ -32,11 +32,13 @@ pub enum Command {
     Run(Run),
     /// Run a program on every picture of a dataset and write results for scoring
     Evaluate(Evaluate),
-    /// Measure the trade-off of speed and accuracy over settings, on cases with ground truth
+    /// Measure the trade-off of speed and accuracy over settings, on cases with ground
+    /// truth
     Tradeoff(Tradeoff),
     /// Draw scenes from the prior and show them on a contact sheet
     Sample(Sample),
-    /// Fill a bank with scenes drawn from the prior, for the proposals of the kernel `knn`
+    /// Fill a bank with scenes drawn from the prior, for the proposals of the kernel
+    /// `knn`
     Learn(Learn),
     /// Check programs for mistakes, or test whether their plans sample from the posterior
     Check(Check),
@@ -76,9 +78,9 @@ pub struct Given {
     /// The camera, a JSON file; by default a view 4.4 units across at distance 8
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
-    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz) or, if
-    /// this build supports it, a network (.onnx). Options follow, as in a program's `detector`:
-    /// 'net.onnx, colours = "bgr", white = 255'
+    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz)
+    /// or, if this build supports it, a network (.onnx). Options follow, as in a
+    /// program's `detector`: 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
     /// Whom it is about
@@ -95,7 +97,8 @@ pub struct Allowed {
     /// A folder the program may read files from, besides its own; may be repeated
     #[arg(long, value_name = "DIR")]
     pub allow_read: Vec<PathBuf>,
-    /// Change a limit on evaluation: depth, nodes, elements or operations; may be repeated
+    /// Change a limit on evaluation: depth, nodes, elements or operations; may be
+    /// repeated
     #[arg(long = "limit", value_name = "NAME=N", value_parser = limit)]
     pub limits: Vec<(String, u64)>,
 }
@@ -139,11 +142,12 @@ pub struct Sampling {
     /// A measured preset of speed and accuracy; `own` uses the program's own settings
     #[arg(long, value_parser = QualityArg::parser())]
     pub quality: Option<QualityArg>,
-    /// The total time (of a dataset: per case), such as 10s, 2m or 500ms; at most half is warm-up.
-    /// Selects the measured preset for that time, unless --quality is given
+    /// The total time (of a dataset: per case), such as 10s, 2m or 500ms; at most half is
+    /// warm-up. Selects the measured preset for that time, unless --quality is given
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
-    /// Re-run the whole program at each step: the same draws, but slow; for testing the engine
+    /// Re-run the whole program at each step: the same draws, but slow; for testing the
+    /// engine
     #[arg(long)]
     pub no_incremental: bool,
 }
@@ -164,18 +168,21 @@ pub struct Job {
     /// Program, parameters, camera
     #[command(flatten)]
     pub given: Given,
-    /// A file for a `data` item, or FILE#ID for one entry of a JSON file; the name may be omitted
-    /// if only one item fits
+    /// A file for a `data` item, or FILE#ID for one entry of a JSON file; the name may be
+    /// omitted if only one item fits
     #[arg(long, value_name = "[NAME=]FILE")]
     pub observe: Vec<String>,
-    /// A contour map (bright pixels are contour) to use instead of the photograph's own contours
+    /// A contour map (bright pixels are contour) to use instead of the photograph's own
+    /// contours
     #[arg(long, value_name = "FILE")]
     pub observe_contours: Option<PathBuf>,
-    /// Keypoints from a pose detector: a file for the program's one keypoints `data` item. `#ID`
-    /// selects one of several people [default: the entry named after the photograph's file]
+    /// Keypoints from a pose detector: a file for the program's one keypoints `data`
+    /// item. `#ID` selects one of several people [default: the entry named after the
+    /// photograph's file]
     #[arg(long, value_name = "FILE[#ID]")]
     pub keypoints: Option<String>,
-    /// The command that computes the photograph's features, for a bank that was made with it
+    /// The command that computes the photograph's features, for a bank that was made with
+    /// it
     #[arg(long, value_name = "CMD")]
     pub features_from: Option<String>,
     /// Seed, chains, steps, time
@@ -186,7 +193,14 @@ pub struct Job {
 impl Job {
     /// A run that observes nothing.
     pub fn of(given: Given, sampling: Sampling) -> Job {
-        Job { given, observe: Vec::new(), observe_contours: None, keypoints: None, features_from: None, sampling }
+        Job {
+            given,
+            observe: Vec::new(),
+            observe_contours: None,
+            keypoints: None,
+            features_from: None,
+            sampling,
+        }
     }
 }
 
@@ -199,8 +213,8 @@ pub struct Run {
     /// The folder for results [default: runs/PROG]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Resume the run that the same command began in this folder, if there is one; `--steps` and
-    /// `--time` may be larger than before
+    /// Resume the run that the same command began in this folder, if there is one;
+    /// `--steps` and `--time` may be larger than before
     #[arg(long)]
     pub resume: bool,
     /// The time between checkpoints, from which an interrupted run resumes
@@ -236,7 +250,8 @@ pub struct Evaluate {
     /// The folder for results: one run folder per case, and summaries
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Detected keypoints, JSON keyed by case; cases without any run on their picture alone
+    /// Detected keypoints, JSON keyed by case; cases without any run on their picture
+    /// alone
     #[arg(long, value_name = "FILE")]
     pub keypoints: Option<PathBuf>,
     /// Only these cases
@@ -245,7 +260,8 @@ pub struct Evaluate {
     /// Seed, chains, steps, time
     #[command(flatten)]
     pub sampling: Sampling,
-    /// Redo all cases; otherwise completed ones are kept, and changed settings are an error
+    /// Redo all cases; otherwise completed ones are kept, and changed settings are an
+    /// error
     #[arg(long)]
     pub fresh: bool,
     /// Print the summary as JSON
@@ -285,8 +301,8 @@ pub struct Tradeoff {
     /// The folder for results; results already there are reused
     #[arg(long, value_name = "DIR", default_value = "tradeoff")]
     pub out: PathBuf,
-    /// The total time, earlier calls with the same folder included; if it is short, settings that
-    /// do badly on a few cases are dropped
+    /// The total time, earlier calls with the same folder included; if it is short,
+    /// settings that do badly on a few cases are dropped
     #[arg(long, value_parser = duration, default_value = "1h")]
     pub budget: Duration,
     /// Runs of each setting on each case
@@ -301,8 +317,8 @@ pub struct Tradeoff {
     /// The number of concurrent runs [default: as many as the hardware threads allow]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
-    /// Also write the Pareto front to this file; as PROG.quality.json it has the presets for `run
-    /// --quality` and `--time`
+    /// Also write the Pareto front to this file; as PROG.quality.json it has the presets
+    /// for `run --quality` and `--time`
     #[arg(long, value_name = "FILE")]
     pub presets: Option<PathBuf>,
     /// Discard earlier results and measure everything again
@@ -366,8 +382,8 @@ pub struct Learn {
     /// The features that pictures are compared by
     #[arg(long, value_enum, default_value_t = FeatureKind::Contours)]
     pub features: FeatureKind,
-    /// A command that prints a picture's features, equally many for all. {png} is replaced by the
-    /// picture's file; no shell is used
+    /// A command that prints a picture's features, equally many for all. {png} is
+    /// replaced by the picture's file; no shell is used
     #[arg(long, value_name = "CMD", conflicts_with = "features")]
     pub features_from: Option<String>,
     /// The longer side of the pictures that features are computed from, in pixels
@@ -397,13 +413,15 @@ pub struct Check {
     /// Check again whenever a source file changes, until interrupted
     #[arg(long, conflicts_with_all = ["sbc", "geweke"])]
     pub watch: bool,
-    /// Simulation-based calibration: rank the true values of simulated data among the draws
+    /// Simulation-based calibration: rank the true values of simulated data among the
+    /// draws
     #[arg(long)]
     pub sbc: bool,
     /// Geweke's test: alternate updates and simulated data, and compare with the prior
     #[arg(long)]
     pub geweke: bool,
-    /// The number of data sets for --sbc [default: 200], of chains for --geweke [default: 100]
+    /// The number of data sets for --sbc [default: 200], of chains for --geweke [default:
+    /// 100]
     #[arg(long, value_parser = clap::value_parser!(u32).range(20..=1_000_000))]
     pub replicates: Option<u32>,
     /// The random seed: the same seed gives the same result
@@ -458,12 +476,13 @@ pub struct Contours {
     /// The contour map to write
     #[arg(short, long, value_name = "FILE", default_value = "contours.png")]
     pub out: PathBuf,
-    /// The longer side in pixels at which contours are detected [default: 256; with --edges 512]
+    /// The longer side in pixels at which contours are detected [default: 256; with
+    /// --edges 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(8..=8192))]
     pub size: Option<u32>,
-    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz) or, if
-    /// this build supports it, a network (.onnx). Options follow, as in a program's `detector`:
-    /// 'net.onnx, colours = "bgr", white = 255'
+    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz)
+    /// or, if this build supports it, a network (.onnx). Options follow, as in a
+    /// program's `detector`: 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
 }
@@ -496,8 +515,9 @@ pub struct Fmt {
 #[derive(Args, Debug)]
 #[command(after_help = PROMPT)]
 pub struct Repl {
-    /// The program to start from: a file, the name of a shipped program, or the folder of a run
-    /// (its program, data, settings and best state are loaded). Without it, an empty program
+    /// The program to start from: a file, the name of a shipped program, or the folder of
+    /// a run (its program, data, settings and best state are loaded). Without it, an
+    /// empty program
     #[arg(value_name = "PROG|RUN", value_parser = program_name)]
     pub program: Option<String>,
     /// Set a `param`; the value is written as in a program; may be repeated
@@ -521,7 +541,8 @@ pub struct Repl {
     /// How to show pictures [default: detected from the environment]
     #[arg(long, value_enum)]
     pub graphics: Option<Graphics>,
-    /// Echo each line with its prompt and continue after errors: a transcript of a session
+    /// Echo each line with its prompt and continue after errors: a transcript of a
+    /// session
     #[arg(long)]
     pub transcript: bool,
 }

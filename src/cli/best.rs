@@ -1,4 +1,5 @@
-//! The best state of a run as files: its trace, depth, normals, mask, pictures, meshes, exports.
+//! The best state of a run as files: its trace, depth, normals, mask, pictures, meshes,
+//! exports.
 //!
 //! Not the run (`job`), and not what is printed.
 
@@ -31,11 +32,13 @@ pub struct Shown {
     pub view: Option<ViewValue>,
     /// The share of the mesh's corners that is in the picture.
     pub inside: Option<f64>,
-    /// How far the chains' last states cover the same pixels: those that all cover, as a share of those that any does.
+    /// How far the chains' last states cover the same pixels: those that all cover, as a
+    /// share of those that any does.
     pub agreement: Option<f64>,
 }
 
-/// Rebuilds the state with the highest log joint density that any chain was in, saves it, and draws it if it has a view.
+/// Rebuilds the state with the highest log joint density that any chain was in, saves it,
+/// and draws it if it has a view.
 pub fn show_best(
     dir: &RunDir,
     seed: u64,
@@ -62,8 +65,9 @@ pub fn show_best(
     Ok(shown)
 }
 
-/// Writes the best state so far as `best.trace.json` while the chains run, until they end: ever less often, but as often as checkpoints
-/// are kept. What cannot be written is said at the end.
+/// Writes the best state so far as `best.trace.json` while the chains run, until they
+/// end: ever less often, but as often as checkpoints are kept. What cannot be written is
+/// said at the end.
 pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending, most: Duration) {
     let (begun, mut written) = (Instant::now(), f64::NEG_INFINITY);
     while !ending.within((begun.elapsed() / 2).clamp(FIRST.min(most), most)) {
@@ -77,7 +81,8 @@ pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending,
     }
 }
 
-/// Depth, normals, mask and meshes at the input's resolution; overlay, contours and mask frequency as pictures.
+/// Depth, normals, mask and meshes at the input's resolution; overlay, contours and mask
+/// frequency as pictures.
 fn draw(
     dir: &RunDir,
     view: &Arc<View>,
@@ -137,7 +142,8 @@ pub fn outside(shown: &Shown) -> Option<String> {
     ))
 }
 
-/// The mesh of a solid; a solid too far away or too small for single precision has none, which is no reason to lose the run.
+/// The mesh of a solid; a solid too far away or too small for single precision has none,
+/// which is no reason to lose the run.
 fn mesh(solid: &Solid) -> Option<Mesh> {
     match solid.to_mesh() {
         Ok(mesh) => Some(mesh),
@@ -148,13 +154,16 @@ fn mesh(solid: &Solid) -> Option<Mesh> {
     }
 }
 
-/// How many of the chains' last states cover each pixel, and how far several cover the same ones.
+/// How many of the chains' last states cover each pixel, and how far several cover the
+/// same ones.
 fn frequency(chains: &[ChainResult], seed: u64, size: u32) -> (GrayImage, Option<f64>) {
     let mut counts: Vec<u32> = Vec::new();
     let (mut width, mut height, mut of) = (1, 1, 0);
     for c in chains {
         let mut trace = c.last.clone();
-        let Some(view) = scene::view(&mut trace, scene::predictive(seed, 1), None) else { continue };
+        let Some(view) = scene::view(&mut trace, scene::predictive(seed, 1), None) else {
+            continue;
+        };
         let frame = view.frame(size);
         (width, height) = (frame.width, frame.height);
         counts.resize((width * height) as usize, 0);
@@ -166,8 +175,9 @@ fn frequency(chains: &[ChainResult], seed: u64, size: u32) -> (GrayImage, Option
     (pictures::frequency(width, height, &counts, of), agreement)
 }
 
-/// Chains that cover the same pixels to less than this have not all found the same thing: of 102 runs of `lathe.pcad` on pictures of
-/// known shape the object was found in 95 % of those above, in 45 % of those below (docs/objects.md).
+/// Chains that cover the same pixels to less than this have not all found the same thing:
+/// of 102 runs of `lathe.pcad` on pictures of known shape the object was found in 95 % of
+/// those above, in 45 % of those below (docs/objects.md).
 const AGREE: f64 = 0.9;
 
 /// What to say of chains that do not agree on what is seen where.
@@ -189,7 +199,9 @@ fn export(
     seed: u64,
 ) -> Result<(), Failure> {
     let Some(operand) = exported_operand(model.code(), x) else { return Ok(()) };
-    let values = trace.query(&[operand], scene::predictive(seed, 2)).map_err(|e| Failure::from(model.run_error(*e)))?;
+    let values = trace
+        .query(&[operand], scene::predictive(seed, 2))
+        .map_err(|e| Failure::from(model.run_error(*e)))?;
     let Some(value) = values.first() else { return Ok(()) };
     let name = x.file.trim_start_matches(['/', '.']).replace('/', "_");
     match exported(value, &name) {

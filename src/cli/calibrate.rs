@@ -1,5 +1,6 @@
-//! `pcadlang check --sbc` and `--geweke`: whether a program's plan draws from its posterior. The statistics are the library's
-//! ([`pcadlang::infer::calibration`]); here is what is run, and what is said of it.
+//! `pcadlang check --sbc` and `--geweke`: whether a program's plan draws from its
+//! posterior. The statistics are the library's ([`pcadlang::infer::calibration`]); here
+//! is what is run, and what is said of it.
 
 use super::args::{Check, Given, Job, Sampling};
 use super::job::{Interrupt, machine_threads};
@@ -65,12 +66,19 @@ fn job(a: &Check, path: &str) -> Job {
         observe: a.observe.clone(),
         observe_contours: None,
         keypoints: None,
-        sampling: Sampling { seed: a.seed, chains: Some(1), threads: a.threads, steps: a.steps, ..Sampling::default() },
+        sampling: Sampling {
+            seed: a.seed,
+            chains: Some(1),
+            threads: a.threads,
+            steps: a.steps,
+            ..Sampling::default()
+        },
     }
 }
 
 /// One of the two checks.
-type Method<T> = fn(&Arc<pcadlang::lang::code::Code>, &dyn Sampler, &Settings) -> Result<T, CalibrationError>;
+type Method<T> =
+    fn(&Arc<pcadlang::lang::code::Code>, &dyn Sampler, &Settings) -> Result<T, CalibrationError>;
 
 fn run<T>(
     a: &Check,
@@ -93,7 +101,15 @@ fn run<T>(
     let options = RunOptions { seed: a.seed, ..RunOptions::default() };
     let sampler = PlanSampler { plan: &plan, options, progress: &progress };
     let said = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, (settings.replicates as u32, "replicates"), &ending, None, false));
+        scope.spawn(|| {
+            progress::watch(
+                &progress,
+                (settings.replicates as u32, "replicates"),
+                &ending,
+                None,
+                false,
+            )
+        });
         ending.of(|| method(model.code(), &sampler, &settings))
     });
     if progress.cancelled.load(Ordering::Relaxed) {
@@ -105,8 +121,7 @@ fn run<T>(
 fn failure(e: infer::calibration::CalibrationError, model: &Model) -> Failure {
     match e {
         CalibrationError::NotSimulable(reason) => {
-            let hint =
-                "programs are checked on simulated data: they need proper priors, and observations that have samplers";
+            let hint = "programs are checked on simulated data: they need proper priors, and observations that have samplers";
             Failure::Plain(reason, Some(hint.into()))
         }
         CalibrationError::TooFew(reason) => plain(reason),
@@ -116,7 +131,8 @@ fn failure(e: infer::calibration::CalibrationError, model: &Model) -> Failure {
 
 /// The table of `--sbc`.
 fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
-    let mut rows = vec![["quantity", "ranks", "chi2", "p", "min ess", "verdict"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["quantity", "ranks", "chi2", "p", "min ess", "verdict"].map(str::to_owned).to_vec()];
     for r in &said.rows {
         let verdict = match (r.passes, r.is_short) {
             (true, false) => "ok",
@@ -125,7 +141,14 @@ fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
             (false, true) => "FAILS, few draws",
         };
         let ess = format!("{:.0}", r.least_ess);
-        rows.push(vec![r.name.clone(), bars(&r.counts), number(r.chi_square), number(r.p), ess, verdict.into()]);
+        rows.push(vec![
+            r.name.clone(),
+            bars(&r.counts),
+            number(r.chi_square),
+            number(r.p),
+            ess,
+            verdict.into(),
+        ]);
     }
     let mut s = format!("{path}: simulation-based calibration\n{}", table::aligned(&rows));
     s.push_str(&more(said.left_out));
@@ -174,7 +197,11 @@ fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
 }
 
 fn more(left_out: usize) -> String {
-    if left_out == 0 { String::new() } else { format!("… and {left_out} more, present in fewer states\n") }
+    if left_out == 0 {
+        String::new()
+    } else {
+        format!("… and {left_out} more, present in fewer states\n")
+    }
 }
 
 /// Counts as bars, level with the largest.

@@ -22,12 +22,17 @@ pub fn check(a: &Check) -> Result<(), Failure> {
             Ok(_) => {
                 print_line!("{path}: no mistakes found");
                 for p in interface.params {
-                    let (default, help) = (p.default.unwrap_or_default(), p.help.unwrap_or_default());
+                    let (default, help) =
+                        (p.default.unwrap_or_default(), p.help.unwrap_or_default());
                     print_line!("{}", format!("  --set {} = {default}  {help}", p.name).trim_end());
                 }
                 for d in interface.data.iter().filter(|d| !d.has_default) {
-                    let (ty, help) = (d.ty.as_deref().unwrap_or("any"), d.help.as_deref().unwrap_or_default());
-                    print_line!("{}", format!("  --observe {}=FILE ({ty})  {help}", d.name).trim_end());
+                    let (ty, help) =
+                        (d.ty.as_deref().unwrap_or("any"), d.help.as_deref().unwrap_or_default());
+                    print_line!(
+                        "{}",
+                        format!("  --observe {}=FILE ({ty})  {help}", d.name).trim_end()
+                    );
                 }
             }
             Err(e) => {

@@ -1,4 +1,5 @@
-//! `pcadlang compare`: two runs side by side: what was set differently, what they say of each quantity, their pictures.
+//! `pcadlang compare`: two runs side by side: what was set differently, what they say of
+//! each quantity, their pictures.
 
 use super::places::sized;
 use super::show::quoted;
@@ -52,7 +53,11 @@ impl Told {
     fn settings(&self) -> Vec<String> {
         let (mut all, mut arguments) = (Vec::new(), self.arguments().into_iter());
         while let Some(a) = arguments.next() {
-            all.push(if a.starts_with("--") { format!("{a} {}", arguments.next().unwrap_or_default()) } else { a });
+            all.push(if a.starts_with("--") {
+                format!("{a} {}", arguments.next().unwrap_or_default())
+            } else {
+                a
+            });
         }
         all
     }
@@ -70,11 +75,16 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
     }
     let (left, right) = (one.settings(), two.settings());
     let only = |mine: &[String], other: &[String]| {
-        let own: Vec<&str> = mine.iter().filter(|s| !other.contains(s)).map(String::as_str).collect();
+        let own: Vec<&str> =
+            mine.iter().filter(|s| !other.contains(s)).map(String::as_str).collect();
         if own.is_empty() { "-".to_owned() } else { own.join(" ") }
     };
     let same = left == right;
-    match (same, one.run["program_hash"] == two.run["program_hash"], one.run["inputs_hash"] == two.run["inputs_hash"]) {
+    match (
+        same,
+        one.run["program_hash"] == two.run["program_hash"],
+        one.run["inputs_hash"] == two.run["inputs_hash"],
+    ) {
         (true, true, true) => print_line!("\nThe commands, programs and data are the same."),
         (_, program, data) => {
             print_line!("\nonly A: {}\nonly B: {}", only(&left, &right), only(&right, &left));
@@ -90,7 +100,8 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
     a.out.as_ref().map_or(Ok(()), |out| pictures(a, out))
 }
 
-/// A table of what both have, the most different first: the difference of means in units of their standard deviations.
+/// A table of what both have, the most different first: the difference of means in units
+/// of their standard deviations.
 fn quantities(one: &Told, two: &Told) -> String {
     let names = one.summary["quantities"].as_object();
     let both = names.into_iter().flatten().map(|(name, _)| name);
@@ -104,11 +115,18 @@ fn quantities(one: &Told, two: &Told) -> String {
         .map(|name| (name, apart(name)))
         .collect();
     both.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let head = ["quantity", "mean A", "sd A", "mean B", "sd B", "difference/sd", "r_hat A", "r_hat B"];
+    let head =
+        ["quantity", "mean A", "sd A", "mean B", "sd B", "difference/sd", "r_hat A", "r_hat B"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (name, apart) in both.iter().take(LISTED) {
         let of = |t: &Told, what: &str| number(t.number(name, what));
-        let mut row = vec![(*name).to_owned(), of(one, "mean"), of(one, "sd"), of(two, "mean"), of(two, "sd")];
+        let mut row = vec![
+            (*name).to_owned(),
+            of(one, "mean"),
+            of(one, "sd"),
+            of(two, "mean"),
+            of(two, "sd"),
+        ];
         row.extend([number(*apart), of(one, "r_hat"), of(two, "r_hat")]);
         rows.push(row);
     }

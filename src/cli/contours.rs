@@ -20,7 +20,9 @@ pub fn contours(a: &Contours) -> Result<(), Failure> {
             let size = a.size.unwrap_or(FileDetector::SIZE);
             if size > FileDetector::MOST {
                 let most = FileDetector::MOST;
-                return Err(plain(format!("--size {size}: with --edges the longer side may be at most {most} pixels")));
+                return Err(plain(format!(
+                    "--size {size}: with --edges the longer side may be at most {most} pixels"
+                )));
             }
             let map = detector.map(&photo, size).map_err(|e| plain(format!("{spec}: {e}")))?;
             detector.contours(&map, &photo, detector.sigma())
@@ -28,6 +30,12 @@ pub fn contours(a: &Contours) -> Result<(), Failure> {
     };
     let picture = png(&map.to_image()).map_err(|e| plain(e.to_string()))?;
     files::write(&a.out, &picture)?;
-    print_line!("{}: {} contour points in {} x {} pixels", a.out.display(), map.len(), map.width, map.height);
+    print_line!(
+        "{}: {} contour points in {} x {} pixels",
+        a.out.display(),
+        map.len(),
+        map.width,
+        map.height
+    );
     Ok(())
 }

@@ -2,14 +2,15 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Now, in UTC, to the second: `2014-06-24T09:30:00Z` (RFC 3339). A clock before 1970 counts as
-/// 1970.
+/// Now, in UTC, to the second: `2014-06-24T09:30:00Z` (RFC 3339). A clock before 1970
+/// counts as 1970.
 pub fn now() -> String {
     written(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs()))
 }
 
-/// Seconds since 1970 as a date of the Gregorian calendar. Years are counted from March, so that
-/// the odd day is their last; 400 of them have the same number of days, whichever they are.
+/// Seconds since 1970 as a date of the Gregorian calendar. Years are counted from March,
+/// so that the odd day is their last; 400 of them have the same number of days, whichever
+/// they are.
 fn written(seconds: u64) -> String {
     const OF_400_YEARS: u64 = 146_097;
     // From 1 March of the year 0.

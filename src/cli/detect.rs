@@ -24,7 +24,8 @@ pub struct Detect {
     /// Draw the people over the photograph, to this file
     #[arg(long, value_name = "PNG")]
     pub overlay: Option<PathBuf>,
-    /// A folder with networks: pose_detection.tflite, pose_landmark_heavy.tflite, …_full or …_lite
+    /// A folder with networks: pose_detection.tflite, pose_landmark_heavy.tflite, …_full
+    /// or …_lite
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
     /// The number of views of the picture: with increasing padding, each also mirrored
@@ -80,14 +81,17 @@ const BONES: [(&[Bone], [f32; 3]); 3] = [
 ];
 
 /// Landmark networks that a folder may have, the best first.
-const LANDMARKS: [&str; 3] = ["pose_landmark_heavy.tflite", "pose_landmark_full.tflite", "pose_landmark_lite.tflite"];
+const LANDMARKS: [&str; 3] =
+    ["pose_landmark_heavy.tflite", "pose_landmark_full.tflite", "pose_landmark_lite.tflite"];
 const DETECTION: &str = "pose_detection.tflite";
 
 /// Finds the people in a photograph and writes where they are.
 pub fn detect(a: &Detect) -> Result<(), Failure> {
     let photo = files::photo(&a.image)?;
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
-    let people = finder(a.models.as_deref())?.find(&photo, &options, a.threads).map_err(|e| plain(e.to_string()))?;
+    let people = finder(a.models.as_deref())?
+        .find(&photo, &options, a.threads)
+        .map_err(|e| plain(e.to_string()))?;
     let size = (photo.width(), photo.height());
     let name = a.image.file_name().unwrap_or_default().to_string_lossy();
     let file = match a.format {
@@ -115,7 +119,11 @@ fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
         Some(folder) => {
             let best =
                 LANDMARKS.iter().map(|n| folder.join(n)).find(|p| p.exists()).ok_or_else(|| {
-                    plain(format!("{}: none of {} was found", folder.display(), LANDMARKS.join(", ")))
+                    plain(format!(
+                        "{}: none of {} was found",
+                        folder.display(),
+                        LANDMARKS.join(", ")
+                    ))
                 })?;
             // Detection is the same for all of them.
             let detection = match (folder.join(DETECTION), shipped()) {
@@ -150,7 +158,9 @@ fn found(people: &[Person]) -> String {
 
 fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
     let [left, top, right, bottom] = p.bounds.map(|x| x.round());
-    let inside = |l: &[f64; 2]| (0.0..f64::from(width)).contains(&l[0]) && (0.0..f64::from(height)).contains(&l[1]);
+    let inside = |l: &[f64; 2]| {
+        (0.0..f64::from(width)).contains(&l[0]) && (0.0..f64::from(height)).contains(&l[1])
+    };
     let seen = p.landmarks.iter().filter(|l| inside(&l.at)).count();
     let others = match p.others.len() {
         0 => String::new(),
@@ -171,10 +181,14 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
 fn overlay(photo: &Photo, people: &[Person]) -> RgbImage {
     let size = (photo.width(), photo.height());
     let (width, height) = picture_size(size.0, size.1);
-    let mut out = image::imageops::resize(photo.rgb(), width, height, image::imageops::FilterType::Triangle);
+    let mut out =
+        image::imageops::resize(photo.rgb(), width, height, image::imageops::FilterType::Triangle);
     for p in people {
         for (bones, color) in BONES {
-            let ends: Vec<_> = bones.iter().filter_map(|(a, b)| Some([p.landmark(a)?.at, p.landmark(b)?.at])).collect();
+            let ends: Vec<_> = bones
+                .iter()
+                .filter_map(|(a, b)| Some([p.landmark(a)?.at, p.landmark(b)?.at]))
+                .collect();
             limbs(&mut out, size, &ends, color);
         }
         dots(&mut out, size, &p.landmarks.map(|l| l.at), DETECTED);

@@ -23,7 +23,8 @@ pub fn doc(a: &Doc) -> Result<(), Failure> {
         None => {
             let names: Vec<String> = table.iter().map(|b| b.full_name()).collect();
             let near = pcadlang::diag::nearest(name, names.iter().map(String::as_str));
-            let search = || format!("`pcadlang doc --search {name}` also searches the descriptions");
+            let search =
+                || format!("`pcadlang doc --search {name}` also searches the descriptions");
             let hint = near.map_or_else(search, |n| format!("did you mean `{n}`?"));
             match name.as_str() {
                 "" => Err(plain("a name is needed")),

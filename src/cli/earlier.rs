@@ -33,7 +33,9 @@ pub fn run(folder: &Path) -> Result<Value, Failure> {
         let hint = match folder {
             _ if !folder.exists() => "there is no such folder",
             _ if !folder.is_dir() => "it is a file; the folder that it is in may be one of a run",
-            _ if folder.join(evaluation::MARK).is_file() => "an evaluation has a run in each folder of a case",
+            _ if folder.join(evaluation::MARK).is_file() => {
+                "an evaluation has a run in each folder of a case"
+            }
             _ => "`pcadlang run` leaves a run in runs/PROG, or in the folder of --out",
         };
         Failure::Plain(RunDirError::NoRun(folder.to_owned()).to_string(), Some(hint.into()))
@@ -59,13 +61,15 @@ pub fn differences(there: &Value, record: &Map<String, Value>) -> Vec<String> {
     all
 }
 
-/// The folder of a run to go on with: that of the same command, or a new one where there is none yet. How long it runs may be
-/// another than before.
+/// The folder of a run to go on with: that of the same command, or a new one where there
+/// is none yet. How long it runs may be another than before.
 ///
 /// # Errors
 /// If a run with other settings was begun there, or the folder cannot be used.
 pub fn resumed(folder: &Path, record: &Map<String, Value>) -> Result<RunDir, Failure> {
-    let Some(there) = left(folder) else { return RunDir::create(folder).map_err(|e| plain(e.to_string())) };
+    let Some(there) = left(folder) else {
+        return RunDir::create(folder).map_err(|e| plain(e.to_string()));
+    };
     let mut now = record.clone();
     if let Some(Value::Object(settings)) = now.get_mut("settings") {
         settings.remove("steps");
@@ -74,7 +78,11 @@ pub fn resumed(folder: &Path, record: &Map<String, Value>) -> Result<RunDir, Fai
     match &differences(&there, &now)[..] {
         [] => RunDir::open(folder).map_err(|e| plain(e.to_string())),
         different => Err(Failure::Plain(
-            format!("the run in {} cannot be resumed: it has a different {}", folder.display(), different.join(", ")),
+            format!(
+                "the run in {} cannot be resumed: it has a different {}",
+                folder.display(),
+                different.join(", ")
+            ),
             Some("repeat the command that began it, or choose another folder with --out".into()),
         )),
     }
@@ -111,7 +119,8 @@ mod tests {
         there["settings"]["time"] = json!(3.5);
         there["program_hash"] = json!("c");
         there["set"] = json!({});
-        let expected = ["program", "seed (was 2, now 1)", r#"--set (was none, now {"x":"2","y":"3"})"#];
+        let expected =
+            ["program", "seed (was 2, now 1)", r#"--set (was none, now {"x":"2","y":"3"})"#];
         assert_eq!(differences(&there, &record)[..3], expected);
         assert_eq!(differences(&there, &record)[3..], ["time (was 3.5, now none)"]);
         assert_eq!(differences(&json!([]), &record).len(), 6);

@@ -9,10 +9,12 @@ use pcadlang::syntax::span::FileId;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// The detector that was read last, and by what: a command that runs a program many times reads it once.
+/// The detector that was read last, and by what: a command that runs a program many times
+/// reads it once.
 static LAST: Mutex<Option<(String, DetectorValue)>> = Mutex::new(None);
 
-/// The file of `FILE[, OPTION = VALUE, …]`, and its options. A file that is called so is a file.
+/// The file of `FILE[, OPTION = VALUE, …]`, and its options. A file that is called so is
+/// a file.
 fn split(spec: &str) -> (&str, &str) {
     match spec.split_once(',') {
         Some((file, options)) if !Path::new(spec).exists() => (file.trim(), options.trim()),
@@ -25,7 +27,8 @@ pub fn file_of(spec: &str) -> &Path {
     Path::new(split(spec).0)
 }
 
-/// The detector that `FILE[, OPTION = VALUE, …]` means, with the options of `detector` as a program writes them.
+/// The detector that `FILE[, OPTION = VALUE, …]` means, with the options of `detector` as
+/// a program writes them.
 pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, known)) = last.as_ref().filter(|(s, _)| s == spec) {
@@ -34,7 +37,9 @@ pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
     let (file, text) = split(spec);
     let options = options(text)?;
     let bytes = files::read(Path::new(file))?;
-    let alone = |other: &str| Err(format!("{file} refers to {other}, but a detector must be a single file"));
+    let alone = |other: &str| {
+        Err(format!("{file} refers to {other}, but a detector must be a single file"))
+    };
     let loaded = data::load("detector", file, &bytes, &options, &alone);
     let loaded = loaded.map_err(|f| Failure::Plain(f.message, f.hint))?;
     let detector = loaded.downcast::<DetectorValue>().cloned().unwrap_or_default();
@@ -48,7 +53,9 @@ fn options(text: &str) -> Result<Options, Failure> {
         return Ok(Options::default());
     }
     let wrong = |why: &str, hint: Option<String>| {
-        let hint = hint.or_else(|| Some("for example --edges 'network.onnx, colours = \"bgr\", white = 255'".into()));
+        let hint = hint.or_else(|| {
+            Some("for example --edges 'network.onnx, colours = \"bgr\", white = 255'".into())
+        });
         Failure::Plain(format!("--edges: {why} (`{text}`)"), hint)
     };
     let (program, errors) = parse(&format!("data d = detector({text});"), FileId(0));
@@ -61,7 +68,8 @@ fn options(text: &str) -> Result<Options, Failure> {
         }
         _ => None,
     };
-    let args = args.ok_or_else(|| wrong("expected the options of a detector after the file name", None))?;
+    let args =
+        args.ok_or_else(|| wrong("expected the options of a detector after the file name", None))?;
     Options::parse("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
 }
 

@@ -1,6 +1,7 @@
 //! `run --explain`: what was modelled, proposed, redrawn and skipped, and why.
 //!
-//! What is drawn is told by trying: one proposal of a choice of each group, in the last state of the first chain, which is then taken back.
+//! What is drawn is told by trying: one proposal of a choice of each group, in the last
+//! state of the first chain, which is then taken back.
 
 use super::job::Outcome;
 use pcadlang::Model;
@@ -13,10 +14,12 @@ use pcadlang::trace::{Draws, Target, Trace};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashSet};
 
-/// Proposals that draw something that are wanted of each group: what a thread keeps of pictures is made by the first ones.
+/// Proposals that draw something that are wanted of each group: what a thread keeps of
+/// pictures is made by the first ones.
 const WANTED: u32 = 4;
 
-/// Proposals that are tried for them: a choice that comes out as it was draws nothing, so a few say little.
+/// Proposals that are tried for them: a choice that comes out as it was draws nothing, so
+/// a few say little.
 const TRIES: u64 = 64;
 
 /// Choices whose addresses differ in keys only.
@@ -49,7 +52,13 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
     for t in trace.all_targets().to_vec() {
         let name = without_keys(&trace.address(t).to_string());
         let new = || {
-            let group = Group { name: name.clone(), choices: 0, kernels: Vec::new(), alone: [0; 2], drawn: None };
+            let group = Group {
+                name: name.clone(),
+                choices: 0,
+                kernels: Vec::new(),
+                alone: [0; 2],
+                drawn: None,
+            };
             (group, Vec::new())
         };
         let (group, targets) = groups.entry(name.clone()).or_insert_with(new);
@@ -80,11 +89,19 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
     let sources = model.sources();
     let line = |span: Span| {
         let file = sources.get(span.file)?;
-        file.text().get(file.line_range(file.line_index(span.start as usize))).map(|line| line.trim().to_owned())
+        file.text()
+            .get(file.line_range(file.line_index(span.start as usize)))
+            .map(|line| line.trim().to_owned())
     };
     let written = |span| [sources.locate(span), line(span).unwrap_or_default()];
-    let absent = trace.undrawn().into_iter().map(written).filter(|[place, _]| place.starts_with(own)).collect();
-    let mut observed: Vec<String> = trace.observations().iter().map(|(a, _)| without_keys(&a.to_string())).collect();
+    let absent = trace
+        .undrawn()
+        .into_iter()
+        .map(written)
+        .filter(|[place, _]| place.starts_with(own))
+        .collect();
+    let mut observed: Vec<String> =
+        trace.observations().iter().map(|(a, _)| without_keys(&a.to_string())).collect();
     observed.sort();
     observed.dedup();
     Explanation { groups: groups.into_values().map(|(group, _)| group).collect(), observed, absent }
@@ -150,13 +167,18 @@ impl Explanation {
             };
             vec![format!("  {}", g.name), g.choices.to_string(), alone]
         };
-        let head = ["  choices", "of them", "single-site proposals, accepted"].map(str::to_owned).to_vec();
-        text += &aligned(&std::iter::once(head).chain(self.groups.iter().map(row)).collect::<Vec<_>>());
+        let head =
+            ["  choices", "of them", "single-site proposals, accepted"].map(str::to_owned).to_vec();
+        text +=
+            &aligned(&std::iter::once(head).chain(self.groups.iter().map(row)).collect::<Vec<_>>());
         let mut by: BTreeMap<&[String], Vec<&str>> = BTreeMap::new();
         self.groups.iter().for_each(|g| by.entry(&g.kernels).or_default().push(&g.name));
         for (kernels, names) in by {
-            let kernels =
-                if kernels.is_empty() { "no kernel: the plan does not select them".into() } else { kernels.join(", ") };
+            let kernels = if kernels.is_empty() {
+                "no kernel: the plan does not select them".into()
+            } else {
+                kernels.join(", ")
+            };
             text += &wrapped(&format!("{} by {kernels}", names.join(", ")));
         }
         text += "\nredrawn, for one proposal of\n";
@@ -176,12 +198,16 @@ impl Explanation {
     /// What was left out, and why.
     fn skipped(&self) -> Vec<String> {
         let absent = |[place, text]: &[String; 2]| {
-            format!("{place} `{text}`: not sampled, since no observation depends on it in this state")
+            format!(
+                "{place} `{text}`: not sampled, since no observation depends on it in this state"
+            )
         };
         let mut all: Vec<String> = self.absent.iter().map(absent).collect();
-        let most =
-            |of: fn(&Work) -> u64| self.groups.iter().filter_map(|g| g.drawn.as_ref().map(of)).max().unwrap_or(0);
-        let [closed, outside, hidden] = [most(|w| w.closed), most(|w| w.outside), most(|w| w.hidden)];
+        let most = |of: fn(&Work) -> u64| {
+            self.groups.iter().filter_map(|g| g.drawn.as_ref().map(of)).max().unwrap_or(0)
+        };
+        let [closed, outside, hidden] =
+            [most(|w| w.closed), most(|w| w.outside), most(|w| w.hidden)];
         if closed > 0 {
             all.push("back faces of closed bodies: hidden by the front faces".into());
         }

@@ -13,7 +13,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 
 /// Writes a file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, bytes).map_err(|e| plain(format!("cannot write {}: {}", path.display(), reason(&e))))
+    std::fs::write(path, bytes)
+        .map_err(|e| plain(format!("cannot write {}: {}", path.display(), reason(&e))))
 }
 
 /// A photograph.
@@ -22,7 +23,8 @@ pub fn photo(path: &Path) -> Result<Photo, Failure> {
     photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
-/// A program as it is named on the command line: `lathe` means `lathe.pcad`, unless there is a file of that name.
+/// A program as it is named on the command line: `lathe` means `lathe.pcad`, unless there
+/// is a file of that name.
 pub fn program_name(text: &str) -> Result<String, std::convert::Infallible> {
     let path = Path::new(text);
     let full = format!("{text}.pcad");

@@ -32,7 +32,8 @@ pub fn fmt(a: &Fmt) -> Result<(), Failure> {
                 changed += 1;
             }
             Ok(Some(text)) => {
-                replace(path, text.as_bytes()).map_err(|e| plain(format!("cannot write {name}: {}", reason(&e))))?;
+                replace(path, text.as_bytes())
+                    .map_err(|e| plain(format!("cannot write {name}: {}", reason(&e))))?;
                 print_line!("{name}: formatted");
             }
         }
@@ -50,7 +51,9 @@ pub fn fmt(a: &Fmt) -> Result<(), Failure> {
 
 fn standard_input(check: bool) -> Result<(), Failure> {
     let mut bytes = Vec::new();
-    std::io::stdin().read_to_end(&mut bytes).map_err(|e| plain(format!("cannot read standard input: {e}")))?;
+    std::io::stdin()
+        .read_to_end(&mut bytes)
+        .map_err(|e| plain(format!("cannot read standard input: {e}")))?;
     match formatted("<stdin>", &bytes) {
         Err(message) => {
             error_text!("{message}");
@@ -73,14 +76,18 @@ fn formatted(name: &str, bytes: &[u8]) -> Result<Option<String>, String> {
     let mut sources = SourceMap::new();
     let shown = |sources: &SourceMap, d: Vec<_>| render(sources, &d, has_colors());
     let file = sources.add_bytes(name, bytes).map_err(|d| shown(&sources, vec![d]));
-    let text = file.map(|file| sources.get(file).map(|f| f.text().to_string()).unwrap_or_default())?;
+    let text =
+        file.map(|file| sources.get(file).map(|f| f.text().to_string()).unwrap_or_default())?;
     match format(&text) {
         Ok(new) => Ok((new.as_bytes() != bytes).then_some(new)),
-        Err(errors) => Err(shown(&sources, errors.into_iter().map(IntoDiagnostic::into_diagnostic).collect())),
+        Err(errors) => {
+            Err(shown(&sources, errors.into_iter().map(IntoDiagnostic::into_diagnostic).collect()))
+        }
     }
 }
 
-/// Adds a program, or those in a folder and the folders in it; names that begin with a dot are hidden.
+/// Adds a program, or those in a folder and the folders in it; names that begin with a
+/// dot are hidden.
 fn find(path: &Path, given: bool, programs: &mut Vec<PathBuf>) -> Result<(), Failure> {
     if !path.is_dir() {
         if given || path.extension().is_some_and(|extension| extension == "pcad") {
@@ -88,7 +95,8 @@ fn find(path: &Path, given: bool, programs: &mut Vec<PathBuf>) -> Result<(), Fai
         }
         return Ok(());
     }
-    let unreadable = |e: std::io::Error| plain(format!("cannot read {}: {}", path.display(), reason(&e)));
+    let unreadable =
+        |e: std::io::Error| plain(format!("cannot read {}: {}", path.display(), reason(&e)));
     let mut entries = Vec::new();
     for entry in std::fs::read_dir(path).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
@@ -102,7 +110,8 @@ fn find(path: &Path, given: bool, programs: &mut Vec<PathBuf>) -> Result<(), Fai
     entries.iter().try_for_each(|entry| find(entry, false, programs))
 }
 
-/// Puts a text in a file's place at once; behind a link, in the place of the file that it leads to.
+/// Puts a text in a file's place at once; behind a link, in the place of the file that it
+/// leads to.
 fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     write_file(&path.canonicalize()?, bytes)
 }

@@ -16,11 +16,14 @@ use std::path::Path;
 pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
     let mut program = Program::open_allowing(&given.program, &given.allowed.allow_read)?;
     if !quiet {
-        for path in program.embedded().iter().filter(|p| p.ends_with(".pcad") && !p.starts_with("std/")) {
+        for path in
+            program.embedded().iter().filter(|p| p.ends_with(".pcad") && !p.starts_with("std/"))
+        {
             error_line!("note: using the shipped {path}");
         }
     }
-    let limits = given.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));
+    let limits =
+        given.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));
     program = program.limits(limits.map_err(plain)?);
     super::detect::choose(given.who.models.as_deref())?;
     if let Some(n) = given.who.person {
@@ -36,21 +39,28 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
         program = program.detector(super::edges::detector(spec)?);
     }
     if let Some(path) = &given.camera {
-        let text = String::from_utf8(files::read(path)?).map_err(|_| plain(format!("{}: not text", path.display())))?;
-        let camera = Camera::from_json(&text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
+        let text = String::from_utf8(files::read(path)?)
+            .map_err(|_| plain(format!("{}: not text", path.display())))?;
+        let camera =
+            Camera::from_json(&text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
         program = program.camera(camera);
     }
     Ok(program)
 }
 
-/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`; gives the name and the value of the photograph among them.
-pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<(String, Value)>), Failure> {
+/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`; gives the name
+/// and the value of the photograph among them.
+pub fn observe(
+    mut program: Program,
+    job: &Job,
+) -> Result<(Program, Option<(String, Value)>), Failure> {
     let mut image: Option<(String, Value)> = None;
     let mut stem: Option<String> = None;
     let mut detected: Vec<(String, String)> = Vec::new();
     for spec in &job.observe {
         let (name, path) = named(&program, spec)?;
-        let kind = program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
+        let kind =
+            program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         match kind.as_deref() {
             Some("image") => {
                 let photo = Value::object(ImageValue::photo(files::photo(Path::new(&path))?));
@@ -80,12 +90,15 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<(Stri
         program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
     if let Some(path) = &job.observe_contours {
-        let map = ContourMap::from_image(&DynamicImage::from(files::photo(path)?.rgb().clone()).to_luma8());
+        let map = ContourMap::from_image(
+            &DynamicImage::from(files::photo(path)?.rgb().clone()).to_luma8(),
+        );
         let name = match &image {
             Some((name, _)) => name.clone(),
             None => only(&program, "image", "--observe")?,
         };
-        let photo = image.as_ref().and_then(|(_, i)| i.downcast::<ImageValue>()?.as_photo().cloned());
+        let photo =
+            image.as_ref().and_then(|(_, i)| i.downcast::<ImageValue>()?.as_photo().cloned());
         let contours = Value::object(ImageValue::contours(map, photo));
         program = program.observe(&name, contours.clone());
         image = image.map(|(name, _)| (name, contours));
@@ -95,7 +108,8 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<(Stri
 
 /// The file and entry of `FILE#ID`; a file that is called so is a file.
 fn entry(path: &str) -> Option<(&str, &str)> {
-    path.rsplit_once('#').filter(|(file, id)| !file.is_empty() && !id.is_empty() && !Path::new(path).exists())
+    path.rsplit_once('#')
+        .filter(|(file, id)| !file.is_empty() && !id.is_empty() && !Path::new(path).exists())
 }
 
 /// The file that `[NAME=]FILE[#ID]` names, or that a kind such as a mask means by it.
@@ -109,11 +123,13 @@ pub fn file_of(spec: &str) -> &str {
 
 /// One entry of a JSON object, as data of a kind.
 fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure> {
-    let all: serde_json::Value =
-        serde_json::from_slice(&files::read(Path::new(file))?).map_err(|e| plain(format!("{file}: {e}")))?;
+    let all: serde_json::Value = serde_json::from_slice(&files::read(Path::new(file))?)
+        .map_err(|e| plain(format!("{file}: {e}")))?;
     let found = all.get(id).ok_or_else(|| plain(format!("{file}: no entry {id:?}")))?;
     let alone = |other: &str| {
-        Err(format!("{called} refers to {other}, but an entry of a JSON file cannot refer to other files"))
+        Err(format!(
+            "{called} refers to {other}, but an entry of a JSON file cannot refer to other files"
+        ))
     };
     data::load(kind, called, found.to_string().as_bytes(), &data::Options::default(), &alone)
         .map_err(|e| Failure::Plain(e.message, e.hint))
@@ -142,11 +158,14 @@ fn named(program: &Program, spec: &str) -> Result<(String, String), Failure> {
 /// The only `data` item of a kind, for an option that may leave out the name.
 fn only(program: &Program, kind: &str, option: &str) -> Result<String, Failure> {
     let data = program.interface().data;
-    let fit: Vec<&str> = data.iter().filter(|d| d.ty.as_deref() == Some(kind)).map(|d| d.name.as_str()).collect();
+    let fit: Vec<&str> =
+        data.iter().filter(|d| d.ty.as_deref() == Some(kind)).map(|d| d.name.as_str()).collect();
     let (one, many) = if kind == "image" { ("image", "images") } else { (kind, kind) };
     match fit[..] {
         [one] => Ok(one.to_owned()),
-        [] if data.is_empty() => Err(plain(format!("the program has no `data` items; omit {option}"))),
+        [] if data.is_empty() => {
+            Err(plain(format!("the program has no `data` items; omit {option}")))
+        }
         [] => {
             let names: Vec<&str> = data.iter().map(|d| d.name.as_str()).collect();
             let hint = match kind {

@@ -1,4 +1,5 @@
-//! One run from its program to its folder, as `run` and `evaluate` do it. Nothing is printed here but the live line.
+//! One run from its program to its folder, as `run` and `evaluate` do it. Nothing is
+//! printed here but the live line.
 //!
 //! Invariant: `run.json` says `done` only when every other file of the folder is whole.
 
@@ -13,12 +14,13 @@ use super::{Failure, date, edges, files, given, people, plain, seen};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
-    BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches, stuck_structure,
+    BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches,
+    stuck_structure,
 };
 use pcadlang::lang::{self, builtins::scene::ImageValue};
 use pcadlang::report::{
-    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities, table, text_hash,
-    widen, zarr,
+    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
+    table, text_hash, widen, zarr,
 };
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
@@ -94,7 +96,8 @@ fn kernel_seconds(kernels: &[KernelStats]) -> f64 {
     kernels.iter().map(|k| k.seconds).sum()
 }
 
-/// The summary of each quantity, with its effective draws in a second of the kernels' time.
+/// The summary of each quantity, with its effective draws in a second of the kernels'
+/// time.
 pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
     let one = |q: &Quantity| {
         let mut s = json!(q.summary);
@@ -127,8 +130,8 @@ impl Interrupt {
     pub fn listen() -> Arc<Interrupt> {
         let interrupt = Arc::new(Interrupt::default());
         let heard = Arc::clone(&interrupt);
-        // If no handler can be set, the system's own stays. Whoever asks twice does not want to wait for the step to end; what is
-        // on the disk by then is whole.
+        // If no handler can be set, the system's own stays. Whoever asks twice does not
+        // want to wait for the step to end; what is on the disk by then is whole.
         let _ = ctrlc::set_handler(move || {
             if heard.asked.swap(true, Ordering::SeqCst) {
                 std::process::exit(130);
@@ -162,13 +165,18 @@ impl Interrupt {
     }
 }
 
-/// A hash of the files that the command line names, and of those that the program reads by itself.
+/// A hash of the files that the command line names, and of those that the program reads
+/// by itself.
 ///
 /// # Errors
 /// If one is not there any more.
 pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
     let mut all = model.data_hash().to_owned();
-    let named = job.observe.iter().map(|o| given::file_of(o)).chain(job.keypoints.as_deref().map(given::file_of));
+    let named = job
+        .observe
+        .iter()
+        .map(|o| given::file_of(o))
+        .chain(job.keypoints.as_deref().map(given::file_of));
     let plain = [&job.observe_contours, &job.given.camera].into_iter().flatten();
     for path in named.map(Path::new).chain(plain.map(|p| p.as_path())) {
         all.push_str(&bytes_hash(&files::read(path)?));
@@ -228,7 +236,12 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
 }
 
 /// Writes `run.json`: the record with its state, and more.
-pub fn write_record(dir: &RunDir, record: &Map<String, Value>, state: &str, more: Value) -> Result<(), Failure> {
+pub fn write_record(
+    dir: &RunDir,
+    record: &Map<String, Value>,
+    state: &str,
+    more: Value,
+) -> Result<(), Failure> {
     write_run(dir, &recorded(record, state, more))
 }
 
@@ -306,7 +319,11 @@ pub fn options(job: &Job, ready: &Ready, watch: Option<Arc<dyn Watch>>) -> RunOp
         incremental: !s.no_incremental,
         limits: model.limits().clone(),
         watch,
-        banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
+        banks: Some(Arc::new(BankFiles::new(
+            model,
+            folder(&job.given.program),
+            job.features_from.clone(),
+        ))),
         sites: true,
         pointwise: true,
     }
@@ -328,14 +345,18 @@ fn fill(
     // A single chain has one mode.
     let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
     let kept = Arc::new(KeptTraces::new(s.chains(), manner.keep as usize, model.hash()));
-    let watches: Vec<Arc<dyn Watch>> = vec![Arc::new(joints.clone()), best.clone(), evidence.clone(), kept.clone()];
+    let watches: Vec<Arc<dyn Watch>> =
+        vec![Arc::new(joints.clone()), best.clone(), evidence.clone(), kept.clone()];
     let options = options(job, ready, Some(Arc::new(Watches(watches))));
-    let memories: Vec<Memory> = (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
+    let memories: Vec<Memory> =
+        (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
     let ending = Ending::default();
     interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, (s.chains(), "chains"), &ending, options.time, !manner.live));
+        scope.spawn(|| {
+            progress::watch(&progress, (s.chains(), "chains"), &ending, options.time, !manner.live)
+        });
         scope.spawn(|| progress::ask_for_checkpoints(&progress, &ending, manner.checkpoint));
         scope.spawn(|| keep_best(dir, model, &best, &ending, manner.checkpoint));
         scope.spawn(|| keep_traces(dir, &kept, &ending, manner.checkpoint));
@@ -344,20 +365,25 @@ fn fill(
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
     let sampled = begun.elapsed().as_secs_f64();
 
-    let chains = results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
+    let chains =
+        results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
     write_traces(dir, &kept)?;
     let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
     // A run that may go on keeps all that it has.
     let even = align(dir.path(), s.chains(), !interrupted);
-    let even = even.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
+    let even =
+        even.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
     if let Some(even) = even {
         draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < even));
     }
     widen(&mut draws);
     let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
-    let step_sizes: Vec<_> = chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
+    let step_sizes: Vec<_> =
+        chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
     let zarr = zarr::write(dir.path(), &draws, &step_sizes, &points);
-    zarr.map_err(|e| plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display())))?;
+    zarr.map_err(|e| {
+        plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display()))
+    })?;
     let quantities = quantities(&draws);
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
@@ -365,7 +391,8 @@ fn fill(
     let mut warnings = table::warnings(&quantities, &modes, &kernels, chains.len());
     let person = job.given.who.person.unwrap_or(1);
     if *chooses {
-        warnings.extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
+        warnings
+            .extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
     }
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
@@ -391,7 +418,8 @@ fn fill(
     let mut more = counts(&chains, best.as_deref(), &quantities);
     more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
     more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
-    let run = recorded(record, if interrupted { "interrupted" } else { "done" }, Value::Object(more));
+    let run =
+        recorded(record, if interrupted { "interrupted" } else { "done" }, Value::Object(more));
     write_page(dir, &run, &summary, &quantities)?;
     write_run(dir, &run)?;
     Ok(Outcome {
@@ -412,7 +440,8 @@ fn fill(
 fn structure_warning(state: &pcadlang::trace::Trace, sites: &[SiteStats]) -> Option<String> {
     let stuck = stuck_structure(state, sites);
     let (address, rate) = stuck.first()?;
-    let more = if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
+    let more =
+        if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
     Some(format!(
         "{address}{more} decides which other choices exist, and {:.1}% of its proposals were accepted, so \
          the number of components hardly changes; marginalise their labels, as in `observe mixture(map(fn(m) {{ 1 / k }}, mu), \
@@ -421,7 +450,8 @@ fn structure_warning(state: &pcadlang::trace::Trace, sites: &[SiteStats]) -> Opt
     ))
 }
 
-/// Writes the states that are kept so far, one to a line, from time to time until the chains end.
+/// Writes the states that are kept so far, one to a line, from time to time until the
+/// chains end.
 fn keep_traces(dir: &RunDir, kept: &KeptTraces, ending: &Ending, every: Duration) {
     while !ending.within(every) {
         // What cannot be written is said at the end.
@@ -430,8 +460,11 @@ fn keep_traces(dir: &RunDir, kept: &KeptTraces, ending: &Ending, every: Duration
 }
 
 fn write_traces(dir: &RunDir, kept: &KeptTraces) -> Result<(), Failure> {
-    let lines =
-        kept.all().iter().filter_map(|k| serde_json::to_string(k).ok()).fold(String::new(), |s, k| s + &k + "\n");
+    let lines = kept
+        .all()
+        .iter()
+        .filter_map(|k| serde_json::to_string(k).ok())
+        .fold(String::new(), |s, k| s + &k + "\n");
     if lines.is_empty() { Ok(()) } else { write(dir, TRACES, lines.as_bytes()) }
 }
 
@@ -445,27 +478,38 @@ fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
 }
 
 /// What `run.json` says of the chains at the end.
-fn counts(chains: &[ChainResult], best: Option<&BestState>, quantities: &[Quantity]) -> Map<String, Value> {
+fn counts(
+    chains: &[ChainResult],
+    best: Option<&BestState>,
+    quantities: &[Quantity],
+) -> Map<String, Value> {
     let each: Vec<Value> = chains
         .iter()
         .map(|c| json!({ "steps": c.steps, "warmup": c.warmup, "draws": c.draws, "seconds": c.seconds }))
         .collect();
     let best = best.map(|b| b.log_joint);
-    let r_hat = quantities.iter().map(|q| q.summary.r_hat).filter(|r| !r.is_nan()).max_by(f64::total_cmp);
+    let r_hat =
+        quantities.iter().map(|q| q.summary.r_hat).filter(|r| !r.is_nan()).max_by(f64::total_cmp);
     // Chains at rest at different values have none, and the others' would say too little.
     let stuck = quantities.iter().find(|q| q.is_stuck());
     let r_hat = if stuck.is_some() { None } else { r_hat };
-    let mut all = vec![("chains", json!(each)), ("best_log_joint", json!(best)), ("r_hat_max", json!(r_hat))];
+    let mut all =
+        vec![("chains", json!(each)), ("best_log_joint", json!(best)), ("r_hat_max", json!(r_hat))];
     if let (None, Some(q)) = (r_hat, stuck.or(quantities.first())) {
-        all.push(("r_hat_max_reason", json!(q.why_no_r_hat().map(|why| format!("{}: {why}", q.name)))));
+        all.push((
+            "r_hat_max_reason",
+            json!(q.why_no_r_hat().map(|why| format!("{}: {why}", q.name))),
+        ));
     }
     all.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
 }
 
 /// What tells a run from others: all that the draws of its chains depend on.
 fn identity(record: &Map<String, Value>) -> String {
-    let said = ["program_hash", "inputs_hash", "seed"].map(|key| record.get(key).cloned().unwrap_or_default());
-    let settings = ["warmup", "incremental"].map(|key| record.get("settings").and_then(|s| s.get(key)).cloned());
+    let said = ["program_hash", "inputs_hash", "seed"]
+        .map(|key| record.get(key).cloned().unwrap_or_default());
+    let settings = ["warmup", "incremental"]
+        .map(|key| record.get("settings").and_then(|s| s.get(key)).cloned());
     text_hash(&json!([said, settings]).to_string())
 }
 

@@ -1,4 +1,5 @@
-//! Where the landmarks of a program's view are in the photograph, over all draws: `keypoints.json`.
+//! Where the landmarks of a program's view are in the photograph, over all draws:
+//! `keypoints.json`.
 
 use super::scene::view_operand;
 use pcadlang::infer::{StateError, Watch};
@@ -14,7 +15,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// The landmarks of the chains, as their draws come. Clones share them.
 #[derive(Clone, Debug)]
 pub struct Joints {
-    /// Width and height of the photograph in pixels; without one, positions are in pixels of the camera.
+    /// Width and height of the photograph in pixels; without one, positions are in pixels
+    /// of the camera.
     size: Option<(u32, u32)>,
     chains: Arc<[Mutex<Chain>]>,
 }
@@ -29,7 +31,8 @@ struct Chain {
 /// What draws say of landmarks.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Seen {
-    /// Where the joints are in the picture: between the scene's and where they were detected.
+    /// Where the joints are in the picture: between the scene's and where they were
+    /// detected.
     joints: Moments,
     /// Where the scene's own are in the picture, and in the scene.
     own: Moments,
@@ -64,7 +67,8 @@ impl Joints {
     fn of(&self, chains: impl Iterator<Item = usize>) -> Seen {
         let mut all = Seen::default();
         for chain in chains.filter_map(|c| self.chains.get(c)) {
-            let Seen { joints, own, scene } = &chain.lock().unwrap_or_else(PoisonError::into_inner).seen;
+            let Seen { joints, own, scene } =
+                &chain.lock().unwrap_or_else(PoisonError::into_inner).seen;
             all.joints.merge(joints);
             all.own.merge(own);
             all.scene.merge(scene);
@@ -74,8 +78,12 @@ impl Joints {
 
     /// The draws of all chains, each mode by its probability if that is known.
     fn by_probability(&self, modes: &[Mode]) -> Seen {
-        let each = modes.iter().map(|m| Some((m.probability?, self.of(m.chains.iter().map(|c| c.wrapping_sub(1))))));
-        let Some(each) = each.collect::<Option<Vec<_>>>().filter(|e| !e.is_empty()) else { return self.all() };
+        let each = modes
+            .iter()
+            .map(|m| Some((m.probability?, self.of(m.chains.iter().map(|c| c.wrapping_sub(1))))));
+        let Some(each) = each.collect::<Option<Vec<_>>>().filter(|e| !e.is_empty()) else {
+            return self.all();
+        };
         let mixed = |part: fn(&Seen) -> &Moments| {
             Moments::mixture(&each.iter().map(|(p, s)| (*p, part(s))).collect::<Vec<_>>())
         };
@@ -88,8 +96,9 @@ impl Joints {
         view.landmarks(width, height).map(|(name, at)| (Arc::clone(name), at)).collect()
     }
 
-    /// The file: means and spreads over all draws of all chains, each of the modes they are in by its probability, and the best
-    /// state, that of `view`. None if it has no landmarks.
+    /// The file: means and spreads over all draws of all chains, each of the modes they
+    /// are in by its probability, and the best state, that of `view`. None if it has no
+    /// landmarks.
     pub fn report(&self, view: &ViewValue, modes: &[Mode], seconds: f64) -> Option<Value> {
         let best = self.positions(view);
         if best.is_empty() {
@@ -97,13 +106,16 @@ impl Joints {
         }
         let numbers = |xs: &mut dyn Iterator<Item = f64>| xs.map(rounded).collect::<Value>();
         let spread = |m: &Moments| -> Map<String, Value> {
-            let each =
-                m.iter().map(|(name, p)| (name.to_owned(), numbers(&mut p.mean.iter().copied().chain([p.sd()]))));
+            let each = m.iter().map(|(name, p)| {
+                (name.to_owned(), numbers(&mut p.mean.iter().copied().chain([p.sd()])))
+            });
             each.collect()
         };
         let Seen { joints, own, scene } = self.by_probability(modes);
-        let best: Map<String, Value> =
-            best.iter().filter_map(|(name, at)| Some((name.to_string(), numbers(&mut (*at)?.into_iter())))).collect();
+        let best: Map<String, Value> = best
+            .iter()
+            .filter_map(|(name, at)| Some((name.to_string(), numbers(&mut (*at)?.into_iter()))))
+            .collect();
         Some(json!({
             "keypoints": spread(&joints),
             "body": spread(&own),
@@ -133,7 +145,9 @@ impl Watch for Joints {
 
     fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws) {
         let Some(mut chain) = self.chain(chain) else { return };
-        let Some(at) = *chain.view.get_or_insert_with(|| view_operand(trace, draws)) else { return };
+        let Some(at) = *chain.view.get_or_insert_with(|| view_operand(trace, draws)) else {
+            return;
+        };
         let Ok(values) = trace.query(&[at], draws) else { return };
         let Some(view) = values.first().and_then(|v| v.downcast::<ViewValue>()) else { return };
         let found = trace.located();
@@ -142,9 +156,12 @@ impl Watch for Joints {
         let seen = &mut chain.seen;
         for (landmark, (name, at)) in view.0.solid().landmarks().iter().zip(self.positions(view)) {
             seen.scene.add(&name, &landmark.position.to_array(), 0.0);
-            // Of several solids' landmarks of one name the second is called NAME#2, but observed by its name.
+            // Of several solids' landmarks of one name the second is called NAME#2, but
+            // observed by its name.
             let same = |l: &&Located| {
-                let near = |k: usize, size: f64| at.is_some_and(|at| (l.own[k] * size - at[k]).abs() < 1e-6 * size);
+                let near = |k: usize, size: f64| {
+                    at.is_some_and(|at| (l.own[k] * size - at[k]).abs() < 1e-6 * size)
+                };
                 name.split('#').next() == Some(&*l.name) && near(0, width) && near(1, height)
             };
             let located = found.iter().find(same);
@@ -154,7 +171,11 @@ impl Watch for Joints {
             }
             match (located, at) {
                 (Some(l), _) => {
-                    seen.joints.add(&name, &[l.at[0] * width, l.at[1] * height], l.variance * diagonal);
+                    seen.joints.add(
+                        &name,
+                        &[l.at[0] * width, l.at[1] * height],
+                        l.variance * diagonal,
+                    );
                 }
                 (None, Some(at)) => seen.joints.add(&name, &at, 0.0),
                 (None, None) => {}

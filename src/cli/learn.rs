@@ -39,7 +39,12 @@ pub fn learn(a: &Learn) -> Result<(), Failure> {
     })?;
     if !a.quiet {
         let took = seconds(begun.elapsed().as_secs_f64());
-        print_line!("{}: {} scenes from the prior in {took}, seed {}", a.out.display(), a.n, a.seed);
+        print_line!(
+            "{}: {} scenes from the prior in {took}, seed {}",
+            a.out.display(),
+            a.n,
+            a.seed
+        );
     }
     Ok(())
 }

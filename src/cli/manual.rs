@@ -33,7 +33,8 @@ pub fn man(a: &Man) -> Result<(), Failure> {
     let mut command = Cli::command().disable_help_subcommand(true);
     command.build();
     let Some(folder) = &a.out else { return print(&page(&command)?) };
-    std::fs::create_dir_all(folder).map_err(|e| plain(format!("cannot make {}: {e}", folder.display())))?;
+    std::fs::create_dir_all(folder)
+        .map_err(|e| plain(format!("cannot make {}: {e}", folder.display())))?;
     files::write(&folder.join("pcadlang.1"), &page(&command)?)?;
     for sub in command.get_subcommands() {
         let name = format!("pcadlang-{}", sub.get_name());
@@ -54,7 +55,9 @@ fn page(command: &clap::Command) -> Result<Vec<u8>, Failure> {
 /// Prints a text; whoever reads it may stop early.
 fn print(text: &[u8]) -> Result<(), Failure> {
     match std::io::stdout().write_all(text) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(plain(format!("cannot write: {e}"))),
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(plain(format!("cannot write: {e}")))
+        }
         _ => Ok(()),
     }
 }

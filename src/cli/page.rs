@@ -1,8 +1,8 @@
-//! `report.html` of a run's folder: everything that the page shows is read from there, but for the
-//! draws. A run ends with it, and `pcadlang report` makes it anew.
+//! `report.html` of a run's folder: everything that the page shows is read from there,
+//! but for the draws. A run ends with it, and `pcadlang report` makes it anew.
 //!
-//! Invariant: a file that is missing or broken is left out of the page, and is no reason to have
-//! none.
+//! Invariant: a file that is missing or broken is left out of the page, and is no reason
+//! to have none.
 
 use super::date::readable;
 use super::job::write;
@@ -27,8 +27,11 @@ const LARGEST: u32 = 1024;
 /// The pictures of a folder: names, captions, and whether they are bright lines on black.
 const PHOTO: (&str, &str, bool) = ("photo.jpg", "the photograph", false);
 const OVER: (&str, &str, bool) = ("overlay.png", "the best state over it", false);
-const JOINTS: (&str, &str, bool) =
-    ("joints.png", "detected joints (blue), each joined to its position in the best state (yellow)", false);
+const JOINTS: (&str, &str, bool) = (
+    "joints.png",
+    "detected joints (blue), each joined to its position in the best state (yellow)",
+    false,
+);
 const EDGES: (&str, &str, bool) = ("photo_contours.png", "the contours of the photograph", true);
 const CONTOURS: (&str, &str, bool) = ("contours.png", "the contours of the best state", true);
 const COVERED: (&str, &str, bool) =
@@ -40,16 +43,23 @@ const MODES: (&str, &str, bool) = (
     false,
 );
 
-/// Writes the page of a folder. `run` and `summary` are what `run.json` and `summary.json` say, or
-/// are about to.
-pub fn write_page(dir: &RunDir, run: &Value, summary: &Value, quantities: &[Quantity]) -> Result<(), Failure> {
+/// Writes the page of a folder. `run` and `summary` are what `run.json` and
+/// `summary.json` say, or are about to.
+pub fn write_page(
+    dir: &RunDir,
+    run: &Value,
+    summary: &Value,
+    quantities: &[Quantity],
+) -> Result<(), Failure> {
     let modes: Vec<Mode> = list(&summary["modes"]);
-    let mode_pictures: Vec<_> = (1..=modes.len()).map(|n| std::fs::read(dir.file(&places::name(n))).ok()).collect();
+    let mode_pictures: Vec<_> =
+        (1..=modes.len()).map(|n| std::fs::read(dir.file(&places::name(n))).ok()).collect();
     let kernels: Vec<KernelStats> = list(&summary["kernels"]);
     let mut warnings: Vec<String> = state(run).into_iter().collect();
     warnings.extend(list::<String>(&summary["warnings"]));
     let mesh = std::fs::read(dir.file("best.obj")).ok().and_then(|bytes| obj::indexed(&bytes).ok());
-    let positions: Vec<[f32; 3]> = mesh.iter().flat_map(|m| &m.positions).map(|p| p.to_array()).collect();
+    let positions: Vec<[f32; 3]> =
+        mesh.iter().flat_map(|m| &m.positions).map(|p| p.to_array()).collect();
     let program = std::fs::read(dir.file(PROGRAM)).unwrap_or_default();
     let html = page(&Page {
         title: text(&run["program"]),
@@ -89,21 +99,31 @@ fn state(run: &Value) -> Option<String> {
         "done" => None,
         "interrupted" => Some("the run was interrupted: this is what it had drawn".into()),
         "failed" => Some(format!("the run failed: {}", text(&run["error"]))),
-        _ => Some("the run has not ended: this is what it had written when the page was made".into()),
+        _ => {
+            Some("the run has not ended: this is what it had written when the page was made".into())
+        }
     }
 }
 
 /// The command of the run; nothing if it was not kept.
 fn command(run: &Value) -> String {
     let arguments: Vec<String> = list(&run["arguments"]);
-    if arguments.is_empty() { String::new() } else { format!("pcadlang run {}", quoted(&arguments)) }
+    if arguments.is_empty() {
+        String::new()
+    } else {
+        format!("pcadlang run {}", quoted(&arguments))
+    }
 }
 
 /// When it was, how long it took, with how many chains and what seed.
 fn facts(run: &Value) -> Vec<String> {
     let mut all: Vec<String> = run["begun"].as_str().map(readable).into_iter().collect();
     all.extend(run["seconds"].as_f64().map(|s| format!("{} in all", seconds(s))));
-    all.extend(run["settings"]["chains"].as_u64().map(|n| format!("{n} chain{}", if n == 1 { "" } else { "s" })));
+    all.extend(
+        run["settings"]["chains"]
+            .as_u64()
+            .map(|n| format!("{n} chain{}", if n == 1 { "" } else { "s" })),
+    );
     all.extend(run["seed"].as_u64().map(|n| format!("seed {n}")));
     all
 }
@@ -111,11 +131,19 @@ fn facts(run: &Value) -> Vec<String> {
 fn settings(run: &Value) -> Vec<(&'static str, String)> {
     let known = |(name, v): (&'static str, &Value)| (!v.is_null()).then(|| (name, plainly(v)));
     let time = |(name, v): (&'static str, &Value)| Some((name, seconds(v.as_f64()?)));
-    let before = [("version", &run["version"]), ("program hash", &run["program_hash"]), ("seed", &run["seed"])];
+    let before = [
+        ("version", &run["version"]),
+        ("program hash", &run["program_hash"]),
+        ("seed", &run["seed"]),
+    ];
     let mut all: Vec<(&str, String)> = before.into_iter().filter_map(known).collect();
     all.extend(known(("chains", &run["settings"]["chains"])));
     all.extend(run["begun"].as_str().map(|date| ("begun", readable(date))));
-    all.extend([("time", &run["seconds"]), ("sampling time", &run["sampling_seconds"])].into_iter().filter_map(time));
+    all.extend(
+        [("time", &run["seconds"]), ("sampling time", &run["sampling_seconds"])]
+            .into_iter()
+            .filter_map(time),
+    );
     let sets = run["set"].as_object().into_iter().flatten();
     all.extend(sets.map(|(k, v)| ("set", format!("{k} = {}", plainly(v)))));
     all.extend(list::<String>(&run["observe"]).into_iter().map(|o| ("observe", o)));
@@ -125,13 +153,15 @@ fn settings(run: &Value) -> Vec<(&'static str, String)> {
 
 /// The pictures that a folder has, those that are to be compared side by side.
 fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
-    let mut groups = vec![vec![PHOTO], vec![OVER], vec![JOINTS], vec![COVERED], vec![EDGES, CONTOURS]];
+    let mut groups =
+        vec![vec![PHOTO], vec![OVER], vec![JOINTS], vec![COVERED], vec![EDGES, CONTOURS]];
     groups.extend(modes.then(|| vec![MODES]));
     let of = |(name, caption, lines): (&str, &'static str, bool)| {
         let file = sized(std::fs::read(dir.file(name)).ok()?)?;
         Some(Picture { caption, file, lines })
     };
-    let found = groups.into_iter().map(|group| group.into_iter().filter_map(of).collect::<Vec<_>>());
+    let found =
+        groups.into_iter().map(|group| group.into_iter().filter_map(of).collect::<Vec<_>>());
     found.filter(|group| !group.is_empty()).collect()
 }
 

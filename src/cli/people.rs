@@ -1,4 +1,5 @@
-//! Which person of a photograph a run is about, and what it says of the people found there.
+//! Which person of a photograph a run is about, and what it says of the people found
+//! there.
 
 use clap::Args;
 use pcadlang::lang::builtins::scene::ImageValue;
@@ -9,11 +10,12 @@ use std::path::PathBuf;
 /// Which person of a photograph is meant, and what finds people.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Who {
-    /// Which person in the photograph, 1 being the most prominent: sets the program's `person`
+    /// Which person in the photograph, 1 being the most prominent: sets the program's
+    /// `person`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub person: Option<u32>,
-    /// A box in pixels of the photograph: selects the person who fills it best. Sets the program's
-    /// `near`
+    /// A box in pixels of the photograph: selects the person who fills it best. Sets the
+    /// program's `near`
     #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rectangle)]
     pub near: Option<[f64; 4]>,
     /// A folder with networks to detect people with, instead of the built-in ones:
@@ -24,8 +26,11 @@ pub struct Who {
 
 /// `X,Y,W,H`.
 fn rectangle(text: &str) -> Result<[f64; 4], String> {
-    let numbers: Vec<f64> =
-        text.split(',').filter_map(|x| x.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
+    let numbers: Vec<f64> = text
+        .split(',')
+        .filter_map(|x| x.trim().parse().ok())
+        .filter(|x: &f64| x.is_finite())
+        .collect();
     match numbers[..] {
         [x, y, w, h] if text.split(',').count() == 4 && w > 0.0 && h > 0.0 => Ok([x, y, w, h]),
         _ => Err("expected four numbers X,Y,W,H with positive width and height".into()),
@@ -48,13 +53,17 @@ const BODY: [&str; 12] = [
     "r_ankle",
 ];
 
-/// Networks are less sure than this of most things that are no people, and of few people (docs/detector.md).
+/// Networks are less sure than this of most things that are no people, and of few people
+/// (docs/detector.md).
 const DOUBTFUL: f64 = 0.5;
 
-/// That nobody was found, that others may be meant, that little of a body is in the picture. `person` counts from 1.
+/// That nobody was found, that others may be meant, that little of a body is in the
+/// picture. `person` counts from 1.
 pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
     let image = image.downcast::<ImageValue>();
-    let Some((image, people)) = image.and_then(|i| Some((i, i.people()?))) else { return Vec::new() };
+    let Some((image, people)) = image.and_then(|i| Some((i, i.people()?))) else {
+        return Vec::new();
+    };
     if people.is_empty() {
         return vec![format!(
             "no person was found in `{name}`: without detected joints the body is seldom found \
@@ -62,7 +71,10 @@ pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
         )];
     }
     let Some(chosen) = people.get((person as usize).saturating_sub(1)) else {
-        return vec![format!("only {} people were found in `{name}`, so there is no person {person}", people.len())];
+        return vec![format!(
+            "only {} people were found in `{name}`, so there is no person {person}",
+            people.len()
+        )];
     };
     let mut all = Vec::new();
     if chosen.sure < DOUBTFUL {
@@ -91,6 +103,8 @@ pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
 
 /// How many of the body's joints are inside a picture of this size.
 fn inside(p: &Person, (width, height): (u32, u32)) -> usize {
-    let within = |at: [f64; 2]| (0.0..f64::from(width)).contains(&at[0]) && (0.0..f64::from(height)).contains(&at[1]);
+    let within = |at: [f64; 2]| {
+        (0.0..f64::from(width)).contains(&at[0]) && (0.0..f64::from(height)).contains(&at[1])
+    };
     BODY.iter().filter(|name| p.landmark(name).is_some_and(|l| within(l.at))).count()
 }

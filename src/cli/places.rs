@@ -1,4 +1,5 @@
-//! A picture of each mode that chains are in, where they do not agree: the best state of its chains over the photograph.
+//! A picture of each mode that chains are in, where they do not agree: the best state of
+//! its chains over the photograph.
 
 use super::job::write;
 use super::{Failure, plain, scene};
@@ -43,7 +44,12 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<Place> {
     let place = |(i, m): (usize, &Mode)| {
         let best = state(m)?;
         let probability = m.probability.map_or(String::new(), |p| format!(", {:.0}%", 100.0 * p));
-        let said = format!("{}: {} of {chains}{probability}, {:.0}", i + 1, m.chains.len(), best.log_joint);
+        let said = format!(
+            "{}: {} of {chains}{probability}, {:.0}",
+            i + 1,
+            m.chains.len(),
+            best.log_joint
+        );
         Some(Place { number: i + 1, said, best })
     };
     modes.iter().take(SHOWN).enumerate().filter_map(place).collect()
@@ -52,12 +58,13 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<Place> {
 /// A picture with a longer side of so many pixels.
 pub fn sized(picture: &RgbImage, side: u32) -> RgbImage {
     let scale = f64::from(side) / f64::from(picture.width().max(picture.height()).max(1));
-    let [w, h] = [picture.width(), picture.height()].map(|v| ((f64::from(v) * scale) as u32).max(1));
+    let [w, h] =
+        [picture.width(), picture.height()].map(|v| ((f64::from(v) * scale) as u32).max(1));
     resize(picture, w, h, FilterType::Triangle)
 }
 
-/// Writes `modes.png`, and `mode-N.png` of each, if there are several modes and something is seen. Those of an earlier part of the run
-/// are removed.
+/// Writes `modes.png`, and `mode-N.png` of each, if there are several modes and something
+/// is seen. Those of an earlier part of the run are removed.
 pub fn show_places(
     dir: &RunDir,
     seed: u64,
@@ -67,7 +74,9 @@ pub fn show_places(
 ) -> Result<(), Failure> {
     for old in (1..=SHOWN).map(name).chain(["modes.png".to_owned()]).map(|name| dir.file(&name)) {
         match std::fs::remove_file(&old) {
-            Err(e) if e.kind() != ErrorKind::NotFound => return Err(plain(format!("{}: {e}", old.display()))),
+            Err(e) if e.kind() != ErrorKind::NotFound => {
+                return Err(plain(format!("{}: {e}", old.display())));
+            }
             _ => {}
         }
     }

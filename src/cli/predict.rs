@@ -1,5 +1,6 @@
-//! `pcadlang predict`: what would be observed again, drawn from the prior or the posterior, against what is observed. The draws
-//! are the library's ([`pcadlang::infer::predictive`]); here they become a table and a file.
+//! `pcadlang predict`: what would be observed again, drawn from the prior or the
+//! posterior, against what is observed. The draws are the library's
+//! ([`pcadlang::infer::predictive`]); here they become a table and a file.
 
 use super::args::{Job, Predict};
 use super::job::{self, Interrupt, Ready, write};
@@ -7,7 +8,9 @@ use super::progress::{self, Ending};
 use super::{Failure, plain, quality};
 use pcadlang::Model;
 use pcadlang::infer::draws::{Discard, Sink};
-use pcadlang::infer::predictive::{Predictive, Replication, STATISTICS, observed, prior, statistics, tail};
+use pcadlang::infer::predictive::{
+    Predictive, Replication, STATISTICS, observed, prior, statistics, tail,
+};
 use pcadlang::infer::{Progress, diagnostics};
 use pcadlang::report::{RunDir, number, seconds, table};
 use std::fmt::Write;
@@ -35,9 +38,13 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
     let silent: Vec<&(String, String)> =
         draws.iter().flatten().next().map_or(Vec::new(), |r| r.silent.iter().collect());
     if draws.iter().flatten().all(|r| r.groups.is_empty()) {
-        let named: Vec<String> = silent.iter().map(|(name, what)| format!("{name} is {what}")).collect();
+        let named: Vec<String> =
+            silent.iter().map(|(name, what)| format!("{name} is {what}")).collect();
         let hint = (!named.is_empty()).then(|| named.join("; "));
-        return Err(Failure::Plain("none of the program's observations has a sampler".into(), hint));
+        return Err(Failure::Plain(
+            "none of the program's observations has a sampler".into(),
+            hint,
+        ));
     }
     let stem = job::stem(&a.job.given.program);
     let dir = match &a.out {
@@ -52,12 +59,17 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
     }
     let count: usize = draws.iter().map(Vec::len).sum();
     let took = seconds(begun.elapsed().as_secs_f64());
-    print_line!("seed {}, {count} draws from the {what} in {took}\n{}", a.job.sampling.seed, dir.path().display());
+    print_line!(
+        "seed {}, {count} draws from the {what} in {took}\n{}",
+        a.job.sampling.seed,
+        dir.path().display()
+    );
     Ok(())
 }
 
 fn from_prior(a: &Predict, model: &Model) -> Result<Vec<Replication>, Failure> {
-    let drawn = prior(model.code(), a.job.sampling.seed, a.n, job::threads(&a.job), model.limits().clone());
+    let drawn =
+        prior(model.code(), a.job.sampling.seed, a.n, job::threads(&a.job), model.limits().clone());
     drawn.map_err(|e| model.chain_error(e).into())
 }
 
@@ -86,14 +98,19 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     let mut marked = false;
     for group in &now.groups {
-        let all: Vec<[f64; 4]> =
-            draws.iter().flatten().filter_map(|r| r.get(&group.name)).map(|g| statistics(&g.numbers)).collect();
+        let all: Vec<[f64; 4]> = draws
+            .iter()
+            .flatten()
+            .filter_map(|r| r.get(&group.name))
+            .map(|g| statistics(&g.numbers))
+            .collect();
         if all.is_empty() {
             continue;
         }
         let here = statistics(&group.numbers);
         for (k, name) in STATISTICS.iter().enumerate() {
-            let mut replicated: Vec<f64> = all.iter().map(|s| s[k]).filter(|x| !x.is_nan()).collect();
+            let mut replicated: Vec<f64> =
+                all.iter().map(|s| s[k]).filter(|x| !x.is_nan()).collect();
             replicated.sort_by(f64::total_cmp);
             // One number has no spread, and is its own mean, least and greatest.
             if replicated.is_empty() || group.numbers.len() == 1 && k > 0 {
@@ -105,7 +122,15 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
             let q = |p: f64| number(diagnostics::quantile_sorted(&replicated, p));
             let tail = format!("{p:.3}{}", if extreme { " *" } else { "" });
             let label = if group.numbers.len() == 1 { "value" } else { name };
-            rows.push(vec![group.name.clone(), label.into(), number(here[k]), q(0.05), q(0.5), q(0.95), tail]);
+            rows.push(vec![
+                group.name.clone(),
+                label.into(),
+                number(here[k]),
+                q(0.05),
+                q(0.5),
+                q(0.95),
+                tail,
+            ]);
         }
     }
     let mut s = table::aligned(&rows);
@@ -115,20 +140,27 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
                          predictive p-value); 0.5 is the centre"
     );
     if marked {
-        let _ = writeln!(s, "*: tail probability below {EXTREME} on one side: the program rarely produces such data");
+        let _ = writeln!(
+            s,
+            "*: tail probability below {EXTREME} on one side: the program rarely produces such data"
+        );
     }
     s
 }
 
-/// Statistics of every draw, and the numbers themselves where they are few. What a draw lacks is empty.
+/// Statistics of every draw, and the numbers themselves where they are few. What a draw
+/// lacks is empty.
 fn csv(now: &Replication, draws: &[Vec<Replication>]) -> String {
     let total: usize = now.groups.iter().map(|g| g.numbers.len()).sum();
     let whole = total <= ELEMENTS;
     let mut s = "chain,draw".to_owned();
     for g in &now.groups {
-        STATISTICS.iter().for_each(|k| s.push_str(&format!(",{}", quoted(&format!("{}.{k}", g.name)))));
+        STATISTICS
+            .iter()
+            .for_each(|k| s.push_str(&format!(",{}", quoted(&format!("{}.{k}", g.name)))));
         if whole {
-            (0..g.numbers.len()).for_each(|i| s.push_str(&format!(",{}", quoted(&format!("{}[{i}]", g.name)))));
+            (0..g.numbers.len())
+                .for_each(|i| s.push_str(&format!(",{}", quoted(&format!("{}[{i}]", g.name)))));
         }
     }
     s.push('\n');
@@ -151,5 +183,9 @@ fn csv(now: &Replication, draws: &[Vec<Replication>]) -> String {
 
 /// A field as RFC 4180 has it.
 fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+    if name.contains([',', '"', '\n']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
 }

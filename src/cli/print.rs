@@ -1,5 +1,6 @@
-//! Printing that never ends the program: who reads may go away (`pcadlang run … | head`), and the run goes on and keeps its files. The
-//! macros of the standard library panic there.
+//! Printing that never ends the program: who reads may go away (`pcadlang run … | head`),
+//! and the run goes on and keeps its files. The macros of the standard library panic
+//! there.
 
 use std::fmt::Arguments;
 use std::io::Write;
@@ -26,8 +27,8 @@ pub fn paragraph(text: &str) {
     }
 }
 
-/// A text in lines of at most so many letters, those after the first a little further in; a word that is longer than a line
-/// stays whole.
+/// A text in lines of at most so many letters, those after the first a little further in;
+/// a word that is longer than a line stays whole.
 fn wrapped(text: &str, columns: usize) -> String {
     let (mut lines, mut length) = (String::new(), 0);
     for word in text.split(' ') {

@@ -22,7 +22,8 @@ pub struct Ending {
 }
 
 impl Ending {
-    /// Does what it is the end of. It comes even where that panics: who waits for it would keep the process.
+    /// Does what it is the end of. It comes even where that panics: who waits for it
+    /// would keep the process.
     pub fn of<T>(&self, work: impl FnOnce() -> T) -> T {
         struct Comes<'a>(&'a Ending);
         impl Drop for Comes<'_> {
@@ -43,8 +44,15 @@ impl Ending {
     }
 }
 
-/// Shows progress until the end; a limit of time makes it a bar. `chains`: how many there are, and what they are called.
-pub fn watch(progress: &Progress, chains: (u32, &'static str), ending: &Ending, limit: Option<Duration>, quiet: bool) {
+/// Shows progress until the end; a limit of time makes it a bar. `chains`: how many there
+/// are, and what they are called.
+pub fn watch(
+    progress: &Progress,
+    chains: (u32, &'static str),
+    ending: &Ending,
+    limit: Option<Duration>,
+    quiet: bool,
+) {
     if quiet {
         return;
     }
@@ -111,7 +119,9 @@ impl Known {
     fn of(progress: &Progress, chains: (u32, &'static str)) -> Known {
         let number = |n: &AtomicU32| n.load(Ordering::Relaxed);
         // No bits: nothing is known yet.
-        let best = Some(progress.best.load(Ordering::Relaxed)).filter(|bits| *bits != 0).map(f64::from_bits);
+        let best = Some(progress.best.load(Ordering::Relaxed))
+            .filter(|bits| *bits != 0)
+            .map(f64::from_bits);
         Known {
             steps: progress.steps.load(Ordering::Relaxed),
             best,
@@ -133,8 +143,8 @@ impl Known {
     }
 }
 
-/// What is said, what matters most first, as narrow terminals cut the end off: the phase, the time left (or taken, if there is no limit),
-/// the best score, steps and their rate.
+/// What is said, what matters most first, as narrow terminals cut the end off: the phase,
+/// the time left (or taken, if there is no limit), the best score, steps and their rate.
 fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
     let mut s = k.phase().to_owned();
     if k.ended > 0 {
@@ -150,7 +160,10 @@ fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
     }
     s.push_str(&format!(", {} steps", k.steps));
     if elapsed.as_secs_f64() >= 0.5 {
-        s.push_str(&format!(", {} per second", number((k.steps as f64 / elapsed.as_secs_f64()).round())));
+        s.push_str(&format!(
+            ", {} per second",
+            number((k.steps as f64 / elapsed.as_secs_f64()).round())
+        ));
     }
     s
 }
@@ -178,13 +191,24 @@ mod tests {
         let mut k = Known { chains: (4, "chains"), ..Known::default() };
         assert_eq!(line(&k, s(0), None), "starts, 0 s, 0 steps");
         (k.started, k.warming, k.steps, k.best) = (2, 2, 500, Some(-12.34));
-        assert_eq!(line(&k, s(2), Some(s(300))), "warm-up, 4 min 58 s left, best -12.3, 500 steps, 250 per second");
+        assert_eq!(
+            line(&k, s(2), Some(s(300))),
+            "warm-up, 4 min 58 s left, best -12.3, 500 steps, 250 per second"
+        );
         (k.started, k.warming, k.ended, k.steps) = (4, 0, 2, 12_345_678);
         let said = line(&k, s(2), Some(s(300)));
-        assert!(said.starts_with("sampling, 2 of 4 chains, 4 min 58 s left, best -12.3, 12345678 steps"), "{said}");
+        assert!(
+            said.starts_with(
+                "sampling, 2 of 4 chains, 4 min 58 s left, best -12.3, 12345678 steps"
+            ),
+            "{said}"
+        );
         // The bar and the line fit a terminal of 80 columns but for the rate.
         assert!(said.find(" steps").is_some_and(|i| i + 6 + 11 <= 80), "{said}");
         (k.ended, k.best) = (4, Some(f64::NEG_INFINITY));
-        assert_eq!(line(&k, s(3), Some(s(3))), "finishing, 4 of 4 chains, 12345678 steps, 4.12e6 per second");
+        assert_eq!(
+            line(&k, s(3), Some(s(3))),
+            "finishing, 4 of 4 chains, 12345678 steps, 4.12e6 per second"
+        );
     }
 }

@@ -1,6 +1,8 @@
-//! `--quality` and `--time`: settings that were chosen from a front of speed and accuracy, filled in where the command line leaves them open.
+//! `--quality` and `--time`: settings that were chosen from a front of speed and
+//! accuracy, filled in where the command line leaves them open.
 //!
-//! Invariant: what is filled in is as if it had been typed, and depends on the command line and the presets alone, never on the machine.
+//! Invariant: what is filled in is as if it had been typed, and depends on the command
+//! line and the presets alone, never on the machine.
 
 use super::args::{Job, QualityArg, Sampling};
 use super::{Failure, plain};
@@ -9,11 +11,13 @@ use pcadlang::tradeoff::{Choice, Presets, Quality};
 use std::path::Path;
 use std::time::Duration;
 
-/// What is known of a program: `NAME.quality.json` beside it; or, of a shipped program, the shipped one.
+/// What is known of a program: `NAME.quality.json` beside it; or, of a shipped program,
+/// the shipped one.
 pub fn presets(program: &str) -> Result<Option<(String, Presets)>, Failure> {
     let path = Path::new(program).with_extension("quality.json");
     let name = path.display().to_string();
-    let shipped = || load::embedded(&name).filter(|_| !Path::new(program).exists()).map(str::to_owned);
+    let shipped =
+        || load::embedded(&name).filter(|_| !Path::new(program).exists()).map(str::to_owned);
     let Some(text) = std::fs::read_to_string(&path).ok().or_else(shipped) else { return Ok(None) };
     let wrong = |e: &dyn std::fmt::Display| plain(format!("{name}: {e}"));
     let presets: Presets = serde_json::from_str(&text).map_err(|e| wrong(&e))?;
@@ -21,7 +25,8 @@ pub fn presets(program: &str) -> Result<Option<(String, Presets)>, Failure> {
     Ok(Some((name, presets)))
 }
 
-/// Fills in what a run leaves open; what is to be said of it, if anything was. `keypoints`: whether it, or the dataset it is of, has some.
+/// Fills in what a run leaves open; what is to be said of it, if anything was.
+/// `keypoints`: whether it, or the dataset it is of, has some.
 pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> {
     let program = &job.given.program;
     let wanted = match (job.sampling.quality, job.sampling.time) {
@@ -31,18 +36,24 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
     };
     let known = presets(program)?;
     let Some(quality) = wanted else {
-        let Some((name, presets)) = known.filter(|(_, p)| fits(p, keypoints)) else { return Ok(None) };
+        let Some((name, presets)) = known.filter(|(_, p)| fits(p, keypoints)) else {
+            return Ok(None);
+        };
         let seconds = job.sampling.time.map_or(0.0, |t| t.as_secs_f64());
         return Ok(presets.of_time(seconds).map(|choice| fill(job, &choice, &name)));
     };
     let Some((name, presets)) = known else {
-        let hint =
-            "`pcadlang tradeoff` measures settings on cases with ground truth; its option --presets writes the file";
-        return Err(Failure::Plain(format!("{program} has no measured presets"), Some(hint.into())));
+        let hint = "`pcadlang tradeoff` measures settings on cases with ground truth; its option --presets writes the file";
+        return Err(Failure::Plain(
+            format!("{program} has no measured presets"),
+            Some(hint.into()),
+        ));
     };
     if !fits(&presets, keypoints) {
         let needs = presets.needs.join(", ");
-        return Err(plain(format!("the presets of {program} were measured with {needs}; --quality requires {needs}")));
+        return Err(plain(format!(
+            "the presets of {program} were measured with {needs}; --quality requires {needs}"
+        )));
     }
     match presets.of_quality(quality) {
         Some(choice) => Ok(Some(fill(job, &choice, &name))),
@@ -107,7 +118,8 @@ pub fn filled(job: &Job, quiet: bool) -> Result<Job, Failure> {
 /// How a run is told again: what is not in the program.
 pub fn again(job: &Job) -> String {
     let sets = job.given.sets.iter().map(|(k, v)| format!(" --set {k}={v}"));
-    let chains = job.sampling.chains.filter(|n| *n != Sampling::CHAINS).map(|n| format!(" --chains {n}"));
+    let chains =
+        job.sampling.chains.filter(|n| *n != Sampling::CHAINS).map(|n| format!(" --chains {n}"));
     sets.chain(chains).collect()
 }
 
@@ -130,7 +142,10 @@ mod tests {
             who: Default::default(),
             allowed: Default::default(),
         };
-        Job::of(given, Sampling { quality, time: time.map(Duration::from_secs_f64), ..Sampling::default() })
+        Job::of(
+            given,
+            Sampling { quality, time: time.map(Duration::from_secs_f64), ..Sampling::default() },
+        )
     }
 
     #[test]
@@ -158,7 +173,10 @@ mod tests {
         let presets: Presets = serde_json::from_str(text).unwrap();
         let mut open = job(None, None);
         fill(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
-        assert_eq!((open.sampling.steps, open.sampling.warmup, open.sampling.time), (Some(200), Some(50), None));
+        assert_eq!(
+            (open.sampling.steps, open.sampling.warmup, open.sampling.time),
+            (Some(200), Some(50), None)
+        );
         let mut told = job(None, Some(2.0));
         told.sampling.warmup = Some(7);
         fill(&mut told, &presets.of_time(2.0).unwrap(), "x.quality.json");

@@ -1,4 +1,5 @@
-//! A run opened again from its folder: the command that it was begun with, all settings that it used, and its states.
+//! A run opened again from its folder: the command that it was begun with, all settings
+//! that it used, and its states.
 
 use super::args::{Cli, Command, Job};
 use super::{Failure, plain};
@@ -21,7 +22,8 @@ pub struct Reopened {
     pub arguments: Vec<String>,
 }
 
-/// What is typed to run a job again, but for the name of the command: all that its draws depend on.
+/// What is typed to run a job again, but for the name of the command: all that its draws
+/// depend on.
 pub fn arguments(job: &Job) -> Vec<String> {
     let (g, s) = (&job.given, &job.sampling);
     let mut all = vec![g.program.clone()];
@@ -49,7 +51,8 @@ pub fn arguments(job: &Job) -> Vec<String> {
 }
 
 impl Reopened {
-    /// The run of a folder. Files that it names are where they were, seen from the folder that the command is given in.
+    /// The run of a folder. Files that it names are where they were, seen from the folder
+    /// that the command is given in.
     ///
     /// # Errors
     /// If the folder holds no run, or one of a version that did not keep its command.
@@ -57,16 +60,24 @@ impl Reopened {
         let run = super::earlier::run(folder)?;
         let told = || {
             let hint = "run it again with this version; `evaluate` keeps the pictures of its cases";
-            Failure::Plain(format!("{}: the folder does not record its command", folder.display()), Some(hint.into()))
+            Failure::Plain(
+                format!("{}: the folder does not record its command", folder.display()),
+                Some(hint.into()),
+            )
         };
         let kept = run["arguments"].as_array().ok_or_else(told)?;
-        let arguments: Vec<String> = kept.iter().filter_map(|a| a.as_str().map(str::to_owned)).collect();
-        let typed = ["pcadlang", "run"].into_iter().map(str::to_owned).chain(arguments.iter().cloned());
+        let arguments: Vec<String> =
+            kept.iter().filter_map(|a| a.as_str().map(str::to_owned)).collect();
+        let typed =
+            ["pcadlang", "run"].into_iter().map(str::to_owned).chain(arguments.iter().cloned());
         match Cli::try_parse_from(typed) {
             Ok(Cli { command: Command::Run(run) }) => {
                 Ok(Reopened { folder: folder.to_owned(), job: run.job, arguments })
             }
-            _ => Err(plain(format!("{}: this version does not have the command it was run with", folder.display()))),
+            _ => Err(plain(format!(
+                "{}: this version does not have the command it was run with",
+                folder.display()
+            ))),
         }
     }
 
@@ -76,9 +87,11 @@ impl Reopened {
     /// If their file cannot be read.
     pub fn traces(&self) -> Result<Vec<KeptTrace>, Failure> {
         let path = self.folder.join(TRACES);
-        let text = std::fs::read_to_string(&path).map_err(|e| plain(format!("cannot read {}: {e}", path.display())))?;
+        let text = std::fs::read_to_string(&path)
+            .map_err(|e| plain(format!("cannot read {}: {e}", path.display())))?;
         let one = |(i, line): (usize, &str)| {
-            serde_json::from_str(line).map_err(|e| plain(format!("{}: line {}: {e}", path.display(), i + 1)))
+            serde_json::from_str(line)
+                .map_err(|e| plain(format!("{}: line {}: {e}", path.display(), i + 1)))
         };
         text.lines().enumerate().map(one).collect()
     }
@@ -98,7 +111,8 @@ impl Reopened {
     /// # Errors
     /// If the program, its data or its settings are no longer those of the run.
     pub fn trace(&self, model: &Model, saved: &SavedTrace) -> Result<Trace, Failure> {
-        let loaded = Trace::load(Arc::clone(model.code()), model.hash(), saved, model.limits().clone());
+        let loaded =
+            Trace::load(Arc::clone(model.code()), model.hash(), saved, model.limits().clone());
         loaded.map_err(|e| plain(format!("a state of {}: {e}", self.folder.display())))
     }
 }

@@ -33,7 +33,8 @@ pub fn report(a: &Report) -> Result<(), Failure> {
         // A run that has not ended, or was killed.
         _ => so_far(&quantities, draws.len()),
     };
-    let names: Vec<&String> = summary["quantities"].as_object().into_iter().flat_map(|q| q.keys()).collect();
+    let names: Vec<&String> =
+        summary["quantities"].as_object().into_iter().flat_map(|q| q.keys()).collect();
     rename(&mut quantities, names.into_iter().map(String::as_str));
     write_page(&dir, &run, &summary, &quantities)?;
     print_line!("{}", dir.file(PAGE).display());

@@ -22,7 +22,9 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
     let (runs, name) = (Path::new("runs"), job::stem(&job.given.program));
-    if let Some(path) = a.out.as_ref().filter(|path| !a.resume && !a.quiet && earlier::left(path).is_some()) {
+    if let Some(path) =
+        a.out.as_ref().filter(|path| !a.resume && !a.quiet && earlier::left(path).is_some())
+    {
         error_line!("note: replacing the earlier run in {}", path.display());
     }
     let dir = match &a.out {
@@ -31,7 +33,12 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         Some(path) => RunDir::create(path).map_err(|e| plain(e.to_string()))?,
         None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
     };
-    let manner = Manner { live: !(a.quiet || a.json), checkpoint: a.checkpoint, resume: a.resume, keep: a.keep };
+    let manner = Manner {
+        live: !(a.quiet || a.json),
+        checkpoint: a.checkpoint,
+        resume: a.resume,
+        keep: a.keep,
+    };
     let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
     let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));
     if let Some(explained) = &explained {
@@ -80,7 +87,10 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
         [] => {}
         all if a.verbose => all.iter().for_each(|a| paragraph(&format!("approximate: {a}"))),
         [one] => paragraph(&format!("approximate: {one}")),
-        all => print_line!("approximate: {} approximations, listed in the report and with --verbose", all.len()),
+        all => print_line!(
+            "approximate: {} approximations, listed in the report and with --verbose",
+            all.len()
+        ),
     }
     if o.chains.first().is_some_and(|c| c.last.is_pseudo()) {
         paragraph(
@@ -89,13 +99,21 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
         );
     }
     if o.every > 1 {
-        print_line!("note: the summary is thinned to one draw in {}; the chain files have all draws", o.every);
+        print_line!(
+            "note: the summary is thinned to one draw in {}; the chain files have all draws",
+            o.every
+        );
     }
     let steps: u64 = o.chains.iter().map(|c| c.steps + c.warmup).sum();
     let most = o.chains.iter().map(|c| (c.steps, c.warmup)).max().unwrap_or_default();
     print_line!("seed {seed}, {} chains, {steps} steps in {}", o.chains.len(), seconds(o.seconds));
     if job.sampling.time.is_some() {
-        print_line!("to repeat the longest chain: --steps {} --warmup {}{}", most.0, most.1, quality::again(job));
+        print_line!(
+            "to repeat the longest chain: --steps {} --warmup {}{}",
+            most.0,
+            most.1,
+            quality::again(job)
+        );
     }
     if o.interrupted {
         print_line!(

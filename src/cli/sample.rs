@@ -23,7 +23,9 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
             None => {
                 let mut row = vec![(i + 1).to_string()];
                 for (name, o) in &model.code().assumed {
-                    let value = trace.query(&[*o], draws).map_err(|e| Failure::from(model.run_error(*e)))?;
+                    let value = trace
+                        .query(&[*o], draws)
+                        .map_err(|e| Failure::from(model.run_error(*e)))?;
                     row.push(value.first().map_or_else(|| name.to_string(), short));
                 }
                 rows.push(row);
@@ -31,7 +33,8 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
         }
     }
     if pictures.is_empty() {
-        let head = std::iter::once("draw".to_owned()).chain(model.code().assumed.iter().map(|(n, _)| n.to_string()));
+        let head = std::iter::once("draw".to_owned())
+            .chain(model.code().assumed.iter().map(|(n, _)| n.to_string()));
         rows.insert(0, head.collect());
         print_text!("{}", table::aligned(&rows));
         print_line!("seed {}", a.seed);

@@ -25,11 +25,13 @@ pub fn rebuilt(model: &Model, choices: &[(u64, Constraint)], draws: Draws) -> Re
 /// Where a program keeps its view: the last top-level name that is one.
 pub fn view_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
-    let is_view = |values: Vec<Value>| values.first().is_some_and(|v| v.downcast::<ViewValue>().is_some());
+    let is_view =
+        |values: Vec<Value>| values.first().is_some_and(|v| v.downcast::<ViewValue>().is_some());
     globals.into_iter().find(|o| trace.query(&[*o], draws).is_ok_and(is_view))
 }
 
-/// The program's view: the last top-level name that is one, or the last solid before a camera.
+/// The program's view: the last top-level name that is one, or the last solid before a
+/// camera.
 pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<Arc<View>> {
     let at = bank::picture(trace, draws)?;
     let values = trace.query(&[at], draws).ok()?;

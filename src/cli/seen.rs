@@ -1,5 +1,5 @@
-//! What a run looked at, as files beside the best state: the photograph, its contours, and the
-//! joints that were detected in it.
+//! What a run looked at, as files beside the best state: the photograph, its contours,
+//! and the joints that were detected in it.
 
 use super::job::write;
 use super::places::sized;
@@ -20,7 +20,8 @@ const QUALITY: u8 = 90;
 /// What is shown around the joints, as a share of how far they reach.
 const MARGIN: f64 = 0.15;
 
-/// Writes `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were detected.
+/// Writes `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were
+/// detected.
 pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Result<(), Failure> {
     let (width, height) = image.size();
     let told = |e: image::ImageError| plain(e.to_string());
@@ -35,14 +36,20 @@ pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Resul
         }
     }
     match image.seen().or_else(|| found(image)) {
-        Some(map) => write(dir, "photo_contours.png", &png(&lines(&map, (width, height))).map_err(told)?),
+        Some(map) => {
+            write(dir, "photo_contours.png", &png(&lines(&map, (width, height))).map_err(told)?)
+        }
         None => Ok(()),
     }
 }
 
-/// That nothing in what was given speaks of the scene: a photograph without contours, keypoints of
-/// which the scene has none.
-pub fn warnings(image: Option<(&str, &ImageValue)>, keypoints: Option<&str>, located: &[Located]) -> Vec<String> {
+/// That nothing in what was given speaks of the scene: a photograph without contours,
+/// keypoints of which the scene has none.
+pub fn warnings(
+    image: Option<(&str, &ImageValue)>,
+    keypoints: Option<&str>,
+    located: &[Located],
+) -> Vec<String> {
     let mut all = Vec::new();
     if let Some((name, image)) = image
         && image.seen().is_some_and(|map| map.is_empty())
@@ -53,14 +60,16 @@ pub fn warnings(image: Option<(&str, &ImageValue)>, keypoints: Option<&str>, loc
         ));
     }
     if let Some(path) = keypoints.filter(|_| located.is_empty()) {
-        all.push(format!("{path} has no keypoint that the scene has, so it does not constrain the pose"));
+        all.push(format!(
+            "{path} has no keypoint that the scene has, so it does not constrain the pose"
+        ));
     }
     all
 }
 
-/// The contours that the built-in detector finds, for the eye to compare, where the program looked
-/// at none: a person whose joints were found is fitted without them. A value of its own, so that
-/// this does not count as looked at.
+/// The contours that the built-in detector finds, for the eye to compare, where the
+/// program looked at none: a person whose joints were found is fitted without them. A
+/// value of its own, so that this does not count as looked at.
 fn found(image: &ImageValue) -> Option<ContourMap> {
     let photo = image.as_photo()?.clone();
     ImageValue::photo(photo).map().ok().cloned()
@@ -71,23 +80,30 @@ fn lines(map: &ContourMap, (width, height): (u32, u32)) -> RgbImage {
     // Points are about a pixel of the map apart.
     let length = vec![1.0; map.len()];
     let ContourMap { x, y, tx, ty, .. } = map;
-    pictures::contours(width, height, &Strokes { width: map.width, height: map.height, x, y, tx, ty, length: &length })
+    pictures::contours(
+        width,
+        height,
+        &Strokes { width: map.width, height: map.height, x, y, tx, ty, length: &length },
+    )
 }
 
-/// The part of a photograph that has the joints, with a line from where each was detected to where
-/// the scene has it.
+/// The part of a photograph that has the joints, with a line from where each was detected
+/// to where the scene has it.
 fn joints(photo: &RgbImage, located: &[Located]) -> Option<RgbImage> {
     let (w, h) = (f64::from(photo.width()), f64::from(photo.height()));
-    let ends: Vec<[[f64; 2]; 2]> = located.iter().map(|l| [l.own, l.observed].map(|[x, y]| [x * w, y * h])).collect();
+    let ends: Vec<[[f64; 2]; 2]> =
+        located.iter().map(|l| [l.own, l.observed].map(|[x, y]| [x * w, y * h])).collect();
     let along = |k: usize, most: f64| {
         let all = || ends.iter().flatten().map(|p| p[k]).filter(|x| (0.0..=most).contains(x));
-        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+        let (low, high) =
+            (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
         (low <= high).then_some((low, high))
     };
     let ((left, right), (top, bottom)) = (along(0, w)?, along(1, h)?);
     let margin = MARGIN * (right - left).max(bottom - top).max(1.0);
     let (x, y) = ((left - margin).max(0.0).floor(), (top - margin).max(0.0).floor());
-    let size = [(right + margin).min(w).ceil() - x, (bottom + margin).min(h).ceil() - y].map(|v| (v as u32).max(1));
+    let size = [(right + margin).min(w).ceil() - x, (bottom + margin).min(h).ceil() - y]
+        .map(|v| (v as u32).max(1));
     let part = crop_imm(photo, x as u32, y as u32, size[0], size[1]).to_image();
     let mut out = sized(&part, LONGER_SIDE);
     let (size, moved) = ((size[0], size[1]), |p: [f64; 2]| [p[0] - x, p[1] - y]);
@@ -109,7 +125,8 @@ mod tests {
 
     #[test]
     fn what_says_nothing_is_named() {
-        let blank = ImageValue::contours(ContourMap::from_image(&image::GrayImage::new(40, 30)), None);
+        let blank =
+            ImageValue::contours(ContourMap::from_image(&image::GrayImage::new(40, 30)), None);
         let said = warnings(Some(("photo", &blank)), Some("joints.json"), &[]);
         assert!(said[0].starts_with("no contours were found in `photo`"), "{said:?}");
         assert!(said[1].starts_with("joints.json has no keypoint"), "{said:?}");
@@ -124,17 +141,33 @@ mod tests {
     #[test]
     fn joints_are_shown_close_by() {
         let photo = RgbImage::from_pixel(400, 200, image::Rgb([100; 3]));
-        let all = [located([0.25, 0.5], [0.5, 0.5]), located([0.3, 0.25], [0.3, 0.3]), located([7.0, 0.5], [0.4, 0.4])];
+        let all = [
+            located([0.25, 0.5], [0.5, 0.5]),
+            located([0.3, 0.25], [0.3, 0.3]),
+            located([7.0, 0.5], [0.4, 0.4]),
+        ];
         let out = joints(&photo, &all).unwrap();
         // From 100 to 200 across with a margin of 15, from 50 to 100 down.
         assert_eq!((out.width(), out.height()), (768, 472));
-        let at =
-            |x: f64, y: f64| out.get_pixel(((x - 85.0) * 768.0 / 130.0) as u32, ((y - 35.0) * 768.0 / 130.0) as u32).0;
-        assert_eq!((at(100.0, 100.0), at(200.0, 100.0)), ([255, 220, 0], [90, 220, 255]), "own yellow, detected blue");
+        let at = |x: f64, y: f64| {
+            out.get_pixel(((x - 85.0) * 768.0 / 130.0) as u32, ((y - 35.0) * 768.0 / 130.0) as u32)
+                .0
+        };
+        assert_eq!(
+            (at(100.0, 100.0), at(200.0, 100.0)),
+            ([255, 220, 0], [90, 220, 255]),
+            "own yellow, detected blue"
+        );
         // Lines are thin, and smooth at their sides.
         let [red, green, blue] = at(150.0, 100.0);
-        assert!(red < 100 && green > 140 && blue > 140, "a line between them: {red} {green} {blue}");
+        assert!(
+            red < 100 && green > 140 && blue > 140,
+            "a line between them: {red} {green} {blue}"
+        );
         assert_eq!(at(150.0, 90.0), [100; 3], "and nothing beside it");
-        assert!(joints(&photo, &[]).is_none() && joints(&photo, &[located([f64::NAN; 2], [2.0, 2.0])]).is_none());
+        assert!(
+            joints(&photo, &[]).is_none()
+                && joints(&photo, &[located([f64::NAN; 2], [2.0, 2.0])]).is_none()
+        );
     }
 }

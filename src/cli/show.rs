@@ -16,11 +16,12 @@ pub struct Show {
     /// The folder of the run
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// Which kept state, numbered from 1 as listed by `show RUN` [default: the best state]
+    /// Which kept state, numbered from 1 as listed by `show RUN` [default: the best
+    /// state]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub draw: Option<u32>,
-    /// The file to write: the picture over the photograph (.png) or the mesh (.obj, .glb). Without
-    /// it, the choices are printed
+    /// The file to write: the picture over the photograph (.png) or the mesh (.obj,
+    /// .glb). Without it, the choices are printed
     #[arg(short, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -36,8 +37,12 @@ pub fn show(a: &Show) -> Result<(), Failure> {
         None => run.best()?,
         Some(n) => {
             let found = kept.get(n as usize - 1);
-            let there = format!("{} states of {} are kept (--keep of `run`)", kept.len(), a.run.display());
-            found.ok_or_else(|| Failure::Plain(format!("no kept state {n}"), Some(there)))?.trace.clone()
+            let there =
+                format!("{} states of {} are kept (--keep of `run`)", kept.len(), a.run.display());
+            found
+                .ok_or_else(|| Failure::Plain(format!("no kept state {n}"), Some(there)))?
+                .trace
+                .clone()
         }
     };
     let ready = job::prepare(&run.job, true)?;
@@ -45,7 +50,12 @@ pub fn show(a: &Show) -> Result<(), Failure> {
     let Some(out) = &a.out else {
         print_line!("pcadlang run {}", quoted(&run.arguments));
         for (k, n) in kept.iter().zip(1..).filter(|_| a.draw.is_none()) {
-            print_line!("{n}: chain {}, draw {}, log joint {}", k.chain, k.draw, number(k.log_joint));
+            print_line!(
+                "{n}: chain {}, draw {}, log joint {}",
+                k.chain,
+                k.draw,
+                number(k.log_joint)
+            );
         }
         let choices = trace.choices();
         let row = |(address, value, score): &(_, pcadlang::lang::value::Value, f64)| {
@@ -60,7 +70,8 @@ pub fn show(a: &Show) -> Result<(), Failure> {
         return Ok(());
     };
     let draws = scene::predictive(run.job.sampling.seed, 0);
-    let view = scene::view(&mut trace, draws, None).ok_or_else(|| plain("the program has no view"))?;
+    let view =
+        scene::view(&mut trace, draws, None).ok_or_else(|| plain("the program has no view"))?;
     let mesh = || view.solid().to_mesh().map_err(|e| plain(format!("cannot make a mesh: {e}")));
     let bytes = match out.extension().and_then(|e| e.to_str()) {
         Some("png") => {
@@ -70,14 +81,22 @@ pub fn show(a: &Show) -> Result<(), Failure> {
         }
         Some("obj") => obj::write(&mesh()?).into_bytes(),
         Some("glb") => glb::write(&mesh()?),
-        _ => return Err(plain(format!("{}: the file name must end in .png, .obj or .glb", out.display()))),
+        _ => {
+            return Err(plain(format!(
+                "{}: the file name must end in .png, .obj or .glb",
+                out.display()
+            )));
+        }
     };
     files::write(Path::new(out), &bytes)
 }
 
 /// Arguments as a shell reads them.
 pub fn quoted(arguments: &[String]) -> String {
-    let plain = |a: &String| !a.is_empty() && a.chars().all(|c| c.is_ascii_alphanumeric() || "_-./=:,#+@".contains(c));
-    let one = |a: &String| if plain(a) { a.clone() } else { format!("'{}'", a.replace('\'', "'\\''")) };
+    let plain = |a: &String| {
+        !a.is_empty() && a.chars().all(|c| c.is_ascii_alphanumeric() || "_-./=:,#+@".contains(c))
+    };
+    let one =
+        |a: &String| if plain(a) { a.clone() } else { format!("'{}'", a.replace('\'', "'\\''")) };
     arguments.iter().map(one).collect::<Vec<_>>().join(" ")
 }

@@ -4,7 +4,8 @@ use super::Failure;
 use pcadlang::diag::render;
 use std::io::IsTerminal;
 
-/// Whether errors may have colours: on a terminal that has any, unless NO_COLOR is set (https://no-color.org).
+/// Whether errors may have colours: on a terminal that has any, unless NO_COLOR is set
+/// (https://no-color.org).
 pub fn has_colors() -> bool {
     let set = |name| std::env::var_os(name).is_some_and(|v: std::ffi::OsString| !v.is_empty());
     let dumb = std::env::var_os("TERM").is_some_and(|v| v == "dumb");

@@ -53,16 +53,19 @@ fn clear() {
 /// When a file was written, and how long it is; nothing if it is not there.
 type Stamp = Option<(SystemTime, u64)>;
 
-/// The files of programs, those that are looked for and missing too, as they are at one time.
+/// The files of programs, those that are looked for and missing too, as they are at one
+/// time.
 struct Seen(BTreeMap<String, Stamp>);
 
 impl Seen {
     fn of(programs: &[String], folders: &[PathBuf]) -> Seen {
-        // What the text was read before is seen: a change that comes while it is checked counts.
+        // What the text was read before is seen: a change that comes while it is checked
+        // counts.
         let mut seen = BTreeMap::new();
         for program in programs {
             let own = Reach::default().of(program);
-            let reach = folders.iter().fold(own, |reach, f| reach.clone().allow(f).unwrap_or(reach));
+            let reach =
+                folders.iter().fold(own, |reach, f| reach.clone().allow(f).unwrap_or(reach));
             let asked = Asked { reach, seen: Mutex::new(seen) };
             let _ = load(program, &asked, &mut SourceMap::new());
             seen = asked.seen.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -72,7 +75,11 @@ impl Seen {
 
     /// The files that are not as they were.
     fn changed(&self) -> Vec<&str> {
-        self.0.iter().filter(|(path, was)| stamp(path) != **was).map(|(path, _)| path.as_str()).collect()
+        self.0
+            .iter()
+            .filter(|(path, was)| stamp(path) != **was)
+            .map(|(path, _)| path.as_str())
+            .collect()
     }
 }
 
@@ -105,7 +112,8 @@ mod tests {
         std::fs::create_dir_all(&folder).unwrap();
         let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
         let (main, part, missing) = (path("main.pcad"), path("part.pcad"), path("missing.pcad"));
-        std::fs::write(&main, "include \"part.pcad\"; include \"missing.pcad\"; let a = 1;").unwrap();
+        std::fs::write(&main, "include \"part.pcad\"; include \"missing.pcad\"; let a = 1;")
+            .unwrap();
         std::fs::write(&part, "let b = ;").unwrap();
         let seen = Seen::of(std::slice::from_ref(&main), &[]);
         assert!(seen.changed().is_empty(), "{:?}", seen.changed());

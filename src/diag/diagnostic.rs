@@ -1,7 +1,7 @@
 //! The diagnostic itself: data, without any rendering.
 //!
-//! Invariant of a good one: it has at least one primary label, its message makes sense without the source beside it,
-//! and a hint says what to type.
+//! Invariant of a good one: it has at least one primary label, its message makes sense
+//! without the source beside it, and a hint says what to type.
 
 use crate::syntax::span::Span;
 
@@ -23,7 +23,8 @@ pub struct Label {
     pub span: Span,
     /// What to say there; may be empty.
     pub text: String,
-    /// Whether this is the place of the error itself (underlined by `^`), or one that explains it (`-`).
+    /// Whether this is the place of the error itself (underlined by `^`), or one that
+    /// explains it (`-`).
     pub primary: bool,
 }
 
@@ -45,7 +46,13 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// A message of the given severity, without labels.
     pub fn new(severity: Severity, message: impl Into<String>) -> Self {
-        Diagnostic { severity, message: message.into(), labels: Vec::new(), hints: Vec::new(), notes: Vec::new() }
+        Diagnostic {
+            severity,
+            message: message.into(),
+            labels: Vec::new(),
+            hints: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 
     /// An error at `span`, whose label says `text`.

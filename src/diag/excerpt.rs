@@ -1,8 +1,10 @@
-//! The lines of the source that one diagnostic shows, made fit for a terminal, as codespan-reporting wants them.
+//! The lines of the source that one diagnostic shows, made fit for a terminal, as
+//! codespan-reporting wants them.
 //!
-//! A line longer than [`MAX_COLUMNS`] is cut to a window around its first label (a generated program may hold megabytes
-//! in a line), and control characters are replaced, so that a source cannot send escape sequences to the terminal.
-//! Line and column numbers stay those of the source.
+//! A line longer than [`MAX_COLUMNS`] is cut to a window around its first label (a
+//! generated program may hold megabytes in a line), and control characters are replaced,
+//! so that a source cannot send escape sequences to the terminal. Line and column numbers
+//! stay those of the source.
 
 use super::diagnostic::Diagnostic;
 use super::source::{SourceFile, SourceMap};
@@ -33,7 +35,8 @@ struct Excerpt {
 struct Line {
     /// The bytes of the source it stands for, without its line break.
     source: Range<usize>,
-    /// Where it starts in the excerpt's text, where the text of the source starts, and where that ends.
+    /// Where it starts in the excerpt's text, where the text of the source starts, and
+    /// where that ends.
     shown: [usize; 3],
     /// How many columns were cut at the left.
     cut: usize,
@@ -46,7 +49,9 @@ impl Excerpts {
             let Span { file, start, end } = label.span;
             spans.entry(file).or_default().push(start as usize..end.max(start) as usize);
         }
-        let shown = |(id, spans): (FileId, Vec<_>)| map.get(id).map(|file| (id, Excerpt::new(file, &spans)));
+        let shown = |(id, spans): (FileId, Vec<_>)| {
+            map.get(id).map(|file| (id, Excerpt::new(file, &spans)))
+        };
         Excerpts(spans.into_iter().filter_map(shown).collect())
     }
 
@@ -66,18 +71,21 @@ impl Excerpt {
     fn new(file: &SourceFile, spans: &[Range<usize>]) -> Self {
         let first = spans.iter().map(|s| file.line_index(s.start)).min().unwrap_or(0);
         let last = spans.iter().map(|s| file.line_index(s.end)).max().unwrap_or(0);
-        let mut excerpt = Excerpt { name: file.name().to_owned(), text: String::new(), lines: Vec::new(), first };
+        let mut excerpt =
+            Excerpt { name: file.name().to_owned(), text: String::new(), lines: Vec::new(), first };
         for index in first..=last {
             let range = file.line_range(index);
             let line = file.text()[range.clone()].trim_end_matches(['\n', '\r']);
             let labels = spans.iter().flat_map(|s| [s.start, s.end]);
-            let label = labels.filter(|p| (range.start..=range.start + line.len()).contains(p)).min();
+            let label =
+                labels.filter(|p| (range.start..=range.start + line.len()).contains(p)).min();
             excerpt.push(line, range.start, label.map(|p| p - range.start));
         }
         excerpt
     }
 
-    /// Adds a line that starts at `start` in the source and holds a label at its byte `label`.
+    /// Adds a line that starts at `start` in the source and holds a label at its byte
+    /// `label`.
     fn push(&mut self, line: &str, start: usize, label: Option<usize>) {
         let begin = self.text.len();
         let long = line.chars().nth(MAX_COLUMNS).is_some();
@@ -111,7 +119,8 @@ impl Excerpt {
     fn shown_at(&self, byte: usize) -> usize {
         let index = self.lines.partition_point(|line| line.source.start <= byte).saturating_sub(1);
         let Some(line) = self.lines.get(index) else { return 0 };
-        // The next line may be cut at its left: then a byte in the cut is beyond the end of this one.
+        // The next line may be cut at its left: then a byte in the cut is beyond the end
+        // of this one.
         let inside = byte.clamp(line.source.start, line.source.end) - line.source.start;
         let mut at = line.shown[1] + inside;
         while !self.text.is_char_boundary(at) {
@@ -154,7 +163,8 @@ impl<'a> Files<'a> for Excerpts {
     fn column_number(&'a self, id: FileId, line: usize, byte: usize) -> Result<usize, Error> {
         let file = self.file(id)?;
         let shown = column_index(&file.text, self.line_range(id, line)?, byte);
-        let (cut, ellipsis) = file.lines.get(line).map_or((0, 0), |l| (l.cut, usize::from(l.cut > 0)));
+        let (cut, ellipsis) =
+            file.lines.get(line).map_or((0, 0), |l| (l.cut, usize::from(l.cut > 0)));
         Ok((cut + shown + 1).saturating_sub(ellipsis))
     }
 

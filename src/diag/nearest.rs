@@ -2,9 +2,10 @@
 
 /// The candidate nearest to `name`, if it is near enough to be a likely slip of the pen.
 ///
-/// Distance is Damerau–Levenshtein in its restricted form (optimal string alignment): insertions, deletions,
-/// substitutions and swaps of neighbours, each costing 1; letters that differ only in case cost nothing. Near enough is
-/// at most a third of the longer name's length, and at least 1 of three letters or more. Ties go to the earlier
+/// Distance is Damerau–Levenshtein in its restricted form (optimal string alignment):
+/// insertions, deletions, substitutions and swaps of neighbours, each costing 1; letters
+/// that differ only in case cost nothing. Near enough is at most a third of the longer
+/// name's length, and at least 1 of three letters or more. Ties go to the earlier
 /// candidate.
 pub fn nearest<'a, I>(name: &str, candidates: I) -> Option<&'a str>
 where
@@ -62,10 +63,13 @@ mod tests {
             ([], _) => b.len(),
             (_, []) => a.len(),
             ([a0, a @ ..], [b0, b @ ..]) => {
-                let mut least = (slow(a, b) + usize::from(a0 != b0)).min(slow(a, &[&[*b0], b].concat()) + 1);
+                let mut least =
+                    (slow(a, b) + usize::from(a0 != b0)).min(slow(a, &[&[*b0], b].concat()) + 1);
                 least = least.min(slow(&[&[*a0], a].concat(), b) + 1);
                 match (a, b) {
-                    ([a1, a @ ..], [b1, b @ ..]) if a0 == b1 && a1 == b0 => least.min(slow(a, b) + 1),
+                    ([a1, a @ ..], [b1, b @ ..]) if a0 == b1 && a1 == b0 => {
+                        least.min(slow(a, b) + 1)
+                    }
                     _ => least,
                 }
             }
@@ -74,10 +78,17 @@ mod tests {
 
     #[test]
     fn distance_equals_the_textbook_recursion() {
-        let words = ["", "a", "ab", "ba", "abc", "acb", "cab", "bca", "aab", "abab", "baba", "abcd", "dcba", "bacd"];
+        let words = [
+            "", "a", "ab", "ba", "abc", "acb", "cab", "bca", "aab", "abab", "baba", "abcd", "dcba",
+            "bacd",
+        ];
         for a in words {
             for b in words {
-                assert_eq!(distance(&letters(a), &letters(b)), slow(&letters(a), &letters(b)), "{a} {b}");
+                assert_eq!(
+                    distance(&letters(a), &letters(b)),
+                    slow(&letters(a), &letters(b)),
+                    "{a} {b}"
+                );
             }
         }
     }

@@ -9,7 +9,8 @@ use codespan_reporting::term::{self, Config};
 
 type Shown = codespan::Diagnostic<crate::syntax::span::FileId>;
 
-/// The diagnostics as the user sees them, in order, a blank line after each; with ANSI colours if `color`.
+/// The diagnostics as the user sees them, in order, a blank line after each; with ANSI
+/// colours if `color`.
 ///
 /// Labels in files that `map` does not know are left out.
 pub fn render(map: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> String {
@@ -27,16 +28,30 @@ pub fn render(map: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> Strin
 }
 
 #[cfg(feature = "cli")]
-fn write(out: &mut Vec<u8>, config: &Config, files: &Excerpts, shown: &Shown, color: bool) -> Result<(), Error> {
+fn write(
+    out: &mut Vec<u8>,
+    config: &Config,
+    files: &Excerpts,
+    shown: &Shown,
+    color: bool,
+) -> Result<(), Error> {
     match color {
-        true => term::emit_to_write_style(&mut term::termcolor::Ansi::new(out), config, files, shown),
+        true => {
+            term::emit_to_write_style(&mut term::termcolor::Ansi::new(out), config, files, shown)
+        }
         false => term::emit_to_io_write(out, config, files, shown),
     }
 }
 
 /// A build without the command has no colours.
 #[cfg(not(feature = "cli"))]
-fn write(out: &mut Vec<u8>, config: &Config, files: &Excerpts, shown: &Shown, _color: bool) -> Result<(), Error> {
+fn write(
+    out: &mut Vec<u8>,
+    config: &Config,
+    files: &Excerpts,
+    shown: &Shown,
+    _color: bool,
+) -> Result<(), Error> {
     term::emit_to_io_write(out, config, files, shown)
 }
 
@@ -47,7 +62,11 @@ fn to_codespan(files: &Excerpts, diagnostic: &Diagnostic) -> Shown {
         Severity::Note => codespan::Severity::Note,
     };
     let labels = diagnostic.labels.iter().filter_map(|label| {
-        let style = if label.primary { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
+        let style = if label.primary {
+            codespan::LabelStyle::Primary
+        } else {
+            codespan::LabelStyle::Secondary
+        };
         let range = files.range(label.span)?;
         Some(codespan::Label::new(style, label.span.file, range).with_message(&label.text))
     });
@@ -66,7 +85,11 @@ mod tests {
     fn one(text: &str, start: usize, end: usize) -> String {
         let mut map = SourceMap::new();
         let id = map.add("a.pcad", text);
-        render(&map, &[Diagnostic::error("wrong", Span::new(id, start, end), "here").hint("do that")], false)
+        render(
+            &map,
+            &[Diagnostic::error("wrong", Span::new(id, start, end), "here").hint("do that")],
+            false,
+        )
     }
 
     #[test]
@@ -83,7 +106,9 @@ mod tests {
         assert!(shown.contains("a.pcad:1:5001"), "{shown}");
         let line = shown.lines().find(|l| l.contains("BAD")).unwrap();
         let caret = shown.lines().find(|l| l.contains("^^^ here")).unwrap();
-        let column = |line: &str, text| line.chars().count() - line[line.find(text).unwrap()..].chars().count();
+        let column = |line: &str, text| {
+            line.chars().count() - line[line.find(text).unwrap()..].chars().count()
+        };
         assert_eq!(column(line, "BAD"), column(caret, "^^^"));
     }
 
@@ -99,7 +124,10 @@ mod tests {
         for text in ["", "\n", "a", "a\r\n", "é\u{0}", "\u{feff}x"] {
             for start in 0..6 {
                 for end in 0..6 {
-                    assert!(one(text, start, end).contains("error: wrong"), "{text:?} {start}..{end}");
+                    assert!(
+                        one(text, start, end).contains("error: wrong"),
+                        "{text:?} {start}..{end}"
+                    );
                 }
             }
         }

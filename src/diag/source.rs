@@ -1,4 +1,5 @@
-//! The source files of a run: names, texts, and where their lines start. Reading files is not done here.
+//! The source files of a run: names, texts, and where their lines start. Reading files is
+//! not done here.
 
 use super::diagnostic::Diagnostic;
 use crate::syntax::span::{FileId, Span};
@@ -18,7 +19,8 @@ pub struct SourceFile {
 
 impl SourceFile {
     fn new(name: &str, text: &str) -> Self {
-        let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
+        let line_starts =
+            std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
         SourceFile { name: name.into(), text: text.into(), line_starts }
     }
 
@@ -38,13 +40,15 @@ impl SourceFile {
         self.line_starts.len()
     }
 
-    /// The index (from 0) of the line that holds a byte; the last line for a byte past the end.
+    /// The index (from 0) of the line that holds a byte; the last line for a byte past
+    /// the end.
     #[doc(hidden)]
     pub fn line_index(&self, byte: usize) -> usize {
         self.line_starts.partition_point(|&start| start <= byte).saturating_sub(1)
     }
 
-    /// The byte range of a line, with its line break; empty at the end of the text for a line past the last.
+    /// The byte range of a line, with its line break; empty at the end of the text for a
+    /// line past the last.
     #[doc(hidden)]
     pub fn line_range(&self, index: usize) -> std::ops::Range<usize> {
         let at = |i: usize| self.line_starts.get(i).copied().unwrap_or(self.text.len());
@@ -55,7 +59,8 @@ impl SourceFile {
     pub fn location(&self, byte: usize) -> (usize, usize) {
         let line = self.line_index(byte);
         let start = self.line_range(line).start;
-        let column = self.text[start..].char_indices().take_while(|(i, _)| start + i < byte).count();
+        let column =
+            self.text[start..].char_indices().take_while(|(i, _)| start + i < byte).count();
         (line + 1, column + 1)
     }
 }
@@ -78,11 +83,13 @@ impl SourceMap {
         FileId((self.files.len() - 1) as u32)
     }
 
-    /// Adds the contents of a file, which should be UTF-8 of at most [`MAX_SOURCE_BYTES`].
+    /// Adds the contents of a file, which should be UTF-8 of at most
+    /// [`MAX_SOURCE_BYTES`].
     ///
     /// # Errors
-    /// A diagnostic that points at the first byte that is not UTF-8, or says that the file is too large. The file is
-    /// added in any case (with replacement characters, or empty), so that the diagnostic can be rendered.
+    /// A diagnostic that points at the first byte that is not UTF-8, or says that the
+    /// file is too large. The file is added in any case (with replacement characters, or
+    /// empty), so that the diagnostic can be rendered.
     #[doc(hidden)]
     pub fn add_bytes(&mut self, name: &str, bytes: &[u8]) -> Result<FileId, Diagnostic> {
         if bytes.len() > MAX_SOURCE_BYTES {
@@ -93,16 +100,24 @@ impl SourceMap {
             Ok(text) => return Ok(self.add(name, text)),
             Err(error) => error,
         };
-        // The text before the error keeps its length under lossy decoding, so the offset stays right.
+        // The text before the error keeps its length under lossy decoding, so the offset
+        // stays right.
         let id = self.add(name, &String::from_utf8_lossy(bytes));
         let at = error.valid_up_to();
         let byte = bytes.get(at).copied().unwrap_or_default();
         let hint = match bytes {
             [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "it looks like UTF-16; save the file as UTF-8",
-            _ => "save the file as UTF-8 (an older encoding such as Latin-1 writes letters with accents this way)",
+            _ => {
+                "save the file as UTF-8 (an older encoding such as Latin-1 writes letters with accents this way)"
+            }
         };
         let span = Span::new(id, at, at + char::REPLACEMENT_CHARACTER.len_utf8());
-        Err(Diagnostic::error("the file is not UTF-8 text", span, format!("byte 0x{byte:02x} is not UTF-8")).hint(hint))
+        Err(Diagnostic::error(
+            "the file is not UTF-8 text",
+            span,
+            format!("byte 0x{byte:02x} is not UTF-8"),
+        )
+        .hint(hint))
     }
 
     /// A file; `None` for a number this map did not give out.
@@ -112,7 +127,9 @@ impl SourceMap {
 
     /// The source text of a span; empty if it lies outside.
     pub fn slice(&self, span: Span) -> &str {
-        self.get(span.file).and_then(|f| f.text.get(span.start as usize..span.end as usize)).unwrap_or("")
+        self.get(span.file)
+            .and_then(|f| f.text.get(span.start as usize..span.end as usize))
+            .unwrap_or("")
     }
 
     /// `file:line:column` of the start of a span.
@@ -130,8 +147,13 @@ impl SourceMap {
 /// The message for a file over the limit.
 pub(crate) fn too_large(bytes: usize, span: Span) -> Diagnostic {
     let mib = |b: usize| b as f64 / f64::from(1 << 20);
-    let message = format!("the file is too large: {:.1} MiB, at most {} MiB", mib(bytes), mib(MAX_SOURCE_BYTES));
-    Diagnostic::error(message, span, "").hint("put data into a separate file: `data d = csv(\"points.csv\");`")
+    let message = format!(
+        "the file is too large: {:.1} MiB, at most {} MiB",
+        mib(bytes),
+        mib(MAX_SOURCE_BYTES)
+    );
+    Diagnostic::error(message, span, "")
+        .hint("put data into a separate file: `data d = csv(\"points.csv\");`")
 }
 
 #[cfg(test)]
@@ -156,7 +178,8 @@ mod tests {
     #[test]
     fn bytes_that_are_no_text_are_located() {
         let mut map = SourceMap::new();
-        let error = map.add_bytes("latin1.pcad", b"let a = 1;\nlet b = \"caf\xe9\";\n").unwrap_err();
+        let error =
+            map.add_bytes("latin1.pcad", b"let a = 1;\nlet b = \"caf\xe9\";\n").unwrap_err();
         assert_eq!(map.locate(error.labels[0].span), "latin1.pcad:2:13");
         let error = map.add_bytes("utf16.pcad", &[0xff, 0xfe, b'l', 0]).unwrap_err();
         assert!(error.hints[0].contains("UTF-16"));

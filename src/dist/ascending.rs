@@ -1,14 +1,19 @@
-//! The map between ascending numbers and unconstrained space: the first coordinate, then the logarithms of the gaps.
+//! The map between ascending numbers and unconstrained space: the first coordinate, then
+//! the logarithms of the gaps.
 //!
-//! For numbers of a bounded space, gaps are those of the numbers' own coordinates, in which the space has no bounds.
+//! For numbers of a bounded space, gaps are those of the numbers' own coordinates, in
+//! which the space has no bounds.
 
 use super::Support;
 use super::transform::{FAR, near};
 
-/// The space whose coordinates are told apart by their order: angles are taken as an interval.
+/// The space whose coordinates are told apart by their order: angles are taken as an
+/// interval.
 fn line(one: &Support) -> Support {
     match one {
-        Support::Circle => Support::Interval { lo: -core::f64::consts::PI, hi: core::f64::consts::PI },
+        Support::Circle => {
+            Support::Interval { lo: -core::f64::consts::PI, hi: core::f64::consts::PI }
+        }
         other => other.clone(),
     }
 }

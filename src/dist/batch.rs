@@ -1,24 +1,44 @@
-//! Many numbers under distributions of one family, whose parameters lie in a buffer: the same densities and slopes as one at a
-//! time, without an allocation, and without working out again what a parameter that stays has already given.
+//! Many numbers under distributions of one family, whose parameters lie in a buffer: the
+//! same densities and slopes as one at a time, without an allocation, and without working
+//! out again what a parameter that stays has already given.
 
 use super::*;
 use crate::num::{Column, ExactSum};
 use std::fmt;
 
-/// Numbers under distributions of one family. Columns of parameters are in the order of the constructor; with none of them the
-/// parameters stay as they were when the batch was made.
+/// Numbers under distributions of one family. Columns of parameters are in the order of
+/// the constructor; with none of them the parameters stay as they were when the batch was
+/// made.
 pub trait Batch: fmt::Debug + Send + Sync {
-    /// Adds the log densities of `n` numbers to a sum. False, with an unknown part of it added, if a number is NaN or a parameter
-    /// outside its domain.
-    fn score(&mut self, buffer: &[f64], x: Column, params: &[Column], n: usize, sum: &mut ExactSum) -> bool;
+    /// Adds the log densities of `n` numbers to a sum. False, with an unknown part of it
+    /// added, if a number is NaN or a parameter outside its domain.
+    fn score(
+        &mut self,
+        buffer: &[f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        sum: &mut ExactSum,
+    ) -> bool;
 
-    /// Adds `weight` times the derivatives of the log densities scored last to adjoints in the same places.
-    fn pull(&self, buffer: &[f64], by: &mut [f64], x: Column, params: &[Column], n: usize, weight: f64);
+    /// Adds `weight` times the derivatives of the log densities scored last to adjoints
+    /// in the same places.
+    fn pull(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        weight: f64,
+    );
 }
 
-/// A batch of one family: one that knows the density and slopes of its first distribution, too.
+/// A batch of one family: one that knows the density and slopes of its first
+/// distribution, too.
 pub(super) trait Family: Batch {
-    /// Makes the distributions anew where parameters have moved; false if one is outside its domain.
+    /// Makes the distributions anew where parameters have moved; false if one is outside
+    /// its domain.
     fn refresh(&mut self, buffer: &[f64], params: &[Column]) -> bool;
 
     /// The log density of a number under the first of them.
@@ -33,7 +53,8 @@ trait Member<const N: usize>: Clone + fmt::Debug + Send + Sync {
     /// With these parameters, if they are in its domain.
     fn with(params: [f64; N]) -> Option<Self>;
 
-    /// The same; what depends on parameters that `self` has too need not be worked out again.
+    /// The same; what depends on parameters that `self` has too need not be worked out
+    /// again.
     fn moved(&self, params: [f64; N]) -> Option<Self> {
         Self::with(params)
     }
@@ -132,7 +153,8 @@ impl Member<1> for Flip {
     }
 }
 
-/// Distributions, one for all numbers or one for each, and the parameters they were made with.
+/// Distributions, one for all numbers or one for each, and the parameters they were made
+/// with.
 #[derive(Debug)]
 struct Members<T, const N: usize>(Vec<(Option<[f64; N]>, T)>);
 
@@ -166,7 +188,14 @@ impl<T: Member<N>, const N: usize> Family for Members<T, N> {
 }
 
 impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
-    fn score(&mut self, buffer: &[f64], x: Column, params: &[Column], n: usize, sum: &mut ExactSum) -> bool {
+    fn score(
+        &mut self,
+        buffer: &[f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        sum: &mut ExactSum,
+    ) -> bool {
         if !self.refresh(buffer, params) {
             return false;
         }
@@ -180,7 +209,15 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         }
     }
 
-    fn pull(&self, buffer: &[f64], by: &mut [f64], x: Column, params: &[Column], n: usize, weight: f64) {
+    fn pull(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        weight: f64,
+    ) {
         let each = self.0.len() != 1;
         let columns = <&[Column; N]>::try_from(params).ok();
         let (mut of_x, mut of_params) = (0.0, [0.0; N]);
@@ -196,14 +233,17 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         if x.live && x.step == 0 {
             by[x.at] += of_x * weight;
         }
-        for (k, c) in columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live && c.step == 0) {
+        for (k, c) in
+            columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live && c.step == 0)
+        {
             by[c.at] += of_params[k] * weight;
         }
     }
 }
 
-/// The batch of a distribution over a number, or of one with elements that are all of one family; its parameters lie in these
-/// columns, or stay. `None` for other distributions, and where columns do not fit the family.
+/// The batch of a distribution over a number, or of one with elements that are all of one
+/// family; its parameters lie in these columns, or stay. `None` for other distributions,
+/// and where columns do not fit the family.
 pub fn batch(dist: &Dist, params: &[Column]) -> Option<Box<dyn Batch>> {
     Some(family(dist, params)?)
 }
@@ -264,16 +304,20 @@ mod tests {
             for shape in 0..1 << width {
                 // The numbers, one column a parameter, then what is seen.
                 let at = |shift: f64, k: usize, i: usize| {
-                    0.4 + 0.1 * k as f64 + shift + if shape >> k & 1 == 1 { 0.07 * i as f64 } else { 0.0 }
+                    0.4 + 0.1 * k as f64
+                        + shift
+                        + if shape >> k & 1 == 1 { 0.07 * i as f64 } else { 0.0 }
                 };
                 let n = 3;
                 let fill = |shift: f64| {
-                    let mut v: Vec<f64> = (0..width).flat_map(|k| (0..n).map(move |i| at(shift, k, i))).collect();
+                    let mut v: Vec<f64> =
+                        (0..width).flat_map(|k| (0..n).map(move |i| at(shift, k, i))).collect();
                     v.extend(seen);
                     v
                 };
-                let columns: Vec<Column> =
-                    (0..width).map(|k| Column { at: k * n, step: shape >> k & 1, live: true }).collect();
+                let columns: Vec<Column> = (0..width)
+                    .map(|k| Column { at: k * n, step: shape >> k & 1, live: true })
+                    .collect();
                 let x = Column { at: width * n, step: 1, live: true };
                 let one = |v: &[f64], i: usize| {
                     let p: Vec<f64> = columns.iter().map(|c| c.get(v, i)).collect();
@@ -282,7 +326,9 @@ mod tests {
                 let first = fill(0.0);
                 let dist = match shape {
                     0 => one(&first, 0),
-                    _ => Dist::Product(Arc::new(Product::new((0..n).map(|i| one(&first, i)).collect()).unwrap())),
+                    _ => Dist::Product(Arc::new(
+                        Product::new((0..n).map(|i| one(&first, i)).collect()).unwrap(),
+                    )),
                 };
                 let mut b = batch(&dist, &columns).unwrap();
                 for shift in [0.0, 0.05, 0.05, 0.1] {
@@ -293,15 +339,20 @@ mod tests {
                     b.pull(&v, &mut by, x, &columns, n, 2.0);
                     let mut slopes = vec![0.0; v.len()];
                     for (i, s) in seen.iter().enumerate() {
-                        let datum = if family == "flip" { Datum::Bool(*s != 0.0) } else { Datum::Num(*s) };
+                        let datum =
+                            if family == "flip" { Datum::Bool(*s != 0.0) } else { Datum::Num(*s) };
                         let d = one(&v, i);
                         expected.add(d.log_density(&datum));
                         let g = d.gradient(&datum).unwrap();
                         slopes[x.at + i] += 2.0 * g.x.first().copied().unwrap_or(0.0);
-                        columns.iter().zip(&g.params).for_each(|(c, p)| slopes[c.at + i * c.step] += 2.0 * p);
+                        columns
+                            .iter()
+                            .zip(&g.params)
+                            .for_each(|(c, p)| slopes[c.at + i * c.step] += 2.0 * p);
                     }
                     assert_eq!(sum, expected, "{family} {shape}");
-                    let off = by.iter().zip(&slopes).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    let off =
+                        by.iter().zip(&slopes).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                     assert!(off < 1e-12, "{family} {shape}: {by:?}, one at a time {slopes:?}");
                 }
                 // Parameters outside the domain.

@@ -11,7 +11,8 @@ use smallvec::smallvec;
 /// From here on for both parameters, the saddle-point form is used.
 const LARGE: f64 = 64.0;
 
-/// `beta(a, b)`. At 0 and 1 the density is its limit: a pole (+inf) for a parameter below 1, 0 for one above.
+/// `beta(a, b)`. At 0 and 1 the density is its limit: a pole (+inf) for a parameter below
+/// 1, 0 for one above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beta {
     a: f64,
@@ -80,7 +81,8 @@ impl Scalar for Beta {
 
     fn speeds(&self, x: f64) -> Option<Speeds> {
         let own = self.log_density_num(x);
-        let tails = |a, b| beta_tails(a, b, x, 1.0 - x).map(|(below, above)| Tails { below, above });
+        let tails =
+            |a, b| beta_tails(a, b, x, 1.0 - x).map(|(below, above)| Tails { below, above });
         let by_a = speed_by_differences(self.a, own, |a| tails(a, self.b))?;
         Some(smallvec![by_a, speed_by_differences(self.b, own, |b| tails(self.a, b))?])
     }

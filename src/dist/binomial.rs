@@ -1,5 +1,6 @@
-//! The binomial distribution. Probabilities by Loader's saddle-point form; draws by inversion for few expected successes, else by
-//! transformed rejection (Hörmann 1993, "The generation of binomial random variates", BTRS).
+//! The binomial distribution. Probabilities by Loader's saddle-point form; draws by
+//! inversion for few expected successes, else by transformed rejection (Hörmann 1993,
+//! "The generation of binomial random variates", BTRS).
 
 use super::param::{integer, probability};
 use super::tails::{Speeds, Tails};
@@ -17,7 +18,8 @@ pub struct Binomial {
 }
 
 impl Binomial {
-    /// So many trials with this probability of success; fails unless `n` is an integer in 0 to 2^53 and `p` is in [0, 1].
+    /// So many trials with this probability of success; fails unless `n` is an integer in
+    /// 0 to 2^53 and `p` is in [0, 1].
     pub fn new(n: f64, p: f64) -> Result<Binomial, ParamError> {
         let (n, p) = (integer(Self::NAME, "n", n)?, probability(Self::NAME, "p", p)?);
         if n < 0.0 {
@@ -77,7 +79,11 @@ impl Scalar for Binomial {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        if self.p <= 0.5 { self.draw_few(self.p, rng) } else { self.n - self.draw_few(1.0 - self.p, rng) }
+        if self.p <= 0.5 {
+            self.draw_few(self.p, rng)
+        } else {
+            self.n - self.draw_few(1.0 - self.p, rng)
+        }
     }
 
     fn log_density_num(&self, k: f64) -> f64 {
@@ -118,7 +124,8 @@ impl Scalar for Binomial {
         if k >= self.n {
             return Some(Tails::ALL_BELOW);
         }
-        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p).map(|(below, above)| Tails { below, above })
+        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p)
+            .map(|(below, above)| Tails { below, above })
     }
 
     fn speeds(&self, x: f64) -> Option<Speeds> {

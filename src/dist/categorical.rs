@@ -13,7 +13,8 @@ pub struct Categorical {
 }
 
 impl Categorical {
-    /// With these weights; fails unless all are finite and not negative, and their sum is positive and finite.
+    /// With these weights; fails unless all are finite and not negative, and their sum is
+    /// positive and finite.
     pub fn new(weights: impl Into<Arc<[f64]>>) -> Result<Categorical, ParamError> {
         let weights = weights.into();
         let total = total(&weights)?;
@@ -44,7 +45,12 @@ fn total(weights: &[f64]) -> Result<f64, ParamError> {
         return Ok(total);
     }
     if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
-        return Err(ParamError::new(Categorical::NAME, "weights", w, "must be finite and not negative"));
+        return Err(ParamError::new(
+            Categorical::NAME,
+            "weights",
+            w,
+            "must be finite and not negative",
+        ));
     }
     Err(ParamError::new(Categorical::NAME, "weights", total, "must have a positive, finite sum"))
 }
@@ -81,14 +87,19 @@ impl Scalar for Categorical {
     fn slope(&self, x: f64) -> Slope {
         let mut slope = Slope::discrete([]);
         slope.params.extend(self.weights.iter().map(|_| -1.0 / self.total));
-        if let (Some(s), Some(w)) = (slope.params.get_mut(x as usize), self.weights.get(x as usize)) {
+        if let (Some(s), Some(w)) = (slope.params.get_mut(x as usize), self.weights.get(x as usize))
+        {
             *s += 1.0 / w;
         }
         slope
     }
 
     fn tails(&self, x: f64) -> Option<Tails> {
-        let split = if x < 0.0 { 0 } else { (libm::floor(x) as usize).saturating_add(1).min(self.weights.len()) };
+        let split = if x < 0.0 {
+            0
+        } else {
+            (libm::floor(x) as usize).saturating_add(1).min(self.weights.len())
+        };
         let (below, above) = self.weights.split_at(split);
         let part = |all: &[f64]| libm::log((all.iter().sum::<f64>() / self.total).min(1.0));
         Some(Tails { below: part(below), above: part(above) })

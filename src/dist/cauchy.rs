@@ -16,11 +16,16 @@ pub struct Cauchy {
 }
 
 impl Cauchy {
-    /// Around this location, with this median distance from it; fails unless the location is finite and the scale positive and
-    /// finite.
+    /// Around this location, with this median distance from it; fails unless the location
+    /// is finite and the scale positive and finite.
     pub fn new(location: f64, scale: f64) -> Result<Cauchy, ParamError> {
-        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
-        Ok(Cauchy { location, scale, log_norm: libm::log(core::f64::consts::FRAC_1_PI) - libm::log(scale) })
+        let (location, scale) =
+            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        Ok(Cauchy {
+            location,
+            scale,
+            log_norm: libm::log(core::f64::consts::FRAC_1_PI) - libm::log(scale),
+        })
     }
 }
 
@@ -45,7 +50,8 @@ impl Scalar for Cauchy {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        // The tangent of a small angle is as exact as the angle, so far draws are not of a few values only.
+        // The tangent of a small angle is as exact as the angle, so far draws are not of
+        // a few values only.
         let size = 1.0 / libm::tan(core::f64::consts::FRAC_PI_2 * rng.open_uniform());
         let sign = if rng.next_u64() & 1 == 0 { 1.0 } else { -1.0 };
         (self.location + self.scale * (sign * size)).clamp(f64::MIN, f64::MAX)
@@ -53,7 +59,11 @@ impl Scalar for Cauchy {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        if x.is_finite() { self.log_norm - log1p_square(x, self.location, self.scale) } else { f64::NEG_INFINITY }
+        if x.is_finite() {
+            self.log_norm - log1p_square(x, self.location, self.scale)
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 
     fn slope(&self, x: f64) -> Slope {

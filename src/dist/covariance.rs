@@ -1,4 +1,5 @@
-//! Covariance functions of one variable: the usual stationary ones, their sums and products. Not a distribution.
+//! Covariance functions of one variable: the usual stationary ones, their sums and
+//! products. Not a distribution.
 
 use super::ParamError;
 use super::param::positive;
@@ -57,23 +58,36 @@ use Covariance::*;
 impl Covariance {
     /// The squared exponential; fails unless both are positive and finite.
     pub fn sq_exp(length: f64, sd: f64) -> Result<Covariance, ParamError> {
-        Ok(SqExp { length: positive("sq_exp", "length", length)?, sd: positive("sq_exp", "sd", sd)? })
+        Ok(SqExp {
+            length: positive("sq_exp", "length", length)?,
+            sd: positive("sq_exp", "sd", sd)?,
+        })
     }
 
     /// Matérn's with nu = 3/2; fails unless both are positive and finite.
     pub fn matern32(length: f64, sd: f64) -> Result<Covariance, ParamError> {
-        Ok(Matern32 { length: positive("matern32", "length", length)?, sd: positive("matern32", "sd", sd)? })
+        Ok(Matern32 {
+            length: positive("matern32", "length", length)?,
+            sd: positive("matern32", "sd", sd)?,
+        })
     }
 
     /// Matérn's with nu = 5/2; fails unless both are positive and finite.
     pub fn matern52(length: f64, sd: f64) -> Result<Covariance, ParamError> {
-        Ok(Matern52 { length: positive("matern52", "length", length)?, sd: positive("matern52", "sd", sd)? })
+        Ok(Matern52 {
+            length: positive("matern52", "length", length)?,
+            sd: positive("matern52", "sd", sd)?,
+        })
     }
 
     /// The periodic one (MacKay 1998); fails unless all are positive and finite.
     pub fn periodic(period: f64, length: f64, sd: f64) -> Result<Covariance, ParamError> {
         let period = positive("periodic", "period", period)?;
-        Ok(Periodic { period, length: positive("periodic", "length", length)?, sd: positive("periodic", "sd", sd)? })
+        Ok(Periodic {
+            period,
+            length: positive("periodic", "length", length)?,
+            sd: positive("periodic", "sd", sd)?,
+        })
     }
 
     /// Independent noise; fails unless the deviation is positive and finite.
@@ -84,9 +98,11 @@ impl Covariance {
     /// The variance at a point.
     pub fn variance(&self) -> f64 {
         match self {
-            SqExp { sd, .. } | Matern32 { sd, .. } | Matern52 { sd, .. } | Periodic { sd, .. } | White { sd } => {
-                sd * sd
-            }
+            SqExp { sd, .. }
+            | Matern32 { sd, .. }
+            | Matern52 { sd, .. }
+            | Periodic { sd, .. }
+            | White { sd } => sd * sd,
             Sum(two) => two.0.variance() + two.1.variance(),
             Product(two) => two.0.variance() * two.1.variance(),
         }
@@ -108,9 +124,11 @@ impl Covariance {
                 sd * sd * (1.0 + r * (1.0 + r / 3.0)) * libm::exp(-r)
             }
             Periodic { period, length, sd } => {
-                // The remainder is exact, so that far points keep their phase; the one nearest to 0, so that points whole periods apart
-                // are as exact as near ones.
-                let s = libm::sin(core::f64::consts::PI * (libm::remainder(d, *period) / period)) / length;
+                // The remainder is exact, so that far points keep their phase; the one
+                // nearest to 0, so that points whole periods apart are as exact as near
+                // ones.
+                let s = libm::sin(core::f64::consts::PI * (libm::remainder(d, *period) / period))
+                    / length;
                 sd * sd * libm::exp(-2.0 * s * s)
             }
             White { .. } => 0.0,
@@ -119,7 +137,8 @@ impl Covariance {
         }
     }
 
-    /// How many parameters it has: of a sum or product those of the left side, then of the right.
+    /// How many parameters it has: of a sum or product those of the left side, then of
+    /// the right.
     pub fn param_count(&self) -> usize {
         match self {
             SqExp { .. } | Matern32 { .. } | Matern52 { .. } => 2,
@@ -129,8 +148,8 @@ impl Covariance {
         }
     }
 
-    /// Adds the derivatives of `by` times the covariance of two points at this distance, or of a point with itself, by the
-    /// parameters in the order of the constructors.
+    /// Adds the derivatives of `by` times the covariance of two points at this distance,
+    /// or of a point with itself, by the parameters in the order of the constructors.
     pub fn pull(&self, d: Option<f64>, by: f64, out: &mut [f64]) {
         let k = d.map_or_else(|| self.variance(), |d| self.at_distance(d));
         // By the standard deviation; and by the length, of r with dk/dr = -slope.
@@ -160,7 +179,11 @@ impl Covariance {
                 let angle = core::f64::consts::PI * (libm::remainder(far, *period) / period);
                 let s = libm::sin(angle) / length;
                 // The distance in periods, whole ones too, moves with the period.
-                add(0, 4.0 * k * s * libm::cos(angle) / length * core::f64::consts::PI * far / (period * period));
+                add(
+                    0,
+                    4.0 * k * s * libm::cos(angle) / length * core::f64::consts::PI * far
+                        / (period * period),
+                );
                 add(1, 4.0 * k * s * s / length);
                 add(2, 2.0 * k / sd);
             }
@@ -192,8 +215,9 @@ impl Covariance {
         })
     }
 
-    /// Its lower triangle by rows, with so much more on the diagonal. A distance that occurs between the first point and another
-    /// is evaluated once: on a regular grid nearly all do.
+    /// Its lower triangle by rows, with so much more on the diagonal. A distance that
+    /// occurs between the first point and another is evaluated once: on a regular grid
+    /// nearly all do.
     pub(super) fn packed(&self, at: &[f64], jitter: f64) -> Vec<f64> {
         let n = at.len();
         let mut packed = Vec::with_capacity(n * (n + 1) / 2);
@@ -226,13 +250,19 @@ impl fmt::Display for Covariance {
             SqExp { length, sd } => write!(f, "sq_exp(length = {length}, sd = {sd})"),
             Matern32 { length, sd } => write!(f, "matern32(length = {length}, sd = {sd})"),
             Matern52 { length, sd } => write!(f, "matern52(length = {length}, sd = {sd})"),
-            Periodic { period, length, sd } => write!(f, "periodic(period = {period}, length = {length}, sd = {sd})"),
+            Periodic { period, length, sd } => {
+                write!(f, "periodic(period = {period}, length = {length}, sd = {sd})")
+            }
             White { sd } => write!(f, "white(sd = {sd})"),
             Sum(two) => write!(f, "{} + {}", two.0, two.1),
             Product(two) => {
                 for (i, part) in [&two.0, &two.1].into_iter().enumerate() {
                     f.write_str(if i > 0 { " * " } else { "" })?;
-                    if matches!(part, Sum(_)) { write!(f, "({part})")? } else { write!(f, "{part}")? }
+                    if matches!(part, Sum(_)) {
+                        write!(f, "({part})")?
+                    } else {
+                        write!(f, "{part}")?
+                    }
                 }
                 Ok(())
             }

@@ -1,4 +1,5 @@
-//! A drawn value, in the few forms distributions know. It is not a value of the language, which has more.
+//! A drawn value, in the few forms distributions know. It is not a value of the language,
+//! which has more.
 
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -7,8 +7,8 @@ use super::{Datum, Distribution, Gradient, ParamError, Support};
 use crate::num::{digamma, ln_gamma, log_sum_exp};
 use crate::rng::Stream;
 
-/// `dirichlet(alpha)`; the density is by all shares but the last. A share of 0 is a pole (+inf) if its concentration is below 1
-/// and impossible if it is above; impossible wins.
+/// `dirichlet(alpha)`; the density is by all shares but the last. A share of 0 is a pole
+/// (+inf) if its concentration is below 1 and impossible if it is above; impossible wins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dirichlet {
     alpha: Box<[f64]>,
@@ -16,17 +16,26 @@ pub struct Dirichlet {
 }
 
 impl Dirichlet {
-    /// With these concentrations; fails unless there is one, and all are positive and have a finite sum.
+    /// With these concentrations; fails unless there is one, and all are positive and
+    /// have a finite sum.
     pub fn new(alpha: &[f64]) -> Result<Dirichlet, ParamError> {
         if alpha.is_empty() {
-            return Err(ParamError::new("dirichlet", "alpha", "none", "must have one number per component"));
+            return Err(ParamError::new(
+                "dirichlet",
+                "alpha",
+                "none",
+                "must have one number per component",
+            ));
         }
         for a in alpha {
             positive("dirichlet", "alpha", *a)?;
         }
         let total = positive("dirichlet", "the sum of alpha", alpha.iter().sum())?;
         let log_norm = ln_gamma(total) - alpha.iter().map(|a| ln_gamma(*a)).sum::<f64>();
-        Ok(Dirichlet { alpha: alpha.into(), log_norm: if alpha.len() == 1 { 0.0 } else { log_norm } })
+        Ok(Dirichlet {
+            alpha: alpha.into(),
+            log_norm: if alpha.len() == 1 { 0.0 } else { log_norm },
+        })
     }
 
     fn score(&self, xs: &[f64]) -> f64 {

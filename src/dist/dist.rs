@@ -1,4 +1,5 @@
-//! Any distribution, by value: the scalar families without allocation, the others behind a pointer.
+//! Any distribution, by value: the scalar families without allocation, the others behind
+//! a pointer.
 
 use super::*;
 use crate::rng::Stream;
@@ -157,7 +158,8 @@ impl Dist {
         }
     }
 
-    /// How many independent elements it has, each a choice of its own; `None` if it is one choice.
+    /// How many independent elements it has, each a choice of its own; `None` if it is
+    /// one choice.
     pub fn elements(&self) -> Option<usize> {
         match self {
             Dist::Iid(d) => Some(d.len()),
@@ -166,7 +168,8 @@ impl Dist {
         }
     }
 
-    /// The distribution of element `i`; the distribution itself if it has no elements or not as many.
+    /// The distribution of element `i`; the distribution itself if it has no elements or
+    /// not as many.
     pub fn element(&self, i: usize) -> Dist {
         match self {
             Dist::Iid(d) => d.one().clone(),
@@ -175,8 +178,8 @@ impl Dist {
         }
     }
 
-    /// How many distributions it is made of, counted as often as they occur; `None` if they are within each other deeper than so
-    /// many. May stop counting above `most`.
+    /// How many distributions it is made of, counted as often as they occur; `None` if
+    /// they are within each other deeper than so many. May stop counting above `most`.
     pub fn parts(&self, depth: u32, most: usize) -> Option<usize> {
         let inside = |parts: &[Dist]| {
             let mut sum = 0usize;
@@ -200,7 +203,14 @@ impl Dist {
 
     /// Whether it is made of others.
     fn is_compound(&self) -> bool {
-        matches!(self, Dist::Iid(_) | Dist::Ordered(_) | Dist::Truncated(_) | Dist::Product(_) | Dist::Mixture(_))
+        matches!(
+            self,
+            Dist::Iid(_)
+                | Dist::Ordered(_)
+                | Dist::Truncated(_)
+                | Dist::Product(_)
+                | Dist::Mixture(_)
+        )
     }
 
     /// The log density of element `i`; -inf if there is none.
@@ -213,7 +223,8 @@ impl Dist {
         }
     }
 
-    /// The same distribution with values as its stored form: what elements of a product are.
+    /// The same distribution with values as its stored form: what elements of a product
+    /// are.
     pub(crate) fn centred(self) -> Dist {
         match self {
             Dist::Gp(d) if d.is_stored_whitened() => Dist::Gp(Arc::new(d.to_centred())),

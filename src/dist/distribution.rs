@@ -1,4 +1,5 @@
-//! The interface of all distributions. Families over one number implement the simpler [`super::Scalar`] instead.
+//! The interface of all distributions. Families over one number implement the simpler
+//! [`super::Scalar`] instead.
 
 use super::{Datum, Support};
 use crate::rng::Stream;
@@ -9,14 +10,16 @@ use std::fmt;
 pub struct Gradient {
     /// By the value, one for each of its numbers; empty for a discrete value.
     pub x: Vec<f64>,
-    /// By the parameters, in the order of the constructor. An integer parameter has 0; a covariance has none.
+    /// By the parameters, in the order of the constructor. An integer parameter has 0; a
+    /// covariance has none.
     pub params: Vec<f64>,
 }
 
 /// A probability distribution.
 ///
-/// Some keep their choices in a *stored* form that is not the value: a Gaussian process keeps the white noise behind it, so that
-/// its values follow when its parameters move. By default the stored form is the value itself.
+/// Some keep their choices in a *stored* form that is not the value: a Gaussian process
+/// keeps the white noise behind it, so that its values follow when its parameters move.
+/// By default the stored form is the value itself.
 pub trait Distribution: fmt::Debug + Send + Sync {
     /// The name in the language.
     fn name(&self) -> &str;
@@ -24,10 +27,12 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     /// The space of its values.
     fn support(&self) -> Support;
 
-    /// Draws a value, always in the support. Draws too large or too near 0 for a double are the nearest one that is not.
+    /// Draws a value, always in the support. Draws too large or too near 0 for a double
+    /// are the nearest one that is not.
     fn sample(&self, rng: &mut Stream) -> Datum;
 
-    /// The log density, in nats: -inf off the support and for a value of another kind; never NaN. It is +inf at poles.
+    /// The log density, in nats: -inf off the support and for a value of another kind;
+    /// never NaN. It is +inf at poles.
     fn log_density(&self, x: &Datum) -> f64;
 
     /// The derivatives of the log density; `None` where it is not finite.
@@ -38,7 +43,8 @@ pub trait Distribution: fmt::Debug + Send + Sync {
         false
     }
 
-    /// The white noise behind a value; `None` if the distribution is not Gaussian or the value does not fit.
+    /// The white noise behind a value; `None` if the distribution is not Gaussian or the
+    /// value does not fit.
     fn whiten(&self, _x: &Datum) -> Option<Vec<f64>> {
         None
     }
@@ -48,8 +54,9 @@ pub trait Distribution: fmt::Debug + Send + Sync {
         None
     }
 
-    /// Whether its bounds are parameters, so that the support moves with them. Bounds that are the same for all parameters may say
-    /// so here: gradients by the parameters of one that moves are not known.
+    /// Whether its bounds are parameters, so that the support moves with them. Bounds
+    /// that are the same for all parameters may say so here: gradients by the parameters
+    /// of one that moves are not known.
     fn has_moving_support(&self) -> bool {
         use Support::*;
         matches!(self.support(), AtLeast { .. } | AtMost { .. } | Interval { .. } | Ascending(..))
@@ -60,8 +67,8 @@ pub trait Distribution: fmt::Debug + Send + Sync {
         self.support().is_number()
     }
 
-    /// Whether it has no integral, so that nothing can be drawn from it: a density of 1 everywhere. Its `sample` gives a place to
-    /// start a chain from.
+    /// Whether it has no integral, so that nothing can be drawn from it: a density of 1
+    /// everywhere. Its `sample` gives a place to start a chain from.
     fn is_improper(&self) -> bool {
         false
     }

@@ -1,4 +1,5 @@
-//! Draws that several families share. All through `libm`, so that they are the same on every platform.
+//! Draws that several families share. All through `libm`, so that they are the same on
+//! every platform.
 
 use crate::rng::Stream;
 
@@ -8,7 +9,8 @@ pub(super) fn representable(x: f64) -> f64 {
     x.clamp(f64::MIN_POSITIVE, f64::MAX)
 }
 
-/// The logarithm of a gamma draw with rate 1 (Marsaglia & Tsang 2000): for small shapes the draw itself would underflow.
+/// The logarithm of a gamma draw with rate 1 (Marsaglia & Tsang 2000): for small shapes
+/// the draw itself would underflow.
 pub(super) fn ln_gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
     if shape < 1.0 {
         let above = libm::log(gamma_draw(shape + 1.0, rng));

@@ -1,8 +1,10 @@
-//! Cholesky factors: the lower triangle, packed by rows, and the few operations Gaussian vectors need. Not a matrix library.
+//! Cholesky factors: the lower triangle, packed by rows, and the few operations Gaussian
+//! vectors need. Not a matrix library.
 
 use nalgebra::DMatrix;
 
-/// A lower triangular matrix L with a positive diagonal; entry (i, j) at i (i + 1) / 2 + j.
+/// A lower triangular matrix L with a positive diagonal; entry (i, j) at i (i + 1) / 2 +
+/// j.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Factor {
     n: usize,
@@ -20,7 +22,8 @@ impl Factor {
     /// The factor of the symmetric matrix with this packed lower triangle.
     ///
     /// # Errors
-    /// If it is not positive definite: the number of rows of the least leading block that is not.
+    /// If it is not positive definite: the number of rows of the least leading block that
+    /// is not.
     pub fn new(n: usize, mut packed: Vec<f64>) -> Result<Factor, usize> {
         debug_assert_eq!(packed.len(), row(n));
         for i in 0..n {
@@ -40,8 +43,8 @@ impl Factor {
         Ok(Factor::with_sum(n, packed))
     }
 
-    /// A matrix that is already a factor; `None` unless it is square and finite with a positive diagonal. What is above the
-    /// diagonal is not looked at.
+    /// A matrix that is already a factor; `None` unless it is square and finite with a
+    /// positive diagonal. What is above the diagonal is not looked at.
     pub fn from_lower(m: &DMatrix<f64>) -> Option<Factor> {
         let packed = lower(m)?;
         let n = m.nrows();
@@ -88,8 +91,9 @@ impl Factor {
         out
     }
 
-    /// From the derivatives by the packed entries of L to those by the entries of the symmetric matrix K = L L', its lower triangle
-    /// packed: what lies off the diagonal stands for both of its places (Giles 2008; Murray 2016).
+    /// From the derivatives by the packed entries of L to those by the entries of the
+    /// symmetric matrix K = L L', its lower triangle packed: what lies off the diagonal
+    /// stands for both of its places (Giles 2008; Murray 2016).
     pub fn pull_cholesky(&self, by: &[f64]) -> Vec<f64> {
         let n = self.n;
         let entry = |m: &[f64], i: usize, j: usize| m[row(i) + j];
@@ -103,9 +107,13 @@ impl Factor {
         }
         // S = L^-T P L^-1.
         let half: Vec<Vec<f64>> = columns.into_iter().map(|c| self.solve_transposed(c)).collect();
-        let rows: Vec<Vec<f64>> = (0..n).map(|i| self.solve_transposed(half.iter().map(|c| c[i]).collect())).collect();
+        let rows: Vec<Vec<f64>> =
+            (0..n).map(|i| self.solve_transposed(half.iter().map(|c| c[i]).collect())).collect();
         let packed = |i: usize| (0..=i).map(move |j| (i, j));
-        (0..n).flat_map(packed).map(|(i, j)| if i == j { rows[i][i] } else { rows[i][j] + rows[j][i] }).collect()
+        (0..n)
+            .flat_map(packed)
+            .map(|(i, j)| if i == j { rows[i][i] } else { rows[i][j] + rows[j][i] })
+            .collect()
     }
 
     /// L^-1 (x - mean).
@@ -141,7 +149,8 @@ pub(super) fn lower(m: &DMatrix<f64>) -> Option<Vec<f64>> {
     (m.ncols() == n).then(|| (0..n).flat_map(|i| (0..=i).map(move |j| m[(i, j)])).collect())
 }
 
-/// The sum of products in a fixed order with four running sums, which the compiler can do at once.
+/// The sum of products in a fixed order with four running sums, which the compiler can do
+/// at once.
 #[inline]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());

@@ -1,4 +1,5 @@
-//! The families' reference: names, parameters, densities. Constant data, from which the language makes its table of built-ins.
+//! The families' reference: names, parameters, densities. Constant data, from which the
+//! language makes its table of built-ins.
 
 /// A parameter of a family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +51,10 @@ pub const FAMILIES: &[Family] = &[
     family(
         "lognormal",
         "The distribution of the exponential of a normal variable.",
-        &[p("mu", "The mean of the logarithm."), p("sigma", "The standard deviation of the logarithm, positive.")],
+        &[
+            p("mu", "The mean of the logarithm."),
+            p("sigma", "The standard deviation of the logarithm, positive."),
+        ],
         "x > 0",
         "exp(-((ln x - mu) / sigma)^2 / 2) / (x sigma sqrt(2 pi))",
     ),
@@ -71,7 +75,10 @@ pub const FAMILIES: &[Family] = &[
     family(
         "gamma",
         "The gamma distribution.",
-        &[p("shape", "The shape, positive."), p("rate", "The rate, positive: the inverse of the scale.")],
+        &[
+            p("shape", "The shape, positive."),
+            p("rate", "The rate, positive: the inverse of the scale."),
+        ],
         "x > 0",
         "rate^shape x^(shape - 1) exp(-rate x) / Gamma(shape)",
     ),
@@ -126,7 +133,10 @@ pub const FAMILIES: &[Family] = &[
         "truncated",
         "Any distribution of numbers truncated to an interval; for integers, the bounds are included.",
         &[
-            p("d", "A distribution of numbers, or of arrays of numbers if a parameter is an array."),
+            p(
+                "d",
+                "A distribution of numbers, or of arrays of numbers if a parameter is an array.",
+            ),
             p("lo", "The lower bound."),
             p("hi", "The upper bound, above `lo`; for integers it may equal `lo`."),
         ],
@@ -143,14 +153,20 @@ pub const FAMILIES: &[Family] = &[
     family(
         "cauchy",
         "The Cauchy distribution, which has no mean.",
-        &[p("location", "The centre."), p("scale", "The scale, positive: the median distance from the location.")],
+        &[
+            p("location", "The centre."),
+            p("scale", "The scale, positive: the median distance from the location."),
+        ],
         "all numbers",
         "1 / (pi scale (1 + ((x - location) / scale)^2))",
     ),
     family(
         "laplace",
         "The Laplace (double exponential) distribution.",
-        &[p("location", "The centre."), p("scale", "The scale, positive: the mean distance from the location.")],
+        &[
+            p("location", "The centre."),
+            p("scale", "The scale, positive: the mean distance from the location."),
+        ],
         "all numbers",
         "exp(-|x - location| / scale) / (2 scale)",
     ),
@@ -225,7 +241,10 @@ pub const FAMILIES: &[Family] = &[
     family(
         "binomial",
         "The binomial distribution: the number of successes in independent trials.",
-        &[p("n", "The number of trials, an integer."), p("p", "The probability of success, from 0 to 1.")],
+        &[
+            p("n", "The number of trials, an integer."),
+            p("p", "The probability of success, from 0 to 1."),
+        ],
         "0, 1, …, n",
         "n! / (x! (n - x)!) p^x (1 - p)^(n - x)",
     ),
@@ -246,7 +265,10 @@ pub const FAMILIES: &[Family] = &[
     family(
         "multinomial",
         "The multinomial distribution: the counts of each category among n draws.",
-        &[p("n", "The number of draws, an integer."), p("weights", "One weight per category; they need not sum to 1.")],
+        &[
+            p("n", "The number of draws, an integer."),
+            p("weights", "One weight per category; they need not sum to 1."),
+        ],
         "arrays of len(weights) counts with sum n",
         "n! product((weights[i] / sum(weights))^x[i] / x[i]!)",
     ),
@@ -255,7 +277,10 @@ pub const FAMILIES: &[Family] = &[
         "The LKJ distribution: the Cholesky factor of a correlation matrix, as rows, which `mv_normal` takes as `chol`.",
         &[
             p("n", "The number of rows, from 1 to 1000."),
-            p("eta", "The shape, positive: 1 is uniform over correlation matrices, larger values favour independence."),
+            p(
+                "eta",
+                "The shape, positive: 1 is uniform over correlation matrices, larger values favour independence.",
+            ),
         ],
         "lower triangular arrays of n rows L, each of norm 1, with a non-negative diagonal",
         "proportional to det(L L')^(eta - 1) with respect to the correlations: product(L[i][i]^(n \
@@ -266,7 +291,10 @@ pub const FAMILIES: &[Family] = &[
         "The Wishart distribution: the Cholesky factor of a random covariance matrix W, as rows, which `mv_normal` takes as `chol`; the mean of W is df scale_chol scale_chol'.",
         &[
             p("df", "The degrees of freedom, above the number of rows minus 1."),
-            p("scale_chol", "The lower triangular Cholesky factor of the scale matrix, an array of rows."),
+            p(
+                "scale_chol",
+                "The lower triangular Cholesky factor of the scale matrix, an array of rows.",
+            ),
         ],
         "lower triangular arrays of rows L with a positive diagonal, W = L L'",
         "L = scale_chol A: A[i][i]^2 is chi-squared with df - i degrees of freedom, A[i][j] normal(0, 1) below the diagonal",
@@ -278,7 +306,10 @@ pub const FAMILIES: &[Family] = &[
             p("mean", "The mean vector."),
             p("cov", "The covariance matrix, an array of rows; give either `cov` or `chol`."),
             p("chol", "The lower triangular Cholesky factor of the covariance."),
-            p("whitened", "Non-centred: stores the white noise z of mean + chol z instead of the value."),
+            p(
+                "whitened",
+                "Non-centred: stores the white noise z of mean + chol z instead of the value.",
+            ),
         ],
         "arrays as long as the mean",
         "exp(-(x - mean)' cov^-1 (x - mean) / 2) / sqrt(det(2 pi cov))",
@@ -291,7 +322,10 @@ pub const FAMILIES: &[Family] = &[
             p("cov", "The covariance function."),
             p("at", "The points."),
             p("centred", "Centred: stores the values instead of the underlying white noise."),
-            p("jitter", "Added to the diagonal of the covariance matrix, as a fraction of the variance."),
+            p(
+                "jitter",
+                "Added to the diagonal of the covariance matrix, as a fraction of the variance.",
+            ),
         ],
         "arrays as long as `at`",
         "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), plus jitter times the variance on the diagonal",

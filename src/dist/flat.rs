@@ -1,10 +1,12 @@
-//! The improper flat prior: density 1 between its bounds, so not a distribution that could be drawn from.
+//! The improper flat prior: density 1 between its bounds, so not a distribution that
+//! could be drawn from.
 
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 
-/// `flat(lo, hi)`: all numbers, or those on one side of a bound. Its log density is 0 there. What it "draws" is a start for a chain
-/// only: as in Stan, uniform(-2, 2) in the unconstrained space.
+/// `flat(lo, hi)`: all numbers, or those on one side of a bound. Its log density is 0
+/// there. What it "draws" is a start for a chain only: as in Stan, uniform(-2, 2) in the
+/// unconstrained space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flat {
     lo: f64,
@@ -21,15 +23,19 @@ impl Flat {
     /// Over all numbers.
     pub const EVERYWHERE: Flat = Flat { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
-    /// Between these bounds, at least one of them infinite; fails for others, and for bounds that leave nothing.
+    /// Between these bounds, at least one of them infinite; fails for others, and for
+    /// bounds that leave nothing.
     pub fn new(lo: f64, hi: f64) -> Result<Flat, ParamError> {
-        let bad = |rule| Err(ParamError::new(Self::NAME, "lo to hi", format!("{lo} and {hi}"), rule));
+        let bad =
+            |rule| Err(ParamError::new(Self::NAME, "lo to hi", format!("{lo} and {hi}"), rule));
         match () {
             () if lo.is_nan() || hi.is_nan() => bad("must be numbers"),
-            () if lo >= hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY => bad("must have numbers between them"),
-            () if lo.is_finite() && hi.is_finite() => {
-                bad("must have an infinite end: between two finite bounds use uniform(lo, hi), which is proper")
+            () if lo >= hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY => {
+                bad("must have numbers between them")
             }
+            () if lo.is_finite() && hi.is_finite() => bad(
+                "must have an infinite end: between two finite bounds use uniform(lo, hi), which is proper",
+            ),
             () => Ok(Flat { lo, hi }),
         }
     }

@@ -20,9 +20,11 @@ pub struct Gamma {
 }
 
 impl Gamma {
-    /// With this shape and rate (the inverse of the scale); fails unless both are positive and finite.
+    /// With this shape and rate (the inverse of the scale); fails unless both are
+    /// positive and finite.
     pub fn new(shape: f64, rate: f64) -> Result<Gamma, ParamError> {
-        let (shape, rate) = (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "rate", rate)?);
+        let (shape, rate) =
+            (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "rate", rate)?);
         let log_norm = if shape < LARGE {
             libm::log(rate) - ln_gamma(shape)
         } else {

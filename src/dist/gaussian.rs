@@ -1,8 +1,8 @@
-//! What all Gaussian vectors share: a mean, a Cholesky factor, and how the choice is stored. `mv_normal` and `gp` differ only in
-//! where these come from.
+//! What all Gaussian vectors share: a mean, a Cholesky factor, and how the choice is
+//! stored. `mv_normal` and `gp` differ only in where these come from.
 //!
-//! A whitened one stores white noise z ~ N(0, I) with value = mean + L z, so that the value follows when mean and L move; a
-//! centred one stores the value.
+//! A whitened one stores white noise z ~ N(0, I) with value = mean + L z, so that the
+//! value follows when mean and L move; a centred one stores the value.
 
 use super::factor::Factor;
 use super::{Datum, Gradient};
@@ -60,8 +60,9 @@ impl Gaussian {
         Some(Gradient { x: by_mean.iter().map(|g| -g).collect(), params: by_mean })
     }
 
-    /// The derivatives by the packed entries of L: of the log density of a value that is stored as such; of one stored as noise,
-    /// of what has these derivatives by the value.
+    /// The derivatives by the packed entries of L: of the log density of a value that is
+    /// stored as such; of one stored as noise, of what has these derivatives by the
+    /// value.
     pub fn factor_gradient(&self, stored: &Datum, by_value: &[f64]) -> Option<Vec<f64>> {
         let outer = |a: &[f64], z: &[f64]| -> Vec<f64> {
             a.iter().enumerate().flat_map(|(i, a)| z[..=i].iter().map(move |z| a * z)).collect()
@@ -79,7 +80,8 @@ impl Gaussian {
 
     /// The noise behind a finite vector.
     pub fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
-        x.with_numbers(self.size(), |x| self.factor.whiten(&self.mean, x)).filter(|z| z.iter().all(|z| z.is_finite()))
+        x.with_numbers(self.size(), |x| self.factor.whiten(&self.mean, x))
+            .filter(|z| z.iter().all(|z| z.is_finite()))
     }
 
     pub fn colour(&self, z: &[f64]) -> Option<Datum> {

@@ -13,7 +13,8 @@ pub struct Geometric {
 }
 
 impl Geometric {
-    /// With this probability of success in each trial; fails unless it is above 0 and at most 1.
+    /// With this probability of success in each trial; fails unless it is above 0 and at
+    /// most 1.
     pub fn new(p: f64) -> Result<Geometric, ParamError> {
         Ok(Geometric { p: success(Self::NAME, p)? })
     }

@@ -5,27 +5,37 @@ use super::gaussian::{Gaussian, gaussian_family};
 use super::param::finite;
 use super::{Covariance, ParamError};
 
-/// The most points: the time to factor their covariance grows as the cube of their number.
+/// The most points: the time to factor their covariance grows as the cube of their
+/// number.
 const MOST_POINTS: usize = 4000;
 
-/// What is added to the diagonal of the covariance matrix, as a share of the variance, unless said otherwise: part of the model.
+/// What is added to the diagonal of the covariance matrix, as a share of the variance,
+/// unless said otherwise: part of the model.
 pub const JITTER: f64 = 1e-6;
 
 /// `gp(mean, cov, at)`, with a jitter of [`JITTER`] unless there is another.
 ///
-/// Its choice is stored as white noise z ~ N(0, I), with value = mean + chol(K + jitter variance I) z, so that the values follow
-/// when a parameter of the covariance moves; a centred one stores the values. Gradients are by the mean only.
+/// Its choice is stored as white noise z ~ N(0, I), with value = mean + chol(K + jitter
+/// variance I) z, so that the values follow when a parameter of the covariance moves; a
+/// centred one stores the values. Gradients are by the mean only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gp(Gaussian, f64);
 
 impl Gp {
-    /// With these means and this covariance function at these points; fails unless there are as many means as points, all
-    /// finite, and the covariance matrix has a Cholesky factor.
-    pub fn new(mean: Vec<f64>, cov: &Covariance, at: &[f64], centred: bool) -> Result<Gp, ParamError> {
+    /// With these means and this covariance function at these points; fails unless there
+    /// are as many means as points, all finite, and the covariance matrix has a Cholesky
+    /// factor.
+    pub fn new(
+        mean: Vec<f64>,
+        cov: &Covariance,
+        at: &[f64],
+        centred: bool,
+    ) -> Result<Gp, ParamError> {
         Gp::with_jitter(mean, cov, at, centred, JITTER)
     }
 
-    /// The same with another share of the variance added to the diagonal; fails unless it is finite and not negative, too.
+    /// The same with another share of the variance added to the diagonal; fails unless it
+    /// is finite and not negative, too.
     pub fn with_jitter(
         mean: Vec<f64>,
         cov: &Covariance,
@@ -64,14 +74,21 @@ impl Gp {
         Gp(self.0.centred(), self.1)
     }
 
-    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log density of a stored value; of one stored as
-    /// noise, of what has these derivatives by the value.
+    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log
+    /// density of a stored value; of one stored as noise, of what has these derivatives
+    /// by the value.
     pub fn factor_gradient(&self, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<f64>> {
         self.0.factor_gradient(stored, by_value)
     }
 
-    /// From those by the factor to those by the parameters of its covariance function, made at these points.
-    pub fn pull_covariance(&self, cov: &Covariance, at: &[f64], by_factor: &[f64]) -> Option<Vec<f64>> {
+    /// From those by the factor to those by the parameters of its covariance function,
+    /// made at these points.
+    pub fn pull_covariance(
+        &self,
+        cov: &Covariance,
+        at: &[f64],
+        by_factor: &[f64],
+    ) -> Option<Vec<f64>> {
         let by = self.0.factor.pull_cholesky(by_factor);
         let mut out = vec![0.0; cov.param_count()];
         let mut entries = by.into_iter();

@@ -17,11 +17,16 @@ pub struct HalfCauchy {
 }
 
 impl HalfCauchy {
-    /// From this location on, with this median distance from it; fails unless the location is finite and the scale positive
-    /// and finite.
+    /// From this location on, with this median distance from it; fails unless the
+    /// location is finite and the scale positive and finite.
     pub fn new(location: f64, scale: f64) -> Result<HalfCauchy, ParamError> {
-        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
-        Ok(HalfCauchy { location, scale, log_norm: libm::log(core::f64::consts::FRAC_2_PI) - libm::log(scale) })
+        let (location, scale) =
+            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        Ok(HalfCauchy {
+            location,
+            scale,
+            log_norm: libm::log(core::f64::consts::FRAC_2_PI) - libm::log(scale),
+        })
     }
 }
 
@@ -33,7 +38,8 @@ impl Scalar for HalfCauchy {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        let x = self.location + self.scale * libm::tan(core::f64::consts::FRAC_PI_2 * rng.open_uniform());
+        let x = self.location
+            + self.scale * libm::tan(core::f64::consts::FRAC_PI_2 * rng.open_uniform());
         x.clamp(self.location, f64::MAX)
     }
 

@@ -15,7 +15,8 @@ pub struct HalfNormal {
 }
 
 impl HalfNormal {
-    /// With this standard deviation of the normal number; fails unless it is positive and finite.
+    /// With this standard deviation of the normal number; fails unless it is positive and
+    /// finite.
     pub fn new(sd: f64) -> Result<HalfNormal, ParamError> {
         let sd = positive(Self::NAME, "sd", sd)?;
         Ok(HalfNormal { sd, log_norm: core::f64::consts::LN_2 - libm::log(sd) - LN_SQRT_2PI })
@@ -54,7 +55,10 @@ impl Scalar for HalfNormal {
         }
         let z = x / self.sd;
         let above = core::f64::consts::LN_2 + log_normal_cdf(-z);
-        Some(Tails { below: libm::log(libm::erf(z * core::f64::consts::FRAC_1_SQRT_2)), above: above.min(0.0) })
+        Some(Tails {
+            below: libm::log(libm::erf(z * core::f64::consts::FRAC_1_SQRT_2)),
+            above: above.min(0.0),
+        })
     }
 
     fn speeds(&self, x: f64) -> Option<Speeds> {

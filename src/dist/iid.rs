@@ -6,7 +6,8 @@ use crate::rng::Stream;
 
 /// `iid(d, n)`. In the language its elements are choices with addresses of their own.
 ///
-/// Elements are stored as values: a Gaussian process becomes a centred one. Gradients by parameters are summed over elements.
+/// Elements are stored as values: a Gaussian process becomes a centred one. Gradients by
+/// parameters are summed over elements.
 #[derive(Clone, Debug)]
 pub struct Iid {
     one: Dist,
@@ -14,7 +15,8 @@ pub struct Iid {
 }
 
 impl Iid {
-    /// So many elements of a distribution; fails for more than 2^32 - 2, which have no addresses.
+    /// So many elements of a distribution; fails for more than 2^32 - 2, which have no
+    /// addresses.
     pub fn new(one: Dist, n: usize) -> Result<Iid, ParamError> {
         if n >= u32::MAX as usize {
             return Err(ParamError::new("iid", "n", n, "must be below 2^32 - 1"));

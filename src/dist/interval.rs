@@ -1,4 +1,5 @@
-//! Intervals of numbers: their ends, the part of a space between two bounds, integrals over them, the doubles in order.
+//! Intervals of numbers: their ends, the part of a space between two bounds, integrals
+//! over them, the doubles in order.
 
 use super::Support;
 use super::param::MAX_INTEGER;

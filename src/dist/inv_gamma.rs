@@ -22,7 +22,8 @@ pub struct InvGamma {
 impl InvGamma {
     /// With this shape and scale; fails unless both are positive and finite.
     pub fn new(shape: f64, scale: f64) -> Result<InvGamma, ParamError> {
-        let (shape, scale) = (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
+        let (shape, scale) =
+            (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
         let log_norm = if shape < LARGE {
             -ln_gamma(shape)
         } else {

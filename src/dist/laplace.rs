@@ -7,7 +7,8 @@ use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// `laplace(location, scale)`. At the location, where the density has a kink, the derivative is taken as 0.
+/// `laplace(location, scale)`. At the location, where the density has a kink, the
+/// derivative is taken as 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Laplace {
     location: f64,
@@ -16,10 +17,11 @@ pub struct Laplace {
 }
 
 impl Laplace {
-    /// Around this location, with this mean distance from it; fails unless the location is finite and the scale positive and
-    /// finite.
+    /// Around this location, with this mean distance from it; fails unless the location
+    /// is finite and the scale positive and finite.
     pub fn new(location: f64, scale: f64) -> Result<Laplace, ParamError> {
-        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        let (location, scale) =
+            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
         Ok(Laplace { location, scale, log_norm: -core::f64::consts::LN_2 - libm::log(scale) })
     }
 }
@@ -39,7 +41,11 @@ impl Scalar for Laplace {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        if x.is_finite() { self.log_norm - standard(x, self.location, self.scale).abs() } else { f64::NEG_INFINITY }
+        if x.is_finite() {
+            self.log_norm - standard(x, self.location, self.scale).abs()
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 
     fn slope(&self, x: f64) -> Slope {

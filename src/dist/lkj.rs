@@ -1,4 +1,5 @@
-//! The distribution of Lewandowski, Kurowicka & Joe (2009) over correlation matrices, as one over their Cholesky factors.
+//! The distribution of Lewandowski, Kurowicka & Joe (2009) over correlation matrices, as
+//! one over their Cholesky factors.
 
 use super::draw::{ln_gamma_draw, x_log_y};
 use super::param::{integer, positive};
@@ -11,11 +12,12 @@ use core::f64::consts::PI;
 /// The most rows.
 const MOST: f64 = 1000.0;
 
-/// `lkj(n, eta)`: the lower triangular Cholesky factor L, as n rows, of a random n x n correlation matrix L L' with density
-/// proportional to det(L L')^(eta - 1). The density is by the numbers below the diagonal, as in Stan's `lkj_corr_cholesky`.
+/// `lkj(n, eta)`: the lower triangular Cholesky factor L, as n rows, of a random n x n
+/// correlation matrix L L' with density proportional to det(L L')^(eta - 1). The density
+/// is by the numbers below the diagonal, as in Stan's `lkj_corr_cholesky`.
 ///
-/// A gradient by the value has a number for each of the n x n entries; only those by the diagonal, on which the density depends,
-/// are not 0.
+/// A gradient by the value has a number for each of the n x n entries; only those by the
+/// diagonal, on which the density depends, are not 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lkj {
     n: usize,
@@ -24,7 +26,8 @@ pub struct Lkj {
 }
 
 impl Lkj {
-    /// With so many rows and this shape; fails unless `n` is an integer in 1 to 1000 and `eta` positive and finite.
+    /// With so many rows and this shape; fails unless `n` is an integer in 1 to 1000 and
+    /// `eta` positive and finite.
     pub fn new(n: f64, eta: f64) -> Result<Lkj, ParamError> {
         let (n, eta) = (rows("lkj", n)?, positive("lkj", "eta", eta)?);
         let mut d = Lkj { n, eta, log_norm: 0.0 };
@@ -59,7 +62,8 @@ impl Distribution for Lkj {
         Support::CorrelationFactor(self.n)
     }
 
-    /// Row by row: a uniform direction, and a squared length that leaves a beta number for the diagonal.
+    /// Row by row: a uniform direction, and a squared length that leaves a beta number
+    /// for the diagonal.
     fn sample(&self, rng: &mut Stream) -> Datum {
         let n = self.n;
         let mut xs = vec![0.0; n * n];
@@ -80,7 +84,9 @@ impl Distribution for Lkj {
     }
 
     fn log_density(&self, x: &Datum) -> f64 {
-        let Some(xs) = triangle::entries(x, self.n).filter(|xs| triangle::is_correlation_factor(xs, self.n)) else {
+        let Some(xs) =
+            triangle::entries(x, self.n).filter(|xs| triangle::is_correlation_factor(xs, self.n))
+        else {
             return f64::NEG_INFINITY;
         };
         let mut sum = self.log_norm;

@@ -17,7 +17,8 @@ pub struct LogNormal {
 }
 
 impl LogNormal {
-    /// With this mean and standard deviation of the logarithm; fails unless mu is finite and sigma positive and finite.
+    /// With this mean and standard deviation of the logarithm; fails unless mu is finite
+    /// and sigma positive and finite.
     pub fn new(mu: f64, sigma: f64) -> Result<LogNormal, ParamError> {
         let (mu, sigma) = (finite(Self::NAME, "mu", mu)?, positive(Self::NAME, "sigma", sigma)?);
         Ok(LogNormal { mu, sigma, log_norm: -libm::log(sigma) - LN_SQRT_2PI })
@@ -68,6 +69,7 @@ impl Scalar for LogNormal {
 
     fn number_sd(&self) -> Option<f64> {
         let variance = self.sigma * self.sigma;
-        Some(libm::exp(self.mu + 0.5 * variance) * libm::expm1(variance).sqrt()).filter(|s| s.is_finite())
+        Some(libm::exp(self.mu + 0.5 * variance) * libm::expm1(variance).sqrt())
+            .filter(|s| s.is_finite())
     }
 }

@@ -1,4 +1,5 @@
-//! Many numbers under one mixture whose weights and components have their parameters in a buffer: as [`super::batch`].
+//! Many numbers under one mixture whose weights and components have their parameters in a
+//! buffer: as [`super::batch`].
 
 use super::batch::{Family, family};
 use super::{Batch, Categorical, Dist, Mixture};
@@ -19,8 +20,9 @@ struct Mixed {
     parts: Vec<Part>,
 }
 
-/// The batch of a mixture whose weights, and the parameters of whose components, lie in these columns or stay. `None` where a
-/// component is no distribution of a number that `batch` knows.
+/// The batch of a mixture whose weights, and the parameters of whose components, lie in
+/// these columns or stay. `None` where a component is no distribution of a number that
+/// `batch` knows.
 pub fn batch_of_mixture(
     dist: &Mixture,
     weights: Option<Column>,
@@ -40,7 +42,8 @@ pub fn batch_of_mixture(
 impl Mixed {
     fn refresh(&mut self, buffer: &[f64]) -> bool {
         if let Some(c) = self.place {
-            let moved = (0..self.weights.len()).any(|i| c.get(buffer, i).to_bits() != self.weights[i].to_bits());
+            let moved = (0..self.weights.len())
+                .any(|i| c.get(buffer, i).to_bits() != self.weights[i].to_bits());
             if moved {
                 self.weights.iter_mut().enumerate().for_each(|(i, w)| *w = c.get(buffer, i));
                 if Categorical::new(&self.weights[..]).is_err() {
@@ -56,14 +59,22 @@ impl Mixed {
     /// The components' log densities of a number, and the mixture's.
     #[inline]
     fn scores(&self, x: f64) -> (SmallVec<[f64; 8]>, f64) {
-        let scores: SmallVec<[f64; 8]> = self.parts.iter().map(|(p, _)| p.log_density_num(x)).collect();
+        let scores: SmallVec<[f64; 8]> =
+            self.parts.iter().map(|(p, _)| p.log_density_num(x)).collect();
         let all = Mixture::total(&self.log_shares, &scores);
         (scores, all)
     }
 }
 
 impl Batch for Mixed {
-    fn score(&mut self, buffer: &[f64], x: Column, _params: &[Column], n: usize, sum: &mut ExactSum) -> bool {
+    fn score(
+        &mut self,
+        buffer: &[f64],
+        x: Column,
+        _params: &[Column],
+        n: usize,
+        sum: &mut ExactSum,
+    ) -> bool {
         self.refresh(buffer)
             && (0..n).all(|i| {
                 let x = x.get(buffer, i);
@@ -73,7 +84,15 @@ impl Batch for Mixed {
             })
     }
 
-    fn pull(&self, buffer: &[f64], by: &mut [f64], x: Column, _params: &[Column], n: usize, weight: f64) {
+    fn pull(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        _params: &[Column],
+        n: usize,
+        weight: f64,
+    ) {
         for i in 0..n {
             let at = x.get(buffer, i);
             let (scores, all) = self.scores(at);
@@ -91,7 +110,11 @@ impl Batch for Mixed {
                 if x.live {
                     by[x.at + i * x.step] += weight * share * of_x;
                 }
-                columns.iter().zip(of_params).filter(|(c, _)| c.live).for_each(|(c, p)| by[c.at] += weight * share * p);
+                columns
+                    .iter()
+                    .zip(of_params)
+                    .filter(|(c, _)| c.live)
+                    .for_each(|(c, p)| by[c.at] += weight * share * p);
             }
         }
     }

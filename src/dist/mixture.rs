@@ -6,10 +6,12 @@ use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use smallvec::SmallVec;
 
-/// `mixture(weights, components)`. The density is the weighted mean of the components' densities.
+/// `mixture(weights, components)`. The density is the weighted mean of the components'
+/// densities.
 ///
-/// Its support is that of the components if they agree; for numbers, else the least interval around theirs. Components store
-/// values: white noise behind a Gaussian one is not kept. Gradients by parameters are by the weights, then by those of each component.
+/// Its support is that of the components if they agree; for numbers, else the least
+/// interval around theirs. Components store values: white noise behind a Gaussian one is
+/// not kept. Gradients by parameters are by the weights, then by those of each component.
 #[derive(Clone, Debug)]
 pub struct Mixture {
     weights: Categorical,
@@ -20,21 +22,25 @@ pub struct Mixture {
 }
 
 impl Mixture {
-    /// Fails unless there is a component, a weight for each, the weights are finite and not negative with a positive, finite
-    /// sum, and the components are proper and have the same kind of values.
+    /// Fails unless there is a component, a weight for each, the weights are finite and
+    /// not negative with a positive, finite sum, and the components are proper and have
+    /// the same kind of values.
     pub fn new(weights: &[f64], components: Vec<Dist>) -> Result<Mixture, ParamError> {
-        let bad = |parameter, value: String, rule| ParamError::new("mixture", parameter, value, rule);
+        let bad =
+            |parameter, value: String, rule| ParamError::new("mixture", parameter, value, rule);
         if weights.len() != components.len() {
             let value = format!("{} for {}", weights.len(), components.len());
             return Err(bad("weights", value, "must have one number per component"));
         }
-        let choice = Categorical::new(weights).map_err(|e| ParamError { distribution: "mixture", ..e })?;
+        let choice =
+            Categorical::new(weights).map_err(|e| ParamError { distribution: "mixture", ..e })?;
         if let Some(c) = components.iter().find(|c| c.is_improper()) {
             return Err(bad("components", c.name().into(), "must be proper distributions"));
         }
         let components: Box<[Dist]> = components.into_iter().map(Dist::centred).collect();
         let mut supports = components.iter().map(|c| plain(c.support()));
-        let first = supports.next().ok_or_else(|| bad("components", "none".into(), "must not be empty"))?;
+        let first =
+            supports.next().ok_or_else(|| bad("components", "none".into(), "must not be empty"))?;
         let names = || components.iter().map(Dist::name).collect::<Vec<_>>().join(", ");
         let support = supports
             .try_fold(first, union)
@@ -48,7 +54,8 @@ impl Mixture {
         self.components.iter().map(|c| c.log_density(x)).collect()
     }
 
-    /// The probability that a value is of each component; nothing where the density is not positive and finite.
+    /// The probability that a value is of each component; nothing where the density is
+    /// not positive and finite.
     pub fn responsibilities(&self, x: &Datum) -> Option<Vec<f64>> {
         let scores = self.scores(x);
         let all = Self::total(&self.log_shares, &scores);
@@ -68,7 +75,8 @@ impl Mixture {
 }
 
 impl Mixture {
-    /// The log density from the components' log densities: a component without weight counts for nothing, not even at its poles.
+    /// The log density from the components' log densities: a component without weight
+    /// counts for nothing, not even at its poles.
     #[inline]
     pub(super) fn total(log_shares: &[f64], scores: &[f64]) -> f64 {
         let weighted = log_shares.iter().zip(scores).filter(|(w, _)| **w > f64::NEG_INFINITY);

@@ -1,7 +1,9 @@
-//! Probability distributions: what they draw, how they score it, the spaces their values live in.
+//! Probability distributions: what they draw, how they score it, the spaces their values
+//! live in.
 //!
-//! Nothing here knows of programs, traces or images. Parameters are checked when a distribution is made, so that everything after
-//! that is total: a log density is -inf off the support (a value of the wrong kind included) and never NaN.
+//! Nothing here knows of programs, traces or images. Parameters are checked when a
+//! distribution is made, so that everything after that is total: a log density is -inf
+//! off the support (a value of the wrong kind included) and never NaN.
 
 mod ascending;
 mod batch;

@@ -1,4 +1,5 @@
-//! The multinomial distribution. Probabilities by Loader's saddle-point form; draws one kind after the other.
+//! The multinomial distribution. Probabilities by Loader's saddle-point form; draws one
+//! kind after the other.
 
 use super::param::integer;
 use super::support::are_counts;
@@ -6,7 +7,8 @@ use super::{Binomial, Categorical, Datum, Distribution, Gradient, ParamError, Sc
 use crate::num::{LN_SQRT_2PI, deviance, stirling_error};
 use crate::rng::Stream;
 
-/// `multinomial(n, weights)`: how many of n draws are of each kind; weights need not sum to 1.
+/// `multinomial(n, weights)`: how many of n draws are of each kind; weights need not sum
+/// to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multinomial {
     n: f64,
@@ -15,8 +17,8 @@ pub struct Multinomial {
 }
 
 impl Multinomial {
-    /// So many draws with these weights; fails unless `n` is an integer in 0 to 2^53, and all weights are finite and not negative
-    /// with a positive, finite sum.
+    /// So many draws with these weights; fails unless `n` is an integer in 0 to 2^53, and
+    /// all weights are finite and not negative with a positive, finite sum.
     pub fn new(n: f64, weights: &[f64]) -> Result<Multinomial, ParamError> {
         let n = integer("multinomial", "n", n)?;
         if n < 0.0 {
@@ -44,7 +46,8 @@ impl Multinomial {
             }
             // A share that no double holds has a logarithm, unless it is 0.
             sum -= if *k > 0.0 && expected < f64::MIN_POSITIVE {
-                *k * (libm::log(*k) - libm::log(self.n) - libm::log(*w) + libm::log(self.total) - 1.0)
+                *k * (libm::log(*k) - libm::log(self.n) - libm::log(*w) + libm::log(self.total)
+                    - 1.0)
             } else {
                 deviance(*k, expected)
             };
@@ -77,7 +80,8 @@ impl Distribution for Multinomial {
             left -= k;
             k
         };
-        let counts: Vec<f64> = self.weights.iter().zip(after.into_iter().rev()).map(count).collect();
+        let counts: Vec<f64> =
+            self.weights.iter().zip(after.into_iter().rev()).map(count).collect();
         counts.into()
     }
 
@@ -90,8 +94,10 @@ impl Distribution for Multinomial {
             return None;
         }
         x.with_numbers(self.weights.len(), |xs| {
-            let by_weight = |(k, w): (&f64, &f64)| if *k > 0.0 { k / w } else { 0.0 } - self.n / self.total;
-            let params = std::iter::once(0.0).chain(xs.iter().zip(&self.weights).map(by_weight)).collect();
+            let by_weight =
+                |(k, w): (&f64, &f64)| if *k > 0.0 { k / w } else { 0.0 } - self.n / self.total;
+            let params =
+                std::iter::once(0.0).chain(xs.iter().zip(&self.weights).map(by_weight)).collect();
             Gradient { x: Vec::new(), params }
         })
     }

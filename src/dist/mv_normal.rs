@@ -8,33 +8,47 @@ use nalgebra::DMatrix;
 
 /// `mv_normal(mean, cov)` or `mv_normal(mean, chol)`. Gradients are by the mean only.
 ///
-/// Its choice is stored as its value; a whitened one stores the white noise z of mean + chol z, so that the value follows when the
-/// mean and the covariance move.
+/// Its choice is stored as its value; a whitened one stores the white noise z of mean +
+/// chol z, so that the value follows when the mean and the covariance move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MvNormal(Gaussian);
 
 impl MvNormal {
-    /// With this mean and covariance; fails unless the mean is finite and the covariance as large, symmetric (to 1e-9 of its
-    /// largest entry) and positive definite.
+    /// With this mean and covariance; fails unless the mean is finite and the covariance
+    /// as large, symmetric (to 1e-9 of its largest entry) and positive definite.
     pub fn from_cov(mean: &[f64], cov: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
-        let size =
-            || ParamError::new("mv_normal", "cov", shape(cov), "must be square and match the length of the mean");
+        let size = || {
+            ParamError::new(
+                "mv_normal",
+                "cov",
+                shape(cov),
+                "must be square and match the length of the mean",
+            )
+        };
         let packed = lower(cov).filter(|_| cov.nrows() == mean.len()).ok_or_else(size)?;
         if let Some(x) = cov.iter().find(|x| !x.is_finite()) {
             return Err(ParamError::new("mv_normal", "cov", x, "must be finite"));
         }
         let scale = cov.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let n = mean.len();
-        let symmetric = (0..n).all(|i| (0..i).all(|j| (cov[(i, j)] - cov[(j, i)]).abs() <= 1e-9 * scale));
+        let symmetric =
+            (0..n).all(|i| (0..i).all(|j| (cov[(i, j)] - cov[(j, i)]).abs() <= 1e-9 * scale));
         if !symmetric {
-            return Err(ParamError::new("mv_normal", "cov", "one that is not", "must be symmetric"));
+            return Err(ParamError::new(
+                "mv_normal",
+                "cov",
+                "one that is not",
+                "must be symmetric",
+            ));
         }
-        let definite = || ParamError::new("mv_normal", "cov", "one that is not", "must be positive definite");
+        let definite =
+            || ParamError::new("mv_normal", "cov", "one that is not", "must be positive definite");
         Self::make(mean, Factor::new(n, packed).map_err(|_| definite())?)
     }
 
-    /// With this mean and the lower triangular Cholesky factor of the covariance; fails unless the mean is finite and the factor
-    /// as large and finite, with a positive diagonal and zeros above it.
+    /// With this mean and the lower triangular Cholesky factor of the covariance; fails
+    /// unless the mean is finite and the factor as large and finite, with a positive
+    /// diagonal and zeros above it.
     pub fn from_chol(mean: &[f64], chol: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
         if chol.nrows() != mean.len() || chol.ncols() != mean.len() {
             return Err(ParamError::new(
@@ -46,9 +60,21 @@ impl MvNormal {
         }
         let n = mean.len();
         if (0..n).any(|j| (0..j).any(|i| chol[(i, j)] != 0.0)) {
-            return Err(ParamError::new("mv_normal", "chol", "one that is not", "must be lower triangular"));
+            return Err(ParamError::new(
+                "mv_normal",
+                "chol",
+                "one that is not",
+                "must be lower triangular",
+            ));
         }
-        let bad = || ParamError::new("mv_normal", "chol", "one without", "must be finite with a positive diagonal");
+        let bad = || {
+            ParamError::new(
+                "mv_normal",
+                "chol",
+                "one without",
+                "must be finite with a positive diagonal",
+            )
+        };
         Self::make(mean, Factor::from_lower(chol).ok_or_else(bad)?)
     }
 
@@ -69,14 +95,15 @@ impl MvNormal {
         MvNormal(self.0.centred())
     }
 
-    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log density of a stored value; of one stored as
-    /// noise, of what has these derivatives by the value.
+    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log
+    /// density of a stored value; of one stored as noise, of what has these derivatives
+    /// by the value.
     pub fn factor_gradient(&self, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<f64>> {
         self.0.factor_gradient(stored, by_value)
     }
 
-    /// From those by the factor to those by the entries of the covariance, its lower triangle by rows: what lies off the diagonal
-    /// stands for both of its places.
+    /// From those by the factor to those by the entries of the covariance, its lower
+    /// triangle by rows: what lies off the diagonal stands for both of its places.
     pub fn pull_covariance(&self, by_factor: &[f64]) -> Vec<f64> {
         self.0.factor.pull_cholesky(by_factor)
     }

@@ -1,4 +1,5 @@
-//! The negative binomial distribution. Probabilities by Loader's saddle-point form; draws as a Poisson number with a gamma rate.
+//! The negative binomial distribution. Probabilities by Loader's saddle-point form; draws
+//! as a Poisson number with a gamma rate.
 
 use super::draw::ln_gamma_draw;
 use super::param::{MAX_INTEGER, positive};
@@ -8,8 +9,9 @@ use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, ln_gamma, stirling_
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// `neg_binomial(r, p)`: failures before the `r`-th success, as scipy's `nbinom(r, p)`; `r` may be any positive number. Stan's
-/// `neg_binomial(alpha, beta)` has r = alpha, p = beta / (1 + beta).
+/// `neg_binomial(r, p)`: failures before the `r`-th success, as scipy's `nbinom(r, p)`;
+/// `r` may be any positive number. Stan's `neg_binomial(alpha, beta)` has r = alpha, p =
+/// beta / (1 + beta).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NegBinomial {
     r: f64,
@@ -18,7 +20,8 @@ pub struct NegBinomial {
 }
 
 impl NegBinomial {
-    /// Up to so many successes of this probability each; fails unless `r` is positive and finite and `p` above 0 and at most 1.
+    /// Up to so many successes of this probability each; fails unless `r` is positive and
+    /// finite and `p` above 0 and at most 1.
     pub fn new(r: f64, p: f64) -> Result<NegBinomial, ParamError> {
         let (r, p) = (positive(Self::NAME, "r", r)?, success(Self::NAME, p)?);
         Ok(NegBinomial { r, p, error: stirling_error(r) })
@@ -61,7 +64,8 @@ impl Scalar for NegBinomial {
         }
         let n = r + k;
         if n == k && r < 1.0 {
-            // Too few successes to show in the sum: Gamma(k + r) / Gamma(k + 1) is k^(r - 1).
+            // Too few successes to show in the sum: Gamma(k + r) / Gamma(k + 1) is k^(r -
+            // 1).
             return (r - 1.0) * libm::log(k) - ln_gamma(r) + r * libm::log(p) + k * libm::log1p(-p);
         }
         let errors = stirling_error(n) - self.error - stirling_error(k);
@@ -82,11 +86,15 @@ impl Scalar for NegBinomial {
             return Some(Tails::NONE_BELOW);
         }
         let k = libm::floor(x);
-        beta_tails(self.r, k + 1.0, self.p, 1.0 - self.p).map(|(below, above)| Tails { below, above })
+        beta_tails(self.r, k + 1.0, self.p, 1.0 - self.p)
+            .map(|(below, above)| Tails { below, above })
     }
 
     fn speeds(&self, x: f64) -> Option<Speeds> {
-        let tails = |r| beta_tails(r, x + 1.0, self.p, 1.0 - self.p).map(|(below, above)| Tails { below, above });
+        let tails = |r| {
+            beta_tails(r, x + 1.0, self.p, 1.0 - self.p)
+                .map(|(below, above)| Tails { below, above })
+        };
         let by_r = speed_by_differences(self.r, self.log_density_num(x), tails)?;
         Some(smallvec![by_r, (self.r + x) / self.p])
     }

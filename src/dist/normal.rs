@@ -17,13 +17,15 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// With this mean and standard deviation; fails unless the mean is finite and the deviation positive and finite.
+    /// With this mean and standard deviation; fails unless the mean is finite and the
+    /// deviation positive and finite.
     pub fn new(mean: f64, sd: f64) -> Result<Normal, ParamError> {
         let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
         Ok(Normal { mean, sd, log_norm: -libm::log(sd) - LN_SQRT_2PI })
     }
 
-    /// The same as [`Normal::new`]; the logarithm is not taken again if the deviation is that of `self`.
+    /// The same as [`Normal::new`]; the logarithm is not taken again if the deviation is
+    /// that of `self`.
     #[inline]
     pub fn near(&self, mean: f64, sd: f64) -> Result<Normal, ParamError> {
         if sd.to_bits() != self.sd.to_bits() {

@@ -9,12 +9,15 @@ use crate::rng::Stream;
 /// How often draws of unlike parts are tried for one in order.
 const TRIES: u32 = 10_000;
 
-/// `ordered(d, n)`: n independent numbers of `d` in ascending order, one choice. The density is n! times the product of those of
-/// `d`. Gradients by parameters are those of `d`, summed.
+/// `ordered(d, n)`: n independent numbers of `d` in ascending order, one choice. The
+/// density is n! times the product of those of `d`. Gradients by parameters are those of
+/// `d`, summed.
 ///
-/// `ordered([d1, d2, …])`: a number of each, in ascending order. The density is the product of theirs, not divided by the probability of
-/// that order, which is known for parts that are alike only: so it counts as improper, and its `sample` gives a place to start
-/// from (draws that came out in order; after 10000 tries sorted ones). Gradients by parameters are those of each in turn.
+/// `ordered([d1, d2, …])`: a number of each, in ascending order. The density is the
+/// product of theirs, not divided by the probability of that order, which is known for
+/// parts that are alike only: so it counts as improper, and its `sample` gives a place to
+/// start from (draws that came out in order; after 10000 tries sorted ones). Gradients by
+/// parameters are those of each in turn.
 #[derive(Clone, Debug)]
 pub struct Ordered {
     parts: Parts,
@@ -28,10 +31,16 @@ enum Parts {
 }
 
 impl Ordered {
-    /// So many numbers of a distribution; fails unless it is one of continuous numbers, and for more than 2^32 - 2.
+    /// So many numbers of a distribution; fails unless it is one of continuous numbers,
+    /// and for more than 2^32 - 2.
     pub fn new(one: Dist, n: usize) -> Result<Ordered, ParamError> {
         if !is_continuous(&one) {
-            return Err(ParamError::new("ordered", "d", one.name(), "must be a distribution of continuous numbers"));
+            return Err(ParamError::new(
+                "ordered",
+                "d",
+                one.name(),
+                "must be a distribution of continuous numbers",
+            ));
         }
         if n >= u32::MAX as usize {
             return Err(ParamError::new("ordered", "n", n, "must be below 2^32 - 1"));
@@ -39,7 +48,8 @@ impl Ordered {
         Ok(Ordered { parts: Parts::Alike(one), n })
     }
 
-    /// A number of each of these; fails unless they are distributions of continuous numbers.
+    /// A number of each of these; fails unless they are distributions of continuous
+    /// numbers.
     pub fn of(parts: Vec<Dist>) -> Result<Ordered, ParamError> {
         let rule = "must hold distributions of continuous numbers";
         if let Some(d) = parts.iter().find(|d| !is_continuous(d)) {
@@ -48,7 +58,8 @@ impl Ordered {
         let around = |a: Support, d: &Dist| union(a, d.support());
         let first = parts.first().map_or(Support::Real, Dist::support);
         let support = parts.iter().try_fold(first, around);
-        let support = support.ok_or_else(|| ParamError::new("ordered", "d", "different kinds of values", rule))?;
+        let support = support
+            .ok_or_else(|| ParamError::new("ordered", "d", "different kinds of values", rule))?;
         Ok(Ordered { n: parts.len(), parts: Parts::Unlike(parts.into(), support) })
     }
 

@@ -1,4 +1,5 @@
-//! Parameters outside their domain: an error value, never a panic and never a NaN later on.
+//! Parameters outside their domain: an error value, never a panic and never a NaN later
+//! on.
 
 use thiserror::Error;
 
@@ -29,13 +30,25 @@ impl ParamError {
 
 /// The number, if it is finite.
 #[inline]
-pub(super) fn finite(distribution: &'static str, parameter: &'static str, x: f64) -> Result<f64, ParamError> {
-    if x.is_finite() { Ok(x) } else { Err(ParamError::new(distribution, parameter, x, "must be finite")) }
+pub(super) fn finite(
+    distribution: &'static str,
+    parameter: &'static str,
+    x: f64,
+) -> Result<f64, ParamError> {
+    if x.is_finite() {
+        Ok(x)
+    } else {
+        Err(ParamError::new(distribution, parameter, x, "must be finite"))
+    }
 }
 
 /// The number, if it is positive and finite.
 #[inline]
-pub(super) fn positive(distribution: &'static str, parameter: &'static str, x: f64) -> Result<f64, ParamError> {
+pub(super) fn positive(
+    distribution: &'static str,
+    parameter: &'static str,
+    x: f64,
+) -> Result<f64, ParamError> {
     if x > 0.0 && x.is_finite() {
         Ok(x)
     } else {
@@ -45,7 +58,11 @@ pub(super) fn positive(distribution: &'static str, parameter: &'static str, x: f
 
 /// The number, if it is in [0, 1].
 #[inline]
-pub(super) fn probability(distribution: &'static str, parameter: &'static str, x: f64) -> Result<f64, ParamError> {
+pub(super) fn probability(
+    distribution: &'static str,
+    parameter: &'static str,
+    x: f64,
+) -> Result<f64, ParamError> {
     if (0.0..=1.0).contains(&x) {
         Ok(x)
     } else {
@@ -58,7 +75,11 @@ pub(super) const MAX_INTEGER: f64 = 9_007_199_254_740_992.0;
 
 /// The number, if it is integral and every integer up to it is a double.
 #[inline]
-pub(super) fn integer(distribution: &'static str, parameter: &'static str, x: f64) -> Result<f64, ParamError> {
+pub(super) fn integer(
+    distribution: &'static str,
+    parameter: &'static str,
+    x: f64,
+) -> Result<f64, ParamError> {
     if x == libm::trunc(x) && x.abs() <= MAX_INTEGER {
         Ok(x)
     } else {

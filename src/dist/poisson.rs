@@ -1,5 +1,6 @@
-//! The Poisson distribution. Probabilities by Loader's saddle-point form; draws by inversion for small rates, else by transformed
-//! rejection (Hörmann 1993, "The transformed rejection method for generating Poisson random variables", PTRS).
+//! The Poisson distribution. Probabilities by Loader's saddle-point form; draws by
+//! inversion for small rates, else by transformed rejection (Hörmann 1993, "The
+//! transformed rejection method for generating Poisson random variables", PTRS).
 
 use super::param::MAX_INTEGER;
 use super::tails::{Speeds, Tails};
@@ -61,7 +62,8 @@ impl Scalar for Poisson {
             if k < 0.0 || (us < 0.013 && v > us) {
                 continue;
             }
-            if libm::log(v) + log_inverse - libm::log(a / (us * us) + b) <= self.log_density_num(k) {
+            if libm::log(v) + log_inverse - libm::log(a / (us * us) + b) <= self.log_density_num(k)
+            {
                 return k;
             }
         }

@@ -1,9 +1,11 @@
-//! Independent elements, each with a distribution of its own: what `normal([0, 1], 1)` means.
+//! Independent elements, each with a distribution of its own: what `normal([0, 1], 1)`
+//! means.
 
 use super::{Datum, Dist, Distribution, Gradient, ParamError, Support};
 use crate::rng::Stream;
 
-/// A product of distributions. In the language its elements are choices with addresses of their own.
+/// A product of distributions. In the language its elements are choices with addresses of
+/// their own.
 ///
 /// Elements are stored as values: a Gaussian process among them becomes a centred one.
 #[derive(Clone, Debug)]
@@ -93,7 +95,8 @@ pub(super) fn score<'a>(parts: impl IntoIterator<Item = &'a Dist>, n: usize, x: 
     sum
 }
 
-/// The elements' derivatives by value one after the other; those by parameters as `join` puts them together.
+/// The elements' derivatives by value one after the other; those by parameters as `join`
+/// puts them together.
 pub(super) fn slopes<'a>(
     parts: impl IntoIterator<Item = &'a Dist>,
     n: usize,
@@ -113,7 +116,11 @@ pub(super) fn slopes<'a>(
 }
 
 /// The noise behind all elements.
-pub(super) fn whiten<'a>(parts: impl IntoIterator<Item = &'a Dist>, n: usize, x: &Datum) -> Option<Vec<f64>> {
+pub(super) fn whiten<'a>(
+    parts: impl IntoIterator<Item = &'a Dist>,
+    n: usize,
+    x: &Datum,
+) -> Option<Vec<f64>> {
     if x.len() != Some(n) {
         return None;
     }
@@ -125,7 +132,11 @@ pub(super) fn whiten<'a>(parts: impl IntoIterator<Item = &'a Dist>, n: usize, x:
 }
 
 /// The elements made from noise.
-pub(super) fn colour<'a>(parts: impl IntoIterator<Item = &'a Dist>, n: usize, z: &[f64]) -> Option<Datum> {
+pub(super) fn colour<'a>(
+    parts: impl IntoIterator<Item = &'a Dist>,
+    n: usize,
+    z: &[f64],
+) -> Option<Datum> {
     let mut xs = Vec::with_capacity(n);
     let mut rest = z;
     for p in parts {

@@ -1,11 +1,13 @@
-//! What gradients through a trace need of distributions besides the gradient of the density: how values move with the
-//! parameters while the coordinates they are stored in stay.
+//! What gradients through a trace need of distributions besides the gradient of the
+//! density: how values move with the parameters while the coordinates they are stored in
+//! stay.
 
 use super::{Datum, Dist, Support};
 use crate::rng::{Purpose, StreamKey};
 
 impl Dist {
-    /// How many derivatives by parameters [`Dist::gradient`] has: those at a draw, the same number always.
+    /// How many derivatives by parameters [`Dist::gradient`] has: those at a draw, the
+    /// same number always.
     pub fn param_count(&self) -> usize {
         match self {
             Dist::Iid(d) => d.one().param_count(),
@@ -32,8 +34,9 @@ impl Dist {
         }
     }
 
-    /// For a number stored as the image x(y) of an unconstrained coordinate: the derivatives by the parameters, while y stays, of
-    /// a function of x with slope `by`, plus those of log |dx/dy|. `None` where they are not known.
+    /// For a number stored as the image x(y) of an unconstrained coordinate: the
+    /// derivatives by the parameters, while y stays, of a function of x with slope `by`,
+    /// plus those of log |dx/dy|. `None` where they are not known.
     pub fn by_bounds(&self, x: &Datum, by: f64) -> Option<Vec<f64>> {
         let x = x.num()?;
         // By the lower and the upper bound.
@@ -66,7 +69,8 @@ impl Dist {
         }
     }
 
-    /// For a value made from white noise, mean + L z: the derivatives by z of a function with these derivatives by the value.
+    /// For a value made from white noise, mean + L z: the derivatives by z of a function
+    /// with these derivatives by the value.
     pub fn realise_pull(&self, by: &[f64]) -> Option<Vec<f64>> {
         match self {
             Dist::MvNormal(d) => Some(d.pull_noise(by)),
@@ -102,7 +106,10 @@ mod tests {
                     p[i] += h;
                     f(&make(p))
                 };
-                assert!((found[i] - (moved(1e-6) - moved(-1e-6)) / 2e-6).abs() < 1e-6, "{i}: {found:?}");
+                assert!(
+                    (found[i] - (moved(1e-6) - moved(-1e-6)) / 2e-6).abs() < 1e-6,
+                    "{i}: {found:?}"
+                );
             }
         }
         let normal = Dist::Normal(Normal::new(0.0, 1.0).unwrap());

@@ -1,4 +1,5 @@
-//! Distributions of one number: a smaller interface that allocates nothing, and [`Distribution`] built on it.
+//! Distributions of one number: a smaller interface that allocates nothing, and
+//! [`Distribution`] built on it.
 
 use super::tails::{Speeds, Tails};
 use super::{Datum, Distribution, Gradient, Support};
@@ -52,8 +53,8 @@ pub trait Scalar: fmt::Debug + Send + Sync {
         None
     }
 
-    /// dP(X <= x)/da over the density at x, for each parameter a, where the density is positive and finite; of an integer
-    /// parameter 0.
+    /// dP(X <= x)/da over the density at x, for each parameter a, where the density is
+    /// positive and finite; of an integer parameter 0.
     fn speeds(&self, _x: f64) -> Option<Speeds> {
         None
     }

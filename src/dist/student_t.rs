@@ -18,11 +18,12 @@ pub struct StudentT {
 }
 
 impl StudentT {
-    /// With these degrees of freedom, location and scale; fails unless the location is finite and the others positive and
-    /// finite.
+    /// With these degrees of freedom, location and scale; fails unless the location is
+    /// finite and the others positive and finite.
     pub fn new(df: f64, location: f64, scale: f64) -> Result<StudentT, ParamError> {
         let df = positive(Self::NAME, "df", df)?;
-        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        let (location, scale) =
+            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
         let log_norm = -ln_beta(0.5 * df, 0.5) - 0.5 * libm::log(df) - libm::log(scale);
         Ok(StudentT { df, location, scale, log_norm })
     }
@@ -33,7 +34,11 @@ impl StudentT {
     #[inline]
     fn log_tail(&self, x: f64) -> f64 {
         let t = standard(x, self.location, self.scale) / self.df.sqrt();
-        if t.abs() < 1e150 { libm::log1p(t * t) } else { far_square(x, self.location, self.scale) - libm::log(self.df) }
+        if t.abs() < 1e150 {
+            libm::log1p(t * t)
+        } else {
+            far_square(x, self.location, self.scale) - libm::log(self.df)
+        }
     }
 }
 
@@ -81,7 +86,8 @@ impl Scalar for StudentT {
 
     fn speeds(&self, x: f64) -> Option<Speeds> {
         let z = standard(x, self.location, self.scale);
-        let by_df = speed_by_differences(self.df, self.log_density_num(x), |df| student_tails(df, z))?;
+        let by_df =
+            speed_by_differences(self.df, self.log_density_num(x), |df| student_tails(df, z))?;
         Some(smallvec![by_df, -1.0, -z])
     }
 
@@ -94,7 +100,8 @@ impl Scalar for StudentT {
     }
 }
 
-/// The tails of the standard distribution, by the incomplete beta function of df / (df + z^2) (Abramowitz & Stegun 26.7.1).
+/// The tails of the standard distribution, by the incomplete beta function of df / (df +
+/// z^2) (Abramowitz & Stegun 26.7.1).
 fn student_tails(df: f64, z: f64) -> Option<Tails> {
     let square = z * z;
     let (x, y) = (1.0 / (1.0 + square / df), 1.0 / (1.0 + df / square));

@@ -1,4 +1,5 @@
-//! The spaces that values live in. How they map to unconstrained space is in `transform.rs`.
+//! The spaces that values live in. How they map to unconstrained space is in
+//! `transform.rs`.
 
 use super::{Datum, triangle};
 use core::f64::consts::{PI, TAU};
@@ -35,7 +36,8 @@ pub enum Support {
         /// The bound.
         hi: f64,
     },
-    /// Angles in radians, in (-pi, pi]. The unconstrained coordinate is the angle, over which the density goes on periodically.
+    /// Angles in radians, in (-pi, pi]. The unconstrained coordinate is the angle, over
+    /// which the density goes on periodically.
     Circle,
     /// Truth values.
     Boolean,
@@ -50,12 +52,14 @@ pub enum Support {
     Simplex(usize),
     /// Vectors of so many finite numbers.
     Vector(usize),
-    /// So many numbers of one continuous space in ascending order; equal neighbours are its boundary.
+    /// So many numbers of one continuous space in ascending order; equal neighbours are
+    /// its boundary.
     Ascending(Box<Support>, usize),
-    /// Cholesky factors of correlation matrices with so many rows: n rows of n numbers, zeros above a diagonal that is not
-    /// negative, every row of length 1.
+    /// Cholesky factors of correlation matrices with so many rows: n rows of n numbers,
+    /// zeros above a diagonal that is not negative, every row of length 1.
     CorrelationFactor(usize),
-    /// Cholesky factors of covariance matrices with so many rows: zeros above a positive diagonal.
+    /// Cholesky factors of covariance matrices with so many rows: zeros above a positive
+    /// diagonal.
     CovarianceFactor(usize),
     /// Counts for so many kinds that sum to a total.
     Counts {
@@ -74,7 +78,15 @@ impl Support {
     /// Whether its values are single numbers.
     pub fn is_number(&self) -> bool {
         use Support::*;
-        matches!(self, Real | Positive | AtLeast { .. } | AtMost { .. } | Interval { .. } | Circle | Integers { .. })
+        matches!(
+            self,
+            Real | Positive
+                | AtLeast { .. }
+                | AtMost { .. }
+                | Interval { .. }
+                | Circle
+                | Integers { .. }
+        )
     }
 
     /// Whether its values can be counted. A product is discrete if all of its parts are.
@@ -105,13 +117,15 @@ impl Support {
         }
     }
 
-    /// All values in ascending order, if they are truth values or at most [`MAX_ENUMERATED`] integers.
+    /// All values in ascending order, if they are truth values or at most
+    /// [`MAX_ENUMERATED`] integers.
     pub fn finite_values(&self) -> Option<Vec<Datum>> {
         let mut values = Vec::new();
         self.list_values(&mut values).then_some(values)
     }
 
-    /// The same into a list that is used again; false, and the list empty, if the support is not finite.
+    /// The same into a list that is used again; false, and the list empty, if the support
+    /// is not finite.
     #[doc(hidden)]
     pub fn list_values(&self, values: &mut Vec<Datum>) -> bool {
         values.clear();
@@ -129,10 +143,13 @@ impl Support {
     pub fn fits(&self, x: &Datum) -> bool {
         match self {
             Support::Boolean => matches!(x, Datum::Bool(_)),
-            Support::Simplex(n) | Support::Vector(n) | Support::Ascending(_, n) | Support::Counts { kinds: n, .. } => {
-                x.with_numbers(*n, |_| ()).is_some()
+            Support::Simplex(n)
+            | Support::Vector(n)
+            | Support::Ascending(_, n)
+            | Support::Counts { kinds: n, .. } => x.with_numbers(*n, |_| ()).is_some(),
+            Support::CorrelationFactor(n) | Support::CovarianceFactor(n) => {
+                triangle::entries(x, *n).is_some()
             }
-            Support::CorrelationFactor(n) | Support::CovarianceFactor(n) => triangle::entries(x, *n).is_some(),
             Support::Product(one, n) => match x {
                 Datum::Vec(xs) => xs.len() == *n && one.is_number(),
                 Datum::List(xs) => xs.len() == *n && xs.iter().all(|x| one.fits(x)),
@@ -140,7 +157,9 @@ impl Support {
             },
             Support::Each(all) => match x {
                 Datum::Vec(xs) => xs.len() == all.len() && all.iter().all(Support::is_number),
-                Datum::List(xs) => xs.len() == all.len() && all.iter().zip(xs.iter()).all(|(s, x)| s.fits(x)),
+                Datum::List(xs) => {
+                    xs.len() == all.len() && all.iter().zip(xs.iter()).all(|(s, x)| s.fits(x))
+                }
                 _ => false,
             },
             _ => matches!(x, Datum::Num(_)),
@@ -159,7 +178,10 @@ impl Support {
             Support::AtMost { hi } => x <= *hi && x.is_finite(),
             Support::Circle => x > -PI && x <= PI,
             Support::Integers { lo, hi } => {
-                x.is_finite() && x == libm::trunc(x) && x >= *lo as f64 && hi.is_none_or(|hi| x <= hi as f64)
+                x.is_finite()
+                    && x == libm::trunc(x)
+                    && x >= *lo as f64
+                    && hi.is_none_or(|hi| x <= hi as f64)
             }
             _ => false,
         }
@@ -171,9 +193,12 @@ impl Support {
             (_, Datum::Num(x)) => self.contains_num(*x),
             (Support::Boolean, Datum::Bool(_)) => true,
             (Support::Simplex(n), _) => x.with_numbers(*n, is_simplex).unwrap_or(false),
-            (Support::Vector(n), _) => x.with_numbers(*n, |xs| xs.iter().all(|x| x.is_finite())).unwrap_or(false),
+            (Support::Vector(n), _) => {
+                x.with_numbers(*n, |xs| xs.iter().all(|x| x.is_finite())).unwrap_or(false)
+            }
             (Support::Ascending(one, n), _) => {
-                let inside = |xs: &[f64]| is_ascending(xs) && xs.iter().all(|x| one.contains_num(*x));
+                let inside =
+                    |xs: &[f64]| is_ascending(xs) && xs.iter().all(|x| one.contains_num(*x));
                 x.with_numbers(*n, inside).unwrap_or(false)
             }
             (Support::Counts { total, kinds }, _) => {
@@ -185,8 +210,12 @@ impl Support {
             (Support::CovarianceFactor(n), _) => {
                 triangle::entries(x, *n).is_some_and(|xs| triangle::is_covariance_factor(&xs, *n))
             }
-            (Support::Product(one, n), Datum::Vec(xs)) => xs.len() == *n && xs.iter().all(|x| one.contains_num(*x)),
-            (Support::Product(one, n), Datum::List(xs)) => xs.len() == *n && xs.iter().all(|x| one.contains(x)),
+            (Support::Product(one, n), Datum::Vec(xs)) => {
+                xs.len() == *n && xs.iter().all(|x| one.contains_num(*x))
+            }
+            (Support::Product(one, n), Datum::List(xs)) => {
+                xs.len() == *n && xs.iter().all(|x| one.contains(x))
+            }
             (Support::Each(all), Datum::Vec(xs)) => {
                 xs.len() == all.len() && all.iter().zip(xs.iter()).all(|(s, x)| s.contains_num(*x))
             }
@@ -214,8 +243,12 @@ impl fmt::Display for Support {
             Support::Simplex(n) => write!(f, "{n} proportions that sum to 1"),
             Support::Vector(n) => write!(f, "vectors of {n} finite numbers"),
             Support::Ascending(one, n) => write!(f, "{n} in ascending order of {one}"),
-            Support::CorrelationFactor(n) => write!(f, "Cholesky factors of {n} x {n} correlation matrices"),
-            Support::CovarianceFactor(n) => write!(f, "Cholesky factors of {n} x {n} covariance matrices"),
+            Support::CorrelationFactor(n) => {
+                write!(f, "Cholesky factors of {n} x {n} correlation matrices")
+            }
+            Support::CovarianceFactor(n) => {
+                write!(f, "Cholesky factors of {n} x {n} covariance matrices")
+            }
             Support::Counts { total, kinds } => write!(f, "{kinds} counts that sum to {total}"),
             Support::Product(one, n) => write!(f, "{n} of {one}"),
             Support::Each(all) => write!(f, "{} values, each with its own support", all.len()),
@@ -225,7 +258,8 @@ impl fmt::Display for Support {
 
 /// Whether these are shares of 1, but for rounding.
 pub(super) fn is_simplex(xs: &[f64]) -> bool {
-    xs.iter().all(|x| (0.0..=1.0).contains(x)) && (xs.iter().sum::<f64>() - 1.0).abs() <= SIMPLEX_TOLERANCE
+    xs.iter().all(|x| (0.0..=1.0).contains(x))
+        && (xs.iter().sum::<f64>() - 1.0).abs() <= SIMPLEX_TOLERANCE
 }
 
 /// Whether every number is at least the one before it.
@@ -236,7 +270,8 @@ pub(super) fn is_ascending(xs: &[f64]) -> bool {
 /// Whether these are whole numbers from 0 with this sum.
 pub(super) fn are_counts(xs: &[f64], total: i64) -> bool {
     let count = |x: &f64| *x >= 0.0 && *x <= total as f64 && *x == libm::trunc(*x);
-    xs.iter().all(count) && xs.iter().map(|x| i128::from(*x as i64)).sum::<i128>() == i128::from(total)
+    xs.iter().all(count)
+        && xs.iter().map(|x| i128::from(*x as i64)).sum::<i128>() == i128::from(total)
 }
 
 /// The same direction in (-pi, pi]; 0 for what is not a finite number.

@@ -1,10 +1,12 @@
-//! How much of a distribution of numbers lies to each side of a number, in logarithms: what truncation rests on.
+//! How much of a distribution of numbers lies to each side of a number, in logarithms:
+//! what truncation rests on.
 
 use super::Dist;
 use crate::num::{log_diff_exp, log_sum_exp};
 use smallvec::SmallVec;
 
-/// The logarithms of P(X <= x) and of P(X > x). Each is accurate where it is the smaller one, however small.
+/// The logarithms of P(X <= x) and of P(X > x). Each is accurate where it is the smaller
+/// one, however small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tails {
     /// ln P(X <= x).
@@ -41,15 +43,21 @@ impl Tails {
     /// Of a mixture: the sums of these, by the logarithms of the shares.
     fn mixed(all: &[(f64, Tails)]) -> Tails {
         let sum = |of: fn(&Tails) -> f64| {
-            log_sum_exp(&all.iter().map(|(share, t)| share + of(t)).collect::<SmallVec<[f64; 8]>>()).min(0.0)
+            log_sum_exp(&all.iter().map(|(share, t)| share + of(t)).collect::<SmallVec<[f64; 8]>>())
+                .min(0.0)
         };
         Tails { below: sum(|t| t.below), above: sum(|t| t.above) }
     }
 }
 
-/// dP(X <= x)/da over the density at x, where only differences know it: by a central difference of the fourth order of the smaller
-/// tail's logarithm. `tails` is of the parameter, `log_density` at x.
-pub(super) fn speed_by_differences(a: f64, log_density: f64, tails: impl Fn(f64) -> Option<Tails>) -> Option<f64> {
+/// dP(X <= x)/da over the density at x, where only differences know it: by a central
+/// difference of the fourth order of the smaller tail's logarithm. `tails` is of the
+/// parameter, `log_density` at x.
+pub(super) fn speed_by_differences(
+    a: f64,
+    log_density: f64,
+    tails: impl Fn(f64) -> Option<Tails>,
+) -> Option<f64> {
     let here = tails(a)?;
     let lower = here.below < here.above;
     let h = 2e-3 * a;
@@ -92,15 +100,18 @@ impl Dist {
             Dist::Categorical(d) => d.tails(x),
             Dist::Mixture(d) => {
                 let (_, shares, _) = d.shares();
-                let all = shares.iter().zip(d.components()).filter(|(s, _)| **s > f64::NEG_INFINITY);
-                let all: Option<Vec<(f64, Tails)>> = all.map(|(s, c)| Some((*s, c.tails(x)?))).collect();
+                let all =
+                    shares.iter().zip(d.components()).filter(|(s, _)| **s > f64::NEG_INFINITY);
+                let all: Option<Vec<(f64, Tails)>> =
+                    all.map(|(s, c)| Some((*s, c.tails(x)?))).collect();
                 Some(Tails::mixed(&all?))
             }
             _ => None,
         }
     }
 
-    /// dP(X <= x)/da over the density at x, for each parameter a, where the density is positive and finite.
+    /// dP(X <= x)/da over the density at x, for each parameter a, where the density is
+    /// positive and finite.
     pub(super) fn speeds(&self, x: f64) -> Option<Speeds> {
         use super::Scalar;
         match self {
@@ -130,7 +141,8 @@ impl Dist {
                 let mut by_weight = Speeds::new();
                 let mut rest = Speeds::new();
                 for (share, c) in shares.iter().zip(d.components()) {
-                    by_weight.push((libm::exp(c.tails(x)?.below) - below) / total * libm::exp(-all));
+                    by_weight
+                        .push((libm::exp(c.tails(x)?.below) - below) / total * libm::exp(-all));
                     let own = libm::exp(share + c.log_density_num(x) - all);
                     match c.speeds(x).filter(|_| own > 0.0) {
                         Some(speeds) => rest.extend(speeds.iter().map(|s| own * s)),

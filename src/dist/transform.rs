@@ -1,8 +1,10 @@
-//! The maps between supports and unconstrained space: the identity, log, logit and stick-breaking, as in the Stan reference
-//! manual ("Constraint transforms"). Those of matrices are in `triangle.rs`, those of sorted numbers in `ascending.rs`.
+//! The maps between supports and unconstrained space: the identity, log, logit and
+//! stick-breaking, as in the Stan reference manual ("Constraint transforms"). Those of
+//! matrices are in `triangle.rs`, those of sorted numbers in `ascending.rs`.
 //!
-//! Points on a boundary, and points that left a support whose bounds moved, map as the nearest points inside: coordinates are
-//! always finite. Whatever comes back is strictly inside.
+//! Points on a boundary, and points that left a support whose bounds moved, map as the
+//! nearest points inside: coordinates are always finite. Whatever comes back is strictly
+//! inside.
 
 use super::support::wrap_angle;
 use super::{Datum, Support, ascending, triangle};
@@ -32,7 +34,8 @@ impl Support {
         }
     }
 
-    /// How many numbers a gradient by the value has: those of the continuous parts, of a matrix row by row.
+    /// How many numbers a gradient by the value has: those of the continuous parts, of a
+    /// matrix row by row.
     pub fn gradient_dim(&self) -> usize {
         match self {
             Support::CorrelationFactor(n) | Support::CovarianceFactor(n) => n * n,
@@ -64,7 +67,8 @@ impl Support {
         }
     }
 
-    /// The number at a coordinate, and log |dx/dy| there; (0, 0) for supports that are not continuous numbers.
+    /// The number at a coordinate, and log |dx/dy| there; (0, 0) for supports that are
+    /// not continuous numbers.
     #[inline]
     pub fn from_free_scalar(&self, y: f64) -> (f64, f64) {
         match self {
@@ -86,19 +90,23 @@ impl Support {
                 let (width, y) = (hi - lo, near(y));
                 let share = libm::exp(-log1p_exp(y.abs()));
                 let x = if y < 0.0 { lo + width * share } else { hi - width * share };
-                let inside = if lo.next_up() < *hi { x.clamp(lo.next_up(), hi.next_down()) } else { *lo };
+                let inside =
+                    if lo.next_up() < *hi { x.clamp(lo.next_up(), hi.next_down()) } else { *lo };
                 (inside, libm::log(width) - y.abs() - 2.0 * log1p_exp(-y.abs()))
             }
             _ => (0.0, 0.0),
         }
     }
 
-    /// Appends the coordinates of a value: as many as [`Support::free_dim`], whatever the value.
+    /// Appends the coordinates of a value: as many as [`Support::free_dim`], whatever the
+    /// value.
     pub fn to_free(&self, x: &Datum, out: &mut Vec<f64>) {
         let end = out.len() + self.free_dim();
         match (self, x) {
             (Support::Vector(n), _) => {
-                x.with_numbers(*n, |xs| out.extend(xs.iter().map(|x| Support::Real.to_free_scalar(*x))));
+                x.with_numbers(*n, |xs| {
+                    out.extend(xs.iter().map(|x| Support::Real.to_free_scalar(*x)))
+                });
             }
             (Support::Simplex(n), _) => {
                 x.with_numbers(*n, |xs| stick_lengths(xs, out));
@@ -107,12 +115,18 @@ impl Support {
                 x.with_numbers(*n, |xs| ascending::to_free(one, xs, out));
             }
             (Support::CorrelationFactor(n), _) => {
-                triangle::entries(x, *n).iter().for_each(|xs| triangle::correlation_to_free(xs, *n, out));
+                triangle::entries(x, *n)
+                    .iter()
+                    .for_each(|xs| triangle::correlation_to_free(xs, *n, out));
             }
             (Support::CovarianceFactor(n), _) => {
-                triangle::entries(x, *n).iter().for_each(|xs| triangle::covariance_to_free(xs, *n, out));
+                triangle::entries(x, *n)
+                    .iter()
+                    .for_each(|xs| triangle::covariance_to_free(xs, *n, out));
             }
-            (Support::Product(one, n), Datum::Vec(xs)) if one.is_number() && one.free_dim() == 1 => {
+            (Support::Product(one, n), Datum::Vec(xs))
+                if one.is_number() && one.free_dim() == 1 =>
+            {
                 out.extend(xs.iter().take(*n).map(|x| one.to_free_scalar(*x)));
             }
             (Support::Product(one, n), _) => {
@@ -130,9 +144,10 @@ impl Support {
         out.resize(end, 0.0);
     }
 
-    /// The value at a point of unconstrained space, and log |dx/dy| there (for a simplex, of all shares but the last; for a
-    /// Cholesky factor, of its lower triangle, of a correlation matrix without the diagonal). Missing
-    /// coordinates count as 0. A discrete part is at its least value.
+    /// The value at a point of unconstrained space, and log |dx/dy| there (for a simplex,
+    /// of all shares but the last; for a Cholesky factor, of its lower triangle, of a
+    /// correlation matrix without the diagonal). Missing coordinates count as 0. A
+    /// discrete part is at its least value.
     pub fn from_free(&self, y: &[f64]) -> (Datum, f64) {
         let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
         match self {
@@ -149,9 +164,10 @@ impl Support {
             }
             Support::CorrelationFactor(n) => triangle::correlation_from_free(*n, at),
             Support::CovarianceFactor(n) => triangle::covariance_from_free(*n, at),
-            Support::Vector(n) => {
-                ((0..*n).map(|i| Support::Real.from_free_scalar(at(i)).0).collect::<Vec<_>>().into(), 0.0)
-            }
+            Support::Vector(n) => (
+                (0..*n).map(|i| Support::Real.from_free_scalar(at(i)).0).collect::<Vec<_>>().into(),
+                0.0,
+            ),
             Support::Simplex(n) => {
                 let (x, jacobian) = break_stick(*n, at);
                 (x.into(), jacobian)
@@ -175,8 +191,9 @@ impl Support {
         }
     }
 
-    /// Appends the derivative by the coordinates of log p(x(y)) + log |dx/dy|, from that of log p by the value (as in
-    /// [`super::Gradient`], so without numbers for discrete parts): what gradient-based moves need.
+    /// Appends the derivative by the coordinates of log p(x(y)) + log |dx/dy|, from that
+    /// of log p by the value (as in [`super::Gradient`], so without numbers for discrete
+    /// parts): what gradient-based moves need.
     pub fn free_gradient(&self, y: &[f64], by_x: &[f64], out: &mut Vec<f64>) {
         let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
         let by = |i: usize| by_x.get(i).copied().unwrap_or(0.0);
@@ -184,7 +201,9 @@ impl Support {
             Support::Boolean | Support::Integers { .. } | Support::Counts { .. } => {}
             Support::Real | Support::Circle => out.push(by(0)),
             Support::Vector(n) => out.extend((0..*n).map(by)),
-            Support::Positive | Support::AtLeast { .. } => out.push(by(0) * libm::exp(near(at(0))) + 1.0),
+            Support::Positive | Support::AtLeast { .. } => {
+                out.push(by(0) * libm::exp(near(at(0))) + 1.0)
+            }
             Support::AtMost { .. } => out.push(1.0 - by(0) * libm::exp(near(at(0)))),
             Support::Ascending(one, n) => ascending::free_gradient(one, *n, at, by, out),
             Support::CorrelationFactor(n) => triangle::correlation_gradient(*n, at, by, out),
@@ -196,7 +215,9 @@ impl Support {
             Support::Simplex(n) => stick_gradient(*n, at, by, out),
             Support::Product(one, n) => {
                 let (dy, dx) = (one.free_dim(), one.gradient_dim());
-                (0..*n).for_each(|i| one.free_gradient(part(y, i * dy, dy), part(by_x, i * dx, dx), out));
+                (0..*n).for_each(|i| {
+                    one.free_gradient(part(y, i * dy, dy), part(by_x, i * dx, dx), out)
+                });
             }
             Support::Each(all) => {
                 let (mut from_y, mut from_x) = (0, 0);
@@ -232,14 +253,16 @@ fn offset(n: usize, k: usize) -> f64 {
     libm::log((n - 1 - k) as f64)
 }
 
-/// The coordinates of shares. What is left is summed from the end, where the small terms of a long stick are.
+/// The coordinates of shares. What is left is summed from the end, where the small terms
+/// of a long stick are.
 fn stick_lengths(xs: &[f64], out: &mut Vec<f64>) {
     let n = xs.len();
     let start = out.len();
     let mut rest = xs.last().copied().unwrap_or(1.0);
     for k in (0..n.saturating_sub(1)).rev() {
         let x = xs[k];
-        let y = libm::log(x.max(f64::MIN_POSITIVE)) - libm::log(rest.max(f64::MIN_POSITIVE)) + offset(n, k);
+        let y = libm::log(x.max(f64::MIN_POSITIVE)) - libm::log(rest.max(f64::MIN_POSITIVE))
+            + offset(n, k);
         out.push(y.clamp(-FAR, FAR));
         rest += x;
     }
@@ -263,8 +286,14 @@ fn break_stick(n: usize, at: impl Fn(usize) -> f64) -> (Vec<f64>, f64) {
     (xs, jacobian)
 }
 
-/// With z the share taken of what is left, x_k = rest_k z_k: the derivatives by y_k of x_k and of all shares after it.
-fn stick_gradient(n: usize, at: impl Fn(usize) -> f64, by: impl Fn(usize) -> f64, out: &mut Vec<f64>) {
+/// With z the share taken of what is left, x_k = rest_k z_k: the derivatives by y_k of
+/// x_k and of all shares after it.
+fn stick_gradient(
+    n: usize,
+    at: impl Fn(usize) -> f64,
+    by: impl Fn(usize) -> f64,
+    out: &mut Vec<f64>,
+) {
     if n < 2 {
         return;
     }
@@ -275,7 +304,8 @@ fn stick_gradient(n: usize, at: impl Fn(usize) -> f64, by: impl Fn(usize) -> f64
     for k in (0..n - 1).rev() {
         let z = crate::num::expit(near(at(k)) - offset(n, k));
         let own = xs[k] * by(k);
-        // d log x_k = 1 - z; d log x_j = -z for j > k; the Jacobian has log z_k + log (1 - z_k) and log rest_j for j > k.
+        // d log x_k = 1 - z; d log x_j = -z for j > k; the Jacobian has log z_k + log (1 -
+        // z_k) and log rest_j for j > k.
         let later = (n - 2 - k) as f64;
         out.push(own * (1.0 - z) - after * z + 1.0 - 2.0 * z - later * z);
         after += own;

@@ -1,8 +1,11 @@
-//! Cholesky factors as values: n rows of n numbers, zeros above the diagonal; their maps to unconstrained space.
+//! Cholesky factors as values: n rows of n numbers, zeros above the diagonal; their maps
+//! to unconstrained space.
 //!
-//! A factor of a correlation matrix has rows of length 1; its coordinates are those of the canonical partial correlations
-//! (Lewandowski, Kurowicka & Joe 2009; "Cholesky factors of correlation matrices" in the Stan reference manual). A factor of a
-//! covariance matrix has the logarithms of its diagonal as coordinates. Both go row by row.
+//! A factor of a correlation matrix has rows of length 1; its coordinates are those of
+//! the canonical partial correlations (Lewandowski, Kurowicka & Joe 2009; "Cholesky
+//! factors of correlation matrices" in the Stan reference manual). A factor of a
+//! covariance matrix has the logarithms of its diagonal as coordinates. Both go row by
+//! row.
 
 use super::Datum;
 use super::transform::{FAR, near};
@@ -41,7 +44,8 @@ fn is_triangle(xs: &[f64], n: usize) -> bool {
 pub(super) fn is_correlation_factor(xs: &[f64], n: usize) -> bool {
     let unit = |i: usize| {
         let row = row(xs, n, i);
-        row.last().is_some_and(|d| *d >= 0.0) && (row.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() <= ROW_TOLERANCE
+        row.last().is_some_and(|d| *d >= 0.0)
+            && (row.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() <= ROW_TOLERANCE
     };
     is_triangle(xs, n) && (0..n).all(unit)
 }
@@ -54,7 +58,8 @@ pub(super) fn correlation_to_free(xs: &[f64], n: usize, out: &mut Vec<f64>) {
     for i in 1..n {
         let start = out.len();
         let row = row(xs, n, i);
-        // The length of what is left of the row, from the end, where the small numbers are.
+        // The length of what is left of the row, from the end, where the small numbers
+        // are.
         let mut rest = row[i].abs();
         for x in row[..i].iter().rev() {
             let y = if *x == 0.0 { 0.0 } else { libm::asinh(x / rest) };
@@ -89,9 +94,14 @@ pub(super) fn correlation_from_free(n: usize, at: impl Fn(usize) -> f64) -> (Dat
     (value(n, &xs), jacobian)
 }
 
-/// With z = tanh y and R the length left before it: x = z R; all after it go with sqrt(1 - z^2), whose derivative of the logarithm
-/// is -z.
-pub(super) fn correlation_gradient(n: usize, at: impl Fn(usize) -> f64, by: impl Fn(usize) -> f64, out: &mut Vec<f64>) {
+/// With z = tanh y and R the length left before it: x = z R; all after it go with sqrt(1 -
+/// z^2), whose derivative of the logarithm is -z.
+pub(super) fn correlation_gradient(
+    n: usize,
+    at: impl Fn(usize) -> f64,
+    by: impl Fn(usize) -> f64,
+    out: &mut Vec<f64>,
+) {
     let mut first = 0;
     for i in 1..n {
         let start = out.len();
@@ -117,7 +127,9 @@ pub(super) fn correlation_gradient(n: usize, at: impl Fn(usize) -> f64, by: impl
 pub(super) fn covariance_to_free(xs: &[f64], n: usize, out: &mut Vec<f64>) {
     for i in 0..n {
         let row = row(xs, n, i);
-        out.extend(row[..i].iter().map(|x| if x.is_nan() { 0.0 } else { x.clamp(f64::MIN, f64::MAX) }));
+        out.extend(
+            row[..i].iter().map(|x| if x.is_nan() { 0.0 } else { x.clamp(f64::MIN, f64::MAX) }),
+        );
         let y = libm::log(row[i]);
         out.push(if y.is_nan() { -FAR } else { y.clamp(-FAR, FAR) });
     }
@@ -141,7 +153,12 @@ pub(super) fn covariance_from_free(n: usize, at: impl Fn(usize) -> f64) -> (Datu
     (value(n, &xs), jacobian)
 }
 
-pub(super) fn covariance_gradient(n: usize, at: impl Fn(usize) -> f64, by: impl Fn(usize) -> f64, out: &mut Vec<f64>) {
+pub(super) fn covariance_gradient(
+    n: usize,
+    at: impl Fn(usize) -> f64,
+    by: impl Fn(usize) -> f64,
+    out: &mut Vec<f64>,
+) {
     let mut k = 0;
     for i in 0..n {
         for j in 0..=i {

@@ -1,8 +1,11 @@
-//! A distribution of one number between two bounds: any family whose distribution function is known.
+//! A distribution of one number between two bounds: any family whose distribution
+//! function is known.
 
 use super::interval::{each_node, ends, from_order, integral, order, within};
 use super::param::MAX_INTEGER;
-use super::{Datum, Dist, Distribution, Gradient, Iid, ParamError, Product, Scalar, Support, TruncatedNormal};
+use super::{
+    Datum, Dist, Distribution, Gradient, Iid, ParamError, Product, Scalar, Support, TruncatedNormal,
+};
 use crate::num::{log_diff_exp, log_sum_exp};
 use crate::rng::Stream;
 use core::f64::consts::LN_2;
@@ -14,11 +17,13 @@ const FEW: f64 = 64.0;
 /// Draws that are tried before the distribution function is inverted.
 const TRIES: u32 = 64;
 
-/// `truncated(d, lo, hi)`: the density of `d` over the probability of the interval, within it. Integers on the bounds are inside.
+/// `truncated(d, lo, hi)`: the density of `d` over the probability of the interval,
+/// within it. Integers on the bounds are inside.
 ///
-/// ln P(lo < X <= hi) is a difference of the smaller tails in log space; of an interval in which the density hardly changes it is an
-/// integral by Gauss-Legendre's rule (of a few integers, a sum), where that difference would cancel. Gradients by parameters: those of
-/// `d`, then by `lo` and `hi`.
+/// ln P(lo < X <= hi) is a difference of the smaller tails in log space; of an interval
+/// in which the density hardly changes it is an integral by Gauss-Legendre's rule (of a
+/// few integers, a sum), where that difference would cancel. Gradients by parameters:
+/// those of `d`, then by `lo` and `hi`.
 #[derive(Clone, Debug)]
 pub struct Truncated {
     base: Dist,
@@ -28,10 +33,12 @@ pub struct Truncated {
     log_mass: f64,
 }
 
-/// What a distribution becomes between two bounds: a product or `iid` element by element, a normal a [`TruncatedNormal`].
+/// What a distribution becomes between two bounds: a product or `iid` element by element,
+/// a normal a [`TruncatedNormal`].
 ///
 /// # Errors
-/// It is not a distribution of numbers whose distribution function is known, the bounds leave nothing, or no probability.
+/// It is not a distribution of numbers whose distribution function is known, the bounds
+/// leave nothing, or no probability.
 pub fn truncated(base: &Dist, lo: f64, hi: f64) -> Result<Dist, ParamError> {
     Ok(match base {
         Dist::Normal(d) => {
@@ -41,7 +48,11 @@ pub fn truncated(base: &Dist, lo: f64, hi: f64) -> Result<Dist, ParamError> {
         }
         Dist::Iid(d) => Dist::Iid(Arc::new(Iid::new(truncated(d.one(), lo, hi)?, d.len())?)),
         Dist::Product(d) => {
-            let parts = d.parts().iter().map(|one| truncated(one, lo, hi)).collect::<Result<Vec<_>, _>>()?;
+            let parts = d
+                .parts()
+                .iter()
+                .map(|one| truncated(one, lo, hi))
+                .collect::<Result<Vec<_>, _>>()?;
             Dist::Product(Arc::new(Product::new(parts)?))
         }
         other => Dist::Truncated(Arc::new(Truncated::new(other.clone(), lo, hi)?)),
@@ -56,7 +67,9 @@ fn bad(parameter: &'static str, value: String, rule: &'static str) -> ParamError
 fn unknown(d: &Dist) -> ParamError {
     let rule = match d {
         Dist::Flat(_) => "must be proper: for a flat prior, give the bounds to `flat(lo, hi)`",
-        Dist::TruncatedNormal(_) | Dist::Truncated(_) => "must not be truncated already: give all bounds in one call",
+        Dist::TruncatedNormal(_) | Dist::Truncated(_) => {
+            "must not be truncated already: give all bounds in one call"
+        }
         Dist::VonMises(_) => "must not be a distribution of angles, which have no bounds",
         d if d.is_scalar() => "must have a computable distribution function for these parameters",
         _ => "must be a distribution of single numbers",
@@ -77,8 +90,9 @@ fn check_bounds(lo: f64, hi: f64, discrete: bool) -> Result<(), ParamError> {
 }
 
 impl Truncated {
-    /// The distribution between these bounds, which may be infinite; fails unless it is one of numbers, is proper, has a known
-    /// distribution function, and has probability there.
+    /// The distribution between these bounds, which may be infinite; fails unless it is
+    /// one of numbers, is proper, has a known distribution function, and has probability
+    /// there.
     pub fn new(base: Dist, lo: f64, hi: f64) -> Result<Truncated, ParamError> {
         let support = base.support();
         check_bounds(lo, hi, matches!(support, Support::Integers { .. }))?;
@@ -115,7 +129,8 @@ impl Truncated {
         matches!(self.support, Support::Integers { .. })
     }
 
-    /// The ends: below the least value and at the greatest one that is not above `x`. Of integers, the first is the one before.
+    /// The ends: below the least value and at the greatest one that is not above `x`. Of
+    /// integers, the first is the one before.
     fn ends_to(&self, x: f64) -> (f64, f64) {
         match &self.support {
             Support::Integers { lo, hi } => {
@@ -133,7 +148,9 @@ impl Truncated {
     fn log_mass_to(&self, x: f64) -> Option<f64> {
         let (a, b) = self.ends_to(x);
         match self.bend(a, b) {
-            Some(at) => Some(log_sum_exp(&[self.log_between(a, at)?, self.log_between(at, b)?]).min(0.0)),
+            Some(at) => {
+                Some(log_sum_exp(&[self.log_between(a, at)?, self.log_between(at, b)?]).min(0.0))
+            }
             None => self.log_between(a, b),
         }
     }
@@ -150,7 +167,8 @@ impl Truncated {
             return Some(f64::NEG_INFINITY);
         }
         if self.is_discrete() && b - a <= FEW {
-            let all: Vec<f64> = (1..=(b - a) as i64).map(|i| self.base.log_density_num(a + i as f64)).collect();
+            let all: Vec<f64> =
+                (1..=(b - a) as i64).map(|i| self.base.log_density_num(a + i as f64)).collect();
             return Some(log_sum_exp(&all).min(0.0));
         }
         if let Some(mass) = self.narrow(a, b) {
@@ -174,7 +192,8 @@ impl Truncated {
         }
         let at = |share: f64| self.base.log_density_num(a + share * (b - a));
         let all = [at(0.0), at(0.25), at(0.5), at(0.75), at(1.0)];
-        let (least, most) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), x| (l.min(*x), m.max(*x)));
+        let (least, most) =
+            all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), x| (l.min(*x), m.max(*x)));
         let little = most.is_finite() && most - least < 0.5;
         // A mixture may rise between the points looked at.
         if !little || matches!(self.base, Dist::Mixture(_)) {
@@ -206,7 +225,9 @@ impl Truncated {
             && !self.is_end_of_base(b)
             && self.narrow(a, b).is_some()
         {
-            each_node(a, b, |x, w| add(x, w * libm::exp(self.base.log_density_num(x) - self.log_mass)));
+            each_node(a, b, |x, w| {
+                add(x, w * libm::exp(self.base.log_density_num(x) - self.log_mass))
+            });
             return Some(sum);
         }
         for (x, sign) in [(b, 1.0), (a, -1.0)] {
@@ -261,7 +282,8 @@ impl Distribution for Truncated {
         self.support.clone()
     }
 
-    /// What was drawn and is inside, where that is likely; else by the distribution function.
+    /// What was drawn and is inside, where that is likely; else by the distribution
+    /// function.
     fn sample(&self, rng: &mut Stream) -> Datum {
         if self.log_mass > -LN_2 * 4.0 {
             for _ in 0..TRIES {
@@ -279,7 +301,9 @@ impl Distribution for Truncated {
 
     fn log_density(&self, x: &Datum) -> f64 {
         match x {
-            Datum::Num(x) if self.support.contains_num(*x) => self.base.log_density_num(*x) - self.log_mass,
+            Datum::Num(x) if self.support.contains_num(*x) => {
+                self.base.log_density_num(*x) - self.log_mass
+            }
             _ => f64::NEG_INFINITY,
         }
     }

@@ -1,7 +1,8 @@
 //! The normal distribution between two bounds, however far out they are.
 //!
-//! All is computed relative to the density at the *anchor*, the point of the interval nearest to the mean, in units of sd. So
-//! nothing underflows in the tails, where the interval's probability does.
+//! All is computed relative to the density at the *anchor*, the point of the interval
+//! nearest to the mean, in units of sd. So nothing underflows in the tails, where the
+//! interval's probability does.
 
 use super::draw::standard;
 use super::interval::integral;
@@ -29,8 +30,9 @@ pub struct TruncatedNormal {
 }
 
 impl TruncatedNormal {
-    /// The normal with this mean and sd before truncation, between these bounds. Fails unless the mean is finite, the sd positive
-    /// and finite, `lo` below `hi`, and the interval within 1e150 sd of the mean and wider than 0 in units of sd.
+    /// The normal with this mean and sd before truncation, between these bounds. Fails
+    /// unless the mean is finite, the sd positive and finite, `lo` below `hi`, and the
+    /// interval within 1e150 sd of the mean and wider than 0 in units of sd.
     pub fn new(mean: f64, sd: f64, lo: f64, hi: f64) -> Result<TruncatedNormal, ParamError> {
         let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
         let bounds = || format!("{lo} and {hi}");
@@ -39,14 +41,24 @@ impl TruncatedNormal {
         }
         let (low, high) = (standard(lo, mean, sd), standard(hi, mean, sd));
         if !(low < FARTHEST && high > -FARTHEST) {
-            return Err(ParamError::new(Self::NAME, "lo to hi", bounds(), "must be within 1e150 sd of the mean"));
+            return Err(ParamError::new(
+                Self::NAME,
+                "lo to hi",
+                bounds(),
+                "must be within 1e150 sd of the mean",
+            ));
         }
         let mut d = TruncatedNormal { mean, sd, lo, hi, low, high, mass: 0.0 };
         d.mass = d.relative_mass();
         if d.mass > 0.0 {
             Ok(d)
         } else {
-            Err(ParamError::new(Self::NAME, "lo to hi", bounds(), "must have positive width in units of sd"))
+            Err(ParamError::new(
+                Self::NAME,
+                "lo to hi",
+                bounds(),
+                "must have positive width in units of sd",
+            ))
         }
     }
 
@@ -63,7 +75,8 @@ impl TruncatedNormal {
     /// The integral of exp(-(z^2 - anchor^2) / 2).
     fn relative_mass(&self) -> f64 {
         if self.low < 0.0 && self.high > 0.0 {
-            let (left, right) = (libm::erf(-self.low * FRAC_1_SQRT_2), libm::erf(self.high * FRAC_1_SQRT_2));
+            let (left, right) =
+                (libm::erf(-self.low * FRAC_1_SQRT_2), libm::erf(self.high * FRAC_1_SQRT_2));
             return FRAC_PI_2.sqrt() * (left + right);
         }
         let (a, w) = (self.distance(), self.width());
@@ -81,7 +94,8 @@ impl TruncatedNormal {
         libm::exp(-0.5 * (z.abs() - a) * (z.abs() + a)) / self.mass
     }
 
-    /// The first two moments of the distance inwards from the anchor (from the mean if that is inside).
+    /// The first two moments of the distance inwards from the anchor (from the mean if
+    /// that is inside).
     fn moments(&self) -> (f64, f64) {
         let a = self.distance();
         let (from, to) = if self.low < 0.0 && self.high > 0.0 {
@@ -103,13 +117,15 @@ impl TruncatedNormal {
         (sums[1] / sums[0], sums[2] / sums[0])
     }
 
-    /// A draw of the distance inwards from the anchor, for an interval on one side of the mean: rejection from an exponential
-    /// that ends where the interval does (Robert 1995, "Simulation of truncated normal variables").
+    /// A draw of the distance inwards from the anchor, for an interval on one side of the
+    /// mean: rejection from an exponential that ends where the interval does (Robert
+    /// 1995, "Simulation of truncated normal variables").
     fn tail(&self, rng: &mut Stream) -> f64 {
         let (a, w) = (self.distance(), self.width());
         let rate = 0.5 * (a + (a * a + 4.0).sqrt());
         let share = -libm::expm1(-rate * w);
-        // rate - a, without cancellation, and where the ratio of the densities is greatest.
+        // rate - a, without cancellation, and where the ratio of the densities is
+        // greatest.
         let excess = 2.0 / (a + (a * a + 4.0).sqrt());
         let best = excess.min(w);
         loop {
@@ -168,7 +184,11 @@ impl Scalar for TruncatedNormal {
             return norm - 0.5 * z * z;
         }
         // From the anchor inwards: exact at the bound, however far that is.
-        let t = if self.low >= 0.0 { standard(x, self.lo, self.sd) } else { standard(self.hi, x, self.sd) };
+        let t = if self.low >= 0.0 {
+            standard(x, self.lo, self.sd)
+        } else {
+            standard(self.hi, x, self.sd)
+        };
         norm - t * (self.distance() + 0.5 * t)
     }
 

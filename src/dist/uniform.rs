@@ -15,11 +15,17 @@ pub struct Uniform {
 }
 
 impl Uniform {
-    /// Between these bounds; fails unless both are finite, `lo` is below `hi`, and their distance is a double.
+    /// Between these bounds; fails unless both are finite, `lo` is below `hi`, and their
+    /// distance is a double.
     pub fn new(lo: f64, hi: f64) -> Result<Uniform, ParamError> {
         let (lo, hi) = (finite(Self::NAME, "lo", lo)?, finite(Self::NAME, "hi", hi)?);
         if lo >= hi {
-            return Err(ParamError::new(Self::NAME, "lo", format!("{lo} and {hi}"), "must be below hi"));
+            return Err(ParamError::new(
+                Self::NAME,
+                "lo",
+                format!("{lo} and {hi}"),
+                "must be below hi",
+            ));
         }
         let width = finite(Self::NAME, "hi - lo", hi - lo)?;
         Ok(Uniform { lo, hi, log_density: -libm::log(width) })

@@ -15,11 +15,17 @@ pub struct UniformDiscrete {
 }
 
 impl UniformDiscrete {
-    /// Between these integers; fails unless both are integers of at most 2^53 in size and `lo` is not above `hi`.
+    /// Between these integers; fails unless both are integers of at most 2^53 in size and
+    /// `lo` is not above `hi`.
     pub fn new(lo: f64, hi: f64) -> Result<UniformDiscrete, ParamError> {
         let (lo, hi) = (integer(Self::NAME, "lo", lo)?, integer(Self::NAME, "hi", hi)?);
         if lo > hi {
-            return Err(ParamError::new(Self::NAME, "lo", format!("{lo} and {hi}"), "must not be above hi"));
+            return Err(ParamError::new(
+                Self::NAME,
+                "lo",
+                format!("{lo} and {hi}"),
+                "must not be above hi",
+            ));
         }
         Ok(UniformDiscrete { lo, hi, log_probability: -libm::log(hi - lo + 1.0) })
     }
@@ -39,7 +45,11 @@ impl Scalar for UniformDiscrete {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        if (self.lo..=self.hi).contains(&x) && x == libm::trunc(x) { self.log_probability } else { f64::NEG_INFINITY }
+        if (self.lo..=self.hi).contains(&x) && x == libm::trunc(x) {
+            self.log_probability
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 
     fn slope(&self, _x: f64) -> Slope {

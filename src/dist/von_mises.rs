@@ -7,10 +7,12 @@ use crate::num::{bessel_deficit, log_scaled_i0};
 use crate::rng::Stream;
 use core::f64::consts::{PI, TAU};
 
-/// `von_mises(mean, concentration)`, an angle in radians in (-pi, pi]; uniform for concentration 0.
+/// `von_mises(mean, concentration)`, an angle in radians in (-pi, pi]; uniform for
+/// concentration 0.
 ///
-/// Draws by Best & Fisher 1979, "Efficient simulation of the von Mises distribution", rearranged so that nothing cancels for a
-/// large concentration. A direction has no mean as a number.
+/// Draws by Best & Fisher 1979, "Efficient simulation of the von Mises distribution",
+/// rearranged so that nothing cancels for a large concentration. A direction has no mean
+/// as a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VonMises {
     mean: f64,
@@ -19,11 +21,17 @@ pub struct VonMises {
 }
 
 impl VonMises {
-    /// Around this angle, any finite one, with this concentration; fails unless that is finite and not negative.
+    /// Around this angle, any finite one, with this concentration; fails unless that is
+    /// finite and not negative.
     pub fn new(mean: f64, concentration: f64) -> Result<VonMises, ParamError> {
         let mean = wrap_angle(finite(Self::NAME, "mean", mean)?);
         if !(concentration >= 0.0 && concentration.is_finite()) {
-            return Err(ParamError::new(Self::NAME, "concentration", concentration, "must be finite and not negative"));
+            return Err(ParamError::new(
+                Self::NAME,
+                "concentration",
+                concentration,
+                "must be finite and not negative",
+            ));
         }
         let log_norm = -libm::log(TAU) - log_scaled_i0(concentration);
         Ok(VonMises { mean, concentration, log_norm })

@@ -19,14 +19,19 @@ pub struct Weibull {
 impl Weibull {
     /// With this shape and scale; fails unless both are positive and finite.
     pub fn new(shape: f64, scale: f64) -> Result<Weibull, ParamError> {
-        let (shape, scale) = (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
+        let (shape, scale) =
+            (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
         Ok(Weibull { shape, scale, log_norm: libm::log(shape) })
     }
 
     /// ln(x / scale), also where the ratio is no double.
     fn log_ratio(&self, x: f64) -> f64 {
         let t = x / self.scale;
-        if t >= f64::MIN_POSITIVE && t.is_finite() { libm::log(t) } else { libm::log(x) - libm::log(self.scale) }
+        if t >= f64::MIN_POSITIVE && t.is_finite() {
+            libm::log(t)
+        } else {
+            libm::log(x) - libm::log(self.scale)
+        }
     }
 }
 
@@ -39,9 +44,14 @@ impl Scalar for Weibull {
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         let power = libm::log(-libm::log(rng.open_uniform())) / self.shape;
-        // For a large shape the factor is near 1, where a detour by the logarithm of the scale would be coarser than the spread.
+        // For a large shape the factor is near 1, where a detour by the logarithm of the
+        // scale would be coarser than the spread.
         let far = power.abs() > 700.0;
-        representable(if far { libm::exp(libm::log(self.scale) + power) } else { self.scale * libm::exp(power) })
+        representable(if far {
+            libm::exp(libm::log(self.scale) + power)
+        } else {
+            self.scale * libm::exp(power)
+        })
     }
 
     #[inline]
@@ -51,14 +61,21 @@ impl Scalar for Weibull {
         }
         let power = self.shape * self.log_ratio(x);
         let fall = libm::exp(power);
-        if fall == f64::INFINITY { f64::NEG_INFINITY } else { self.log_norm + power - libm::log(x) - fall }
+        if fall == f64::INFINITY {
+            f64::NEG_INFINITY
+        } else {
+            self.log_norm + power - libm::log(x) - fall
+        }
     }
 
     fn slope(&self, x: f64) -> Slope {
         let log_ratio = self.log_ratio(x);
         let excess = libm::expm1(self.shape * log_ratio);
         let by_x = -(1.0 + self.shape * excess) / x;
-        Slope::new(by_x, [1.0 / self.shape - log_ratio * excess, self.shape * (excess / self.scale)])
+        Slope::new(
+            by_x,
+            [1.0 / self.shape - log_ratio * excess, self.shape * (excess / self.scale)],
+        )
     }
 
     fn tails(&self, x: f64) -> Option<Tails> {
@@ -79,9 +96,11 @@ impl Scalar for Weibull {
 
     fn number_sd(&self) -> Option<f64> {
         let e = 1.0 / self.shape;
-        // ln(1 + var / mean^2); by the zeta values' series where the plain difference would cancel.
+        // ln(1 + var / mean^2); by the zeta values' series where the plain difference
+        // would cancel.
         let log_ratio = if e < 1e-3 {
-            let (two, three, four) = (1.644_934_066_848_226_4, 1.202_056_903_159_594, 1.082_323_233_711_138);
+            let (two, three, four) =
+                (1.644_934_066_848_226_4, 1.202_056_903_159_594, 1.082_323_233_711_138);
             e * e * (two - e * (2.0 * three - e * 3.5 * four))
         } else {
             ln_gamma(1.0 + 2.0 * e) - 2.0 * ln_gamma(1.0 + e)

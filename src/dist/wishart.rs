@@ -1,4 +1,5 @@
-//! The Wishart distribution over covariance matrices, as one over their Cholesky factors (Bartlett's decomposition).
+//! The Wishart distribution over covariance matrices, as one over their Cholesky factors
+//! (Bartlett's decomposition).
 
 use super::draw::ln_gamma_draw;
 use super::factor::Factor;
@@ -10,12 +11,14 @@ use crate::rng::Stream;
 use core::f64::consts::LN_2;
 use nalgebra::DMatrix;
 
-/// `wishart(df, scale_chol)`: the lower triangular Cholesky factor L, as n rows, of a matrix W = L L' that has the Wishart
-/// distribution with this many degrees of freedom and scale matrix S S', S = `scale_chol`. The mean of W is df S S'.
+/// `wishart(df, scale_chol)`: the lower triangular Cholesky factor L, as n rows, of a
+/// matrix W = L L' that has the Wishart distribution with this many degrees of freedom
+/// and scale matrix S S', S = `scale_chol`. The mean of W is df S S'.
 ///
-/// L = S A, where A is lower triangular with standard normal numbers below the diagonal, and A\[i\]\[i\]^2 chi-squared with df - i
-/// degrees of freedom. The density is by the lower triangle of L. Gradients are by the value (n x n numbers, 0 above the
-/// diagonal) and by df; those by S come apart ([`Wishart::scale_gradient`]).
+/// L = S A, where A is lower triangular with standard normal numbers below the diagonal,
+/// and A\[i\]\[i\]^2 chi-squared with df - i degrees of freedom. The density is by the
+/// lower triangle of L. Gradients are by the value (n x n numbers, 0 above the diagonal)
+/// and by df; those by S come apart ([`Wishart::scale_gradient`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wishart {
     df: f64,
@@ -24,42 +27,68 @@ pub struct Wishart {
 }
 
 impl Wishart {
-    /// Fails unless the scale's factor is square, finite, lower triangular with a positive diagonal, has a row, and `df` is
-    /// finite and above the number of rows less 1.
+    /// Fails unless the scale's factor is square, finite, lower triangular with a
+    /// positive diagonal, has a row, and `df` is finite and above the number of rows less 1.
     pub fn new(df: f64, scale_chol: &DMatrix<f64>) -> Result<Wishart, ParamError> {
         let n = scale_chol.nrows();
         if n == 0 || scale_chol.ncols() != n {
             let value = format!("{n} x {}", scale_chol.ncols());
-            return Err(ParamError::new("wishart", "scale_chol", value, "must be square and not empty"));
+            return Err(ParamError::new(
+                "wishart",
+                "scale_chol",
+                value,
+                "must be square and not empty",
+            ));
         }
         if (0..n).any(|j| (0..j).any(|i| scale_chol[(i, j)] != 0.0)) {
-            return Err(ParamError::new("wishart", "scale_chol", "one that is not", "must be lower triangular"));
+            return Err(ParamError::new(
+                "wishart",
+                "scale_chol",
+                "one that is not",
+                "must be lower triangular",
+            ));
         }
-        let bad = || ParamError::new("wishart", "scale_chol", "one without", "must be finite with a positive diagonal");
+        let bad = || {
+            ParamError::new(
+                "wishart",
+                "scale_chol",
+                "one without",
+                "must be finite with a positive diagonal",
+            )
+        };
         let scale = Factor::from_lower(scale_chol).ok_or_else(bad)?;
         let df = positive("wishart", "df", df)?;
         if df <= (n - 1) as f64 {
-            return Err(ParamError::new("wishart", "df", df, "must be above the number of rows minus 1"));
+            return Err(ParamError::new(
+                "wishart",
+                "df",
+                df,
+                "must be above the number of rows minus 1",
+            ));
         }
-        let jacobian = |i: usize| (i + 1) as f64 * libm::log(scale_chol[(i, i)]) + LN_SQRT_2PI * i as f64;
+        let jacobian =
+            |i: usize| (i + 1) as f64 * libm::log(scale_chol[(i, i)]) + LN_SQRT_2PI * i as f64;
         let log_norm = -(0..n).map(jacobian).sum::<f64>();
         Ok(Wishart { df, scale, log_norm })
     }
 
-    /// The derivatives of the log density of a value by the scale's factor S, its lower triangle by rows. With A = S^-1 L and G the
-    /// derivatives by A, they are -S^-T G A' less those of the log Jacobian.
+    /// The derivatives of the log density of a value by the scale's factor S, its lower
+    /// triangle by rows. With A = S^-1 L and G the derivatives by A, they are -S^-T G A'
+    /// less those of the log Jacobian.
     pub fn scale_gradient(&self, x: &Datum) -> Option<Vec<f64>> {
         if !self.log_density(x).is_finite() {
             return None;
         }
         let n = self.scale.size();
         let a = self.whiten(&triangle::entries(x, n)?);
-        let columns: Vec<Vec<f64>> = (0..n).map(|j| self.scale.solve_transposed(self.by_whitened(&a, j))).collect();
+        let columns: Vec<Vec<f64>> =
+            (0..n).map(|j| self.scale.solve_transposed(self.by_whitened(&a, j))).collect();
         let cell = |i: usize, k: usize| {
             let sum: f64 = columns.iter().enumerate().map(|(j, c)| c[i] * a[k * n + j]).sum();
             -sum - if i == k { (i + 1) as f64 / self.scale.diagonal(i) } else { 0.0 }
         };
-        let by: Vec<f64> = (0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).map(|(i, k)| cell(i, k)).collect();
+        let by: Vec<f64> =
+            (0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).map(|(i, k)| cell(i, k)).collect();
         by.iter().all(|g| g.is_finite()).then_some(by)
     }
 
@@ -85,7 +114,8 @@ impl Wishart {
     }
 }
 
-/// The log density of the root of a chi-squared number; by that of a gamma number where the plain formula would cancel.
+/// The log density of the root of a chi-squared number; by that of a gamma number where
+/// the plain formula would cancel.
 fn log_chi(df: f64, x: f64) -> f64 {
     let (half, t) = (0.5 * df, 0.5 * x * x);
     match Gamma::new(half, 1.0) {
@@ -125,7 +155,8 @@ impl Distribution for Wishart {
 
     fn log_density(&self, x: &Datum) -> f64 {
         let n = self.scale.size();
-        let Some(xs) = triangle::entries(x, n).filter(|xs| triangle::is_covariance_factor(xs, n)) else {
+        let Some(xs) = triangle::entries(x, n).filter(|xs| triangle::is_covariance_factor(xs, n))
+        else {
             return f64::NEG_INFINITY;
         };
         let a = self.whiten(&xs);
@@ -145,7 +176,9 @@ impl Distribution for Wishart {
         let mut by_df = 0.0;
         for j in 0..n {
             let d = a[j * n + j];
-            for (i, g) in self.scale.solve_transposed(self.by_whitened(&a, j)).into_iter().enumerate().skip(j) {
+            for (i, g) in
+                self.scale.solve_transposed(self.by_whitened(&a, j)).into_iter().enumerate().skip(j)
+            {
                 by_x[i * n + j] = g;
             }
             by_df += libm::log(d) - 0.5 * LN_2 - 0.5 * digamma(0.5 * (self.df - j as f64));

@@ -1,11 +1,14 @@
-//! Placements: affine maps of the world. They neither check their numbers nor know what they place.
+//! Placements: affine maps of the world. They neither check their numbers nor know what
+//! they place.
 //!
-//! Invariant: the same arguments give the same bits on every machine (sines and cosines are `libm`'s).
+//! Invariant: the same arguments give the same bits on every machine (sines and cosines
+//! are `libm`'s).
 
 use glam::{DAffine3, DMat3, DVec3};
 use std::ops::Mul;
 
-/// An affine map p' = T Rz Ry Rx S p (Kulkarni et al. 2014, section 2.1.1, in that order).
+/// An affine map p' = T Rz Ry Rx S p (Kulkarni et al. 2014, section 2.1.1, in that
+/// order).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine(pub DAffine3);
 
@@ -21,7 +24,10 @@ impl Affine {
         let x = DVec3::new(cz * cy, sz * cy, -sy);
         let y = DVec3::new(cz * sy * sx - sz * cx, sz * sy * sx + cz * cx, cy * sx);
         let z = DVec3::new(cz * sy * cx + sz * sx, sz * sy * cx - cz * sx, cy * cx);
-        Affine(DAffine3 { matrix3: DMat3::from_cols(x * scale.x, y * scale.y, z * scale.z), translation: translate })
+        Affine(DAffine3 {
+            matrix3: DMat3::from_cols(x * scale.x, y * scale.y, z * scale.z),
+            translation: translate,
+        })
     }
 
     /// The image of a point.
@@ -29,12 +35,17 @@ impl Affine {
         self.0.matrix3 * p + self.0.translation
     }
 
-    /// What takes normals along: the cofactor matrix times the sign of the determinant, which is the inverse transpose times
-    /// the size of the determinant. Outward normals stay outward also when the map mirrors, and it exists when the map is
-    /// singular. Its results are not unit vectors.
+    /// What takes normals along: the cofactor matrix times the sign of the determinant,
+    /// which is the inverse transpose times the size of the determinant. Outward normals
+    /// stay outward also when the map mirrors, and it exists when the map is singular.
+    /// Its results are not unit vectors.
     pub fn normal_matrix(&self) -> DMat3 {
         let m = self.0.matrix3;
-        let cofactor = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+        let cofactor = DMat3::from_cols(
+            m.y_axis.cross(m.z_axis),
+            m.z_axis.cross(m.x_axis),
+            m.x_axis.cross(m.y_axis),
+        );
         if self.is_mirrored() { -1.0 * cofactor } else { cofactor }
     }
 
@@ -43,12 +54,17 @@ impl Affine {
         self.0.matrix3.determinant() < 0.0
     }
 
-    /// No line gets longer than by this factor: the greatest stretch, exact where the axes of a scale stay at right angles, else an upper
-    /// bound (Gershgorin's, for the square of the linear part).
+    /// No line gets longer than by this factor: the greatest stretch, exact where the
+    /// axes of a scale stay at right angles, else an upper bound (Gershgorin's, for the
+    /// square of the linear part).
     pub fn stretch(&self) -> f64 {
         let m = self.0.matrix3;
         let square = (m.transpose() * m).to_cols_array_2d();
-        square.iter().map(|column| column.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max).sqrt()
+        square
+            .iter()
+            .map(|column| column.iter().map(|x| x.abs()).sum::<f64>())
+            .fold(0.0, f64::max)
+            .sqrt()
     }
 
     /// The map that undoes it, if there is one.
@@ -83,7 +99,8 @@ mod tests {
         let sheared = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, 4.0, 1.0)) * turned;
         for k in 0..100 {
             let angle = f64::from(k);
-            let way = DVec3::new(libm::cos(angle), libm::sin(angle), libm::sin(3.0 * angle)).normalize();
+            let way =
+                DVec3::new(libm::cos(angle), libm::sin(angle), libm::sin(3.0 * angle)).normalize();
             assert!((sheared.0.matrix3 * way).length() <= sheared.stretch() + 1e-12);
         }
     }
@@ -91,22 +108,35 @@ mod tests {
     #[test]
     fn order_is_scale_turns_shift() {
         let quarter = core::f64::consts::FRAC_PI_2;
-        let a = Affine::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(quarter, 0.0, quarter), DVec3::new(2.0, 3.0, 4.0));
-        // (1, 1, 1) is scaled to (2, 3, 4), turned round x to (2, -4, 3), round z to (4, 2, 3), shifted to (5, 4, 6).
+        let a = Affine::new(
+            DVec3::new(1.0, 2.0, 3.0),
+            DVec3::new(quarter, 0.0, quarter),
+            DVec3::new(2.0, 3.0, 4.0),
+        );
+        // (1, 1, 1) is scaled to (2, 3, 4), turned round x to (2, -4, 3), round z to (4,
+        // 2, 3), shifted to (5, 4, 6).
         assert!((a.point(DVec3::ONE) - DVec3::new(5.0, 4.0, 6.0)).length() < 1e-14);
         let rotation = DVec3::new(0.3, -0.7, 1.1);
         let m = Affine::new(DVec3::ZERO, rotation, DVec3::ONE).0.matrix3;
-        let expected = DMat3::from_rotation_z(1.1) * DMat3::from_rotation_y(-0.7) * DMat3::from_rotation_x(0.3);
+        let expected = DMat3::from_rotation_z(1.1)
+            * DMat3::from_rotation_y(-0.7)
+            * DMat3::from_rotation_x(0.3);
         assert!((m - expected).to_cols_array().iter().all(|x| x.abs() < 1e-14));
     }
 
     #[test]
     fn inverse_and_composition() {
-        let a = Affine::new(DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.3, 0.2, -0.5), DVec3::new(1.5, 0.5, 2.0));
+        let a = Affine::new(
+            DVec3::new(1.0, -2.0, 0.5),
+            DVec3::new(0.3, 0.2, -0.5),
+            DVec3::new(1.5, 0.5, 2.0),
+        );
         let p = DVec3::new(0.3, 0.4, 0.5);
         let back = a.inverse().unwrap() * a;
         assert!((back.point(p) - p).length() < 1e-13);
-        assert!(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0)).inverse().is_none());
+        assert!(
+            Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0)).inverse().is_none()
+        );
     }
 
     #[test]
@@ -116,14 +146,25 @@ mod tests {
             let (n, t) = (DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.7));
             let (m, u) = (a.normal_matrix() * n, a.0.matrix3 * t);
             assert!(m.dot(u).abs() < 1e-12);
-            assert!(m.dot(a.0.matrix3 * n) > 0.0, "points the same way as the image of the outside");
+            assert!(
+                m.dot(a.0.matrix3 * n) > 0.0,
+                "points the same way as the image of the outside"
+            );
         }
     }
 
     #[test]
     fn products_apply_the_right_one_first() {
-        let a = Affine::new(DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.3, 0.2, -0.5), DVec3::new(1.5, 0.5, 2.0));
-        let b = Affine::new(DVec3::new(0.0, 3.0, 1.0), DVec3::new(-1.3, 0.0, 0.8), DVec3::new(-1.0, 0.7, 1.1));
+        let a = Affine::new(
+            DVec3::new(1.0, -2.0, 0.5),
+            DVec3::new(0.3, 0.2, -0.5),
+            DVec3::new(1.5, 0.5, 2.0),
+        );
+        let b = Affine::new(
+            DVec3::new(0.0, 3.0, 1.0),
+            DVec3::new(-1.3, 0.0, 0.8),
+            DVec3::new(-1.0, 0.7, 1.1),
+        );
         let p = DVec3::new(0.3, 0.4, 0.5);
         assert!(((a * b).point(p) - a.point(b.point(p))).length() < 1e-13);
         assert!(((b * a).point(p) - a.point(b.point(p))).length() > 0.1);

@@ -10,18 +10,25 @@ use glam::{DVec3, Vec3};
 /// Unless all are from 1e-30 to 1e6.
 pub fn cuboid(size: DVec3) -> Result<Mesh, GeomError> {
     if !size.to_array().iter().all(|x| (SMALLEST..=1e6).contains(x)) {
-        return Err(GeomError::domain(format!("box: the edge lengths must be from 1e-30 to 1e6, got {size}")));
+        return Err(GeomError::domain(format!(
+            "box: the edge lengths must be from 1e-30 to 1e6, got {size}"
+        )));
     }
     let half = (0.5 * size).as_vec3();
-    let corner = |i: u32| Vec3::from_array([0, 1, 2].map(|a| if i >> a & 1 == 1 { half[a] } else { -half[a] }));
+    let corner = |i: u32| {
+        Vec3::from_array([0, 1, 2].map(|a| if i >> a & 1 == 1 { half[a] } else { -half[a] }))
+    };
     let positions: Vec<Vec3> = (0..8).map(corner).collect();
     // Bit 0 is x, bit 1 y, bit 2 z; quads counter-clockwise from outside.
-    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    let quads =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles: Vec<[u32; 3]> =
+        quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
     Mesh::new(positions, triangles, vec![0; 12])
 }
 
-/// From the derivatives of something by the vertices of a box of this size to those by its edge lengths.
+/// From the derivatives of something by the vertices of a box of this size to those by
+/// its edge lengths.
 pub fn pull_cuboid(size: DVec3, mesh: &Mesh, by_vertex: &[DVec3]) -> DVec3 {
     mesh.positions.iter().zip(by_vertex).map(|(p, g)| p.as_dvec3() * *g).sum::<DVec3>() / size
 }
@@ -41,6 +48,9 @@ mod tests {
             assert!(n.dot(p[0]) > 0.0, "faces outwards");
             assert!(t.iter().all(|v| (m.normals[*v as usize] - n).length() < 1e-6));
         }
-        assert!(cuboid(DVec3::new(1.0, 0.0, 1.0)).is_err() && cuboid(DVec3::splat(f64::INFINITY)).is_err());
+        assert!(
+            cuboid(DVec3::new(1.0, 0.0, 1.0)).is_err()
+                && cuboid(DVec3::splat(f64::INFINITY)).is_err()
+        );
     }
 }

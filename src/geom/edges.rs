@@ -1,7 +1,8 @@
 //! From loose triangles to a mesh: welding, the table of edges, creases, smooth normals.
 //!
-//! Does not check its input ([`Mesh::new`] does). Invariant: the result depends on the order of the faces alone, never on
-//! that of a hash table; every edge of every face is in the table once.
+//! Does not check its input ([`Mesh::new`] does). Invariant: the result depends on the
+//! order of the faces alone, never on that of a hash table; every edge of every face is
+//! in the table once.
 
 use super::mesh::CREASE_DEGREES;
 use super::{Edge, Mesh, NO_FACE, Topology};
@@ -31,7 +32,9 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
     if faces.is_empty() {
         return None;
     }
-    let edges = pair_edges(&faces, |a, b| normals[a].dot(normals[b]) < libm::cos(CREASE_DEGREES.to_radians()));
+    let edges = pair_edges(&faces, |a, b| {
+        normals[a].dot(normals[b]) < libm::cos(CREASE_DEGREES.to_radians())
+    });
     let groups = smoothing_groups(&faces, &edges);
 
     // One vertex for each point and smoothing group around it.
@@ -55,16 +58,28 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
     let out_normals = sums.iter().map(|n| n.normalize_or(DVec3::Y).as_vec3()).collect();
     let edges = edges
         .into_iter()
-        .map(|(f, c, g, crease)| Edge { vertices: [out[f][c], out[f][(c + 1) % 3]], faces: [f as u32, g], crease })
+        .map(|(f, c, g, crease)| Edge {
+            vertices: [out[f][c], out[f][(c + 1) % 3]],
+            faces: [f as u32, g],
+            crease,
+        })
         .collect();
     let part_count = kept_parts.iter().max().map_or(0, |p| p.saturating_add(1));
     let part_names = Vec::new();
-    let topology = Topology { triangles: out, parts: kept_parts, part_count, part_names, edges, ..Topology::default() };
+    let topology = Topology {
+        triangles: out,
+        parts: kept_parts,
+        part_count,
+        part_names,
+        edges,
+        ..Topology::default()
+    };
     Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
 }
 
-/// A normal for each vertex of a surface without creases: the mean over the faces around it, weighted by area, which needs no
-/// angles and so is quick enough to be done for every shape of a body.
+/// A normal for each vertex of a surface without creases: the mean over the faces around
+/// it, weighted by area, which needs no angles and so is quick enough to be done for
+/// every shape of a body.
 pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; positions.len()];
     for t in triangles {
@@ -84,8 +99,8 @@ pub(super) fn weld(positions: &[Vec3]) -> Vec<u32> {
     positions.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()
 }
 
-/// Every edge once: its first face and corner there, its second face, and whether it is a crease. More than two faces at an
-/// edge make pairs; one left over makes a boundary.
+/// Every edge once: its first face and corner there, its second face, and whether it is a
+/// crease. More than two faces at an edge make pairs; one left over makes a boundary.
 pub(super) fn pair_edges(
     faces: &[[u32; 3]],
     is_crease: impl Fn(usize, usize) -> bool,
@@ -112,8 +127,8 @@ pub(super) fn pair_edges(
     edges
 }
 
-/// For each corner of each face the number of its smoothing group: corners at one point belong together if a way round the
-/// point joins their faces without crossing a crease.
+/// For each corner of each face the number of its smoothing group: corners at one point
+/// belong together if a way round the point joins their faces without crossing a crease.
 fn smoothing_groups(faces: &[[u32; 3]], edges: &[(usize, usize, u32, bool)]) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..faces.len() as u32 * 3).collect();
     fn root(parent: &mut [u32], mut x: u32) -> u32 {
@@ -130,7 +145,10 @@ fn smoothing_groups(faces: &[[u32; 3]], edges: &[(usize, usize, u32, bool)]) -> 
         for corner in [*c, (c + 1) % 3] {
             let point = faces[*f][corner];
             if let Some(other) = faces[*g as usize].iter().position(|w| *w == point) {
-                let (a, b) = (root(&mut parent, (f * 3 + corner) as u32), root(&mut parent, g * 3 + other as u32));
+                let (a, b) = (
+                    root(&mut parent, (f * 3 + corner) as u32),
+                    root(&mut parent, g * 3 + other as u32),
+                );
                 parent[a.max(b) as usize] = a.min(b);
             }
         }
@@ -142,33 +160,51 @@ fn smoothing_groups(faces: &[[u32; 3]], edges: &[(usize, usize, u32, bool)]) -> 
 mod tests {
     use super::*;
 
-    /// Two unit squares' halves that share the z axis' edge, the second turned up by an angle.
+    /// Two unit squares' halves that share the z axis' edge, the second turned up by an
+    /// angle.
     fn hinge(degrees: f32) -> Mesh {
         let (s, c) = degrees.to_radians().sin_cos();
-        let p = vec![Vec3::ZERO, Vec3::Z, Vec3::X, Vec3::Z, Vec3::new(-0.0, 0.0, 0.0), Vec3::new(-c, s, 0.0)];
+        let p = vec![
+            Vec3::ZERO,
+            Vec3::Z,
+            Vec3::X,
+            Vec3::Z,
+            Vec3::new(-0.0, 0.0, 0.0),
+            Vec3::new(-c, s, 0.0),
+        ];
         Mesh::new(p, vec![[0, 1, 2], [3, 4, 5]], vec![0, 3]).unwrap()
     }
 
     #[test]
     fn equal_positions_are_one_point_and_sharp_edges_split_it() {
-        for (degrees, crease, vertices) in [(0.0, false, 4), (39.0, false, 4), (41.0, true, 6), (150.0, true, 6)] {
+        for (degrees, crease, vertices) in
+            [(0.0, false, 4), (39.0, false, 4), (41.0, true, 6), (150.0, true, 6)]
+        {
             let m = hinge(degrees);
             assert_eq!(m.positions.len(), vertices, "{degrees} degrees");
-            let shared: Vec<&Edge> = m.topology.edges.iter().filter(|e| e.faces[1] != NO_FACE).collect();
+            let shared: Vec<&Edge> =
+                m.topology.edges.iter().filter(|e| e.faces[1] != NO_FACE).collect();
             assert_eq!((m.topology.edges.len(), shared.len()), (5, 1));
             assert_eq!((shared[0].faces, shared[0].crease), ([0, 1], crease));
-            assert_eq!(shared[0].vertices, [m.topology.triangles[0][0], m.topology.triangles[0][1]]);
+            assert_eq!(
+                shared[0].vertices,
+                [m.topology.triangles[0][0], m.topology.triangles[0][1]]
+            );
             assert_eq!((m.topology.parts.as_slice(), m.topology.part_count), (&[0, 3][..], 4));
         }
-        // Smooth: both faces have the same angle at the origin, so the normal there halves the 39 degrees.
+        // Smooth: both faces have the same angle at the origin, so the normal there
+        // halves the 39 degrees.
         let m = hinge(39.0);
         let (s, c) = 19.5f32.to_radians().sin_cos();
-        assert!((m.normals[m.topology.triangles[0][0] as usize] - Vec3::new(s, c, 0.0)).length() < 1e-6);
+        assert!(
+            (m.normals[m.topology.triangles[0][0] as usize] - Vec3::new(s, c, 0.0)).length() < 1e-6
+        );
     }
 
     #[test]
     fn normals_are_weighted_by_angle() {
-        // A right angle made of one face on one side of the crease-free ridge and of two on the other counts the same.
+        // A right angle made of one face on one side of the crease-free ridge and of two
+        // on the other counts the same.
         let up = Vec3::new(0.0, 0.2, 0.0);
         let p = vec![up, Vec3::new(0.0, 0.2, 1.0), Vec3::X, Vec3::new(1.0, 0.0, 1.0), -Vec3::X];
         let one = Mesh::new(p.clone(), vec![[0, 1, 2], [0, 4, 1]], vec![0; 2]).unwrap();
@@ -189,7 +225,8 @@ mod tests {
         let m = Mesh::new(p, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4], [2, 2, 0]], vec![0; 4]).unwrap();
         assert_eq!(m.topology.triangles.len(), 3, "the face without area is dropped");
         assert_eq!(m.topology.edges.len(), 8);
-        let sides: usize = m.topology.edges.iter().map(|e| if e.faces[1] == NO_FACE { 1 } else { 2 }).sum();
+        let sides: usize =
+            m.topology.edges.iter().map(|e| if e.faces[1] == NO_FACE { 1 } else { 2 }).sum();
         assert_eq!(sides, 9, "every side of every face is in the table once");
     }
 }

@@ -1,4 +1,5 @@
-//! What a mesh file's axes and numbers mean: which axis points up, and how long its unit is.
+//! What a mesh file's axes and numbers mean: which axis points up, and how long its unit
+//! is.
 //!
 //! Only turns and scales; no mirrors. Invariant: the unit is positive and finite.
 
@@ -39,11 +40,14 @@ impl FileFrame {
         if unit > 0.0 && unit.is_finite() {
             Ok(FileFrame { up, unit })
         } else {
-            Err(GeomError::invalid(format!("the unit of a file must be a positive number of metres, got {unit}")))
+            Err(GeomError::invalid(format!(
+                "the unit of a file must be a positive number of metres, got {unit}"
+            )))
         }
     }
 
-    /// A file's point in the scene. With z up, x stays and y points away from the viewer's +z; with x up, z stays.
+    /// A file's point in the scene. With z up, x stays and y points away from the
+    /// viewer's +z; with x up, z stays.
     pub fn apply(&self, p: DVec3) -> DVec3 {
         let turned = match self.up {
             UpAxis::X => DVec3::new(-p.y, p.x, p.z),

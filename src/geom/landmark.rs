@@ -1,7 +1,7 @@
 //! Landmarks: named points of a solid, such as the joints of a body.
 //!
-//! Not geometry: they are not drawn and have no part in bounds. Invariant of a list made by [`unique`]: no two have the
-//! same name.
+//! Not geometry: they are not drawn and have no part in bounds. Invariant of a list made
+//! by [`unique`]: no two have the same name.
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
@@ -16,13 +16,15 @@ pub struct Landmark {
     pub position: DVec3,
 }
 
-/// The same points in the same order with names of their own: the second `hand` is `hand#2`, the third `hand#3`. Numbers
-/// that earlier lists gave are given anew, so that it does not matter how groups nest.
+/// The same points in the same order with names of their own: the second `hand` is
+/// `hand#2`, the third `hand#3`. Numbers that earlier lists gave are given anew, so that
+/// it does not matter how groups nest.
 pub(super) fn unique(all: impl IntoIterator<Item = Landmark>) -> Arc<[Landmark]> {
     let mut seen: FxHashMap<Arc<str>, u32> = FxHashMap::default();
     let named = all.into_iter().map(|l| {
         let base = base(&l.name);
-        let base: Arc<str> = if base.len() == l.name.len() { Arc::clone(&l.name) } else { Arc::from(base) };
+        let base: Arc<str> =
+            if base.len() == l.name.len() { Arc::clone(&l.name) } else { Arc::from(base) };
         let count = seen.entry(Arc::clone(&base)).or_insert(0);
         *count += 1;
         let name = if *count == 1 { base } else { Arc::from(format!("{base}#{count}")) };
@@ -34,7 +36,11 @@ pub(super) fn unique(all: impl IntoIterator<Item = Landmark>) -> Arc<[Landmark]>
 /// A name without the number that [`unique`] appends.
 fn base(name: &str) -> &str {
     match name.rsplit_once('#') {
-        Some((base, n)) if !base.is_empty() && !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()) => base,
+        Some((base, n))
+            if !base.is_empty() && !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()) =>
+        {
+            base
+        }
         _ => name,
     }
 }

@@ -1,7 +1,9 @@
-//! The lathe: profiles swept round the y axis into an object of revolution (Kulkarni et al. 2014, section 2.1.1).
+//! The lathe: profiles swept round the y axis into an object of revolution (Kulkarni et
+//! al. 2014, section 2.1.1).
 //!
-//! Checks what is asked for and lays out the surface as strips; `profile_path` cuts profiles into strips, `revolve` turns
-//! them. Invariant: the faces look outward, and wherever both ends are closed the mesh is watertight.
+//! Checks what is asked for and lays out the surface as strips; `profile_path` cuts
+//! profiles into strips, `revolve` turns them. Invariant: the faces look outward, and
+//! wherever both ends are closed the mesh is watertight.
 
 use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
@@ -25,7 +27,8 @@ pub struct Profile {
 pub struct Wall<T = f64> {
     /// The thickness of the wall, scene units; 0 for a full body.
     pub thickness: T,
-    /// How high above the lower end the floor is, scene units; as the wall is thick at least. What fills a vessel raises it.
+    /// How high above the lower end the floor is, scene units; as the wall is thick at
+    /// least. What fills a vessel raises it.
     pub floor: T,
 }
 
@@ -54,34 +57,51 @@ const MOST_POINTS: usize = 4096;
 const MOST_PROFILES: usize = 1000;
 /// The largest height or radius, in scene units.
 const LARGEST: f64 = 1e6;
-/// The smallest object, in scene units: below it vertex data in single precision degenerate.
+/// The smallest object, in scene units: below it vertex data in single precision
+/// degenerate.
 pub(super) const SMALLEST: f64 = 1e-30;
 
-/// Sweeps profiles, stacked in the order given, round the y axis. A step from one to the next is closed by a ring. With
-/// a wall that has a thickness it is a vessel open at the top: an outer wall, a rim, an inner wall so much further in (at 2 %
-/// of the radius at least, measured along the radius only), and where `caps` closes the bottom a floor: as high as the wall is
-/// thick (half the height at most), or higher as `wall` says (95 % of the height at most). Without, `caps` says which ends get
-/// a disc.
+/// Sweeps profiles, stacked in the order given, round the y axis. A step from one to the
+/// next is closed by a ring. With a wall that has a thickness it is a vessel open at the
+/// top: an outer wall, a rim, an inner wall so much further in (at 2 % of the radius at
+/// least, measured along the radius only), and where `caps` closes the bottom a floor: as
+/// high as the wall is thick (half the height at most), or higher as `wall` says (95 % of
+/// the height at most). Without, `caps` says which ends get a disc.
 ///
-/// A profile that begins or ends at the axis (below 1e-6 of the object's size) is closed there whatever `caps` says, except
-/// at the top of a vessel, which keeps a mouth. Radii at the axis between the ends make a thin neck.
+/// A profile that begins or ends at the axis (below 1e-6 of the object's size) is closed
+/// there whatever `caps` says, except at the top of a vessel, which keeps a mouth. Radii
+/// at the axis between the ends make a thin neck.
 ///
-/// Parts are numbered: the `n` profiles in order from 0, then `n` rings at steps, `n + 1` the bottom disc, `n + 2` the top
-/// disc or the rim, `n + 3` the inner wall, `n + 4` the floor inside. The count is `n + 5` also where some are absent.
+/// Parts are numbered: the `n` profiles in order from 0, then `n` rings at steps, `n + 1`
+/// the bottom disc, `n + 2` the top disc or the rim, `n + 3` the inner wall, `n + 4` the
+/// floor inside. The count is `n + 5` also where some are absent.
 ///
-/// Normals come from the slope of the profile (central differences). Creases run along discs, rings and rims and where one
-/// profile meets the next at more than 40 degrees, never within a profile.
+/// Normals come from the slope of the profile (central differences). Creases run along
+/// discs, rings and rims and where one profile meets the next at more than 40 degrees,
+/// never within a profile.
 ///
 /// # Errors
-/// [`GeomError::Domain`] if a profile has fewer than 2 points, unequal numbers of heights and radii, numbers that are not
-/// finite or above 1e6, heights that decrease, negative radii; if there are no profiles or more than 1000, more than 4096
-/// points, fewer than 3 or more than 1024 sides, more than five million triangles; if the object has no extent.
-pub fn lathe(parts: &[Profile], sides: u32, wall: impl Into<Wall>, caps: Caps) -> Result<Mesh, GeomError> {
+/// [`GeomError::Domain`] if a profile has fewer than 2 points, unequal numbers of heights
+/// and radii, numbers that are not finite or above 1e6, heights that decrease, negative
+/// radii; if there are no profiles or more than 1000, more than 4096 points, fewer than 3
+/// or more than 1024 sides, more than five million triangles; if the object has no
+/// extent.
+pub fn lathe(
+    parts: &[Profile],
+    sides: u32,
+    wall: impl Into<Wall>,
+    caps: Caps,
+) -> Result<Mesh, GeomError> {
     turned(parts, sides, wall.into(), caps).map(|(mesh, _)| mesh)
 }
 
 /// The mesh, and what it was made of.
-fn turned(parts: &[Profile], sides: u32, wall: Wall, caps: Caps) -> Result<(Mesh, Turned), GeomError> {
+fn turned(
+    parts: &[Profile],
+    sides: u32,
+    wall: Wall,
+    caps: Caps,
+) -> Result<(Mesh, Turned), GeomError> {
     check(parts, sides, wall)?;
     let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
     let count = parts.len() as u16 + 5;
@@ -93,8 +113,14 @@ impl Solid {
     ///
     /// # Errors
     /// As [`lathe`].
-    pub fn lathe(parts: &[Profile], sides: u32, wall: impl Into<Wall>, caps: Caps) -> Result<Solid, GeomError> {
-        turned(parts, sides, wall.into(), caps).map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
+    pub fn lathe(
+        parts: &[Profile],
+        sides: u32,
+        wall: impl Into<Wall>,
+        caps: Caps,
+    ) -> Result<Solid, GeomError> {
+        turned(parts, sides, wall.into(), caps)
+            .map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
     }
 }
 
@@ -107,8 +133,9 @@ pub struct LatheGradient {
     pub wall: Wall,
 }
 
-/// The vector-Jacobian product of [`lathe`]: from the derivatives of something by the mesh's vertices, in order. Which points
-/// count as one, and which ends as closed, is taken as it is.
+/// The vector-Jacobian product of [`lathe`]: from the derivatives of something by the
+/// mesh's vertices, in order. Which points count as one, and which ends as closed, is
+/// taken as it is.
 ///
 /// # Errors
 /// As [`lathe`].
@@ -131,11 +158,16 @@ pub fn pull_lathe(
     };
     let strips = layout(parts, caps, wall, number)?.strips;
     let rings = pull_rings(&strips, sides, by_vertex);
-    let outputs = strips.iter().flat_map(|s| &s.points).zip(rings).flat_map(|(p, (r, y))| [(p.0, r), (p.1, y)]);
+    let outputs = strips
+        .iter()
+        .flat_map(|s| &s.points)
+        .zip(rings)
+        .flat_map(|(p, (r, y))| [(p.0, r), (p.1, y)]);
     let slopes = tape.reverse(outputs);
     let mut numbers = inputs.iter().map(|v| slopes[v.index()]);
     let mut next = || numbers.next().unwrap_or(0.0);
-    let wall = Wall { thickness: slopes[wall.thickness.index()], floor: slopes[wall.floor.index()] };
+    let wall =
+        Wall { thickness: slopes[wall.thickness.index()], floor: slopes[wall.floor.index()] };
     let one = |p: &Profile| {
         let (r, y) = p.r.iter().map(|_| (next(), next())).unzip();
         Profile { y, r }
@@ -161,7 +193,8 @@ fn layout<T: Real>(
     let tolerance = Tolerance::of(parts).ok_or_else(flat)?;
     let n = parts.len() as u16;
     let (ring, bottom_disc, rim, inner, floor) = (n, n + 1, n + 2, n + 3, n + 4);
-    let OuterPath { first, last, mut strips } = OuterPath::new(parts, &tolerance, ring, number).ok_or_else(flat)?;
+    let OuterPath { first, last, mut strips } =
+        OuterPath::new(parts, &tolerance, ring, number).ok_or_else(flat)?;
     let thickness = wall.thickness;
     let axis = thickness.constant(0.0);
     let hollow = thickness.value() > 0.0;
@@ -174,13 +207,21 @@ fn layout<T: Real>(
     let mut after = Vec::new();
     let mut closed = false;
     if hollow {
-        let down_to =
-            if closed_bottom { floor_height(first.1, last.1, wall) } else { thickness.constant(f64::NEG_INFINITY) };
-        let (walls, [start, end]) = inner_wall(&strips, last, thickness, down_to, &tolerance, inner);
+        let down_to = if closed_bottom {
+            floor_height(first.1, last.1, wall)
+        } else {
+            thickness.constant(f64::NEG_INFINITY)
+        };
+        let (walls, [start, end]) =
+            inner_wall(&strips, last, thickness, down_to, &tolerance, inner);
         after.push(Strip { points: vec![last, start], parts: vec![rim], blend: false });
         after.extend(walls);
         if closed_bottom {
-            after.push(Strip { points: vec![end, (axis, end.1)], parts: vec![floor], blend: false });
+            after.push(Strip {
+                points: vec![end, (axis, end.1)],
+                parts: vec![floor],
+                blend: false,
+            });
         } else {
             after.push(Strip { points: vec![end, first], parts: vec![rim], blend: false });
             closed = true;
@@ -189,7 +230,11 @@ fn layout<T: Real>(
     if bottom_pole {
         all.extend(strips[0].close_start());
     } else if closed_bottom {
-        all.push(Strip { points: vec![(axis, first.1), first], parts: vec![bottom_disc], blend: false });
+        all.push(Strip {
+            points: vec![(axis, first.1), first],
+            parts: vec![bottom_disc],
+            blend: false,
+        });
     }
     if top_pole {
         after.extend(strips.last_mut().and_then(Strip::close_end));
@@ -242,14 +287,18 @@ fn check(parts: &[Profile], sides: u32, wall: Wall) -> Result<(), GeomError> {
         for (y, r) in p.y.iter().zip(&p.r) {
             for (what, x) in [("height", y), ("radius", r)] {
                 if !x.is_finite() || x.abs() > LARGEST {
-                    return wrong(format!("profile {i} has the {what} {x}; it must be finite and at most {LARGEST}"));
+                    return wrong(format!(
+                        "profile {i} has the {what} {x}; it must be finite and at most {LARGEST}"
+                    ));
                 }
             }
             if *r < 0.0 {
                 return wrong(format!("profile {i} has the negative radius {r}"));
             }
             if *y < height {
-                return wrong(format!("heights must not decrease: {y} after {height} in profile {i}"));
+                return wrong(format!(
+                    "heights must not decrease: {y} after {height} in profile {i}"
+                ));
             }
             height = *y;
         }

@@ -1,4 +1,5 @@
-//! Tests of the lathe: closed, outward, with the volumes of cylinders, cones, spheres and vessels; every refusal.
+//! Tests of the lathe: closed, outward, with the volumes of cylinders, cones, spheres and
+//! vessels; every refusal.
 
 use super::*;
 use crate::geom::NO_FACE;
@@ -18,7 +19,8 @@ fn volume(m: &Mesh) -> f64 {
     m.topology.triangles.iter().map(t).sum()
 }
 
-/// Each edge has two faces that run through it in opposite directions, and the surface is one sphere or torus.
+/// Each edge has two faces that run through it in opposite directions, and the surface is
+/// one sphere or torus.
 fn assert_closed(m: &Mesh, euler: i64) {
     let key = |v: u32| m.positions[v as usize].to_array().map(|x| (x + 0.0).to_bits());
     let mut directed: HashMap<_, i32> = HashMap::new();
@@ -29,9 +31,13 @@ fn assert_closed(m: &Mesh, euler: i64) {
             points.insert(key(t[c]));
         }
     }
-    assert!(directed.iter().all(|((a, b), n)| *n == 1 && directed.get(&(*b, *a)) == Some(&1)), "not watertight");
+    assert!(
+        directed.iter().all(|((a, b), n)| *n == 1 && directed.get(&(*b, *a)) == Some(&1)),
+        "not watertight"
+    );
     assert!(m.topology.edges.iter().all(|e| e.faces[1] != NO_FACE));
-    let (v, e, f) = (points.len() as i64, m.topology.edges.len() as i64, m.topology.triangles.len() as i64);
+    let (v, e, f) =
+        (points.len() as i64, m.topology.edges.len() as i64, m.topology.triangles.len() as i64);
     assert_eq!(v - e + f, euler);
 }
 
@@ -40,7 +46,11 @@ fn assert_outward(m: &Mesh) {
         let p = t.map(|v| m.positions[v as usize]);
         let n = (p[1] - p[0]).cross(p[2] - p[0]).normalize();
         for v in t {
-            assert!(n.dot(m.normals[*v as usize]) > 0.5, "normal {} on a face of {n}", m.normals[*v as usize]);
+            assert!(
+                n.dot(m.normals[*v as usize]) > 0.5,
+                "normal {} on a face of {n}",
+                m.normals[*v as usize]
+            );
         }
     }
     assert!(m.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-5));
@@ -58,7 +68,8 @@ fn cylinder_and_cone_have_their_volumes() {
     assert_outward(&cylinder);
     let expected = std::f64::consts::PI * 0.25 * 2.0 * polygon(64.0);
     assert!((volume(&cylinder) - expected).abs() < 1e-5);
-    let cone = lathe(&[profile(&[(1.0, 0.0), (0.5, 1.0), (0.0, 2.0)])], 64, 0.0, Caps::Both).unwrap();
+    let cone =
+        lathe(&[profile(&[(1.0, 0.0), (0.5, 1.0), (0.0, 2.0)])], 64, 0.0, Caps::Both).unwrap();
     assert_closed(&cone, 2);
     assert!((volume(&cone) - std::f64::consts::PI * 2.0 / 3.0 * polygon(64.0)).abs() < 1e-3);
 }
@@ -82,15 +93,20 @@ fn a_vessel_holds_what_its_walls_leave() {
 fn joints_are_smooth_bent_or_stepped() {
     let lower = profile(&[(0.5, 0.0), (0.5, 1.0)]);
     let creases = |m: &Mesh| m.topology.edges.iter().filter(|e| e.crease).count();
-    let smooth = lathe(&[lower.clone(), profile(&[(0.5, 1.0), (0.6, 2.0)])], 32, 0.0, Caps::None).unwrap();
+    let smooth =
+        lathe(&[lower.clone(), profile(&[(0.5, 1.0), (0.6, 2.0)])], 32, 0.0, Caps::None).unwrap();
     assert_eq!(creases(&smooth), 0);
-    let bent = lathe(&[lower.clone(), profile(&[(0.5, 1.0), (2.5, 2.0)])], 32, 0.0, Caps::None).unwrap();
+    let bent =
+        lathe(&[lower.clone(), profile(&[(0.5, 1.0), (2.5, 2.0)])], 32, 0.0, Caps::None).unwrap();
     assert_eq!(creases(&bent), 32);
     let stepped = lathe(&[lower, profile(&[(0.3, 1.0), (0.3, 2.0)])], 32, 0.0, Caps::Both).unwrap();
     assert_eq!(creases(&stepped), 4 * 32);
     assert_closed(&stepped, 2);
     assert_outward(&stepped);
-    assert_eq!(stepped.topology.parts.iter().copied().collect::<std::collections::BTreeSet<_>>().len(), 5);
+    assert_eq!(
+        stepped.topology.parts.iter().copied().collect::<std::collections::BTreeSet<_>>().len(),
+        5
+    );
 }
 
 #[test]
@@ -114,17 +130,22 @@ fn a_floor_is_as_high_as_it_is_raised() {
         let full = std::f64::consts::PI * (2.0 - 0.81 * (2.0 - high)) * polygon(64.0);
         assert!((volume(&m) - full).abs() < 1e-5, "{floor}: {} {full}", volume(&m));
     }
-    let wrong = lathe(from_ref(&cup), 64, Wall { thickness: 0.1, floor: -1.0 }, Caps::Bottom).unwrap_err();
+    let wrong =
+        lathe(from_ref(&cup), 64, Wall { thickness: 0.1, floor: -1.0 }, Caps::Bottom).unwrap_err();
     assert_eq!(wrong.to_string(), "lathe: the floor must be from 0 to 1000000, got -1");
 }
 
 #[test]
 fn impossible_profiles_are_errors() {
-    let fails =
-        |parts: &[Profile], sides, thickness| lathe(parts, sides, thickness, Caps::Both).unwrap_err().to_string();
+    let fails = |parts: &[Profile], sides, thickness| {
+        lathe(parts, sides, thickness, Caps::Both).unwrap_err().to_string()
+    };
     let good = profile(&[(0.5, 0.0), (0.5, 1.0)]);
     assert_eq!(fails(&[], 8, 0.0), "lathe: there is no profile");
-    assert_eq!(fails(&[profile(&[(1.0, 0.0)])], 8, 0.0), "lathe: profile 0 needs at least 2 points, got 1");
+    assert_eq!(
+        fails(&[profile(&[(1.0, 0.0)])], 8, 0.0),
+        "lathe: profile 0 needs at least 2 points, got 1"
+    );
     assert!(fails(&[profile(&[(0.5, 1.0), (0.5, 0.0)])], 8, 0.0).contains("must not decrease"));
     assert!(fails(&[profile(&[(-0.5, 0.0), (0.5, 1.0)])], 8, 0.0).contains("negative"));
     assert!(fails(&[profile(&[(f64::NAN, 0.0), (0.5, 1.0)])], 8, 0.0).contains("NaN"));
@@ -142,7 +163,11 @@ fn profiles_that_end_at_the_axis_are_closed_there() {
         let cone = lathe(&[profile(&[(1.0, 0.0), (0.0, 2.0)])], 64, 0.0, caps).unwrap();
         assert_closed(&cone, 2);
         assert_outward(&cone);
-        assert_eq!(cone.topology.edges.iter().filter(|e| e.crease).count(), 64, "only the rim of the base");
+        assert_eq!(
+            cone.topology.edges.iter().filter(|e| e.crease).count(),
+            64,
+            "only the rim of the base"
+        );
         assert!((volume(&cone) - std::f64::consts::PI * 2.0 / 3.0 * polygon(64.0)).abs() < 1e-5);
     }
     // A ball: poles.
@@ -157,13 +182,21 @@ fn profiles_that_end_at_the_axis_are_closed_there() {
         assert!(m.topology.edges.iter().all(|e| !e.crease));
         assert!(m.topology.parts.iter().all(|p| *p == 0));
         // Slopes by differences of equal steps are exact on a circle.
-        assert!(m.positions.iter().zip(&m.normals).all(|(p, n)| (p.normalize() - *n).length() < 1e-6));
+        assert!(
+            m.positions.iter().zip(&m.normals).all(|(p, n)| (p.normalize() - *n).length() < 1e-6)
+        );
         // The body is a stack of frusta.
-        let frusta: f64 = ball.r.windows(2).zip(ball.y.windows(2)).map(|(r, y)| frustum(r[0], r[1], y[1] - y[0])).sum();
+        let frusta: f64 = ball
+            .r
+            .windows(2)
+            .zip(ball.y.windows(2))
+            .map(|(r, y)| frustum(r[0], r[1], y[1] - y[0]))
+            .sum();
         assert!((volume(&m) - frusta * polygon(64.0)).abs() < 1e-5);
         assert!((volume(&m) - 4.0 / 3.0 * std::f64::consts::PI).abs() < 0.02);
     }
-    // A spindle, two bodies joined by a neck at the axis, and a bowl that rests on a point.
+    // A spindle, two bodies joined by a neck at the axis, and a bowl that rests on a
+    // point.
     let spindle = profile(&[(0.0, -1.0), (1.0, 0.0), (0.0, 1.0)]);
     assert_closed(&lathe(from_ref(&spindle), 12, 0.0, Caps::None).unwrap(), 2);
     let two = [spindle, profile(&[(0.0, 1.0), (1.0, 2.0), (0.0, 3.0)])];
@@ -212,10 +245,15 @@ fn slanted_walls_have_analytic_normals() {
     let m = lathe(&[profile(&[(0.5, 0.0), (0.75, 0.5), (1.0, 1.0)])], 16, 0.0, Caps::None).unwrap();
     let slope = 1.0 / 1.25f32.sqrt();
     for (p, n) in m.positions.iter().zip(&m.normals) {
-        let expected = glam::Vec3::new(p.x, 0.0, p.z).normalize() * slope - glam::Vec3::Y * (0.5 * slope);
+        let expected =
+            glam::Vec3::new(p.x, 0.0, p.z).normalize() * slope - glam::Vec3::Y * (0.5 * slope);
         assert!((*n - expected).length() < 1e-6);
     }
-    assert_eq!(m.topology.edges.iter().filter(|e| e.faces[1] == NO_FACE).count(), 32, "open at both ends");
+    assert_eq!(
+        m.topology.edges.iter().filter(|e| e.faces[1] == NO_FACE).count(),
+        32,
+        "open at both ends"
+    );
 }
 
 #[test]
@@ -230,7 +268,8 @@ fn flat_and_repeated_points_make_no_collapsed_triangles() {
     ];
     for (points, thickness) in shapes {
         let m = lathe(&[profile(points)], 24, thickness, Caps::Both).unwrap();
-        // Discs that lie on each other share places but not points, so that places cannot be compared here.
+        // Discs that lie on each other share places but not points, so that places cannot
+        // be compared here.
         assert!(m.topology.edges.iter().all(|e| e.faces[1] != NO_FACE), "{points:?}");
         assert!(m.positions.iter().chain(&m.normals).all(|p| p.is_finite()));
         for t in &m.topology.triangles {
@@ -242,12 +281,19 @@ fn flat_and_repeated_points_make_no_collapsed_triangles() {
 
 #[test]
 fn sizes_are_limited() {
-    let fails = |parts: &[Profile], sides| lathe(parts, sides, 0.0, Caps::Both).unwrap_err().to_string();
+    let fails =
+        |parts: &[Profile], sides| lathe(parts, sides, 0.0, Caps::Both).unwrap_err().to_string();
     let long = |n: usize| Profile { y: (0..n).map(|i| i as f64).collect(), r: vec![1.0; n] };
     assert_eq!(fails(&[long(4097)], 8), "lathe: 4097 points; at most 4096");
     assert_eq!(fails(&vec![long(2); 1001], 8), "lathe: 1001 profiles; at most 1000");
-    assert_eq!(fails(&[long(4096)], 1024), "lathe: 4096 points and 1024 sides make 8394752 triangles; at most 5000000");
-    assert!(fails(&[profile(&[(0.5, 0.0), (0.5, 1.0), (0.5, 2.0)]), long(2)], 8).contains("must not decrease"));
+    assert_eq!(
+        fails(&[long(4096)], 1024),
+        "lathe: 4096 points and 1024 sides make 8394752 triangles; at most 5000000"
+    );
+    assert!(
+        fails(&[profile(&[(0.5, 0.0), (0.5, 1.0), (0.5, 2.0)]), long(2)], 8)
+            .contains("must not decrease")
+    );
     assert!(fails(&[profile(&[(0.5, 0.0), (f64::INFINITY, 1.0)])], 8).contains("the radius inf"));
     assert!(fails(&[profile(&[(0.5, 0.0), (0.5, 2e6)])], 8).contains("at most 1000000"));
     let uneven = Profile { y: vec![0.0, 1.0], r: vec![1.0] };
@@ -256,7 +302,15 @@ fn sizes_are_limited() {
     let e = lathe(from_ref(&flat), 8, 0.0, Caps::None).unwrap_err();
     assert_eq!(e, GeomError::Domain("lathe: the object has no height and no discs".into()));
     for caps in [Caps::Bottom, Caps::Both] {
-        assert!(lathe(&[long(600), Profile { y: vec![600.0, 601.0], r: vec![0.0, 0.0] }], 1024, 0.5, caps).is_ok());
+        assert!(
+            lathe(
+                &[long(600), Profile { y: vec![600.0, 601.0], r: vec![0.0, 0.0] }],
+                1024,
+                0.5,
+                caps
+            )
+            .is_ok()
+        );
     }
 }
 
@@ -275,7 +329,8 @@ proptest::proptest! {
         thickness in proptest::option::of(0.001..0.5f64),
         caps in proptest::sample::select(vec![Caps::None, Caps::Bottom, Caps::Top, Caps::Both]),
     ) {
-        // Small numbers become 0, so that poles, repeated heights and repeated radii are common.
+        // Small numbers become 0, so that poles, repeated heights and repeated radii are
+        // common.
         let snap = |x: f64| if x < 0.25 { 0.0 } else { x };
         let mut y = 0.0;
         let points: Vec<(f64, f64)> = steps.iter().map(|(r, dy)| { y += snap(*dy); (snap(*r), y) }).collect();

@@ -1,7 +1,8 @@
 //! Triangle meshes with smooth normals, part numbers and a table of edges.
 //!
-//! Immutable, shared by `Arc`. Vertices are split where a crease runs, so that each has one normal; edges know the faces on
-//! both sides across such splits. Meshes of one shape share their [`Topology`].
+//! Immutable, shared by `Arc`. Vertices are split where a crease runs, so that each has
+//! one normal; edges know the faces on both sides across such splits. Meshes of one shape
+//! share their [`Topology`].
 
 use super::edges;
 use super::{Bounds, GeomError, Patches};
@@ -35,7 +36,8 @@ impl Edge {
     }
 }
 
-/// The edges of a mesh, each once: a slice of them, those first that show as lines however the mesh is turned.
+/// The edges of a mesh, each once: a slice of them, those first that show as lines
+/// however the mesh is turned.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edges {
     list: Vec<Edge>,
@@ -45,10 +47,12 @@ pub struct Edges {
 }
 
 impl Edges {
-    /// Puts edges in order: boundaries and creases that hang together, one such line after another, then the others.
+    /// Puts edges in order: boundaries and creases that hang together, one such line
+    /// after another, then the others.
     pub fn new(list: Vec<Edge>) -> Edges {
         let (sharp, smooth): (Vec<Edge>, Vec<Edge>) = list.into_iter().partition(Edge::is_sharp);
-        // A line for each edge by itself, boundaries and creases apart; where two meet, the shorter joins the longer.
+        // A line for each edge by itself, boundaries and creases apart; where two meet,
+        // the shorter joins the longer.
         let mut lines: Vec<Vec<Edge>> = Vec::new();
         let mut line_at: FxHashMap<(u32, bool), usize> = FxHashMap::default();
         for edge in sharp {
@@ -59,9 +63,15 @@ impl Edges {
                 if other == line {
                     continue;
                 }
-                let (long, short) = if lines[other].len() < lines[line].len() { (line, other) } else { (other, line) };
+                let (long, short) = if lines[other].len() < lines[line].len() {
+                    (line, other)
+                } else {
+                    (other, line)
+                };
                 let moved = std::mem::take(&mut lines[short]);
-                line_at.extend(moved.iter().flat_map(|e| e.vertices.map(|v| ((v, e.is_boundary()), long))));
+                line_at.extend(
+                    moved.iter().flat_map(|e| e.vertices.map(|v| ((v, e.is_boundary()), long))),
+                );
                 lines[long].extend(moved);
                 line = long;
             }
@@ -111,12 +121,14 @@ pub struct Topology {
     pub parts: Vec<u16>,
     /// The number of parts.
     pub part_count: u16,
-    /// The names of parts by number, where they have some: empty strings and those beyond the end have none.
+    /// The names of parts by number, where they have some: empty strings and those beyond
+    /// the end have none.
     pub part_names: Vec<Arc<str>>,
     /// Its edges.
     pub edges: Edges,
-    /// Whether the faces are known to enclose a body without crossing each other: seen from outside, those that are turned
-    /// away are hidden by others and need not be drawn. Meshes from files make no such promise.
+    /// Whether the faces are known to enclose a body without crossing each other: seen
+    /// from outside, those that are turned away are hidden by others and need not be
+    /// drawn. Meshes from files make no such promise.
     pub encloses: bool,
     /// The triangles by small groups.
     pub patches: Patches,
@@ -141,13 +153,19 @@ pub const MOST_TRIANGLES: usize = 5_000_000;
 pub const MOST_PARTS: usize = u16::MAX as usize;
 
 impl Mesh {
-    /// A mesh from positions and triangles, with the part of each triangle. Equal positions are one point; triangles
-    /// without area are dropped; normals are means over the faces around a point, weighted by angle, within creases.
+    /// A mesh from positions and triangles, with the part of each triangle. Equal
+    /// positions are one point; triangles without area are dropped; normals are means
+    /// over the faces around a point, weighted by angle, within creases.
     ///
     /// # Errors
-    /// If a position is not finite, an index out of range, a part number 65535, nothing is left, there is not one part
-    /// number for each triangle, or there are more than five million triangles.
-    pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, parts: Vec<u16>) -> Result<Mesh, GeomError> {
+    /// If a position is not finite, an index out of range, a part number 65535, nothing
+    /// is left, there is not one part number for each triangle, or there are more than
+    /// five million triangles.
+    pub fn new(
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        parts: Vec<u16>,
+    ) -> Result<Mesh, GeomError> {
         if triangles.len() > MOST_TRIANGLES {
             return Err(GeomError::invalid(format!(
                 "the mesh has {} triangles; at most {MOST_TRIANGLES} are allowed",
@@ -158,14 +176,24 @@ impl Mesh {
             return Err(GeomError::invalid("a mesh needs one part number per triangle"));
         }
         if parts.contains(&u16::MAX) {
-            return Err(GeomError::invalid(format!("a mesh has at most {MOST_PARTS} parts, numbered from 0")));
+            return Err(GeomError::invalid(format!(
+                "a mesh has at most {MOST_PARTS} parts, numbered from 0"
+            )));
         }
         if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(GeomError::invalid(format!("vertex {i} of the mesh is not finite: {}", positions[i])));
+            return Err(GeomError::invalid(format!(
+                "vertex {i} of the mesh is not finite: {}",
+                positions[i]
+            )));
         }
-        if let Some(i) = triangles.iter().position(|t| t.iter().any(|v| *v as usize >= positions.len())) {
+        if let Some(i) =
+            triangles.iter().position(|t| t.iter().any(|v| *v as usize >= positions.len()))
+        {
             let t = triangles[i];
-            let message = format!("triangle {i} of the mesh uses vertices {t:?}, but there are {}", positions.len());
+            let message = format!(
+                "triangle {i} of the mesh uses vertices {t:?}, but there are {}",
+                positions.len()
+            );
             return Err(GeomError::invalid(message));
         }
         edges::build(&positions, &triangles, &parts)
@@ -189,7 +217,14 @@ mod tests {
         let e = Mesh::new(p.clone(), vec![[0, 1, 3]], vec![0]).unwrap_err().to_string();
         assert_eq!(e, "triangle 0 of the mesh uses vertices [0, 1, 3], but there are 3");
         assert!(Mesh::new(p.clone(), vec![[0, 1, 1]], vec![0]).is_err());
-        assert!(Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)], vec![[0, 1, 2]], vec![0]).is_err());
+        assert!(
+            Mesh::new(
+                vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)],
+                vec![[0, 1, 2]],
+                vec![0]
+            )
+            .is_err()
+        );
         assert!(Mesh::new(p.clone(), vec![], vec![]).is_err());
         assert!(Mesh::new(p.clone(), vec![[0, 1, 2]], vec![]).is_err());
         let e = Mesh::new(p.clone(), vec![[0, 1, 2]], vec![u16::MAX]).unwrap_err().to_string();
@@ -208,8 +243,13 @@ mod tests {
 
     #[test]
     fn lines_of_edges_hang_together() {
-        // Two loops of four boundary edges, told in an order that joins them late, a crease apart, and one smooth edge.
-        let edge = |a: u32, b: u32, crease: bool, other: u32| Edge { vertices: [a, b], faces: [0, other], crease };
+        // Two loops of four boundary edges, told in an order that joins them late, a
+        // crease apart, and one smooth edge.
+        let edge = |a: u32, b: u32, crease: bool, other: u32| Edge {
+            vertices: [a, b],
+            faces: [0, other],
+            crease,
+        };
         let open = |a, b| edge(a, b, false, NO_FACE);
         let list = [
             open(0, 1),
@@ -224,8 +264,10 @@ mod tests {
             open(13, 10),
         ];
         let edges: Edges = list.into_iter().collect();
-        let mut lines: Vec<(usize, u32)> =
-            edges.lines().map(|l| (l.len(), l.iter().flat_map(|e| e.vertices).max().unwrap_or(0))).collect();
+        let mut lines: Vec<(usize, u32)> = edges
+            .lines()
+            .map(|l| (l.len(), l.iter().flat_map(|e| e.vertices).max().unwrap_or(0)))
+            .collect();
         lines.sort_unstable();
         assert_eq!(lines, [(1, 20), (4, 3), (4, 13)]);
         assert_eq!((edges.len(), edges.open(), edges[9]), (10, true, list[2]));

@@ -1,6 +1,7 @@
 //! Shapes: triangle meshes made in code or read from files, placed in the world.
 //!
-//! World: right-handed, y up; lengths in scene units, angles in radians. Knows nothing of cameras or programs.
+//! World: right-handed, y up; lengths in scene units, angles in radians. Knows nothing of
+//! cameras or programs.
 
 mod affine;
 pub mod armature;

@@ -1,7 +1,9 @@
-//! Wavefront OBJ: reading through `tobj`, after a look at the text that says which line is wrong; writing.
+//! Wavefront OBJ: reading through `tobj`, after a look at the text that says which line
+//! is wrong; writing.
 //!
-//! Materials, colours, texture coordinates and the file's own normals are not read: normals are made anew by [`Mesh::new`].
-//! Invariant: `tobj` sees only finite vertices and faces whose corners are there, so no bytes can make it stumble.
+//! Materials, colours, texture coordinates and the file's own normals are not read:
+//! normals are made anew by [`Mesh::new`]. Invariant: `tobj` sees only finite vertices
+//! and faces whose corners are there, so no bytes can make it stumble.
 
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{FileFrame, GeomError, Mesh};
@@ -13,14 +15,15 @@ use std::sync::Arc;
 /// The most corners of a polygon.
 const MOST_CORNERS: usize = 1000;
 
-/// Reads a mesh; each object or group of the file is a part with its name, numbered by first use, and one opened again goes
-/// on. Polygons
-/// are cut into triangles as fans. A fourth coordinate divides the others.
+/// Reads a mesh; each object or group of the file is a part with its name, numbered by
+/// first use, and one opened again goes on. Polygons are cut into triangles as fans. A
+/// fourth coordinate divides the others.
 ///
 /// # Errors
-/// [`GeomError::Invalid`] if it is not text, a line is malformed, a coordinate is not finite, a face uses a vertex that is
-/// not there before it, there are more than 65535 parts or five million triangles: with the number of the line. If there
-/// are no faces or none has an area.
+/// [`GeomError::Invalid`] if it is not text, a line is malformed, a coordinate is not
+/// finite, a face uses a vertex that is not there before it, there are more than 65535
+/// parts or five million triangles: with the number of the line. If there are no faces or
+/// none has an area.
 pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
     load_in(bytes, &FileFrame::default())
 }
@@ -31,17 +34,30 @@ pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
 /// As [`load`], and if a coordinate is not finite in the scene's unit.
 pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     let (plain, names) = plain(text(bytes)?)?;
-    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        single_index: false,
+    };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let unreadable = |e: &dyn std::fmt::Display| GeomError::invalid(format!("cannot read the OBJ file: {e}"));
-    let (models, _) = tobj::load_obj_buf(&mut plain.as_bytes(), &options, no_materials).map_err(|e| unreadable(&e))?;
+    let unreadable =
+        |e: &dyn std::fmt::Display| GeomError::invalid(format!("cannot read the OBJ file: {e}"));
+    let (models, _) = tobj::load_obj_buf(&mut plain.as_bytes(), &options, no_materials)
+        .map_err(|e| unreadable(&e))?;
     let (mut positions, mut triangles, mut parts) = (Vec::new(), Vec::new(), Vec::new());
     for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {
         let part: u16 = m.name.parse().map_err(|e| unreadable(&e))?;
         let first = positions.len() as u32;
-        positions
-            .extend(m.mesh.positions.chunks_exact(3).map(|p| frame.apply(Vec3::from_slice(p).as_dvec3()).as_vec3()));
-        triangles.extend(m.mesh.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]));
+        positions.extend(
+            m.mesh
+                .positions
+                .chunks_exact(3)
+                .map(|p| frame.apply(Vec3::from_slice(p).as_dvec3()).as_vec3()),
+        );
+        triangles.extend(
+            m.mesh.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]),
+        );
         parts.resize(triangles.len(), part);
     }
     if triangles.is_empty() {
@@ -52,7 +68,8 @@ pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     Ok(mesh)
 }
 
-/// Vertices and triangles as the file numbers them, with the name of each triangle's object or group.
+/// Vertices and triangles as the file numbers them, with the name of each triangle's
+/// object or group.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Indexed {
     /// The vertices, in the file's order, used or not.
@@ -82,7 +99,8 @@ pub fn indexed(bytes: &[u8]) -> Result<Indexed, GeomError> {
             }
             Some("g") => part = words.next().and_then(|w| w.parse().ok()).unwrap_or(part),
             Some("f") => {
-                let corners: Vec<u32> = words.filter_map(|w| w.parse::<u32>().ok()?.checked_sub(1)).collect();
+                let corners: Vec<u32> =
+                    words.filter_map(|w| w.parse::<u32>().ok()?.checked_sub(1)).collect();
                 for pair in corners.get(1..).unwrap_or_default().windows(2) {
                     out.triangles.push([corners[0], pair[0], pair[1]]);
                     out.parts.push(part);
@@ -98,19 +116,21 @@ pub fn indexed(bytes: &[u8]) -> Result<Indexed, GeomError> {
 }
 
 fn text(bytes: &[u8]) -> Result<&str, GeomError> {
-    std::str::from_utf8(bytes)
-        .map_err(|e| GeomError::invalid(format!("the OBJ file is not text (byte {})", e.valid_up_to())))
+    std::str::from_utf8(bytes).map_err(|e| {
+        GeomError::invalid(format!("the OBJ file is not text (byte {})", e.valid_up_to()))
+    })
 }
 
-/// Checks a file, line by line, and keeps the vertices, the faces' vertex numbers counted from the start, and the parts,
-/// as `g` with a number; and the names of the parts.
+/// Checks a file, line by line, and keeps the vertices, the faces' vertex numbers counted
+/// from the start, and the parts, as `g` with a number; and the names of the parts.
 fn plain(text: &str) -> Result<(String, Vec<Arc<str>>), GeomError> {
     let mut out = String::with_capacity(text.len());
     let (mut vertices, mut triangles) = (0i64, 0usize);
     let mut names: FxHashMap<&str, usize> = FxHashMap::default();
     let (mut name, mut open) = ("", None);
     for (i, line) in text.lines().enumerate() {
-        let at = |what: String| GeomError::invalid(format!("line {} of the OBJ file: {what}", i + 1));
+        let at =
+            |what: String| GeomError::invalid(format!("line {} of the OBJ file: {what}", i + 1));
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
@@ -139,7 +159,9 @@ fn plain(text: &str) -> Result<(String, Vec<Arc<str>>), GeomError> {
                 }
                 out.push('\n');
             }
-            Some(word @ ("o" | "g")) => name = line.trim_start().strip_prefix(word).unwrap_or_default().trim(),
+            Some(word @ ("o" | "g")) => {
+                name = line.trim_start().strip_prefix(word).unwrap_or_default().trim()
+            }
             _ => {}
         }
     }
@@ -157,7 +179,8 @@ fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> 
     let mut count = 0;
     for w in words {
         let finite = w.parse::<f32>().ok().filter(|x| x.is_finite());
-        let number = finite.ok_or_else(|| format!("a coordinate must be a finite number, got `{w}`"))?;
+        let number =
+            finite.ok_or_else(|| format!("a coordinate must be a finite number, got `{w}`"))?;
         *x.get_mut(count).ok_or("a vertex with more than 7 numbers")? = number;
         count += 1;
     }
@@ -181,7 +204,9 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i
     let mut corners = Vec::with_capacity(4);
     for w in words {
         let number = w.split('/').next().unwrap_or_default();
-        let v = number.parse::<i64>().map_err(|_| format!("a corner must be the number of a vertex, got `{w}`"))?;
+        let v = number
+            .parse::<i64>()
+            .map_err(|_| format!("a corner must be the number of a vertex, got `{w}`"))?;
         let place = if v < 0 { vertices.saturating_add(v).saturating_add(1) } else { v };
         if !(1..=vertices).contains(&place) {
             return Err(format!("no vertex {v}; {vertices} are defined so far"));
@@ -191,12 +216,17 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i
             return Err(format!("a face with more than {MOST_CORNERS} corners"));
         }
     }
-    if corners.len() < 3 { Err(format!("a face needs three corners, got {}", corners.len())) } else { Ok(corners) }
+    if corners.len() < 3 {
+        Err(format!("a face needs three corners, got {}", corners.len()))
+    } else {
+        Ok(corners)
+    }
 }
 
 /// The text of an OBJ file with positions, normals and one group for each part.
 pub fn write(mesh: &Mesh) -> String {
-    let mut s = String::with_capacity(mesh.positions.len() * 64 + mesh.topology.triangles.len() * 32);
+    let mut s =
+        String::with_capacity(mesh.positions.len() * 64 + mesh.topology.triangles.len() * 32);
     for p in &mesh.positions {
         let _ = writeln!(s, "v {} {} {}", p.x, p.y, p.z);
     }
@@ -228,7 +258,10 @@ mod tests {
         assert_eq!(back.topology.triangles.len(), m.topology.triangles.len());
         assert_eq!(back.bounds(), m.bounds());
         let b = cuboid(glam::DVec3::ONE).unwrap();
-        assert_eq!(load(write(&b).as_bytes()).unwrap().topology.edges.len(), b.topology.edges.len());
+        assert_eq!(
+            load(write(&b).as_bytes()).unwrap().topology.edges.len(),
+            b.topology.edges.len()
+        );
     }
 
     #[test]
@@ -242,22 +275,49 @@ mod tests {
             fails("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
             "line 4 of the OBJ file: no vertex 4; 3 are defined so far"
         );
-        assert_eq!(fails("f -1 1 2\n"), "line 1 of the OBJ file: no vertex -1; 0 are defined so far");
+        assert_eq!(
+            fails("f -1 1 2\n"),
+            "line 1 of the OBJ file: no vertex -1; 0 are defined so far"
+        );
         assert_eq!(fails("v 1 2\n"), "line 1 of the OBJ file: a vertex needs three coordinates");
-        assert_eq!(fails("v 1 1e99 2\n"), "line 1 of the OBJ file: a coordinate must be a finite number, got `1e99`");
+        assert_eq!(
+            fails("v 1 1e99 2\n"),
+            "line 1 of the OBJ file: a coordinate must be a finite number, got `1e99`"
+        );
         assert_eq!(fails(""), "the OBJ file has no faces");
         assert_eq!(fails("v 0 0 0\nf 1 1 1\n"), "all triangles of the mesh have zero area");
         let three = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-        assert_eq!(fails(&format!("{three}f 1 2\n")), "line 4 of the OBJ file: a face needs three corners, got 2");
-        assert_eq!(fails(&format!("{three}f 0 1 2\n")), "line 4 of the OBJ file: no vertex 0; 3 are defined so far");
-        assert!(fails(&format!("{three}f 1 2 -9223372036854775808\n")).contains("no vertex -9223372036854775808"));
-        assert!(fails(&format!("{three}f 1 2 /3\n")).ends_with("a corner must be the number of a vertex, got `/3`"));
-        assert!(fails("v 1 1 1 0\n").starts_with("line 1 of the OBJ file: the coordinates divided by 0"));
+        assert_eq!(
+            fails(&format!("{three}f 1 2\n")),
+            "line 4 of the OBJ file: a face needs three corners, got 2"
+        );
+        assert_eq!(
+            fails(&format!("{three}f 0 1 2\n")),
+            "line 4 of the OBJ file: no vertex 0; 3 are defined so far"
+        );
+        assert!(
+            fails(&format!("{three}f 1 2 -9223372036854775808\n"))
+                .contains("no vertex -9223372036854775808")
+        );
+        assert!(
+            fails(&format!("{three}f 1 2 /3\n"))
+                .ends_with("a corner must be the number of a vertex, got `/3`")
+        );
+        assert!(
+            fails("v 1 1 1 0\n")
+                .starts_with("line 1 of the OBJ file: the coordinates divided by 0")
+        );
         assert!(fails("v 3e38 1 1 1e-9\n").contains("not finite"));
         assert!(fails("v 1 2 3 4 5 6 7 8\n").contains("more than 7"));
-        assert!(fails(&format!("{three}f{}\n", " 1 2 3".repeat(400))).contains("more than 1000 corners"));
+        assert!(
+            fails(&format!("{three}f{}\n", " 1 2 3".repeat(400)))
+                .contains("more than 1000 corners")
+        );
         let many = (0..65537).fold(three.to_string(), |s, i| s + &format!("g {i}\nf 1 2 3\n"));
-        assert_eq!(fails(&many), format!("line {} of the OBJ file: more than 65535 objects and groups", 3 + 2 * 65536));
+        assert_eq!(
+            fails(&many),
+            format!("line {} of the OBJ file: more than 65535 objects and groups", 3 + 2 * 65536)
+        );
         assert!(load(&[0x66, 0xff, 0x20]).unwrap_err().to_string().contains("not text"));
     }
 
@@ -270,7 +330,10 @@ mod tests {
         assert_eq!(indexed(text.as_bytes()).unwrap().part_names, m.topology.part_names);
         let two = crate::geom::Solid::new(Arc::new(m));
         let both = crate::geom::Solid::group(&[two.clone(), two]).to_mesh().unwrap();
-        assert_eq!(both.topology.part_names.iter().map(|n| &**n).collect::<Vec<_>>(), ["a", "b", "a", "b"]);
+        assert_eq!(
+            both.topology.part_names.iter().map(|n| &**n).collect::<Vec<_>>(),
+            ["a", "b", "a", "b"]
+        );
     }
 
     #[test]
@@ -279,20 +342,33 @@ mod tests {
                     f 1/9/-7 2/x 3//\nl 1 99\ng b\nusemtl\nf -3 -1 -2\ng a\nf 1 2 3\n";
         let m = load(text.as_bytes()).unwrap();
         assert_eq!(m.topology.parts, [0, 1, 0], "a group opened again goes on");
-        assert_eq!(m.bounds().unwrap().max, glam::DVec3::new(2.0, 2.0, 0.0), "the fourth number divides");
+        assert_eq!(
+            m.bounds().unwrap().max,
+            glam::DVec3::new(2.0, 2.0, 0.0),
+            "the fourth number divides"
+        );
     }
 
     #[test]
     fn parts_and_shape_survive() {
-        let stack =
-            [Profile { y: vec![0.0, 1.0], r: vec![0.5, 0.5] }, Profile { y: vec![1.0, 2.0], r: vec![0.3, 0.0] }];
+        let stack = [
+            Profile { y: vec![0.0, 1.0], r: vec![0.5, 0.5] },
+            Profile { y: vec![1.0, 2.0], r: vec![0.3, 0.0] },
+        ];
         let m = lathe(&stack, 9, 0.0, Caps::Both).unwrap();
         let back = load(write(&m).as_bytes()).unwrap();
-        let corners =
-            |m: &Mesh| m.topology.triangles.iter().flatten().map(|v| m.positions[*v as usize]).collect::<Vec<_>>();
+        let corners = |m: &Mesh| {
+            m.topology
+                .triangles
+                .iter()
+                .flatten()
+                .map(|v| m.positions[*v as usize])
+                .collect::<Vec<_>>()
+        };
         let faces_of = |m: &Mesh| {
-            let mut sizes: Vec<usize> =
-                (0..m.topology.part_count).map(|p| m.topology.parts.iter().filter(|q| **q == p).count()).collect();
+            let mut sizes: Vec<usize> = (0..m.topology.part_count)
+                .map(|p| m.topology.parts.iter().filter(|q| **q == p).count())
+                .collect();
             sizes.retain(|n| *n > 0);
             sizes.sort_unstable();
             sizes

@@ -2,8 +2,8 @@
 
 use std::sync::OnceLock;
 
-/// Groups of [`Patches::FACES`] faces that follow one another, with the vertices of each. Made when first asked for; equal to
-/// any other, since faces alone decide what they are.
+/// Groups of [`Patches::FACES`] faces that follow one another, with the vertices of each.
+/// Made when first asked for; equal to any other, since faces alone decide what they are.
 #[derive(Debug, Default)]
 pub struct Patches(OnceLock<Lists>);
 
@@ -33,14 +33,16 @@ impl Run {
     }
 }
 
-/// A run goes on over so many vertices that the patch does not have: looking at them, too, is cheaper than another run.
+/// A run goes on over so many vertices that the patch does not have: looking at them,
+/// too, is cheaper than another run.
 const GAP: usize = 2;
 
 impl Patches {
     /// Faces in a patch; the last one may have fewer.
     pub const FACES: usize = 16;
 
-    /// The vertices of each patch of these faces, which are always the same ones; a few more may be among them.
+    /// The vertices of each patch of these faces, which are always the same ones; a few
+    /// more may be among them.
     pub(crate) fn of<'a>(&'a self, triangles: &[[u32; 3]]) -> impl Iterator<Item = &'a [Run]> {
         let Lists { runs, ends } = self.0.get_or_init(|| Lists::new(triangles));
         let firsts = std::iter::once(0).chain(ends.iter().copied());
@@ -58,7 +60,9 @@ impl Lists {
             let mut run: Option<Run> = None;
             for v in own.iter().copied() {
                 match &mut run {
-                    Some(r) if v <= r.first + r.count + GAP && v < r.first + Run::MOST => r.count = v + 1 - r.first,
+                    Some(r) if v <= r.first + r.count + GAP && v < r.first + Run::MOST => {
+                        r.count = v + 1 - r.first
+                    }
                     _ => lists.runs.extend(run.replace(Run { first: v, count: 1 })),
                 }
             }

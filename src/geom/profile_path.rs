@@ -1,7 +1,9 @@
 //! From profiles to the strips of a vessel's outer and inner wall.
 //!
-//! Works in the half plane (r, y), knows nothing of triangles. Generic in its numbers, so that a tape gives derivatives. Invariant: neighbouring points differ by more than the
-//! tolerance, so that no triangle collapses in single precision, and each strip begins where the one before ends.
+//! Works in the half plane (r, y), knows nothing of triangles. Generic in its numbers, so
+//! that a tape gives derivatives. Invariant: neighbouring points differ by more than the
+//! tolerance, so that no triangle collapses in single precision, and each strip begins
+//! where the one before ends.
 
 use super::lathe::{Profile, SMALLEST, Wall};
 use super::real::Real;
@@ -9,10 +11,12 @@ use super::revolve::Strip;
 
 /// Profiles that meet within this angle go on smoothly: the cosine of 40 degrees.
 const SMOOTH_COS: f64 = 0.766_044_443_118_978;
-/// An end at the axis is a smooth dome if its slope there is at most this (the surface then turns by less than 40 degrees
-/// across the axis), else a tip: the tangent of 20 degrees.
+/// An end at the axis is a smooth dome if its slope there is at most this (the surface
+/// then turns by less than 40 degrees across the axis), else a tip: the tangent of 20
+/// degrees.
 const DOME_SLOPE: f64 = 0.363_970_234_266_202;
-/// Radii below this share of the size count as at the axis and are drawn as if they were it.
+/// Radii below this share of the size count as at the axis and are drawn as if they were
+/// it.
 const TIP: f64 = 1e-6;
 /// An inner wall keeps at least this share of the outer radius.
 const LEAST_BORE: f64 = 0.02;
@@ -64,7 +68,8 @@ pub(super) struct OuterPath<T> {
 }
 
 impl<T: Real> OuterPath<T> {
-    /// Stacks checked profiles; steps get the part number `ring`. `number` is asked for each radius and height in turn.
+    /// Stacks checked profiles; steps get the part number `ring`. `number` is asked for
+    /// each radius and height in turn.
     pub fn new(
         parts: &[Profile],
         tolerance: &Tolerance,
@@ -89,14 +94,18 @@ impl<T: Real> OuterPath<T> {
         }
         let is_cut = |k: usize| {
             let at_ring = labels[k] == ring || labels[k - 1] == ring;
-            at_ring || labels[k] != labels[k - 1] && !is_smooth(points[k - 1], points[k], points[k + 1])
+            at_ring
+                || labels[k] != labels[k - 1] && !is_smooth(points[k - 1], points[k], points[k + 1])
         };
         let mut strips = Vec::new();
         let mut start = 0;
         for k in 1..=labels.len() {
             if k == labels.len() || is_cut(k) {
-                let piece =
-                    Strip { points: points[start..=k].to_vec(), parts: labels[start..k].to_vec(), blend: false };
+                let piece = Strip {
+                    points: points[start..=k].to_vec(),
+                    parts: labels[start..k].to_vec(),
+                    blend: false,
+                };
                 strips.push(piece);
                 start = k;
             }
@@ -120,8 +129,8 @@ fn is_dome<T: Real>(tip: (T, T), next: (T, T)) -> bool {
 }
 
 impl<T: Real> Strip<T> {
-    /// Closes the lower end, which is at the axis: a dome by a pole; a tip, which has no normal of its own, by a disc that
-    /// is returned and goes before the strip.
+    /// Closes the lower end, which is at the axis: a dome by a pole; a tip, which has no
+    /// normal of its own, by a disc that is returned and goes before the strip.
     pub fn close_start(&mut self) -> Option<Strip<T>> {
         let tip = self.points[0];
         if is_dome(tip, self.points[1]) {
@@ -129,7 +138,11 @@ impl<T: Real> Strip<T> {
             return None;
         }
         self.blend = true;
-        Some(Strip { points: vec![(tip.0.constant(0.0), tip.1), tip], parts: vec![self.parts[0]], blend: false })
+        Some(Strip {
+            points: vec![(tip.0.constant(0.0), tip.1), tip],
+            parts: vec![self.parts[0]],
+            blend: false,
+        })
     }
 
     /// Closes the upper end likewise; the disc goes after the strip.
@@ -140,7 +153,11 @@ impl<T: Real> Strip<T> {
             self.points[k].0 = tip.0.constant(0.0);
             return None;
         }
-        Some(Strip { points: vec![tip, (tip.0.constant(0.0), tip.1)], parts: vec![self.parts[k - 1]], blend: true })
+        Some(Strip {
+            points: vec![tip, (tip.0.constant(0.0), tip.1)],
+            parts: vec![self.parts[k - 1]],
+            blend: true,
+        })
     }
 }
 
@@ -148,12 +165,13 @@ impl<T: Real> Strip<T> {
 pub(super) fn floor_height<T: Real>(bottom: T, top: T, wall: Wall<T>) -> T {
     let share = |s: f64| (top - bottom) * top.constant(s);
     let least = |a: T, b: T| if a.value() < b.value() { a } else { b };
-    let (thick, raised) = (least(wall.thickness, share(0.5)), least(wall.floor, share(MOST_FILLED)));
+    let (thick, raised) =
+        (least(wall.thickness, share(0.5)), least(wall.floor, share(MOST_FILLED)));
     bottom + if thick.value() < raised.value() { raised } else { thick }
 }
 
-/// The inner wall from the rim, inside `last`, down to a height: its strips, its first and its last point. It has creases
-/// where the outer wall has them.
+/// The inner wall from the rim, inside `last`, down to a height: its strips, its first
+/// and its last point. It has creases where the outer wall has them.
 pub(super) fn inner_wall<T: Real>(
     outer: &[Strip<T>],
     last: (T, T),

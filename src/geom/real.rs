@@ -1,5 +1,6 @@
-//! Numbers that kinematics and profiles are written for: plain doubles, and variables of a tape that gives the derivatives of
-//! the same computation in reverse. So values and gradients come from one text.
+//! Numbers that kinematics and profiles are written for: plain doubles, and variables of
+//! a tape that gives the derivatives of the same computation in reverse. So values and
+//! gradients come from one text.
 
 use std::cell::RefCell;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -55,7 +56,8 @@ impl Real for f64 {
     }
 }
 
-/// The record of a computation: for each variable, the two it came from and its derivatives by them.
+/// The record of a computation: for each variable, the two it came from and its
+/// derivatives by them.
 #[derive(Default)]
 pub(super) struct Tape(RefCell<Vec<[(u32, f64); 2]>>);
 
@@ -79,7 +81,8 @@ impl Tape {
         Var { tape: self, index: records.len() as u32 - 1, value }
     }
 
-    /// The derivatives of the sum of `outputs`, each times its factor, by every variable of the tape.
+    /// The derivatives of the sum of `outputs`, each times its factor, by every variable
+    /// of the tape.
     pub fn reverse<'t>(&'t self, outputs: impl Iterator<Item = (Var<'t>, f64)>) -> Vec<f64> {
         let records = self.0.borrow();
         let mut slopes = vec![0.0; records.len()];
@@ -148,7 +151,8 @@ impl Real for Var<'_> {
 
     fn atan2(self, x: Self) -> Self {
         let square = self.value * self.value + x.value * x.value;
-        let (dy, dx) = if square > 0.0 { (x.value / square, -self.value / square) } else { (0.0, 0.0) };
+        let (dy, dx) =
+            if square > 0.0 { (x.value / square, -self.value / square) } else { (0.0, 0.0) };
         self.tape.push(libm::atan2(self.value, x.value), [(self.index, dy), (x.index, dx)])
     }
 
@@ -218,7 +222,8 @@ impl<T: Real> M3<T> {
         M3(self.0.map(|row| [0, 1, 2].map(|j| row[j] * s.0[j])))
     }
 
-    /// The rotation by a rotation vector, its axis times its angle (Rodrigues' formula); smooth also at 0.
+    /// The rotation by a rotation vector, its axis times its angle (Rodrigues' formula);
+    /// smooth also at 0.
     pub fn from_rotation_vector(v: V3<T>) -> Self {
         let square = v.dot(v);
         let q = square.value();
@@ -269,12 +274,22 @@ mod tests {
     fn rotations_and_their_derivatives() {
         for v in [[0.3, -0.4, 1.2], [1e-5, 2e-5, -1e-5], [0.0; 3], [3.0, 0.5, -0.2]] {
             let axis = glam::DVec3::from(v);
-            let want = glam::DMat3::from_quat(glam::DQuat::from_scaled_axis(axis)).transpose().to_cols_array();
+            let want = glam::DMat3::from_quat(glam::DQuat::from_scaled_axis(axis))
+                .transpose()
+                .to_cols_array();
             let got = M3::from_rotation_vector(V3(v)).0.concat();
             assert!(want.iter().zip(&got).all(|(a, b)| (a - b).abs() < 1e-14), "{v:?}");
-            let turned = crate::geom::Affine::new(glam::DVec3::ZERO, axis, glam::DVec3::ONE).0.matrix3;
+            let turned =
+                crate::geom::Affine::new(glam::DVec3::ZERO, axis, glam::DVec3::ONE).0.matrix3;
             let got = M3::from_angles(V3(v)).0.concat();
-            assert!(turned.transpose().to_cols_array().iter().zip(&got).all(|(a, b)| (a - b).abs() < 1e-14));
+            assert!(
+                turned
+                    .transpose()
+                    .to_cols_array()
+                    .iter()
+                    .zip(&got)
+                    .all(|(a, b)| (a - b).abs() < 1e-14)
+            );
             let weights: Vec<f64> = (0..9).map(|i| libm::cos(f64::from(i))).collect();
             let by: [(Plain, Taped); 2] = [
                 (M3::from_rotation_vector, |v| M3::from_rotation_vector(v)),
@@ -289,7 +304,13 @@ mod tests {
                     let f = |h: f64| {
                         let mut v = v;
                         v[k] += h;
-                        plain(V3(v)).0.concat().iter().zip(&weights).map(|(a, b)| a * b).sum::<f64>()
+                        plain(V3(v))
+                            .0
+                            .concat()
+                            .iter()
+                            .zip(&weights)
+                            .map(|(a, b)| a * b)
+                            .sum::<f64>()
                     };
                     let numeric = (f(1e-5) - f(-1e-5)) / 2e-5;
                     assert!((numeric - slopes[x.0[k].index()]).abs() < 1e-8, "{v:?} {k}");

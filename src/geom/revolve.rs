@@ -1,9 +1,11 @@
 //! Surfaces of revolution round the y axis, from a path in the half plane (r, y).
 //!
-//! The path runs with the outside on its right: up along an outer wall, inwards over a top. It is cut into strips that are
-//! smooth in themselves; between strips the surface has a crease unless a strip says otherwise. Topology depends on the numbers of points only and is
-//! shared between surfaces of the same numbers: positions and normals are all that a new profile costs.
-//! Invariant: the mesh is the same whether its topology was found in the cache or not.
+//! The path runs with the outside on its right: up along an outer wall, inwards over a
+//! top. It is cut into strips that are smooth in themselves; between strips the surface
+//! has a crease unless a strip says otherwise. Topology depends on the numbers of points
+//! only and is shared between surfaces of the same numbers: positions and normals are all
+//! that a new profile costs. Invariant: the mesh is the same whether its topology was
+//! found in the cache or not.
 
 use super::edges::pair_edges;
 use super::real::Real;
@@ -15,7 +17,8 @@ use std::sync::Arc;
 /// A smooth piece of the path.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Strip<T = f64> {
-    /// Points (r, y); consecutive ones differ. Radius 0 is a pole and allowed at the very ends of the strip only.
+    /// Points (r, y); consecutive ones differ. Radius 0 is a pole and allowed at the very
+    /// ends of the strip only.
     pub points: Vec<(T, T)>,
     /// The part of each segment.
     pub parts: Vec<u16>,
@@ -35,7 +38,8 @@ struct Signature {
     strips: Vec<u32>,
 }
 
-/// Sweeps strips, each beginning where the one before ends; `closed` joins the last to the first.
+/// Sweeps strips, each beginning where the one before ends; `closed` joins the last to
+/// the first.
 pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Mesh {
     let Shared { topology, circle } = shared(strips, sides, closed, part_count);
     let n = sides as usize;
@@ -64,7 +68,12 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
 }
 
 /// The topology of [`revolve`].
-pub(super) fn topology_of(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Arc<Topology> {
+pub(super) fn topology_of(
+    strips: &[Strip],
+    sides: u32,
+    closed: bool,
+    part_count: u16,
+) -> Arc<Topology> {
     shared(strips, sides, closed, part_count).topology
 }
 
@@ -77,8 +86,13 @@ fn shared(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Shared
     })
 }
 
-/// From the derivatives of something by the vertices of [`revolve`] to those by each point (r, y) of the path in turn.
-pub(super) fn pull_rings<T: Real>(strips: &[Strip<T>], sides: u32, by_vertex: &[DVec3]) -> Vec<(f64, f64)> {
+/// From the derivatives of something by the vertices of [`revolve`] to those by each
+/// point (r, y) of the path in turn.
+pub(super) fn pull_rings<T: Real>(
+    strips: &[Strip<T>],
+    sides: u32,
+    by_vertex: &[DVec3],
+) -> Vec<(f64, f64)> {
     let circle = circle(sides);
     let mut rest = by_vertex;
     let mut next = || match rest.split_first() {
@@ -104,7 +118,13 @@ fn circle(sides: u32) -> Arc<[(f64, f64)]> {
     (0..sides).map(|k| (libm::cos(angle(k)), libm::sin(angle(k)))).collect()
 }
 
-fn signature(strips: &[Strip], sides: u32, closed: bool, part_count: u16, rising: bool) -> Signature {
+fn signature(
+    strips: &[Strip],
+    sides: u32,
+    closed: bool,
+    part_count: u16,
+    rising: bool,
+) -> Signature {
     let mut numbers = Vec::with_capacity(strips.iter().map(|s| s.parts.len() + 2).sum());
     for s in strips {
         let pole = |p: Option<&(f64, f64)>| u32::from(p.is_some_and(|p| p.0 == 0.0));
@@ -196,10 +216,13 @@ fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topo
                 }
             }
         }
-        end = rings.last().map(|(first, count)| (*first..first + count).map(|v| weld[v as usize]).collect());
+        end = rings
+            .last()
+            .map(|(first, count)| (*first..first + count).map(|v| weld[v as usize]).collect());
     }
     if closed && let Some(end) = end {
-        // The last ring is the first one: its points, numbered one after another, take their names wherever used.
+        // The last ring is the first one: its points, numbered one after another, take
+        // their names wherever used.
         let from = end.first().copied().unwrap_or(0);
         let names = from..from + end.len() as u32;
         weld.iter_mut().filter(|w| names.contains(w)).for_each(|w| *w -= from);

@@ -1,8 +1,9 @@
-//! Solids: meshes placed in the world, alone or in groups, and their named points. Cheap to clone and to move: meshes are
-//! shared.
+//! Solids: meshes placed in the world, alone or in groups, and their named points. Cheap
+//! to clone and to move: meshes are shared.
 //!
-//! Not a volume: members may overlap, nothing is cut or merged. Invariants: a member's parts are numbered after those of
-//! the members before it (numbers beyond 65534 are all drawn as that one); no two landmarks have the same name.
+//! Not a volume: members may overlap, nothing is cut or merged. Invariants: a member's
+//! parts are numbered after those of the members before it (numbers beyond 65534 are all
+//! drawn as that one); no two landmarks have the same name.
 
 use super::detail::{Coarse, Detail};
 use super::landmark::{Landmark, unique};
@@ -27,13 +28,14 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// The coarsest version of its mesh that is at most `error` (the mesh's units) from every vertex it leaves out; `None` if that is the
-    /// mesh itself.
+    /// The coarsest version of its mesh that is at most `error` (the mesh's units) from
+    /// every vertex it leaves out; `None` if that is the mesh itself.
     pub fn coarse(&self, error: f64) -> Option<Arc<Coarse>> {
         self.detail.as_ref()?.within(&self.mesh, error)
     }
 
-    /// The centre and radius of a ball around it, in world coordinates, where it has coarser versions.
+    /// The centre and radius of a ball around it, in world coordinates, where it has
+    /// coarser versions.
     pub fn ball(&self) -> Option<(DVec3, f64)> {
         let (centre, radius) = self.detail.as_ref()?.ball(&self.mesh);
         Some((self.affine.point(centre), radius * self.affine.stretch()))
@@ -99,7 +101,10 @@ const MOST_WAITING: u32 = 64;
 
 impl fmt::Debug for Solid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Solid").field("instances", &self.instances()).field("landmarks", &self.landmarks()).finish()
+        f.debug_struct("Solid")
+            .field("instances", &self.instances())
+            .field("landmarks", &self.landmarks())
+            .finish()
     }
 }
 
@@ -131,11 +136,17 @@ fn ready<T: Send + Sync + 'static>(list: Arc<[T]>) -> Arc<Lazy<T>> {
 impl Solid {
     /// A mesh as it is.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
-        Solid::of(Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0, detail: None }]))
+        Solid::of(Arc::new([Instance {
+            mesh,
+            affine: Affine::IDENTITY,
+            first_part: 0,
+            detail: None,
+        }]))
     }
 
-    /// A mesh that will be seen many times, such as a file's: coarser versions of it are worked out when a view first wants one, once for
-    /// all placements of the solid (about a second for 100,000 triangles).
+    /// A mesh that will be seen many times, such as a file's: coarser versions of it are
+    /// worked out when a view first wants one, once for all placements of the solid
+    /// (about a second for 100,000 triangles).
     pub fn lasting(mesh: Mesh) -> Solid {
         Solid::detailed(mesh, Detail::rigid())
     }
@@ -148,11 +159,16 @@ impl Solid {
 
     /// Placed meshes, without named points.
     pub fn of(instances: Arc<[Instance]>) -> Solid {
-        Solid { instances: Meshes(ready(instances)), group: None, landmarks: ready(Arc::default()), waiting: 0 }
+        Solid {
+            instances: Meshes(ready(instances)),
+            group: None,
+            landmarks: ready(Arc::default()),
+            waiting: 0,
+        }
     }
 
-    /// The same with these named points in place of its own (world coordinates); a name that occurs again gets `#2`, `#3`, …
-    /// appended.
+    /// The same with these named points in place of its own (world coordinates); a name
+    /// that occurs again gets `#2`, `#3`, … appended.
     #[must_use]
     pub fn with_landmarks(self, landmarks: impl Into<Arc<[Landmark]>>) -> Solid {
         Solid { landmarks: ready(unique(landmarks.into().iter().cloned())), ..self }
@@ -172,7 +188,8 @@ impl Solid {
         &self.landmarks
     }
 
-    /// Placed meshes that are made when somebody first looks, which costs nothing where only landmarks matter.
+    /// Placed meshes that are made when somebody first looks, which costs nothing where
+    /// only landmarks matter.
     pub fn of_parts<M>(make: impl FnOnce() -> M + Send + 'static) -> Solid
     where
         M: IntoIterator<Item = Instance>,
@@ -189,9 +206,12 @@ impl Solid {
     /// Moved by an affine map.
     pub fn placed(&self, by: Affine) -> Solid {
         let of = self.instances.clone();
-        let placed = move || of.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() }).collect();
+        let placed =
+            move || of.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() }).collect();
         let of = Arc::clone(&self.landmarks);
-        let moved = move || of.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() }).collect();
+        let moved = move || {
+            of.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() }).collect()
+        };
         let (instances, landmarks) = (Meshes(later(placed)), later(moved));
         Solid { instances, group: None, landmarks, waiting: self.waiting + 1 }.looked_at_in_time()
     }
@@ -223,14 +243,18 @@ impl Solid {
         let instances = Meshes(later(move || {
             let (mut first, mut instances) = (0u16, Vec::with_capacity(of.count));
             for list in &of.lists {
-                let numbered = |i: &Instance| Instance { first_part: first.saturating_add(i.first_part), ..i.clone() };
+                let numbered = |i: &Instance| Instance {
+                    first_part: first.saturating_add(i.first_part),
+                    ..i.clone()
+                };
                 instances.extend(list.iter().map(numbered));
                 first = first.saturating_add(list.part_count());
             }
             instances.into()
         }));
         let of: Vec<_> = solids.iter().map(|s| Arc::clone(&s.landmarks)).collect();
-        let landmarks = later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
+        let landmarks =
+            later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
         let waiting = solids.iter().map(|s| s.waiting).max().unwrap_or(0) + 1;
         Solid { instances, group: Some(group), landmarks, waiting }.looked_at_in_time()
     }
@@ -240,9 +264,13 @@ impl Solid {
         self.group.as_ref().map_or_else(|| self.instances().len(), |group| group.count)
     }
 
-    /// Its meshes in turn, in the lists of the members that it was put together from. They have part numbers of their own.
+    /// Its meshes in turn, in the lists of the members that it was put together from.
+    /// They have part numbers of their own.
     pub(crate) fn lists(&self) -> impl Iterator<Item = &Meshes> {
-        self.group.as_ref().map_or(std::slice::from_ref(&self.instances), |group| &group.lists).iter()
+        self.group
+            .as_ref()
+            .map_or(std::slice::from_ref(&self.instances), |group| &group.lists)
+            .iter()
     }
 
     /// The number of parts.
@@ -255,8 +283,9 @@ impl Solid {
         Bounds::around(self.vertices())
     }
 
-    /// Moved so that the centre of its box is the origin; with `fit` also scaled so that half the box's longest edge is 1.
-    /// Left as it is where no finite placement does that.
+    /// Moved so that the centre of its box is the origin; with `fit` also scaled so that
+    /// half the box's longest edge is 1. Left as it is where no finite placement does
+    /// that.
     pub fn centred(&self, fit: bool) -> Solid {
         let Some(b) = self.bounds() else { return self.clone() };
         let half = 0.5 * b.size().max_element();
@@ -272,12 +301,20 @@ impl Solid {
 
     /// The vertices of all its meshes in turn, in world coordinates.
     pub fn vertices(&self) -> impl Iterator<Item = DVec3> {
-        self.instances.iter().flat_map(|i| i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3())))
+        self.instances
+            .iter()
+            .flat_map(|i| i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3())))
     }
 
-    /// The vector-Jacobian product of [`Solid::placed`]: from the derivatives of something by the vertices and landmarks of the
-    /// placed solid, in world coordinates. No vertices: nothing depends on them.
-    pub fn pull_placed(&self, by: Affine, by_vertex: &[DVec3], by_landmark: &[DVec3]) -> PlacedGradient {
+    /// The vector-Jacobian product of [`Solid::placed`]: from the derivatives of
+    /// something by the vertices and landmarks of the placed solid, in world coordinates.
+    /// No vertices: nothing depends on them.
+    pub fn pull_placed(
+        &self,
+        by: Affine,
+        by_vertex: &[DVec3],
+        by_landmark: &[DVec3],
+    ) -> PlacedGradient {
         let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
         let back = by.0.matrix3.transpose();
         let mut pull = |p: DVec3, by: &DVec3| {
@@ -294,12 +331,19 @@ impl Solid {
         } else {
             self.vertices().zip(by_vertex).map(|(p, by)| pull(p, by)).collect()
         };
-        let landmarks = self.landmarks.iter().zip(by_landmark).map(|(l, by)| pull(l.position, by)).collect();
+        let landmarks =
+            self.landmarks.iter().zip(by_landmark).map(|(l, by)| pull(l.position, by)).collect();
         PlacedGradient { linear, shift, vertices, landmarks }
     }
 
-    /// The vector-Jacobian product of [`Solid::centred`], like that of [`Solid::pull_placed`]: by vertices and landmarks.
-    pub fn pull_centred(&self, fit: bool, by_vertex: &[DVec3], by_landmark: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
+    /// The vector-Jacobian product of [`Solid::centred`], like that of
+    /// [`Solid::pull_placed`]: by vertices and landmarks.
+    pub fn pull_centred(
+        &self,
+        fit: bool,
+        by_vertex: &[DVec3],
+        by_landmark: &[DVec3],
+    ) -> (Vec<DVec3>, Vec<DVec3>) {
         let Some(b) = self.bounds() else { return (by_vertex.to_vec(), by_landmark.to_vec()) };
         let (size, centre) = (b.size(), b.centre());
         let half = 0.5 * size.max_element();
@@ -308,14 +352,20 @@ impl Solid {
         if !by.is_finite() {
             return (by_vertex.to_vec(), by_landmark.to_vec());
         }
-        let PlacedGradient { linear, shift, mut vertices, landmarks } = self.pull_placed(by, by_vertex, by_landmark);
+        let PlacedGradient { linear, shift, mut vertices, landmarks } =
+            self.pull_placed(by, by_vertex, by_landmark);
         vertices.resize(self.vertex_count(), DVec3::ZERO);
         let by_centre = shift * -scale;
         // By half the longest edge, through the scale.
         let trace = linear.x_axis.x + linear.y_axis.y + linear.z_axis.z;
-        let by_half = if scale == 1.0 / half && fit { (shift.dot(centre) - trace) * scale * scale } else { 0.0 };
+        let by_half = if scale == 1.0 / half && fit {
+            (shift.dot(centre) - trace) * scale * scale
+        } else {
+            0.0
+        };
         for axis in 0..3 {
-            let longest = size[axis] == size.max_element() && (0..axis).all(|a| size[a] < size[axis]);
+            let longest =
+                size[axis] == size.max_element() && (0..axis).all(|a| size[a] < size[axis]);
             let by_half = if longest { 0.5 * by_half } else { 0.0 };
             for (end, sign) in [(b.max[axis], 1.0), (b.min[axis], -1.0)] {
                 // The first vertex at that side of the box.
@@ -327,8 +377,9 @@ impl Solid {
         (vertices, landmarks)
     }
 
-    /// One mesh in world coordinates, for export: the same faces, normals and creases as its members, in order. Where a
-    /// placement squashes faces flat, the mesh is built anew from what is left.
+    /// One mesh in world coordinates, for export: the same faces, normals and creases as
+    /// its members, in order. Where a placement squashes faces flat, the mesh is built
+    /// anew from what is left.
     ///
     /// # Errors
     /// As [`Mesh::new`].
@@ -346,7 +397,8 @@ impl Solid {
             let turn = i.affine.normal_matrix();
             // Squashed onto a point along a line, normals have no image; any one will do.
             let normal = |n: &glam::Vec3| (turn * n.as_dvec3()).normalize_or(DVec3::Y).as_vec3();
-            positions.extend(i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3()).as_vec3()));
+            positions
+                .extend(i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3()).as_vec3()));
             normals.extend(i.mesh.normals.iter().map(normal));
             let mirrored = i.affine.is_mirrored();
             t.triangles.extend(i.mesh.topology.triangles.iter().map(|face| {
@@ -354,7 +406,9 @@ impl Solid {
                 if mirrored { [a, c, b] } else { [a, b, c] }
             }));
             let last_part = (MOST_PARTS - 1) as u16;
-            t.parts.extend(i.mesh.topology.parts.iter().map(|p| p.saturating_add(i.first_part).min(last_part)));
+            t.parts.extend(
+                i.mesh.topology.parts.iter().map(|p| p.saturating_add(i.first_part).min(last_part)),
+            );
             edges.extend(i.mesh.topology.edges.iter().map(|e| {
                 let [a, b] = e.vertices.map(|v| v + first);
                 let faces = e.faces.map(|f| if f == NO_FACE { NO_FACE } else { f + first_face });
@@ -365,7 +419,9 @@ impl Solid {
         t.part_count = self.part_count();
         for i in self.instances.iter() {
             let first = usize::from(i.first_part);
-            for (k, name) in i.mesh.topology.part_names.iter().enumerate().filter(|(_, n)| !n.is_empty()) {
+            for (k, name) in
+                i.mesh.topology.part_names.iter().enumerate().filter(|(_, n)| !n.is_empty())
+            {
                 let at = (first + k).min(MOST_PARTS - 1);
                 t.part_names.resize(t.part_names.len().max(at + 1), Arc::from(""));
                 t.part_names[at] = Arc::clone(name);
@@ -376,7 +432,10 @@ impl Solid {
             (p[1] - p[0]).cross(p[2] - p[0]).length_squared() > 0.0
         };
         // Also false where a coordinate is not finite, which `Mesh::new` then names.
-        if t.triangles.is_empty() || !t.triangles.iter().all(whole) || !positions.iter().all(|p| p.is_finite()) {
+        if t.triangles.is_empty()
+            || !t.triangles.iter().all(whole)
+            || !positions.iter().all(|p| p.is_finite())
+        {
             let mut mesh = Mesh::new(positions, t.triangles, t.parts)?;
             Arc::make_mut(&mut mesh.topology).part_names = t.part_names;
             return Ok(mesh);
@@ -419,8 +478,15 @@ mod tests {
         assert!(after.centre().length() < 1e-12 && (after.size() - before.size()).length() < 1e-12);
         assert!(Solid::group(&[]).centred(true).bounds().is_none());
         for scale in [0.0, 1e-320, 1e308] {
-            let extreme = block(DVec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(scale)));
-            assert!(extreme.centred(true).instances().iter().all(|i| i.affine.is_finite()), "{scale}");
+            let extreme = block(DVec3::ONE).placed(Affine::new(
+                DVec3::ZERO,
+                DVec3::ZERO,
+                DVec3::splat(scale),
+            ));
+            assert!(
+                extreme.centred(true).instances().iter().all(|i| i.affine.is_finite()),
+                "{scale}"
+            );
         }
     }
 
@@ -428,15 +494,23 @@ mod tests {
     fn landmarks_go_where_their_solid_goes() {
         let at = |name: &str, position| Landmark { name: Arc::from(name), position };
         let tip = DVec3::new(0.0, 2.0, 0.0);
-        let arm = block(DVec3::new(1.0, 4.0, 1.0)).with_landmarks([at("elbow", DVec3::ZERO), at("hand", tip)]);
-        let turned = Affine::new(DVec3::X, DVec3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2), DVec3::splat(3.0));
+        let arm = block(DVec3::new(1.0, 4.0, 1.0))
+            .with_landmarks([at("elbow", DVec3::ZERO), at("hand", tip)]);
+        let turned = Affine::new(
+            DVec3::X,
+            DVec3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2),
+            DVec3::splat(3.0),
+        );
         let two = Solid::group(&[arm.clone(), arm.placed(turned), block(DVec3::ONE)]);
         let names: Vec<&str> = two.landmarks().iter().map(|l| &*l.name).collect();
         assert_eq!(names, ["elbow", "hand", "elbow#2", "hand#2"]);
         assert!((two.landmarks()[3].position - DVec3::new(-5.0, 0.0, 0.0)).length() < 1e-12);
         let lifted = arm.placed(Affine::new(DVec3::Y, DVec3::ZERO, DVec3::ONE));
         let fit = lifted.centred(true);
-        assert!((fit.landmarks()[1].position - DVec3::Y).length() < 1e-6, "half the longest edge is 1 now");
+        assert!(
+            (fit.landmarks()[1].position - DVec3::Y).length() < 1e-6,
+            "half the longest edge is 1 now"
+        );
         assert!(fit.landmarks()[0].position.length() < 1e-6);
         assert!(block(DVec3::ONE).landmarks().is_empty());
     }
@@ -446,11 +520,17 @@ mod tests {
         let b = block(DVec3::ONE);
         let inner = Solid::group(&[b.clone(), b.clone()]);
         let outer = Solid::group(&[b.clone(), inner.clone(), inner]);
-        assert_eq!(outer.instances().iter().map(|i| i.first_part).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+        assert_eq!(
+            outer.instances().iter().map(|i| i.first_part).collect::<Vec<_>>(),
+            [0, 1, 2, 3, 4]
+        );
         let far = (0..17).fold(b, |s, _| Solid::group(&[s.clone(), s]));
         assert_eq!(far.part_count(), u16::MAX, "numbers end there");
         let m = far.to_mesh().unwrap();
-        assert_eq!((m.topology.triangles.len(), m.topology.parts.iter().max()), (12 << 17, Some(&65534)));
+        assert_eq!(
+            (m.topology.triangles.len(), m.topology.parts.iter().max()),
+            (12 << 17, Some(&65534))
+        );
     }
 
     #[test]
@@ -472,13 +552,18 @@ mod tests {
         }
         for e in t.edges.iter() {
             let face = t.triangles[e.faces[0] as usize];
-            assert!((0..3).any(|c| e.vertices == [face[c], face[(c + 1) % 3]]), "as the first face runs");
+            assert!(
+                (0..3).any(|c| e.vertices == [face[c], face[(c + 1) % 3]]),
+                "as the first face runs"
+            );
         }
     }
 
     #[test]
     fn squashed_and_endless_solids() {
-        let flat = |y: f64| block(DVec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, y, 1.0)));
+        let flat = |y: f64| {
+            block(DVec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, y, 1.0)))
+        };
         assert_eq!(flat(0.0).to_mesh().unwrap().topology.triangles.len(), 4, "the sides are gone");
         assert!(flat(1e300).to_mesh().unwrap_err().to_string().contains("not finite"));
         assert!(Solid::group(&[]).to_mesh().is_err());

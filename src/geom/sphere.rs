@@ -1,4 +1,5 @@
-//! Spheres, as meridians and rings; not subdivided solids. Invariant: every normal is the exact one of the sphere.
+//! Spheres, as meridians and rings; not subdivided solids. Invariant: every normal is the
+//! exact one of the sphere.
 
 use super::detail::{Detail, Turned};
 use super::lathe::SMALLEST;
@@ -27,7 +28,9 @@ impl Solid {
 /// The mesh, and what it was made of.
 fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
     if !(SMALLEST..=1e6).contains(&radius) {
-        return Err(GeomError::domain(format!("sphere: the radius must be from 1e-30 to 1e6, got {radius}")));
+        return Err(GeomError::domain(format!(
+            "sphere: the radius must be from 1e-30 to 1e6, got {radius}"
+        )));
     }
     if !(4..=1024).contains(&sides) {
         return Err(GeomError::domain(format!("sphere: 4 to 1024 sides, got {sides}")));
@@ -47,7 +50,8 @@ fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
     Ok((mesh, Turned::new(strips, sides, false, 1)))
 }
 
-/// From the derivatives of something by the vertices of a sphere of this radius to that by the radius.
+/// From the derivatives of something by the vertices of a sphere of this radius to that
+/// by the radius.
 pub fn pull_sphere(radius: f64, mesh: &Mesh, by_vertex: &[DVec3]) -> f64 {
     mesh.positions.iter().zip(by_vertex).map(|(p, g)| p.as_dvec3().dot(*g)).sum::<f64>() / radius
 }
@@ -64,8 +68,11 @@ mod tests {
             assert!((*p / 2.0 - *n).length() < 2e-7, "{p} {n}");
         }
         assert!(s.topology.edges.iter().all(|e| !e.crease && e.faces[1] != crate::geom::NO_FACE));
-        let poles = s.normals.iter().filter(|n| n.x == 0.0 && n.z == 0.0).map(|n| n.y).collect::<Vec<_>>();
+        let poles =
+            s.normals.iter().filter(|n| n.x == 0.0 && n.z == 0.0).map(|n| n.y).collect::<Vec<_>>();
         assert_eq!(poles, [-1.0, 1.0]);
-        assert!(sphere(0.0, 32).is_err() && sphere(f64::NAN, 32).is_err() && sphere(1.0, 3).is_err());
+        assert!(
+            sphere(0.0, 32).is_err() && sphere(f64::NAN, 32).is_err() && sphere(1.0, 3).is_err()
+        );
     }
 }

@@ -3,7 +3,8 @@
 use crate::dist::{Datum, Distribution, Gradient, Support};
 use crate::rng::Stream;
 
-/// A distribution whose log density is never NaN: where it would be, the value is impossible.
+/// A distribution whose log density is never NaN: where it would be, the value is
+/// impossible.
 #[derive(Debug)]
 pub(super) struct Checked<D>(pub D);
 

@@ -12,9 +12,11 @@ use crate::syntax::{is_keyword, is_name};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// One thing that a host brings: a function, a family of distributions or likelihoods, a kernel. Arguments are told in their order.
+/// One thing that a host brings: a function, a family of distributions or likelihoods, a
+/// kernel. Arguments are told in their order.
 ///
-/// Closures are called from several threads at once, and must give the same for the same arguments, to the last bit.
+/// Closures are called from several threads at once, and must give the same for the same
+/// arguments, to the last bit.
 #[derive(Clone)]
 pub struct Entry {
     pub(super) builtin: Builtin,
@@ -24,7 +26,12 @@ pub struct Entry {
 }
 
 impl Entry {
-    fn new(name: impl Into<Cow<'static, str>>, section: &'static str, returns: Type, foreign: Foreign) -> Entry {
+    fn new(
+        name: impl Into<Cow<'static, str>>,
+        section: &'static str,
+        returns: Type,
+        foreign: Foreign,
+    ) -> Entry {
         let (kind, derivative) = foreign.entry();
         let builtin = Builtin {
             name: name.into(),
@@ -67,11 +74,14 @@ impl Entry {
         Entry::new(name, HOST, Type::Any, Foreign::Function { call: Arc::new(call), pull: None })
     }
 
-    /// A function that can go on from an earlier evaluation, and what it then keeps for the next one.
+    /// A function that can go on from an earlier evaluation, and what it then keeps for
+    /// the next one.
     ///
-    /// It must give what it gives from scratch (`None`), bit for bit: an earlier evaluation saves work and nothing else. What it
-    /// keeps belongs to the place in the program where it is called and to the state of the trace: a rejected proposal goes back
-    /// to what was kept before it, forks of a trace share it, and it is never changed, so a large one had better share what stays the same.
+    /// It must give what it gives from scratch (`None`), bit for bit: an earlier
+    /// evaluation saves work and nothing else. What it keeps belongs to the place in the
+    /// program where it is called and to the state of the trace: a rejected proposal goes
+    /// back to what was kept before it, forks of a trace share it, and it is never
+    /// changed, so a large one had better share what stays the same.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Fault, Host, Previous, Type};
@@ -108,7 +118,10 @@ impl Entry {
     /// ```
     pub fn incremental<S: Send + Sync + 'static>(
         name: impl Into<Cow<'static, str>>,
-        call: impl Fn(&Args, Option<Previous<'_, S>>) -> Result<(Value, S), Fault> + Send + Sync + 'static,
+        call: impl Fn(&Args, Option<Previous<'_, S>>) -> Result<(Value, S), Fault>
+        + Send
+        + Sync
+        + 'static,
     ) -> Entry {
         let call = move |a: &Args, before: Option<&Before>| {
             let previous = before.and_then(Previous::new);
@@ -117,9 +130,12 @@ impl Entry {
         Entry::new(name, HOST, Type::Any, Foreign::Incremental { call: Arc::new(call), pull: None })
     }
 
-    /// A family of distributions: from its parameters to one of them. A parameter outside its domain is a [`Fault::domain`].
+    /// A family of distributions: from its parameters to one of them. A parameter outside
+    /// its domain is a [`Fault::domain`].
     ///
-    /// A value whose log density is NaN counts as impossible. [`Gradient::params`](crate::host::Gradient) are by the numbers in the arguments, one after the other.
+    /// A value whose log density is NaN counts as impossible.
+    /// [`Gradient::params`](crate::host::Gradient) are by the numbers in the arguments,
+    /// one after the other.
     pub fn distribution<D: Distribution + 'static>(
         name: impl Into<Cow<'static, str>>,
         make: impl Fn(&Args) -> Result<D, Fault> + Send + Sync + 'static,
@@ -128,8 +144,9 @@ impl Entry {
         Entry::new(name, "Distributions", Type::Dist, Foreign::Family(Arc::new(make)))
     }
 
-    /// A family of likelihoods: from its arguments to one of them, which scores what is observed. A comparator is one whose
-    /// argument is a view (see [`Seen`](crate::host::Seen)).
+    /// A family of likelihoods: from its arguments to one of them, which scores what is
+    /// observed. A comparator is one whose argument is a view (see
+    /// [`Seen`](crate::host::Seen)).
     ///
     /// [`Likelihood::gradient`] is a list: the adjoint of each argument in turn.
     pub fn likelihood<L: Likelihood + 'static>(
@@ -140,7 +157,8 @@ impl Entry {
         Entry::new(name, "Comparing", Type::Likelihood, Foreign::Likelihood(Arc::new(make)))
     }
 
-    /// A kernel for `infer` blocks: from the call as written to what moves the trace. Each chain makes its own.
+    /// A kernel for `infer` blocks: from the call as written to what moves the trace.
+    /// Each chain makes its own.
     pub fn kernel<K: Kernel + 'static>(
         name: impl Into<Cow<'static, str>>,
         make: impl Fn(&mut KernelCall) -> Result<K, Fault> + Send + Sync + 'static,
@@ -151,7 +169,12 @@ impl Entry {
 
     /// One more argument, which must be given.
     #[must_use]
-    pub fn argument(self, name: impl Into<Cow<'static, str>>, ty: Type, about: impl Into<Cow<'static, str>>) -> Entry {
+    pub fn argument(
+        self,
+        name: impl Into<Cow<'static, str>>,
+        ty: Type,
+        about: impl Into<Cow<'static, str>>,
+    ) -> Entry {
         let (name, doc) = (name.into(), about.into());
         self.push(Argument { name, ty, unit: "".into(), default: None, value: Value::Unit, doc })
     }
@@ -166,7 +189,14 @@ impl Entry {
         about: impl Into<Cow<'static, str>>,
     ) -> Entry {
         let (name, doc, value) = (name.into(), about.into(), default.into());
-        self.push(Argument { name, ty, unit: "".into(), default: Some(value.to_string().into()), value, doc })
+        self.push(Argument {
+            name,
+            ty,
+            unit: "".into(),
+            default: Some(value.to_string().into()),
+            value,
+            doc,
+        })
     }
 
     /// The unit of the argument told last.
@@ -202,19 +232,22 @@ impl Entry {
         self
     }
 
-    /// The vector-Jacobian product of a function: from its arguments, its result and the result's adjoint to the adjoints of the
-    /// arguments in order; `None` where it is not known. Those left out at the end are zero.
+    /// The vector-Jacobian product of a function: from its arguments, its result and the
+    /// result's adjoint to the adjoints of the arguments in order; `None` where it is not
+    /// known. Those left out at the end are zero.
     #[must_use]
     pub fn gradient(
         mut self,
         product: impl Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync + 'static,
     ) -> Entry {
         match &mut self.builtin.foreign {
-            Some(Foreign::Function { pull, .. } | Foreign::Incremental { pull, .. }) => *pull = Some(Arc::new(product)),
-            _ => {
-                self.wrong =
-                    Some("only functions take a gradient; distributions and likelihoods define their own".into())
+            Some(Foreign::Function { pull, .. } | Foreign::Incremental { pull, .. }) => {
+                *pull = Some(Arc::new(product))
             }
+            _ => self.wrong = Some(
+                "only functions take a gradient; distributions and likelihoods define their own"
+                    .into(),
+            ),
         }
         if let Some(f) = &self.builtin.foreign {
             self.builtin.derivative = f.entry().1;
@@ -226,7 +259,9 @@ impl Entry {
     #[must_use]
     pub fn flat(mut self) -> Entry {
         match &self.builtin.foreign {
-            Some(Foreign::Function { .. } | Foreign::Incremental { .. }) => self.builtin.derivative = Derivative::Zero,
+            Some(Foreign::Function { .. } | Foreign::Incremental { .. }) => {
+                self.builtin.derivative = Derivative::Zero
+            }
             _ => self.wrong = Some("only functions can be flat".into()),
         }
         self
@@ -268,7 +303,9 @@ impl Entry {
                 wrong.push(format!("`{name}` has two arguments `{own}`"));
             }
             if a.default.is_none() && before.iter().any(|b| b.default.is_some()) {
-                wrong.push(format!("`{name}`: the required argument `{own}` must come before the optional ones"));
+                wrong.push(format!(
+                    "`{name}`: the required argument `{own}` must come before the optional ones"
+                ));
             }
         }
         wrong

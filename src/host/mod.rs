@@ -1,7 +1,9 @@
-//! What a host program brings to the language: functions, distributions, likelihoods and kernels under names of their own.
+//! What a host program brings to the language: functions, distributions, likelihoods and
+//! kernels under names of their own.
 //!
-//! A [`Host`] is a list of [`Entry`]s. They go into the one table of built-ins, so static checks, error messages, completion and
-//! `doc` know them as they know the language's own.
+//! A [`Host`] is a list of [`Entry`]s. They go into the one table of built-ins, so static
+//! checks, error messages, completion and `doc` know them as they know the language's
+//! own.
 //!
 //! ```
 //! use pcadlang::host::{Adjoint, Entry, Host, Type};
@@ -74,7 +76,8 @@ impl Host {
         self
     }
 
-    /// What `pcadlang doc` says of a name: the host's own, or the language's. `None` also where an entry is not valid.
+    /// What `pcadlang doc` says of a name: the host's own, or the language's. `None` also
+    /// where an entry is not valid.
     pub fn doc(&self, name: &str) -> Option<String> {
         doc::doc(&*self.table().ok()?, name)
     }
@@ -82,7 +85,8 @@ impl Host {
     /// The built-ins of the language and the host's.
     ///
     /// # Errors
-    /// A name that is none or taken, arguments that cannot be told apart, a gradient of what is no function: all of them.
+    /// A name that is none or taken, arguments that cannot be told apart, a gradient of
+    /// what is no function: all of them.
     pub(crate) fn table(&self) -> Result<Arc<Table>, Error> {
         let own = Table::default();
         let mut diagnostics = Vec::new();
@@ -112,7 +116,9 @@ impl Host {
             e.check_arguments().into_iter().for_each(|message| wrong(message, ""));
         }
         match diagnostics.is_empty() {
-            true => Ok(Arc::new(Table::new(self.entries.iter().map(|e| Builtin::clone(&e.builtin))))),
+            true => {
+                Ok(Arc::new(Table::new(self.entries.iter().map(|e| Builtin::clone(&e.builtin)))))
+            }
             false => Err(Error { diagnostics, sources: SourceMap::new() }),
         }
     }

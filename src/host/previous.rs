@@ -3,7 +3,8 @@
 use crate::lang::builtins::{Args, Before};
 use crate::lang::value::Value;
 
-/// An earlier evaluation of a function of the host: its arguments, its result, what it kept ([`Entry::incremental`](super::Entry::incremental)).
+/// An earlier evaluation of a function of the host: its arguments, its result, what it
+/// kept ([`Entry::incremental`](super::Entry::incremental)).
 #[derive(Clone, Copy, Debug)]
 pub struct Previous<'a, S> {
     before: &'a Before,
@@ -33,7 +34,8 @@ impl<'a, S> Previous<'a, S> {
         self.state
     }
 
-    /// Whether argument `i` is another than it was. What is shared by pointer is told at once, numbers by their bits.
+    /// Whether argument `i` is another than it was. What is shared by pointer is told at
+    /// once, numbers by their bits.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Host, Previous, Type};
@@ -61,7 +63,8 @@ impl<'a, S> Previous<'a, S> {
         !self.argument(i).same(a.get(i))
     }
 
-    /// The elements of argument `i` that are others than they were; `None` if it is no array, or of another length than it was.
+    /// The elements of argument `i` that are others than they were; `None` if it is no
+    /// array, or of another length than it was.
     pub fn changed_elements(&self, a: &Args, i: usize) -> Option<Vec<usize>> {
         let (old, new) = (self.argument(i), a.get(i));
         match (old, new) {

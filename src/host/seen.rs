@@ -8,8 +8,8 @@ use crate::render::View;
 use std::fmt;
 use std::sync::Arc;
 
-/// A solid before a camera (what `scene.render` gives), drawn when asked and once a size. `longer` is the longer side of the picture in
-/// pixels.
+/// A solid before a camera (what `scene.render` gives), drawn when asked and once a size.
+/// `longer` is the longer side of the picture in pixels.
 ///
 /// ```
 /// use pcadlang::host::{Adjoint, Entry, Host, Likelihood, Seen, Type};
@@ -85,12 +85,14 @@ impl Seen {
         self.0.frame(longer).mask().collect()
     }
 
-    /// How far away what each pixel shows is, row by row, in scene units; infinite where it shows nothing.
+    /// How far away what each pixel shows is, row by row, in scene units; infinite where
+    /// it shows nothing.
     pub fn depth(&self, longer: u32) -> Vec<f32> {
         self.0.depth(longer).depth.clone()
     }
 
-    /// The pieces of the contours: x, y and length in pixels, and angle in radians, from right to down.
+    /// The pieces of the contours: x, y and length in pixels, and angle in radians, from
+    /// right to down.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Host, Seen, Type};
@@ -126,7 +128,8 @@ impl Seen {
         by_contours(&self.0, longer, by_piece)
     }
 
-    /// The adjoint of the view, from what each pixel brings that the solid covers: the outline moves, and takes pixels in.
+    /// The adjoint of the view, from what each pixel brings that the solid covers: the
+    /// outline moves, and takes pixels in.
     pub fn by_mask(&self, longer: u32, gains: &[f64]) -> Adjoint {
         by_silhouette(&self.0, longer, gains)
     }

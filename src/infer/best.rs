@@ -1,4 +1,5 @@
-//! The best state of each chain so far, warm-up included: what there is to show of a run, while it goes on and when it has ended.
+//! The best state of each chain so far, warm-up included: what there is to show of a run,
+//! while it goes on and when it has ended.
 
 use super::plan::{Progress, Watch};
 use super::state::{StateError, pack, unpack};
@@ -7,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// States between draws are looked at every so many steps, after the first few: a state costs as much to keep as it has choices.
+/// States between draws are looked at every so many steps, after the first few: a state
+/// costs as much to keep as it has choices.
 const EVERY: u64 = 8;
 
 /// A state worth keeping.
@@ -21,7 +23,8 @@ pub struct BestState {
     pub choices: Vec<(u64, Constraint)>,
 }
 
-/// Keeps the best state of each chain; [`Progress::best`] is kept up to date as well. The chains' draws stay as they are.
+/// Keeps the best state of each chain; [`Progress::best`] is kept up to date as well. The
+/// chains' draws stay as they are.
 #[derive(Debug)]
 pub struct BestSoFar {
     chains: Vec<Mutex<Option<Arc<BestState>>>>,
@@ -61,10 +64,16 @@ impl BestSoFar {
     }
 
     fn keep(&self, chain: usize, state: BestState) {
-        let (Some(cell), Some(known)) = (self.chains.get(chain), self.known.get(chain)) else { return };
+        let (Some(cell), Some(known)) = (self.chains.get(chain), self.known.get(chain)) else {
+            return;
+        };
         known.store(state.log_joint.to_bits(), Ordering::Relaxed);
         *cell.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(state));
-        let best = self.known.iter().map(|k| f64::from_bits(k.load(Ordering::Relaxed))).fold(f64::MIN, f64::max);
+        let best = self
+            .known
+            .iter()
+            .map(|k| f64::from_bits(k.load(Ordering::Relaxed)))
+            .fold(f64::MIN, f64::max);
         self.progress.best.store(best.to_bits(), Ordering::Relaxed);
     }
 }
@@ -121,7 +130,9 @@ mod tests {
     }
 
     fn model_density(x: f64) -> f64 {
-        let normal = |z: f64, sd: f64| -0.5 * (z / sd) * (z / sd) - sd.ln() - 0.5 * std::f64::consts::TAU.ln();
+        let normal = |z: f64, sd: f64| {
+            -0.5 * (z / sd) * (z / sd) - sd.ln() - 0.5 * std::f64::consts::TAU.ln()
+        };
         normal(x, 1.0) + normal(1.0 - x, 0.1)
     }
 }

@@ -4,7 +4,8 @@ use super::expr::{Scope, evaluate};
 use super::foreign::build_foreign;
 use super::kernel::{self, Kernel};
 use super::kernels::{
-    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Modes, Nuts, Optimize, Own, Slice, Smc, Temper,
+    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Modes, Nuts, Optimize,
+    Own, Slice, Smc, Temper,
 };
 use super::plan::banks::neighbours;
 use super::plan::{RunOptions, argument, call};
@@ -18,8 +19,8 @@ use crate::syntax::span::Span;
 use crate::trace::Selector;
 use std::sync::Arc;
 
-/// A kernel, and what tells it from others: calls written alike that mean the same choices are one kernel, so that what is
-/// learnt in a warm-up serves the loops after it.
+/// A kernel, and what tells it from others: calls written alike that mean the same
+/// choices are one kernel, so that what is learnt in a warm-up serves the loops after it.
 pub(super) struct Built {
     pub kernel: Box<dyn Kernel>,
     pub signature: String,
@@ -52,7 +53,8 @@ pub(super) fn build(
         return build_foreign(e, (b, maker), args, frozen, options, env);
     }
     if known.is_some_and(|b| b.is_planned()) {
-        let mut e = fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
+        let mut e =
+            fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
         e.hint = Some(format!("available kernels: {AVAILABLE}"));
         return Err(e);
     }
@@ -89,8 +91,9 @@ pub(super) fn build(
     if name == "abc" {
         let inner = build(&first.value, frozen, options, env)?;
         let eps = positive(argument(args, 1, "eps"), name, "eps", env)?;
-        let eps =
-            eps.ok_or_else(|| fail(e.span, "abc needs the tolerance `eps`, the largest accepted distance".into()))?;
+        let eps = eps.ok_or_else(|| {
+            fail(e.span, "abc needs the tolerance `eps`, the largest accepted distance".into())
+        })?;
         let Some(particles) = argument(args, 2, "particles") else {
             let signature = format!("abc({}, {eps})", inner.signature);
             return Ok(Built { kernel: Box::new(Abc::new(inner.kernel, eps, e.span)), signature });
@@ -98,7 +101,8 @@ pub(super) fn build(
         let particles = whole(Some(particles), "particles", 100, 2, 1_000_000, env)?;
         let moves = whole(argument(args, 3, "moves"), "moves", 1, 1, 10_000, env)?;
         let signature = format!("abc({}, {eps}, {particles}, {moves})", inner.signature);
-        let kernel = AbcSmc::new(inner.kernel, eps, (particles as usize, moves), frozen.clone(), e.span);
+        let kernel =
+            AbcSmc::new(inner.kernel, eps, (particles as usize, moves), frozen.clone(), e.span);
         return Ok(Built { kernel: Box::new(kernel), signature });
     }
     let mut scope = scope(&first.value, env)?;
@@ -124,30 +128,41 @@ pub(super) fn build(
             Box::new(Nuts::new(scope, depth).summing_out(marginal(args, 2, frozen, env)?))
         }
         "knn" => Box::new(Knn::new(scope, neighbours(e, args, options, env)?)),
-        "drift" => Box::new(Drift::new(scope, positive(argument(args, 1, "scale"), name, "scale", env)?)),
+        "drift" => {
+            Box::new(Drift::new(scope, positive(argument(args, 1, "scale"), name, "scale", env)?))
+        }
         "slice" => {
             let width = positive(argument(args, 1, "width"), name, "width", env)?;
-            Box::new(Slice::new(scope, width, truth(argument(args, 2, "doubling"), "doubling", env)?))
+            Box::new(Slice::new(
+                scope,
+                width,
+                truth(argument(args, 2, "doubling"), "doubling", env)?,
+            ))
         }
-        "optimize" => {
-            Box::new(Optimize::new(scope, whole(argument(args, 1, "steps"), "steps", 100, 1, 1_000_000, env)?))
-        }
+        "optimize" => Box::new(Optimize::new(
+            scope,
+            whole(argument(args, 1, "steps"), "steps", 100, 1, 1_000_000, env)?,
+        )),
         "modes" => {
             let tries = whole(argument(args, 1, "tries"), "tries", 200, 1, 1_000_000, env)?;
             let keep = whole(argument(args, 2, "keep"), "keep", 16, 1, 1000, env)?;
             let steps = whole(argument(args, 3, "steps"), "steps", 60, 1, 1_000_000, env)?;
             let first = argument(args, 4, "first").map(|e| self::scope(e, env)).transpose()?;
             let first = first.map(|s| kernel::Scope { selector: without(s.selector, frozen), ..s });
-            let coarse = argument(args, 5, "at").map_or(Ok(Selector::Nothing), |e| selector(e, env))?;
-            Box::new(Modes::new(scope, tries, keep, steps).climbing_first(first).by_surrogates_of(coarse))
+            let coarse =
+                argument(args, 5, "at").map_or(Ok(Selector::Nothing), |e| selector(e, env))?;
+            Box::new(
+                Modes::new(scope, tries, keep, steps)
+                    .climbing_first(first)
+                    .by_surrogates_of(coarse),
+            )
         }
         _ => return Err(fail(e.span, format!("`{name}` is not a kernel"))),
     };
     Ok(Built { kernel, signature })
 }
 
-const AVAILABLE: &str =
-    "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, modes, optimize";
+const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, modes, optimize";
 
 pub(super) fn without(selector: Selector, frozen: &Selector) -> Selector {
     match frozen {
@@ -157,7 +172,12 @@ pub(super) fn without(selector: Selector, frozen: &Selector) -> Selector {
 }
 
 /// The finite choices that a kernel sums out.
-fn marginal(args: &[Arg], place: usize, frozen: &Selector, env: &mut Scope) -> Result<Selector, Box<RunError>> {
+fn marginal(
+    args: &[Arg],
+    place: usize,
+    frozen: &Selector,
+    env: &mut Scope,
+) -> Result<Selector, Box<RunError>> {
     let Some(e) = argument(args, place, "marginal") else { return Ok(Selector::Nothing) };
     Ok(without(selector(e, env)?, frozen))
 }
@@ -174,14 +194,20 @@ pub(super) fn arguments(
 ) -> Result<Vec<(Arc<str>, Value)>, Box<RunError>> {
     let one = |(i, p): (usize, &Param)| {
         let given = argument(args, i, &p.name.node).or(p.default.as_ref());
-        let given = given.ok_or_else(|| fail(call, format!("the argument `{}` is missing", p.name.node)))?;
+        let given = given
+            .ok_or_else(|| fail(call, format!("the argument `{}` is missing", p.name.node)))?;
         Ok((Arc::clone(&p.name.node), evaluate(given, env)?))
     };
     k.params.iter().enumerate().map(one).collect()
 }
 
 /// A positive number that a kernel takes besides its selection, if it is given.
-fn positive(e: Option<&Expr>, kernel: &str, name: &str, env: &mut Scope) -> Result<Option<f64>, Box<RunError>> {
+fn positive(
+    e: Option<&Expr>,
+    kernel: &str,
+    name: &str,
+    env: &mut Scope,
+) -> Result<Option<f64>, Box<RunError>> {
     let Some(e) = e else { return Ok(None) };
     match evaluate(e, env)? {
         Value::Num(s) if s > 0.0 => Ok(Some(s)),
@@ -209,8 +235,13 @@ fn whole(
 ) -> Result<u32, Box<RunError>> {
     let Some(e) = e else { return Ok(default) };
     match evaluate(e, env)? {
-        Value::Num(x) if x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x) => Ok(x as u32),
-        v => Err(fail(e.span, format!("`{name}` must be a whole number from {least} to {most}, got {v}"))),
+        Value::Num(x) if x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x) => {
+            Ok(x as u32)
+        }
+        v => Err(fail(
+            e.span,
+            format!("`{name}` must be a whole number from {least} to {most}, got {v}"),
+        )),
     }
 }
 

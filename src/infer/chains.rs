@@ -1,4 +1,5 @@
-//! Chains side by side: each has its own streams, so the number of threads changes nothing but the time.
+//! Chains side by side: each has its own streams, so the number of threads changes
+//! nothing but the time.
 
 use super::draws::Sink;
 use super::init::draw_once;
@@ -10,9 +11,9 @@ use crate::trace::Limits;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Runs chains `0 .. chains` of a plan; `sinks` has one sink a chain. All chains run to their end even if one fails. A limit
-/// of time is for all of them together: with more chains than threads each gets its share of what is left once the data are
-/// ready.
+/// Runs chains `0 .. chains` of a plan; `sinks` has one sink a chain. All chains run to
+/// their end even if one fails. A limit of time is for all of them together: with more
+/// chains than threads each gets its share of what is left once the data are ready.
 pub fn run_chains(
     code: &Arc<Code>,
     plan: &[KStmt],
@@ -24,20 +25,26 @@ pub fn run_chains(
     let rounds = sinks.len().div_ceil(threads.max(1)).max(1) as u32;
     let time = options.time.map(|t| share(code, options, t, rounds));
     let options = &RunOptions { time, ..options.clone() };
-    let run =
-        |(chain, mut sink): (usize, Box<dyn Sink>)| run_chain(code, plan, options, progress, &mut *sink, chain as u32);
+    let run = |(chain, mut sink): (usize, Box<dyn Sink>)| {
+        run_chain(code, plan, options, progress, &mut *sink, chain as u32)
+    };
     let work: Vec<_> = sinks.into_iter().enumerate().collect();
     in_parallel(threads, work, run)
 }
 
-/// The time of each of so many rounds of chains. What is worked out once, such as the people in a photograph, is so before the
-/// chains begin, or else the first of each thread would pay for it and have less time than those after it.
+/// The time of each of so many rounds of chains. What is worked out once, such as the
+/// people in a photograph, is so before the chains begin, or else the first of each
+/// thread would pay for it and have less time than those after it.
 fn share(code: &Arc<Code>, options: &RunOptions, time: Duration, rounds: u32) -> Duration {
     if rounds == 1 {
         return time;
     }
     let begun = Instant::now();
     let limits = options.limits.clone();
-    draw_once(code, options.seed, Limits { stop: limits.stop.clone().or_within(Some(time)), ..limits });
+    draw_once(
+        code,
+        options.seed,
+        Limits { stop: limits.stop.clone().or_within(Some(time)), ..limits },
+    );
     time.saturating_sub(begun.elapsed()) / rounds
 }

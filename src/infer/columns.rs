@@ -1,4 +1,5 @@
-//! The columns of recorded draws: names and shapes, and how draws with fewer columns fit among those with more.
+//! The columns of recorded draws: names and shapes, and how draws with fewer columns fit
+//! among those with more.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
@@ -55,7 +56,8 @@ pub fn width(columns: &[Column]) -> usize {
     columns.iter().map(|c| c.shape.len()).sum()
 }
 
-/// The columns of two lists, those of the first in their order and then the others. Of columns with one name the longer is taken.
+/// The columns of two lists, those of the first in their order and then the others. Of
+/// columns with one name the longer is taken.
 pub fn merged(a: &[Column], b: &[Column]) -> Vec<Column> {
     let mut all: IndexMap<&str, Shape> = IndexMap::new();
     for c in a.iter().chain(b) {
@@ -94,7 +96,8 @@ impl Layout {
 
     /// The row in the other columns; NaN where it has nothing.
     pub fn apply(&self, values: &[f64]) -> Vec<f64> {
-        let value = |from: &Option<usize>| from.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN);
+        let value =
+            |from: &Option<usize>| from.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN);
         self.0.iter().map(value).collect()
     }
 }
@@ -108,7 +111,12 @@ mod tests {
         let few = [Column::scalar("a"), Column::vector("w", 2), Column::vector("e", 0)];
         let more = [Column::vector("w", 3), Column::scalar("z"), Column::vector("e", 1)];
         let all = merged(&few, &more);
-        let wanted = [Column::scalar("a"), Column::vector("w", 3), Column::vector("e", 1), Column::scalar("z")];
+        let wanted = [
+            Column::scalar("a"),
+            Column::vector("w", 3),
+            Column::vector("e", 1),
+            Column::scalar("z"),
+        ];
         assert_eq!(all, wanted);
         let row = Layout::new(&few, &all).apply(&[1.0, 2.0, 3.0]);
         assert_eq!((&row[..3], row.len()), (&[1.0, 2.0, 3.0][..], 6));
@@ -117,6 +125,9 @@ mod tests {
         assert!(row[0].is_nan() && row[1..] == [5.0, 6.0, 7.0, 9.0, 8.0]);
         assert!(Layout::new(&all, &all).is_same(6) && !Layout::new(&all, &few).is_same(6));
         // A number that is a list in other draws is its first element.
-        assert_eq!(merged(&[Column::scalar("x")], &[Column::vector("x", 1)]), [Column::vector("x", 1)]);
+        assert_eq!(
+            merged(&[Column::scalar("x")], &[Column::vector("x", 1)]),
+            [Column::vector("x", 1)]
+        );
     }
 }

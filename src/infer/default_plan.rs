@@ -1,12 +1,14 @@
-//! The plan of a program without an `infer` block, chosen by the kinds of its choices and printed so that it can be copied.
+//! The plan of a program without an `infer` block, chosen by the kinds of its choices and
+//! printed so that it can be copied.
 
 use crate::trace::{ChoiceKind, Selector, Trace};
 
-/// The plan for a program, as program text, by the choices that some draws from its prior make: another draw may ask for
-/// choices that the first does not.
+/// The plan for a program, as program text, by the choices that some draws from its prior
+/// make: another draw may ask for choices that the first does not.
 ///
-/// Where the density has a gradient, `nuts` moves all continuous choices together and a sweep of `gibbs` the finite ones; the
-/// rest is left to kernels that need no slope. `nuts` and sweeps stay within one structure: where that depends on choices of theirs,
+/// Where the density has a gradient, `nuts` moves all continuous choices together and a
+/// sweep of `gibbs` the finite ones; the rest is left to kernels that need no slope.
+/// `nuts` and sweeps stay within one structure: where that depends on choices of theirs,
 /// kernels that take one at a time change it.
 pub fn default_plan(draws: &mut [Trace]) -> String {
     let mut count = |kind| {
@@ -23,7 +25,8 @@ pub fn default_plan(draws: &mut [Trace]) -> String {
     }
     if continuous > 0 && draws.iter_mut().all(has_gradient) {
         let depends = |kind| draws.iter().any(|t: &Trace| t.structure_depends_on(kind));
-        let (on_continuous, on_finite) = (depends(ChoiceKind::Continuous), depends(ChoiceKind::Finite));
+        let (on_continuous, on_finite) =
+            (depends(ChoiceKind::Continuous), depends(ChoiceKind::Finite));
         with_gradient(finite, discrete, on_continuous, on_finite)
     } else {
         without_gradient(continuous, discrete, finite, gaussian)
@@ -57,7 +60,9 @@ fn with_gradient(finite: usize, discrete: usize, on_continuous: bool, on_finite:
             unbounded.min(50)
         );
     }
-    format!("infer {{\n  init(best_of(20));\n  warmup 1000 {{{pass} }}\n  repeat 1000 {{{pass} }}\n}}\n")
+    format!(
+        "infer {{\n  init(best_of(20));\n  warmup 1000 {{{pass} }}\n  repeat 1000 {{{pass} }}\n}}\n"
+    )
 }
 
 fn without_gradient(continuous: usize, discrete: usize, finite: usize, gaussian: usize) -> String {
@@ -70,7 +75,10 @@ fn without_gradient(continuous: usize, discrete: usize, finite: usize, gaussian:
         arms.push((0.5, "mh(one($continuous))"));
     }
     if gaussian > 0 {
-        arms.push((1.5, if gaussian > 1 { "elliptical(one($gaussian))" } else { "elliptical($gaussian)" }));
+        arms.push((
+            1.5,
+            if gaussian > 1 { "elliptical(one($gaussian))" } else { "elliptical($gaussian)" },
+        ));
         if gaussian > 1 {
             arms.push((1.0, "elliptical($gaussian)"));
         }

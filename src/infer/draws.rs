@@ -1,7 +1,8 @@
 //! What inference hands out: draws, one row at a time, and what the kernels did.
 //!
-//! Plain data and the [`Sink`] they flow into; where draws go (a file, memory, a progress line) is the sink's business.
-//! Invariant: the values of every row have the length [`width`] of the columns announced last.
+//! Plain data and the [`Sink`] they flow into; where draws go (a file, memory, a progress
+//! line) is the sink's business. Invariant: the values of every row have the length
+//! [`width`] of the columns announced last.
 
 use super::Checkpoint;
 pub use super::columns::{Column, Layout, Shape, merged, width};
@@ -34,8 +35,9 @@ pub struct DrawRow {
 
 /// Where the draws of one chain go.
 pub trait Sink: Send {
-    /// Announces the columns: before the first draw, and again when a draw has more than those before it. Then each of the
-    /// earlier columns is among the new ones, maybe longer; earlier draws have NaN for what they lack ([`Layout`]).
+    /// Announces the columns: before the first draw, and again when a draw has more than
+    /// those before it. Then each of the earlier columns is among the new ones, maybe
+    /// longer; earlier draws have NaN for what they lack ([`Layout`]).
     ///
     /// # Errors
     /// If they cannot be written.
@@ -47,13 +49,15 @@ pub trait Sink: Send {
     /// If it cannot be written.
     fn draw(&mut self, row: &DrawRow) -> io::Result<()>;
 
-    /// The chain has ended after `steps` kernel applications and `warmup` before them, in `seconds` of wall time.
+    /// The chain has ended after `steps` kernel applications and `warmup` before them, in
+    /// `seconds` of wall time.
     ///
     /// # Errors
     /// If that cannot be written.
     fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()>;
 
-    /// The checkpoint to go on from, asked for once, before all else; the draws before it are the sink's already.
+    /// The checkpoint to go on from, asked for once, before all else; the draws before it
+    /// are the sink's already.
     ///
     /// # Errors
     /// If there is one that cannot be read.
@@ -113,7 +117,8 @@ pub struct KernelStats {
     /// The step size after warm-up (Hamiltonian kernels): of several chains the mean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step_size: Option<f64>,
-    /// The log of the evidence, from kernels that estimate it: of several chains that of the mean estimate.
+    /// The log of the evidence, from kernels that estimate it: of several chains that of
+    /// the mean estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_evidence: Option<f64>,
 }
@@ -171,7 +176,9 @@ impl KernelStats {
         let mut sum: indexmap::IndexMap<&str, KernelStats> = indexmap::IndexMap::new();
         let all: Vec<&KernelStats> = stats.into_iter().collect();
         for s in &all {
-            let t = sum.entry(&s.name).or_insert_with(|| KernelStats { name: s.name.clone(), ..Default::default() });
+            let t = sum
+                .entry(&s.name)
+                .or_insert_with(|| KernelStats { name: s.name.clone(), ..Default::default() });
             t.proposals += s.proposals;
             t.accepted += s.accepted;
             t.seconds += s.seconds;
@@ -183,7 +190,8 @@ impl KernelStats {
             let estimates: Vec<f64> = same.filter_map(|s| s.log_evidence).collect();
             let mean = || crate::num::log_sum_exp(&estimates) - libm::log(estimates.len() as f64);
             t.log_evidence = (!estimates.is_empty()).then(mean);
-            let sizes: Vec<f64> = all.iter().filter(|s| s.name == t.name).filter_map(|s| s.step_size).collect();
+            let sizes: Vec<f64> =
+                all.iter().filter(|s| s.name == t.name).filter_map(|s| s.step_size).collect();
             let n = sizes.len() as f64;
             t.step_size = (n > 0.0).then(|| sizes.iter().sum::<f64>() / n);
         }
@@ -207,16 +215,25 @@ mod tests {
         };
         let total = KernelStats::total(&[k("mh", 4, 1), k("drift", 2, 2), k("mh", 6, 4)]);
         assert_eq!(total.iter().map(|t| &*t.name).collect::<Vec<_>>(), ["mh", "drift"]);
-        assert_eq!((total[0].proposals, total[0].accepted, total[0].failed, total[0].seconds), (10, 5, 2, 1.0));
+        assert_eq!(
+            (total[0].proposals, total[0].accepted, total[0].failed, total[0].seconds),
+            (10, 5, 2, 1.0)
+        );
         assert_eq!(total[0].acceptance(), Some(0.5));
         assert_eq!(KernelStats::default().acceptance(), None);
     }
 
     #[test]
     fn estimates_of_the_evidence_are_averaged() {
-        let k = |log_evidence| KernelStats { name: "smc".into(), log_evidence, ..Default::default() };
-        let total = KernelStats::total(&[k(Some(libm::log(2.0))), k(None), k(Some(libm::log(4.0)))]);
-        assert!((total[0].log_evidence.unwrap() - libm::log(3.0)).abs() < 1e-15, "{:?}", total[0].log_evidence);
+        let k =
+            |log_evidence| KernelStats { name: "smc".into(), log_evidence, ..Default::default() };
+        let total =
+            KernelStats::total(&[k(Some(libm::log(2.0))), k(None), k(Some(libm::log(4.0)))]);
+        assert!(
+            (total[0].log_evidence.unwrap() - libm::log(3.0)).abs() < 1e-15,
+            "{:?}",
+            total[0].log_evidence
+        );
         assert_eq!(KernelStats::total(&[k(None)])[0].log_evidence, None);
     }
 }

@@ -1,4 +1,5 @@
-//! What chains that do not agree say of the evidence of where each of them is: gathered draw by draw.
+//! What chains that do not agree say of the evidence of where each of them is: gathered
+//! draw by draw.
 
 use super::diagnostics::{Clouds, LogEvidence, log_density, log_evidence, shares};
 use super::plan::Watch;
@@ -10,7 +11,8 @@ use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 use std::sync::{Mutex, PoisonError};
 
-/// The most choices of a program whose modes are weighed, and the most configurations of a chain that are kept apart.
+/// The most choices of a program whose modes are weighed, and the most configurations of
+/// a chain that are kept apart.
 const MOST: (usize, usize) = (256, 32);
 /// The standard error in nats up to which an evidence counts as known.
 const KNOWN: f64 = 3.0;
@@ -21,7 +23,8 @@ const LOOKED_AT: (u64, u64) = (1000, 8);
 #[derive(Debug, Default)]
 pub struct Evidence(Vec<Mutex<Gathered>>);
 
-/// A chain's draws by configuration: which choices there are, and the values of the discrete ones.
+/// A chain's draws by configuration: which choices there are, and the values of the
+/// discrete ones.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Gathered {
     /// Draws so far, and those of them that were looked at.
@@ -36,11 +39,13 @@ impl Evidence {
         Evidence((0..chains).map(|_| Mutex::default()).collect())
     }
 
-    /// What the draws of these chains, by their numbers from 0, say of the mode that they are in: of the configuration that they are in
-    /// most, over the share of draws in it. `None` from too few draws, or of more choices than is worth the time.
+    /// What the draws of these chains, by their numbers from 0, say of the mode that they
+    /// are in: of the configuration that they are in most, over the share of draws in it.
+    /// `None` from too few draws, or of more choices than is worth the time.
     pub fn of(&self, chains: &[usize]) -> Option<Weighed> {
         let chains = chains.iter().filter_map(|c| self.0.get(*c));
-        let locked: Vec<_> = chains.map(|c| c.lock().unwrap_or_else(PoisonError::into_inner)).collect();
+        let locked: Vec<_> =
+            chains.map(|c| c.lock().unwrap_or_else(PoisonError::into_inner)).collect();
         let mut counts: BTreeMap<u64, u64> = BTreeMap::new();
         for (key, clouds) in locked.iter().flat_map(|c| &c.clouds) {
             *counts.entry(*key).or_default() += clouds.count();
@@ -48,8 +53,14 @@ impl Evidence {
         let (key, count) = counts.into_iter().max_by_key(|(_, n)| *n)?;
         let looked: u64 = locked.iter().map(|c| c.looked).sum();
         let clouds: Vec<&Clouds> = locked.iter().filter_map(|c| c.clouds.get(&key)).collect();
-        let over = |e: LogEvidence| LogEvidence { value: e.value - libm::log(count as f64 / looked as f64), ..e };
-        Some(Weighed { evidence: log_evidence(&clouds).map(over), density: over(log_density(&clouds)?) })
+        let over = |e: LogEvidence| LogEvidence {
+            value: e.value - libm::log(count as f64 / looked as f64),
+            ..e
+        };
+        Some(Weighed {
+            evidence: log_evidence(&clouds).map(over),
+            density: over(log_density(&clouds)?),
+        })
     }
 }
 
@@ -63,10 +74,11 @@ pub struct Weighed {
 }
 
 impl Weighed {
-    /// The probabilities of some modes: by their evidences, if all are known to within [`KNOWN`], or else as if all were equally
-    /// wide.
+    /// The probabilities of some modes: by their evidences, if all are known to within
+    /// [`KNOWN`], or else as if all were equally wide.
     pub fn probabilities(all: &[Weighed]) -> (Vec<f64>, bool) {
-        let known = all.iter().map(|w| w.evidence.filter(|e| e.error <= KNOWN)).collect::<Option<Vec<_>>>();
+        let known =
+            all.iter().map(|w| w.evidence.filter(|e| e.error <= KNOWN)).collect::<Option<Vec<_>>>();
         match known {
             Some(evidences) => (shares(&evidences), true),
             None => (shares(&all.iter().map(|w| w.density).collect::<Vec<_>>()), false),
@@ -74,7 +86,8 @@ impl Weighed {
     }
 }
 
-/// The configuration of a state, its continuous choices in the unconstrained space, and its log density there.
+/// The configuration of a state, its continuous choices in the unconstrained space, and
+/// its log density there.
 fn free(trace: &Trace) -> Option<(u64, Vec<f64>, f64)> {
     let targets = trace.all_targets();
     if targets.len() > MOST.0 {
@@ -129,8 +142,9 @@ mod tests {
     use crate::{Model, RunOptions};
     use std::sync::Arc;
 
-    /// Chains that begin in either of two modes and cannot leave: shares are those of the masses, 0.3 and 0.7 times what the
-    /// observation leaves, whatever the number of chains in each.
+    /// Chains that begin in either of two modes and cannot leave: shares are those of the
+    /// masses, 0.3 and 0.7 times what the observation leaves, whatever the number of
+    /// chains in each.
     #[test]
     fn modes_that_chains_cannot_leave_have_their_shares() {
         let model = Model::from_text(
@@ -143,7 +157,8 @@ mod tests {
         )
         .unwrap();
         let evidence = Arc::new(Evidence::new(6));
-        let options = RunOptions { watch: Some(evidence.clone()), seed: 5, ..RunOptions::default() };
+        let options =
+            RunOptions { watch: Some(evidence.clone()), seed: 5, ..RunOptions::default() };
         let posterior = model.run(&options, 6, 2).unwrap();
         let far = posterior.quantity("far").unwrap();
         let of = |v: f64| (0..6).filter(|c| far.chains[*c][0] == v).collect::<Vec<_>>();
@@ -151,7 +166,8 @@ mod tests {
         assert!(!near.is_empty() && !far.is_empty(), "{near:?} {far:?}");
         let weighed = [&near, &far].map(|m| evidence.of(m).unwrap());
         let each = weighed.map(|w| w.evidence.unwrap());
-        // Of all distributions of a covariance a Gaussian has the most entropy: what is not one has a little too much evidence.
+        // Of all distributions of a covariance a Gaussian has the most entropy: what is
+        // not one has a little too much evidence.
         let truth = libm::log(0.5 / std::f64::consts::PI.sqrt()) - 0.25 * 0.09;
         let over = each[0].value - truth - libm::log(0.3);
         assert!(over > 0.0 && over < 0.2, "{each:?} {truth}");

@@ -1,4 +1,5 @@
-//! What a plan says of a model's choices: which of its kernels select them. Nothing is run.
+//! What a plan says of a model's choices: which of its kernels select them. Nothing is
+//! run.
 
 use super::expr::Scope;
 use super::plan::call;
@@ -22,8 +23,15 @@ pub struct Selecting {
 /// The kernels of a plan, those of warm-up too, each once, in the order of the plan.
 pub fn selecting(code: &Arc<Code>, plan: &[KStmt], trace: &mut Trace) -> Vec<Selecting> {
     let mut found = Vec::new();
-    let env =
-        Scope { code, trace, variables: &[], draws: Draws::default(), started: Instant::now(), steps: 0, moved: None };
+    let env = Scope {
+        code,
+        trace,
+        variables: &[],
+        draws: Draws::default(),
+        started: Instant::now(),
+        steps: 0,
+        moved: None,
+    };
     Reader { code, env, found: &mut found, within: Vec::new() }.statements(plan);
     found
 }
@@ -66,17 +74,21 @@ impl Reader<'_, '_> {
             self.within.pop();
             return;
         }
-        // Kernels without a selection move everything; those that hold others, what these do.
+        // Kernels without a selection move everything; those that hold others, what these
+        // do.
         let mut selected = false;
         for arg in args {
-            let inside = call(&arg.value)
-                .is_some_and(|(inner, args)| !matches!(inner, "one" | "each") && args.iter().any(|a| target(&a.value)));
+            let inside = call(&arg.value).is_some_and(|(inner, args)| {
+                !matches!(inner, "one" | "each") && args.iter().any(|a| target(&a.value))
+            });
             if inside {
                 selected = true;
                 self.kernel(&arg.value);
             } else if target(&arg.value) {
                 selected = true;
-                let all = call(&arg.value).and_then(|(_, args)| args.first()).map_or(&arg.value, |a| &a.value);
+                let all = call(&arg.value)
+                    .and_then(|(_, args)| args.first())
+                    .map_or(&arg.value, |a| &a.value);
                 let selector = selector(all, &mut self.env).unwrap_or(Selector::All);
                 self.add(print_expr(e), selector);
             }
@@ -105,7 +117,9 @@ impl Reader<'_, '_> {
     fn add(&mut self, kernel: String, selector: Selector) {
         match self.found.iter_mut().find(|k| k.kernel == kernel) {
             Some(k) if k.selector == selector => {}
-            Some(k) => k.selector = Selector::Union(Box::new(k.selector.clone()), Box::new(selector)),
+            Some(k) => {
+                k.selector = Selector::Union(Box::new(k.selector.clone()), Box::new(selector))
+            }
             None => self.found.push(Selecting { kernel, selector }),
         }
     }

@@ -1,5 +1,5 @@
-//! Expressions of inference blocks: counts, weights, conditions. They see the block's own variables, the model's top-level
-//! names, and what is known of the run.
+//! Expressions of inference blocks: counts, weights, conditions. They see the block's own
+//! variables, the model's top-level names, and what is known of the run.
 
 use super::selection::{fail, fault};
 use crate::lang::builtins::{Args, Builtin, Kind};
@@ -21,7 +21,8 @@ pub(crate) struct Scope<'a> {
     pub draws: Draws,
     pub started: Instant,
     pub steps: u64,
-    /// In a map of a kernel, which reads nothing else of the state: choices with values in place of those they have.
+    /// In a map of a kernel, which reads nothing else of the state: choices with values
+    /// in place of those they have.
     pub moved: Option<&'a [(Address, Value)]>,
 }
 
@@ -50,7 +51,8 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
         }
         ExprKind::Field { base, field } => {
             let b = evaluate(base, env)?;
-            index_value(&b, &Value::Str(Arc::clone(&field.node))).map_err(|f| fail(e.span, f.message))
+            index_value(&b, &Value::Str(Arc::clone(&field.node)))
+                .map_err(|f| fail(e.span, f.message))
         }
         ExprKind::Unary { op, expr } => {
             let v = evaluate(expr, env)?;
@@ -81,32 +83,46 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
                 "value" => {
                     let [arg] = &args[..] else { return Err(unsupported(e)) };
                     let at = super::selection::address(&arg.value, env)?;
-                    if let Some((_, v)) = env.moved.and_then(|moved| moved.iter().find(|(a, _)| *a == at)) {
+                    if let Some((_, v)) =
+                        env.moved.and_then(|moved| moved.iter().find(|(a, _)| *a == at))
+                    {
                         return Ok(v.clone());
                     }
                     let found = env.trace.find(&at).map(|t| env.trace.value(t));
-                    return found.ok_or_else(|| fail(arg.value.span, format!("this state has no choice {at}")));
+                    return found.ok_or_else(|| {
+                        fail(arg.value.span, format!("this state has no choice {at}"))
+                    });
                 }
-                "log_joint" | "log_prior" | "log_likelihood" if env.moved.is_some() => return Err(unmapped(e)),
+                "log_joint" | "log_prior" | "log_likelihood" if env.moved.is_some() => {
+                    return Err(unmapped(e));
+                }
                 "log_joint" => return Ok(Value::Num(env.trace.log_joint())),
                 "log_prior" => return Ok(Value::Num(env.trace.log_prior())),
                 "log_likelihood" => return Ok(Value::Num(env.trace.log_likelihood())),
                 _ => {}
             }
-            let values: Result<Vec<Value>, _> = args.iter().map(|a| evaluate(&a.value, env)).collect();
+            let values: Result<Vec<Value>, _> =
+                args.iter().map(|a| evaluate(&a.value, env)).collect();
             let values = values?;
             let called = known(name, e, env)?;
-            // As many as it has, those left out as nothing: keywords may change the order.
+            // As many as it has, those left out as nothing: keywords may change the
+            // order.
             let order = called.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)));
             let order = order.map_err(|message| fail(e.span, message))?;
-            let placed: Vec<&Value> = order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
+            let placed: Vec<&Value> =
+                order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
             apply(called, &placed, e)
         }
         ExprKind::If { cond, then, otherwise } => {
             let taken = match evaluate(cond, env)? {
                 Value::Bool(true) => then,
                 Value::Bool(false) => otherwise,
-                v => return Err(fail(cond.span, format!("a condition must be a bool, got {}", v.type_name()))),
+                v => {
+                    return Err(fail(
+                        cond.span,
+                        format!("a condition must be a bool, got {}", v.type_name()),
+                    ));
+                }
             };
             match (&taken.stmts[..], &taken.result) {
                 ([], Some(result)) => evaluate(result, env),
@@ -121,7 +137,9 @@ fn variable(name: &Arc<str>, e: &Expr, env: &mut Scope) -> Result<Value, Box<Run
     if let Some((_, v)) = env.variables.iter().rev().find(|(n, _)| n == name) {
         return Ok(v.clone());
     }
-    if env.moved.is_some() && env.code.globals.get(name).is_some_and(|o| !matches!(o, Operand::Const(_))) {
+    if env.moved.is_some()
+        && env.code.globals.get(name).is_some_and(|o| !matches!(o, Operand::Const(_)))
+    {
         return Err(unmapped(e));
     }
     match env.trace.global(name, env.draws) {
@@ -153,7 +171,10 @@ fn apply(b: &Builtin, values: &[&Value], e: &Expr) -> Result<Value, Box<RunError
 }
 
 fn unmapped(e: &Expr) -> Box<RunError> {
-    let mut error = fail(e.span, "a map may use only choices and constants, so that its derivatives are known".into());
+    let mut error = fail(
+        e.span,
+        "a map may use only choices and constants, so that its derivatives are known".into(),
+    );
     error.hint = Some("write it in terms of value(@x) of the choices it depends on".into());
     error
 }

@@ -1,4 +1,5 @@
-//! `force @a = v`: sets a choice at the start of a chain; it keeps its prior score and may be proposed again.
+//! `force @a = v`: sets a choice at the start of a chain; it keeps its prior score and
+//! may be proposed again.
 
 use super::plan::RunOptions;
 use super::selection::fail;
@@ -19,7 +20,8 @@ pub(crate) fn apply(
     options: &RunOptions,
     chain: u32,
 ) -> Result<(), Box<RunError>> {
-    let draws = Draws { key: StreamKey::new(options.seed, chain, Purpose::START), step: u64::MAX, lane: 0 };
+    let draws =
+        Draws { key: StreamKey::new(options.seed, chain, Purpose::START), step: u64::MAX, lane: 0 };
     put(&code.forces, trace, draws)
 }
 
@@ -31,10 +33,14 @@ pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(
     for f in forces {
         let value = trace.query(&[f.value], draws)?.swap_remove(0);
         let Some(address) = literal(&f.target) else {
-            return Err(fail(f.span, "`force` needs the address of one choice, without wildcards".into()));
+            return Err(fail(
+                f.span,
+                "`force` needs the address of one choice, without wildcards".into(),
+            ));
         };
         let Some(target) = trace.find(&address) else {
-            let known: Vec<String> = trace.choices().iter().map(|(a, _, _)| a.to_string()).collect();
+            let known: Vec<String> =
+                trace.choices().iter().map(|(a, _, _)| a.to_string()).collect();
             let mut e = fail(f.span, format!("no observation depends on a choice {address}"));
             let near = crate::diag::nearest(&address.to_string(), known.iter().map(String::as_str));
             let all = || format!("the choices are {}", known[..known.len().min(8)].join(", "));
@@ -52,7 +58,10 @@ pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(
         trace.propose(&[(target, Change::Set(datum))], draws)?;
         trace.commit();
         if trace.log_prior() == f64::NEG_INFINITY {
-            return Err(fail(f.span, format!("{address} cannot be {value}: its prior density is zero there")));
+            return Err(fail(
+                f.span,
+                format!("{address} cannot be {value}: its prior density is zero there"),
+            ));
         }
     }
     Ok(())
@@ -72,7 +81,11 @@ pub(crate) fn literal(a: &ast::Address) -> Option<Address> {
                 _ => None,
             })
             .collect();
-        segments.push(AddressSegment { name: Arc::clone(name), occurrence: s.occurrence.max(1), keys: keys? });
+        segments.push(AddressSegment {
+            name: Arc::clone(name),
+            occurrence: s.occurrence.max(1),
+            keys: keys?,
+        });
     }
     Some(Address { segments })
 }

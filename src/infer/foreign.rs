@@ -31,10 +31,15 @@ impl KernelCall<'_> {
     /// # Errors
     /// If it is no selection.
     pub fn scope(&self, i: usize) -> Result<Scope, Fault> {
-        self.scopes.get(i).cloned().flatten().ok_or_else(|| self.args.wrong(i, "a selection such as @**"))
+        self.scopes
+            .get(i)
+            .cloned()
+            .flatten()
+            .ok_or_else(|| self.args.wrong(i, "a selection such as @**"))
     }
 
-    /// The kernel that argument `i` is, for one that applies others; it can be taken once.
+    /// The kernel that argument `i` is, for one that applies others; it can be taken
+    /// once.
     ///
     /// # Errors
     /// If it is no kernel.
@@ -46,7 +51,8 @@ impl KernelCall<'_> {
 
 type Make = dyn Fn(&mut KernelCall) -> Result<Box<dyn Kernel>, Fault> + Send + Sync;
 
-/// What makes a host's kernel from its call: what stands behind its entry in the table of built-ins.
+/// What makes a host's kernel from its call: what stands behind its entry in the table of
+/// built-ins.
 pub(crate) struct KernelMaker(Box<Make>);
 
 impl KernelMaker {

@@ -21,12 +21,14 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How a chain starts: with the best of so many draws from the prior, by log joint density.
+/// How a chain starts: with the best of so many draws from the prior, by log joint
+/// density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
     /// Draws of positive probability that are tried.
     pub draws: u64,
-    /// How many of the best are kept: more than one begin a population that anneals in warm-up.
+    /// How many of the best are kept: more than one begin a population that anneals in
+    /// warm-up.
     pub keep: usize,
     /// No further draws are tried after this, if one was found.
     pub within: Option<Duration>,
@@ -55,7 +57,8 @@ pub enum StartError {
 pub struct NoStart {
     /// Observations and factors first, then choices.
     pub terms: Vec<ZeroTerm>,
-    /// The first choices of that draw that are single numbers or truth values, with their values.
+    /// The first choices of that draw that are single numbers or truth values, with their
+    /// values.
     pub drawn: Vec<(Address, Value)>,
 }
 
@@ -76,11 +79,15 @@ impl fmt::Display for NoStart {
     }
 }
 
-/// The first of so many attempts at drawing from a prior that leads where the program has a value.
+/// The first of so many attempts at drawing from a prior that leads where the program has
+/// a value.
 ///
 /// # Errors
 /// The last attempt's, or the first that is not a matter of the values drawn.
-pub(crate) fn attempts<T>(most: u64, mut draw: impl FnMut(u64) -> TraceResult<T>) -> TraceResult<T> {
+pub(crate) fn attempts<T>(
+    most: u64,
+    mut draw: impl FnMut(u64) -> TraceResult<T>,
+) -> TraceResult<T> {
     let mut attempt = 0;
     loop {
         match draw(attempt) {
@@ -90,17 +97,26 @@ pub(crate) fn attempts<T>(most: u64, mut draw: impl FnMut(u64) -> TraceResult<T>
     }
 }
 
-/// Draws from the prior and keeps nothing, for what is worked out once and kept by the data: a failure is for the chains to tell.
+/// Draws from the prior and keeps nothing, for what is worked out once and kept by the
+/// data: a failure is for the chains to tell.
 pub(super) fn draw_once(code: &Arc<Code>, seed: u64, limits: Limits) {
     let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: 0, lane: 0 };
     let _ = Trace::simulate(Arc::clone(code), draws, limits);
 }
 
-/// The traces a chain starts with, the best first: as many as are to be kept, or fewer if fewer draws succeed.
+/// The traces a chain starts with, the best first: as many as are to be kept, or fewer if
+/// fewer draws succeed.
 ///
 /// # Errors
-/// If the program fails, or if no draw has positive probability within the bounded retries.
-pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limits) -> Result<Vec<Trace>, StartError> {
+/// If the program fails, or if no draw has positive probability within the bounded
+/// retries.
+pub fn starts(
+    code: &Arc<Code>,
+    seed: u64,
+    chain: u32,
+    how: Start,
+    limits: Limits,
+) -> Result<Vec<Trace>, StartError> {
     starts_from(code, (seed, chain), how, None, limits)
 }
 
@@ -127,7 +143,8 @@ pub(crate) fn starts_from(
     for attempt in 0..how.draws.saturating_add(RETRIES) {
         let draw = drawn(attempt);
         if attempt == 0 {
-            // What is made ready once, such as a photograph that is looked at, is no draw.
+            // What is made ready once, such as a photograph that is looked at, is no
+            // draw.
             begun = Instant::now();
         }
         match draw {
@@ -165,23 +182,30 @@ pub(crate) fn starts_from(
 fn explain(t: &Trace) -> NoStart {
     let mut outside: HashMap<Address, String> = t.outside_support().into_iter().collect();
     let zero = t.impossible().into_iter();
-    let zero = zero.map(|(address, span)| ZeroTerm { outside: outside.remove(&address), address, span });
+    let zero =
+        zero.map(|(address, span)| ZeroTerm { outside: outside.remove(&address), address, span });
     let single = |(address, value, _): (Address, Value, _)| match value {
         Value::Num(_) | Value::Bool(_) => Some((address, value)),
         _ => None,
     };
-    NoStart { terms: zero.collect(), drawn: t.choices().into_iter().filter_map(single).take(6).collect() }
+    NoStart {
+        terms: zero.collect(),
+        drawn: t.choices().into_iter().filter_map(single).take(6).collect(),
+    }
 }
 
-/// What the `init` statement of a plan asks for. Where there is a limit of time, a quarter of it: as much as is left to warm-up.
-/// And the kernel whose proposals it takes, if it takes any.
+/// What the `init` statement of a plan asks for. Where there is a limit of time, a
+/// quarter of it: as much as is left to warm-up. And the kernel whose proposals it takes,
+/// if it takes any.
 pub(crate) fn start_of(
     code: &Arc<Code>,
     plan: &[KStmt],
     options: &RunOptions,
 ) -> Result<(Start, Option<Own>), ChainError> {
     let init = plan.iter().find_map(|s| match &s.kind {
-        KStmtKind::Expr(e) => call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args)),
+        KStmtKind::Expr(e) => {
+            call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args))
+        }
         _ => None,
     });
     let Some((e, args)) = init else { return Ok((Start::default(), None)) };
@@ -190,7 +214,15 @@ pub(crate) fn start_of(
     let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
     let mut count = |e: &Expr| -> Result<u64, ChainError> {
         let (draws, started) = (Draws::default(), Instant::now());
-        let mut env = Scope { code, trace: &mut trace, variables: &[], draws, started, steps: 0, moved: None };
+        let mut env = Scope {
+            code,
+            trace: &mut trace,
+            variables: &[],
+            draws,
+            started,
+            steps: 0,
+            moved: None,
+        };
         match evaluate(e, &mut env)? {
             Value::Num(x) if x >= 1.0 => Ok(x as u64),
             v => Err(ChainError::Run(fail(e.span, format!("expected a number of draws, got {v}")))),
@@ -202,7 +234,14 @@ pub(crate) fn start_of(
             let draws = argument(args, 0, "n").map_or(Err(wrong()), &mut count)?;
             let keep = argument(args, 1, "keep").map_or(Ok(1), &mut count)?;
             let from = argument(args, 2, "from").map(|e| own(code, e, options)).transpose()?;
-            Ok((Start { draws, keep: keep.min(draws) as usize, within: options.time.map(|t| t / 4) }, from))
+            Ok((
+                Start {
+                    draws,
+                    keep: keep.min(draws) as usize,
+                    within: options.time.map(|t| t / 4),
+                },
+                from,
+            ))
         }
         _ => Err(wrong()),
     }
@@ -217,11 +256,16 @@ fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<Own, ChainErr
         ChainError::Run(wrong)
     };
     let (name, args) = call(e).ok_or_else(wrong)?;
-    let declared = code.kernels.iter().find(|k| &*k.name.node == name && proposes(&k.body)).ok_or_else(wrong)?;
+    let declared = code
+        .kernels
+        .iter()
+        .find(|k| &*k.name.node == name && proposes(&k.body))
+        .ok_or_else(wrong)?;
     let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
     let started = Instant::now();
     let (draws, variables) = (Draws::default(), &[]);
-    let mut env = Scope { code, trace: &mut trace, variables, draws, started, steps: 0, moved: None };
+    let mut env =
+        Scope { code, trace: &mut trace, variables, draws, started, steps: 0, moved: None };
     let arguments = arguments(declared, args, e.span, &mut env)?;
     Ok(Own::new(Arc::clone(code), declared.clone(), arguments, started))
 }

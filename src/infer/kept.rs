@@ -1,4 +1,5 @@
-//! Whole states of chains at some of their draws: what any picture, mesh or quantity can be made from when a run has ended.
+//! Whole states of chains at some of their draws: what any picture, mesh or quantity can
+//! be made from when a run has ended.
 
 use super::plan::Watch;
 use super::state::{StateError, pack, unpack};
@@ -27,8 +28,8 @@ struct Chain {
     kept: Vec<KeptTrace>,
 }
 
-/// Keeps the states of some draws at even distances: when there is no room, every other one is let go, and from then on every second
-/// draw is kept, every fourth, and so on.
+/// Keeps the states of some draws at even distances: when there is no room, every other
+/// one is let go, and from then on every second draw is kept, every fourth, and so on.
 #[derive(Debug)]
 pub struct KeptTraces {
     program: String,
@@ -38,7 +39,8 @@ pub struct KeptTraces {
 }
 
 impl KeptTraces {
-    /// At most so many of all chains together; `program` is the hash that their states are known by.
+    /// At most so many of all chains together; `program` is the hash that their states
+    /// are known by.
     pub fn new(chains: u32, most: usize, program: &str) -> KeptTraces {
         let chain = || Mutex::new(Chain { draws: 0, every: 1, kept: Vec::new() });
         let room = most.div_ceil(chains.max(1) as usize);
@@ -58,7 +60,12 @@ impl Watch for KeptTraces {
         let mut c = cell.lock().unwrap_or_else(PoisonError::into_inner);
         if c.draws.is_multiple_of(c.every) {
             let (draw, log_joint) = (c.draws + 1, trace.log_joint());
-            c.kept.push(KeptTrace { chain: chain + 1, draw, log_joint, trace: trace.save(&self.program) });
+            c.kept.push(KeptTrace {
+                chain: chain + 1,
+                draw,
+                log_joint,
+                trace: trace.save(&self.program),
+            });
             if c.kept.len() > self.room {
                 c.every *= 2;
                 let every = c.every;
@@ -101,7 +108,13 @@ mod tests {
         for k in &all {
             let row = &posterior.draws[k.chain as usize - 1].rows[k.draw as usize - 1];
             assert_eq!(row.log_joint.to_bits(), k.log_joint.to_bits());
-            let back = Trace::load(Arc::clone(model.code()), model.hash(), &k.trace, model.limits().clone()).unwrap();
+            let back = Trace::load(
+                Arc::clone(model.code()),
+                model.hash(),
+                &k.trace,
+                model.limits().clone(),
+            )
+            .unwrap();
             assert_eq!(back.log_joint().to_bits(), k.log_joint.to_bits());
         }
         let again = KeptTraces::new(2, 20, model.hash());

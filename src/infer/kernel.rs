@@ -33,7 +33,8 @@ impl At {
         At { seed, chain, step, adapting: false, power: 1.0, member: 0, part: 0 }
     }
 
-    /// The randomness of values drawn inside the trace; `lane` tells alternatives of one step apart.
+    /// The randomness of values drawn inside the trace; `lane` tells alternatives of one
+    /// step apart.
     pub fn draws(&self, lane: u64) -> Draws {
         let key = StreamKey::new(self.seed, self.chain, Purpose::VALUES);
         let lane = if self.part == 0 { lane } else { mix(self.part, lane) };
@@ -63,7 +64,8 @@ pub struct Outcome {
     pub proposals: u32,
     /// Those accepted.
     pub accepted: u32,
-    /// Those rejected because the program has no value there (a scale that is not positive, a matrix that will not factor).
+    /// Those rejected because the program has no value there (a scale that is not
+    /// positive, a matrix that will not factor).
     pub failed: u32,
     /// Trajectories on which the energy was not kept.
     pub divergent: u32,
@@ -104,8 +106,8 @@ pub trait Kernel: Send {
     /// Its name in tables.
     fn name(&self) -> String;
 
-    /// Begins a sweep, if the kernel goes through its choices in turn: how many steps it has. [`At::member`] tells which of
-    /// them a step is.
+    /// Begins a sweep, if the kernel goes through its choices in turn: how many steps it
+    /// has. [`At::member`] tells which of them a step is.
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
         let _ = trace;
         None
@@ -122,8 +124,8 @@ pub trait Kernel: Send {
         None
     }
 
-    /// What it has learnt and remembers beside the state it moved last, for a checkpoint; nothing, if each step is a function of
-    /// the state alone.
+    /// What it has learnt and remembers beside the state it moved last, for a checkpoint;
+    /// nothing, if each step is a function of the state alone.
     fn save(&self, trace: &Trace) -> Vec<u8> {
         let _ = trace;
         Vec::new()
@@ -147,8 +149,13 @@ pub trait Kernel: Send {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome>;
 }
 
-/// One step of a kernel inside another: a whole sweep where it goes through its choices in turn.
-pub(crate) fn inner_step(kernel: &mut dyn Kernel, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+/// One step of a kernel inside another: a whole sweep where it goes through its choices
+/// in turn.
+pub(crate) fn inner_step(
+    kernel: &mut dyn Kernel,
+    trace: &mut Trace,
+    at: &At,
+) -> TraceResult<Outcome> {
     let Some(members) = kernel.sweep(trace) else { return kernel.step(trace, at) };
     let mut all = Outcome::default();
     for member in 0..members {
@@ -165,8 +172,9 @@ pub enum Pick {
     All,
     /// One of them at random (`one(sel)`).
     One,
-    /// Each in turn, in the order of the program (`each(sel)`): a sweep of as many steps. Moves that would change what is
-    /// selected are rejected, so that the order does not depend on the outcome of the steps.
+    /// Each in turn, in the order of the program (`each(sel)`): a sweep of as many steps.
+    /// Moves that would change what is selected are rejected, so that the order does not
+    /// depend on the outcome of the steps.
     Each,
 }
 
@@ -239,8 +247,14 @@ impl Registered {
         Some(self.sweep.as_ref().map_or(0, |s| s.order.len()))
     }
 
-    /// One member: picked uniformly, with how many there are, or the one a sweep has come to.
-    pub fn pick(&mut self, trace: &mut Trace, at: &At, rng: &mut Stream) -> Option<(Target, usize)> {
+    /// One member: picked uniformly, with how many there are, or the one a sweep has come
+    /// to.
+    pub fn pick(
+        &mut self,
+        trace: &mut Trace,
+        at: &At,
+        rng: &mut Stream,
+    ) -> Option<(Target, usize)> {
         if self.scope.pick == Pick::Each {
             if self.sweep.is_none() {
                 self.sweep(trace);
@@ -252,7 +266,8 @@ impl Registered {
         (!targets.is_empty()).then(|| (targets[rng.index(targets.len())], targets.len()))
     }
 
-    /// The members a step works on, and what picking them costs: the log of the number of ways.
+    /// The members a step works on, and what picking them costs: the log of the number of
+    /// ways.
     pub fn members(&mut self, trace: &mut Trace, at: &At, rng: &mut Stream) -> (Vec<Target>, f64) {
         if self.scope.pick == Pick::All {
             let selection = self.selection(trace);
@@ -264,8 +279,8 @@ impl Registered {
         }
     }
 
-    /// What picking the same members costs in the proposed state: single-site picking pays the ratio of the numbers, a sweep
-    /// cannot go on among other members.
+    /// What picking the same members costs in the proposed state: single-site picking
+    /// pays the ratio of the numbers, a sweep cannot go on among other members.
     pub fn ways_back(&self, trace: &Trace) -> f64 {
         let Some((_, selection)) = self.selection else { return 0.0 };
         match (self.scope.pick, &self.sweep) {
@@ -276,7 +291,8 @@ impl Registered {
     }
 }
 
-/// The Metropolis-Hastings test. A ratio that is NaN, which would be a rejection, is a mistake of the kernel.
+/// The Metropolis-Hastings test. A ratio that is NaN, which would be a rejection, is a
+/// mistake of the kernel.
 pub(crate) fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
     debug_assert!(!log_ratio.is_nan());
     let u = rng.open_uniform();
@@ -299,7 +315,8 @@ pub(crate) fn settle(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Out
     Outcome::one(accepted)
 }
 
-/// Separates proposals that lead where the program has no value from failures of the program.
+/// Separates proposals that lead where the program has no value from failures of the
+/// program.
 pub fn recoverable<T>(result: TraceResult<T>) -> TraceResult<Option<T>> {
     match result {
         Ok(x) => Ok(Some(x)),

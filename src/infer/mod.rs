@@ -1,4 +1,5 @@
-//! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of pictures.
+//! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of
+//! pictures.
 
 #![doc = include_str!("guide.md")]
 
@@ -57,7 +58,9 @@ pub use kept::{KeptTrace, KeptTraces};
 pub(crate) use kernel::accepts;
 pub use kernel::{At, Kernel, Outcome, Pick, Scope, decide, recoverable};
 #[doc(hidden)]
-pub use kernels::{Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper};
+pub use kernels::{
+    Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper,
+};
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
 #[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};

@@ -1,4 +1,5 @@
-//! What `knn` proposes from: the latents of scenes whose pictures look like the observed one, and who finds them.
+//! What `knn` proposes from: the latents of scenes whose pictures look like the observed
+//! one, and who finds them.
 //!
 //! It knows no pictures and no files: those who do implement [`Banks`].
 
@@ -13,8 +14,9 @@ use std::sync::Arc;
 pub enum Latent {
     /// The stored value of a discrete choice.
     Discrete(Datum),
-    /// Where a continuous choice was in the unconstrained space, under the support it had there. A proposal from it is then the
-    /// same in every state, also where a support depends on other choices.
+    /// Where a continuous choice was in the unconstrained space, under the support it had
+    /// there. A proposal from it is then the same in every state, also where a support
+    /// depends on other choices.
     Free(Vec<f64>),
 }
 
@@ -48,25 +50,29 @@ pub struct Neighbours {
 }
 
 impl Neighbours {
-    /// Neighbours among scenes of all kinds, whose spread tells the scale of each coordinate: a draw from the prior will do, and
-    /// nothing where none is at hand. What is found need not be right: a bad neighbour costs acceptance, never correctness.
+    /// Neighbours among scenes of all kinds, whose spread tells the scale of each
+    /// coordinate: a draw from the prior will do, and nothing where none is at hand. What
+    /// is found need not be right: a bad neighbour costs acceptance, never correctness.
     pub fn new(entries: Vec<Latents>, among: &[Latents]) -> Neighbours {
         Neighbours { spreads: spreads(among), entries }
     }
 
-    /// The standard deviation of a coordinate over scenes of all kinds; 1 where it is not known.
+    /// The standard deviation of a coordinate over scenes of all kinds; 1 where it is not
+    /// known.
     pub(crate) fn spread(&self, hash: u64, coordinate: usize) -> f64 {
         let known = self.spreads.get(&hash).and_then(|s| s.get(coordinate)).copied();
         known.filter(|s| *s > 0.0).unwrap_or(1.0)
     }
 
-    /// The standard deviation of each coordinate over the neighbours, by the hash of its choice.
+    /// The standard deviation of each coordinate over the neighbours, by the hash of its
+    /// choice.
     pub(crate) fn local(&self) -> FxHashMap<u64, Vec<f64>> {
         spreads(&self.entries)
     }
 }
 
-/// Standard deviations by coordinate over the scenes that have the choice in its most frequent form: 0 for fewer than two.
+/// Standard deviations by coordinate over the scenes that have the choice in its most
+/// frequent form: 0 for fewer than two.
 fn spreads(scenes: &[Latents]) -> FxHashMap<u64, Vec<f64>> {
     let mut sums: FxHashMap<u64, (f64, Vec<[f64; 2]>)> = FxHashMap::default();
     for scene in scenes {
@@ -86,13 +92,15 @@ fn spreads(scenes: &[Latents]) -> FxHashMap<u64, Vec<f64>> {
         }
     }
     let sd = |n: f64, square: f64| if n < 2.0 { 0.0 } else { (square / (n - 1.0)).max(0.0).sqrt() };
-    sums.into_iter().map(|(h, (n, m))| (h, m.into_iter().map(|[_, square]| sd(n, square)).collect())).collect()
+    sums.into_iter()
+        .map(|(h, (n, m))| (h, m.into_iter().map(|[_, square]| sd(n, square)).collect()))
+        .collect()
 }
 
 /// Finds the neighbours of what a run observes.
 pub trait Banks: fmt::Debug + Send + Sync {
-    /// The `k` scenes of a bank whose pictures are most like the observed one. Asked once a kernel and chain, so an answer
-    /// should be kept.
+    /// The `k` scenes of a bank whose pictures are most like the observed one. Asked once
+    /// a kernel and chain, so an answer should be kept.
     ///
     /// # Errors
     /// Why the bank cannot be used here, for people.
@@ -114,12 +122,20 @@ mod tests {
     #[test]
     fn spreads_are_standard_deviations() {
         let scene = |x: f64, y: f64| -> Latents {
-            [(1, Latent::Free(vec![x, y])), (2, Latent::Discrete(Datum::Num(x)))].into_iter().collect()
+            [(1, Latent::Free(vec![x, y])), (2, Latent::Discrete(Datum::Num(x)))]
+                .into_iter()
+                .collect()
         };
-        let n =
-            Neighbours::new(vec![scene(0.0, 5.0)], &[scene(1e9, 5.0), scene(1e9 + 2.0, 5.0), scene(1e9 + 4.0, 5.0)]);
+        let n = Neighbours::new(
+            vec![scene(0.0, 5.0)],
+            &[scene(1e9, 5.0), scene(1e9 + 2.0, 5.0), scene(1e9 + 4.0, 5.0)],
+        );
         assert_eq!(n.spread(1, 0), 2.0);
-        assert_eq!((n.spread(1, 1), n.spread(2, 0), n.spread(9, 0)), (1.0, 1.0, 1.0), "unknown or none: 1");
+        assert_eq!(
+            (n.spread(1, 1), n.spread(2, 0), n.spread(9, 0)),
+            (1.0, 1.0, 1.0),
+            "unknown or none: 1"
+        );
         assert_eq!(n.local()[&1], [0.0, 0.0], "one scene has no spread");
         assert_eq!(n.neighbours("any", 0).unwrap().entries.len(), 0);
     }

@@ -11,8 +11,9 @@ type OnStep = dyn Fn(u32, u64, &Trace) -> ControlFlow<()> + Send + Sync;
 /// At a draw: the chain, its state.
 type OnDraw = dyn Fn(u32, &mut Trace) -> ControlFlow<()> + Send + Sync;
 
-/// Callbacks of a run, for [`RunOptions::watch`](super::RunOptions::watch): they see what chains do and may end the run, all chains
-/// of it, which then keeps its draws. They are called from the chains' threads.
+/// Callbacks of a run, for [`RunOptions::watch`](super::RunOptions::watch): they see what
+/// chains do and may end the run, all chains of it, which then keeps its draws. They are
+/// called from the chains' threads.
 ///
 /// ```
 /// use pcadlang::infer::Observer;
@@ -58,14 +59,20 @@ impl Observer {
 
     /// Called after each step of a chain with the chain, its steps so far and its state.
     #[must_use]
-    pub fn on_step(mut self, call: impl Fn(u32, u64, &Trace) -> ControlFlow<()> + Send + Sync + 'static) -> Observer {
+    pub fn on_step(
+        mut self,
+        call: impl Fn(u32, u64, &Trace) -> ControlFlow<()> + Send + Sync + 'static,
+    ) -> Observer {
         self.step = Some(Box::new(call));
         self
     }
 
     /// Called at each draw with the chain and its state, which is to be left as it is.
     #[must_use]
-    pub fn on_draw(mut self, call: impl Fn(u32, &mut Trace) -> ControlFlow<()> + Send + Sync + 'static) -> Observer {
+    pub fn on_draw(
+        mut self,
+        call: impl Fn(u32, &mut Trace) -> ControlFlow<()> + Send + Sync + 'static,
+    ) -> Observer {
         self.draw = Some(Box::new(call));
         self
     }

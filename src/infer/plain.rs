@@ -17,7 +17,8 @@ pub(crate) enum Plain {
 }
 
 impl Plain {
-    /// A value as plain data; `None` if it is more than that: a function, a distribution, an object.
+    /// A value as plain data; `None` if it is more than that: a function, a distribution,
+    /// an object.
     pub fn of(value: &Value) -> Option<Plain> {
         Some(match value {
             Value::Unit => Plain::Unit,
@@ -43,7 +44,9 @@ impl Plain {
             Plain::Str(s) => Value::Str(Arc::clone(s)),
             Plain::Array(xs) => Value::Array(Arc::clone(xs)),
             Plain::List(xs) => Value::List(xs.iter().map(Plain::value).collect()),
-            Plain::Record(r) => Value::Record(Arc::new(r.iter().map(|(k, v)| (Arc::clone(k), v.value())).collect())),
+            Plain::Record(r) => {
+                Value::Record(Arc::new(r.iter().map(|(k, v)| (Arc::clone(k), v.value())).collect()))
+            }
         }
     }
 }

@@ -1,23 +1,28 @@
 //! A population of states that shrinks to one while the likelihood is annealed.
 //!
-//! Far from the posterior a single annealed chain ends in whichever mode drew it first. A population explores several: its
-//! members move in turn under the same kernels, and as the power of the likelihood rises from b to b', each gains a weight of
-//! likelihood^(b' - b), as in population annealing (Hukushima & Iba 2003) and sequential Monte Carlo samplers (Del Moral, Doucet &
-//! Jasra 2006). The number falls geometrically as the power rises, so that those who are left get more of the time; offspring are
-//! drawn by weight when a third of the members has to go, and not before: after few steps likelihoods say more of how a member
-//! began than of where it is going. It belongs to warm-up: the states it goes through are not draws.
+//! Far from the posterior a single annealed chain ends in whichever mode drew it first. A
+//! population explores several: its members move in turn under the same kernels, and as
+//! the power of the likelihood rises from b to b', each gains a weight of likelihood^(b' -
+//! b), as in population annealing (Hukushima & Iba 2003) and sequential Monte Carlo
+//! samplers (Del Moral, Doucet & Jasra 2006). The number falls geometrically as the power
+//! rises, so that those who are left get more of the time; offspring are drawn by weight
+//! when a third of the members has to go, and not before: after few steps likelihoods say
+//! more of how a member began than of where it is going. It belongs to warm-up: the
+//! states it goes through are not draws.
 
 use super::resampling::systematic;
 use crate::rng::Stream;
 use crate::trace::{Constraint, Draws, Trace, TraceResult};
 use serde::{Deserialize, Serialize};
 
-/// Steps a member makes before it is the next one's turn: enough that going over, a full update, costs little beside them.
+/// Steps a member makes before it is the next one's turn: enough that going over, a full
+/// update, costs little beside them.
 const LEG: u64 = 16;
 
 type State = Vec<(u64, Constraint)>;
 
-/// A state, its log-likelihood, and the log of the weight it has gained since offspring were drawn.
+/// A state, its log-likelihood, and the log of the weight it has gained since offspring
+/// were drawn.
 type Member = (State, f64, f64);
 
 /// Some members; the chain's trace is in the one whose turn it is.
@@ -45,8 +50,9 @@ impl Population {
         (self.members.is_empty() || self.turn < self.members.len()) && self.steps < 1 << 60
     }
 
-    /// Called after each step of the annealing, with the share of it that is done and the power that belongs to it. Gives the
-    /// power of the next step: it stays the same until every member has had its turn.
+    /// Called after each step of the annealing, with the share of it that is done and the
+    /// power that belongs to it. Gives the power of the next step: it stays the same
+    /// until every member has had its turn.
     ///
     /// # Errors
     /// Those of the program.
@@ -130,7 +136,8 @@ mod tests {
 
     fn population(log_likelihoods: &[f64]) -> Population {
         let state = |i: usize| vec![(i as u64, Constraint::Stored(crate::dist::Datum::Num(0.0)))];
-        let members: Vec<_> = log_likelihoods.iter().enumerate().map(|(i, l)| (state(i), *l, 0.0)).collect();
+        let members: Vec<_> =
+            log_likelihoods.iter().enumerate().map(|(i, l)| (state(i), *l, 0.0)).collect();
         Population { first: members.len(), members, turn: 0, steps: 0, power: None }
     }
 
@@ -165,7 +172,8 @@ mod tests {
         assert_eq!(p.members.len(), 2);
     }
 
-    /// Twelve members thin out to eight, five, three, two and one as the power rises, not one by one.
+    /// Twelve members thin out to eight, five, three, two and one as the power rises, not
+    /// one by one.
     #[test]
     fn members_go_by_thirds() {
         let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 0;").unwrap();

@@ -1,8 +1,11 @@
-//! Predictive checks: what would be observed again, in draws from the prior or the posterior, against what is observed.
+//! Predictive checks: what would be observed again, in draws from the prior or the
+//! posterior, against what is observed.
 //!
-//! Every observation that has a sampler is drawn anew in each state ([`Trace::replicate`]); what has none is named. Observations
-//! that differ only in the keys of their addresses (those of a loop) count as one, of many numbers. Compared are test
-//! statistics: Gelman, Meng & Stern, "Posterior predictive assessment of model fitness" (1996). Not here: judging.
+//! Every observation that has a sampler is drawn anew in each state
+//! ([`Trace::replicate`]); what has none is named. Observations that differ only in the
+//! keys of their addresses (those of a loop) count as one, of many numbers. Compared are
+//! test statistics: Gelman, Meng & Stern, "Posterior predictive assessment of model
+//! fitness" (1996). Not here: judging.
 
 use super::calibration::simulate::{replicating, state};
 use super::parallel::in_parallel;
@@ -42,7 +45,8 @@ impl Replication {
     }
 }
 
-/// Mean, standard deviation (over n - 1), least and greatest of the numbers that are finite; NaN where there are too few.
+/// Mean, standard deviation (over n - 1), least and greatest of the numbers that are
+/// finite; NaN where there are too few.
 pub fn statistics(numbers: &[f64]) -> [f64; 4] {
     let (mut n, mut mean, mut squares) = (0.0, 0.0, 0.0);
     let (mut low, mut high) = (f64::NAN, f64::NAN);
@@ -58,7 +62,8 @@ pub fn statistics(numbers: &[f64]) -> [f64; 4] {
     [if n > 0.0 { mean } else { f64::NAN }, sd, low, high]
 }
 
-/// The share of replicated statistics above the observed one, equal ones counting half; NaN where nothing can be compared.
+/// The share of replicated statistics above the observed one, equal ones counting half;
+/// NaN where nothing can be compared.
 pub fn tail(observed: f64, replicated: &[f64]) -> f64 {
     let known: Vec<f64> = replicated.iter().copied().filter(|x| !x.is_nan()).collect();
     if known.is_empty() || observed.is_nan() {
@@ -82,7 +87,11 @@ pub fn replication(trace: &Trace, draws: Draws) -> Result<Replication, Box<RunEr
     let drawn = trace.replicate(draws)?;
     let addresses: rustc_hash::FxHashMap<u64, Address> =
         trace.observed().into_iter().map(|o| (o.hash, o.address)).collect();
-    let values = drawn.values.into_iter().filter_map(|(hash, v)| Some((addresses.get(&hash)?.clone(), v))).collect();
+    let values = drawn
+        .values
+        .into_iter()
+        .filter_map(|(hash, v)| Some((addresses.get(&hash)?.clone(), v)))
+        .collect();
     let mut all = grouped(values);
     for (address, what) in drawn.silent {
         let name = keyless(&address);
@@ -104,7 +113,10 @@ fn grouped(values: Vec<(Address, Value)>) -> Replication {
             groups.entry(name).or_default().extend(numbers);
         }
     }
-    Replication { groups: groups.into_iter().map(|(name, numbers)| Group { name, numbers }).collect(), silent }
+    Replication {
+        groups: groups.into_iter().map(|(name, numbers)| Group { name, numbers }).collect(),
+        silent,
+    }
 }
 
 fn keyless(address: &Address) -> String {
@@ -131,7 +143,8 @@ pub fn prior(
     in_parallel(threads.max(1), (0..count).collect(), one).into_iter().collect()
 }
 
-/// Replications of every recorded draw of some chains, as a run's watch. Clones share them.
+/// Replications of every recorded draw of some chains, as a run's watch. Clones share
+/// them.
 #[derive(Clone, Debug)]
 pub struct Predictive {
     seed: u64,
@@ -193,13 +206,17 @@ mod tests {
         assert!(tail(f64::NAN, &[1.0]).is_nan() && tail(1.0, &[]).is_nan());
     }
 
-    /// The posterior of m given six observations of unit variance, mean 1.5 and prior variance 4: mean 1.44, variance 0.16.
+    /// The posterior of m given six observations of unit variance, mean 1.5 and prior
+    /// variance 4: mean 1.44, variance 0.16.
     #[test]
     fn predictive_draws_have_the_exact_moments() {
         let model = Model::from_text(TEXT).unwrap();
         let now = observed(&model.simulate(0, 0).unwrap());
         let names: Vec<&str> = now.groups.iter().map(|g| &*g.name).collect();
-        assert_eq!((names, now.groups[0].numbers.clone()), (vec!["@x", "@y"], vec![0.0, 1.0, 2.0, 3.0]));
+        assert_eq!(
+            (names, now.groups[0].numbers.clone()),
+            (vec!["@x", "@y"], vec![0.0, 1.0, 2.0, 3.0])
+        );
         let moments = |draws: &[Replication]| {
             let xs: Vec<f64> = draws.iter().map(|r| r.get("@x").unwrap().numbers[0]).collect();
             let [mean, sd, ..] = statistics(&xs);
@@ -211,12 +228,23 @@ mod tests {
         let (mean, variance) = moments(&from_prior);
         assert!(mean.abs() < 0.2 && (variance - 5.0).abs() < 0.6, "{mean} {variance}");
         let watch = Predictive::new(1, 3);
-        let options = RunOptions { seed: 3, watch: Some(Arc::new(watch.clone())), ..RunOptions::default() };
+        let options =
+            RunOptions { seed: 3, watch: Some(Arc::new(watch.clone())), ..RunOptions::default() };
         let (plan, _) = model.plan().unwrap();
-        let done = run_chains(model.code(), &plan, &options, 1, &Progress::default(), vec![Box::new(Discard)]);
+        let done = run_chains(
+            model.code(),
+            &plan,
+            &options,
+            1,
+            &Progress::default(),
+            vec![Box::new(Discard)],
+        );
         assert!(done[0].is_ok());
         let draws = watch.draws().unwrap().concat();
         let (mean, variance) = moments(&draws);
-        assert!(draws.len() == 1000 && (mean - 1.44).abs() < 0.2 && (variance - 1.16).abs() < 0.3, "{mean} {variance}");
+        assert!(
+            draws.len() == 1000 && (mean - 1.44).abs() < 0.2 && (variance - 1.16).abs() < 0.3,
+            "{mean} {variance}"
+        );
     }
 }

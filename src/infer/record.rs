@@ -12,11 +12,13 @@ use crate::trace::{Draws, Trace};
 pub(crate) struct Recorder {
     collects: bool,
     columns: Vec<Column>,
-    /// The observations of the first draw: the hash of each one's address, and how many values it observes.
+    /// The observations of the first draw: the hash of each one's address, and how many
+    /// values it observes.
     observed: Option<Vec<(u64, usize)>>,
 }
 
-/// The column of the log density of each observed value, as Stan's programs and ArviZ call it.
+/// The column of the log density of each observed value, as Stan's programs and ArviZ
+/// call it.
 pub const POINTWISE: &str = "log_lik";
 /// So many observed values get one each.
 pub const MOST_POINTS: usize = 1000;
@@ -42,7 +44,8 @@ impl Recorder {
         self.columns = columns;
     }
 
-    /// The values to record: what is collected (or everything assumed), and the predictions.
+    /// The values to record: what is collected (or everything assumed), and the
+    /// predictions.
     pub fn values(
         &self,
         code: &Code,
@@ -56,7 +59,10 @@ impl Recorder {
             Some(exprs) => {
                 for e in exprs {
                     let Some(operand) = code.queries.get(&e.span) else {
-                        return Err(super::selection::fail(e.span, "this cannot be collected".into()));
+                        return Err(super::selection::fail(
+                            e.span,
+                            "this cannot be collected".into(),
+                        ));
                     };
                     names.push(column_name(e));
                     operands.push(*operand);
@@ -86,11 +92,12 @@ impl Recorder {
         self.observed = observed;
     }
 
-    /// Adds the log density of each observed value, if there are not too many of them; NaN where others are observed than in the
-    /// first draw.
+    /// Adds the log density of each observed value, if there are not too many of them;
+    /// NaN where others are observed than in the first draw.
     pub fn add_pointwise(&mut self, trace: &Trace, values: &mut Vec<(String, Value)>) {
         let is_first = self.columns.is_empty();
-        if values.iter().any(|(name, _)| name == POINTWISE) || !is_first && self.observed.is_none() {
+        if values.iter().any(|(name, _)| name == POINTWISE) || !is_first && self.observed.is_none()
+        {
             return;
         }
         let all = trace.pointwise(MOST_POINTS).unwrap_or_default();
@@ -106,8 +113,9 @@ impl Recorder {
         values.push((POINTWISE.into(), Value::array(scores)));
     }
 
-    /// One number a column, NaN where a column has none in this draw; and whether the draw has more than the draws before it, for
-    /// which columns came. Numbers, bools, arrays and records of them are kept, anything else is left out.
+    /// One number a column, NaN where a column has none in this draw; and whether the
+    /// draw has more than the draws before it, for which columns came. Numbers, bools,
+    /// arrays and records of them are kept, anything else is left out.
     pub fn row(&mut self, values: &[(String, Value)]) -> (Vec<f64>, bool) {
         let (row, fits) = self.flatten(values);
         if fits {
@@ -141,13 +149,17 @@ impl Recorder {
 
 fn add_columns(name: &str, v: &Value, columns: &mut Vec<Column>) {
     match v {
-        Value::Num(_) | Value::Bool(_) => columns.push(Column { name: name.into(), shape: Shape::Scalar }),
+        Value::Num(_) | Value::Bool(_) => {
+            columns.push(Column { name: name.into(), shape: Shape::Scalar })
+        }
         Value::Array(_) | Value::List(_) => {
             let mut flat = Vec::new();
             flatten(v, &mut flat);
             columns.push(Column { name: name.into(), shape: Shape::Vector(flat.len()) });
         }
-        Value::Record(r) => r.iter().for_each(|(k, v)| add_columns(&format!("{name}/{k}"), v, columns)),
+        Value::Record(r) => {
+            r.iter().for_each(|(k, v)| add_columns(&format!("{name}/{k}"), v, columns))
+        }
         _ => {}
     }
 }
@@ -186,7 +198,8 @@ fn flatten(v: &Value, out: &mut Vec<f64>) {
     }
 }
 
-/// What a collected expression is called: `log_joint()` without its parentheses, anything else as written.
+/// What a collected expression is called: `log_joint()` without its parentheses, anything
+/// else as written.
 fn column_name(e: &Expr) -> String {
     match &e.kind {
         ExprKind::Call { callee, args } if args.is_empty() => column_name(callee),

@@ -6,7 +6,9 @@ use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::key::Key;
 use crate::syntax::ast::{self, BinaryOp, Expr, ExprKind, SegmentName};
 use crate::syntax::span::Span;
-use crate::trace::{Address, AddressSegment, ChoiceKind, Draws, Pattern, PatternSegment, Selector, Trace};
+use crate::trace::{
+    Address, AddressSegment, ChoiceKind, Draws, Pattern, PatternSegment, Selector, Trace,
+};
 use std::sync::Arc;
 
 /// Reads a selection, with `one(…)` or `each(…)` around it or not.
@@ -27,8 +29,9 @@ pub(super) fn target(e: &Expr) -> bool {
     match &e.kind {
         ExprKind::Address(_) | ExprKind::TagSel { .. } => true,
         ExprKind::Binary { left, .. } => target(left),
-        _ => super::plan::call(e)
-            .is_some_and(|(name, args)| pick(name).is_some() && args.first().is_some_and(|a| target(&a.value))),
+        _ => super::plan::call(e).is_some_and(|(name, args)| {
+            pick(name).is_some() && args.first().is_some_and(|a| target(&a.value))
+        }),
     }
 }
 
@@ -40,14 +43,18 @@ fn pick(name: &str) -> Option<Pick> {
     }
 }
 
-/// Reads a selection as people write it, outside of inference blocks: what keys compute they compute in this trace.
+/// Reads a selection as people write it, outside of inference blocks: what keys compute
+/// they compute in this trace.
 ///
 /// # Errors
 /// If the expression is not a selection, or a computed key fails.
 pub fn selected(e: &Expr, trace: &mut Trace, draws: Draws) -> Result<Selector, Box<RunError>> {
     let code = Arc::clone(trace.code());
     let started = crate::platform::clock::Instant::now();
-    selector(e, &mut Scope { code: &code, trace, variables: &[], draws, started, steps: 0, moved: None })
+    selector(
+        e,
+        &mut Scope { code: &code, trace, variables: &[], draws, started, steps: 0, moved: None },
+    )
 }
 
 /// Reads a selection.
@@ -120,7 +127,9 @@ pub(crate) fn pattern(a: &ast::Address, env: &mut Scope) -> Result<Pattern, Box<
                 ast::Key::Expr(e) => {
                     let v = evaluate(e, env)?;
                     let key = Key::from_value(&v);
-                    Some(key.ok_or_else(|| fail(e.span, format!("{} cannot be used as a key", v.type_name())))?)
+                    Some(key.ok_or_else(|| {
+                        fail(e.span, format!("{} cannot be used as a key", v.type_name()))
+                    })?)
                 }
             });
         }
@@ -138,7 +147,9 @@ pub(crate) fn address(e: &Expr, env: &mut Scope) -> Result<Address, Box<RunError
     let ExprKind::Address(a) = &e.kind else { return Err(one()) };
     let mut segments = Vec::with_capacity(a.segments.len());
     for s in pattern(a, env)?.segments {
-        let PatternSegment::Segment { name: Some(name), occurrence, keys } = s else { return Err(one()) };
+        let PatternSegment::Segment { name: Some(name), occurrence, keys } = s else {
+            return Err(one());
+        };
         let keys = keys.into_iter().collect::<Option<Vec<Key>>>().ok_or_else(one)?;
         segments.push(AddressSegment { name, occurrence: occurrence.max(1), keys });
     }
@@ -147,7 +158,10 @@ pub(crate) fn address(e: &Expr, env: &mut Scope) -> Result<Address, Box<RunError
 
 fn not_a_selection(span: Span) -> Box<RunError> {
     let mut e = fail(span, "expected a selection of choices".into());
-    e.hint = Some("an address such as @**, a tag such as $affine, or a combination of these with +, - or &".into());
+    e.hint = Some(
+        "an address such as @**, a tag such as $affine, or a combination of these with +, - or &"
+            .into(),
+    );
     e
 }
 

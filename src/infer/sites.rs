@@ -1,4 +1,5 @@
-//! Counting what single-site kernels do, by address. Not part of a step unless asked for ([`super::RunOptions::sites`]).
+//! Counting what single-site kernels do, by address. Not part of a step unless asked for
+//! ([`super::RunOptions::sites`]).
 
 use super::draws::SiteStats;
 use super::kernel::Outcome;
@@ -63,7 +64,8 @@ mod tests {
         let all = SiteStats::total(done.chains.iter().flat_map(|c| &c.sites));
         let names: Vec<&str> = all.iter().map(|s| &*s.address).collect();
         assert_eq!(names, ["@c", "@x/a", "@x/b", "@z[0]", "@z[1]"]);
-        // Every choice stays where it is when it is picked, so every proposal is at some address.
+        // Every choice stays where it is when it is picked, so every proposal is at some
+        // address.
         let proposals: u64 = done.chains.iter().flat_map(|c| &c.kernels).map(|k| k.proposals).sum();
         assert_eq!(all.iter().map(|s| s.proposals).sum::<u64>(), proposals);
         assert!(all.iter().all(|s| s.acceptance().is_some_and(|a| a > 0.05 && a < 1.0)), "{all:?}");

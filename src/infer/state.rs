@@ -22,7 +22,8 @@ pub(crate) fn in_order<K: Ord + Copy, T>(map: &FxHashMap<K, T>) -> BTreeMap<K, &
     map.iter().map(|(key, value)| (*key, value)).collect()
 }
 
-/// A value as bytes (CBOR, RFC 8949: exact for all numbers, and its reader bounds how deep it goes).
+/// A value as bytes (CBOR, RFC 8949: exact for all numbers, and its reader bounds how
+/// deep it goes).
 pub(crate) fn pack<T: Serialize>(value: &T) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Writing to memory does not fail, and no type here refuses to be written.
@@ -40,7 +41,11 @@ pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError>
 
 /// Whether something holds, as a state that is read must.
 pub(crate) fn holds(condition: bool, what: &str) -> Result<(), StateError> {
-    if condition { Ok(()) } else { Err(StateError::new(format!("the state of {what} does not fit together"))) }
+    if condition {
+        Ok(())
+    } else {
+        Err(StateError::new(format!("the state of {what} does not fit together")))
+    }
 }
 
 #[cfg(test)]
@@ -49,7 +54,16 @@ mod tests {
 
     #[test]
     fn numbers_come_back_bit_for_bit() {
-        let all = [0.0, -0.0, 0.1, f64::MIN_POSITIVE / 3.0, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
+        let all = [
+            0.0,
+            -0.0,
+            0.1,
+            f64::MIN_POSITIVE / 3.0,
+            f64::MAX,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
+        ];
         let back: Vec<f64> = unpack(&pack(&all.to_vec())).unwrap();
         assert!(all.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits()), "{back:?}");
         assert!(unpack::<Vec<f64>>(&[0xff, 0]).is_err());

@@ -8,8 +8,9 @@ const JUDGED: u64 = 100;
 /// The least fraction of them that is accepted where a choice moves.
 const MOVES: f64 = 0.01;
 
-/// The choices on which the structure of a state depends (whether others are there, and how many) and
-/// that the single-site kernels of a run hardly ever moved, with the fraction of proposals accepted.
+/// The choices on which the structure of a state depends (whether others are there, and
+/// how many) and that the single-site kernels of a run hardly ever moved, with the
+/// fraction of proposals accepted.
 pub fn stuck_structure(state: &Trace, sites: &[SiteStats]) -> Vec<(String, f64)> {
     let stuck = |s: &SiteStats| s.acceptance().filter(|a| s.proposals >= JUDGED && *a < MOVES);
     let mut trace = None;

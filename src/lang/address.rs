@@ -1,7 +1,9 @@
-//! Addresses: the path that leads to a random choice or observation, as a value and as text.
+//! Addresses: the path that leads to a random choice or observation, as a value and as
+//! text.
 //!
-//! What an address prints as reads back as the same address, but for keys that are arrays of one element or of arrays, which
-//! print as their elements. Not here: patterns with wildcards, and the address literals of programs.
+//! What an address prints as reads back as the same address, but for keys that are arrays
+//! of one element or of arrays, which print as their elements. Not here: patterns with
+//! wildcards, and the address literals of programs.
 
 use super::code::segment_hash;
 use super::key::{Key, mix};
@@ -31,7 +33,8 @@ pub struct AddressSegment {
 pub(crate) const ROOT_HASH: u64 = 0x7063_6164_6c61_6e67;
 
 impl Address {
-    /// A 64-bit hash, the same on every platform: it keys the random stream of the choice.
+    /// A 64-bit hash, the same on every platform: it keys the random stream of the
+    /// choice.
     pub fn hash64(&self) -> u64 {
         self.segments.iter().fold(ROOT_HASH, |h, s| {
             let h = mix(h, segment_hash(&s.name, s.occurrence));
@@ -39,7 +42,8 @@ impl Address {
         })
     }
 
-    /// Whether this address is `other` or lies below it: same segments, and at the last of them the same leading keys.
+    /// Whether this address is `other` or lies below it: same segments, and at the last
+    /// of them the same leading keys.
     pub fn starts_with(&self, other: &Address) -> bool {
         let Some((last, init)) = other.segments.split_last() else { return true };
         self.segments.len() >= other.segments.len() && self.segments[..init.len()] == *init && {
@@ -56,8 +60,14 @@ impl Address {
         if n <= 12 {
             return self.to_string();
         }
-        let part = |s: &[AddressSegment]| s.iter().map(ToString::to_string).collect::<Vec<_>>().join("/");
-        format!("@{}/… {} more …/{}", part(&self.segments[..4]), n - 7, part(&self.segments[n - 3..]))
+        let part =
+            |s: &[AddressSegment]| s.iter().map(ToString::to_string).collect::<Vec<_>>().join("/");
+        format!(
+            "@{}/… {} more …/{}",
+            part(&self.segments[..4]),
+            n - 7,
+            part(&self.segments[n - 3..])
+        )
     }
 }
 
@@ -87,7 +97,8 @@ impl fmt::Display for AddressSegment {
     }
 }
 
-/// Names given to observations and factors without one of their own; they always show their number.
+/// Names given to observations and factors without one of their own; they always show
+/// their number.
 pub(crate) fn is_numbered(name: &str) -> bool {
     name == "obs" || name == "factor"
 }
@@ -113,19 +124,27 @@ impl FromStr for Address {
     /// Reads an address as it is printed; the `@` may be left out.
     fn from_str(text: &str) -> Result<Self, AddressTextError> {
         let mut rest = text.strip_prefix('@').unwrap_or(text);
-        let wrong =
-            |rest: &str, expected| AddressTextError { text: text.to_owned(), at: text.len() - rest.len(), expected };
+        let wrong = |rest: &str, expected| AddressTextError {
+            text: text.to_owned(),
+            at: text.len() - rest.len(),
+            expected,
+        };
         let mut segments = Vec::new();
         loop {
             let name = take(&mut rest, |c| c.is_alphanumeric() || c == '_');
             if name.is_empty() {
                 return Err(wrong(rest, "a name"));
             }
-            let mut segment = AddressSegment { name: Arc::from(name), occurrence: 1, keys: Vec::new() };
+            let mut segment =
+                AddressSegment { name: Arc::from(name), occurrence: 1, keys: Vec::new() };
             if let Some(after) = rest.strip_prefix('#') {
                 rest = after;
                 let digits = take(&mut rest, |c| c.is_ascii_digit());
-                segment.occurrence = digits.parse().ok().filter(|n| *n > 0).ok_or(wrong(after, "a number from 1"))?;
+                segment.occurrence = digits
+                    .parse()
+                    .ok()
+                    .filter(|n| *n > 0)
+                    .ok_or(wrong(after, "a number from 1"))?;
             }
             while let Some(after) = rest.strip_prefix('[') {
                 rest = after;
@@ -238,11 +257,15 @@ mod tests {
 
     #[test]
     fn what_is_no_address_is_told() {
-        for text in
-            ["", "@", "@a/", "@a[", "@a[1", "@a[]", "@a[a b]", "@a#0", "@a#x", "@a b", "@a[\"b]", "@a[nan]", "@**"]
-        {
+        for text in [
+            "", "@", "@a/", "@a[", "@a[1", "@a[]", "@a[a b]", "@a#0", "@a#x", "@a b", "@a[\"b]",
+            "@a[nan]", "@**",
+        ] {
             let e = text.parse::<Address>().unwrap_err();
-            assert!(e.at <= text.len() && e.to_string().contains("is not an address"), "{text}: {e}");
+            assert!(
+                e.at <= text.len() && e.to_string().contains("is not an address"),
+                "{text}: {e}"
+            );
         }
         assert_eq!("@a/b c".parse::<Address>().unwrap_err().at, 4);
     }

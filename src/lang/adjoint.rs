@@ -1,5 +1,5 @@
-//! Adjoints: the derivatives of a number by a value, in the value's shape. They are what flows backwards through a program
-//! when a gradient is taken (reverse mode).
+//! Adjoints: the derivatives of a number by a value, in the value's shape. They are what
+//! flows backwards through a program when a gradient is taken (reverse mode).
 
 use super::value::Value;
 use crate::num::accumulate;
@@ -13,8 +13,8 @@ pub enum Adjoint {
     Zero,
     /// By a number.
     Num(f64),
-    /// By an array of numbers. By a distribution: by its parameters, in the order of its constructor. By an object or a
-    /// likelihood: as its type says.
+    /// By an array of numbers. By a distribution: by its parameters, in the order of its
+    /// constructor. By an object or a likelihood: as its type says.
     Array(Vec<f64>),
     /// By the elements of an array.
     List(Vec<Adjoint>),
@@ -58,7 +58,9 @@ impl Adjoint {
     /// By a field of a record.
     pub fn field(&self, name: &str) -> Adjoint {
         match self {
-            Adjoint::Record(all) => all.iter().find(|(n, _)| **n == *name).map(|(_, a)| a.clone()).unwrap_or_default(),
+            Adjoint::Record(all) => {
+                all.iter().find(|(n, _)| **n == *name).map(|(_, a)| a.clone()).unwrap_or_default()
+            }
             Adjoint::Unknown => Adjoint::Unknown,
             _ => Adjoint::Zero,
         }
@@ -99,7 +101,10 @@ impl Adjoint {
             (Adjoint::List(a), Adjoint::List(b)) if a.len() == b.len() => {
                 a.iter_mut().zip(b).for_each(|(a, b)| a.add(b));
             }
-            (Adjoint::Array(_) | Adjoint::List(_), other @ (Adjoint::Array(_) | Adjoint::List(_))) => {
+            (
+                Adjoint::Array(_) | Adjoint::List(_),
+                other @ (Adjoint::Array(_) | Adjoint::List(_)),
+            ) => {
                 let n = match &other {
                     Adjoint::List(all) => all.len(),
                     Adjoint::Array(gs) => gs.len(),
@@ -241,7 +246,11 @@ mod tests {
         assert_eq!(a.field("y"), Adjoint::Num(5.0));
         let mut picked = Adjoint::Zero;
         let xs = Value::array(vec![1.0, 2.0, 3.0]);
-        picked.add_at(&xs, &[Value::array(vec![2.0, 2.0, 0.0])], Adjoint::Array(vec![1.0, 10.0, 100.0]));
+        picked.add_at(
+            &xs,
+            &[Value::array(vec![2.0, 2.0, 0.0])],
+            Adjoint::Array(vec![1.0, 10.0, 100.0]),
+        );
         assert_eq!(picked.numbers(3), [100.0, 0.0, 11.0]);
         picked.add(Adjoint::Unknown);
         assert!(picked.is_unknown());

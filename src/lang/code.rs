@@ -1,8 +1,9 @@
 //! Lowered code: blocks of operations in slots, with every name resolved.
 //!
-//! A block is a straight line of operations; slot `i` holds the result of operation `i`, and an operand is a constant, a
-//! slot of the same block, or a slot of an enclosing one. Bodies that may run any number of times (functions, branches,
-//! loop passes) are blocks of their own. The trace instantiates a block as a frame of nodes, one node a slot, and
+//! A block is a straight line of operations; slot `i` holds the result of operation `i`,
+//! and an operand is a constant, a slot of the same block, or a slot of an enclosing one.
+//! Bodies that may run any number of times (functions, branches, loop passes) are blocks
+//! of their own. The trace instantiates a block as a frame of nodes, one node a slot, and
 //! evaluates a slot when something asks for it.
 
 pub use super::slots::{SlotFacts, Spread};
@@ -39,7 +40,8 @@ pub enum Operand {
 pub struct Code {
     /// The blocks; block 0 is the top level.
     pub blocks: Vec<Block>,
-    /// The operations of all blocks, one block after the other, and what is known of the slot of each.
+    /// The operations of all blocks, one block after the other, and what is known of the
+    /// slot of each.
     pub ops: Vec<Op>,
     /// See `ops`.
     pub slots: Vec<SlotFacts>,
@@ -55,7 +57,8 @@ pub struct Code {
     pub globals: indexmap::IndexMap<Arc<str>, Operand>,
     /// What `predict` records, in order.
     pub predictions: Vec<(Arc<str>, Operand)>,
-    /// The names bound by `assume`, in order: what a report shows when nothing else is collected.
+    /// The names bound by `assume`, in order: what a report shows when nothing else is
+    /// collected.
     pub assumed: Vec<(Arc<str>, Operand)>,
     /// `sample e;` statements, in order.
     pub samples: Vec<Operand>,
@@ -65,9 +68,11 @@ pub struct Code {
     pub freezes: Vec<crate::syntax::ast::Expr>,
     /// The kernels the program declares.
     pub kernels: Vec<crate::syntax::ast::KernelDecl>,
-    /// Expressions of inference blocks, reports and exports that only read the model, by their place.
+    /// Expressions of inference blocks, reports and exports that only read the model, by
+    /// their place.
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
-    /// Values observed in place of what the program says, by the hash of the observation's address.
+    /// Values observed in place of what the program says, by the hash of the
+    /// observation's address.
     pub observed: Arc<Observed>,
     /// What runs although nothing asks for it.
     pub eager: Eager,
@@ -76,10 +81,12 @@ pub struct Code {
 /// What runs although nothing asks for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Eager {
-    /// Observations and factors: a choice that none of them asks for is not part of a trace.
+    /// Observations and factors: a choice that none of them asks for is not part of a
+    /// trace.
     #[default]
     Observations,
-    /// Top-level names too (predictions aside), so that who looks at a name twice sees one value.
+    /// Top-level names too (predictions aside), so that who looks at a name twice sees
+    /// one value.
     Names,
     /// Top-level names alone: the prior, of a program whose data are not there.
     NamesOnly,
@@ -126,7 +133,8 @@ pub struct Block {
     pub kind: BlockKind,
     /// The lexically enclosing block.
     pub parent: Option<BlockId>,
-    /// The operations, by slot, while the block is being filled; then they go to [`Code::ops`].
+    /// The operations, by slot, while the block is being filled; then they go to
+    /// [`Code::ops`].
     pub ops: Vec<Op>,
     /// The index of its first operation in [`Code::ops`].
     pub first: u32,
@@ -134,17 +142,19 @@ pub struct Block {
     pub spans: Vec<Span>,
     /// The value of the block.
     pub result: Option<Operand>,
-    /// The slots that run whether or not anything asks for them: observations, factors, and what contains them.
+    /// The slots that run whether or not anything asks for them: observations, factors,
+    /// and what contains them.
     pub effects: Vec<Slot>,
 }
 
 /// A place in the text that adds to addresses.
 #[derive(Clone, Debug)]
 pub struct Site {
-    /// The segments it adds to the path of its function's frame, outermost first. The keys of the enclosing loops go to
-    /// the first of them.
+    /// The segments it adds to the path of its function's frame, outermost first. The
+    /// keys of the enclosing loops go to the first of them.
     pub segments: Arc<[SiteSegment]>,
-    /// Which of the enclosing loops of the same function, innermost first, add no key because the target carries it.
+    /// Which of the enclosing loops of the same function, innermost first, add no key
+    /// because the target carries it.
     pub carried: u32,
     /// Tags of the choices at and below it: name and value.
     pub tags: Box<[SiteTag]>,
@@ -162,7 +172,8 @@ pub struct SiteSegment {
 }
 
 impl SiteSegment {
-    /// A segment; observations without a name show their occurrence even when it is the first.
+    /// A segment; observations without a name show their occurrence even when it is the
+    /// first.
     pub fn new(name: Arc<str>, occurrence: u32) -> Self {
         let hash = segment_hash(&name, occurrence);
         SiteSegment { name, occurrence, hash }
@@ -219,7 +230,8 @@ pub enum Callee {
 /// Where the elements of a keyed container are drawn.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// The `for` operations to go through, outermost first: a slot of the container's block, then of each body.
+    /// The `for` operations to go through, outermost first: a slot of the container's
+    /// block, then of each body.
     pub loops: Box<[Slot]>,
     /// The draw, in the innermost body (or the container's own block).
     pub draw: Slot,
@@ -302,7 +314,8 @@ pub enum Op {
         /// When false.
         otherwise: BlockId,
     },
-    /// A branch whose alternatives are slots of this block (made by `flatten`): only the one taken is asked for.
+    /// A branch whose alternatives are slots of this block (made by `flatten`): only the
+    /// one taken is asked for.
     Select {
         /// The condition.
         cond: Operand,
@@ -371,7 +384,8 @@ pub enum Op {
         dist: DistSpec,
         /// The observed value.
         value: Operand,
-        /// The surrogate of delayed acceptance: a slot of this block that nothing else asks for.
+        /// The surrogate of delayed acceptance: a slot of this block that nothing else
+        /// asks for.
         coarse: Option<Operand>,
         /// Its address.
         site: u32,
@@ -388,7 +402,8 @@ pub enum Op {
 }
 
 impl Op {
-    /// Calls `f` with each operand the operation always reads when it is evaluated; branches, bodies and callees read more.
+    /// Calls `f` with each operand the operation always reads when it is evaluated;
+    /// branches, bodies and callees read more.
     pub fn operands(&self, mut f: impl FnMut(Operand)) {
         match self {
             Op::Param { default, .. } => default.iter().copied().for_each(f),
@@ -426,7 +441,12 @@ impl Op {
                 f(*value);
             }
             Op::Factor { weight, .. } => f(*weight),
-            Op::Container { .. } | Op::Gather | Op::Item | Op::Accumulator | Op::Closure(_) | Op::Probe(_) => {}
+            Op::Container { .. }
+            | Op::Gather
+            | Op::Item
+            | Op::Accumulator
+            | Op::Closure(_)
+            | Op::Probe(_) => {}
         }
     }
 }
@@ -434,7 +454,15 @@ impl Op {
 impl Block {
     /// An empty block.
     pub fn new(kind: BlockKind, parent: Option<BlockId>) -> Self {
-        Block { kind, parent, ops: Vec::new(), spans: Vec::new(), result: None, first: 0, effects: Vec::new() }
+        Block {
+            kind,
+            parent,
+            ops: Vec::new(),
+            spans: Vec::new(),
+            result: None,
+            first: 0,
+            effects: Vec::new(),
+        }
     }
 
     /// How many slots it has.
@@ -467,8 +495,12 @@ impl Code {
 
     /// The index of a constant, added if new. Numbers, bools and strings are shared.
     pub fn constant(&mut self, v: Value) -> Operand {
-        let shareable = matches!(v, Value::Num(_) | Value::Bool(_) | Value::Str(_) | Value::Unit | Value::Builtin(_));
-        // Only the last ones are looked at, so that a long table of numbers costs no more than its length.
+        let shareable = matches!(
+            v,
+            Value::Num(_) | Value::Bool(_) | Value::Str(_) | Value::Unit | Value::Builtin(_)
+        );
+        // Only the last ones are looked at, so that a long table of numbers costs no more
+        // than its length.
         let first = self.consts.len().saturating_sub(SHARED_CONSTANTS);
         if shareable && let Some(i) = self.consts[first..].iter().position(|c| c.same(&v)) {
             return Operand::Const((first + i) as u32);
@@ -482,7 +514,8 @@ impl Code {
         &self.consts[i as usize]
     }
 
-    /// Every literal key of a container indexed somewhere would go here; computed keys are checked when they run.
+    /// Every literal key of a container indexed somewhere would go here; computed keys
+    /// are checked when they run.
     pub fn key_of(&self, o: Operand) -> Option<Key> {
         match o {
             Operand::Const(i) => Key::from_value(self.const_value(i)),

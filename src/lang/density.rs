@@ -1,4 +1,5 @@
-//! Densities of values of the language and their derivatives: what observations and choices are scored by, whatever scores them.
+//! Densities of values of the language and their derivatives: what observations and
+//! choices are scored by, whatever scores them.
 
 use crate::dist::{Datum, Dist, Flat, Support};
 use crate::lang::adjoint::Adjoint;
@@ -18,7 +19,8 @@ pub(crate) enum Score {
     Sum(ExactSum),
 }
 
-/// Whether it is flat over everything, so that it may be of what is no number: as a surrogate, it leaves an observation out.
+/// Whether it is flat over everything, so that it may be of what is no number: as a
+/// surrogate, it leaves an observation out.
 fn tells_nothing(dist: &Dist) -> bool {
     matches!(dist, Dist::Flat(f) if *f == Flat::EVERYWHERE)
 }
@@ -33,12 +35,20 @@ pub(crate) fn likelihood_score(v: &Value, observed: &Value) -> Result<f64, Fault
     Ok(score)
 }
 
-/// Scores a value, element by element where the distribution is over single numbers and the value is an array.
+/// Scores a value, element by element where the distribution is over single numbers and
+/// the value is an array.
 pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
-    let wrong = || Fault::type_error(format!("a value of `{}` cannot be {}", dist.name(), observed.type_name()));
+    let wrong = || {
+        Fault::type_error(format!(
+            "a value of `{}` cannot be {}",
+            dist.name(),
+            observed.type_name()
+        ))
+    };
     if let Some(count) = dist.elements() {
         if observed.len() != Some(count) {
-            let got = observed.len().map_or(observed.type_name().to_owned(), |l| format!("{l} values"));
+            let got =
+                observed.len().map_or(observed.type_name().to_owned(), |l| format!("{l} values"));
             return Err(Fault::type_error(format!(
                 "expected {count} observed values, one per element of the distribution, got {got}"
             )));
@@ -46,7 +56,9 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         return sum_scores(count, |i| {
             let x = observed.element(i).as_ref().and_then(Value::to_datum).ok_or_else(wrong)?;
             if matches!(x, Datum::Num(x) if x.is_nan()) {
-                return Err(Fault::domain(format!("element {i} of the observed value is not a number")));
+                return Err(Fault::domain(format!(
+                    "element {i} of the observed value is not a number"
+                )));
             }
             Ok(dist.element_log_density(i, &x))
         });
@@ -56,21 +68,28 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         Value::Num(x) if x.is_nan() => Err(nan()),
         Value::Array(xs) if xs.iter().any(|x| x.is_nan()) => Err(nan()),
         Value::Num(x) => Ok(Score::One(dist.log_density(&Datum::Num(*x)))),
-        Value::Array(xs) if is_truth(dist) => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
+        Value::Array(xs) if is_truth(dist) => {
+            sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i]))))
+        }
         Value::Bool(b) => Ok(Score::One(dist.log_density(&Datum::Bool(*b)))),
-        Value::Array(xs) if dist.is_scalar() => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
+        Value::Array(xs) if dist.is_scalar() => {
+            sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i]))))
+        }
         Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => {
             let x = observed.to_datum().ok_or_else(wrong)?;
             Ok(Score::One(dist.log_density(&x)))
         }
-        Value::List(xs) => sum_scores(xs.len(), |i| xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)),
+        Value::List(xs) => sum_scores(xs.len(), |i| {
+            xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)
+        }),
         Value::Array(xs) => Ok(Score::One(dist.log_density(&Datum::Vec(Arc::clone(xs))))),
         Value::Object(_) if tells_nothing(dist) => Ok(Score::One(0.0)),
         _ => Err(wrong()),
     }
 }
 
-/// The log density of each value that is observed: their sum is the [`score`]. NaN of what has none.
+/// The log density of each value that is observed: their sum is the [`score`]. NaN of
+/// what has none.
 pub(crate) fn pointwise(dist: &Dist, observed: &Value) -> Vec<f64> {
     let one = |d: &Dist, x: Option<Datum>| x.map_or(f64::NAN, |x| d.log_density(&x));
     let element = |i: usize| observed.element(i).as_ref().and_then(Value::to_datum);
@@ -79,7 +98,9 @@ pub(crate) fn pointwise(dist: &Dist, observed: &Value) -> Vec<f64> {
         return (0..count).map(log_density).collect();
     }
     match observed.len() {
-        Some(count) if is_repeated(dist, observed) => (0..count).map(|i| one(dist, element(i))).collect(),
+        Some(count) if is_repeated(dist, observed) => {
+            (0..count).map(|i| one(dist, element(i))).collect()
+        }
         _ => vec![one(dist, observed.to_datum())],
     }
 }
@@ -98,7 +119,10 @@ fn is_truth(dist: &Dist) -> bool {
     !dist.is_scalar() && dist.support() == Support::Boolean
 }
 
-fn sum_scores(count: usize, mut score: impl FnMut(usize) -> Result<f64, Fault>) -> Result<Score, Fault> {
+fn sum_scores(
+    count: usize,
+    mut score: impl FnMut(usize) -> Result<f64, Fault>,
+) -> Result<Score, Fault> {
     let mut sum = ExactSum::default();
     for i in 0..count {
         sum.add(score(i)?);
@@ -106,8 +130,8 @@ fn sum_scores(count: usize, mut score: impl FnMut(usize) -> Result<f64, Fault>) 
     Ok(Score::Sum(sum))
 }
 
-/// The derivatives of the log density of a value: by the value, in its shape, and by the parameters. As scored, many values
-/// under a distribution of one number are independent.
+/// The derivatives of the log density of a value: by the value, in its shape, and by the
+/// parameters. As scored, many values under a distribution of one number are independent.
 pub(crate) fn gradient(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)> {
     if let (Value::Array(xs), true) = (value, dist.is_scalar() || is_truth(dist)) {
         let (mut by_x, mut params) = (Vec::with_capacity(xs.len()), Vec::new());
@@ -157,7 +181,8 @@ fn shaped(value: &Value, rest: &mut &[f64]) -> Adjoint {
     }
 }
 
-/// From the derivatives by a distribution's parameters to those by the arguments it was made from.
+/// From the derivatives by a distribution's parameters to those by the arguments it was
+/// made from.
 pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[Adjoint; 4]> {
     let count = a.values.len();
     let covariance = matrix(dist, a.values);
@@ -166,7 +191,9 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
         && !p.is_empty()
     {
         let each = params.len() / p.len();
-        let column = |i: usize| params.chunks_exact(each.max(1)).map(move |c| c.get(i).copied().unwrap_or(0.0));
+        let column = |i: usize| {
+            params.chunks_exact(each.max(1)).map(move |c| c.get(i).copied().unwrap_or(0.0))
+        };
         // A truncated one: the parameters of what is truncated, then the bounds.
         if let Value::Dist(d) = a.get(0) {
             let own = each.saturating_sub(2);
@@ -181,7 +208,9 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
                 Value::Array(_) => Adjoint::Array(column(own + i - 1).collect()),
                 _ => Adjoint::Zero,
             };
-            return (0..count).map(|i| if i == 0 { Adjoint::Array(of_base.clone()) } else { bound(i) }).collect();
+            return (0..count)
+                .map(|i| if i == 0 { Adjoint::Array(of_base.clone()) } else { bound(i) })
+                .collect();
         }
         let one = |i: usize| match a.get(i) {
             Value::Num(_) => Adjoint::Num(column(i).sum()),
@@ -202,7 +231,12 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
             // The jitter.
             Value::Num(_) if i == 4 && matches!(dist, Dist::Gp(_)) => Adjoint::Unknown,
             // A bound left out has a place among the parameters.
-            Value::Unit if matches!(dist, Dist::TruncatedNormal(_) | Dist::Truncated(_) | Dist::Flat(_)) => {
+            Value::Unit
+                if matches!(
+                    dist,
+                    Dist::TruncatedNormal(_) | Dist::Truncated(_) | Dist::Flat(_)
+                ) =>
+            {
                 take(1);
                 Adjoint::Zero
             }
@@ -214,7 +248,9 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
             Value::Dist(d) => take(d.param_count()).map_or(Adjoint::Unknown, Adjoint::Array),
             Value::List(xs) => {
                 let parts = xs.iter().map(|x| match x {
-                    Value::Dist(d) => take(d.param_count()).map_or(Adjoint::Unknown, Adjoint::Array),
+                    Value::Dist(d) => {
+                        take(d.param_count()).map_or(Adjoint::Unknown, Adjoint::Array)
+                    }
                     _ => Adjoint::Unknown,
                 });
                 Adjoint::List(parts.collect())
@@ -226,7 +262,8 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     (0..count).map(one).collect()
 }
 
-/// The argument that is a covariance or a factor of one, whose derivatives come by another way: [`by_factor`] and [`by_matrix`].
+/// The argument that is a covariance or a factor of one, whose derivatives come by
+/// another way: [`by_factor`] and [`by_matrix`].
 pub(crate) fn matrix(dist: &Dist, values: &[&Value]) -> Option<usize> {
     match (dist, values.get(1)) {
         (Dist::MvNormal(_), Some(Value::Unit)) => Some(2),
@@ -235,8 +272,9 @@ pub(crate) fn matrix(dist: &Dist, values: &[&Value]) -> Option<usize> {
     }
 }
 
-/// The derivatives by the Cholesky factor of a distribution's covariance, its lower triangle by rows: of the log density of a
-/// stored value; of one stored as noise, of what has these derivatives by the value.
+/// The derivatives by the Cholesky factor of a distribution's covariance, its lower
+/// triangle by rows: of the log density of a stored value; of one stored as noise, of
+/// what has these derivatives by the value.
 pub(crate) fn by_factor(dist: &Dist, stored: &Datum, by_value: &[f64]) -> Option<Vec<f64>> {
     match dist {
         Dist::Gp(d) => d.factor_gradient(stored, by_value),
@@ -248,7 +286,8 @@ pub(crate) fn by_factor(dist: &Dist, stored: &Datum, by_value: &[f64]) -> Option
 
 /// From those to the derivatives by the argument the factor was made from, in its shape.
 pub(crate) fn by_matrix(a: &Args, dist: &Dist, by_factor: &[f64]) -> Option<Adjoint> {
-    // An entry off the diagonal of a covariance stands for two places, one of a factor for one.
+    // An entry off the diagonal of a covariance stands for two places, one of a factor
+    // for one.
     let rows = |by: &[f64], above: f64| {
         let n = (0..).find(|n| n * (n + 1) / 2 >= by.len()).unwrap_or(0);
         let cell = |i: usize, j: usize| {
@@ -260,14 +299,18 @@ pub(crate) fn by_matrix(a: &Args, dist: &Dist, by_factor: &[f64]) -> Option<Adjo
             };
             by.get(row * (row + 1) / 2 + column).map_or(0.0, |g| g * share)
         };
-        Adjoint::List((0..n).map(|i| Adjoint::Array((0..n).map(|j| cell(i, j)).collect())).collect())
+        Adjoint::List(
+            (0..n).map(|i| Adjoint::Array((0..n).map(|j| cell(i, j)).collect())).collect(),
+        )
     };
     match dist {
         Dist::Gp(d) => {
             let cov = a.get(1).downcast::<CovarianceValue>()?;
             Some(Adjoint::Array(d.pull_covariance(&cov.0, &a.array(2).ok()?, by_factor)?))
         }
-        Dist::MvNormal(d) if !matches!(a.get(1), Value::Unit) => Some(rows(&d.pull_covariance(by_factor), 0.5)),
+        Dist::MvNormal(d) if !matches!(a.get(1), Value::Unit) => {
+            Some(rows(&d.pull_covariance(by_factor), 0.5))
+        }
         Dist::MvNormal(_) | Dist::Wishart(_) => Some(rows(by_factor, 0.0)),
         _ => None,
     }

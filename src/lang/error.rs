@@ -1,4 +1,5 @@
-//! Errors while a program runs: what went wrong, where in the text, at which address, through which calls.
+//! Errors while a program runs: what went wrong, where in the text, at which address,
+//! through which calls.
 
 use super::address::Address;
 use crate::syntax::span::Span;
@@ -8,8 +9,9 @@ use std::sync::Arc;
 /// What kind of failure it is, and so what may be done about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// A number outside a parameter's domain, a matrix that will not factor: impossible under the model, so that a proposal
-    /// that leads here is rejected and counted. At the start of a chain it is reported.
+    /// A number outside a parameter's domain, a matrix that will not factor: impossible
+    /// under the model, so that a proposal that leads here is rejected and counted. At
+    /// the start of a chain it is reported.
     Domain,
     /// A value of the wrong type.
     Type,
@@ -60,12 +62,20 @@ impl Fault {
         self
     }
 
-    /// The same with a hint for a name that is not known: the known one most like it, or all of them after `introduced`.
+    /// The same with a hint for a name that is not known: the known one most like it, or
+    /// all of them after `introduced`.
     #[doc(hidden)]
-    pub fn with_nearest<'a>(self, name: &str, introduced: &str, known: impl Iterator<Item = &'a str> + Clone) -> Self {
+    pub fn with_nearest<'a>(
+        self,
+        name: &str,
+        introduced: &str,
+        known: impl Iterator<Item = &'a str> + Clone,
+    ) -> Self {
         match crate::diag::nearest(name, known.clone()) {
             Some(near) => self.with_hint(format!("did you mean `{near}`?")),
-            None => self.with_hint(format!("{introduced} {}", known.collect::<Vec<_>>().join(", "))),
+            None => {
+                self.with_hint(format!("{introduced} {}", known.collect::<Vec<_>>().join(", ")))
+            }
         }
     }
 }
@@ -88,7 +98,8 @@ pub struct RunError {
 }
 
 impl RunError {
-    /// Whether a proposal that fails like this is to be rejected rather than to end the run.
+    /// Whether a proposal that fails like this is to be rejected rather than to end the
+    /// run.
     pub fn is_recoverable(&self) -> bool {
         self.kind == FaultKind::Domain
     }

@@ -1,9 +1,11 @@
-//! How large and how deep a value is. Values are shared, so that a short program can make one that has more elements than any
-//! memory (`[x, x]` of `[x, x]` of …); and what is nested deeply is a danger to every function that walks it.
+//! How large and how deep a value is. Values are shared, so that a short program can make
+//! one that has more elements than any memory (`[x, x]` of `[x, x]` of …); and what is
+//! nested deeply is a danger to every function that walks it.
 
 use super::value::Value;
 
-/// The most elements of a value, those of its elements counted, and of an array that a function makes in one go.
+/// The most elements of a value, those of its elements counted, and of an array that a
+/// function makes in one go.
 pub const MOST_ELEMENTS: usize = 10_000_000;
 /// How deep arrays and records, distributions, and covariances may be nested.
 pub const MOST_NESTED: u32 = 200;
@@ -20,8 +22,9 @@ pub enum Extent {
 }
 
 impl Value {
-    /// Whether it is small and flat enough to be handled. Takes time in proportion to its elements, but not to the numbers in
-    /// arrays of numbers, and stops where it is too large.
+    /// Whether it is small and flat enough to be handled. Takes time in proportion to its
+    /// elements, but not to the numbers in arrays of numbers, and stops where it is too
+    /// large.
     pub fn extent(&self) -> Extent {
         let mut left = MOST_ELEMENTS;
         extent(self, MOST_NESTED, &mut left)
@@ -60,7 +63,9 @@ mod tests {
         let nested = |n: u32| (0..n).fold(Value::Num(1.0), |v, _| wrap(v));
         assert_eq!(nested(MOST_NESTED).extent(), Extent::Fits);
         assert_eq!(nested(MOST_NESTED + 1).extent(), Extent::TooDeep);
-        let shared = |n: u32| (0..n).fold(Value::array(vec![1.0; 10]), |v, _| Value::List(vec![v.clone(), v].into()));
+        let shared = |n: u32| {
+            (0..n).fold(Value::array(vec![1.0; 10]), |v, _| Value::List(vec![v.clone(), v].into()))
+        };
         assert_eq!(shared(15).extent(), Extent::Fits);
         assert_eq!(shared(60).extent(), Extent::TooLarge);
         assert_eq!(Value::Num(1.0).extent(), Extent::Fits);

@@ -1,8 +1,10 @@
 //! Branches without structure of their own become slots of the block around them.
 //!
-//! An `if` makes a frame for the branch it takes. Where both branches only compute (no choices, observations, calls, loops),
-//! no frame is needed: their operations are appended to the block, and the `if` becomes a [`Op::Select`] that asks for one
-//! of the two results. Evaluation is by need, so the other branch is still not run, and what only it reads is not drawn.
+//! An `if` makes a frame for the branch it takes. Where both branches only compute (no
+//! choices, observations, calls, loops), no frame is needed: their operations are
+//! appended to the block, and the `if` becomes a [`Op::Select`] that asks for one of the
+//! two results. Evaluation is by need, so the other branch is still not run, and what
+//! only it reads is not drawn.
 
 use super::code::{Block, BlockKind, Code, Op, Operand, Slot};
 use super::value::Value;
@@ -13,7 +15,9 @@ pub(super) fn flatten(code: &mut Code) {
     for b in (0..code.blocks.len()).rev() {
         for slot in 0..code.blocks[b].ops.len() {
             let Op::If { cond, then, otherwise } = code.blocks[b].ops[slot] else { continue };
-            if !only_computes(&code.blocks[then as usize]) || !only_computes(&code.blocks[otherwise as usize]) {
+            if !only_computes(&code.blocks[then as usize])
+                || !only_computes(&code.blocks[otherwise as usize])
+            {
                 continue;
             }
             let then = splice(code, b, then as usize, nothing);
@@ -26,13 +30,24 @@ pub(super) fn flatten(code: &mut Code) {
 fn only_computes(block: &Block) -> bool {
     block.kind == BlockKind::Branch
         && block.ops.iter().all(|op| {
-            matches!(op, Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. })
+            matches!(
+                op,
+                Op::Prim { .. }
+                    | Op::Array(_)
+                    | Op::Record { .. }
+                    | Op::Index { .. }
+                    | Op::Select { .. }
+            )
         })
 }
 
-/// Moves the operations of a branch to the end of the block around it, and gives its result as seen from there.
+/// Moves the operations of a branch to the end of the block around it, and gives its
+/// result as seen from there.
 fn splice(code: &mut Code, into: usize, branch: usize, nothing: Operand) -> Operand {
-    let (ops, spans) = (std::mem::take(&mut code.blocks[branch].ops), std::mem::take(&mut code.blocks[branch].spans));
+    let (ops, spans) = (
+        std::mem::take(&mut code.blocks[branch].ops),
+        std::mem::take(&mut code.blocks[branch].spans),
+    );
     let first = code.blocks[into].ops.len() as Slot;
     let outwards = |o: &mut Operand| {
         *o = match *o {
@@ -50,7 +65,9 @@ fn splice(code: &mut Code, into: usize, branch: usize, nothing: Operand) -> Oper
                 outwards(base);
                 keys.iter_mut().for_each(outwards);
             }
-            Op::Select { cond, then, otherwise } => [cond, then, otherwise].into_iter().for_each(outwards),
+            Op::Select { cond, then, otherwise } => {
+                [cond, then, otherwise].into_iter().for_each(outwards)
+            }
             _ => {}
         }
         code.blocks[into].push(op, span);

@@ -1,9 +1,11 @@
-//! Formulas: what another value of a choice does to the scores beside it, as a short program over single numbers.
+//! Formulas: what another value of a choice does to the scores beside it, as a short
+//! program over single numbers.
 //!
-//! Most choices are single numbers that feed a little arithmetic and a few scores of the same block. For those the scores
-//! under another value can be had without touching the trace: this is the code for it, made once for each slot. It covers
-//! what has a form on single numbers (see [`Scalar`]) and gives up on all else, at run time as well: then the general way
-//! decides, so a formula needs to be right only where it answers.
+//! Most choices are single numbers that feed a little arithmetic and a few scores of the
+//! same block. For those the scores under another value can be had without touching the
+//! trace: this is the code for it, made once for each slot. It covers what has a form on
+//! single numbers (see [`Scalar`]) and gives up on all else, at run time as well: then
+//! the general way decides, so a formula needs to be right only where it answers.
 
 use super::builtins::{Scalar, Table};
 use super::code::{DistSpec, Op, Operand, Slot, SlotFacts};
@@ -44,7 +46,8 @@ pub enum Step {
     Logic { f: fn(bool) -> bool, x: Source, into: u8 },
     /// An element of an array.
     Index { base: Source, key: Source, into: u8 },
-    /// Goes on at `otherwise` if the condition of the selection in the slot does not hold.
+    /// Goes on at `otherwise` if the condition of the selection in the slot does not
+    /// hold.
     Branch { slot: Slot, cond: Source, otherwise: u16 },
     /// Goes on elsewhere.
     Go { to: u16 },
@@ -76,19 +79,28 @@ pub struct Held {
 pub struct Formula {
     /// What is done.
     pub steps: Box<[Step]>,
-    /// The computations that depend on the value; they must not be read from other blocks.
+    /// The computations that depend on the value; they must not be read from other
+    /// blocks.
     pub computations: Box<[Slot]>,
-    /// In which registers computations are left, if they are computed: these and those that alternatives ask for.
+    /// In which registers computations are left, if they are computed: these and those
+    /// that alternatives ask for.
     pub results: Box<[(Slot, u8)]>,
-    /// What the alternatives of its selections hold: who else holds it keeps it when a selection takes the other alternative.
+    /// What the alternatives of its selections hold: who else holds it keeps it when a
+    /// selection takes the other alternative.
     pub held: Box<[Held]>,
-    /// The computations of the alternatives; they must hold nothing besides their operands.
+    /// The computations of the alternatives; they must hold nothing besides their
+    /// operands.
     pub computed: Box<[Slot]>,
 }
 
 impl Formula {
     /// The formula of a slot of a block, if there is one.
-    pub(super) fn new(ops: &[Op], slots: &[SlotFacts], from: Slot, builtins: &Table) -> Option<Formula> {
+    pub(super) fn new(
+        ops: &[Op],
+        slots: &[SlotFacts],
+        from: Slot,
+        builtins: &Table,
+    ) -> Option<Formula> {
         let dependents = super::spread::dependents(ops, slots, from)?;
         let mut compiler = Compiler {
             ops,
@@ -104,12 +116,16 @@ impl Formula {
             computed: Vec::new(),
         };
         dependents.iter().for_each(|s| compiler.dependent[*s as usize] = true);
-        let is_score = |s: &Slot| matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. });
-        let (scores, computations): (Vec<Slot>, Vec<Slot>) = dependents.into_iter().partition(is_score);
+        let is_score = |s: &Slot| {
+            matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. })
+        };
+        let (scores, computations): (Vec<Slot>, Vec<Slot>) =
+            dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
         let Compiler { steps, results, mut held, computed, .. } = compiler;
         let operands: Vec<Operand> = held.iter().map(|h| h.operand).collect();
-        held.iter_mut().for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
+        held.iter_mut()
+            .for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
         Some(Formula {
             steps: steps.into(),
             computations: computations.into(),
@@ -130,7 +146,8 @@ struct Compiler<'a> {
     /// By slot: the register that has its value wherever the next step runs.
     known: Vec<Option<u8>>,
     registers: usize,
-    /// Whether the next step is inside an alternative: what it reads may not be evaluated.
+    /// Whether the next step is inside an alternative: what it reads may not be
+    /// evaluated.
     inside: bool,
     results: Vec<(Slot, u8)>,
     held: Vec<Held>,

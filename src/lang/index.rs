@@ -12,7 +12,9 @@ pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
     match (base, key) {
         (Value::Array(_) | Value::List(_), Value::Num(x)) => position(base, *x),
         // As the arm below, without a value for each number.
-        (Value::Array(xs), Value::Array(at)) if at.iter().all(|x| place(xs.len(), *x).is_some()) => {
+        (Value::Array(xs), Value::Array(at))
+            if at.iter().all(|x| place(xs.len(), *x).is_some()) =>
+        {
             Ok(Value::Array(at.iter().map(|x| xs[*x as usize]).collect()))
         }
         (Value::Array(_) | Value::List(_), Value::Array(at)) => {
@@ -23,12 +25,13 @@ pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
             let fault = Fault::new(FaultKind::Index, format!("the record has no field `{name}`"));
             fault.with_nearest(name, "its fields are", r.keys().map(|k| &**k))
         }),
-        (Value::Object(o), Value::Str(name)) => o
-            .field(name)
-            .ok_or_else(|| Fault::new(FaultKind::Index, format!("{} has no field `{name}`", o.type_name()))),
-        (Value::Array(_) | Value::List(_), k) => {
-            Err(Fault::type_error(format!("an array index must be a number, not {}", k.type_name())))
-        }
+        (Value::Object(o), Value::Str(name)) => o.field(name).ok_or_else(|| {
+            Fault::new(FaultKind::Index, format!("{} has no field `{name}`", o.type_name()))
+        }),
+        (Value::Array(_) | Value::List(_), k) => Err(Fault::type_error(format!(
+            "an array index must be a number, not {}",
+            k.type_name()
+        ))),
         (Value::Record(_), k) => {
             Err(Fault::type_error(format!("a record index must be a name, not {}", k.type_name())))
         }
@@ -44,13 +47,16 @@ fn position(base: &Value, x: f64) -> Result<Value, Fault> {
     }
     if x != libm::trunc(x) {
         let message = format!("an array index must be a whole number, got {x}");
-        return Err(Fault::new(FaultKind::Index, message).with_hint("floor(x) and round(x) give one"));
+        return Err(
+            Fault::new(FaultKind::Index, message).with_hint("floor(x) and round(x) give one")
+        );
     }
     let range = match len {
         0 => "it is empty".to_owned(),
         _ => format!("its indices run from 0 to {}", len - 1),
     };
-    Err(Fault::new(FaultKind::Index, format!("no element {x} in an array of length {len}")).with_hint(range))
+    Err(Fault::new(FaultKind::Index, format!("no element {x} in an array of length {len}"))
+        .with_hint(range))
 }
 
 /// The index that `x` is into so many elements.
@@ -62,5 +68,7 @@ pub(crate) fn place(len: usize, x: f64) -> Option<usize> {
 
 /// The components of `[x, y, z]` by name, as a record.
 pub fn xyz(v: [f64; 3]) -> Value {
-    Value::Record(Arc::new(["x", "y", "z"].into_iter().map(Arc::from).zip(v.map(Value::Num)).collect()))
+    Value::Record(Arc::new(
+        ["x", "y", "z"].into_iter().map(Arc::from).zip(v.map(Value::Num)).collect(),
+    ))
 }

@@ -1,4 +1,5 @@
-//! Keys: what tells the elements of containers, the passes of loops and the entries of `mem` apart.
+//! Keys: what tells the elements of containers, the passes of loops and the entries of
+//! `mem` apart.
 
 use super::error::Fault;
 use super::value::Value;
@@ -30,17 +31,25 @@ impl Key {
     /// # Errors
     /// If it is none.
     pub fn of(v: &Value) -> Result<Key, Fault> {
-        let other = || Fault::type_error(format!("a key must be a number, a string or a bool, got {}", v.type_name()));
+        let other = || {
+            Fault::type_error(format!(
+                "a key must be a number, a string or a bool, got {}",
+                v.type_name()
+            ))
+        };
         Key::from_value(v).ok_or_else(other)
     }
 
-    /// The key a value stands for; `None` if it cannot be one (a function, an object, NaN).
+    /// The key a value stands for; `None` if it cannot be one (a function, an object,
+    /// NaN).
     pub fn from_value(v: &Value) -> Option<Key> {
         match v {
             Value::Num(x) => Key::num(*x),
             Value::Str(s) => Some(Key::Str(Arc::clone(s))),
             Value::Bool(b) => Some(Key::Bool(*b)),
-            Value::Array(xs) => xs.iter().map(|x| Key::num(*x)).collect::<Option<_>>().map(Key::List),
+            Value::Array(xs) => {
+                xs.iter().map(|x| Key::num(*x)).collect::<Option<_>>().map(Key::List)
+            }
             Value::List(xs) => xs.iter().map(Key::from_value).collect::<Option<_>>().map(Key::List),
             _ => None,
         }
@@ -78,7 +87,8 @@ impl Key {
     }
 }
 
-/// One step of the address hash: a multiply-xorshift mix (the finaliser of SplitMix64, Steele et al. 2014).
+/// One step of the address hash: a multiply-xorshift mix (the finaliser of SplitMix64,
+/// Steele et al. 2014).
 pub fn mix(h: u64, x: u64) -> u64 {
     let mut z = (h ^ x.wrapping_mul(0x9e37_79b9_7f4a_7c15)).wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -97,7 +107,8 @@ pub fn hash_str(h: u64, s: &str) -> u64 {
     h
 }
 
-/// Whether a string can stand in an address without quotes, and not be taken for something else.
+/// Whether a string can stand in an address without quotes, and not be taken for
+/// something else.
 pub(crate) fn is_bare(s: &str) -> bool {
     !s.is_empty()
         && !matches!(s, "true" | "false")
@@ -133,7 +144,11 @@ mod tests {
         assert_eq!(show(Value::Num(17.0)).as_deref(), Some("17"));
         assert_eq!(show(Value::Num(-0.0)).as_deref(), Some("0"));
         assert_eq!(show(Value::str("arm_l")).as_deref(), Some("arm_l"));
-        assert_eq!(show(Value::str("a]/b")).as_deref(), Some("\"a]/b\""), "user names cannot forge separators");
+        assert_eq!(
+            show(Value::str("a]/b")).as_deref(),
+            Some("\"a]/b\""),
+            "user names cannot forge separators"
+        );
         assert_eq!(show(Value::array(vec![1.0, 2.5])).as_deref(), Some("1,2.5"));
         assert_eq!(show(Value::Num(f64::NAN)), None);
     }

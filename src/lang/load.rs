@@ -1,7 +1,9 @@
-//! Finding the files of a program: the main one and what it includes, each parsed once per `include`.
+//! Finding the files of a program: the main one and what it includes, each parsed once
+//! per `include`.
 //!
-//! Files come from a [`Loader`], as a rule a [`Reach`](super::reach::Reach); `std/…` and the shipped programs are embedded, so that they work in any folder. A file of
-//! the user's own wins over an embedded one of the same name.
+//! Files come from a [`Loader`], as a rule a [`Reach`](super::reach::Reach); `std/…` and
+//! the shipped programs are embedded, so that they work in any folder. A file of the
+//! user's own wins over an embedded one of the same name.
 
 use super::reach::Outside;
 use crate::diag::{Diagnostic, IntoDiagnostic, SourceMap};
@@ -57,10 +59,16 @@ pub const EMBEDDED: &[(&str, &str)] = &[
     ("std/human/human.morphs.json", include_str!("../../programs/std/human/human.morphs.json")),
     ("std/human/human.lod1.obj", include_str!("../../programs/std/human/human.lod1.obj")),
     ("std/human/human.lod1.rig.json", include_str!("../../programs/std/human/human.lod1.rig.json")),
-    ("std/human/human.lod1.morphs.json", include_str!("../../programs/std/human/human.lod1.morphs.json")),
+    (
+        "std/human/human.lod1.morphs.json",
+        include_str!("../../programs/std/human/human.lod1.morphs.json"),
+    ),
     ("std/human/human.lod2.obj", include_str!("../../programs/std/human/human.lod2.obj")),
     ("std/human/human.lod2.rig.json", include_str!("../../programs/std/human/human.lod2.rig.json")),
-    ("std/human/human.lod2.morphs.json", include_str!("../../programs/std/human/human.lod2.morphs.json")),
+    (
+        "std/human/human.lod2.morphs.json",
+        include_str!("../../programs/std/human/human.lod2.morphs.json"),
+    ),
     ("std/human/pose_prior.json", include_str!("../../programs/std/human/pose_prior.json")),
     ("data/dog.obj", include_str!("../../programs/data/dog.obj")),
     ("data/line.csv", include_str!("../../programs/data/line.csv")),
@@ -120,22 +128,33 @@ const MAX_INCLUDES: usize = 256;
 ///
 /// # Errors
 /// Every syntax error of every file, missing files, circular includes.
-pub fn load(path: &str, loader: &dyn Loader, map: &mut SourceMap) -> Result<Loaded, Vec<Diagnostic>> {
+pub fn load(
+    path: &str,
+    loader: &dyn Loader,
+    map: &mut SourceMap,
+) -> Result<Loaded, Vec<Diagnostic>> {
     let (bytes, inside) = match read(loader, path) {
         Ok(found) => found,
         Err(e) => {
-            let d = Diagnostic::new(crate::diag::Severity::Error, format!("cannot read {path}: {}", reason(&e)));
+            let d = Diagnostic::new(
+                crate::diag::Severity::Error,
+                format!("cannot read {path}: {}", reason(&e)),
+            );
             // The ending is no part of what a name is like.
             let stem = |path: &'static str| path.strip_suffix(PCAD).unwrap_or(path);
             let wanted = path.strip_suffix(PCAD).unwrap_or(path);
             let near = crate::diag::nearest(wanted, shipped().map(stem));
             return Err(vec![match near {
                 Some(n) => d.hint(format!("did you mean the shipped program {n}{PCAD}?")),
-                None => d.hint(format!("shipped programs are {}", shipped().collect::<Vec<_>>().join(", "))),
+                None => d.hint(format!(
+                    "shipped programs are {}",
+                    shipped().collect::<Vec<_>>().join(", ")
+                )),
             }]);
         }
     };
-    let mut loading = Loading { loader, map, loaded: Loaded::default(), errors: Vec::new(), stack: Vec::new() };
+    let mut loading =
+        Loading { loader, map, loaded: Loaded::default(), errors: Vec::new(), stack: Vec::new() };
     loading.unit(tidy(path), &bytes, inside);
     loading.finish()
 }
@@ -144,8 +163,14 @@ pub fn load(path: &str, loader: &dyn Loader, map: &mut SourceMap) -> Result<Load
 ///
 /// # Errors
 /// As [`load`].
-pub fn load_text(name: &str, text: &str, loader: &dyn Loader, map: &mut SourceMap) -> Result<Loaded, Vec<Diagnostic>> {
-    let mut loading = Loading { loader, map, loaded: Loaded::default(), errors: Vec::new(), stack: Vec::new() };
+pub fn load_text(
+    name: &str,
+    text: &str,
+    loader: &dyn Loader,
+    map: &mut SourceMap,
+) -> Result<Loaded, Vec<Diagnostic>> {
+    let mut loading =
+        Loading { loader, map, loaded: Loaded::default(), errors: Vec::new(), stack: Vec::new() };
     loading.unit(tidy(name), text.as_bytes(), false);
     loading.finish()
 }
@@ -165,12 +190,14 @@ pub fn reason(e: &io::Error) -> String {
     }
 }
 
-/// A path that a file in a folder names: relative to the folder, which is empty or ends in `/`.
+/// A path that a file in a folder names: relative to the folder, which is empty or ends
+/// in `/`.
 pub fn beside(folder: &str, path: &str) -> String {
     if Path::new(path).is_absolute() { path.to_owned() } else { format!("{folder}{path}") }
 }
 
-/// A path without the `./` at its start: a file has one name here, so that a circle is seen.
+/// A path without the `./` at its start: a file has one name here, so that a circle is
+/// seen.
 fn tidy(mut path: &str) -> &str {
     while let Some(rest) = path.strip_prefix("./") {
         path = rest.trim_start_matches('/');
@@ -227,7 +254,10 @@ impl Loading<'_> {
             includes: Vec::new(),
         });
         self.stack.push(path.to_owned());
-        let includes = wanted.into_iter().map(|w| w.and_then(|(p, span)| self.include(&folder, &p, span))).collect();
+        let includes = wanted
+            .into_iter()
+            .map(|w| w.and_then(|(p, span)| self.include(&folder, &p, span)))
+            .collect();
         self.stack.pop();
         self.loaded.units[index].includes = includes;
         index
@@ -237,7 +267,8 @@ impl Loading<'_> {
         let path = tidy(path);
         let beside = beside(folder, path);
         let found = read(self.loader, &beside).map(|f| (f, beside.clone()));
-        let found = found.or_else(|e| read(self.loader, path).map(|f| (f, path.to_owned())).map_err(|_| e));
+        let found =
+            found.or_else(|e| read(self.loader, path).map(|f| (f, path.to_owned())).map_err(|_| e));
         let ((bytes, inside), path) = match found {
             Ok(f) => f,
             Err(e) => {
@@ -246,19 +277,29 @@ impl Loading<'_> {
                 self.errors.push(match (Outside::hint(&e), near) {
                     (Some(hint), _) => d.hint(hint),
                     (None, Some(n)) => d.hint(format!("did you mean \"{n}\"?")),
-                    (None, None) => d.hint("paths are relative to the file that includes; `std/…` is built in"),
+                    (None, None) => {
+                        d.hint("paths are relative to the file that includes; `std/…` is built in")
+                    }
                 });
                 return None;
             }
         };
         if let Some(i) = self.stack.iter().position(|p| *p == path) {
             let way = self.stack[i..].join(" -> ");
-            let d = Diagnostic::error("files include each other in a cycle", span, format!("{path} is being loaded"));
+            let d = Diagnostic::error(
+                "files include each other in a cycle",
+                span,
+                format!("{path} is being loaded"),
+            );
             self.errors.push(d.note(format!("{way} -> {path}")));
             return None;
         }
         if self.loaded.units.len() >= MAX_INCLUDES {
-            self.errors.push(Diagnostic::error("too many included files", span, format!("more than {MAX_INCLUDES}")));
+            self.errors.push(Diagnostic::error(
+                "too many included files",
+                span,
+                format!("more than {MAX_INCLUDES}"),
+            ));
             return None;
         }
         Some(self.unit(&path, &bytes, inside))

@@ -1,6 +1,8 @@
-//! The language without its syntax: values, addresses, built-ins, and lowering from syntax trees to code.
+//! The language without its syntax: values, addresses, built-ins, and lowering from
+//! syntax trees to code.
 //!
-//! The way of a program: [`load`] finds its files, [`lower`] checks names and types and makes [`code`]; the trace runs it.
+//! The way of a program: [`load`] finds its files, [`lower`] checks names and types and
+//! makes [`code`]; the trace runs it.
 
 pub mod address;
 pub mod adjoint;

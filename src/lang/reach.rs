@@ -1,5 +1,6 @@
-//! What a program may read: files below some folders, and files that were named from outside. Symbolic links and `..` are followed
-//! before anything is compared. A file that is exchanged between the comparison and the reading is not noticed.
+//! What a program may read: files below some folders, and files that were named from
+//! outside. Symbolic links and `..` are followed before anything is compared. A file that
+//! is exchanged between the comparison and the reading is not noticed.
 
 use super::load::Loader;
 use std::fmt;
@@ -44,8 +45,9 @@ impl Outside {
 }
 
 impl Reach {
-    /// That of another program with the same folders besides: its file, wherever it may lie in truth, and all below its folder. Where
-    /// there is no such folder, there is nothing to read.
+    /// That of another program with the same folders besides: its file, wherever it may
+    /// lie in truth, and all below its folder. Where there is no such folder, there is
+    /// nothing to read.
     #[must_use]
     pub fn of(&self, program: &str) -> Reach {
         let path = Path::new(program);
@@ -70,18 +72,22 @@ impl Reach {
     /// The file to read for a path.
     ///
     /// # Errors
-    /// If there is none, or it may not be read. What lies outside is not told from what does not exist there.
+    /// If there is none, or it may not be read. What lies outside is not told from what
+    /// does not exist there.
     pub fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
         let outside = |folder: &Path| Err(io::Error::other(Outside { folder: folder.to_owned() }));
         match path.canonicalize() {
             Ok(real) => {
-                let named = self.program.as_ref().is_some_and(|(name, file)| name == path && *file == real);
+                let named =
+                    self.program.as_ref().is_some_and(|(name, file)| name == path && *file == real);
                 if named || self.holds(&real) { Ok(real) } else { outside(folder_of(&real)) }
             }
-            Err(e) => match path.ancestors().skip(1).find_map(|p| existing(p).canonicalize().ok()) {
-                Some(nearest) if !self.holds(&nearest) => outside(&nearest),
-                _ => Err(e),
-            },
+            Err(e) => {
+                match path.ancestors().skip(1).find_map(|p| existing(p).canonicalize().ok()) {
+                    Some(nearest) if !self.holds(&nearest) => outside(&nearest),
+                    _ => Err(e),
+                }
+            }
         }
     }
 
@@ -113,7 +119,9 @@ pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > MOST_BYTES {
-        true => Err(io::Error::other(format!("it is too large; at most {MOST_BYTES} bytes are read"))),
+        true => {
+            Err(io::Error::other(format!("it is too large; at most {MOST_BYTES} bytes are read")))
+        }
         false => Ok(bytes),
     }
 }

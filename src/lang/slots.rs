@@ -1,5 +1,6 @@
-//! What follows from the operations of lowered code and updates need at hand: who reads a slot, what it reads, whether it runs
-//! although nothing asks for it, how the change of a choice spreads.
+//! What follows from the operations of lowered code and updates need at hand: who reads a
+//! slot, what it reads, whether it runs although nothing asks for it, how the change of a
+//! choice spreads.
 
 use super::code::{Block, Callee, Code, Eager, Op, Operand, Slot};
 use super::formula::Formula;
@@ -16,25 +17,30 @@ pub struct SlotFacts {
     pub is_draw: bool,
     /// Whether it is the result of its block.
     pub is_result: bool,
-    /// The slots it reads whenever it is evaluated: how many levels out, and which; `None` where that depends on the state.
+    /// The slots it reads whenever it is evaluated: how many levels out, and which;
+    /// `None` where that depends on the state.
     pub reads: Option<Box<[(u16, Slot)]>>,
     /// The slots of the same block that have it as an operand.
     pub users: Box<[Slot]>,
-    /// For a choice that only computations of its own block depend on: how its change spreads.
+    /// For a choice that only computations of its own block depend on: how its change
+    /// spreads.
     pub spread: Option<Spread>,
-    /// For a choice or an element of an array: what another number there does to the scores of its block.
+    /// For a choice or an element of an array: what another number there does to the
+    /// scores of its block.
     pub formula: Option<Box<Formula>>,
 }
 
-/// The part of a choice's scaffold that lies in its own block, where that is the same in every state.
+/// The part of a choice's scaffold that lies in its own block, where that is the same in
+/// every state.
 #[derive(Clone, Debug)]
 pub struct Spread {
-    /// What depends on the choice, each after what it reads, up to and including observations and other choices.
+    /// What depends on the choice, each after what it reads, up to and including
+    /// observations and other choices.
     pub slots: Box<[Slot]>,
     /// Whether none of them reads anything of another block.
     pub is_closed: bool,
-    /// A bit for each of the slots: it may be asked for by nothing once conditions have changed, so it must not run before
-    /// they have.
+    /// A bit for each of the slots: it may be asked for by nothing once conditions have
+    /// changed, so it must not run before they have.
     pub conditional: u64,
     /// Whether conditions of selections are among them.
     pub turns: bool,
@@ -46,7 +52,8 @@ impl Code {
         super::flatten::flatten(self);
         let effects = self.effects();
         for (block, is_effect) in self.blocks.iter_mut().zip(effects) {
-            block.effects = (0..block.ops.len() as Slot).filter(|s| is_effect[*s as usize]).collect();
+            block.effects =
+                (0..block.ops.len() as Slot).filter(|s| is_effect[*s as usize]).collect();
             block.first = self.ops.len() as u32;
             let mut users = vec![Vec::new(); block.ops.len()];
             for (slot, op) in block.ops.iter().enumerate() {
@@ -79,13 +86,17 @@ impl Code {
                 });
                 self.ops.push(op);
             }
-            let (ops, slots) = (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
+            let (ops, slots) =
+                (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
             let asked = super::spread::always_asked(ops, slots);
             let found: Vec<_> = (0..slots.len() as Slot)
                 .filter(|s| matches!(ops[*s as usize], Op::Draw { .. } | Op::Index { .. }))
                 .map(|s| {
-                    let spread =
-                        if slots[s as usize].is_draw { super::spread::spread(ops, slots, &asked, s) } else { None };
+                    let spread = if slots[s as usize].is_draw {
+                        super::spread::spread(ops, slots, &asked, s)
+                    } else {
+                        None
+                    };
                     (s, spread, Formula::new(ops, slots, s, &self.builtins).map(Box::new))
                 })
                 .collect();
@@ -115,8 +126,8 @@ impl Code {
         effects
     }
 
-    /// Marks the slots that observe, or hold or call a block that does. Calls of function values count if any function
-    /// that is used as a value observes.
+    /// Marks the slots that observe, or hold or call a block that does. Calls of function
+    /// values count if any function that is used as a value observes.
     fn find_effects(&self) -> Vec<Vec<bool>> {
         let n = self.blocks.len();
         let mut observes = vec![false; n];
@@ -124,7 +135,10 @@ impl Code {
         loop {
             let mut changed = false;
             for b in 0..n {
-                let has = self.blocks[b].ops.iter().any(|op| op_observes(op, &observes, escaped_observes));
+                let has = self.blocks[b]
+                    .ops
+                    .iter()
+                    .any(|op| op_observes(op, &observes, escaped_observes));
                 if has && !observes[b] {
                     observes[b] = true;
                     changed = true;
@@ -145,7 +159,9 @@ impl Code {
                 break;
             }
         }
-        let of = |b: &Block| b.ops.iter().map(|op| op_observes(op, &observes, escaped_observes)).collect();
+        let of = |b: &Block| {
+            b.ops.iter().map(|op| op_observes(op, &observes, escaped_observes)).collect()
+        };
         self.blocks.iter().map(of).collect()
     }
 }
@@ -153,7 +169,10 @@ impl Code {
 impl Op {
     /// Where its operands are, if those it always reads are all it holds.
     pub(super) fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
-        if matches!(self, Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather) {
+        if matches!(
+            self,
+            Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather
+        ) {
             return None;
         }
         let mut reads = Vec::new();

@@ -1,8 +1,9 @@
 //! How the change of a choice spreads within its block, found once for all frames.
 //!
-//! Most choices feed a few computations and observations beside them. Where no operation on the way makes structure (calls,
-//! branches with frames, loops), what depends on the choice is the same list in every state, and an update can go through it
-//! in order instead of marking and asking.
+//! Most choices feed a few computations and observations beside them. Where no operation
+//! on the way makes structure (calls, branches with frames, loops), what depends on the
+//! choice is the same list in every state, and an update can go through it in order
+//! instead of marking and asking.
 
 use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, Spread};
 use smallvec::SmallVec;
@@ -10,18 +11,26 @@ use smallvec::SmallVec;
 /// The longest list worth keeping; a bit each in [`Spread::conditional`].
 const LONGEST: usize = u64::BITS as usize;
 
-/// The spread of the choice in slot `from` of a block, if it is the same in every state. `asked` are the slots that are always asked for.
-pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], asked: &[bool], from: Slot) -> Option<Spread> {
+/// The spread of the choice in slot `from` of a block, if it is the same in every state.
+/// `asked` are the slots that are always asked for.
+pub(super) fn spread(
+    ops: &[Op],
+    slots: &[SlotFacts],
+    asked: &[bool],
+    from: Slot,
+) -> Option<Spread> {
     let order = dependents(ops, slots, from)?;
     // A keyed choice may turn into another one.
-    if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty())) {
+    if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty()))
+    {
         return None;
     }
     let is_closed = reads_inside(ops, from, &order);
     let bits = order.iter().enumerate().filter(|(_, s)| !asked[**s as usize]);
     let conditional = bits.fold(0, |all, (i, _)| all | 1 << i);
     let decides = |o: &Operand| matches!(o, Operand::Local(s) if *s == from || order.contains(s));
-    let turns = order.iter().any(|s| matches!(&ops[*s as usize], Op::Select { cond, .. } if decides(cond)));
+    let turns =
+        order.iter().any(|s| matches!(&ops[*s as usize], Op::Select { cond, .. } if decides(cond)));
     Some(Spread { slots: order.into(), is_closed, conditional, turns })
 }
 
@@ -44,8 +53,9 @@ pub(super) fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
     asked
 }
 
-/// Whether all that these dependents of a slot read is in order when they run: in their list, or of this block through and
-/// through. What comes from frames may have changed because they read what changes here.
+/// Whether all that these dependents of a slot read is in order when they run: in their
+/// list, or of this block through and through. What comes from frames may have changed
+/// because they read what changes here.
 fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
     let mut seen = vec![false; ops.len()];
     order.iter().chain([&from]).for_each(|s| seen[*s as usize] = true);
@@ -68,7 +78,9 @@ fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
             }
             match &ops[s as usize] {
                 Op::Param { .. } | Op::Item | Op::Accumulator | Op::Closure(_) => {}
-                Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } => open.push(s),
+                Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } => {
+                    open.push(s)
+                }
                 Op::Select { .. } | Op::Draw { .. } => open.push(s),
                 _ => return false,
             }
@@ -77,8 +89,8 @@ fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
     true
 }
 
-/// What depends on a slot in its block, each after what it reads, up to and including observations and other choices, if that
-/// is the same in every state.
+/// What depends on a slot in its block, each after what it reads, up to and including
+/// observations and other choices, if that is the same in every state.
 pub(super) fn dependents(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Vec<Slot>> {
     let (mut reached, mut order) = (vec![false; slots.len()], Vec::new());
     visit(ops, slots, from, &mut reached, &mut order)?;
@@ -87,8 +99,15 @@ pub(super) fn dependents(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<
     Some(order)
 }
 
-/// Depth first: users before what they read, so that the reverse is an order of evaluation.
-fn visit(ops: &[Op], slots: &[SlotFacts], slot: Slot, reached: &mut [bool], order: &mut Vec<Slot>) -> Option<()> {
+/// Depth first: users before what they read, so that the reverse is an order of
+/// evaluation.
+fn visit(
+    ops: &[Op],
+    slots: &[SlotFacts],
+    slot: Slot,
+    reached: &mut [bool],
+    order: &mut Vec<Slot>,
+) -> Option<()> {
     reached[slot as usize] = true;
     if slots[slot as usize].is_result {
         return None;
@@ -98,14 +117,19 @@ fn visit(ops: &[Op], slots: &[SlotFacts], slot: Slot, reached: &mut [bool], orde
             continue;
         }
         match &ops[*user as usize] {
-            Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. } => {
+            Op::Prim { .. }
+            | Op::Array(_)
+            | Op::Record { .. }
+            | Op::Index { .. }
+            | Op::Select { .. } => {
                 visit(ops, slots, *user, reached, order)?;
             }
             Op::Observe { coarse: None, .. } | Op::Factor { .. } => {
                 reached[*user as usize] = true;
                 order.push(*user);
             }
-            // A choice keeps its value when its parameters change, unless it is of a form that is seen only when it runs.
+            // A choice keeps its value when its parameters change, unless it is of a form
+            // that is seen only when it runs.
             Op::Draw { dist: DistSpec::Family { .. }, .. } => {
                 reached[*user as usize] = true;
                 order.push(*user);

@@ -1,11 +1,12 @@
-//! Programs in which the coarse surrogates of observations (`with coarse = …`) stand in their place: what delayed acceptance
-//! moves in first.
+//! Programs in which the coarse surrogates of observations (`with coarse = …`) stand in
+//! their place: what delayed acceptance moves in first.
 
 use super::code::{Code, DistSpec, Op, Operand};
 use super::slots::SlotFacts;
 
 impl Code {
-    /// The same program with the surrogates of these observations, given as indices of operations, in their place.
+    /// The same program with the surrogates of these observations, given as indices of
+    /// operations, in their place.
     #[must_use]
     pub fn with_surrogates(&self, observations: &[u32]) -> Code {
         let mut code = self.clone();
@@ -24,8 +25,17 @@ impl Code {
         }
         // How changes spread was found for the program as it was.
         for facts in &mut code.slots {
-            let SlotFacts { slot, is_effect, is_draw, is_result, reads, users, .. } = std::mem::take(facts);
-            *facts = SlotFacts { slot, is_effect, is_draw, is_result, reads, users, ..SlotFacts::default() };
+            let SlotFacts { slot, is_effect, is_draw, is_result, reads, users, .. } =
+                std::mem::take(facts);
+            *facts = SlotFacts {
+                slot,
+                is_effect,
+                is_draw,
+                is_result,
+                reads,
+                users,
+                ..SlotFacts::default()
+            };
         }
         code
     }

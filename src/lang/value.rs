@@ -1,7 +1,7 @@
 //! Values of the language: immutable, cheap to clone, shared by pointer.
 //!
-//! Scene things (solids, views, photographs) enter as [`Object`]s and comparators as [`Likelihood`]s, so that neither the
-//! language nor the traces know what a picture is.
+//! Scene things (solids, views, photographs) enter as [`Object`]s and comparators as
+//! [`Likelihood`]s, so that neither the language nor the traces know what a picture is.
 
 use super::adjoint::Adjoint;
 pub use super::extent::{Extent, MOST_ELEMENTS, MOST_NESTED};
@@ -36,7 +36,8 @@ pub enum Value {
     Builtin(u32),
     /// What `mem(f)` gives.
     Memo(NodeRef),
-    /// Random choices by key, or the results of a `map`, by reference: indexing depends on one element only.
+    /// Random choices by key, or the results of a `map`, by reference: indexing depends
+    /// on one element only.
     Container(NodeRef),
     /// A distribution.
     Dist(Arc<Dist>),
@@ -58,8 +59,9 @@ pub struct Closure {
     pub frame: u32,
 }
 
-/// A reference to a node of the trace that holds structure rather than a value. The version changes whenever the set of
-/// elements does, so that equal references mean equal structure.
+/// A reference to a node of the trace that holds structure rather than a value. The
+/// version changes whenever the set of elements does, so that equal references mean equal
+/// structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeRef {
     /// The node.
@@ -68,7 +70,8 @@ pub struct NodeRef {
     pub version: u32,
 }
 
-/// A value the language itself knows nothing about: a solid, a camera, a view, a photograph, a host's own type.
+/// A value the language itself knows nothing about: a solid, a camera, a view, a
+/// photograph, a host's own type.
 pub trait Object: Any + fmt::Debug + Send + Sync {
     /// What errors and `doc` call the type.
     fn type_name(&self) -> &'static str;
@@ -96,7 +99,8 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     fn own_numbers(&self) -> usize {
         0
     }
-    /// Its contents as numbers, in an order and number that depend on its form alone; NaN where something is missing.
+    /// Its contents as numbers, in an order and number that depend on its form alone; NaN
+    /// where something is missing.
     fn numbers(&self) -> Option<Vec<f64>> {
         None
     }
@@ -115,14 +119,16 @@ pub struct Located {
     pub observed: [f64; 2],
     /// Where the scene has it, in the same shares.
     pub own: [f64; 2],
-    /// The variance along an axis of the point about where the scene has it, as far as no observation tells of it; as `variance`.
+    /// The variance along an axis of the point about where the scene has it, as far as no
+    /// observation tells of it; as `variance`.
     pub own_variance: f64,
 }
 
-/// A log-density of an observed value given the scene: it scores; some can draw observations, none can be drawn with `~`.
+/// A log-density of an observed value given the scene: it scores; some can draw
+/// observations, none can be drawn with `~`.
 ///
-/// What can be prepared from the observed value alone (a distance transform) is prepared once, by the implementation,
-/// and kept with the value.
+/// What can be prepared from the observed value alone (a distance transform) is prepared
+/// once, by the implementation, and kept with the value.
 pub trait Likelihood: fmt::Debug + Send + Sync {
     /// What errors call it.
     fn name(&self) -> &str;
@@ -131,29 +137,32 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     /// # Errors
     /// When the observed value is of the wrong type or cannot be compared.
     fn log_density(&self, observed: &Value) -> Result<f64, String>;
-    /// The derivatives of the log density by what the likelihood was made from, in a form that the derivative of the built-in
-    /// that makes it understands; `None` where they are not known.
+    /// The derivatives of the log density by what the likelihood was made from, in a form
+    /// that the derivative of the built-in that makes it understands; `None` where they
+    /// are not known.
     fn gradient(&self, _observed: &Value) -> Option<Adjoint> {
         None
     }
-    /// Draws an observation given the scene: in the form of the observed one, with the same parts missing. `None` where it has
-    /// no sampler.
+    /// Draws an observation given the scene: in the form of the observed one, with the
+    /// same parts missing. `None` where it has no sampler.
     ///
     /// # Errors
     /// As [`Likelihood::log_density`], inside.
     fn sample(&self, _observed: &Value, _rng: &mut Stream) -> Option<Result<Value, String>> {
         None
     }
-    /// Named points of the scene as the observation puts them, where that says more than the scene alone.
+    /// Named points of the scene as the observation puts them, where that says more than
+    /// the scene alone.
     fn located(&self, _observed: &Value) -> Vec<Located> {
         Vec::new()
     }
-    /// False when the result is not a density over observations, so that its scale is a matter of choice; the run then
-    /// says that its posterior is a pseudo-posterior.
+    /// False when the result is not a density over observations, so that its scale is a
+    /// matter of choice; the run then says that its posterior is a pseudo-posterior.
     fn is_proper(&self) -> bool {
         true
     }
-    /// What is approximate in it by its settings, for readers: single precision, coarser meshes, distances cut off. The run says so.
+    /// What is approximate in it by its settings, for readers: single precision, coarser
+    /// meshes, distances cut off. The run says so.
     fn approximations(&self) -> Vec<String> {
         Vec::new()
     }
@@ -223,8 +232,8 @@ impl Value {
         }
     }
 
-    /// The numbers in it, one after the other: bools as 0 and 1, arrays and records element by element, what objects say of
-    /// themselves; nothing for anything else.
+    /// The numbers in it, one after the other: bools as 0 and 1, arrays and records
+    /// element by element, what objects say of themselves; nothing for anything else.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Value::Num(x) => vec![*x],
@@ -261,8 +270,9 @@ impl Value {
         }
     }
 
-    /// Whether two values are the same to the last bit; shared things are compared by pointer first, objects only by
-    /// pointer. Used to stop propagation: a false negative costs time, never truth.
+    /// Whether two values are the same to the last bit; shared things are compared by
+    /// pointer first, objects only by pointer. Used to stop propagation: a false negative
+    /// costs time, never truth.
     pub fn same(&self, other: &Value) -> bool {
         match (self, other) {
             (Value::Unit, Value::Unit) => true,
@@ -271,14 +281,17 @@ impl Value {
             (Value::Str(a), Value::Str(b)) => a == b,
             (Value::Array(a), Value::Array(b)) => {
                 Arc::ptr_eq(a, b)
-                    || (a.len() == b.len() && a.iter().zip(b.iter()).all(|(x, y)| x.to_bits() == y.to_bits()))
+                    || (a.len() == b.len()
+                        && a.iter().zip(b.iter()).all(|(x, y)| x.to_bits() == y.to_bits()))
             }
             (Value::List(a), Value::List(b)) => {
-                Arc::ptr_eq(a, b) || (a.len() == b.len() && a.iter().zip(b.iter()).all(|(x, y)| x.same(y)))
+                Arc::ptr_eq(a, b)
+                    || (a.len() == b.len() && a.iter().zip(b.iter()).all(|(x, y)| x.same(y)))
             }
             (Value::Record(a), Value::Record(b)) => {
                 Arc::ptr_eq(a, b)
-                    || (a.len() == b.len() && a.iter().zip(b.iter()).all(|((ka, x), (kb, y))| ka == kb && x.same(y)))
+                    || (a.len() == b.len()
+                        && a.iter().zip(b.iter()).all(|((ka, x), (kb, y))| ka == kb && x.same(y)))
             }
             (Value::Closure(a), Value::Closure(b)) => a == b,
             (Value::Builtin(a), Value::Builtin(b)) => a == b,
@@ -306,7 +319,9 @@ impl Value {
             Value::Num(x) => Some(Datum::Num(*x)),
             Value::Bool(b) => Some(Datum::Bool(*b)),
             Value::Array(xs) => Some(Datum::Vec(Arc::clone(xs))),
-            Value::List(xs) => xs.iter().map(Value::to_datum).collect::<Option<Arc<[_]>>>().map(Datum::List),
+            Value::List(xs) => {
+                xs.iter().map(Value::to_datum).collect::<Option<Arc<[_]>>>().map(Datum::List)
+            }
             _ => None,
         }
     }

@@ -1,5 +1,5 @@
-//! Programs made from programs: another text, more at the end, a question; and the plans of a model by name. For whoever writes a
-//! program bit by bit.
+//! Programs made from programs: another text, more at the end, a question; and the plans
+//! of a model by name. For whoever writes a program bit by bit.
 
 use super::program::Files;
 use super::{Error, Model, Program};
@@ -11,7 +11,8 @@ use std::sync::Arc;
 
 #[doc(hidden)]
 impl Program {
-    /// The same program with another text: what it was given stays, and so do the files that it has read.
+    /// The same program with another text: what it was given stays, and so do the files
+    /// that it has read.
     ///
     /// # Errors
     /// As [`Program::open`].
@@ -21,7 +22,8 @@ impl Program {
         Ok(Program { loaded, sources, text, ..self.clone() })
     }
 
-    /// The same program with more items at its end, from a text of its own that includes nothing.
+    /// The same program with more items at its end, from a text of its own that includes
+    /// nothing.
     ///
     /// # Errors
     /// If the text does not parse.
@@ -32,8 +34,9 @@ impl Program {
         })
     }
 
-    /// The same program with `sample e;` at its end, `e` being the expression of a text of its own: its value is that of the last
-    /// of [`Code::samples`](crate::lang::code::Code::samples).
+    /// The same program with `sample e;` at its end, `e` being the expression of a text
+    /// of its own: its value is that of the last of
+    /// [`Code::samples`](crate::lang::code::Code::samples).
     ///
     /// # Errors
     /// If the text is no expression.
@@ -69,12 +72,14 @@ impl Program {
         }
     }
 
-    /// The same program as it would be loaded from a file of its text: from there it includes and reads.
+    /// The same program as it would be loaded from a file of its text: from there it
+    /// includes and reads.
     ///
     /// # Errors
     /// If it would not load from there.
     pub fn written_as(&self, path: &str) -> Result<Program, Error> {
-        Program { name: path.to_owned(), reach: self.reach.of(path), ..self.clone() }.edited(&self.text)
+        Program { name: path.to_owned(), reach: self.reach.of(path), ..self.clone() }
+            .edited(&self.text)
     }
 
     /// Another program with what this one was given, as far as it asks for it.
@@ -109,7 +114,11 @@ impl Model {
 
     /// The inference block of a name.
     pub fn plan_named(&self, name: &str) -> Option<Arc<[KStmt]>> {
-        self.compiled.plans.iter().find(|p| p.name.as_deref() == Some(name)).map(|p| Arc::clone(&p.body))
+        self.compiled
+            .plans
+            .iter()
+            .find(|p| p.name.as_deref() == Some(name))
+            .map(|p| Arc::clone(&p.body))
     }
 
     /// The last inference block.

@@ -5,7 +5,9 @@ use super::{Error, Model};
 use crate::diag::SourceMap;
 use crate::host::Host;
 use crate::lang::builtins::data::Options;
-use crate::lang::builtins::scene::{CameraValue, DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
+use crate::lang::builtins::scene::{
+    CameraValue, DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue,
+};
 use crate::lang::builtins::{Table, data};
 use crate::lang::code::Eager;
 use crate::lang::error::{Fault, FaultKind};
@@ -25,10 +27,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The arguments that the run's camera stands in for.
 const CAMERAS: [(&str, &str); 2] = [("scene.render", "camera"), ("scene.candidates", "camera")];
 
-/// Files of data that a program has read, with their hashes, by kind, path and how they were read.
+/// Files of data that a program has read, with their hashes, by kind, path and how they
+/// were read.
 pub(super) type Files = Arc<Mutex<FxHashMap<(String, String, String), (Value, String)>>>;
 
-/// A program on its way to a [`Model`]: loaded, its inputs not yet given. A clone can go another way: both keep what they read.
+/// A program on its way to a [`Model`]: loaded, its inputs not yet given. A clone can go
+/// another way: both keep what they read.
 #[derive(Clone)]
 pub struct Program {
     pub(super) loaded: Loaded,
@@ -47,8 +51,8 @@ pub struct Program {
 }
 
 impl Program {
-    /// Loads a program by path; the shipped programs are found in any folder. It, and the files that it names, may be read below
-    /// its own folder and nowhere else.
+    /// Loads a program by path; the shipped programs are found in any folder. It, and the
+    /// files that it names, may be read below its own folder and nowhere else.
     ///
     /// # Errors
     /// If a file is missing or may not be read, or does not parse.
@@ -84,7 +88,8 @@ impl Program {
         Program::read("<program>", text, Reach::default())
     }
 
-    /// A program from its text, which stands for a file of this name: what it includes and reads is found from there.
+    /// A program from its text, which stands for a file of this name: what it includes
+    /// and reads is found from there.
     ///
     /// # Errors
     /// As [`Program::open`].
@@ -102,8 +107,11 @@ impl Program {
     }
 
     fn new(name: &str, loaded: Loaded, sources: SourceMap, reach: Reach) -> Program {
-        let text =
-            loaded.units.first().and_then(|u| sources.get(u.file)).map_or(String::new(), |f| f.text().to_string());
+        let text = loaded
+            .units
+            .first()
+            .and_then(|u| sources.get(u.file))
+            .map_or(String::new(), |f| f.text().to_string());
         Program {
             loaded,
             sources,
@@ -140,11 +148,16 @@ impl Program {
     /// The `data` items that have no value yet.
     #[doc(hidden)]
     pub fn missing_data(&self) -> Vec<String> {
-        let open = self.interface().data.into_iter().filter(|d| !d.has_default && !self.data.contains_key(&d.name));
+        let open = self
+            .interface()
+            .data
+            .into_iter()
+            .filter(|d| !d.has_default && !self.data.contains_key(&d.name));
         open.map(|d| d.name).collect()
     }
 
-    /// A hash of its text, that of the files it includes, and the parameters set so far: that of the model it gives.
+    /// A hash of its text, that of the files it includes, and the parameters set so far:
+    /// that of the model it gives.
     pub fn hash(&self) -> String {
         hash_of(&self.loaded, &self.sources, &self.sets)
     }
@@ -176,8 +189,8 @@ impl Program {
         self
     }
 
-    /// Lets its `data` items and kernels read files below a folder; what it includes was read when it was
-    /// [opened](Program::open_allowing).
+    /// Lets its `data` items and kernels read files below a folder; what it includes was
+    /// read when it was [opened](Program::open_allowing).
     ///
     /// # Errors
     /// If there is no such folder.
@@ -186,15 +199,16 @@ impl Program {
         Ok(self)
     }
 
-    /// Bounds on what the program may build when it is not run but looked at: one draw, the plan. Runs have their own
-    /// ([`crate::RunOptions::limits`]).
+    /// Bounds on what the program may build when it is not run but looked at: one draw,
+    /// the plan. Runs have their own ([`crate::RunOptions::limits`]).
     #[must_use]
     pub fn limits(self, limits: Limits) -> Program {
         Program { limits, ..self }
     }
 
-    /// Reads a file for a `data` item as its declared kind, with the options of its default. What that file names is read below
-    /// its own folder and where the program may read.
+    /// Reads a file for a `data` item as its declared kind, with the options of its
+    /// default. What that file names is read below its own folder and where the program
+    /// may read.
     ///
     /// # Errors
     /// If the program has no such item, or the file cannot be read as that.
@@ -206,8 +220,12 @@ impl Program {
         let folder = folder_of(Path::new(file));
         let reach = self.reach.clone().allow(folder).unwrap_or_else(|_| self.reach.clone());
         let loaded = match read_file(Path::new(file)) {
-            Ok(bytes) => data::load(&kind, path, &bytes, &options, &|other| sibling(&reach, path, other)),
-            Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
+            Ok(bytes) => {
+                data::load(&kind, path, &bytes, &options, &|other| sibling(&reach, path, other))
+            }
+            Err(e) => {
+                Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e))))
+            }
         };
         match loaded {
             Ok(value) => Ok(self.observe(name, value)),
@@ -215,7 +233,8 @@ impl Program {
         }
     }
 
-    /// The value of an argument wherever a program leaves it out: of a built-in by full name, an argument by name.
+    /// The value of an argument wherever a program leaves it out: of a built-in by full
+    /// name, an argument by name.
     #[must_use]
     pub fn default_argument(mut self, function: &str, argument: &str, value: Value) -> Program {
         self.defaults.insert((function.into(), argument.into()), value);
@@ -225,7 +244,8 @@ impl Program {
     /// What the program calls may be the host's too.
     ///
     /// # Errors
-    /// If the host brings a name of the language without saying that it replaces it, or something is wrong with what it brings.
+    /// If the host brings a name of the language without saying that it replaces it, or
+    /// something is wrong with what it brings.
     pub fn host(mut self, host: &Host) -> Result<Program, Error> {
         self.builtins = host.table()?;
         Ok(self)
@@ -249,11 +269,14 @@ impl Program {
     /// The camera of views that name none.
     #[must_use]
     pub fn camera(self, camera: Camera) -> Program {
-        CAMERAS.iter().fold(self, |p, (of, name)| p.default_argument(of, name, Value::object(CameraValue(camera))))
+        CAMERAS.iter().fold(self, |p, (of, name)| {
+            p.default_argument(of, name, Value::object(CameraValue(camera)))
+        })
     }
 
-    /// Contours of photographs are found by a detector wherever the program says nothing of it: a value as of `data d =
-    /// detector("file");`, `None` for the detector that is built in.
+    /// Contours of photographs are found by a detector wherever the program says nothing
+    /// of it: a value as of `data d = detector("file");`, `None` for the detector that is
+    /// built in.
     #[must_use]
     #[doc(hidden)]
     pub fn detector(self, detector: DetectorValue) -> Program {
@@ -266,8 +289,9 @@ impl Program {
         chosen.downcast::<DetectorValue>().cloned()
     }
 
-    /// Without a camera, the default view in the shape of the first picture given, or of that of keypoints. Keypoints that do
-    /// not say which picture they belong to belong to the first one.
+    /// Without a camera, the default view in the shape of the first picture given, or of
+    /// that of keypoints. Keypoints that do not say which picture they belong to belong
+    /// to the first one.
     fn default_camera(&mut self) {
         let picture = self.data.values().find_map(|v| {
             let image = v.downcast::<ImageValue>().map(ImageValue::size);
@@ -286,7 +310,9 @@ impl Program {
         if self.defaults.contains_key(&cameras[0]) {
             return;
         }
-        let keypoints = || self.data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()));
+        let keypoints = || {
+            self.data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()))
+        };
         if let Some((width, height)) = picture.or_else(keypoints) {
             let camera = CameraValue(Camera::default_for(width, height));
             for of in cameras {
@@ -302,7 +328,9 @@ impl Program {
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
         let detector = self.chosen_detector();
-        let detecting = |v: Value| detector.as_ref().map_or_else(|| v.clone(), |d| ImageValue::detecting(&v, d));
+        let detecting = |v: Value| {
+            detector.as_ref().map_or_else(|| v.clone(), |d| ImageValue::detecting(&v, d))
+        };
         self.data.values_mut().for_each(|v| *v = detecting(v.clone()));
         let (reach, files) = (&self.reach, &*self.files);
         let data_hash = RefCell::new(String::new());
@@ -316,10 +344,13 @@ impl Program {
             }
             let file = data::path_of(kind, &beside);
             let (bytes, _) = read(reach, file).map_err(|e| {
-                let fault = Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)));
+                let fault =
+                    Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)));
                 Outside::hint(&e).into_iter().fold(fault, Fault::with_hint)
             })?;
-            let value = data::load(kind, &beside, &bytes, options, &|other| sibling(reach, &beside, other))?;
+            let value = data::load(kind, &beside, &bytes, options, &|other| {
+                sibling(reach, &beside, other)
+            })?;
             let hash = bytes_hash(&bytes);
             data_hash.borrow_mut().push_str(&hash);
             files.insert(key, (value.clone(), hash));
@@ -338,7 +369,15 @@ impl Program {
             Ok(compiled) => {
                 let hash = hash_of(&self.loaded, &self.sources, &self.sets);
                 let (reach, limits, data_hash) = (self.reach, self.limits, data_hash.into_inner());
-                Ok(Model { compiled, sources: self.sources, text: self.text, hash, data_hash, reach, limits })
+                Ok(Model {
+                    compiled,
+                    sources: self.sources,
+                    text: self.text,
+                    hash,
+                    data_hash,
+                    reach,
+                    limits,
+                })
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
         }

@@ -1,4 +1,5 @@
-//! Operators from the entries of a file, checked against their tensors: what is taken up here cannot fail when it runs.
+//! Operators from the entries of a file, checked against their tensors: what is taken up
+//! here cannot fail when it runs.
 
 use super::NetworkError;
 use super::convolution::{Convolution, Depthwise, Transposed};
@@ -57,7 +58,8 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A window of this size; options have the padding first, then the steps along columns and rows.
+    /// A window of this size; options have the padding first, then the steps along
+    /// columns and rows.
     fn window(&self, size: [usize; 2]) -> Fit<Window> {
         if size.iter().any(|s| !(1..=LONGEST).contains(s)) {
             return Err("a window has an invalid size".into());
@@ -85,7 +87,8 @@ impl File<'_> {
     pub fn operator(&mut self, e: &Entry) -> Fit<(Operator, Vec<usize>)> {
         let first = *e.inputs.first().ok_or("it has no input")?;
         let (input, output) = (self.shapes[first].clone(), self.shapes[e.output].clone());
-        let pictures = || Size::of(&input).zip(Size::of(&output)).ok_or("its tensors are not single images");
+        let pictures =
+            || Size::of(&input).zip(Size::of(&output)).ok_or("its tensors are not single images");
         let one = |operator: Operator| Ok((operator, vec![first]));
         let fits = |holds: bool| {
             if holds { Ok(()) } else { Err(Unfit::from("the shapes of its tensors do not match")) }
@@ -93,7 +96,8 @@ impl File<'_> {
         match e.code {
             code::CONVOLUTION | code::DEPTHWISE => {
                 let (from, to) = pictures()?;
-                let [dilation_at, clip_at] = if e.code == code::CONVOLUTION { [4, 3] } else { [5, 4] };
+                let [dilation_at, clip_at] =
+                    if e.code == code::CONVOLUTION { [4, 3] } else { [5, 4] };
                 if (e.number(dilation_at, 1)?, e.number(dilation_at + 1, 1)?) != (1, 1) {
                     return Err("dilation is not supported".into());
                 }
@@ -108,14 +112,18 @@ impl File<'_> {
                 let weights = self.numbers(weights)?;
                 if e.code == code::CONVOLUTION {
                     fits((outer, inner) == (to.channels, from.channels))?;
-                    return one(Operator::Convolution(Convolution::new(window, &weights, &biases, clip)));
+                    return one(Operator::Convolution(Convolution::new(
+                        window, &weights, &biases, clip,
+                    )));
                 }
                 fits((outer, inner) == (1, to.channels) && from.channels == to.channels)?;
                 one(Operator::Depthwise(Depthwise { window, weights, biases, clip }))
             }
             code::CUSTOM if e.custom == TRANSPOSED => {
                 let (from, to) = pictures()?;
-                let [_, weights, _] = e.inputs[..] else { return Err("it has no weights and biases".into()) };
+                let [_, weights, _] = e.inputs[..] else {
+                    return Err("it has no weights and biases".into());
+                };
                 let [outer, height, width, inner] = self.shapes[weights][..] else {
                     return Err("its weights do not have four dimensions".into());
                 };
@@ -126,17 +134,27 @@ impl File<'_> {
                 let biases = self.biases(e, to.channels)?;
                 let weights = self.numbers(weights)?;
                 let transposed = Transposed { window, weights, biases };
-                fits((outer, inner) == (to.channels, from.channels) && transposed.output(from) == to)?;
+                fits(
+                    (outer, inner) == (to.channels, from.channels) && transposed.output(from) == to,
+                )?;
                 one(Operator::Transposed(transposed))
             }
             code::PAD => {
                 let (from, to) = pictures()?;
                 let [_, by] = e.inputs[..] else { return Err("it has no padding widths".into()) };
-                let by: Vec<usize> = self.integers(by)?.into_iter().filter_map(|p| usize::try_from(p).ok()).collect();
+                let by: Vec<usize> = self
+                    .integers(by)?
+                    .into_iter()
+                    .filter_map(|p| usize::try_from(p).ok())
+                    .collect();
                 let [0, 0, top, bottom, left, right, near, far] = by[..] else {
                     return Err("its padding widths are not those of an image".into());
                 };
-                let sides = [(from.height, top, bottom), (from.width, left, right), (from.channels, near, far)];
+                let sides = [
+                    (from.height, top, bottom),
+                    (from.width, left, right),
+                    (from.channels, near, far),
+                ];
                 let padded = sides.map(|(n, a, b)| n.checked_add(a).and_then(|n| n.checked_add(b)));
                 fits(padded == [Some(to.height), Some(to.width), Some(to.channels)])?;
                 one(Operator::Pad([top, left, near]))
@@ -150,7 +168,10 @@ impl File<'_> {
             code::MEAN => {
                 let from = Size::of(&input).ok_or("its input is not an image")?;
                 let [_, axes] = e.inputs[..] else { return Err("it has no axes".into()) };
-                fits(self.integers(axes)? == [1, 2] && output.iter().product::<usize>() == from.channels)?;
+                fits(
+                    self.integers(axes)? == [1, 2]
+                        && output.iter().product::<usize>() == from.channels,
+                )?;
                 one(Operator::Mean)
             }
             code::RESIZE => {
@@ -172,13 +193,21 @@ impl File<'_> {
             code::CONCATENATION => {
                 let axis = e.number(0, 0)?;
                 let axis = if axis < 0 { axis + output.len() as i32 } else { axis };
-                let along =
-                    usize::try_from(axis).ok().filter(|a| *a < output.len()).ok_or("its dimension does not exist")?;
+                let along = usize::try_from(axis)
+                    .ok()
+                    .filter(|a| *a < output.len())
+                    .ok_or("its dimension does not exist")?;
                 let mut whole = 0;
                 for t in &e.inputs {
                     let shape = &self.shapes[*t];
                     fits(shape.len() == output.len())?;
-                    fits(shape.iter().zip(&output).enumerate().all(|(i, (a, b))| i == along || a == b))?;
+                    fits(
+                        shape
+                            .iter()
+                            .zip(&output)
+                            .enumerate()
+                            .all(|(i, (a, b))| i == along || a == b),
+                    )?;
                     whole += shape[along];
                 }
                 fits(whole == output[along])?;
@@ -190,18 +219,28 @@ impl File<'_> {
             code::ADD | code::MULTIPLY => {
                 let [a, b] = e.inputs[..] else { return Err("it does not have two inputs".into()) };
                 let (a_shape, b_shape) = (&self.shapes[a], &self.shapes[b]);
-                let (long, short) = if a_shape.iter().product::<usize>() >= b_shape.iter().product::<usize>() {
-                    (a_shape, b_shape)
-                } else {
-                    (b_shape, a_shape)
-                };
+                let (long, short) =
+                    if a_shape.iter().product::<usize>() >= b_shape.iter().product::<usize>() {
+                        (a_shape, b_shape)
+                    } else {
+                        (b_shape, a_shape)
+                    };
                 // The same shape, or a number for each channel, or one number.
-                let channels = short.iter().rposition(|n| *n != 1).map_or(&[][..], |last| &short[last..]);
+                let channels =
+                    short.iter().rposition(|n| *n != 1).map_or(&[][..], |last| &short[last..]);
                 let broadcast = short.iter().filter(|n| **n != 1).count() <= 1
-                    && (channels.is_empty() || long.last() == channels.last() && short.last() == channels.last());
+                    && (channels.is_empty()
+                        || long.last() == channels.last() && short.last() == channels.last());
                 fits((long == short || broadcast) && *long == output)?;
                 let clip = e.clip(0)?;
-                Ok((if e.code == code::ADD { Operator::Add(clip) } else { Operator::Multiply(clip) }, vec![a, b]))
+                Ok((
+                    if e.code == code::ADD {
+                        Operator::Add(clip)
+                    } else {
+                        Operator::Multiply(clip)
+                    },
+                    vec![a, b],
+                ))
             }
             code::RESHAPE => {
                 fits(input.iter().product::<usize>() == output.iter().product::<usize>())?;

@@ -1,7 +1,8 @@
-//! Convolutions as products of matrices: a row for each pixel of the output, a column for each channel.
+//! Convolutions as products of matrices: a row for each pixel of the output, a column for
+//! each channel.
 //!
-//! Every sum is taken in the order of the weights, multiplied and added in two roundings, so that it has the same bits whatever the
-//! width of the processor's instructions.
+//! Every sum is taken in the order of the weights, multiplied and added in two roundings,
+//! so that it has the same bits whatever the width of the processor's instructions.
 
 use super::shape::{Clip, Size, Window};
 use crate::num::simd::vectorised;
@@ -19,14 +20,16 @@ pub(super) struct Convolution {
     channels: usize,
     /// Weights of a channel: window rows, window columns, channels of the input.
     depth: usize,
-    /// By panel: a row of [`PANEL`] weights for each of `depth`; and the biases. Both padded with zeros.
+    /// By panel: a row of [`PANEL`] weights for each of `depth`; and the biases. Both
+    /// padded with zeros.
     panels: Vec<f32>,
     biases: Vec<f32>,
     clip: Clip,
 }
 
 impl Convolution {
-    /// `weights` by channel of the output, row and column of the window, channel of the input; a bias for each channel.
+    /// `weights` by channel of the output, row and column of the window, channel of the
+    /// input; a bias for each channel.
     pub fn new(window: Window, weights: &[f32], biases: &[f32], clip: Clip) -> Convolution {
         let channels = biases.len();
         let depth = weights.len() / channels.max(1);
@@ -74,7 +77,8 @@ impl Convolution {
                     self.rows::<ROWS>(group, lines);
                 }
                 let rest = groups.remainder().chunks_exact(self.depth);
-                for (row, line) in rest.zip(lines.into_remainder().chunks_exact_mut(self.channels)) {
+                for (row, line) in rest.zip(lines.into_remainder().chunks_exact_mut(self.channels))
+                {
                     self.rows::<1>(row, line);
                 }
             },
@@ -83,8 +87,10 @@ impl Convolution {
 
     #[inline(always)]
     fn rows<const R: usize>(&self, rows: &[f32], out: &mut [f32]) {
-        let rows: [&[f32]; R] = core::array::from_fn(|r| &rows[r * self.depth..(r + 1) * self.depth]);
-        let panels = self.panels.chunks_exact(self.depth * PANEL).zip(self.biases.chunks_exact(PANEL));
+        let rows: [&[f32]; R] =
+            core::array::from_fn(|r| &rows[r * self.depth..(r + 1) * self.depth]);
+        let panels =
+            self.panels.chunks_exact(self.depth * PANEL).zip(self.biases.chunks_exact(PANEL));
         for (p, (panel, biases)) in panels.enumerate() {
             let mut sums = [[0f32; PANEL]; R];
             sums.iter_mut().for_each(|s| s.copy_from_slice(biases));
@@ -132,7 +138,8 @@ impl Depthwise {
                             (row, column),
                             #[inline(always)]
                             |ky, kx, y, x| {
-                                let weights = &self.weights[(ky * width + kx) * channels..][..channels];
+                                let weights =
+                                    &self.weights[(ky * width + kx) * channels..][..channels];
                                 let values = from.pixel(input, y, x);
                                 for ((s, v), w) in sums.iter_mut().zip(values).zip(weights) {
                                     *s += v * w;
@@ -149,11 +156,13 @@ impl Depthwise {
     }
 }
 
-/// A convolution transposed, with biases: each pixel of the input adds a window to the output (MediaPipe's own operator).
+/// A convolution transposed, with biases: each pixel of the input adds a window to the
+/// output (MediaPipe's own operator).
 #[derive(Debug)]
 pub(super) struct Transposed {
     pub window: Window,
-    /// By channel of the output, row and column of the window: a weight for each channel of the input.
+    /// By channel of the output, row and column of the window: a weight for each channel
+    /// of the input.
     pub weights: Vec<f32>,
     pub biases: Vec<f32>,
 }

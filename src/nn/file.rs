@@ -1,4 +1,5 @@
-//! From the bytes of a TFLite file to a network: constants, operators with their weights, and a check that all of them fit together.
+//! From the bytes of a TFLite file to a network: constants, operators with their weights,
+//! and a check that all of them fit together.
 
 use super::NetworkError;
 use super::assemble::{Entry, Unfit};
@@ -13,7 +14,8 @@ type Result<T> = core::result::Result<T, NetworkError>;
 
 /// The most numbers in one tensor, and in all constants together.
 const MOST_NUMBERS: usize = 1 << 26;
-/// The most numbers in all tensors that are computed, and multiplications: some ten times those of the largest network of a person.
+/// The most numbers in all tensors that are computed, and multiplications: some ten times
+/// those of the largest network of a person.
 const MOST_COMPUTED: usize = 1 << 29;
 const MOST_WORK: usize = 1 << 36;
 
@@ -22,7 +24,8 @@ pub(super) struct File<'a> {
     tensors: Vec<Table<'a>>,
     buffers: Vec<Table<'a>>,
     pub shapes: Vec<Vec<usize>>,
-    /// Tensors that are others in another form: those that are not sparse any more, or of more bits.
+    /// Tensors that are others in another form: those that are not sparse any more, or of
+    /// more bits.
     same: HashMap<usize, usize>,
     /// How many constants may still be read.
     left: usize,
@@ -42,15 +45,20 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
     };
     file.check(input)?;
 
-    let (mut steps, mut filled, mut constants) = (Vec::<Step>::new(), HashSet::from([input]), HashMap::new());
+    let (mut steps, mut filled, mut constants) =
+        (Vec::<Step>::new(), HashSet::from([input]), HashMap::new());
     let (mut computed, mut work) = (0usize, 0usize);
     for (index, table) in graph.tables(field::graph::OPERATORS)?.iter().enumerate() {
         let entry = file.entry(&codes, table)?;
-        let wrong = |why: &str| NetworkError::Operator { index, name: name(&entry), why: why.into() };
+        let wrong =
+            |why: &str| NetworkError::Operator { index, name: name(&entry), why: why.into() };
         // Constants in another form are constants.
         if matches!(entry.code, code::DEQUANTIZE | code::DENSIFY) {
             let from = *entry.inputs.first().ok_or_else(|| wrong("it has no input"))?;
-            if filled.contains(&from) || file.same.insert(entry.output, from).is_some() || entry.output == from {
+            if filled.contains(&from)
+                || file.same.insert(entry.output, from).is_some()
+                || entry.output == from
+            {
                 return Err(wrong("its input is not a constant"));
             }
             continue;
@@ -111,7 +119,8 @@ impl File<'_> {
         let absent = || format("an operator has an undefined code");
         let kind = codes.get(table.index(field::operator::CODE)?).ok_or_else(absent)?;
         // Files that are older have the number in a byte.
-        let code = kind.i32(field::code::LONG, 0)?.max(i32::from(kind.u8(field::code::SHORT)? as i8));
+        let code =
+            kind.i32(field::code::LONG, 0)?.max(i32::from(kind.u8(field::code::SHORT)? as i8));
         let inputs = table.i32s(field::operator::INPUTS)?.into_iter();
         // An input that is left out is -1.
         let inputs: Vec<usize> = inputs.filter_map(|i| usize::try_from(i).ok()).collect();
@@ -135,7 +144,8 @@ impl File<'_> {
                 Some(from) => tensor = *from,
                 None => {
                     let buffer = self.tensors[tensor].index(field::tensor::BUFFER)?;
-                    let buffer = self.buffers.get(buffer).ok_or_else(|| format("a buffer is missing"))?;
+                    let buffer =
+                        self.buffers.get(buffer).ok_or_else(|| format("a buffer is missing"))?;
                     return Ok((tensor, buffer.bytes(0)?));
                 }
             }
@@ -148,7 +158,10 @@ impl File<'_> {
         let (from, bytes) = self.constant(tensor)?;
         let (table, shape) = (self.tensors[from], &self.shapes[from]);
         let values: Vec<f32> = match table.u8(field::tensor::KIND)? {
-            0 => bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
+            0 => bytes
+                .chunks_exact(4)
+                .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                .collect(),
             1 => {
                 let halves = bytes.chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]));
                 let halves: Vec<half::f16> = halves.collect();
@@ -157,12 +170,16 @@ impl File<'_> {
             _ => return Err(format("a constant is not of 32- or 16-bit floats")),
         };
         let size: usize = shape.iter().product();
-        self.left = self.left.checked_sub(size).ok_or_else(|| NetworkError::TooLarge("its constants".into()))?;
+        self.left = self
+            .left
+            .checked_sub(size)
+            .ok_or_else(|| NetworkError::TooLarge("its constants".into()))?;
         let values = match table.table(field::tensor::SPARSITY)? {
             Some(sparsity) => sparse::dense(shape, &sparsity, &values)?,
             None => values,
         };
-        let is_whole = values.len() == size && size == self.shapes[tensor].iter().product::<usize>();
+        let is_whole =
+            values.len() == size && size == self.shapes[tensor].iter().product::<usize>();
         if !is_whole {
             return Err(format("the number of values of a constant does not match its shape"));
         }
@@ -176,7 +193,10 @@ impl File<'_> {
     pub fn integers(&self, tensor: usize) -> Result<Vec<i32>> {
         let (from, bytes) = self.constant(tensor)?;
         match self.tensors[from].u8(field::tensor::KIND)? {
-            2 => Ok(bytes.chunks_exact(4).map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()),
+            2 => Ok(bytes
+                .chunks_exact(4)
+                .map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                .collect()),
             _ => Err(format("a constant is not of integers")),
         }
     }

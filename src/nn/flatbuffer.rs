@@ -1,4 +1,5 @@
-//! FlatBuffers, as far as TFLite files need them: tables, vectors, numbers. Every offset is checked against the file.
+//! FlatBuffers, as far as TFLite files need them: tables, vectors, numbers. Every offset
+//! is checked against the file.
 
 use super::NetworkError;
 
@@ -48,7 +49,9 @@ impl<'a> Table<'a> {
     }
 
     fn new(file: &'a [u8], at: usize) -> Result<Table<'a>> {
-        let vtable = (at as i64).checked_sub(i64::from(i32_at(file, at)?)).and_then(|v| usize::try_from(v).ok());
+        let vtable = (at as i64)
+            .checked_sub(i64::from(i32_at(file, at)?))
+            .and_then(|v| usize::try_from(v).ok());
         let vtable = vtable.ok_or_else(cut)?;
         Ok(Table { file, at, vtable, vtable_len: u16_at(file, vtable)? })
     }
@@ -99,7 +102,12 @@ impl<'a> Table<'a> {
     }
 
     pub fn i32s(&self, i: usize) -> Result<Vec<i32>> {
-        Ok(self.vector(i, 4)?.1.chunks_exact(4).map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+        Ok(self
+            .vector(i, 4)?
+            .1
+            .chunks_exact(4)
+            .map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect())
     }
 
     /// Numbers that say how many, or which ones.
@@ -109,6 +117,8 @@ impl<'a> Table<'a> {
 
     pub fn tables(&self, i: usize) -> Result<Vec<Table<'a>>> {
         let (start, all) = self.vector(i, 4)?;
-        (0..all.len() / 4).map(|k| Table::new(self.file, follow(self.file, start + 4 * k)?)).collect()
+        (0..all.len() / 4)
+            .map(|k| Table::new(self.file, follow(self.file, start + 4 * k)?))
+            .collect()
     }
 }

@@ -1,7 +1,9 @@
-//! Neural networks: reads TFLite files of convolutional networks and runs them, on one thread and with the same bits everywhere.
+//! Neural networks: reads TFLite files of convolutional networks and runs them, on one
+//! thread and with the same bits everywhere.
 //!
-//! As much of the format as networks that find people need: pictures one at a time, numbers of 32 or 16 bits, sparse weights. What a file
-//! may contain is checked when it is read, so that running what was read cannot fail, and takes bounded time and memory.
+//! As much of the format as networks that find people need: pictures one at a time,
+//! numbers of 32 or 16 bits, sparse weights. What a file may contain is checked when it
+//! is read, so that running what was read cannot fail, and takes bounded time and memory.
 
 mod assemble;
 mod convolution;
@@ -25,7 +27,8 @@ pub enum NetworkError {
     /// The file is cut short, or not of the format.
     #[error("not a readable TFLite file: {0}")]
     Format(String),
-    /// An operator, by its place in the file, is not one of those that are known, or does not fit its tensors.
+    /// An operator, by its place in the file, is not one of those that are known, or does
+    /// not fit its tensors.
     #[error("operator {index} of the network, {name}: {why}")]
     Operator {
         /// Its place in the file, from 0.

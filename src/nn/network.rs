@@ -30,7 +30,8 @@ impl Network {
     /// The network of a `.tflite` file.
     ///
     /// # Errors
-    /// If the file is not of the format, if the network has operators that are not known here, or if it is too large.
+    /// If the file is not of the format, if the network has operators that are not known
+    /// here, or if it is too large.
     pub fn read(bytes: &[u8]) -> Result<Network, NetworkError> {
         file::read(bytes)
     }
@@ -50,7 +51,8 @@ impl Network {
         self.work
     }
 
-    /// The outputs for an input, in the file's order. Rows of pixels from the top, channels together.
+    /// The outputs for an input, in the file's order. Rows of pixels from the top,
+    /// channels together.
     ///
     /// # Errors
     /// If the input is of another length than its shape says.
@@ -83,7 +85,11 @@ impl Network {
 
 /// A list of so many numbers, of any values, out of the smallest that is long enough.
 fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
-    let fits = free.iter().enumerate().filter(|(_, v)| v.capacity() >= len).min_by_key(|(_, v)| v.capacity());
+    let fits = free
+        .iter()
+        .enumerate()
+        .filter(|(_, v)| v.capacity() >= len)
+        .min_by_key(|(_, v)| v.capacity());
     match fits.map(|(i, _)| i) {
         Some(i) => {
             let mut v = free.swap_remove(i);

@@ -45,7 +45,8 @@ pub fn sigmoid(x: f32) -> f32 {
 }
 
 impl Operator {
-    /// Fills `out`, of this shape, from the inputs. Shapes are those that were checked when the network was read.
+    /// Fills `out`, of this shape, from the inputs. Shapes are those that were checked
+    /// when the network was read.
     pub fn run(&self, inputs: &[Tensor], shape: &[usize], out: &mut [f32]) {
         let Some(first) = inputs.first() else { return };
         let pictures = Size::of(first.shape).zip(Size::of(shape));
@@ -53,7 +54,9 @@ impl Operator {
             (Operator::Convolution(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Depthwise(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Transposed(c), Some((from, to))) => c.run(first.values, from, to, out),
-            (Operator::Pad(before), Some((from, to))) => resampling::pad(first.values, from, to, *before, out),
+            (Operator::Pad(before), Some((from, to))) => {
+                resampling::pad(first.values, from, to, *before, out)
+            }
             (Operator::Pool { window, largest, clip }, Some((from, to))) => {
                 resampling::pool(first.values, from, to, window, *largest, out);
                 clip.apply(out);
@@ -81,7 +84,9 @@ impl Operator {
             (Operator::Reshape, _) => out.copy_from_slice(first.values),
             (Operator::Sigmoid, _) => each(first.values, out, sigmoid),
             (Operator::Relu, _) => each(first.values, out, |x| x.max(0.0)),
-            (Operator::HardSwish, _) => each(first.values, out, |x| x * (x + 3.0).clamp(0.0, 6.0) / 6.0),
+            (Operator::HardSwish, _) => {
+                each(first.values, out, |x| x * (x + 3.0).clamp(0.0, 6.0) / 6.0)
+            }
             // Refused when the network was read.
             (_, None) => {}
         }
@@ -110,7 +115,9 @@ fn each(values: &[f32], out: &mut [f32], f: impl Fn(f32) -> f32) {
 fn combine(inputs: &[Tensor], out: &mut [f32], f: impl Fn(f32, f32) -> f32) {
     let [a, b] = inputs else { return };
     let (long, short) = if a.values.len() >= b.values.len() { (a, b) } else { (b, a) };
-    for (out, long) in out.chunks_mut(short.values.len()).zip(long.values.chunks(short.values.len())) {
+    for (out, long) in
+        out.chunks_mut(short.values.len()).zip(long.values.chunks(short.values.len()))
+    {
         out.iter_mut().zip(long.iter().zip(short.values)).for_each(|(o, (x, y))| *o = f(*x, *y));
     }
 }

@@ -1,20 +1,30 @@
-//! Operators that change a picture's size without weights: padding, pooling, interpolation, channels that become pixels.
+//! Operators that change a picture's size without weights: padding, pooling,
+//! interpolation, channels that become pixels.
 
 use super::shape::{Size, Window};
 
-/// Copies a picture into a larger one, so many rows and columns from its corner; the rest is zero.
+/// Copies a picture into a larger one, so many rows and columns from its corner; the rest
+/// is zero.
 pub(super) fn pad(input: &[f32], from: Size, to: Size, before: [usize; 3], out: &mut [f32]) {
     out.fill(0.0);
     for row in 0..from.height {
         for column in 0..from.width {
             let pixel = to.pixel_mut(out, row + before[0], column + before[1]);
-            pixel[before[2]..before[2] + from.channels].copy_from_slice(from.pixel(input, row, column));
+            pixel[before[2]..before[2] + from.channels]
+                .copy_from_slice(from.pixel(input, row, column));
         }
     }
 }
 
 /// The largest value in each window, or the mean of those within the picture.
-pub(super) fn pool(input: &[f32], from: Size, to: Size, window: &Window, largest: bool, out: &mut [f32]) {
+pub(super) fn pool(
+    input: &[f32],
+    from: Size,
+    to: Size,
+    window: &Window,
+    largest: bool,
+    out: &mut [f32],
+) {
     let before = window.before(from, to);
     for row in 0..to.height {
         for column in 0..to.width {
@@ -54,7 +64,8 @@ pub(super) enum Alignment {
 }
 
 impl Alignment {
-    /// The two pixels that one of the output lies between, and how far it is from the first.
+    /// The two pixels that one of the output lies between, and how far it is from the
+    /// first.
     fn between(self, i: usize, from: usize, to: usize) -> (usize, usize, f32) {
         let scale = match self {
             Alignment::Corners if to > 1 => (from - 1) as f32 / (to - 1) as f32,
@@ -91,7 +102,8 @@ pub(super) fn depth_to_space(input: &[f32], from: Size, to: Size, side: usize, o
         for column in 0..from.width {
             let parts = from.pixel(input, row, column).chunks_exact(to.channels);
             for (i, part) in parts.enumerate() {
-                to.pixel_mut(out, row * side + i / side, column * side + i % side).copy_from_slice(part);
+                to.pixel_mut(out, row * side + i / side, column * side + i % side)
+                    .copy_from_slice(part);
             }
         }
     }

@@ -40,7 +40,8 @@ pub(super) struct Window {
     /// Rows and columns of the window, and of a step.
     pub size: [usize; 2],
     pub stride: [usize; 2],
-    /// Whether the picture is padded, so that there is a window for each step (`SAME`), or not (`VALID`).
+    /// Whether the picture is padded, so that there is a window for each step (`SAME`),
+    /// or not (`VALID`).
     pub same: bool,
 }
 
@@ -53,16 +54,27 @@ impl Window {
 
     /// The picture's size with one value for each window and channel.
     pub fn output(&self, from: Size, channels: usize) -> Option<Size> {
-        Some(Size { height: self.count(0, from.height)?, width: self.count(1, from.width)?, channels })
+        Some(Size {
+            height: self.count(0, from.height)?,
+            width: self.count(1, from.width)?,
+            channels,
+        })
     }
 
     /// How many rows and columns are padded above and left of the picture.
     pub fn before(&self, from: Size, to: Size) -> [usize; 2] {
-        let pad = |n: usize, m: usize, i: usize| ((m - 1) * self.stride[i] + self.size[i]).saturating_sub(n) / 2;
-        if self.same { [pad(from.height, to.height, 0), pad(from.width, to.width, 1)] } else { [0, 0] }
+        let pad = |n: usize, m: usize, i: usize| {
+            ((m - 1) * self.stride[i] + self.size[i]).saturating_sub(n) / 2
+        };
+        if self.same {
+            [pad(from.height, to.height, 0), pad(from.width, to.width, 1)]
+        } else {
+            [0, 0]
+        }
     }
 
-    /// Calls `f` with each row and column of the window, and where in the picture it lies, of those that do.
+    /// Calls `f` with each row and column of the window, and where in the picture it
+    /// lies, of those that do.
     pub fn each(
         &self,
         from: Size,
@@ -71,11 +83,16 @@ impl Window {
         mut f: impl FnMut(usize, usize, usize, usize),
     ) {
         for ky in 0..self.size[0] {
-            let Some(y) = (row * self.stride[0] + ky).checked_sub(before[0]).filter(|y| *y < from.height) else {
+            let Some(y) =
+                (row * self.stride[0] + ky).checked_sub(before[0]).filter(|y| *y < from.height)
+            else {
                 continue;
             };
             for kx in 0..self.size[1] {
-                if let Some(x) = (column * self.stride[1] + kx).checked_sub(before[1]).filter(|x| *x < from.width) {
+                if let Some(x) = (column * self.stride[1] + kx)
+                    .checked_sub(before[1])
+                    .filter(|x| *x < from.width)
+                {
                     f(ky, kx, y, x);
                 }
             }
@@ -83,7 +100,8 @@ impl Window {
     }
 }
 
-/// What is done to the values of an operator in the end: they are kept within these bounds.
+/// What is done to the values of an operator in the end: they are kept within these
+/// bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Clip {
     pub lo: f32,

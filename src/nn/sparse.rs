@@ -1,12 +1,14 @@
 //! Sparse tensors of TFLite files, laid out densely.
 //!
-//! A tensor of rank n may be cut into blocks; its n outer and the inner dimensions of the blocks are traversed in some order, each
-//! densely or by a list of the indices that there are (compressed sparse rows), down to values (TFLite's `SparsityParameters`).
+//! A tensor of rank n may be cut into blocks; its n outer and the inner dimensions of the
+//! blocks are traversed in some order, each densely or by a list of the indices that
+//! there are (compressed sparse rows), down to values (TFLite's `SparsityParameters`).
 
 use super::NetworkError;
 use super::flatbuffer::Table;
 
-/// The dimensions of the table `SparsityParameters`, of `DimensionMetadata`, and where a vector of indices has its kind.
+/// The dimensions of the table `SparsityParameters`, of `DimensionMetadata`, and where a
+/// vector of indices has its kind.
 const ORDER: usize = 0;
 const BLOCK_MAP: usize = 1;
 const DIMENSIONS: usize = 2;
@@ -36,7 +38,11 @@ struct Layout<'a> {
 }
 
 /// The values of a sparse tensor in a dense one of this shape.
-pub(super) fn dense(shape: &[usize], sparsity: &Table, values: &[f32]) -> Result<Vec<f32>, NetworkError> {
+pub(super) fn dense(
+    shape: &[usize],
+    sparsity: &Table,
+    values: &[f32],
+) -> Result<Vec<f32>, NetworkError> {
     let layout = Layout::read(shape, sparsity)?;
     let mut out = vec![0.0; shape.iter().product()];
     let mut rest = values;
@@ -50,16 +56,24 @@ impl<'a> Layout<'a> {
         let dimensions = sparsity.tables(DIMENSIONS)?;
         let mut sorted = order.clone();
         sorted.sort_unstable();
-        if sorted != (0..shape.len() + map.len()).collect::<Vec<_>>() || dimensions.len() != order.len() {
+        if sorted != (0..shape.len() + map.len()).collect::<Vec<_>>()
+            || dimensions.len() != order.len()
+        {
             return Err(bad("has an invalid traversal order"));
         }
         // The size of blocks along each dimension; a block's own dimensions are dense.
         let mut block = vec![1; shape.len()];
         for (level, which) in order.iter().enumerate().filter(|(_, which)| **which >= shape.len()) {
-            let d =
-                *map.get(which - shape.len()).filter(|d| **d < shape.len()).ok_or_else(|| bad("has wrong blocks"))?;
+            let d = *map
+                .get(which - shape.len())
+                .filter(|d| **d < shape.len())
+                .ok_or_else(|| bad("has wrong blocks"))?;
             let size = dimensions[level].index(DENSE_SIZE)?;
-            if dimensions[level].u8(FORMAT)? != 0 || block[d] != 1 || size == 0 || !shape[d].is_multiple_of(size) {
+            if dimensions[level].u8(FORMAT)? != 0
+                || block[d] != 1
+                || size == 0
+                || !shape[d].is_multiple_of(size)
+            {
                 return Err(bad("has wrong blocks"));
             }
             block[d] = size;

@@ -1,7 +1,8 @@
 //! An exact, order-independent accumulator of log densities.
 //!
-//! A term is quantised once: to a multiple of 2^-64 below 2^40 in size, to a multiple of 2^(e-64) in coarser limbs above. After that
-//! everything is integer addition, so any order of additions and subtractions gives the same bits, and a sum kept up by
+//! A term is quantised once: to a multiple of 2^-64 below 2^40 in size, to a multiple of
+//! 2^(e-64) in coarser limbs above. After that everything is integer addition, so any
+//! order of additions and subtractions gives the same bits, and a sum kept up by
 //! differences equals one made from scratch. Infinities and NaN are counted, not added.
 
 /// 2^64, the inverse of the finest quantum.
@@ -15,7 +16,8 @@ const SPAN: i32 = 40;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExactSum {
     fine: i128,
-    /// Limb `k` holds terms of size 2^(40 k) to 2^(40 (k + 1)), in units of 2^(40 k - 64); none while all terms are small.
+    /// Limb `k` holds terms of size 2^(40 k) to 2^(40 (k + 1)), in units of 2^(40 k -
+    /// 64); none while all terms are small.
     coarse: Option<Box<[i128; LIMBS]>>,
     negative: i64,
     positive: i64,
@@ -25,7 +27,8 @@ pub struct ExactSum {
 /// Limbs for exponents up to 1024.
 const LIMBS: usize = 26;
 
-/// x 2^64 towards zero, for |x| < 2^40: `(x * SCALE) as i128` in three pieces that are machine words, each exact.
+/// x 2^64 towards zero, for |x| < 2^40: `(x * SCALE) as i128` in three pieces that are
+/// machine words, each exact.
 #[inline]
 fn quantised(x: f64) -> i128 {
     const HALF: f64 = 4_294_967_296.0; // 2^32
@@ -55,11 +58,12 @@ impl ExactSum {
         self.coarse.is_none() && (self.negative | self.positive | self.nan) == 0
     }
 
-    /// [`ExactSum::difference`] between two sums of sums: `new[0] + new[1] - …` above `old[0] + old[1] - …`, where the last of
-    /// each is taken out.
+    /// [`ExactSum::difference`] between two sums of sums: `new[0] + new[1] - …` above
+    /// `old[0] + old[1] - …`, where the last of each is taken out.
     pub fn balance(new: [&ExactSum; 3], old: [&ExactSum; 3]) -> f64 {
         if new.iter().chain(&old).all(|s| s.is_fine()) {
-            let fine = (new[0].fine + new[1].fine - new[2].fine) - (old[0].fine + old[1].fine - old[2].fine);
+            let fine = (new[0].fine + new[1].fine - new[2].fine)
+                - (old[0].fine + old[1].fine - old[2].fine);
             return fine as f64 / SCALE;
         }
         let total = |[a, b, without]: [&ExactSum; 3]| {
@@ -73,7 +77,11 @@ impl ExactSum {
 
     /// [`ExactSum::difference`] to an empty sum.
     pub fn above_nothing(&self) -> f64 {
-        if self.is_fine() { self.fine as f64 / SCALE } else { ExactSum::difference(self, &ExactSum::default()) }
+        if self.is_fine() {
+            self.fine as f64 / SCALE
+        } else {
+            ExactSum::difference(self, &ExactSum::default())
+        }
     }
 
     /// [`ExactSum::above_nothing`] of two sums together.
@@ -96,7 +104,8 @@ impl ExactSum {
         } else {
             let exponent = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1023;
             let limb = (exponent / SPAN).clamp(1, LIMBS as i32 - 1);
-            // Scaling by a power of two is exact; the quotient has at most 53 significant bits above the unit.
+            // Scaling by a power of two is exact; the quotient has at most 53 significant
+            // bits above the unit.
             let scaled = libm::ldexp(x, 64 - SPAN * limb) as i128;
             let limbs = self.coarse.get_or_insert_with(|| Box::new([0; LIMBS]));
             limbs[limb as usize] += i128::from(sign) * scaled;
@@ -130,7 +139,8 @@ impl ExactSum {
         }
     }
 
-    /// The sum, rounded: -inf if a term is, NaN if a term is or if both infinities are among them.
+    /// The sum, rounded: -inf if a term is, NaN if a term is or if both infinities are
+    /// among them.
     pub fn value(&self) -> f64 {
         if self.nan != 0 || (self.negative != 0 && self.positive != 0) {
             f64::NAN
@@ -156,8 +166,9 @@ impl ExactSum {
 
     /// How much `new` is above `old`: what an accept test compares.
     ///
-    /// Anything above an impossible `old` is +inf, an impossible `new` is -inf (also from an impossible `old`: a chain does not
-    /// wander among impossible states); a NaN in `new` counts as impossible.
+    /// Anything above an impossible `old` is +inf, an impossible `new` is -inf (also from
+    /// an impossible `old`: a chain does not wander among impossible states); a NaN in
+    /// `new` counts as impossible.
     pub fn difference(new: &ExactSum, old: &ExactSum) -> f64 {
         if new.is_fine() && old.is_fine() {
             return (new.fine - old.fine) as f64 / SCALE;
@@ -227,7 +238,18 @@ mod tests {
 
     #[test]
     fn terms_are_quantised_towards_zero() {
-        let mut xs = vec![0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, -1e-19, 6e-20, LARGE.next_down(), -LARGE.next_down()];
+        let mut xs = vec![
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            0.5,
+            1e-300,
+            -1e-19,
+            6e-20,
+            LARGE.next_down(),
+            -LARGE.next_down(),
+        ];
         xs.extend((0..2000).map(|i| libm::sin(f64::from(i)) * libm::exp2(f64::from(i % 120 - 80))));
         for x in xs {
             assert_eq!(quantised(x), (x * SCALE) as i128, "{x}");

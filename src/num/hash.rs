@@ -1,8 +1,11 @@
-//! Hashing of bytes: tells texts apart, keeps no secrets. Not here: the hashes of addresses, which go key by key.
+//! Hashing of bytes: tells texts apart, keeps no secrets. Not here: the hashes of
+//! addresses, which go key by key.
 
 /// The 64-bit FNV-1a hash (Fowler, Noll & Vo; IETF draft-eastlake-fnv).
 pub fn fnv1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
+    bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
 }
 
 #[cfg(test)]

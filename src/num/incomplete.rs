@@ -5,8 +5,9 @@ use super::special::ln_gamma;
 /// Terms of the series and of the continued fraction before they are taken as they are.
 const TERMS: u32 = 500;
 
-/// The regularised upper incomplete gamma function Q(a, x) for a > 0, x >= 0: by the power series below a + 1 (DLMF 8.7.1), by
-/// Legendre's continued fraction above (DLMF 8.9.2, evaluated after Lentz). NaN outside.
+/// The regularised upper incomplete gamma function Q(a, x) for a > 0, x >= 0: by the
+/// power series below a + 1 (DLMF 8.7.1), by Legendre's continued fraction above (DLMF
+/// 8.9.2, evaluated after Lentz). NaN outside.
 pub fn upper_gamma(a: f64, x: f64) -> f64 {
     if a.is_nan() || x.is_nan() || a <= 0.0 || x < 0.0 {
         return f64::NAN;
@@ -32,7 +33,8 @@ pub fn upper_gamma(a: f64, x: f64) -> f64 {
     (scale * upper_fraction(a, x, TERMS)).clamp(0.0, 1.0)
 }
 
-/// Legendre's continued fraction for Gamma(a, x) over x^a e^-x (DLMF 8.9.2), evaluated after Lentz up to so many terms.
+/// Legendre's continued fraction for Gamma(a, x) over x^a e^-x (DLMF 8.9.2), evaluated
+/// after Lentz up to so many terms.
 pub(super) fn upper_fraction(a: f64, x: f64, terms: u32) -> f64 {
     let mut b = x + 1.0 - a;
     let (mut c, mut d) = (1.0 / TINY, 1.0 / b);
@@ -59,7 +61,8 @@ pub(super) fn not_zero(x: f64) -> f64 {
     if x.abs() < TINY { TINY } else { x }
 }
 
-/// The probability that a chi-square variable of so many degrees of freedom is at least `x`; NaN for none.
+/// The probability that a chi-square variable of so many degrees of freedom is at least
+/// `x`; NaN for none.
 pub fn chi_square_tail(x: f64, freedom: f64) -> f64 {
     upper_gamma(0.5 * freedom, 0.5 * x)
 }

@@ -1,4 +1,5 @@
-//! The incomplete gamma and beta functions, both sides of each in logarithms, so that neither underflows.
+//! The incomplete gamma and beta functions, both sides of each in logarithms, so that
+//! neither underflows.
 
 use super::incomplete::{not_zero, upper_fraction};
 use super::saddle::{deviance, stirling_error};
@@ -12,8 +13,9 @@ fn terms(a: f64) -> u32 {
     500 + (40.0 * a.sqrt()) as u32
 }
 
-/// The logarithms of the regularised incomplete gamma functions P(a, x) and Q(a, x) for a > 0: the power series below a + 1 (DLMF
-/// 8.7.1), Legendre's continued fraction above (DLMF 8.9.2). `None` for a above 1e8, where they would take long.
+/// The logarithms of the regularised incomplete gamma functions P(a, x) and Q(a, x) for a >
+/// 0: the power series below a + 1 (DLMF 8.7.1), Legendre's continued fraction above
+/// (DLMF 8.9.2). `None` for a above 1e8, where they would take long.
 pub fn gamma_tails(a: f64, x: f64) -> Option<(f64, f64)> {
     if a.is_nan() || x.is_nan() || a <= 0.0 || a > LARGEST {
         return None;
@@ -45,8 +47,9 @@ pub fn gamma_tails(a: f64, x: f64) -> Option<(f64, f64)> {
     Some((log_diff_exp(0.0, above), above))
 }
 
-/// The logarithms of the regularised incomplete beta function I_x(a, b) and of 1 - I_x(a, b) for a, b > 0, with y = 1 - x given beside
-/// x: by the continued fraction DLMF 8.17.22, evaluated after Lentz. `None` for a or b above 1e8.
+/// The logarithms of the regularised incomplete beta function I_x(a, b) and of 1 - I_x(a,
+/// b) for a, b > 0, with y = 1 - x given beside x: by the continued fraction DLMF
+/// 8.17.22, evaluated after Lentz. `None` for a or b above 1e8.
 pub fn beta_tails(a: f64, b: f64, x: f64, y: f64) -> Option<(f64, f64)> {
     if !(a > 0.0 && b > 0.0 && a <= LARGEST && b <= LARGEST) || x.is_nan() || y.is_nan() {
         return None;
@@ -69,7 +72,9 @@ pub fn beta_tails(a: f64, b: f64, x: f64, y: f64) -> Option<(f64, f64)> {
                 - deviance(b, n * y)
         }
     };
-    let one = |scale: f64, a: f64, b: f64, x: f64| (scale + libm::log(fraction(a, b, x)) - libm::log(a)).min(0.0);
+    let one = |scale: f64, a: f64, b: f64, x: f64| {
+        (scale + libm::log(fraction(a, b, x)) - libm::log(a)).min(0.0)
+    };
     if x < (a + 1.0) / (n + 2.0) {
         let below = one(scale, a, b, x);
         Some((below, log_diff_exp(0.0, below)))
@@ -118,7 +123,10 @@ mod tests {
                 for x in [0.01, 0.2, 0.5, 0.83, 0.99] {
                     let (p, q) = beta_tails(a, b, x, 1.0 - x).unwrap();
                     let other = beta_reg(a, b, x);
-                    assert!((p.exp() - other).abs() < 1e-11 && (q.exp() - 1.0 + other).abs() < 1e-11, "{a} {b} {x}");
+                    assert!(
+                        (p.exp() - other).abs() < 1e-11 && (q.exp() - 1.0 + other).abs() < 1e-11,
+                        "{a} {b} {x}"
+                    );
                 }
             }
         }
@@ -126,8 +134,9 @@ mod tests {
 
     #[test]
     fn far_tails_keep_their_digits() {
-        let close =
-            |found: f64, wanted: f64| assert!((found - wanted).abs() < 1e-13 * wanted.abs(), "{found} {wanted}");
+        let close = |found: f64, wanted: f64| {
+            assert!((found - wanted).abs() < 1e-13 * wanted.abs(), "{found} {wanted}")
+        };
         // Q(1, x) = e^-x; Q(2, x) = (1 + x) e^-x; P(1, x) = 1 - e^-x.
         close(gamma_tails(1.0, 5000.0).unwrap().1, -5000.0);
         close(gamma_tails(2.0, 3000.0).unwrap().1, -3000.0 + libm::log(3001.0));

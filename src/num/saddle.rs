@@ -1,16 +1,17 @@
-//! The pieces of Loader's saddle-point form of densities (2000, "Fast and accurate computation of binomial probabilities"), in which
-//! large terms do not cancel.
+//! The pieces of Loader's saddle-point form of densities (2000, "Fast and accurate
+//! computation of binomial probabilities"), in which large terms do not cancel.
 
 use super::special::LN_SQRT_2PI;
 
-/// What Stirling's formula leaves of ln Gamma(x) for x > 0: ln Gamma(x) - ((x - 1/2) ln x - x + ln sqrt(2 pi)). The same
-/// number for x = n is what it leaves of ln n!.
+/// What Stirling's formula leaves of ln Gamma(x) for x > 0: ln Gamma(x) - ((x - 1/2) ln x -
+/// x + ln sqrt(2 pi)). The same number for x = n is what it leaves of ln n!.
 pub fn stirling_error(x: f64) -> f64 {
     if x < 10.0 {
         return libm::lgamma(x) - ((x - 0.5) * libm::log(x) - x + LN_SQRT_2PI);
     }
     let t = 1.0 / (x * x);
-    let series = 1.0 / 1260.0 - t * (1.0 / 1680.0 - t * (1.0 / 1188.0 - t * (691.0 / 360_360.0 - t / 156.0)));
+    let series = 1.0 / 1260.0
+        - t * (1.0 / 1680.0 - t * (1.0 / 1188.0 - t * (691.0 / 360_360.0 - t / 156.0)));
     (1.0 / 12.0 - t * (1.0 / 360.0 - t * series)) / x
 }
 
@@ -35,6 +36,10 @@ pub fn deviance(x: f64, m: f64) -> f64 {
         return sum;
     }
     let ratio = x / m;
-    let log = if ratio.is_finite() && ratio > 0.0 { libm::log(ratio) } else { libm::log(x) - libm::log(m) };
+    let log = if ratio.is_finite() && ratio > 0.0 {
+        libm::log(ratio)
+    } else {
+        libm::log(x) - libm::log(m)
+    };
     x * log + m - x
 }

@@ -1,7 +1,7 @@
 //! Loops over many numbers, with the widest instructions that the processor has.
 //!
-//! The same code is compiled twice, plainly and for AVX2, and chosen at run time. Nothing is fused or reordered, so both give the
-//! same bits.
+//! The same code is compiled twice, plainly and for AVX2, and chosen at run time. Nothing
+//! is fused or reordered, so both give the same bits.
 
 /// Runs `work`, compiled for the processor's widest instructions as far as it is inlined.
 #[inline]

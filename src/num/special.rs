@@ -21,13 +21,16 @@ pub fn ln_beta(a: f64, b: f64) -> f64 {
     if large < 10.0 {
         return ln_gamma(a) + ln_gamma(b) - ln_gamma(a + b);
     }
-    // ln Gamma(large) - ln Gamma(large + small) by Stirling's formula, where the plain difference would cancel.
+    // ln Gamma(large) - ln Gamma(large + small) by Stirling's formula, where the plain
+    // difference would cancel.
     let sum = small + large;
     let errors = stirling_error(large) - stirling_error(sum);
     let ratio = if small < 10.0 {
         ln_gamma(small) - small * libm::log(sum) + small
     } else {
-        LN_SQRT_2PI + stirling_error(small) - 0.5 * libm::log(small) - small * libm::log1p(large / small)
+        LN_SQRT_2PI + stirling_error(small)
+            - 0.5 * libm::log(small)
+            - small * libm::log1p(large / small)
     };
     ratio - (large - 0.5) * libm::log1p(small / large) + errors
 }
@@ -60,7 +63,11 @@ pub fn log_diff_exp(a: f64, b: f64) -> f64 {
         return a;
     }
     let d = b - a;
-    a + if d > -core::f64::consts::LN_2 { libm::log(-libm::expm1(d)) } else { libm::log1p(-libm::exp(d)) }
+    a + if d > -core::f64::consts::LN_2 {
+        libm::log(-libm::expm1(d))
+    } else {
+        libm::log1p(-libm::exp(d))
+    }
 }
 
 /// ln(p / (1 - p)).
@@ -83,7 +90,8 @@ pub fn normal_cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x * core::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Its logarithm, also far in the tails (an asymptotic series below -37, where the function itself underflows).
+/// Its logarithm, also far in the tails (an asymptotic series below -37, where the
+/// function itself underflows).
 pub fn log_normal_cdf(x: f64) -> f64 {
     if x > 0.0 {
         return libm::log1p(-normal_cdf(-x));
@@ -96,7 +104,8 @@ pub fn log_normal_cdf(x: f64) -> f64 {
     -0.5 * x * x - LN_SQRT_2PI - libm::log(-x) + libm::log(series)
 }
 
-/// The standard normal quantile: Acklam's rational approximation, refined by one step of Halley's method.
+/// The standard normal quantile: Acklam's rational approximation, refined by one step of
+/// Halley's method.
 pub fn inv_normal_cdf(p: f64) -> f64 {
     if p.is_nan() || !(0.0..=1.0).contains(&p) {
         return f64::NAN;
@@ -118,8 +127,13 @@ pub fn inv_normal_cdf(p: f64) -> f64 {
         -3.066479806614716e1,
         2.506628277459239,
     ];
-    const B: [f64; 5] =
-        [-5.447609879822406e1, 1.615858368580409e2, -1.556989798598866e2, 6.680131188771972e1, -1.328068155288572e1];
+    const B: [f64; 5] = [
+        -5.447609879822406e1,
+        1.615858368580409e2,
+        -1.556989798598866e2,
+        6.680131188771972e1,
+        -1.328068155288572e1,
+    ];
     const C: [f64; 6] = [
         -7.784894002430293e-3,
         -3.223964580411365e-1,
@@ -128,7 +142,8 @@ pub fn inv_normal_cdf(p: f64) -> f64 {
         4.374664141464968,
         2.938163982698783,
     ];
-    const D: [f64; 4] = [7.784695709041462e-3, 3.224671290700398e-1, 2.445134137142996, 3.754408661907416];
+    const D: [f64; 4] =
+        [7.784695709041462e-3, 3.224671290700398e-1, 2.445134137142996, 3.754408661907416];
     let poly = |c: &[f64], x: f64| c.iter().fold(0.0, |s, c| s * x + c);
     let x = if p < 0.02425 {
         let q = (-2.0 * libm::log(p)).sqrt();
@@ -159,8 +174,15 @@ pub fn digamma(x: f64) -> f64 {
     }
     let t = 1.0 / (x * x);
     // The coefficients are B_2k / (2 k).
-    const C: [f64; 7] =
-        [1.0 / 12.0, -1.0 / 120.0, 1.0 / 252.0, -1.0 / 240.0, 1.0 / 132.0, -691.0 / 32_760.0, 1.0 / 12.0];
+    const C: [f64; 7] = [
+        1.0 / 12.0,
+        -1.0 / 120.0,
+        1.0 / 252.0,
+        -1.0 / 240.0,
+        1.0 / 132.0,
+        -691.0 / 32_760.0,
+        1.0 / 12.0,
+    ];
     let series = C.iter().rev().fold(0.0, |s, c| t * (c + s));
     shift + libm::log(x) - 0.5 / x - series
 }

@@ -1,9 +1,11 @@
-//! What truncated normal and circular densities rest on: Mills' ratio and the modified Bessel functions, without overflow or
-//! cancellation anywhere. Not special functions in general: only those of order 0 and 1, for arguments that are not negative.
+//! What truncated normal and circular densities rest on: Mills' ratio and the modified
+//! Bessel functions, without overflow or cancellation anywhere. Not special functions in
+//! general: only those of order 0 and 1, for arguments that are not negative.
 
 use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, TAU};
 
-/// Mills' ratio of the standard normal, (1 - Phi(x)) / phi(x), for x >= 0: Laplace's continued fraction from 4 on.
+/// Mills' ratio of the standard normal, (1 - Phi(x)) / phi(x), for x >= 0: Laplace's
+/// continued fraction from 4 on.
 pub fn mills_ratio(x: f64) -> f64 {
     if x < 4.0 {
         return FRAC_PI_2.sqrt() * libm::erfc(x * FRAC_1_SQRT_2) * libm::exp(0.5 * x * x);
@@ -48,7 +50,8 @@ fn power_series(x: f64) -> (f64, f64) {
     (i0, 0.5 * x * i1)
 }
 
-/// sqrt(2 pi x) e^-x times I0, and times I0 - I1 term by term (Abramowitz & Stegun 9.7.1).
+/// sqrt(2 pi x) e^-x times I0, and times I0 - I1 term by term (Abramowitz & Stegun
+/// 9.7.1).
 fn inverse_series(x: f64) -> (f64, f64) {
     let (mut zero, mut one) = (1.0, 1.0);
     let (mut i0, mut difference) = (1.0, 0.0);

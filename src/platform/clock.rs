@@ -1,4 +1,5 @@
-//! The clock. Bare WebAssembly has none: there time stands still, and runs are bounded by steps.
+//! The clock. Bare WebAssembly has none: there time stands still, and runs are bounded by
+//! steps.
 
 #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
 mod running {

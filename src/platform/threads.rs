@@ -1,6 +1,8 @@
-//! Work shared among threads, or done in turn where there are none. Invariant: what comes out does not depend on how many there are.
+//! Work shared among threads, or done in turn where there are none. Invariant: what comes
+//! out does not depend on how many there are.
 
-/// Threads that wait for work; none in a build without the feature `threads`, or where none can be had.
+/// Threads that wait for work; none in a build without the feature `threads`, or where
+/// none can be had.
 pub(crate) struct Pool {
     #[cfg(feature = "threads")]
     pool: Option<rayon::ThreadPool>,
@@ -14,7 +16,11 @@ impl Pool {
     }
 
     /// Does the same with each of some things; results in order.
-    pub fn map<I: Send, T: Send>(&self, items: Vec<I>, one: impl Fn(I) -> T + Sync + Send) -> Vec<T> {
+    pub fn map<I: Send, T: Send>(
+        &self,
+        items: Vec<I>,
+        one: impl Fn(I) -> T + Sync + Send,
+    ) -> Vec<T> {
         use rayon::prelude::*;
         match &self.pool {
             Some(pool) => pool.install(|| items.into_par_iter().with_max_len(1).map(one).collect()),
@@ -31,12 +37,17 @@ impl Pool {
     }
 
     /// Does the same with each of some things, one after the other.
-    pub fn map<I: Send, T: Send>(&self, items: Vec<I>, one: impl Fn(I) -> T + Sync + Send) -> Vec<T> {
+    pub fn map<I: Send, T: Send>(
+        &self,
+        items: Vec<I>,
+        one: impl Fn(I) -> T + Sync + Send,
+    ) -> Vec<T> {
         items.into_iter().map(one).collect()
     }
 }
 
-/// Does the same with each of some things, on so many threads (0: as many as there are cores); results in order.
+/// Does the same with each of some things, on so many threads (0: as many as there are
+/// cores); results in order.
 pub(crate) fn in_parallel<I: Send, T: Send>(
     threads: usize,
     items: Vec<I>,
@@ -45,9 +56,13 @@ pub(crate) fn in_parallel<I: Send, T: Send>(
     Pool::new(threads).map(items, one)
 }
 
-/// Does `work` for every part, each on a thread of its own, and waits for all. Not the threads of a [`Pool`]: whoever waits here may
-/// hold a lock that a task of theirs, which they would take up meanwhile, waits for.
-pub(crate) fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(usize, T) + Sync) {
+/// Does `work` for every part, each on a thread of its own, and waits for all. Not the
+/// threads of a [`Pool`]: whoever waits here may hold a lock that a task of theirs, which
+/// they would take up meanwhile, waits for.
+pub(crate) fn side_by_side<T: Send>(
+    parts: impl IntoIterator<Item = T>,
+    work: impl Fn(usize, T) + Sync,
+) {
     #[cfg(all(feature = "threads", not(target_family = "wasm")))]
     {
         let work = &work;

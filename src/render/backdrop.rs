@@ -1,9 +1,13 @@
-//! Contours of a scene most of which stands still. The meshes that have not moved make a **backdrop**: its depth, and its pieces of contour
-//! that it does not hide itself, by the pixels that they look at. When one of the others moves, depth is composed anew where it was and is, and only the
-//! pieces that look there are looked at again; what came and went is told as a [`Change`]. So a picture costs what moves, not what is in it.
+//! Contours of a scene most of which stands still. The meshes that have not moved make a
+//! **backdrop**: its depth, and its pieces of contour that it does not hide itself, by
+//! the pixels that they look at. When one of the others moves, depth is composed anew
+//! where it was and is, and only the pieces that look there are looked at again; what
+//! came and went is told as a [`Change`]. So a picture costs what moves, not what is in
+//! it.
 //!
-//! Invariant: as for [`super::layers`], contours are those drawn at once, bit for bit. That rests on looks being monotone: what another mesh
-//! or a smaller depth range hides stays hidden with both, in `f64` too.
+//! Invariant: as for [`super::layers`], contours are those drawn at once, bit for bit.
+//! That rests on looks being monotone: what another mesh or a smaller depth range hides
+//! stays hidden with both, in `f64` too.
 
 mod mover;
 mod still;
@@ -29,10 +33,12 @@ const MOST_PIECES: usize = 1 << 19;
 /// How many drawings later a scene of which most moved is looked at again.
 const PATIENCE: u32 = 1024;
 
-/// A drawing's contours: those of what moves, and what the rest have more and less than in the drawing before, by the same thread in the same picture.
+/// A drawing's contours: those of what moves, and what the rest have more and less than
+/// in the drawing before, by the same thread in the same picture.
 #[derive(Debug)]
 pub struct Change {
-    /// Stands for the contours before; another one, that nobody has, where everything came.
+    /// Stands for the contours before; another one, that nobody has, where everything
+    /// came.
     pub from: Arc<()>,
     /// Stands for the contours now.
     pub to: Arc<()>,
@@ -100,9 +106,12 @@ thread_local! {
     static BACKDROPS: RefCell<Backdrops> = RefCell::default();
 }
 
-/// The contours of a solid most of which stands still, and with them what has changed; `None` for one that is better drawn in another way.
+/// The contours of a solid most of which stands still, and with them what has changed;
+/// `None` for one that is better drawn in another way.
 pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
-    with_scene(solid, camera, |scene, tools| scene.draw(solid, camera, tools).map(|_| scene.contours(camera)))
+    with_scene(solid, camera, |scene, tools| {
+        scene.draw(solid, camera, tools).map(|_| scene.contours(camera))
+    })
 }
 
 /// As [`contours`], only what has changed.
@@ -158,7 +167,8 @@ impl Backdrop {
         }
     }
 
-    /// Brings it up to date; `None` for solids that are better drawn in another way: of few meshes, or most of which have moved.
+    /// Brings it up to date; `None` for solids that are better drawn in another way: of
+    /// few meshes, or most of which have moved.
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<Change> {
         let count = solid.mesh_count();
         let changed = self.find_changed(solid);
@@ -212,7 +222,8 @@ impl Backdrop {
         }
         still.settle(camera, extent, known)?;
         if self.movers.iter().any(|m| !m.now.is_whole()) {
-            // What was hidden, or did not matter, need not be so with another depth range.
+            // What was hidden, or did not matter, need not be so with another depth
+            // range.
             let mut movers = self.movers.iter_mut().peekable();
             for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
                 if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
@@ -244,11 +255,15 @@ impl Backdrop {
         (self.still, self.waited, self.refused) = (None, 0, None);
     }
 
-    /// The meshes that are not as they were drawn last; what is known of the solid becomes that of this one.
+    /// The meshes that are not as they were drawn last; what is known of the solid
+    /// becomes that of this one.
     fn find_changed<'a>(&mut self, solid: &'a Solid) -> Vec<(usize, &'a Instance)> {
         let (mut changed, mut first, mut lists) = (Vec::new(), 0, 0);
         for meshes in solid.lists() {
-            let known = self.lists.get(lists).filter(|known| known.first == first && meshes.is(&known.list));
+            let known = self
+                .lists
+                .get(lists)
+                .filter(|known| known.first == first && meshes.is(&known.list));
             if let Some(known) = known {
                 first += known.count;
                 lists += 1;
@@ -258,13 +273,19 @@ impl Backdrop {
             for (leaf, instance) in (first..).zip(meshes.iter()) {
                 let affine = affine_bits(&instance.affine);
                 match self.leaves.get_mut(leaf) {
-                    Some(l) if l.affine == affine && std::ptr::eq(l.mesh.as_ptr(), Arc::as_ptr(&instance.mesh)) => {}
+                    Some(l)
+                        if l.affine == affine
+                            && std::ptr::eq(l.mesh.as_ptr(), Arc::as_ptr(&instance.mesh)) => {}
                     Some(l) => {
                         (l.mesh, l.affine) = (Arc::downgrade(&instance.mesh), affine);
                         changed.push((leaf, instance));
                     }
                     None => {
-                        self.leaves.push(Leaf { mesh: Arc::downgrade(&instance.mesh), affine, moves: false });
+                        self.leaves.push(Leaf {
+                            mesh: Arc::downgrade(&instance.mesh),
+                            affine,
+                            moves: false,
+                        });
                         self.still = None;
                         changed.push((leaf, instance));
                     }
@@ -319,7 +340,9 @@ impl Backdrop {
             work.pixels += camera.pixels() as u64;
         });
         depth.clone_from(&still.depth);
-        movers.iter().for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
+        movers
+            .iter()
+            .for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
         self.shown = still.look_at_all(&depths);
         movers.iter_mut().for_each(|mover| mover.look(&depths));
@@ -330,14 +353,21 @@ impl Backdrop {
 
     /// The change to what is there now.
     fn change(&mut self, camera: &Camera, from: Arc<()>, [gone, come]: [Contours; 2]) -> Change {
-        let mut moving = Contours::with_room(camera, self.movers.iter().map(|m| m.seen.len()).sum());
+        let mut moving =
+            Contours::with_room(camera, self.movers.iter().map(|m| m.seen.len()).sum());
         self.movers.iter().for_each(|mover| moving.append(&mover.seen));
         self.count = self.shown + moving.len();
         Change { from, to: self.at.clone(), gone, come, moving, count: self.count }
     }
 
-    /// Composes the picture where some have moved, and looks again where they were and are.
-    fn step(&mut self, camera: &Camera, extents: [f64; 2], moved: impl Fn(&Mover) -> bool) -> Option<Change> {
+    /// Composes the picture where some have moved, and looks again where they were and
+    /// are.
+    fn step(
+        &mut self,
+        camera: &Camera,
+        extents: [f64; 2],
+        moved: impl Fn(&Mover) -> bool,
+    ) -> Option<Change> {
         let same_extent = extents[0].to_bits() == extents[1].to_bits();
         let anything = !same_extent || self.movers.iter().any(&moved);
         let Backdrop { still, movers, depth, extent, rows, pixels, areas, again, .. } = self;
@@ -349,11 +379,14 @@ impl Backdrop {
         });
         pixels.clear();
         for area in &*areas {
-            let (columns, span) =
-                (area.right - area.left, |row: usize| row * width + area.left..row * width + area.right);
+            let (columns, span) = (area.right - area.left, |row: usize| {
+                row * width + area.left..row * width + area.right
+            });
             rows.clear();
             for row in area.top..area.bottom {
-                let (Some(there), Some(still)) = (depth.get_mut(span(row)), still.depth.get(span(row))) else {
+                let (Some(there), Some(still)) =
+                    (depth.get_mut(span(row)), still.depth.get(span(row)))
+                else {
                     continue;
                 };
                 rows.extend_from_slice(there);
@@ -367,14 +400,22 @@ impl Backdrop {
                     movers.iter().for_each(|m| m.now.layer.show(depth, width, area));
                     let lists = rows.chunks_exact(columns).zip(again.chunks_exact_mut(columns));
                     for (row, (before, again)) in (area.top..area.bottom).zip(lists) {
-                        let lists = (depth.get(span(row)), still.depth.get(span(row)), still.nearest.get(span(row)));
+                        let lists = (
+                            depth.get(span(row)),
+                            still.depth.get(span(row)),
+                            still.nearest.get(span(row)),
+                        );
                         let (Some(now), Some(still), Some(nearest)) = lists else { continue };
-                        let lists = now.iter().zip(before).zip(still.iter().zip(nearest)).zip(again);
+                        let lists =
+                            now.iter().zip(before).zip(still.iter().zip(nearest)).zip(again);
                         for (((now, before), (still, nearest)), again) in lists {
-                            // Where something is so near that all looks of the backdrop end at it, a change means nothing; where
-                            // there is a mover, what is seen may also change with the depth range.
+                            // Where something is so near that all looks of the backdrop end at
+                            // it, a change means nothing; where there is a mover, what is seen
+                            // may also change with the depth range.
                             let hidden = (now < nearest) & (before < nearest);
-                            *again = u8::from(!hidden & ((now != before) | (!same_extent & (now != still))));
+                            *again = u8::from(
+                                !hidden & ((now != before) | (!same_extent & (now != still))),
+                            );
                         }
                     }
                 },
@@ -383,14 +424,21 @@ impl Backdrop {
             let (eights, rest) = again.as_chunks::<8>();
             let lists = eights.iter().map(|eight| &eight[..]).chain([rest]).enumerate();
             for (k, some) in lists.filter(|(_, some)| some.iter().any(|again| *again != 0)) {
-                pixels.extend((8 * k..).zip(some).filter(|(_, again)| **again != 0).map(|(i, _)| at(i)));
+                pixels.extend(
+                    (8 * k..).zip(some).filter(|(_, again)| **again != 0).map(|(i, _)| at(i)),
+                );
             }
         }
         if !same_extent {
             for mover in movers.iter().filter(|m| !moved(m)) {
                 let area = mover.now.layer.area;
-                let all = (area.top..area.bottom).flat_map(|row| row * width + area.left..row * width + area.right);
-                let open = |at: &usize| match (depth.get(*at), still.depth.get(*at), still.nearest.get(*at)) {
+                let all = (area.top..area.bottom)
+                    .flat_map(|row| row * width + area.left..row * width + area.right);
+                let open = |at: &usize| match (
+                    depth.get(*at),
+                    still.depth.get(*at),
+                    still.nearest.get(*at),
+                ) {
                     (Some(now), Some(still), Some(nearest)) => now != still && now >= nearest,
                     _ => false,
                 };

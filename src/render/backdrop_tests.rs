@@ -1,4 +1,5 @@
-//! Backdrops against drawing everything at once, bit for bit, and what they leave undrawn.
+//! Backdrops against drawing everything at once, bit for bit, and what they leave
+//! undrawn.
 
 use super::*;
 use crate::geom::Affine;
@@ -17,7 +18,8 @@ fn shape(random: &mut Uniform) -> Solid {
 }
 
 fn somewhere(random: &mut Uniform, reach: f64, size: f64) -> Affine {
-    let mut at = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+    let mut at =
+        |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
     Affine::new(at(reach), at(2.0), DVec3::splat(size))
 }
 
@@ -31,17 +33,27 @@ struct Followed {
 }
 
 fn bits(c: &Contours) -> Vec<[u32; 5]> {
-    (0..c.len()).map(|i| [c.x[i], c.y[i], c.tx[i], c.ty[i], c.length[i]].map(f32::to_bits)).collect()
+    (0..c.len())
+        .map(|i| [c.x[i], c.y[i], c.tx[i], c.ty[i], c.length[i]].map(f32::to_bits))
+        .collect()
 }
 
 impl Followed {
     fn new(camera: &Camera) -> Followed {
-        Followed { backdrop: Backdrop::new(camera), tools: Tools::default(), at: Arc::default(), pieces: Vec::new() }
+        Followed {
+            backdrop: Backdrop::new(camera),
+            tools: Tools::default(),
+            at: Arc::default(),
+            pieces: Vec::new(),
+        }
     }
 
-    /// Draws, and holds the picture and its change against everything drawn at once. Whether it was done by the backdrop, and by a change.
+    /// Draws, and holds the picture and its change against everything drawn at once.
+    /// Whether it was done by the backdrop, and by a change.
     fn check(&mut self, solid: &Solid, camera: &Camera) -> [bool; 2] {
-        let Some(change) = self.backdrop.draw(solid, camera, &mut self.tools) else { return [false; 2] };
+        let Some(change) = self.backdrop.draw(solid, camera, &mut self.tools) else {
+            return [false; 2];
+        };
         let (got, wanted) = (self.backdrop.contours(camera), Contours::drawn(solid, camera));
         assert_eq!(bits(&got), bits(&wanted));
         assert_eq!(change.count, wanted.len());
@@ -76,14 +88,16 @@ fn backdrops_give_what_is_drawn_at_once() {
         let mut camera = Camera::default_for(60 + 7 * round, 96 - 5 * round);
         if round % 3 == 1 {
             let units_per_pixel = 0.05;
-            camera.projection = crate::render::Projection::Orthographic { units_per_pixel, cx: 30.0, cy: 40.0 };
+            camera.projection =
+                crate::render::Projection::Orthographic { units_per_pixel, cx: 30.0, cy: 40.0 };
         } else if round % 3 == 2 {
             // The near plane cuts some.
             camera.eye.z = 1.4;
         }
         let count = 4 + 6 * round as usize;
-        let mut solids: Vec<Solid> =
-            (0..count).map(|_| shape(&mut random).placed(somewhere(&mut random, 1.2, 0.25))).collect();
+        let mut solids: Vec<Solid> = (0..count)
+            .map(|_| shape(&mut random).placed(somewhere(&mut random, 1.2, 0.25)))
+            .collect();
         let moving = 1 + round as usize % 3;
         let shapes: Vec<Solid> = (0..moving).map(|_| shape(&mut random)).collect();
         let mut followers = Followed::new(&camera);
@@ -122,7 +136,10 @@ fn a_scene_that_changes_altogether_is_drawn_in_another_way() {
     }
     let fixed = scene(8);
     followed.check(&Solid::group(&fixed), &camera);
-    assert!(!followed.check(&Solid::group(&fixed), &camera)[0], "asked for again, it is still better drawn so");
+    assert!(
+        !followed.check(&Solid::group(&fixed), &camera)[0],
+        "asked for again, it is still better drawn so"
+    );
     let mut moved = fixed.clone();
     moved[3] = sphere(7, 5);
     assert!(followed.check(&Solid::group(&moved), &camera)[0], "most of it stands still");
@@ -135,7 +152,8 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     let camera = Camera::default_for(64, 64);
     let at = |x: f64, z: f64| Affine::new(DVec3::new(x, 0.0, z), DVec3::ZERO, DVec3::splat(0.4));
     let wall = cuboid(Vec3::new(3.0, 3.0, 0.2));
-    let floor = cuboid(Vec3::new(0.2, 0.2, 4.0)).placed(Affine::new(DVec3::Y, DVec3::ZERO, DVec3::ONE));
+    let floor =
+        cuboid(Vec3::new(0.2, 0.2, 4.0)).placed(Affine::new(DVec3::Y, DVec3::ZERO, DVec3::ONE));
     let fixed = Solid::group(&[wall, floor.clone(), floor]);
     let ball = sphere(16, 9);
     let mut followed = Followed::new(&camera);
@@ -145,7 +163,10 @@ fn what_is_outside_or_behind_costs_no_drawing() {
         let change = followed.backdrop.draw(&solid, &camera, &mut followed.tools);
         let spent = work::work() - before;
         if change.is_some() {
-            assert_eq!(bits(&followed.backdrop.contours(&camera)), bits(&Contours::drawn(&solid, &camera)));
+            assert_eq!(
+                bits(&followed.backdrop.contours(&camera)),
+                bits(&Contours::drawn(&solid, &camera))
+            );
         }
         spent
     };
@@ -160,13 +181,20 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     assert_eq!((behind.drawn, behind.outside, behind.hidden), (0, 0, 1));
     // It comes out again, and is there.
     assert_eq!(took(at(0.0, 1.0)).drawn, 1);
-    // Where the eye is within its reach, nobody can say that it is hidden: corners in front of the near plane are not all of it.
-    let beam =
-        |x: f64| cuboid(Vec3::new(0.1, 0.1, 6.0)).placed(Affine::new(DVec3::new(x, 0.0, 3.0), DVec3::ZERO, DVec3::ONE));
+    // Where the eye is within its reach, nobody can say that it is hidden: corners in
+    // front of the near plane are not all of it.
+    let beam = |x: f64| {
+        cuboid(Vec3::new(0.1, 0.1, 6.0)).placed(Affine::new(
+            DVec3::new(x, 0.0, 3.0),
+            DVec3::ZERO,
+            DVec3::ONE,
+        ))
+    };
     for x in [0.5, 0.6, 0.7] {
         let solid = Solid::group(&[fixed.clone(), beam(x)]);
         followed.backdrop.draw(&solid, &camera, &mut followed.tools);
-        let (seen, wanted) = (followed.backdrop.contours(&camera), Contours::drawn(&solid, &camera));
+        let (seen, wanted) =
+            (followed.backdrop.contours(&camera), Contours::drawn(&solid, &camera));
         assert_eq!(bits(&seen), bits(&wanted));
         assert!(wanted.len() > Contours::drawn(&fixed, &camera).len());
     }
@@ -181,7 +209,8 @@ fn what_is_outside_or_behind_costs_no_drawing() {
 fn odd_placements_are_as_drawn_at_once() {
     let mut random = Uniform(33);
     let camera = Camera::default_for(64, 48);
-    let fixed: Vec<Solid> = (0..6).map(|_| shape(&mut random).placed(somewhere(&mut random, 1.0, 0.4))).collect();
+    let fixed: Vec<Solid> =
+        (0..6).map(|_| shape(&mut random).placed(somewhere(&mut random, 1.0, 0.4))).collect();
     let mut followed = Followed::new(&camera);
     let odd = [
         (DVec3::new(f64::NAN, 0.0, 0.0), 1.0),
@@ -195,7 +224,9 @@ fn odd_placements_are_as_drawn_at_once() {
     ];
     let mut drawn = 0;
     for (at, size) in odd.into_iter().cycle().take(24) {
-        for place in [Affine::new(at, DVec3::ZERO, DVec3::splat(size)), somewhere(&mut random, 0.6, 0.5)] {
+        for place in
+            [Affine::new(at, DVec3::ZERO, DVec3::splat(size)), somewhere(&mut random, 0.6, 0.5)]
+        {
             let solid = Solid::group(&[&fixed[..], &[sphere(11, 7).placed(place)]].concat());
             drawn += usize::from(followed.check(&solid, &camera)[0]);
         }
@@ -206,18 +237,25 @@ fn odd_placements_are_as_drawn_at_once() {
 #[test]
 fn what_looks_out_from_behind_a_wall_is_seen_on_every_side() {
     let camera = Camera::default_for(64, 64);
-    // In the picture the wall reaches 15 pixels from the middle, and the ball behind it 5 from its own.
+    // In the picture the wall reaches 15 pixels from the middle, and the ball behind it 5
+    // from its own.
     let (wall, inside) = (cuboid(Vec3::new(1.0, 1.0, 0.2)), cuboid(Vec3::splat(0.1)));
     let fixed = Solid::group(&[wall, inside.clone(), inside]);
     let ball = sphere(16, 9);
     let mut followed = Followed::new(&camera);
-    let places = [[0.0, 0.0], [0.1, 0.0], [0.0, -0.98], [0.0, 0.98], [-0.98, 0.0], [0.98, 0.0], [0.0, 0.1]];
+    let places =
+        [[0.0, 0.0], [0.1, 0.0], [0.0, -0.98], [0.0, 0.98], [-0.98, 0.0], [0.98, 0.0], [0.0, 0.1]];
     for (step, [x, y]) in places.into_iter().enumerate() {
         let by = Affine::new(DVec3::new(x, y, -1.5), DVec3::ZERO, DVec3::splat(0.4));
-        let [by_backdrop, _] = followed.check(&Solid::group(&[fixed.clone(), ball.placed(by)]), &camera);
+        let [by_backdrop, _] =
+            followed.check(&Solid::group(&[fixed.clone(), ball.placed(by)]), &camera);
         assert_eq!(by_backdrop, step > 0);
         let seen = followed.backdrop.contours(&camera);
-        let beside = seen.x.iter().zip(&seen.y).any(|(&x, &y)| (x - 32.0).abs().max((y - 32.0).abs()) > 16.0);
+        let beside = seen
+            .x
+            .iter()
+            .zip(&seen.y)
+            .any(|(&x, &y)| (x - 32.0).abs().max((y - 32.0).abs()) > 16.0);
         assert_eq!(beside, (2..6).contains(&step), "{x} {y}");
     }
 }
@@ -226,15 +264,19 @@ fn what_looks_out_from_behind_a_wall_is_seen_on_every_side() {
 fn what_only_the_depth_range_decides_is_told_anew_behind_what_stays_as_deep() {
     let camera = Camera::default_for(64, 64);
     let square = |half: f32, x: f32, z: f32| {
-        [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[u, v]| Vec3::new(x + u, v, z))
+        [[-half, -half], [half, -half], [half, half], [-half, half]]
+            .map(|[u, v]| Vec3::new(x + u, v, z))
     };
-    let flat = |half: f32, x: f32, z: f32| solid(square(half, x, z).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+    let flat =
+        |half: f32, x: f32, z: f32| solid(square(half, x, z).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
     // In the middle at depth 8, and to both sides at 7, which is the least.
     let fixed = Solid::group(&[flat(0.3, 0.0, 0.0), flat(0.2, 1.6, 1.0), flat(0.2, -1.6, 1.0)]);
-    // A shield, and behind it what is farthest off: stretched, the shield stays where it is.
+    // A shield, and behind it what is farthest off: stretched, the shield stays where it
+    // is.
     let corners = [square(1.0, 0.0, 0.0), square(0.1, 0.0, -1.0)].concat();
     let shield = solid(corners, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
-    // Nearer than the middle by this, it hides that where 0.006 of the depth range and 1e-6 of the depth are less.
+    // Nearer than the middle by this, it hides that where 0.006 of the depth range and
+    // 1e-6 of the depth are less.
     let nearer = 0.006 * 2.0045 + 8e-6;
     let mut followed = Followed::new(&camera);
     for (step, range) in [1.8, 2.0, 2.009, 2.0, 2.009].into_iter().enumerate() {
@@ -243,7 +285,8 @@ fn what_only_the_depth_range_decides_is_told_anew_behind_what_stays_as_deep() {
         let drawn = followed.check(&Solid::group(&[fixed.clone(), shield.placed(by)]), &camera);
         assert_eq!(drawn, [step > 0, step > 1]);
         let seen = followed.backdrop.contours(&camera);
-        let middle = seen.x.iter().zip(&seen.y).any(|(&x, &y)| (x - 32.0).abs().max((y - 32.0).abs()) < 8.0);
+        let middle =
+            seen.x.iter().zip(&seen.y).any(|(&x, &y)| (x - 32.0).abs().max((y - 32.0).abs()) < 8.0);
         assert_eq!(middle, step > 0 && range > 2.0045, "{range}");
     }
 }

@@ -1,7 +1,9 @@
-//! Many scenes at once, for banks of proposals and populations, whose members do not wait for one another.
+//! Many scenes at once, for banks of proposals and populations, whose members do not wait
+//! for one another.
 //!
-//! [`BatchRenderer`] is where another device would take over: what it is given are shared meshes with flat lists of vertices, what
-//! it gives back is one set of flat lists for all scenes. Invariant: a scene's contours do not depend on the others, on their order,
+//! [`BatchRenderer`] is where another device would take over: what it is given are shared
+//! meshes with flat lists of vertices, what it gives back is one set of flat lists for
+//! all scenes. Invariant: a scene's contours do not depend on the others, on their order,
 //! or on the number of threads: they are those of [`Contours::of`].
 
 use super::{Camera, Contours};
@@ -10,10 +12,12 @@ use crate::platform::threads::Pool;
 
 /// A scene to be drawn.
 ///
-/// Its meshes ([`Solid::instances`]) are triangle lists: `positions` and `normals` are three `f32` a vertex without gaps, scene
-/// units, y up; `triangles` three `u32` indices each, counter-clockwise seen from outside; placements are `f64`, columns first,
-/// from the mesh's coordinates to the world's. Scenes share meshes: the same `Arc` is the same data, and a device that keeps
-/// what it was given can tell by the address as long as it holds the `Arc`.
+/// Its meshes ([`Solid::instances`]) are triangle lists: `positions` and `normals` are
+/// three `f32` a vertex without gaps, scene units, y up; `triangles` three `u32` indices
+/// each, counter-clockwise seen from outside; placements are `f64`, columns first, from
+/// the mesh's coordinates to the world's. Scenes share meshes: the same `Arc` is the same
+/// data, and a device that keeps what it was given can tell by the address as long as it
+/// holds the `Arc`.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// What is seen.
@@ -22,8 +26,9 @@ pub struct Scene {
     pub camera: Camera,
 }
 
-/// The contours of many scenes: those of scene `i` are the entries `ends[i - 1]..ends[i]` of each list (from 0 for the first).
-/// All are `f32`, in pixels of the scene's picture, x to the right and y down, as in [`Contours`].
+/// The contours of many scenes: those of scene `i` are the entries `ends[i - 1]..ends[i]`
+/// of each list (from 0 for the first). All are `f32`, in pixels of the scene's picture,
+/// x to the right and y down, as in [`Contours`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContourBatch {
     /// Middle of each piece, from the left edge.
@@ -76,8 +81,9 @@ impl ContourBatch {
     pub fn scene(&self, i: usize) -> ContourSlice<'_> {
         let past = self.ends.get(i).copied().unwrap_or_default();
         let first = i.checked_sub(1).and_then(|i| self.ends.get(i)).copied().unwrap_or_default();
-        let part =
-            |list: &'_ Vec<f32>| -> std::ops::Range<usize> { first.min(list.len())..past.clamp(first, list.len()) };
+        let part = |list: &'_ Vec<f32>| -> std::ops::Range<usize> {
+            first.min(list.len())..past.clamp(first, list.len())
+        };
         let [width, height] = self.sizes.get(i).copied().unwrap_or_default();
         ContourSlice {
             x: &self.x[part(&self.x)],
@@ -104,8 +110,9 @@ impl ContourBatch {
 
 /// Draws the contours of many scenes.
 pub trait BatchRenderer: Sync {
-    /// The contours of each scene, in the order given: to the bit those of [`Contours::of`] on the processor; another device may
-    /// differ by rounding, and says by how much.
+    /// The contours of each scene, in the order given: to the bit those of
+    /// [`Contours::of`] on the processor; another device may differ by rounding, and says
+    /// by how much.
     fn contours(&self, scenes: &[Scene]) -> ContourBatch;
 }
 
@@ -115,7 +122,8 @@ pub struct Cores {
 }
 
 impl Cores {
-    /// On so many threads (0: as many as there are cores), which stay until this is dropped, with what they keep for drawing.
+    /// On so many threads (0: as many as there are cores), which stay until this is
+    /// dropped, with what they keep for drawing.
     pub fn new(threads: usize) -> Cores {
         Cores { pool: Pool::new(threads) }
     }
@@ -145,7 +153,11 @@ mod tests {
         let mut one = |i: usize| {
             let turn = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
             // Some are out of view.
-            let at = DVec3::new(if i.is_multiple_of(7) { 50.0 } else { random.between(-0.5, 0.5) }, 0.0, 0.0);
+            let at = DVec3::new(
+                if i.is_multiple_of(7) { 50.0 } else { random.between(-0.5, 0.5) },
+                0.0,
+                0.0,
+            );
             let solid = shapes[i % 2].placed(Affine::new(at, turn, DVec3::ONE));
             Scene { solid, camera: Camera::default_for(40 + (i as u32 % 3) * 20, 50) }
         };

@@ -1,8 +1,9 @@
 //! The camera: where it stands, how it projects, and the same view at another image size.
 //!
-//! It is not a lens model (no distortion) and holds no exposure. Invariant of every camera made here: the axes are
-//! orthonormal and right-handed (`right x up = -forward`), the image is 1 to [`Camera::MAX_SIDE`] pixels a side, and
-//! the focal length or pixel size is finite and positive.
+//! It is not a lens model (no distortion) and holds no exposure. Invariant of every
+//! camera made here: the axes are orthonormal and right-handed (`right x up = -forward`),
+//! the image is 1 to [`Camera::MAX_SIDE`] pixels a side, and the focal length or pixel
+//! size is finite and positive.
 
 use glam::DVec3;
 use thiserror::Error;
@@ -54,7 +55,8 @@ pub enum Projection {
 
 /// A camera and the size of its image.
 ///
-/// Pixel (0, 0) is the top left one and has its centre at (0.5, 0.5); y runs down in the image, up in the scene.
+/// Pixel (0, 0) is the top left one and has its centre at (0.5, 0.5); y runs down in the
+/// image, up in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Position in scene units; for a parallel projection, a point of the plane of depth 0.
@@ -80,8 +82,9 @@ impl Camera {
     /// Depth (scene units) in front of which nothing is drawn, in either projection.
     pub const NEAR: f64 = 1e-3;
 
-    /// The default camera: a pinhole at (0, 0, 8) looking along -z, whose longer side shows 4.4 units at z = 0.
-    /// Sides of 0 pixels count as 1, longer ones than [`Camera::MAX_SIDE`] as that.
+    /// The default camera: a pinhole at (0, 0, 8) looking along -z, whose longer side
+    /// shows 4.4 units at z = 0. Sides of 0 pixels count as 1, longer ones than
+    /// [`Camera::MAX_SIDE`] as that.
     pub fn default_for(width: u32, height: u32) -> Camera {
         let (width, height) = (width.clamp(1, Self::MAX_SIDE), height.clamp(1, Self::MAX_SIDE));
         Camera {
@@ -99,8 +102,8 @@ impl Camera {
         }
     }
 
-    /// The same view with the longer side at `longer_side` pixels (1 to [`Camera::MAX_SIDE`]); the shorter side is
-    /// rounded to whole pixels, at least 1.
+    /// The same view with the longer side at `longer_side` pixels (1 to
+    /// [`Camera::MAX_SIDE`]); the shorter side is rounded to whole pixels, at least 1.
     pub fn scaled_to(&self, longer_side: u32) -> Camera {
         let longer_side = longer_side.clamp(1, Self::MAX_SIDE);
         let (w, h) = (f64::from(self.width), f64::from(self.height));
@@ -112,34 +115,41 @@ impl Camera {
             Projection::Pinhole { focal_px, cx, cy } => {
                 Projection::Pinhole { focal_px: focal_px * by, cx: cx * bx, cy: cy * by_y }
             }
-            Projection::Orthographic { units_per_pixel, cx, cy } => {
-                Projection::Orthographic { units_per_pixel: units_per_pixel / by, cx: cx * bx, cy: cy * by_y }
-            }
+            Projection::Orthographic { units_per_pixel, cx, cy } => Projection::Orthographic {
+                units_per_pixel: units_per_pixel / by,
+                cx: cx * bx,
+                cy: cy * by_y,
+            },
         };
         Camera { width, height, projection, ..*self }
     }
 
-    /// The pixel position of a scene point and its depth: the distance along the viewing axis, in scene units.
-    /// At a depth of 0 or less a pinhole's position has no meaning (it may be infinite or NaN).
+    /// The pixel position of a scene point and its depth: the distance along the viewing
+    /// axis, in scene units. At a depth of 0 or less a pinhole's position has no meaning
+    /// (it may be infinite or NaN).
     pub fn project(&self, point: DVec3) -> (f64, f64, f64) {
         let from = point - self.eye;
         let (x, y, depth) = (from.dot(self.right), from.dot(self.up), from.dot(self.forward));
         match self.projection {
-            Projection::Pinhole { focal_px, cx, cy } => (cx + focal_px * x / depth, cy - focal_px * y / depth, depth),
+            Projection::Pinhole { focal_px, cx, cy } => {
+                (cx + focal_px * x / depth, cy - focal_px * y / depth, depth)
+            }
             Projection::Orthographic { units_per_pixel, cx, cy } => {
                 (cx + x / units_per_pixel, cy - y / units_per_pixel, depth)
             }
         }
     }
 
-    /// The derivative by a scene point of a function of where it is in the picture, from that by its two pixel coordinates.
+    /// The derivative by a scene point of a function of where it is in the picture, from
+    /// that by its two pixel coordinates.
     pub fn pull_point(&self, point: DVec3, [by_x, by_y]: [f64; 2]) -> DVec3 {
         let from = point - self.eye;
         let (x, y, depth) = (from.dot(self.right), from.dot(self.up), from.dot(self.forward));
         match self.projection {
             Projection::Pinhole { focal_px, .. } => {
                 let k = focal_px / depth;
-                self.right * (by_x * k) - self.up * (by_y * k) + self.forward * ((by_y * y - by_x * x) * k / depth)
+                self.right * (by_x * k) - self.up * (by_y * k)
+                    + self.forward * ((by_y * y - by_x * x) * k / depth)
             }
             Projection::Orthographic { units_per_pixel, .. } => {
                 self.right * (by_x / units_per_pixel) - self.up * (by_y / units_per_pixel)
@@ -198,7 +208,8 @@ mod tests {
         let mut camera = Camera::default_for(64, 48);
         for orthographic in [false, true] {
             if orthographic {
-                camera.projection = Projection::Orthographic { units_per_pixel: 0.05, cx: 32.0, cy: 24.0 };
+                camera.projection =
+                    Projection::Orthographic { units_per_pixel: 0.05, cx: 32.0, cy: 24.0 };
             }
             let (p, by) = (DVec3::new(0.4, 0.9, -1.5), [0.7, -1.3]);
             let f = |p: DVec3| {

@@ -1,9 +1,10 @@
 //! Cameras from and to JSON.
 //!
-//! Keys: `model` (`pinhole` or `orthographic`), `position`, `looks_along`, `up` (triples), `image` (width and height in
-//! pixels), `principal_point` (pixels), and `focal_px` or `units_per_pixel`. A missing `principal_point` is the image
-//! centre; a missing `position` of an orthographic camera is 8 units before the origin. Other keys are ignored.
-//! Not a general scene format. What is read is always a valid [`Camera`].
+//! Keys: `model` (`pinhole` or `orthographic`), `position`, `looks_along`, `up`
+//! (triples), `image` (width and height in pixels), `principal_point` (pixels), and
+//! `focal_px` or `units_per_pixel`. A missing `principal_point` is the image centre; a
+//! missing `position` of an orthographic camera is 8 units before the origin. Other keys
+//! are ignored. Not a general scene format. What is read is always a valid [`Camera`].
 
 use super::{Camera, CameraError, Projection};
 use glam::DVec3;
@@ -19,19 +20,29 @@ impl Camera {
     /// Reads a camera file's text.
     ///
     /// # Errors
-    /// The text is not a JSON object, or a needed key is missing or cannot be used; the error names the key.
+    /// The text is not a JSON object, or a needed key is missing or cannot be used; the
+    /// error names the key.
     pub fn from_json(text: &str) -> Result<Camera, CameraError> {
-        let document: Value = serde_json::from_str(text).map_err(|e| CameraError::Json(e.to_string()))?;
+        let document: Value =
+            serde_json::from_str(text).map_err(|e| CameraError::Json(e.to_string()))?;
         let map = document.as_object().ok_or(CameraError::NotAnObject)?;
         let pinhole = match map.get("model").ok_or(CameraError::Missing("model"))?.as_str() {
             Some("pinhole") => true,
             Some("orthographic") => false,
-            _ => return Err(CameraError::Invalid { key: "model", wanted: "\"pinhole\" or \"orthographic\"" }),
+            _ => {
+                return Err(CameraError::Invalid {
+                    key: "model",
+                    wanted: "\"pinhole\" or \"orthographic\"",
+                });
+            }
         };
         let forward = direction(map, "looks_along")?;
         let right = forward.cross(direction(map, "up")?);
         if right.length() < 1e-6 {
-            return Err(CameraError::Invalid { key: "up", wanted: "a direction other than `looks_along`'s" });
+            return Err(CameraError::Invalid {
+                key: "up",
+                wanted: "a direction other than `looks_along`'s",
+            });
         }
         let right = right.normalize();
         let eye = match triple(map, "position") {
@@ -43,7 +54,12 @@ impl Camera {
             None => (f64::from(width) / 2.0, f64::from(height) / 2.0),
             Some(value) => match numbers(value).as_deref() {
                 Some([x, y]) => (*x, *y),
-                _ => return Err(CameraError::Invalid { key: "principal_point", wanted: "two numbers (pixels)" }),
+                _ => {
+                    return Err(CameraError::Invalid {
+                        key: "principal_point",
+                        wanted: "two numbers (pixels)",
+                    });
+                }
             },
         };
         let projection = if pinhole {
@@ -102,14 +118,19 @@ fn positive(map: &Map<String, Value>, key: &'static str) -> Result<f64, CameraEr
 }
 
 fn image(map: &Map<String, Value>) -> Result<(u32, u32), CameraError> {
-    let side = |x: f64| (x >= 1.0 && x <= f64::from(Camera::MAX_SIDE) && x.fract() == 0.0).then_some(x as u32);
+    let side = |x: f64| {
+        (x >= 1.0 && x <= f64::from(Camera::MAX_SIDE) && x.fract() == 0.0).then_some(x as u32)
+    };
     let value = numbers(map.get("image").ok_or(CameraError::Missing("image"))?);
     if let Some([w, h]) = value.as_deref()
         && let (Some(w), Some(h)) = (side(*w), side(*h))
     {
         return Ok((w, h));
     }
-    Err(CameraError::Invalid { key: "image", wanted: "a width and a height, whole pixels from 1 to 16384" })
+    Err(CameraError::Invalid {
+        key: "image",
+        wanted: "a width and a height, whole pixels from 1 to 16384",
+    })
 }
 
 #[cfg(test)]
@@ -147,7 +168,10 @@ mod tests {
             "units_per_pixel": 0.0171875}"#;
         let camera = Camera::from_json(text).unwrap();
         assert_eq!(camera.eye, DVec3::new(0.0, 0.0, 8.0));
-        assert_eq!(camera.projection, Projection::Orthographic { units_per_pixel: 0.0171875, cx: 96.0, cy: 128.0 });
+        assert_eq!(
+            camera.projection,
+            Projection::Orthographic { units_per_pixel: 0.0171875, cx: 96.0, cy: 128.0 }
+        );
         assert_eq!(Camera::from_json(&camera.to_json()).unwrap(), camera);
     }
 

@@ -1,6 +1,8 @@
-//! Which triangles of a mesh may show in a picture, or at its marked pixels, and drawing those.
+//! Which triangles of a mesh may show in a picture, or at its marked pixels, and drawing
+//! those.
 //!
-//! Nothing is decided by branches that could not be foretold: lists are written branch-free, and triangles set up many at a time.
+//! Nothing is decided by branches that could not be foretold: lists are written
+//! branch-free, and triangles set up many at a time.
 
 use super::coverage::is_turned;
 use super::lanes::{Batch, Kind, LANES};
@@ -12,7 +14,8 @@ use super::triangle::{Plane, is_flat, keep_all, put_face};
 use crate::geom::{Patches, Topology};
 use glam::Vec4;
 
-/// The triangles of meshes that have pixels' centres between their corners, with where. Reused from picture to picture.
+/// The triangles of meshes that have pixels' centres between their corners, with where.
+/// Reused from picture to picture.
 #[derive(Default)]
 pub(super) struct Candidates {
     faces: Vec<u32>,
@@ -22,9 +25,17 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// Those of one mesh all of whose vertices are in view, but for backs that need not be drawn; with marks, those that reach some.
+    /// Those of one mesh all of whose vertices are in view, but for backs that need not
+    /// be drawn; with marks, those that reach some.
     #[inline(always)]
-    fn find(&mut self, topology: &Topology, vertices: &Vertices<'_>, size: Vec4, back: f64, marks: Option<&Marks>) {
+    fn find(
+        &mut self,
+        topology: &Topology,
+        vertices: &Vertices<'_>,
+        size: Vec4,
+        back: f64,
+        marks: Option<&Marks>,
+    ) {
         let triangles = &topology.triangles;
         if self.faces.len() < triangles.len() {
             self.faces.resize(triangles.len(), 0);
@@ -34,16 +45,21 @@ impl Candidates {
         let Some(marks) = marks else {
             return self.add(0, triangles, vertices, size, back, |_| true);
         };
-        for (i, (patch, triangles)) in topology.patches.of(triangles).zip(triangles.chunks(Patches::FACES)).enumerate()
+        for (i, (patch, triangles)) in
+            topology.patches.of(triangles).zip(triangles.chunks(Patches::FACES)).enumerate()
         {
             let extent = Extent::between(vertices.least(patch), size);
             if !extent.is_empty() && marks.hold(extent.ends()) {
-                self.add(i * Patches::FACES, triangles, vertices, size, back, |ends| marks.may_hold(ends));
+                self.add(i * Patches::FACES, triangles, vertices, size, back, |ends| {
+                    marks.may_hold(ends)
+                });
             }
         }
         let found = std::mem::take(&mut self.count);
         for i in 0..found {
-            let (Some(&face), Some(&extent)) = (self.faces.get(i), self.extents.get(i)) else { continue };
+            let (Some(&face), Some(&extent)) = (self.faces.get(i), self.extents.get(i)) else {
+                continue;
+            };
             self.put(face, extent, marks.hold(extent.ends()));
         }
     }
@@ -63,21 +79,29 @@ impl Candidates {
             let Some(places) = vertices.places(corners) else { continue };
             let extent = Extent::around(places, size);
             let turned = back != 0.0 && is_turned(places, back);
-            self.put((first + i) as u32, extent, !extent.is_empty() & !turned & wanted(extent.ends()));
+            self.put(
+                (first + i) as u32,
+                extent,
+                !extent.is_empty() & !turned & wanted(extent.ends()),
+            );
         }
     }
 
-    /// Each is written down, and written over unless it counts: a branch could not be foretold.
+    /// Each is written down, and written over unless it counts: a branch could not be
+    /// foretold.
     #[inline(always)]
     fn put(&mut self, face: u32, extent: Extent, counts: bool) {
-        if let (Some(f), Some(e)) = (self.faces.get_mut(self.count), self.extents.get_mut(self.count)) {
+        if let (Some(f), Some(e)) =
+            (self.faces.get_mut(self.count), self.extents.get_mut(self.count))
+        {
             (*f, *e) = (face, extent);
         }
         self.count += usize::from(counts);
     }
 
-    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area. With `FACES`, `seen` gets the face of each
-    /// pixel where a triangle was nearer, and everything is wanted.
+    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area.
+    /// With `FACES`, `seen` gets the face of each pixel where a triangle was nearer, and
+    /// everything is wanted.
     #[inline(always)]
     pub fn fill<const FACES: bool>(
         &mut self,
@@ -123,17 +147,23 @@ impl Candidates {
                     #[inline(always)]
                     |row, from, outside| {
                         let at = (row - area.top) * width + from - area.left;
-                        if marks.is_some_and(|marks| marks.window(at, LANES) as u32 & !outside.to_bitmask() == 0) {
+                        if marks.is_some_and(|marks| {
+                            marks.window(at, LANES) as u32 & !outside.to_bitmask() == 0
+                        }) {
                             return;
                         }
                         if let Some(least) = wanted.least(at) {
-                            // A triangle without area covers nothing, whatever its rounded corners say.
-                            if *flat.get_or_insert_with(|| is_flat(&vertices.corners(topology, face))) {
+                            // A triangle without area covers nothing, whatever its rounded
+                            // corners say.
+                            if *flat
+                                .get_or_insert_with(|| is_flat(&vertices.corners(topology, face)))
+                            {
                                 return;
                             }
                             return keep_all(buffer, at, least, outside);
                         }
-                        let corners = || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);
+                        let corners =
+                            || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);
                         if let Some(plane) = plane.get_or_insert_with(corners) {
                             let nearer = plane.keep(buffer, at, row, from, outside);
                             if FACES {

@@ -1,8 +1,11 @@
-//! Visible contours of a solid: smooth silhouettes, boundaries and creases, as short oriented pieces.
+//! Visible contours of a solid: smooth silhouettes, boundaries and creases, as short
+//! oriented pieces.
 //!
-//! A smooth silhouette is the zero set of (interpolated vertex normal . direction to the eye) inside each face, so it
-//! moves smoothly with the pose and does not follow the mesh's edges. Texture and shading edges are not contours here.
-//! Invariant: the five lists have one entry per piece, all finite, positions inside the image, tangents of unit length.
+//! A smooth silhouette is the zero set of (interpolated vertex normal . direction to the
+//! eye) inside each face, so it moves smoothly with the pose and does not follow the
+//! mesh's edges. Texture and shading edges are not contours here. Invariant: the five
+//! lists have one entry per piece, all finite, positions inside the image, tangents of
+//! unit length.
 
 use super::looked::Looked;
 use super::project::{DepthRange, Placement, Projected, project};
@@ -12,8 +15,9 @@ use super::{Camera, backdrop, layers, work};
 use crate::geom::Solid;
 use std::cell::RefCell;
 
-/// Visible contour pieces in an image. A piece's object side lies to the right of its tangent as seen in the image
-/// (outward is `(ty, -tx)`); creases that show both their faces, and boundaries, have an arbitrary sense.
+/// Visible contour pieces in an image. A piece's object side lies to the right of its
+/// tangent as seen in the image (outward is `(ty, -tx)`); creases that show both their
+/// faces, and boundaries, have an arbitrary sense.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contours {
     /// Middle of each piece, pixels from the left edge.
@@ -50,8 +54,8 @@ thread_local! {
 }
 
 impl Contours {
-    /// The contours of a solid, seen in a camera's image. Draws its own depth image; of a solid of several meshes, only
-    /// what this thread has not drawn lately.
+    /// The contours of a solid, seen in a camera's image. Draws its own depth image; of a
+    /// solid of several meshes, only what this thread has not drawn lately.
     pub fn of(solid: &Solid, camera: &Camera) -> Contours {
         backdrop::contours(solid, camera)
             .or_else(|| layers::contours(solid, camera))
@@ -65,31 +69,46 @@ impl Contours {
             let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
             hidden.clear();
             hidden.resize(pieces.len(), true);
-            // Most pieces are seen by their first look: only the others take a second one.
+            // Most pieces are seen by their first look: only the others take a second
+            // one.
             for side in 0..2 {
-                let pixels =
-                    || hidden.iter().zip(&*pieces).filter(|(hidden, _)| **hidden).filter_map(|(_, p)| p.pixel(side));
+                let pixels = || {
+                    hidden
+                        .iter()
+                        .zip(&*pieces)
+                        .filter(|(hidden, _)| **hidden)
+                        .filter_map(|(_, p)| p.pixel(side))
+                };
                 if pixels().next().is_none() {
                     break;
                 }
                 looked.clear(camera);
                 pixels().for_each(|pixel| looked.mark(pixel));
                 let depth = looked.draw(solid, camera, projected);
-                let Some(depths) = Depths::new(depth, camera.width, camera.height, range.extent()) else { break };
+                let Some(depths) = Depths::new(depth, camera.width, camera.height, range.extent())
+                else {
+                    break;
+                };
                 for (hidden, piece) in hidden.iter_mut().zip(&*pieces) {
                     *hidden = *hidden && !depths.visible_by(piece, side);
                 }
             }
-            seen(pieces.iter().zip(hidden).filter(|(_, hidden)| !**hidden).map(|(piece, _)| piece), camera, found)
+            seen(
+                pieces.iter().zip(hidden).filter(|(_, hidden)| !**hidden).map(|(piece, _)| piece),
+                camera,
+                found,
+            )
         })
     }
 
-    /// As [`Contours::of`], with the depth image of the same solid and camera drawn before.
+    /// As [`Contours::of`], with the depth image of the same solid and camera drawn
+    /// before.
     pub(super) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let depths = Depths::new(depth, camera.width, camera.height, range.extent());
-            let visible = |piece: &&Piece| depths.as_ref().is_some_and(|depths| depths.visible(piece));
+            let visible =
+                |piece: &&Piece| depths.as_ref().is_some_and(|depths| depths.visible(piece));
             seen(scratch.pieces.iter().filter(visible), camera, &mut scratch.found)
         })
     }
@@ -156,21 +175,33 @@ impl Scratch {
         let range = project(solid, camera, &mut self.projected);
         self.pieces.clear();
         for (i, instance) in solid.instances().iter().enumerate() {
-            let (placement, vertices) = (Placement::new(camera, &instance.affine), self.projected.mesh(i));
+            let (placement, vertices) =
+                (Placement::new(camera, &instance.affine), self.projected.mesh(i));
             if vertices.outside(camera) {
                 work::count(|work| work.outside += 1);
                 continue;
             }
             work::drawn(&instance.mesh);
             let pieces = &mut self.pieces;
-            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut self.room, |piece, _| pieces.push(piece));
+            trace_mesh(
+                &instance.mesh,
+                &placement,
+                camera,
+                &vertices,
+                &mut self.room,
+                |piece, _| pieces.push(piece),
+            );
         }
         range
     }
 }
 
 /// The contours of the pieces that are seen, where there were so many before.
-fn seen<'a>(pieces: impl Iterator<Item = &'a Piece>, camera: &Camera, found: &mut usize) -> Contours {
+fn seen<'a>(
+    pieces: impl Iterator<Item = &'a Piece>,
+    camera: &Camera,
+    found: &mut usize,
+) -> Contours {
     let mut out = Contours::with_room(camera, *found);
     pieces.for_each(|piece| out.push(piece));
     *found = out.len();

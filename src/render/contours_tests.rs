@@ -1,4 +1,5 @@
-//! Contours against circles, against the depth jumps of a much larger depth image, and for continuity.
+//! Contours against circles, against the depth jumps of a much larger depth image, and
+//! for continuity.
 
 use super::*;
 use crate::geom::Affine;
@@ -14,7 +15,9 @@ fn check_invariants(c: &Contours) {
     let n = c.len();
     assert!([c.y.len(), c.tx.len(), c.ty.len(), c.length.len()].iter().all(|&m| m == n));
     for i in 0..n {
-        assert!((0.0..=c.width as f32).contains(&c.x[i]) && (0.0..=c.height as f32).contains(&c.y[i]));
+        assert!(
+            (0.0..=c.width as f32).contains(&c.x[i]) && (0.0..=c.height as f32).contains(&c.y[i])
+        );
         assert!((c.tx[i] * c.tx[i] + c.ty[i] * c.ty[i] - 1.0).abs() < 1e-5);
         assert!(c.length[i] > 0.0 && c.length[i] <= 1.5);
     }
@@ -48,10 +51,13 @@ fn a_box_shows_nine_edges_seen_from_a_corner() {
         projection: Projection::Orthographic { units_per_pixel: 0.03, cx: 64.0, cy: 64.0 },
         ..Camera::default_for(128, 128)
     };
-    // Each edge of a cube turned with its diagonal to the viewer shows sqrt(2/3) of its length.
+    // Each edge of a cube turned with its diagonal to the viewer shows sqrt(2/3) of its
+    // length.
     let tilt = (1.0f64 / 2.0f64.sqrt()).atan();
-    let cube = cuboid(Vec3::ONE)
-        .placed(place([0.0; 3], [tilt, 0.0, 0.0], 1.0) * place([0.0; 3], [0.0, std::f64::consts::FRAC_PI_4, 0.0], 1.0));
+    let cube = cuboid(Vec3::ONE).placed(
+        place([0.0; 3], [tilt, 0.0, 0.0], 1.0)
+            * place([0.0; 3], [0.0, std::f64::consts::FRAC_PI_4, 0.0], 1.0),
+    );
     let c = Contours::of(&cube, &camera);
     check_invariants(&c);
     let wanted = 9.0 * 2.0 / 0.03 * (2.0f64 / 3.0).sqrt();
@@ -68,7 +74,9 @@ fn nothing_in_view_gives_nothing() {
         place([f64::NAN, 0.0, 0.0], [0.0; 3], 1.0),
         place([0.0; 3], [0.0; 3], 1e200),
     ] {
-        for thing in [sphere(16, 8), cuboid(Vec3::ONE), lathe(&[(0.5, -1.0), (0.5, 1.0)], 12, false)] {
+        for thing in
+            [sphere(16, 8), cuboid(Vec3::ONE), lathe(&[(0.5, -1.0), (0.5, 1.0)], 12, false)]
+        {
             let c = Contours::of(&thing.placed(affine), &camera);
             assert!(c.is_empty(), "{affine:?}: {c:?}");
         }
@@ -116,12 +124,14 @@ fn the_far_rim_of_a_bowl_shows_on_both_sides() {
     let rim = std::f64::consts::TAU * 0.77 * 29.0;
     assert!(seen.total_length() > 1.2 * rim, "{}", seen.total_length());
     for turn in [0.5, -0.9] {
-        let (there, back) = distances(&bowl.placed(place([0.0; 3], [turn, 0.0, 0.0], 1.0)), &camera);
+        let (there, back) =
+            distances(&bowl.placed(place([0.0; 3], [turn, 0.0, 0.0], 1.0)), &camera);
         assert!(there < 0.5 && back < 0.5, "{turn}: {there} {back}");
     }
 }
 
-/// A depth image `factor` times larger, and the positions (in small pixels) of its depth jumps.
+/// A depth image `factor` times larger, and the positions (in small pixels) of its depth
+/// jumps.
 fn jumps(solid: &Solid, camera: &Camera, factor: u32) -> Vec<(f32, f32)> {
     let large = camera.scaled_to(camera.width.max(camera.height) * factor);
     let depth = Frame::render(solid, &large, Channels::Depth).depth;
@@ -150,7 +160,10 @@ fn jumps(solid: &Solid, camera: &Camera, factor: u32) -> Vec<(f32, f32)> {
 
 /// Distance from a point to the nearest of others, at most 10.
 fn nearest(x: f32, y: f32, others: &[(f32, f32)]) -> f64 {
-    f64::from(others.iter().fold(100.0f32, |best, o| best.min((o.0 - x).powi(2) + (o.1 - y).powi(2)))).sqrt()
+    f64::from(
+        others.iter().fold(100.0f32, |best, o| best.min((o.0 - x).powi(2) + (o.1 - y).powi(2))),
+    )
+    .sqrt()
 }
 
 /// Mean distances from jumps to contours and from contours to jumps, in pixels.
@@ -159,13 +172,20 @@ fn distances(solid: &Solid, camera: &Camera) -> (f64, f64) {
     let c = Contours::of(solid, camera);
     check_invariants(&c);
     let pieces: Vec<_> = c.x.iter().copied().zip(c.y.iter().copied()).collect();
-    let there = reference.iter().map(|p| nearest(p.0, p.1, &pieces)).sum::<f64>() / reference.len().max(1) as f64;
-    let back: f64 = (0..c.len()).map(|i| f64::from(c.length[i]) * nearest(c.x[i], c.y[i], &reference)).sum();
+    let there = reference.iter().map(|p| nearest(p.0, p.1, &pieces)).sum::<f64>()
+        / reference.len().max(1) as f64;
+    let back: f64 =
+        (0..c.len()).map(|i| f64::from(c.length[i]) * nearest(c.x[i], c.y[i], &reference)).sum();
     (there, back / c.total_length().max(1e-9))
 }
 
 fn smooth_profile(random: &mut Uniform, points: usize) -> Vec<(f32, f32)> {
-    let (a, b, p, q) = (random.between(0.1, 0.4), random.between(0.0, 0.15), random.next() * 6.0, random.next() * 6.0);
+    let (a, b, p, q) = (
+        random.between(0.1, 0.4),
+        random.between(0.0, 0.15),
+        random.next() * 6.0,
+        random.next() * 6.0,
+    );
     (0..points)
         .map(|i| {
             let t = i as f64 / (points - 1) as f64;
@@ -186,7 +206,8 @@ fn open_lathes_agree_with_depth_jumps() {
     let mut random = Uniform(11);
     let camera = Camera::default_for(128, 128);
     for round in 0..12 {
-        let thing = lathe(&smooth_profile(&mut random, 32), 48, false).placed(random_pose(&mut random));
+        let thing =
+            lathe(&smooth_profile(&mut random, 32), 48, false).placed(random_pose(&mut random));
         let (there, back) = distances(&thing, &camera);
         assert!(there < 0.5 && back < 0.5, "{round}: {there} {back}");
     }
@@ -198,7 +219,8 @@ fn capped_lathes_agree_with_depth_jumps() {
     let camera = Camera::default_for(128, 128);
     for round in 0..12 {
         let segments = if round % 2 == 0 { 24 } else { 64 };
-        let thing = lathe(&smooth_profile(&mut random, 32), segments, true).placed(random_pose(&mut random));
+        let thing = lathe(&smooth_profile(&mut random, 32), segments, true)
+            .placed(random_pose(&mut random));
         let (there, back) = distances(&thing, &camera);
         // The near part of the top's crease has no jump.
         assert!(there < 0.5 && back < 4.0, "{round}: {there} {back}");
@@ -237,21 +259,32 @@ fn a_small_step_changes_little() {
         let thing = lathe(&smooth_profile(&mut random, 32), 48, true);
         let pose = random_pose(&mut random);
         let step = place([1e-3, -1e-3, 1e-3], [1e-3, 1e-3, -1e-3], 1.0);
-        let change =
-            (smooth_mean(&thing.placed(pose), &camera) - smooth_mean(&thing.placed(step * pose), &camera)).abs();
+        let change = (smooth_mean(&thing.placed(pose), &camera)
+            - smooth_mean(&thing.placed(step * pose), &camera))
+        .abs();
         total += change;
         most = most.max(change);
     }
-    assert!(total / f64::from(rounds) < 4e-3 && most < 2e-2, "{} {most}", total / f64::from(rounds));
+    assert!(
+        total / f64::from(rounds) < 4e-3 && most < 2e-2,
+        "{} {most}",
+        total / f64::from(rounds)
+    );
 }
 
 #[test]
 fn random_poses_never_panic() {
     let mut random = Uniform(6);
-    let things = [lathe(&[(0.2, -1.0), (0.9, -0.3), (0.4, 0.5)], 7, false), cuboid(Vec3::ONE), sphere(9, 5)];
+    let things =
+        [lathe(&[(0.2, -1.0), (0.9, -0.3), (0.4, 0.5)], 7, false), cuboid(Vec3::ONE), sphere(9, 5)];
     for round in 0..300 {
-        let mut v = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+        let mut v = |s: f64| {
+            DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s))
+        };
         let affine = Affine::new(v(12.0), v(3.0), v(20.0));
-        check_invariants(&Contours::of(&things[round % 3].placed(affine), &Camera::default_for(40, 27)));
+        check_invariants(&Contours::of(
+            &things[round % 3].placed(affine),
+            &Camera::default_for(40, 27),
+        ));
     }
 }

@@ -1,9 +1,10 @@
 //! Which pixels a triangle covers, exactly.
 //!
-//! Corners are rounded to 1/1024 of a pixel and edges worked out in integers, so triangles that share an edge neither overlap nor
-//! leave gaps, at any size: a pixel belongs to a triangle when its centre is inside, centres on an edge go to the triangle to the
-//! right of or below it (the top-left rule). Any triangle is told here, by runs; small ones of whole meshes are told by
-//! [`super::lanes`].
+//! Corners are rounded to 1/1024 of a pixel and edges worked out in integers, so
+//! triangles that share an edge neither overlap nor leave gaps, at any size: a pixel
+//! belongs to a triangle when its centre is inside, centres on an edge go to the triangle
+//! to the right of or below it (the top-left rule). Any triangle is told here, by runs;
+//! small ones of whole meshes are told by [`super::lanes`].
 
 use super::crossing::{Crossing, Int};
 use super::place::{BITS, Extent, Place, UNIT, is_near};
@@ -40,10 +41,12 @@ fn units(place: Place, point: &Point) -> [i64; 2] {
     })
 }
 
-/// Which way round near places lie in the image: above 0 clockwise, below counter-clockwise, 0 without area.
+/// Which way round near places lie in the image: above 0 clockwise, below
+/// counter-clockwise, 0 without area.
 #[inline(always)]
 fn turn([a, b, c]: [Place; 3]) -> f64 {
-    // Differences of places are exact in single precision, their products in double precision.
+    // Differences of places are exact in single precision, their products in double
+    // precision.
     let (b, c) = ((b - a).to_array().map(f64::from), (c - a).to_array().map(f64::from));
     b[0] * c[1] - b[1] * c[0]
 }
@@ -63,10 +66,16 @@ pub(super) fn is_turned(places: [Place; 3], back: f64) -> bool {
 }
 
 impl Coverage {
-    /// `None` when there are no pixels. With `back`, also when it turns that way: clockwise in the image if above 0, the other way if
-    /// below. The corners as they are, `points`, count only where they are far out.
+    /// `None` when there are no pixels. With `back`, also when it turns that way:
+    /// clockwise in the image if above 0, the other way if below. The corners as they
+    /// are, `points`, count only where they are far out.
     #[inline(always)]
-    pub fn new(places: [Place; 3], points: impl Fn() -> [Point; 3], extent: Extent, back: f64) -> Option<Coverage> {
+    pub fn new(
+        places: [Place; 3],
+        points: impl Fn() -> [Point; 3],
+        extent: Extent,
+        back: f64,
+    ) -> Option<Coverage> {
         let [a, b, c] = places;
         let least = a.min(b).min(c);
         let turn = if is_near(least) { turn(places) } else { far_turn(&places, &points()) };
@@ -77,11 +86,13 @@ impl Coverage {
         Some(Coverage { places, clockwise: turn > 0.0, columns, rows })
     }
 
-    /// Edges as functions that are not negative inside: value at a pixel's centre, change by column, change by row.
+    /// Edges as functions that are not negative inside: value at a pixel's centre, change
+    /// by column, change by row.
     #[inline(always)]
     fn edges<N: Int>(&self, corners: [[N; 2]; 3], [x, y]: [N; 2]) -> [[N; 3]; 3] {
         let (zero, one, unit) = (N::from(0), N::from(1), N::from(UNIT));
-        // Counter-clockwise, every edge runs the other way. No branches: they could not be foretold.
+        // Counter-clockwise, every edge runs the other way. No branches: they could not
+        // be foretold.
         let way = N::from(2 * i32::from(self.clockwise) - 1);
         std::array::from_fn(|i| {
             let (p, q) = (corners[i], corners[(i + 1) % 3]);
@@ -93,12 +104,17 @@ impl Coverage {
         })
     }
 
-    /// Calls `draw` for every row's run of pixels: row, first column, the column past the last one.
+    /// Calls `draw` for every row's run of pixels: row, first column, the column past the
+    /// last one.
     pub fn runs(&self, points: &[Point; 3], draw: impl FnMut(usize, usize, usize)) {
         // Products of two differences must fit.
         let corners: [[i64; 2]; 3] = std::array::from_fn(|i| units(self.places[i], &points[i]));
         let near = corners.as_flattened().iter().all(|v| v.abs() < 1 << 29);
-        if near { self.runs_in(corners, draw) } else { self.runs_in(corners.map(|p| p.map(i128::from)), draw) }
+        if near {
+            self.runs_in(corners, draw)
+        } else {
+            self.runs_in(corners.map(|p| p.map(i128::from)), draw)
+        }
     }
 
     fn runs_in<N: Int>(&self, corners: [[N; 2]; 3], mut draw: impl FnMut(usize, usize, usize)) {

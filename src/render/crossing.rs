@@ -1,10 +1,16 @@
-//! Where the edges of a triangle cross rows of pixels, in whole numbers and without a division for each row.
+//! Where the edges of a triangle cross rows of pixels, in whole numbers and without a
+//! division for each row.
 
 use std::cmp::Ordering;
 
 /// Whole numbers of some width.
 pub(super) trait Int:
-    Copy + Ord + From<i32> + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
+    Copy
+    + Ord
+    + From<i32>
+    + std::ops::Add<Output = Self>
+    + std::ops::Sub<Output = Self>
+    + std::ops::Mul<Output = Self>
 {
     /// The quotient by a positive number, rounded down, and the remainder.
     fn divided(self, by: Self) -> (Self, Self);
@@ -29,18 +35,22 @@ macro_rules! int {
 
 int!(i32, i64, i128);
 
-/// Where an edge crosses a row, kept by quotient and remainder so that rows need no division.
+/// Where an edge crosses a row, kept by quotient and remainder so that rows need no
+/// division.
 pub(super) struct Crossing<N> {
-    /// Which side is inside: to the right (1), to the left (-1), or one of both whole rows (0).
+    /// Which side is inside: to the right (1), to the left (-1), or one of both whole
+    /// rows (0).
     side: i32,
-    /// The edge's function where the row begins, divided by its change from column to column, which is `by`.
+    /// The edge's function where the row begins, divided by its change from column to
+    /// column, which is `by`.
     at: (N, N),
     per_row: (N, N),
     by: N,
 }
 
 impl<N: Int> Crossing<N> {
-    /// Of an edge's function: value where the first row begins, change by column, change by row.
+    /// Of an edge's function: value where the first row begins, change by column, change
+    /// by row.
     pub fn new([at, by_column, by_row]: [N; 3]) -> Crossing<N> {
         let zero = N::from(0);
         let (side, by) = match by_column.cmp(&zero) {

@@ -1,7 +1,8 @@
-//! How fine a mesh must be in a picture: the coarsest version that shows every vertex within so many pixels of where it is.
+//! How fine a mesh must be in a picture: the coarsest version that shows every vertex
+//! within so many pixels of where it is.
 //!
-//! The choice depends on the solid, the camera and that number alone. Meshes that reach behind the eye, or have no coarser versions, stay
-//! as they are.
+//! The choice depends on the solid, the camera and that number alone. Meshes that reach
+//! behind the eye, or have no coarser versions, stay as they are.
 
 use super::{Camera, Projection};
 use crate::geom::{Coarse, Instance, Solid};
@@ -16,7 +17,8 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// The solid, nowhere off by more than `detail` pixels; 0 (or less, or NaN) is the solid itself.
+    /// The solid, nowhere off by more than `detail` pixels; 0 (or less, or NaN) is the
+    /// solid itself.
     pub fn new(solid: &Solid, camera: &Camera, detail: f64) -> Drawn {
         if detail <= 0.0 || detail.is_nan() {
             return Drawn { solid: solid.clone(), coarse: Vec::new() };
@@ -33,7 +35,8 @@ impl Drawn {
         Drawn { solid: Solid::of(solid.instances().iter().zip(&coarse).map(one).collect()), coarse }
     }
 
-    /// From derivatives by the vertices of what is drawn to those by the solid's own: 0 for those that are not drawn.
+    /// From derivatives by the vertices of what is drawn to those by the solid's own: 0
+    /// for those that are not drawn.
     pub fn by_vertices_of(&self, solid: &Solid, by_vertex: Vec<DVec3>) -> Vec<DVec3> {
         if self.coarse.is_empty() {
             return by_vertex;
@@ -45,7 +48,9 @@ impl Drawn {
             let count = coarse.as_ref().map_or(here.len(), |c| c.vertices.len());
             let (by, others) = rest.split_at(count.min(rest.len()));
             match coarse {
-                Some(coarse) => coarse.vertices.iter().zip(by).for_each(|(v, g)| here[*v as usize] = *g),
+                Some(coarse) => {
+                    coarse.vertices.iter().zip(by).for_each(|(v, g)| here[*v as usize] = *g)
+                }
                 None => here.iter_mut().zip(by).for_each(|(place, g)| *place = *g),
             }
             (own, rest) = (after, others);
@@ -54,14 +59,16 @@ impl Drawn {
     }
 }
 
-/// How far (the mesh's units) a vertex of an instance may be from where it is to be off by so many pixels at most, wherever in the picture
-/// it is and whichever way; `None` for one that reaches behind the eye.
+/// How far (the mesh's units) a vertex of an instance may be from where it is to be off
+/// by so many pixels at most, wherever in the picture it is and whichever way; `None` for
+/// one that reaches behind the eye.
 fn allowed(instance: &Instance, camera: &Camera, pixels: f64) -> Option<f64> {
     let (centre, radius) = instance.ball()?;
     let nearest = (centre - camera.eye).dot(camera.forward) - radius;
     let most = match camera.projection {
         Projection::Pinhole { focal_px, cx, cy } => {
-            // Towards the corners of a picture what moves along the line of sight's axis moves in the picture, too.
+            // Towards the corners of a picture what moves along the line of sight's axis
+            // moves in the picture, too.
             let side = |c: f64, size: u32| c.abs().max((f64::from(size) - c).abs());
             let slant = side(cx, camera.width).hypot(side(cy, camera.height)) / focal_px;
             focal_px / nearest * (1.0 + slant * slant).sqrt()
@@ -84,10 +91,17 @@ mod tests {
         let y: Vec<f64> = (0..25).map(|i| f64::from(i) / 12.0 - 1.0).collect();
         let r = y.iter().map(|y| 0.5 + 0.1 * libm::sin(5.0 * y)).collect();
         let vase = Solid::lathe(&[Profile { y, r }], 48, 0.0, Caps::Both).unwrap();
-        let fine = lathe(&[(0.3, -0.8), (0.7, -0.2), (0.65, 0.1), (0.4, 0.5), (0.6, 0.9)], 96, true);
+        let fine =
+            lathe(&[(0.3, -0.8), (0.7, -0.2), (0.65, 0.1), (0.4, 0.5), (0.6, 0.9)], 96, true);
         let file = Solid::lasting((*fine.instances()[0].mesh).clone());
-        let at = |x: f64, turn: f64| Affine::new(DVec3::new(x, 0.0, 0.0), DVec3::new(turn, 0.3, 0.1), DVec3::ONE);
-        Solid::group(&[vase.placed(at(-1.2, 0.4)), file.placed(at(1.0, -0.3)), fine.placed(at(0.0, 0.9))])
+        let at = |x: f64, turn: f64| {
+            Affine::new(DVec3::new(x, 0.0, 0.0), DVec3::new(turn, 0.3, 0.1), DVec3::ONE)
+        };
+        Solid::group(&[
+            vase.placed(at(-1.2, 0.4)),
+            file.placed(at(1.0, -0.3)),
+            fine.placed(at(0.0, 0.9)),
+        ])
     }
 
     fn triangles(solid: &Solid) -> Vec<usize> {
@@ -105,12 +119,16 @@ mod tests {
             assert_eq!(shown(1.0, detail), triangles(&solid));
         }
         let (near, far) = (shown(1.0, 0.5), shown(0.2, 0.5));
-        assert!(near[0] < triangles(&solid)[0] && far[0] < near[0] && far[1] < triangles(&solid)[1]);
+        assert!(
+            near[0] < triangles(&solid)[0] && far[0] < near[0] && far[1] < triangles(&solid)[1]
+        );
         assert_eq!(far[2], triangles(&solid)[2], "nothing is known about this one");
         // Around the eye nothing is made coarser.
         assert_eq!(shown(40.0, 1.0), triangles(&solid));
-        let parallel =
-            Camera { projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 64.0, cy: 64.0 }, ..camera };
+        let parallel = Camera {
+            projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 64.0, cy: 64.0 },
+            ..camera
+        };
         assert!(triangles(&Drawn::new(&solid, &parallel, 0.5).solid)[0] < near[0]);
     }
 
@@ -127,7 +145,10 @@ mod tests {
             let view = view(0.5);
             before(&view, 128);
             assert_eq!(*view.contours(128), *wanted);
-            assert_eq!(view.frame(128).depth, Frame::render(&solid, &camera, Channels::Depth).depth);
+            assert_eq!(
+                view.frame(128).depth,
+                Frame::render(&solid, &camera, Channels::Depth).depth
+            );
         }
         let other = group();
         let there = std::thread::scope(|s| {
@@ -140,8 +161,10 @@ mod tests {
     #[test]
     fn derivatives_are_by_the_vertices_of_the_solid() {
         let camera = Camera::default_for(96, 96);
-        let parallel =
-            Camera { projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 48.0, cy: 48.0 }, ..camera };
+        let parallel = Camera {
+            projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 48.0, cy: 48.0 },
+            ..camera
+        };
         for camera in [camera, parallel] {
             let view = View::with_detail(group(), camera, 0.5);
             let contours = view.contours(96);
@@ -157,16 +180,20 @@ mod tests {
             let plain = contours.pull(&drawn.solid, &camera, &by);
             let sum = |all: &[DVec3]| all.iter().map(|g| g.length_squared()).sum::<f64>();
             assert!(sum(&found) > 0.0 && (sum(&found) - sum(&plain)).abs() < 1e-9 * sum(&plain));
-            // Turned round the middle of the picture, the same pieces go round it, as do the vertices that they come from.
+            // Turned round the middle of the picture, the same pieces go round it, as do
+            // the vertices that they come from.
             let (cx, cy) = (48.0, 48.0);
             let along = |(p, g): (DVec3, &DVec3)| {
                 let from = p - camera.eye;
                 g.dot(camera.up * from.dot(camera.right) - camera.right * from.dot(camera.up))
             };
             let along: f64 = view.solid().vertices().zip(&found).map(along).sum();
-            let piece =
-                |i: usize| by[i][0] * (f64::from(contours.y[i]) - cy) - by[i][1] * (f64::from(contours.x[i]) - cx);
-            let (pieces, gross) = (0..by.len()).map(piece).fold((0.0, 0.0), |(sum, all), x| (sum + x, all + x.abs()));
+            let piece = |i: usize| {
+                by[i][0] * (f64::from(contours.y[i]) - cy)
+                    - by[i][1] * (f64::from(contours.x[i]) - cx)
+            };
+            let (pieces, gross) =
+                (0..by.len()).map(piece).fold((0.0, 0.0), |(sum, all), x| (sum + x, all + x.abs()));
             assert!((along - pieces).abs() < 1e-4 * gross, "{along} {pieces} of {gross}");
         }
     }

@@ -1,4 +1,5 @@
-//! Triangles no mesh should have, pictures with and without wide instructions, and depth at a few pixels against depth at all.
+//! Triangles no mesh should have, pictures with and without wide instructions, and depth
+//! at a few pixels against depth at all.
 
 use super::simd::portable;
 use super::testing::{Uniform, cuboid, lathe, solid, sphere};
@@ -8,7 +9,8 @@ use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
 fn affine(random: &mut Uniform, reach: f64) -> Affine {
-    let mut v = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+    let mut v =
+        |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
     Affine::new(v(reach), v(3.0), DVec3::ONE + v(0.6))
 }
 
@@ -16,7 +18,10 @@ fn camera(random: &mut Uniform, round: usize) -> Camera {
     let side = |random: &mut Uniform| random.between(5.0, 300.0) as u32;
     let mut camera = Camera::default_for(side(random), side(random));
     match round % 4 {
-        0 => camera.projection = Projection::Orthographic { units_per_pixel: 0.03, cx: 40.0, cy: 50.0 },
+        0 => {
+            camera.projection =
+                Projection::Orthographic { units_per_pixel: 0.03, cx: 40.0, cy: 50.0 }
+        }
         // The near plane cuts some.
         1 => camera.eye.z = random.between(-0.5, 1.5),
         _ => {}
@@ -26,10 +31,15 @@ fn camera(random: &mut Uniform, round: usize) -> Camera {
 
 fn scene(random: &mut Uniform) -> Solid {
     let profile = [(0.5, -0.8), (0.7, -0.1), (0.4, 0.6)];
-    let shapes =
-        [sphere(31, 17), cuboid(Vec3::new(0.4, 0.9, 0.3)), lathe(&profile, 9, false), lathe(&profile, 40, true)];
+    let shapes = [
+        sphere(31, 17),
+        cuboid(Vec3::new(0.4, 0.9, 0.3)),
+        lathe(&profile, 9, false),
+        lathe(&profile, 40, true),
+    ];
     let count = 1 + (random.next() * 3.0) as usize;
-    let one = |random: &mut Uniform| shapes[(random.next() * 4.0) as usize].placed(affine(random, 1.0));
+    let one =
+        |random: &mut Uniform| shapes[(random.next() * 4.0) as usize].placed(affine(random, 1.0));
     Solid::group(&(0..count).map(|_| one(random)).collect::<Vec<_>>())
 }
 
@@ -39,7 +49,9 @@ fn bits(values: &[f32]) -> Vec<u32> {
 
 fn assert_same(a: &Contours, b: &Contours) {
     assert_eq!(a.len(), b.len());
-    for (a, b) in [(&a.x, &b.x), (&a.y, &b.y), (&a.tx, &b.tx), (&a.ty, &b.ty), (&a.length, &b.length)] {
+    for (a, b) in
+        [(&a.x, &b.x), (&a.y, &b.y), (&a.tx, &b.tx), (&a.ty, &b.ty), (&a.length, &b.length)]
+    {
         assert_eq!(bits(a), bits(b));
     }
 }
@@ -50,7 +62,8 @@ fn wide_instructions_change_nothing() {
     let (mut pixels, mut pieces) = (0, 0);
     for round in 0..60 {
         let (thing, camera) = (scene(&mut random), camera(&mut random, round));
-        let draw = || (Frame::render(&thing, &camera, Channels::Depth), Contours::drawn(&thing, &camera));
+        let draw =
+            || (Frame::render(&thing, &camera, Channels::Depth), Contours::drawn(&thing, &camera));
         let (wide, plain) = (draw(), portable(draw));
         assert_eq!(bits(&wide.0.depth), bits(&plain.0.depth));
         assert_same(&wide.1, &plain.1);
@@ -76,7 +89,12 @@ fn depth_at_a_few_pixels_is_depth_at_all() {
 /// A mesh as it is, whatever its numbers.
 fn raw(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Solid {
     let normals = vec![Vec3::Z; positions.len()];
-    let topology = Topology { parts: vec![0; triangles.len()], triangles, part_count: 1, ..Topology::default() };
+    let topology = Topology {
+        parts: vec![0; triangles.len()],
+        triangles,
+        part_count: 1,
+        ..Topology::default()
+    };
     Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::new(topology) }))
 }
 
@@ -108,17 +126,27 @@ fn slivers_and_enormous_triangles_keep_their_depth() {
     let camera = Camera::default_for(128, 100);
     let mut drawn = 0;
     for round in 0..2000 {
-        // From a thousandth of a pixel to ten thousand pictures, the smaller side down to nothing.
+        // From a thousandth of a pixel to ten thousand pictures, the smaller side down to
+        // nothing.
         let size = libm::pow(10.0, random.between(-4.0, 4.5));
         let thin = libm::pow(10.0, random.between(-9.0, 0.0));
-        let mut v = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+        let mut v = |s: f64| {
+            DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s))
+        };
         let (middle, along, across) = (v(1.0), v(size), v(size * thin));
         let corners = [middle - along, middle + along, middle + across].map(|p| p.as_vec3());
-        let frame = Frame::render(&raw(corners.to_vec(), vec![[0, 1, 2]]), &camera, Channels::Depth);
+        let frame =
+            Frame::render(&raw(corners.to_vec(), vec![[0, 1, 2]]), &camera, Channels::Depth);
         let depth = corners.map(|p| 8.0 - p.z);
-        let (near, far) = (depth.iter().copied().fold(f32::MAX, f32::min), depth.iter().copied().fold(0.0, f32::max));
+        let (near, far) = (
+            depth.iter().copied().fold(f32::MAX, f32::min),
+            depth.iter().copied().fold(0.0, f32::max),
+        );
         for d in frame.depth.iter().filter(|d| d.is_finite()) {
-            assert!(*d >= near.max(0.0) * (1.0 - 1e-5) && *d <= far * (1.0 + 1e-5), "{round}: {d} not in {near} {far}");
+            assert!(
+                *d >= near.max(0.0) * (1.0 - 1e-5) && *d <= far * (1.0 + 1e-5),
+                "{round}: {d} not in {near} {far}"
+            );
             drawn += 1;
         }
     }
@@ -129,7 +157,11 @@ fn slivers_and_enormous_triangles_keep_their_depth() {
 fn one_enormous_triangle_is_a_plane() {
     let camera = Camera::default_for(64, 48);
     for size in [10.0f32, 1e3, 1e5] {
-        let corners = vec![Vec3::new(-size, -size, 0.5), Vec3::new(size, -size, 0.5), Vec3::new(0.0, size, 0.5)];
+        let corners = vec![
+            Vec3::new(-size, -size, 0.5),
+            Vec3::new(size, -size, 0.5),
+            Vec3::new(0.0, size, 0.5),
+        ];
         let frame = Frame::render(&solid(corners, vec![[0, 1, 2]]), &camera, Channels::Depth);
         assert!(frame.depth.iter().all(|d| (d - 7.5).abs() < 1e-5 * 7.5), "{size}");
     }
@@ -145,7 +177,11 @@ fn holes_too_small_to_be_seen_change_nothing() {
                 (a.cos().max(1e-7), a.sin())
             })
             .collect();
-        lathe(&profile, 40, false).placed(Affine::new(DVec3::ZERO, DVec3::new(0.9, 0.3, 0.2), DVec3::ONE))
+        lathe(&profile, 40, false).placed(Affine::new(
+            DVec3::ZERO,
+            DVec3::new(0.9, 0.3, 0.2),
+            DVec3::ONE,
+        ))
     };
     let [tiny, seen] = [1e-4, 0.05].map(|hole| Contours::of(&ball(hole), &camera).total_length());
     let around = Contours::of(&sphere(40, 40), &camera).total_length();

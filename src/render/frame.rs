@@ -1,7 +1,8 @@
 //! Depth, part and normal of what a camera sees, one value per pixel centre.
 //!
-//! No anti-aliasing, no colours (see `shade`). Invariant: `depth` has `width * height` entries, row by row from the top,
-//! finite exactly where something is seen; the other channels have as many entries or, when not asked for, none.
+//! No anti-aliasing, no colours (see `shade`). Invariant: `depth` has `width * height`
+//! entries, row by row from the top, finite exactly where something is seen; the other
+//! channels have as many entries or, when not asked for, none.
 
 use super::candidates::Candidates;
 use super::project::{Lens, Placement, Point, Projected, project};
@@ -33,18 +34,20 @@ pub struct Frame {
     pub depth: Vec<f32>,
     /// Part number; `u16::MAX` off the object. Empty when only depth was drawn.
     pub part: Vec<u16>,
-    /// Unit normal in the camera's frame (x right, y up, z towards the camera), turned to the side that is seen;
-    /// zero off the object. Empty when only depth was drawn.
+    /// Unit normal in the camera's frame (x right, y up, z towards the camera), turned to
+    /// the side that is seen; zero off the object. Empty when only depth was drawn.
     pub normal: Vec<[f32; 3]>,
 }
 
 thread_local! {
-    /// Projected vertices, what may be drawn and how it is shaded, reused from frame to frame.
+    /// Projected vertices, what may be drawn and how it is shaded, reused from frame to
+    /// frame.
     static SCRATCH: RefCell<(Projected, Candidates, Shading)> = RefCell::default();
 }
 
 impl Frame {
-    /// Draws a solid. Back faces are drawn too, but for bodies that hide their own; triangles with a vertex that is not finite are left out.
+    /// Draws a solid. Back faces are drawn too, but for bodies that hide their own;
+    /// triangles with a vertex that is not finite are left out.
     pub fn render(solid: &Solid, camera: &Camera, channels: Channels) -> Frame {
         SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
             Ok(mut scratch) => Frame::draw(solid, camera, channels, &mut scratch),
@@ -104,7 +107,8 @@ pub(super) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
     );
 }
 
-/// Nearness, parts and normals of all meshes. The nearest face of each pixel comes first, its normal after that and once.
+/// Nearness, parts and normals of all meshes. The nearest face of each pixel comes first,
+/// its normal after that and once.
 fn draw_all(
     solid: &Solid,
     camera: &Camera,
@@ -124,7 +128,8 @@ fn draw_all(
     for (i, instance) in solid.instances().iter().enumerate() {
         let (mesh, placement) = (&instance.mesh, &Placement::new(camera, &instance.affine));
         let number = |face: usize| {
-            let own = mesh.topology.parts.get(face).map_or(0, |p| p.saturating_add(instance.first_part));
+            let own =
+                mesh.topology.parts.get(face).map_or(0, |p| p.saturating_add(instance.first_part));
             own.min(u16::MAX - 1)
         };
         let vertices = projected.mesh(i);
@@ -133,13 +138,15 @@ fn draw_all(
         }
         if !vertices.whole {
             cut_triangles(mesh, placement, camera, &vertices, |triangle, face, weights| {
-                let slope = Slope::new(mesh, placement, lens.pinhole, face, &triangle.points, weights);
+                let slope =
+                    Slope::new(mesh, placement, lens.pinhole, face, &triangle.points, weights);
                 let number = number(face);
                 triangle.runs(|run| {
                     for column in run.from..run.to {
                         let (i, q) = (run.row * width + column, run.nearness(column));
                         if q > nearness[i] {
-                            (nearness[i], part[i], normal[i]) = (q, number, shade(&slope, run.row, column));
+                            (nearness[i], part[i], normal[i]) =
+                                (q, number, shade(&slope, run.row, column));
                         }
                     }
                 });
@@ -168,7 +175,8 @@ fn draw_all(
 /// No face.
 const NOWHERE: u32 = u32::MAX;
 
-/// The nearest faces of one mesh, and how normals change over them. Reused from mesh to mesh.
+/// The nearest faces of one mesh, and how normals change over them. Reused from mesh to
+/// mesh.
 #[derive(Default)]
 struct Shading {
     /// The face of each pixel, where the mesh is nearest.
@@ -179,7 +187,8 @@ struct Shading {
 }
 
 impl Shading {
-    /// Forgets what was seen in an area, which no later mesh may look beyond, and all slopes.
+    /// Forgets what was seen in an area, which no later mesh may look beyond, and all
+    /// slopes.
     fn begin(&mut self, pixels: usize, faces: usize, width: usize, area: &Area) {
         self.faces.resize(pixels, NOWHERE);
         for row in self.faces.chunks_exact_mut(width).take(area.bottom).skip(area.top) {
@@ -221,7 +230,8 @@ impl Slope {
         weights: [[f64; 3]; 3],
     ) -> Slope {
         let area = area(points);
-        // Counter-clockwise in the scene is a negative area in the image, whose y runs down.
+        // Counter-clockwise in the scene is a negative area in the image, whose y runs
+        // down.
         let turn = if (area < 0.0) != placement.mirrored { 1.0 } else { -1.0 };
         let corner = |v: u32| {
             let n = mesh.normals.get(v as usize).map_or(DVec3::ZERO, |n| n.as_dvec3());
@@ -249,8 +259,8 @@ impl Slope {
     }
 }
 
-/// A unit normal that does not point away from the eye: interpolated normals can lean a little beyond the outline,
-/// and are then pulled back to a right angle.
+/// A unit normal that does not point away from the eye: interpolated normals can lean a
+/// little beyond the outline, and are then pulled back to a right angle.
 fn seen_normal(n: Vec3, to_eye: Vec3) -> [f32; 3] {
     let v = to_eye.normalize();
     let mut n = n.normalize_or(v);

@@ -11,9 +11,15 @@ fn render(solid: &Solid, camera: &Camera) -> Frame {
     Frame::render(solid, camera, Channels::All)
 }
 
-/// Nearest hit of the ray through a pixel centre with a sphere: depth, normal in camera coordinates, and cosine between
-/// normal and ray.
-fn hit_sphere(camera: &Camera, centre: DVec3, radius: f64, x: u32, y: u32) -> Option<(f64, DVec3, f64)> {
+/// Nearest hit of the ray through a pixel centre with a sphere: depth, normal in camera
+/// coordinates, and cosine between normal and ray.
+fn hit_sphere(
+    camera: &Camera,
+    centre: DVec3,
+    radius: f64,
+    x: u32,
+    y: u32,
+) -> Option<(f64, DVec3, f64)> {
     let (px, py) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
     let (a, b) = (camera.unproject(px, py, 1.0), camera.unproject(px, py, 2.0));
     let d = (b - a).normalize();
@@ -29,7 +35,11 @@ fn hit_sphere(camera: &Camera, centre: DVec3, radius: f64, x: u32, y: u32) -> Op
 
 fn check_sphere(camera: &Camera) {
     let (centre, radius) = (DVec3::new(0.3, -0.2, 0.4), 1.1);
-    let ball = sphere(256, 128).placed(Affine::new(centre, DVec3::new(0.3, 0.2, 0.1), DVec3::splat(radius)));
+    let ball = sphere(256, 128).placed(Affine::new(
+        centre,
+        DVec3::new(0.3, 0.2, 0.1),
+        DVec3::splat(radius),
+    ));
     let frame = render(&ball, camera);
     let (mut seen, mut wrong) = (0, 0);
     for y in 0..camera.height {
@@ -42,7 +52,11 @@ fn check_sphere(camera: &Camera) {
                 let ours = Vec3::from_array(frame.normal[i]).as_dvec3();
                 assert!((ours.length() - 1.0).abs() < 1e-5 && frame.part[i] == 0);
                 if cosine > 0.2 {
-                    assert!((f64::from(frame.depth[i]) - depth).abs() < 2e-3, "{x} {y}: {} {depth}", frame.depth[i]);
+                    assert!(
+                        (f64::from(frame.depth[i]) - depth).abs() < 2e-3,
+                        "{x} {y}: {} {depth}",
+                        frame.depth[i]
+                    );
                     assert!(ours.distance(n) < 1e-2, "{x} {y}: {ours} {n}");
                 }
             } else if !frame.depth[i].is_finite() {
@@ -100,7 +114,10 @@ fn a_slanted_plane_is_perspective_correct() {
 fn triangles_across_the_near_plane_are_cut() {
     // A floor from behind the camera to far in front of it.
     let corners = [(-500.0, 500.0), (500.0, 500.0), (500.0, -500.0), (-500.0, -500.0)];
-    let floor = solid(corners.iter().map(|&(x, z)| Vec3::new(x, -1.0, z)).collect(), vec![[0, 1, 2], [0, 2, 3]]);
+    let floor = solid(
+        corners.iter().map(|&(x, z)| Vec3::new(x, -1.0, z)).collect(),
+        vec![[0, 1, 2], [0, 2, 3]],
+    );
     let camera = Camera::default_for(40, 40);
     let frame = render(&floor, &camera);
     for y in 0..40 {
@@ -136,7 +153,11 @@ fn behind_the_camera_and_huge_scales_show_nothing() {
         }
     }
     // Around the camera: every pixel shows the inside.
-    let around = sphere(16, 8).placed(Affine::new(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, DVec3::splat(5.0)));
+    let around = sphere(16, 8).placed(Affine::new(
+        DVec3::new(0.0, 0.0, 8.0),
+        DVec3::ZERO,
+        DVec3::splat(5.0),
+    ));
     let frame = render(&around, &camera);
     assert!(frame.depth.iter().all(|d| (4.0..5.1).contains(d)));
     assert!(frame.normal.iter().all(|n| n[2] > 0.7));
@@ -159,10 +180,15 @@ fn two_halves_make_the_whole() {
     let mesh = whole.instances()[0].mesh.clone();
     let triangles = &mesh.topology.triangles;
     let half = |pick: usize| {
-        let some = triangles.iter().enumerate().filter(|(i, _)| i % 2 == pick).map(|(_, t)| *t).collect();
+        let some =
+            triangles.iter().enumerate().filter(|(i, _)| i % 2 == pick).map(|(_, t)| *t).collect();
         solid(mesh.positions.clone(), some)
     };
-    let affine = Affine::new(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.4, 0.1, 0.2), DVec3::new(1.0, -1.2, 0.9));
+    let affine = Affine::new(
+        DVec3::new(0.1, 0.2, 0.3),
+        DVec3::new(0.4, 0.1, 0.2),
+        DVec3::new(1.0, -1.2, 0.9),
+    );
     let (a, b) = (half(0).placed(affine), half(1).placed(affine));
     let together = render(&Solid::group(&[a.clone(), b.clone()]), &camera);
     let (fa, fb) = (render(&a, &camera), render(&b, &camera));
@@ -184,15 +210,19 @@ fn two_halves_make_the_whole() {
 fn mirrored_and_flat_solids_keep_facing_normals() {
     let camera = Camera::default_for(64, 64);
     let plain = render(&sphere(48, 24), &camera);
-    let mirrored =
-        render(&sphere(48, 24).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(-1.0, 1.0, 1.0))), &camera);
+    let mirrored = render(
+        &sphere(48, 24).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(-1.0, 1.0, 1.0))),
+        &camera,
+    );
     for (a, b) in plain.normal.iter().zip(&mirrored.normal) {
         if a[2] > 0.3 && b[2] > 0.3 {
             assert!(Vec3::from_array(*a).distance(Vec3::from_array(*b)) < 0.05);
         }
     }
-    let flat =
-        render(&cuboid(Vec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0))), &camera);
+    let flat = render(
+        &cuboid(Vec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0))),
+        &camera,
+    );
     let middle = 32 * 64 + 32;
     assert_eq!(flat.depth[middle], 8.0);
     assert!(flat.normal.iter().flatten().all(|v| v.is_finite()));
@@ -209,7 +239,9 @@ fn the_data_set_is_drawn_as_it_was_made() {
             continue;
         };
         let meta: serde_json::Value = serde_json::from_str(&meta).unwrap();
-        let camera = Camera::from_json(&std::fs::read_to_string(folder.join("camera.json")).unwrap()).unwrap();
+        let camera =
+            Camera::from_json(&std::fs::read_to_string(folder.join("camera.json")).unwrap())
+                .unwrap();
         let Ok(truth) = image::open(folder.join("depth16.png")) else { continue };
         let truth = truth.to_luma16();
         let triple = |v: &serde_json::Value| {
@@ -226,8 +258,10 @@ fn the_data_set_is_drawn_as_it_was_made() {
         let solids: Vec<_> = models
             .iter()
             .map(|m| {
-                let positions: Vec<_> = m.mesh.positions.chunks_exact(3).map(Vec3::from_slice).collect();
-                let triangles: Vec<_> = m.mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+                let positions: Vec<_> =
+                    m.mesh.positions.chunks_exact(3).map(Vec3::from_slice).collect();
+                let triangles: Vec<_> =
+                    m.mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
                 let parts = vec![0; triangles.len()];
                 Solid::new(Arc::new(Mesh::new(positions, triangles, parts).unwrap()))
             })
@@ -253,9 +287,12 @@ fn random_poses_never_panic() {
     let mut random = Uniform(5);
     let thing = lathe(&[(0.2, -1.0), (0.9, -0.3), (0.4, 0.5)], 7, false);
     for _ in 0..300 {
-        let mut place = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+        let mut place = |s: f64| {
+            DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s))
+        };
         let (at, turn, scale) = (place(12.0), place(3.0), place(30.0));
-        let frame = render(&thing.placed(Affine::new(at, turn, scale)), &Camera::default_for(33, 21));
+        let frame =
+            render(&thing.placed(Affine::new(at, turn, scale)), &Camera::default_for(33, 21));
         assert!(frame.depth.iter().all(|d| *d > 0.0));
         assert!(frame.normal.iter().flatten().all(|v| v.is_finite()));
     }
@@ -269,20 +306,29 @@ fn a_body_without_its_backs_looks_the_same() {
     let parts = [profile(&[-1.0, -0.2, 0.3], &[0.3, 0.9, 0.2]), profile(&[0.3, 0.9], &[0.6, 0.4])];
     let bodies = [lathe(&parts, 24, 0.0, Caps::Both).unwrap(), sphere(0.8, 20).unwrap()];
     assert!(bodies.iter().all(|m| m.topology.encloses));
-    assert!(!lathe(&parts, 24, 0.0, Caps::Bottom).unwrap().topology.encloses, "its inside can be seen");
-    assert!(!lathe(&parts, 24, 0.05, Caps::Bottom).unwrap().topology.encloses, "its walls may cross");
+    assert!(
+        !lathe(&parts, 24, 0.0, Caps::Bottom).unwrap().topology.encloses,
+        "its inside can be seen"
+    );
+    assert!(
+        !lathe(&parts, 24, 0.05, Caps::Bottom).unwrap().topology.encloses,
+        "its walls may cross"
+    );
     let mut random = Uniform(8);
     let (camera, mut drawn) = (Camera::default_for(60, 50), 0);
     for round in 0..200 {
-        let mut place = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+        let mut place = |s: f64| {
+            DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s))
+        };
         let (at, turn, scale) = (place(1.0), place(3.0), place(1.5));
         // Some stand across the near plane or round the eye.
         let at = if round % 5 == 0 { camera.eye + at } else { at };
         let mesh = &bodies[round % 2];
         let mut plain = mesh.clone();
         Arc::make_mut(&mut plain.topology).encloses = false;
-        let [fast, plain] = [mesh.clone(), plain]
-            .map(|m| render(&Solid::new(Arc::new(m)).placed(Affine::new(at, turn, scale)), &camera));
+        let [fast, plain] = [mesh.clone(), plain].map(|m| {
+            render(&Solid::new(Arc::new(m)).placed(Affine::new(at, turn, scale)), &camera)
+        });
         for (i, (a, b)) in fast.depth.iter().zip(&plain.depth).enumerate() {
             assert!(a == b || (a - b).abs() < 1e-5 * b, "round {round}, pixel {i}: {a} {b}");
             drawn += usize::from(a.is_finite());
@@ -302,7 +348,8 @@ fn by_runs(solid: &Solid, camera: &Camera) -> Vec<Option<(usize, usize)>> {
             for column in run.from..run.to {
                 let i = run.row * camera.width as usize + column;
                 if run.nearness(column) > nearest[i] {
-                    (nearest[i], seen[i]) = (run.nearness(column), Some((source.instance, source.face)));
+                    (nearest[i], seen[i]) =
+                        (run.nearness(column), Some((source.instance, source.face)));
                 }
             }
         });
@@ -310,8 +357,9 @@ fn by_runs(solid: &Solid, camera: &Camera) -> Vec<Option<(usize, usize)>> {
     seen
 }
 
-/// The nearest face of each pixel is that of all triangles drawn one by one, and the normal is that face's: many meshes, large and
-/// small triangles, mirrored ones, open and closed, pictures narrower than the lanes.
+/// The nearest face of each pixel is that of all triangles drawn one by one, and the
+/// normal is that face's: many meshes, large and small triangles, mirrored ones, open and
+/// closed, pictures narrower than the lanes.
 #[test]
 fn faces_are_those_of_all_triangles_drawn_by_runs() {
     let mut random = Uniform(5);
@@ -325,21 +373,33 @@ fn faces_are_those_of_all_triangles_drawn_by_runs() {
             2 => lathe(&[(0.5, -0.8), (0.3, 0.1), (0.6, 0.7)], 24, round % 2 == 0),
             _ => solid(
                 (0..30)
-                    .map(|k| Vec3::new((k % 6) as f32 - 2.5, (k / 6) as f32 - 2.0, ((k * 7) % 5) as f32 * 0.3))
+                    .map(|k| {
+                        Vec3::new(
+                            (k % 6) as f32 - 2.5,
+                            (k / 6) as f32 - 2.0,
+                            ((k * 7) % 5) as f32 * 0.3,
+                        )
+                    })
                     .collect(),
                 (0..24).map(|k| [k, k + 1, k + 6]).collect(),
             ),
         };
         let placed: Vec<Solid> = (0..1 + round % 5)
             .map(|i| {
-                let mut v = |scale: f64| DVec3::from_array(std::array::from_fn(|_| random.between(-scale, scale)));
+                let mut v = |scale: f64| {
+                    DVec3::from_array(std::array::from_fn(|_| random.between(-scale, scale)))
+                };
                 let (at, turn, size) = (v(1.2), v(3.0), v(0.7) + DVec3::splat(0.1));
                 shape(i + round).placed(Affine::new(at, turn, size))
             })
             .collect();
         let solid = Solid::group(&placed);
         let (frame, faces) = (render(&solid, &camera), by_runs(&solid, &camera));
-        assert_eq!(frame.depth, Frame::render(&solid, &camera, Channels::Depth).depth, "round {round}");
+        assert_eq!(
+            frame.depth,
+            Frame::render(&solid, &camera, Channels::Depth).depth,
+            "round {round}"
+        );
         let mut projected = Projected::default();
         project(&solid, &camera, &mut projected);
         for (i, seen) in faces.iter().enumerate() {
@@ -355,7 +415,8 @@ fn faces_are_those_of_all_triangles_drawn_by_runs() {
             let slope = Slope::new(mesh, &placement, true, face, &points, WHOLE);
             let (x, y) = ((i % w as usize) as f64 + 0.5, (i / w as usize) as f64 + 0.5);
             let away = (camera.unproject(x, y, 1.0) - camera.eye).normalize();
-            let to_eye = -DVec3::new(away.dot(camera.right), away.dot(camera.up), -away.dot(camera.forward));
+            let to_eye =
+                -DVec3::new(away.dot(camera.right), away.dot(camera.up), -away.dot(camera.forward));
             let wanted = Vec3::from_array(seen_normal(slope.at(x, y).as_vec3(), to_eye.as_vec3()));
             assert_eq!(frame.part[i], part, "round {round}");
             assert!(Vec3::from_array(frame.normal[i]).distance(wanted) < 1e-4, "round {round}");

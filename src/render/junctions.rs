@@ -1,9 +1,10 @@
 //! Where one contour passes behind another, and how long it is there when they move.
 //!
-//! A contour that goes on unseen behind a nearer one ends at the crossing of their images. When the nearer one moves by v and the
-//! farther by w, the end moves along the farther by (v - w) . n / (t . n), with t its tangent and n the normal of the nearer. No
-//! use of the depth image: what is seen is known, and a nearer piece that faces the end is looked for. Invariant: the order of what
-//! is added is that of the pieces.
+//! A contour that goes on unseen behind a nearer one ends at the crossing of their
+//! images. When the nearer one moves by v and the farther by w, the end moves along the
+//! farther by (v - w) . n / (t . n), with t its tangent and n the normal of the nearer.
+//! No use of the depth image: what is seen is known, and a nearer piece that faces the
+//! end is looked for. Invariant: the order of what is added is that of the pieces.
 
 use super::Camera;
 use super::project::{Lens, Vertices};
@@ -11,13 +12,16 @@ use super::pull::Traced;
 use super::trace::Origin;
 use rustc_hash::FxHashMap;
 
-/// How far from the last piece seen the nearer contour may be, in pixels: looks go 1.2 pixels aside and are answered by whole pixels.
+/// How far from the last piece seen the nearer contour may be, in pixels: looks go 1.2
+/// pixels aside and are answered by whole pixels.
 const REACH: f64 = 3.0;
 
-/// The least sine between two contours that cross. Ends on contours that nearly coincide run along them faster than is of use.
+/// The least sine between two contours that cross. Ends on contours that nearly coincide
+/// run along them faster than is of use.
 const LEAST: f64 = 0.3;
 
-/// Hidden stretches shorter than this come and go with the pixels they are looked at by, and have no ends that move. Pixels.
+/// Hidden stretches shorter than this come and go with the pixels they are looked at by,
+/// and have no ends that move. Pixels.
 const SHORT: f64 = 3.0;
 
 /// The most pieces walked over to measure a stretch.
@@ -26,8 +30,8 @@ const MOST: usize = 64;
 /// The height of a band of pieces, in pixels.
 const BAND: f64 = 4.0;
 
-/// What the end of a segment lies on: a vertex, or an edge between two, by their places in the image, which parts that share a
-/// seam have in common.
+/// What the end of a segment lies on: a vertex, or an edge between two, by their places
+/// in the image, which parts that share a seam have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct End([u64; 2]);
 
@@ -50,11 +54,17 @@ impl End {
     }
 }
 
-/// For each piece, the one that follows at its end against its tangent, and the one at its end along it.
+/// For each piece, the one that follows at its end against its tangent, and the one at
+/// its end along it.
 type Links = Vec<[Option<usize>; 2]>;
 
-/// The derivatives by each piece, with those by the lengths of contours passed on to what hides their ends.
-pub(super) fn moved_ends(traced: &[Traced<'_>], camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<[f64; 4]> {
+/// The derivatives by each piece, with those by the lengths of contours passed on to what
+/// hides their ends.
+pub(super) fn moved_ends(
+    traced: &[Traced<'_>],
+    camera: &Camera,
+    by_piece: &[[f64; 4]],
+) -> Vec<[f64; 4]> {
     let mut out = by_piece.to_vec();
     if traced.iter().all(|t| t.seen.is_some()) {
         return out;
@@ -69,11 +79,16 @@ pub(super) fn moved_ends(traced: &[Traced<'_>], camera: &Camera, by_piece: &[[f6
                 continue;
             }
             let tangent = [sense * f64::from(t.piece.tx), sense * f64::from(t.piece.ty)];
-            let Some((nearer, [nx, ny])) = bands.nearer(traced, camera, t, tangent) else { continue };
-            let (Some(&[gx, gy, by_length, _]), Some(nearer)) = (by_piece.get(seen), traced[nearer].seen) else {
+            let Some((nearer, [nx, ny])) = bands.nearer(traced, camera, t, tangent) else {
                 continue;
             };
-            // What is added lies at the end of the piece, half its length from the middle.
+            let (Some(&[gx, gy, by_length, _]), Some(nearer)) =
+                (by_piece.get(seen), traced[nearer].seen)
+            else {
+                continue;
+            };
+            // What is added lies at the end of the piece, half its length from the
+            // middle.
             let by = by_length + 0.5 * (gx * tangent[0] + gy * tangent[1]);
             let across = tangent[0] * nx + tangent[1] * ny;
             for (i, by) in [(nearer, by / across), (seen, -by / across)] {
@@ -90,7 +105,10 @@ pub(super) fn moved_ends(traced: &[Traced<'_>], camera: &Camera, by_piece: &[[f6
 /// Where a piece ends along its tangent (1) or against it (0).
 fn end(t: &Traced<'_>, side: usize) -> [f64; 2] {
     let by = (side as f64 - 0.5) * f64::from(t.piece.length);
-    [f64::from(t.piece.x) + by * f64::from(t.piece.tx), f64::from(t.piece.y) + by * f64::from(t.piece.ty)]
+    [
+        f64::from(t.piece.x) + by * f64::from(t.piece.tx),
+        f64::from(t.piece.y) + by * f64::from(t.piece.ty),
+    ]
 }
 
 /// Which pieces follow each other.
@@ -113,7 +131,9 @@ fn links(traced: &[Traced<'_>]) -> Links {
         {
             join([(before, sides[1]), (i, sides[0])]);
         }
-        for (which, at_end) in [(0, from.abs() < 1e-9), (1, (from + t.origin.share - 1.0).abs() < 1e-9)] {
+        for (which, at_end) in
+            [(0, from.abs() < 1e-9), (1, (from + t.origin.share - 1.0).abs() < 1e-9)]
+        {
             if !at_end {
                 continue;
             }
@@ -136,7 +156,9 @@ fn is_short(traced: &[Traced<'_>], links: &Links, first: usize, from: usize) -> 
         if length >= SHORT {
             return false;
         }
-        let Some(next) = links[at].iter().flatten().copied().find(|n| *n != before) else { return true };
+        let Some(next) = links[at].iter().flatten().copied().find(|n| *n != before) else {
+            return true;
+        };
         if traced[next].seen.is_some() {
             return true;
         }
@@ -170,7 +192,8 @@ impl Bands {
         Bands { start, pieces }
     }
 
-    /// The piece behind whose contour another one ends that goes on with a tangent, and its normal.
+    /// The piece behind whose contour another one ends that goes on with a tangent, and
+    /// its normal.
     fn nearer(
         &self,
         traced: &[Traced<'_>],
@@ -184,7 +207,8 @@ impl Bands {
         let lens = Lens::new(camera);
         let pixel = if lens.pinhole { of.piece.depth / lens.scale } else { 1.0 / lens.scale };
         let last = self.start.len().saturating_sub(2);
-        let range = self.start[band(y - REACH).min(last)]..self.start[(band(y + REACH) + 1).min(last + 1)];
+        let range =
+            self.start[band(y - REACH).min(last)]..self.start[(band(y + REACH) + 1).min(last + 1)];
         let mut best = None;
         let mut least = REACH;
         for &k in self.pieces.get(range)? {
@@ -196,7 +220,8 @@ impl Bands {
             let (kx, ky) = (f64::from(p.tx), f64::from(p.ty));
             let (nx, ny) = (ky, -kx);
             let across = tx * nx + ty * ny;
-            // Into the nearer object, whose outside is along the normal; edges have no such sense.
+            // Into the nearer object, whose outside is along the normal; edges have no
+            // such sense.
             if (if p.edge { across.abs() } else { -across }) < LEAST {
                 continue;
             }

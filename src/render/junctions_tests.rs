@@ -5,18 +5,24 @@ use crate::render::testing::{along, cuboid, sphere, weighted};
 use crate::render::{Camera, Contours, Projection};
 use glam::{DVec3, Vec3};
 
-/// Slopes of a weighted length of contour by shifts and a turn of the nearer of two solids and a shift of the farther: by differences
-/// of some pixels, as derived, and as derived with pieces held fast.
+/// Slopes of a weighted length of contour by shifts and a turn of the nearer of two
+/// solids and a shift of the farther: by differences of some pixels, as derived, and as
+/// derived with pieces held fast.
 fn slopes(near: &Solid, far: &Solid, camera: &Camera) -> Vec<[f64; 3]> {
     let at = |p: [f64; 4]| {
-        let nearer = Affine::new(DVec3::new(0.8 + p[0], 0.1 + p[1], 0.6), DVec3::new(0.0, 0.0, 0.3 + p[2]), DVec3::ONE);
+        let nearer = Affine::new(
+            DVec3::new(0.8 + p[0], 0.1 + p[1], 0.6),
+            DVec3::new(0.0, 0.0, 0.3 + p[2]),
+            DVec3::ONE,
+        );
         let farther = Affine::new(DVec3::new(-0.2 + p[3], 0.0, -0.6), DVec3::ZERO, DVec3::ONE);
         Solid::group(&[far.placed(farther), near.placed(nearer)])
     };
     let here = at([0.0; 4]);
     let contours = Contours::of(&here, camera);
     let by = weighted(&contours).1;
-    let [moving, fixed] = [contours.pull(&here, camera, &by), contours.pull_fixed(&here, camera, &by)];
+    let [moving, fixed] =
+        [contours.pull(&here, camera, &by), contours.pull_fixed(&here, camera, &by)];
     let one = |k: usize| {
         let moved = |h: f64| at(std::array::from_fn(|i| if i == k { h } else { 0.0 }));
         // Pieces come and go one by one: over many the steps even out.
@@ -36,7 +42,9 @@ fn what_moves_in_front_hides_and_reveals() {
     parallel.projection = Projection::Orthographic { units_per_pixel: 0.02, cx: 96.0, cy: 96.0 };
     for camera in [Camera::default_for(192, 192), parallel] {
         let plate = cuboid(Vec3::new(0.5, 0.7, 0.05));
-        for (near, far) in [(&plate, cuboid(Vec3::new(0.9, 0.3, 0.1))), (&sphere(48, 24), sphere(48, 24))] {
+        for (near, far) in
+            [(&plate, cuboid(Vec3::new(0.9, 0.3, 0.1))), (&sphere(48, 24), sphere(48, 24))]
+        {
             let all = slopes(near, &far, &camera);
             let missed = |i: usize| all.iter().map(|s| (s[i] - s[0]).abs()).fold(0.0, f64::max);
             let most = all.iter().map(|s| s[0].abs()).fold(0.0, f64::max);
@@ -47,21 +55,29 @@ fn what_moves_in_front_hides_and_reveals() {
 
 #[test]
 fn a_plate_before_a_bar_hides_as_much_as_it_moves() {
-    // Contours of a bar along x, a turned plate over its end: the edge's crossing with a line along x moves with the plate along x, and
-    // by tan of the turn when the plate moves along y.
+    // Contours of a bar along x, a turned plate over its end: the edge's crossing with a
+    // line along x moves with the plate along x, and by tan of the turn when the plate
+    // moves along y.
     let mut camera = Camera::default_for(192, 192);
     camera.projection = Projection::Orthographic { units_per_pixel: 0.02, cx: 96.0, cy: 96.0 };
     let (bar, plate) = (cuboid(Vec3::new(0.9, 0.3, 0.1)), cuboid(Vec3::new(0.5, 0.7, 0.05)));
     let turn = 0.3;
     let at = |x: f64, y: f64| {
-        let plate =
-            plate.placed(Affine::new(DVec3::new(0.8 + x, 0.1 + y, 0.6), DVec3::new(0.0, 0.0, turn), DVec3::ONE));
-        Solid::group(&[bar.placed(Affine::new(DVec3::new(-0.2, 0.0, -0.6), DVec3::ZERO, DVec3::ONE)), plate])
+        let plate = plate.placed(Affine::new(
+            DVec3::new(0.8 + x, 0.1 + y, 0.6),
+            DVec3::new(0.0, 0.0, turn),
+            DVec3::ONE,
+        ));
+        Solid::group(&[
+            bar.placed(Affine::new(DVec3::new(-0.2, 0.0, -0.6), DVec3::ZERO, DVec3::ONE)),
+            plate,
+        ])
     };
     let here = at(0.0, 0.0);
     let contours = Contours::of(&here, &camera);
     let by = contours.pull(&here, &camera, &vec![[0.0, 0.0, 1.0, 0.0]; contours.len()]);
-    // Looked at straight, a bar has two lines along x that go on behind the plate, on each of its faces that can be told apart.
+    // Looked at straight, a bar has two lines along x that go on behind the plate, on
+    // each of its faces that can be told apart.
     let lines = along(&by, &at(-1e-6, 0.0), &at(1e-6, 0.0), 2e-6) * 0.02;
     assert!((lines - lines.round()).abs() < 1e-3 && lines >= 2.0, "{lines}");
     let up = along(&by, &at(0.0, -1e-6), &at(0.0, 1e-6), 2e-6) * 0.02;

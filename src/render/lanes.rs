@@ -1,6 +1,8 @@
-//! The pixels of small triangles, nearly all of a fine mesh: many triangles set up at a time, eight pixels of a row told at a time.
+//! The pixels of small triangles, nearly all of a fine mesh: many triangles set up at a
+//! time, eight pixels of a row told at a time.
 //!
-//! The same pixels as by [`super::coverage`], whose edges these are in whole numbers of 32 bits.
+//! The same pixels as by [`super::coverage`], whose edges these are in whole numbers of
+//! 32 bits.
 
 use super::place::{Extent, Place, UNIT};
 use pulp::bytemuck::cast;
@@ -13,12 +15,14 @@ const MOST: usize = 64;
 /// A triangle is small if it is less wide and high than this, in pixels.
 const SMALL: f32 = 16.0;
 
-/// Some triangles with their edges as functions that are not negative inside. Reused from triangles to triangles.
+/// Some triangles with their edges as functions that are not negative inside. Reused from
+/// triangles to triangles.
 pub(super) struct Batch {
     count: usize,
     faces: [u32; MOST],
     extents: [Extent; MOST],
-    /// The corners' coordinates by turns, relative to where the lanes begin in the first row, in pixels.
+    /// The corners' coordinates by turns, relative to where the lanes begin in the first
+    /// row, in pixels.
     corners: [[f32; MOST]; 6],
     /// Each edge's value there, its change by column, its change by row.
     edges: [[[i32; MOST]; 3]; 3],
@@ -41,7 +45,14 @@ impl Default for Batch {
     fn default() -> Batch {
         let kinds = [Kind::Nothing; MOST];
         let extents = [Extent::default(); MOST];
-        Batch { count: 0, faces: [0; MOST], extents, corners: [[0.0; MOST]; 6], edges: [[[0; MOST]; 3]; 3], kinds }
+        Batch {
+            count: 0,
+            faces: [0; MOST],
+            extents,
+            corners: [[0.0; MOST]; 6],
+            edges: [[[0; MOST]; 3]; 3],
+            kinds,
+        }
     }
 }
 
@@ -52,8 +63,9 @@ fn start(extent: &Extent, right: usize) -> usize {
 }
 
 impl Batch {
-    /// Calls `draw` with the faces of a list that cover pixels, each with how and its index in the batch. `right` is the column past
-    /// the last one of the buffer, at least [`LANES`]; `back` as in [`Coverage::new`](super::coverage::Coverage::new).
+    /// Calls `draw` with the faces of a list that cover pixels, each with how and its
+    /// index in the batch. `right` is the column past the last one of the buffer, at
+    /// least [`LANES`]; `back` as in [`Coverage::new`](super::coverage::Coverage::new).
     #[inline(always)]
     pub fn each(
         &mut self,
@@ -91,7 +103,8 @@ impl Batch {
         let [[_, _], [top, _]] = extent.ends();
         let origin = Place::new(start(&extent, right) as i32 as f32, top as i32 as f32, 0.0, 0.0);
         for (corner, place) in places.into_iter().enumerate() {
-            // Exact: both are multiples of the same unit, and the difference is not larger.
+            // Exact: both are multiples of the same unit, and the difference is not
+            // larger.
             let [x, y, ..] = (place - origin).to_array();
             (self.corners[2 * corner][i], self.corners[2 * corner + 1][i]) = (x, y);
         }
@@ -102,17 +115,21 @@ impl Batch {
     /// Works out the edges of all.
     #[inline(always)]
     fn solve(&mut self, back: i32) {
-        // The lowest bits of a sum with this are the nearest whole number, also below zero.
+        // The lowest bits of a sum with this are the nearest whole number, also below
+        // zero.
         const LOW_BITS: f32 = 12_582_912.0;
         let Batch { corners: [ax, ay, bx, by, cx, cy], edges, kinds, .. } = self;
-        let whole = |v: f32| ((v * UNIT as f32 + LOW_BITS).to_bits() as i32).wrapping_sub(LOW_BITS.to_bits() as i32);
+        let whole = |v: f32| {
+            ((v * UNIT as f32 + LOW_BITS).to_bits() as i32).wrapping_sub(LOW_BITS.to_bits() as i32)
+        };
         for i in 0..MOST {
             let (x, y) = ([ax[i], bx[i], cx[i]], [ay[i], by[i], cy[i]]);
             let span = |v: [f32; 3]| v[0].max(v[1]).max(v[2]) - v[0].min(v[1]).min(v[2]);
             let small = (span(x) < SMALL) & (span(y) < SMALL);
             let (x, y) = (x.map(whole), y.map(whole));
-            let cross =
-                |p: i32, q: i32| (x[p as usize].wrapping_sub(x[0])).wrapping_mul(y[q as usize].wrapping_sub(y[0]));
+            let cross = |p: i32, q: i32| {
+                (x[p as usize].wrapping_sub(x[0])).wrapping_mul(y[q as usize].wrapping_sub(y[0]))
+            };
             let turn = cross(1, 2).wrapping_sub(cross(2, 1));
             // Counter-clockwise, every edge runs the other way.
             let way = if turn > 0 { 1 } else { -1 };
@@ -122,7 +139,10 @@ impl Batch {
                 let dy = y[next].wrapping_sub(y[e]).wrapping_mul(way);
                 // Left and top edges have the centres on them.
                 let has = (dy < 0) | ((dy == 0) & (dx > 0));
-                at[i] = dy.wrapping_mul(x[e]).wrapping_sub(dx.wrapping_mul(y[e])).wrapping_add(i32::from(has) - 1);
+                at[i] = dy
+                    .wrapping_mul(x[e])
+                    .wrapping_sub(dx.wrapping_mul(y[e]))
+                    .wrapping_add(i32::from(has) - 1);
                 by_column[i] = dy.wrapping_mul(-UNIT);
                 by_row[i] = dx.wrapping_mul(UNIT);
             }
@@ -135,10 +155,16 @@ impl Batch {
         }
     }
 
-    /// Calls `draw` for each row of a small triangle, once or twice, with the lanes from some column on: row, column, sign bits set
-    /// outside of the triangle.
+    /// Calls `draw` for each row of a small triangle, once or twice, with the lanes from
+    /// some column on: row, column, sign bits set outside of the triangle.
     #[inline(always)]
-    pub fn rows(&self, i: usize, extent: &Extent, right: usize, mut draw: impl FnMut(usize, usize, i32x8)) {
+    pub fn rows(
+        &self,
+        i: usize,
+        extent: &Extent,
+        right: usize,
+        mut draw: impl FnMut(usize, usize, i32x8),
+    ) {
         let [[first, past], [top, bottom]] = extent.ends();
         let begin = start(extent, right);
         let mut at = self.edges.each_ref().map(|[at, by_column, _]| {
@@ -182,7 +208,8 @@ mod tests {
     use super::*;
     use crate::render::testing::Uniform;
 
-    /// The same pixels and the same numbers as by runs, several batches at once, with and without backs.
+    /// The same pixels and the same numbers as by runs, several batches at once, with and
+    /// without backs.
     #[test]
     fn lanes_draw_what_runs_draw() {
         let mut random = Uniform(17);
@@ -192,14 +219,17 @@ mod tests {
         for round in 0..60 {
             let side = [1.5, 6.0, 15.0, 24.0][round % 4];
             let corners: Vec<_> = (0..150).map(|_| random.corners(side, round % 3 == 0)).collect();
-            let places: Vec<_> = corners.iter().map(|points| points.map(|p| place(p.x, p.y))).collect();
+            let places: Vec<_> =
+                corners.iter().map(|points| points.map(|p| place(p.x, p.y))).collect();
             let extents = places.iter().map(|places| Extent::around(*places, image));
-            let list: Vec<(u32, Extent)> = (0..).zip(extents).filter(|(_, extent)| !extent.is_empty()).collect();
+            let list: Vec<(u32, Extent)> =
+                (0..).zip(extents).filter(|(_, extent)| !extent.is_empty()).collect();
             for back in [-1, 0, 1] {
                 let mut by_runs = vec![0.5f32; width * height];
                 for (face, extent) in &list {
                     let (points, places) = (corners[*face as usize], places[*face as usize]);
-                    if let Some(triangle) = Triangle::new(points, places, *extent, f64::from(back)) {
+                    if let Some(triangle) = Triangle::new(points, places, *extent, f64::from(back))
+                    {
                         triangle.fill(&mut by_runs, [0, width], 0);
                     }
                 }
@@ -208,7 +238,8 @@ mod tests {
                     let points = corners[face as usize];
                     kinds[kind as usize] += 1;
                     if kind == Kind::Large {
-                        let triangle = Triangle::new(points, places[face as usize], *extent, f64::from(back));
+                        let triangle =
+                            Triangle::new(points, places[face as usize], *extent, f64::from(back));
                         return triangle.iter().for_each(|t| t.fill(&mut by_lanes, [0, width], 0));
                     }
                     let plane = Plane::new(&points, extent.ends()[0][0]).unwrap();

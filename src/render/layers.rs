@@ -1,10 +1,12 @@
-//! What each mesh of a solid adds to the picture, kept from drawing to drawing: its depth in a rectangle, its pieces of contour
-//! before any is hidden, its depth range. When one part of a body has moved, the others are not drawn again; the picture is
-//! composed anew, the nearest layer at each pixel, only where layers came or went, and of the other layers' pieces only those of
-//! layers that look there are looked at again.
+//! What each mesh of a solid adds to the picture, kept from drawing to drawing: its depth
+//! in a rectangle, its pieces of contour before any is hidden, its depth range. When one
+//! part of a body has moved, the others are not drawn again; the picture is composed
+//! anew, the nearest layer at each pixel, only where layers came or went, and of the
+//! other layers' pieces only those of layers that look there are looked at again.
 //!
-//! Invariant: a layer is a function of mesh, placement and camera alone, and 1 / q falls as q grows, in `f32` too, so the
-//! nearest of the layers' depths is the depth drawn at once, and the contours are those drawn at once, bit for bit.
+//! Invariant: a layer is a function of mesh, placement and camera alone, and 1 / q falls
+//! as q grows, in `f32` too, so the nearest of the layers' depths is the depth drawn at
+//! once, and the contours are those drawn at once, bit for bit.
 
 use super::candidates::Candidates;
 use super::contours::Contours;
@@ -28,7 +30,8 @@ const MOST: usize = SLOTS / 2;
 /// The most layers kept by a thread.
 const SLOTS: usize = 128;
 
-/// The most memory kept by a thread's layers after a drawing. A solid that could need more by itself is drawn at once.
+/// The most memory kept by a thread's layers after a drawing. A solid that could need
+/// more by itself is drawn at once.
 const BYTES: usize = 32 << 20;
 
 /// What one mesh adds to a picture.
@@ -47,12 +50,14 @@ pub(super) struct Layer {
     exact: Vec<u8>,
 }
 
-/// What a layer is drawn before, by pixel of the picture: where all of a mesh is nearer than this, it does not matter how near it is.
+/// What a layer is drawn before, by pixel of the picture: where all of a mesh is nearer
+/// than this, it does not matter how near it is.
 pub(super) type Behind<'a> = &'a [f32];
 
 /// A layer and what it belongs to.
 struct Slot {
-    /// Held weakly, so that a mesh that is gone can be told and its address is not used again.
+    /// Held weakly, so that a mesh that is gone can be told and its address is not used
+    /// again.
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     camera: [u64; 17],
@@ -104,7 +109,8 @@ thread_local! {
     static LAYERS: RefCell<Layers> = RefCell::new(Layers::default());
 }
 
-/// The contours of a solid, composed of layers; `None` for solids that are better drawn at once.
+/// The contours of a solid, composed of layers; `None` for solids that are better drawn
+/// at once.
 pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
     let count = solid.mesh_count();
     let most_bytes = camera.pixels().saturating_mul(count).saturating_mul(size_of::<f32>());
@@ -126,10 +132,16 @@ impl Layers {
             // 0 is never, also in the first drawing.
             let seen_before = slot.seen_at > 0 && slot.seen_at + 1 >= self.clock;
             let layer = &mut slot.layer;
-            if !(same_range && seen_before) || self.dirty.iter().any(|dirty| dirty.meets(&layer.looks)) {
+            if !(same_range && seen_before)
+                || self.dirty.iter().any(|dirty| dirty.meets(&layer.looks))
+            {
                 self.bytes -= layer.bytes();
                 layer.seen.clear();
-                layer.pieces.iter().filter(|piece| depths.visible(piece)).for_each(|piece| layer.seen.push(piece));
+                layer
+                    .pieces
+                    .iter()
+                    .filter(|piece| depths.visible(piece))
+                    .for_each(|piece| layer.seen.push(piece));
                 self.bytes += layer.bytes();
             }
             slot.seen_at = self.clock;
@@ -162,7 +174,8 @@ impl Layers {
             };
             // Most often it is where it was.
             let before = self.shown.get(i).copied();
-            let kept = before.map(|shown| shown.at).filter(|&at| self.slots.get(at).is_some_and(is_it));
+            let kept =
+                before.map(|shown| shown.at).filter(|&at| self.slots.get(at).is_some_and(is_it));
             let found = kept.or_else(|| self.slots.iter().position(is_it));
             work::count(|work| work.kept += u64::from(found.is_some()));
             let at = found.unwrap_or_else(|| self.draw(instance, camera, affine, eye));
@@ -203,15 +216,31 @@ impl Layers {
         range
     }
 
-    /// Draws a layer and says where it is: in the place of one whose mesh is gone, in a new place, or in that of the one
-    /// that was not used for longest.
-    fn draw(&mut self, instance: &Instance, camera: &Camera, affine: [u64; 12], eye: [u64; 17]) -> usize {
+    /// Draws a layer and says where it is: in the place of one whose mesh is gone, in a
+    /// new place, or in that of the one that was not used for longest.
+    fn draw(
+        &mut self,
+        instance: &Instance,
+        camera: &Camera,
+        affine: [u64; 12],
+        eye: [u64; 17],
+    ) -> usize {
         let gone = self.slots.iter().position(|s| s.mesh.strong_count() == 0);
         let oldest = || (0..self.slots.len()).min_by_key(|&i| self.slots[i].used);
-        let at = gone.or_else(|| if self.slots.len() < SLOTS { None } else { oldest() }).unwrap_or(self.slots.len());
+        let at = gone
+            .or_else(|| if self.slots.len() < SLOTS { None } else { oldest() })
+            .unwrap_or(self.slots.len());
         if at == self.slots.len() {
             let (used, seen_at, made, layer) = (0, 0, (0, 0), Layer::default());
-            self.slots.push(Slot { mesh: Weak::new(), affine, camera: eye, used, seen_at, made, layer });
+            self.slots.push(Slot {
+                mesh: Weak::new(),
+                affine,
+                camera: eye,
+                used,
+                seen_at,
+                made,
+                layer,
+            });
         }
         let slot = &mut self.slots[at];
         self.bytes -= slot.layer.bytes();
@@ -223,11 +252,14 @@ impl Layers {
         at
     }
 
-    /// Frees layers until they keep to their limit: of meshes that are gone, then those not used for longest.
+    /// Frees layers until they keep to their limit: of meshes that are gone, then those
+    /// not used for longest.
     fn trim(&mut self) {
         while self.bytes > BYTES {
             let age = |slot: &Slot| if slot.mesh.strong_count() == 0 { 0 } else { slot.used };
-            let Some(at) = (0..self.slots.len()).min_by_key(|&i| age(&self.slots[i])) else { return };
+            let Some(at) = (0..self.slots.len()).min_by_key(|&i| age(&self.slots[i])) else {
+                return;
+            };
             self.bytes -= self.slots.swap_remove(at).layer.bytes();
         }
     }
@@ -244,8 +276,10 @@ pub(super) enum Sight<'a> {
 }
 
 impl Layer {
-    /// Draws a mesh alone, as its depth range and the pixels it reaches ask for. Where something is known of what is behind it, depth is exact where
-    /// its pieces look and where it may matter to what is behind; elsewhere it may be told farther than it is, but not so far that it would matter.
+    /// Draws a mesh alone, as its depth range and the pixels it reaches ask for. Where
+    /// something is known of what is behind it, depth is exact where its pieces look and
+    /// where it may matter to what is behind; elsewhere it may be told farther than it
+    /// is, but not so far that it would matter.
     pub fn draw<'a>(
         &mut self,
         instance: &Instance,
@@ -275,7 +309,9 @@ impl Layer {
             return;
         }
         work::drawn(&instance.mesh);
-        trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| self.pieces.push(piece));
+        trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| {
+            self.pieces.push(piece)
+        });
         self.looks = Area::looked_at(&self.pieces, camera);
         let wanted = match sight {
             Sight::Before(behind) => {
@@ -285,11 +321,20 @@ impl Layer {
             }
             _ => Wanted::All,
         };
-        draw_mesh(&instance.mesh, &placement, camera, &vertices, candidates, (&self.area, wanted), &mut self.depth);
+        draw_mesh(
+            &instance.mesh,
+            &placement,
+            camera,
+            &vertices,
+            candidates,
+            (&self.area, wanted),
+            &mut self.depth,
+        );
         to_depth(camera, &mut self.depth);
     }
 
-    /// Where the depth of its pixels has to be known: where own pieces look, and where its farthest point is not nearer than what is behind.
+    /// Where the depth of its pixels has to be known: where own pieces look, and where
+    /// its farthest point is not nearer than what is behind.
     fn find_exact(&mut self, camera: &Camera, behind: Behind<'_>, farthest: f32) {
         let Layer { area, exact, pieces, .. } = self;
         let (columns, width) = (area.right - area.left, camera.width as usize);
@@ -302,12 +347,18 @@ impl Layer {
             #[inline(always)]
             || {
                 for (row, exact) in (area.top..).zip(exact.chunks_exact_mut(columns)) {
-                    let behind = behind.get(row * width + area.left..row * width + area.right).unwrap_or_default();
-                    exact.iter_mut().zip(behind).for_each(|(exact, behind)| *exact = u8::from(farthest >= *behind));
+                    let behind = behind
+                        .get(row * width + area.left..row * width + area.right)
+                        .unwrap_or_default();
+                    exact
+                        .iter_mut()
+                        .zip(behind)
+                        .for_each(|(exact, behind)| *exact = u8::from(farthest >= *behind));
                 }
             },
         );
-        for pixel in pieces.iter().flat_map(|piece| [0, 1].map(|side| piece.pixel(side))).flatten() {
+        for pixel in pieces.iter().flat_map(|piece| [0, 1].map(|side| piece.pixel(side))).flatten()
+        {
             let (row, column) = (pixel as usize / width, pixel as usize % width);
             if (area.top..area.bottom).contains(&row) && (area.left..area.right).contains(&column) {
                 exact[(row - area.top) * columns + column - area.left] = 1;
@@ -336,12 +387,15 @@ impl Layer {
 
     fn bytes(&self) -> usize {
         let numbers = self.depth.capacity() + 5 * self.seen.x.capacity();
-        numbers * size_of::<f32>() + self.exact.capacity() + self.pieces.capacity() * size_of::<Piece>()
+        numbers * size_of::<f32>()
+            + self.exact.capacity()
+            + self.pieces.capacity() * size_of::<Piece>()
     }
 }
 
 impl Area {
-    /// Leaves out those without pixels. Where much has changed, areas overlap: then one around them all is less.
+    /// Leaves out those without pixels. Where much has changed, areas overlap: then one
+    /// around them all is less.
     pub(super) fn join(areas: &mut Vec<Area>) {
         areas.retain(|area| area.pixels() > 0);
         let around = areas.iter().fold(Area::default(), |all, area| all.with(area));
@@ -354,16 +408,17 @@ impl Area {
     /// A rectangle with all pixels that pieces look at.
     fn looked_at(pieces: &[Piece], camera: &Camera) -> Area {
         let ends = |side: u32, at: fn(&Piece) -> f32| {
-            let (low, high) = pieces
-                .iter()
-                .map(at)
-                .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+            let (low, high) =
+                pieces.iter().map(at).fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
+                    (low.min(v), high.max(v))
+                });
             // What lies outside looks at the nearest pixel inside.
             let (reach, last) = (BESIDE as f32 + 1.0, side as f32 - 1.0);
             let index = |v: f32| v.max(0.0).min(last) as usize;
             if pieces.is_empty() { (0, 0) } else { (index(low - reach), index(high + reach) + 1) }
         };
-        let ((left, right), (top, bottom)) = (ends(camera.width, |p| p.x), ends(camera.height, |p| p.y));
+        let ((left, right), (top, bottom)) =
+            (ends(camera.width, |p| p.x), ends(camera.height, |p| p.y));
         Area { left, right, top, bottom }
     }
 }
@@ -377,7 +432,8 @@ pub(super) fn camera_bits(camera: &Camera) -> [u64; 17] {
         Projection::Pinhole { focal_px, cx, cy } => (0, focal_px, cx, cy),
         Projection::Orthographic { units_per_pixel, cx, cy } => (1, units_per_pixel, cx, cy),
     };
-    let axes = [camera.eye, camera.right, camera.up, camera.forward].map(|v| v.to_array().map(f64::to_bits));
+    let axes = [camera.eye, camera.right, camera.up, camera.forward]
+        .map(|v| v.to_array().map(f64::to_bits));
     let mut out = [0; 17];
     out[..12].copy_from_slice(axes.as_flattened());
     let size = u64::from(camera.width) << 32 | u64::from(camera.height);

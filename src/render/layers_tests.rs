@@ -1,4 +1,5 @@
-//! Layers against drawing everything at once, bit for bit, over sequences of changes; and their limits.
+//! Layers against drawing everything at once, bit for bit, over sequences of changes; and
+//! their limits.
 
 use super::*;
 use crate::render::testing::{Uniform, cuboid, lathe, sphere};
@@ -7,8 +8,9 @@ use glam::{DVec3, Vec3};
 
 /// A mesh in posed coordinates: a ball, a box, an open or a closed lathe, somewhere.
 fn part(random: &mut Uniform) -> Arc<Mesh> {
-    let at =
-        |random: &mut Uniform, s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+    let at = |random: &mut Uniform, s: f64| {
+        DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s))
+    };
     let profile = [(0.5, -0.8), (0.7, -0.1), (0.4, 0.6)];
     let shape = match (random.next() * 4.0) as u32 {
         0 => sphere(11, 7),
@@ -16,7 +18,8 @@ fn part(random: &mut Uniform) -> Arc<Mesh> {
         2 => lathe(&profile, 9, false),
         _ => lathe(&profile, 13, true),
     };
-    let (middle, turn, size) = (at(random, 1.0), at(random, 2.0), DVec3::splat(random.between(0.2, 0.7)));
+    let (middle, turn, size) =
+        (at(random, 1.0), at(random, 2.0), DVec3::splat(random.between(0.2, 0.7)));
     Arc::new(shape.placed(Affine::new(middle, turn, size)).to_mesh().unwrap())
 }
 
@@ -48,7 +51,8 @@ fn layers_give_what_is_drawn_at_once() {
     for round in 0..10 {
         let mut camera = Camera::default_for(40 + 7 * round, 96 - 5 * round);
         if round % 3 == 1 {
-            camera.projection = Projection::Orthographic { units_per_pixel: 0.05, cx: 30.0, cy: 40.0 };
+            camera.projection =
+                Projection::Orthographic { units_per_pixel: 0.05, cx: 30.0, cy: 40.0 };
         } else if round % 3 == 2 {
             // The near plane cuts some.
             camera.eye.z = 0.4;
@@ -59,7 +63,11 @@ fn layers_give_what_is_drawn_at_once() {
             let before = (meshes.clone(), by);
             if step % 10 == 9 {
                 let turn = DVec3::new(random.next(), random.next(), 0.3);
-                by = Affine::new(DVec3::new(0.2, 0.1, random.next()), turn, DVec3::new(-1.0, 1.0, 1.2));
+                by = Affine::new(
+                    DVec3::new(0.2, 0.1, random.next()),
+                    turn,
+                    DVec3::new(-1.0, 1.0, 1.2),
+                );
             }
             for _ in 0..1 + step % 3 {
                 let at = (random.next() * meshes.len() as f64) as usize;
@@ -89,7 +97,8 @@ fn what_did_not_move_is_not_drawn_again() {
     let first = layers.shown.clone();
     check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
     assert_eq!(layers.shown, first);
-    // A step that is not taken, many times: the layer of a mesh that is gone is used again.
+    // A step that is not taken, many times: the layer of a mesh that is gone is used
+    // again.
     for _ in 0..300 {
         let old = std::mem::replace(&mut meshes[3], part(&mut random));
         check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
@@ -113,12 +122,20 @@ fn number_and_memory_stay_bounded() {
     let mut layers = Layers::default();
     let meshes: Vec<_> = (0..40).map(|_| part(&mut random)).collect();
     for step in 0..12 {
-        let by = Affine::new(DVec3::new(0.01 * f64::from(step), 0.0, 0.0), DVec3::ZERO, DVec3::splat(2.0));
+        let by = Affine::new(
+            DVec3::new(0.01 * f64::from(step), 0.0, 0.0),
+            DVec3::ZERO,
+            DVec3::splat(2.0),
+        );
         check(&mut layers, &group(&meshes, by), &Camera::default_for(64, 64));
     }
     assert_eq!(layers.slots.len(), SLOTS);
     for step in 0..6 {
-        let by = Affine::new(DVec3::new(0.0, 0.01 * f64::from(step), 0.0), DVec3::ZERO, DVec3::splat(3.0));
+        let by = Affine::new(
+            DVec3::new(0.0, 0.01 * f64::from(step), 0.0),
+            DVec3::ZERO,
+            DVec3::splat(3.0),
+        );
         check(&mut layers, &group(&meshes[..4], by), &Camera::default_for(1200, 1200));
         assert!(layers.bytes <= BYTES, "{}", layers.bytes);
     }
@@ -130,12 +147,17 @@ fn few_many_or_huge_are_drawn_at_once() {
     let mut random = Uniform(24);
     let meshes: Vec<_> = (0..MOST + 1).map(|_| part(&mut random)).collect();
     let camera = Camera::default_for(48, 48);
-    for (count, kept) in [(0, false), (1, false), (2, false), (3, true), (MOST, true), (MOST + 1, false)] {
+    for (count, kept) in
+        [(0, false), (1, false), (2, false), (3, true), (MOST, true), (MOST + 1, false)]
+    {
         let solid = group(&meshes[..count], Affine::IDENTITY);
         assert_eq!(contours(&solid, &camera).is_some(), kept, "{count}");
         assert_eq!(Contours::of(&solid, &camera), Contours::drawn(&solid, &camera));
     }
-    assert!(contours(&group(&meshes[..10], Affine::IDENTITY), &Camera::default_for(2000, 2000)).is_none());
+    assert!(
+        contours(&group(&meshes[..10], Affine::IDENTITY), &Camera::default_for(2000, 2000))
+            .is_none()
+    );
 }
 
 #[test]
@@ -144,7 +166,13 @@ fn what_cannot_be_seen_leaves_an_empty_layer() {
     let mut layers = Layers::default();
     let mut random = Uniform(25);
     let meshes: Vec<_> = (0..3).map(|_| part(&mut random)).collect();
-    for at in [[0.0, 0.0, 30.0], [90.0, 0.0, 0.0], [0.0, -90.0, 0.0], [f64::NAN, 0.0, 0.0], [0.0, 0.0, -1e12]] {
+    for at in [
+        [0.0, 0.0, 30.0],
+        [90.0, 0.0, 0.0],
+        [0.0, -90.0, 0.0],
+        [f64::NAN, 0.0, 0.0],
+        [0.0, 0.0, -1e12],
+    ] {
         let solid = group(&meshes, Affine::new(DVec3::from_array(at), DVec3::ZERO, DVec3::ONE));
         check(&mut layers, &solid, &camera);
         assert!(layers.found == 0 && layers.depth.iter().all(|d| *d == f32::INFINITY), "{at:?}");
@@ -162,7 +190,8 @@ fn a_mesh_between_the_centres_of_pixels_has_contours_as_soon_as_it_is_there() {
     let mut meshes = vec![cube(0.4, -1.0), cube(0.4, 1.0)];
     let others = Contours::drawn(&group(&meshes, Affine::IDENTITY), &camera).len();
     meshes.push(cube(0.02, 0.0));
-    // A pixel is 0.09 wide, and four of them meet in the middle. The depth range stays as it is.
+    // A pixel is 0.09 wide, and four of them meet in the middle. The depth range stays as
+    // it is.
     for half in [0.02, 0.015, 0.01, 0.025] {
         meshes[2] = cube(half, 0.0);
         check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
@@ -175,7 +204,8 @@ fn flat_meshes_between_the_centres_of_pixels_are_seen_in_the_first_drawing() {
     let camera = Camera::default_for(48, 48);
     // Triangles at one depth: the range of the scene is 0 from the start.
     let flat = |half: f32, x: f32| {
-        let corners = [[-half, -half], [half, -half], [0.0, half]].map(|[u, v]| Vec3::new(x + u, v, 0.0));
+        let corners =
+            [[-half, -half], [half, -half], [0.0, half]].map(|[u, v]| Vec3::new(x + u, v, 0.0));
         Arc::new(Mesh::new(corners.to_vec(), vec![[0, 1, 2]], vec![0]).unwrap())
     };
     let meshes = [flat(0.4, -1.0), flat(0.4, 1.0), flat(0.02, 0.0)];

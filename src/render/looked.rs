@@ -1,6 +1,8 @@
-//! The depth of a few pixels: those that pieces of contour look at. The triangles that cover none of them are not drawn.
+//! The depth of a few pixels: those that pieces of contour look at. The triangles that
+//! cover none of them are not drawn.
 //!
-//! Invariant: what is read of a pixel that was marked is what the whole depth image has there, bit for bit.
+//! Invariant: what is read of a pixel that was marked is what the whole depth image has
+//! there, bit for bit.
 
 use super::Camera;
 use super::candidates::Candidates;
@@ -40,7 +42,8 @@ impl Looked {
         }
     }
 
-    /// Draws the solid at the marked pixels, and says what depth they have: entries of an image of which the others mean nothing.
+    /// Draws the solid at the marked pixels, and says what depth they have: entries of an
+    /// image of which the others mean nothing.
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) -> &[f32] {
         let Looked { marks, depth, candidates, .. } = self;
         marks.settle();
@@ -49,7 +52,15 @@ impl Looked {
         for (i, item) in solid.instances().iter().enumerate() {
             let (placement, vertices) = (Placement::new(camera, &item.affine), projected.mesh(i));
             if !vertices.outside(camera) {
-                fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Wanted::Marked(marks)), depth);
+                fill_mesh(
+                    &item.mesh,
+                    &placement,
+                    camera,
+                    &vertices,
+                    candidates,
+                    (&area, Wanted::Marked(marks)),
+                    depth,
+                );
             }
         }
         let pinhole = Lens::new(camera).pinhole;

@@ -8,8 +8,9 @@ use super::simd::vectorised;
 pub(super) struct Marks {
     /// A bit for each pixel, row by row, and one word more.
     words: Vec<u64>,
-    /// For each pixel the side of the smallest square that holds a mark and has the pixel in its upper left corner, [`FAR`] if that
-    /// is larger than [`SIDE`]. There are columns more at the right and a row below.
+    /// For each pixel the side of the smallest square that holds a mark and has the pixel
+    /// in its upper left corner, [`FAR`] if that is larger than [`SIDE`]. There are
+    /// columns more at the right and a row below.
     reach: Vec<u8>,
     /// Entries of `reach` in a row.
     stride: usize,
@@ -47,7 +48,9 @@ impl Marks {
         let at = row * self.stride + column;
         self.rows = [self.rows[0].min(row), self.rows[1].max(row)];
         self.columns = [self.columns[0].min(column), self.columns[1].max(column)];
-        if let (Some(word), Some(reach)) = (self.words.get_mut(pixel as usize / 64), self.reach.get_mut(at)) {
+        if let (Some(word), Some(reach)) =
+            (self.words.get_mut(pixel as usize / 64), self.reach.get_mut(at))
+        {
             *word |= 1 << (pixel % 64);
             *reach = 1;
         }
@@ -69,10 +72,16 @@ impl Marks {
             || {
                 for row in (top.saturating_sub(SIDE)..=*bottom).rev() {
                     let (above, below) = reach.split_at_mut((row + 1) * stride);
-                    let own = above.get_mut(row * stride..).and_then(|row| row.get_mut(columns.clone()));
-                    let (Some(own), Some(below)) = (own, below.get(columns.clone())) else { return };
-                    // A square is one pixel and, a side shorter, those to the right, below, and both.
-                    for ((own, down), corner) in own[..count].iter_mut().zip(&below[..count]).zip(&below[1..]) {
+                    let own =
+                        above.get_mut(row * stride..).and_then(|row| row.get_mut(columns.clone()));
+                    let (Some(own), Some(below)) = (own, below.get(columns.clone())) else {
+                        return;
+                    };
+                    // A square is one pixel and, a side shorter, those to the right,
+                    // below, and both.
+                    for ((own, down), corner) in
+                        own[..count].iter_mut().zip(&below[..count]).zip(&below[1..])
+                    {
                         *own = (*own).min((*down).min(*corner) + 1);
                     }
                     for step in [1, 4] {
@@ -96,13 +105,16 @@ impl Marks {
     /// The marks of some pixels in a row, at most 64, as bits.
     #[inline(always)]
     pub fn window(&self, from: usize, count: usize) -> u64 {
-        let Some([low, high]) = self.words.get(from / 64..).and_then(|m| m.first_chunk()) else { return 0 };
+        let Some([low, high]) = self.words.get(from / 64..).and_then(|m| m.first_chunk()) else {
+            return 0;
+        };
         let shift = from % 64;
         let word = (low >> shift) | (high << 1 << (63 - shift));
         if count < 64 { word & ((1 << count) - 1) } else { word }
     }
 
-    /// Whether there may be a mark in some columns and rows, of which there may be none: false where the square around them that begins with them has none.
+    /// Whether there may be a mark in some columns and rows, of which there may be none:
+    /// false where the square around them that begins with them has none.
     #[inline(always)]
     pub fn may_hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
         let side = right.wrapping_sub(left).max(bottom.wrapping_sub(top));
@@ -114,7 +126,8 @@ impl Marks {
     #[inline(always)]
     pub fn hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
         let (columns, rows) = (right - left, bottom - top);
-        // Three squares in a line, at both ends and in the middle, cover what is at most three times as long as wide.
+        // Three squares in a line, at both ends and in the middle, cover what is at most
+        // three times as long as wide.
         let side = columns.min(rows);
         let (across, down) = (columns - side, rows - side);
         if side > SIDE || across + down > 2 * side {
@@ -122,7 +135,9 @@ impl Marks {
         }
         let at = top * self.stride + left;
         let near = |at: usize| self.reach.get(at).is_some_and(|reach| usize::from(*reach) <= side);
-        near(at) | near(at + across / 2 + down / 2 * self.stride) | near(at + across + down * self.stride)
+        near(at)
+            | near(at + across / 2 + down / 2 * self.stride)
+            | near(at + across + down * self.stride)
     }
 
     /// As [`Marks::hold`], for any rectangle, by squares of some side.
@@ -164,14 +179,18 @@ mod tests {
             let mut below = |n: u32| (random.next() * f64::from(n)) as u32;
             for _ in 0..20 {
                 marks.clear(&camera);
-                let set: Vec<u32> = (0..1 + width * height / 300).map(|_| below(width * height)).collect();
+                let set: Vec<u32> =
+                    (0..1 + width * height / 300).map(|_| below(width * height)).collect();
                 set.iter().for_each(|pixel| marks.set(*pixel));
                 marks.settle();
                 for _ in 0..200 {
                     let [x, y] = [below(width), below(height)];
                     let most = [3, 9, 30, 200][below(4) as usize];
-                    let [right, bottom] = [x + 1 + below(most.min(width - x)), y + 1 + below(most.min(height - y))];
-                    let inside = |p: &u32| (x..right).contains(&(p % width)) && (y..bottom).contains(&(p / width));
+                    let [right, bottom] =
+                        [x + 1 + below(most.min(width - x)), y + 1 + below(most.min(height - y))];
+                    let inside = |p: &u32| {
+                        (x..right).contains(&(p % width)) && (y..bottom).contains(&(p / width))
+                    };
                     let wanted = set.iter().any(inside);
                     let extent = [[x, right], [y, bottom]].map(|ends| ends.map(|v| v as usize));
                     assert_eq!(marks.hold(extent), wanted, "{extent:?} in {width} x {height}");

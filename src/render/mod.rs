@@ -1,7 +1,8 @@
 //! Drawing on the processor: cameras, depth frames, contours, and simple shaded pictures.
 //!
-//! Not here: meshes and transforms (`geom`), comparing pictures (`vision`). Nothing in this module draws random
-//! numbers, and the same input gives the same output on every machine.
+//! Not here: meshes and transforms (`geom`), comparing pictures (`vision`). Nothing in
+//! this module draws random numbers, and the same input gives the same output on every
+//! machine.
 
 mod backdrop;
 mod batch;

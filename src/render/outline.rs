@@ -1,8 +1,10 @@
-//! How a silhouette moves with the surface: sums over the pixels that a solid covers, by its vertices.
+//! How a silhouette moves with the surface: sums over the pixels that a solid covers, by
+//! its vertices.
 //!
-//! Where the outline moves outward it takes in what lies beside it, as much as its length times its motion. Pixels are in or
-//! out, so this is the slope of a sum whose steps are evened out, not of the steps. The outline is taken from the contours: where a
-//! coarse mesh reaches pixels beyond its smooth silhouette, that piece of it is missed.
+//! Where the outline moves outward it takes in what lies beside it, as much as its length
+//! times its motion. Pixels are in or out, so this is the slope of a sum whose steps are
+//! evened out, not of the steps. The outline is taken from the contours: where a coarse
+//! mesh reaches pixels beyond its smooth silhouette, that piece of it is missed.
 
 use super::{Contours, View};
 use glam::DVec3;
@@ -11,8 +13,9 @@ use glam::DVec3;
 const BESIDE: f64 = 1.2;
 
 impl View {
-    /// The derivatives of the sum of `gain` over the pixels that show the solid, in the picture whose longer side has `size` pixels,
-    /// by each vertex of the solid's meshes in turn, in world coordinates. `gain` has a number for each pixel, row by row.
+    /// The derivatives of the sum of `gain` over the pixels that show the solid, in the
+    /// picture whose longer side has `size` pixels, by each vertex of the solid's meshes
+    /// in turn, in world coordinates. `gain` has a number for each pixel, row by row.
     pub fn pull_mask(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
         // Drawn before the contours, which then use it.
         let frame = self.depth(size);
@@ -21,7 +24,8 @@ impl View {
             .map(|i| {
                 let Some([nx, ny]) = outward(&contours, &frame.depth, i) else { return [0.0; 4] };
                 let (x, y) = (f64::from(contours.x[i]), f64::from(contours.y[i]));
-                let by = f64::from(contours.length[i]) * between(gain, contours.width, contours.height, x, y);
+                let by = f64::from(contours.length[i])
+                    * between(gain, contours.width, contours.height, x, y);
                 [by * nx, by * ny, 0.0, 0.0]
             })
             .collect();
@@ -37,7 +41,9 @@ fn outward(c: &Contours, depth: &[f32], i: usize) -> Option<[f64; 2]> {
     let shown = |sign: f64| {
         let (u, v) = (x + sign * BESIDE * ty, y - sign * BESIDE * tx);
         let inside = u >= 0.0 && v >= 0.0 && u < f64::from(c.width) && v < f64::from(c.height);
-        inside.then(|| depth.get(v as usize * c.width as usize + u as usize).is_some_and(|d| d.is_finite()))
+        inside.then(|| {
+            depth.get(v as usize * c.width as usize + u as usize).is_some_and(|d| d.is_finite())
+        })
     };
     match (shown(1.0)?, shown(-1.0)?) {
         (false, true) => Some([ty, -tx]),
@@ -51,7 +57,8 @@ fn between(values: &[f64], width: u32, height: u32, x: f64, y: f64) -> f64 {
     let (w, h) = (width as usize, height as usize);
     let (u, v) = ((x - 0.5).clamp(0.0, (w - 1) as f64), (y - 0.5).clamp(0.0, (h - 1) as f64));
     let (u0, v0) = (u as usize, v as usize);
-    let at = |u: usize, v: usize| values.get(v.min(h - 1) * w + u.min(w - 1)).copied().unwrap_or(0.0);
+    let at =
+        |u: usize, v: usize| values.get(v.min(h - 1) * w + u.min(w - 1)).copied().unwrap_or(0.0);
     let (fu, fv) = (u - u0 as f64, v - v0 as f64);
     let row = |v: usize| at(u0, v) + fu * (at(u0 + 1, v) - at(u0, v));
     row(v0) + fv * (row(v0 + 1) - row(v0))
@@ -89,7 +96,8 @@ mod tests {
     #[test]
     fn sums_over_silhouettes_change_as_predicted() {
         const SIZE: u32 = 192;
-        // A smooth gain, and pictures coarse enough that a difference of some pixels tells the slope.
+        // A smooth gain, and pictures coarse enough that a difference of some pixels
+        // tells the slope.
         let gain: Vec<f64> = (0..SIZE * SIZE)
             .map(|i| {
                 let (x, y) = (f64::from(i % SIZE), f64::from(i / SIZE));
@@ -116,13 +124,21 @@ mod tests {
                     p[k] += h;
                     p
                 };
-                let way = vertices(&moved(1e-6)).into_iter().zip(vertices(&moved(-1e-6))).map(|(a, b)| (a - b) / 2e-6);
+                let way = vertices(&moved(1e-6))
+                    .into_iter()
+                    .zip(vertices(&moved(-1e-6)))
+                    .map(|(a, b)| (a - b) / 2e-6);
                 let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
-                let (along, gross) = (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
+                let (along, gross) =
+                    (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
                 let slope = (sum(&moved(0.04)) - sum(&moved(-0.04))) / 0.08;
-                // What is gained on one side is mostly lost on the other. Pixels are in or out: of the outline's 300, some 20 more or
-                // fewer by chance, each bringing about 1 to 3, over a difference of 0.08.
-                assert!((along - slope).abs() < 0.03 * gross + 400.0, "number {k}: {along} {slope} of {gross}");
+                // What is gained on one side is mostly lost on the other. Pixels are in
+                // or out: of the outline's 300, some 20 more or fewer by chance, each
+                // bringing about 1 to 3, over a difference of 0.08.
+                assert!(
+                    (along - slope).abs() < 0.03 * gross + 400.0,
+                    "number {k}: {along} {slope} of {gross}"
+                );
             }
         }
     }

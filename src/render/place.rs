@@ -1,6 +1,8 @@
-//! Positions in the image rounded to 1/1024 of a pixel, and the rectangle of pixels between some.
+//! Positions in the image rounded to 1/1024 of a pixel, and the rectangle of pixels
+//! between some.
 //!
-//! Invariant: places are exact in single precision, so what is worked out from them does not depend on the order.
+//! Invariant: places are exact in single precision, so what is worked out from them does
+//! not depend on the order.
 
 use glam::{Vec4, Vec4Swizzles};
 
@@ -9,8 +11,9 @@ pub(super) const BITS: u32 = 10;
 /// Units of a rounded position in a pixel.
 pub(super) const UNIT: i32 = 1 << BITS;
 
-/// A position relative to the centre of the first pixel, rounded to 1/1024 of a pixel: x, y, -x, -y, so that least and greatest
-/// are found in one go. Exact in single precision; what is [`BOUND`] or farther out is kept there.
+/// A position relative to the centre of the first pixel, rounded to 1/1024 of a pixel: x,
+/// y, -x, -y, so that least and greatest are found in one go. Exact in single precision;
+/// what is [`BOUND`] or farther out is kept there.
 pub(super) type Place = Vec4;
 
 /// Beyond any image, in pixels.
@@ -34,8 +37,9 @@ pub(super) fn place(x: f64, y: f64) -> Place {
     Vec4::new(x, y, -x, -y)
 }
 
-/// The columns and rows of pixels between some places, from the first one to that past the last one: left, top, right, bottom, as
-/// the lowest bits of numbers in single precision, which is how they come about.
+/// The columns and rows of pixels between some places, from the first one to that past
+/// the last one: left, top, right, bottom, as the lowest bits of numbers in single
+/// precision, which is how they come about.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Extent(Vec4);
 
@@ -43,11 +47,12 @@ pub(super) struct Extent(Vec4);
 const LOW_BITS: f32 = 8_388_608.0;
 
 impl Extent {
-    /// The pixels of an image whose centres lie between the places with these least coordinates, as far as columns and rows tell.
-    /// `size` is width and height, twice.
+    /// The pixels of an image whose centres lie between the places with these least
+    /// coordinates, as far as columns and rows tell. `size` is width and height, twice.
     #[inline(always)]
     pub fn between(least: Place, size: Vec4) -> Extent {
-        // Whole numbers in these units are centres: upwards for the first one, downwards and one more for the one past the last.
+        // Whole numbers in these units are centres: upwards for the first one, downwards
+        // and one more for the one past the last.
         const ALMOST: f32 = (UNIT - 1) as f32 / UNIT as f32;
         let at = least * Vec4::new(1.0, 1.0, -1.0, -1.0) + Vec4::new(ALMOST, ALMOST, 1.0, 1.0);
         let at = at.max(Vec4::ZERO).min(size);
@@ -81,7 +86,8 @@ pub(super) fn size(width: u32, height: u32) -> Vec4 {
     Vec4::new(width, height, width, height)
 }
 
-/// Whether a place, or the least coordinates of some, are not kept from being farther out.
+/// Whether a place, or the least coordinates of some, are not kept from being farther
+/// out.
 #[inline(always)]
 pub(super) fn is_near(least: Place) -> bool {
     least.cmpgt(Vec4::splat(-BOUND)).all()
@@ -92,7 +98,8 @@ mod tests {
     use super::*;
     use crate::render::testing::Uniform;
 
-    /// First and past-the-last pixel whose centres lie between two rounded coordinates, in double precision.
+    /// First and past-the-last pixel whose centres lie between two rounded coordinates,
+    /// in double precision.
     fn between(least: f64, most: f64, side: u32) -> [usize; 2] {
         let inside = |v: f64| v.clamp(0.0, f64::from(side)) as usize;
         [inside(least.ceil()), inside(most.floor() + 1.0)]
@@ -105,7 +112,8 @@ mod tests {
         for round in 0..20_000 {
             let side = [7, 128, 5000, 16384][round % 4];
             let reach = f64::from(side) * [0.6, 1.5, 30.0][round % 3];
-            let near = [random.between(-0.1, 1.1), random.between(-0.1, 1.1)].map(|v| v * f64::from(side));
+            let near =
+                [random.between(-0.1, 1.1), random.between(-0.1, 1.1)].map(|v| v * f64::from(side));
             let corners: [[f64; 2]; 3] = std::array::from_fn(|_| {
                 let spread = if round % 5 == 0 { reach } else { [0.3, 3.0, 40.0][round % 3] };
                 let v = near.map(|v| v + random.between(-spread, spread));
@@ -116,7 +124,8 @@ mod tests {
             let extent = Extent::around(corners.map(|[x, y]| place(x, y)), size(width, height));
             let ends: [[usize; 2]; 2] = std::array::from_fn(|axis| {
                 let all = corners.map(|c| f64::from(rounded(c[axis])));
-                let (least, most) = (all[0].min(all[1]).min(all[2]), all[0].max(all[1]).max(all[2]));
+                let (least, most) =
+                    (all[0].min(all[1]).min(all[2]), all[0].max(all[1]).max(all[2]));
                 between(least, most, [width, height][axis])
             });
             let empty = ends.iter().any(|[first, past]| first >= past);

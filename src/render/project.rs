@@ -1,7 +1,9 @@
-//! Vertices in camera and image coordinates, the common ground of the rasteriser and the contours.
+//! Vertices in camera and image coordinates, the common ground of the rasteriser and the
+//! contours.
 //!
-//! Camera coordinates: x right, y up, z towards the camera, eye at the origin. `nearness` is 1 / depth for a pinhole
-//! and -depth for a parallel projection: linear over the image inside a triangle, larger is nearer in both.
+//! Camera coordinates: x right, y up, z towards the camera, eye at the origin. `nearness`
+//! is 1 / depth for a pinhole and -depth for a parallel projection: linear over the image
+//! inside a triangle, larger is nearer in both.
 
 use super::place::{Extent, Place, place, rounded};
 use super::simd::vectorised;
@@ -10,8 +12,8 @@ use super::{Camera, Projection};
 use crate::geom::{Affine, Mesh, Run, Solid, Topology};
 use glam::{DMat3, DVec3, Vec3};
 
-/// Vertices worked on at a time: loops over them are long enough to be told from code that is written out, and short enough for
-/// the nearest cache.
+/// Vertices worked on at a time: loops over them are long enough to be told from code
+/// that is written out, and short enough for the nearest cache.
 const LANES: usize = 64;
 
 /// Coordinates beyond this (scene units) mark a vertex as unusable.
@@ -50,7 +52,9 @@ pub(super) struct Lens {
 impl Lens {
     pub fn new(camera: &Camera) -> Lens {
         match camera.projection {
-            Projection::Pinhole { focal_px, cx, cy } => Lens { pinhole: true, scale: focal_px, cx, cy },
+            Projection::Pinhole { focal_px, cx, cy } => {
+                Lens { pinhole: true, scale: focal_px, cx, cy }
+            }
             Projection::Orthographic { units_per_pixel, cx, cy } => {
                 Lens { pinhole: false, scale: 1.0 / units_per_pixel, cx, cy }
             }
@@ -73,7 +77,8 @@ impl Lens {
     }
 }
 
-/// The part of a segment in camera coordinates that lies beyond the near plane, if there is some.
+/// The part of a segment in camera coordinates that lies beyond the near plane, if there
+/// is some.
 pub(super) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> {
     let near = -Camera::NEAR;
     if from.z > near && to.z > near {
@@ -93,7 +98,8 @@ pub(super) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> 
 pub(super) struct Placement {
     m: DMat3,
     t: DVec3,
-    /// Cofactors of `m` times the sign of its determinant: takes outward normals to outward normals.
+    /// Cofactors of `m` times the sign of its determinant: takes outward normals to
+    /// outward normals.
     cofactor: DMat3,
     /// Whether the instance is mirrored, so that its faces turn the other way round.
     pub mirrored: bool,
@@ -161,8 +167,9 @@ impl DepthRange {
     }
 }
 
-/// The vertices of meshes in the image, in single precision: positions to 1e-7 of their distance from the image's corner, nearness
-/// to 1e-7 of itself. Rounded positions ([`Place`]) come from double precision. Lists are reused, so that nothing is allocated
+/// The vertices of meshes in the image, in single precision: positions to 1e-7 of their
+/// distance from the image's corner, nearness to 1e-7 of itself. Rounded positions
+/// ([`Place`]) come from double precision. Lists are reused, so that nothing is allocated
 /// once they have grown.
 #[derive(Default)]
 pub(super) struct Projected {
@@ -249,14 +256,18 @@ impl Projected {
             for i in 0..LANES {
                 let [vx, vy, vz] = rows.map(|[a, b, c, t]| px[i] * a + py[i] * b + pz[i] * c + t);
                 // Written so that NaN fails it.
-                inside &= (vx.abs() < HUGE) & (vy.abs() < HUGE) & (vz.abs() < HUGE) & (-vz >= Camera::NEAR);
+                inside &= (vx.abs() < HUGE)
+                    & (vy.abs() < HUGE)
+                    & (vz.abs() < HUGE)
+                    & (-vz >= Camera::NEAR);
                 (cx[i], cy[i], depth[i]) = (vx, vy, -vz);
             }
             if !inside {
                 seen.whole = false;
                 for i in 0..LANES {
                     let point = seen.odd(&lens, DVec3::new(cx[i], cy[i], -depth[i]));
-                    (x[i], y[i], nearness[i]) = (point.x as f32, point.y as f32, point.nearness as f32);
+                    (x[i], y[i], nearness[i]) =
+                        (point.x as f32, point.y as f32, point.nearness as f32);
                     places[i] = place(point.x, point.y);
                 }
                 continue;
@@ -318,7 +329,8 @@ impl Vertices<'_> {
         self.x.len()
     }
 
-    /// The rounded positions of a triangle's corners; `None` if there are no such vertices.
+    /// The rounded positions of a triangle's corners; `None` if there are no such
+    /// vertices.
     #[inline(always)]
     pub fn places(&self, corners: &[u32; 3]) -> Option<[Place; 3]> {
         match corners.map(|v| self.places.get(v as usize)) {
@@ -351,7 +363,8 @@ impl Vertices<'_> {
         self.nearness.iter().fold(f32::INFINITY, |a, b| a.min(*b))
     }
 
-    /// Whether all of the mesh is behind the eye, or beside the picture by half a pixel at least: it covers no pixel and has no contour there.
+    /// Whether all of the mesh is behind the eye, or beside the picture by half a pixel
+    /// at least: it covers no pixel and has no contour there.
     pub fn outside(&self, camera: &Camera) -> bool {
         if !self.whole {
             return self.nearness.iter().all(|n| *n == f32::INFINITY);
@@ -363,7 +376,13 @@ impl Vertices<'_> {
 
     /// A triangle ready to be drawn, if it is to be: see [`Triangle::new`].
     #[inline(always)]
-    pub fn triangle(&self, topology: &Topology, face: u32, extent: Extent, back: f64) -> Option<Triangle> {
+    pub fn triangle(
+        &self,
+        topology: &Topology,
+        face: u32,
+        extent: Extent,
+        back: f64,
+    ) -> Option<Triangle> {
         let corners = topology.triangles.get(face as usize)?;
         Triangle::new(corners.map(|v| self.point(v)), self.places(corners)?, extent, back)
     }
@@ -375,7 +394,8 @@ impl Vertices<'_> {
         corners.map(|v| self.point(v))
     }
 
-    /// Where a vertex is; of one that is not in view, nearness is infinite (behind the near plane) or NaN (not usable).
+    /// Where a vertex is; of one that is not in view, nearness is infinite (behind the
+    /// near plane) or NaN (not usable).
     #[inline(always)]
     pub fn point(&self, v: u32) -> Point {
         let at = |list: &[f32]| list.get(v as usize).map_or(f64::NAN, |x| f64::from(*x));
@@ -395,9 +415,11 @@ pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Projected) -> De
 /// Which vertices of a mesh show their front. Reused from mesh to mesh.
 #[derive(Default)]
 pub(super) struct Fronts {
-    /// Positive where the outward normal faces the eye, zero at right angles to the line of sight; linear in the position.
+    /// Positive where the outward normal faces the eye, zero at right angles to the line
+    /// of sight; linear in the position.
     pub facing: Vec<f64>,
-    /// 1 where it is not negative, else 0; there are [`Run::MOST`] more entries than vertices.
+    /// 1 where it is not negative, else 0; there are [`Run::MOST`] more entries than
+    /// vertices.
     pub front: Vec<u8>,
 }
 
@@ -413,8 +435,11 @@ impl Fronts {
         vectorised(
             #[inline(always)]
             || {
-                let (p, n) = (Groups::new(&mesh.positions[..count]), Groups::new(&mesh.normals[..count]));
-                for ((p, n), (facing, front)) in p.iter().zip(n.iter()).zip(groups(facing).zip(groups(front))) {
+                let (p, n) =
+                    (Groups::new(&mesh.positions[..count]), Groups::new(&mesh.normals[..count]));
+                for ((p, n), (facing, front)) in
+                    p.iter().zip(n.iter()).zip(groups(facing).zip(groups(front)))
+                {
                     let ([px, py, pz], [nx, ny, nz]) = (coordinates(p), coordinates(n));
                     for i in 0..LANES {
                         facing[i] = nx[i] * (view.x - px[i] * bend)

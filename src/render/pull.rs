@@ -1,8 +1,11 @@
-//! How contours move with the surface: from derivatives by their pieces to derivatives by the vertices.
+//! How contours move with the surface: from derivatives by their pieces to derivatives by
+//! the vertices.
 //!
-//! A piece moves as the points of the surface do that make its segment. That is exact for creases; smooth silhouettes also slide
-//! over faces that turn (`wander`), and contours that pass behind others become longer or shorter there (`junctions`). Nothing is
-//! drawn: the pieces of the meshes are traced again, and those that were seen are told by their numbers.
+//! A piece moves as the points of the surface do that make its segment. That is exact for
+//! creases; smooth silhouettes also slide over faces that turn (`wander`), and contours
+//! that pass behind others become longer or shorter there (`junctions`). Nothing is
+//! drawn: the pieces of the meshes are traced again, and those that were seen are told by
+//! their numbers.
 
 use super::junctions::{End, moved_ends};
 use super::project::{Lens, Placement, Projected};
@@ -27,17 +30,25 @@ pub(super) struct Traced<'a> {
 }
 
 impl Contours {
-    /// The vector-Jacobian product of [`Contours::of`] for the same solid and camera: from the derivatives of something by each
-    /// piece's x, y, length (pixels) and angle (radians, from right to down) to those by each vertex of the solid's meshes in
+    /// The vector-Jacobian product of [`Contours::of`] for the same solid and camera:
+    /// from the derivatives of something by each piece's x, y, length (pixels) and angle
+    /// (radians, from right to down) to those by each vertex of the solid's meshes in
     /// turn, in world coordinates. Pieces beyond the end of `by_piece` count as 0.
     ///
-    /// Normals are taken to turn as the faces around them do. Pieces that come and go by themselves are not followed.
+    /// Normals are taken to turn as the faces around them do. Pieces that come and go by
+    /// themselves are not followed.
     pub fn pull(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
         self.pull_with(solid, camera, by_piece, STEADY)
     }
 
     /// As [`Contours::pull`], with another angle than [`STEADY`].
-    pub(super) fn pull_with(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]], steady: f64) -> Vec<DVec3> {
+    pub(super) fn pull_with(
+        &self,
+        solid: &Solid,
+        camera: &Camera,
+        by_piece: &[[f64; 4]],
+        steady: f64,
+    ) -> Vec<DVec3> {
         let mut traced = Vec::with_capacity(self.len() + self.len() / 4);
         self.each(solid, camera, |t| traced.push(t));
         let by_piece = moved_ends(&traced, camera, by_piece);
@@ -55,11 +66,18 @@ impl Contours {
     }
 
     /// As [`Contours::pull`], with each piece held to its points of the surface.
-    pub(super) fn pull_fixed(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
+    pub(super) fn pull_fixed(
+        &self,
+        solid: &Solid,
+        camera: &Camera,
+        by_piece: &[[f64; 4]],
+    ) -> Vec<DVec3> {
         let mut out = vec![DVec3::ZERO; solid.vertex_count()];
         self.each(solid, camera, |t| {
             let by = t.seen.and_then(|i| by_piece.get(i));
-            if let (Some(by), Some(own)) = (by.and_then(|by| by_ends(&t, camera, by)), out.get_mut(t.base..)) {
+            if let (Some(by), Some(own)) =
+                (by.and_then(|by| by_ends(&t, camera, by)), out.get_mut(t.base..))
+            {
                 pull_ends(&t.origin, &by, own);
             }
         });
@@ -75,12 +93,19 @@ impl Contours {
             projected.clear();
             projected.add(&instance.mesh, &placement, &Lens::new(camera));
             let vertices = projected.mesh(0);
-            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut room, |piece, origin| {
-                let seen = self.is(next, &piece).then_some(next);
-                next += usize::from(seen.is_some());
-                let ends = End::both(origin, &vertices);
-                f(Traced { piece, origin: *origin, ends, seen, instance, base });
-            });
+            trace_mesh(
+                &instance.mesh,
+                &placement,
+                camera,
+                &vertices,
+                &mut room,
+                |piece, origin| {
+                    let seen = self.is(next, &piece).then_some(next);
+                    next += usize::from(seen.is_some());
+                    let ends = End::both(origin, &vertices);
+                    f(Traced { piece, origin: *origin, ends, seen, instance, base });
+                },
+            );
             base += vertices.len();
         }
     }
@@ -96,13 +121,19 @@ impl Contours {
     }
 }
 
-/// From the derivatives by a piece to those by the ends of its segment, in world coordinates.
-fn by_ends(t: &Traced<'_>, camera: &Camera, &[gx, gy, by_length, by_angle]: &[f64; 4]) -> Option<[DVec3; 2]> {
+/// From the derivatives by a piece to those by the ends of its segment, in world
+/// coordinates.
+fn by_ends(
+    t: &Traced<'_>,
+    camera: &Camera,
+    &[gx, gy, by_length, by_angle]: &[f64; 4],
+) -> Option<[DVec3; 2]> {
     let Traced { instance, origin, .. } = t;
     let corners = origin.corners.map(|v| instance.mesh.positions.get(v as usize));
     let [Some(p), Some(q), Some(r)] = corners else { return None };
-    let ends =
-        origin.ends.map(|[a, b, c]| instance.affine.point(p.as_dvec3() * a + q.as_dvec3() * b + r.as_dvec3() * c));
+    let ends = origin.ends.map(|[a, b, c]| {
+        instance.affine.point(p.as_dvec3() * a + q.as_dvec3() * b + r.as_dvec3() * c)
+    });
     let [(ax, ay, a_depth), (bx, by, b_depth)] = ends.map(|e| camera.project(e));
     let (dx, dy) = (bx - ax, by - ay);
     let length = (dx * dx + dy * dy).sqrt();
@@ -114,7 +145,8 @@ fn by_ends(t: &Traced<'_>, camera: &Camera, &[gx, gy, by_length, by_angle]: &[f6
     let (stretch, turn) = (by_length * origin.share, by_angle / length);
     let along = [stretch * tx - turn * ty, stretch * ty + turn * tx];
     let pull = |end: DVec3, share: f64, sign: f64| {
-        let g = camera.pull_point(end, [share * gx + sign * along[0], share * gy + sign * along[1]]);
+        let g =
+            camera.pull_point(end, [share * gx + sign * along[0], share * gy + sign * along[1]]);
         if g.is_finite() { g } else { DVec3::ZERO }
     };
     Some([pull(ends[0], 1.0 - origin.at, -1.0), pull(ends[1], origin.at, 1.0)])
@@ -141,7 +173,12 @@ mod tests {
     /// Numbers of a piece in double precision, from the vertices in world coordinates.
     fn piece(camera: &Camera, vertices: &[DVec3], base: usize, o: &Origin) -> [f64; 4] {
         let ends = o.ends.map(|w| {
-            let at = o.corners.iter().zip(w).map(|(v, w)| vertices[base + *v as usize] * w).sum::<DVec3>();
+            let at = o
+                .corners
+                .iter()
+                .zip(w)
+                .map(|(v, w)| vertices[base + *v as usize] * w)
+                .sum::<DVec3>();
             camera.project(at)
         });
         let (dx, dy) = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
@@ -151,7 +188,9 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_differences_for_the_same_pieces() {
-        let place = |x: f64, turn: f64| Affine::new(DVec3::new(x, 0.1, -0.3), DVec3::new(turn, 0.4, 0.2), DVec3::ONE);
+        let place = |x: f64, turn: f64| {
+            Affine::new(DVec3::new(x, 0.1, -0.3), DVec3::new(turn, 0.4, 0.2), DVec3::ONE)
+        };
         let vase = lathe(&[(0.3, -0.8), (0.7, -0.2), (0.4, 0.5), (0.6, 0.9)], 24, true);
         let group = Solid::group(&[
             vase.placed(place(-0.8, 0.3)),
@@ -159,17 +198,24 @@ mod tests {
             cuboid(Vec3::new(0.8, 1.1, 0.6)).placed(place(0.2, -0.7)),
         ]);
         let mut parallel = Camera::default_for(96, 80);
-        parallel.projection = crate::render::Projection::Orthographic { units_per_pixel: 0.04, cx: 47.0, cy: 41.0 };
+        parallel.projection =
+            crate::render::Projection::Orthographic { units_per_pixel: 0.04, cx: 47.0, cy: 41.0 };
         for camera in [Camera::default_for(96, 80), parallel] {
             let contours = Contours::of(&group, &camera);
             let mut rng = Uniform(3);
             // Angles count by length: those of short pieces turn fast.
-            let one = |length: &f32| [1.0, 1.0, 1.0, f64::from(*length)].map(|by| by * (rng.next() - 0.5));
+            let one = |length: &f32| {
+                [1.0, 1.0, 1.0, f64::from(*length)].map(|by| by * (rng.next() - 0.5))
+            };
             let by: Vec<[f64; 4]> = contours.length.iter().map(one).collect();
             let found = contours.pull_fixed(&group, &camera, &by);
             let mut origins = Vec::new();
-            contours.each(&group, &camera, |t| origins.extend(t.seen.map(|i| (i, t.base, t.origin))));
-            assert!(origins.iter().map(|o| o.0).eq(0..contours.len()), "every piece was found again");
+            contours
+                .each(&group, &camera, |t| origins.extend(t.seen.map(|i| (i, t.base, t.origin))));
+            assert!(
+                origins.iter().map(|o| o.0).eq(0..contours.len()),
+                "every piece was found again"
+            );
             let vertices: Vec<DVec3> = group.vertices().collect();
             for (i, base, o) in &origins {
                 let [x, y, length, _] = piece(&camera, &vertices, *base, o);
@@ -179,14 +225,22 @@ mod tests {
             }
             let sum = |vertices: &[DVec3]| -> f64 {
                 let one = |(i, base, o): &(usize, usize, Origin)| {
-                    piece(&camera, vertices, *base, o).iter().zip(by[*i]).map(|(x, g)| x * g).sum::<f64>()
+                    piece(&camera, vertices, *base, o)
+                        .iter()
+                        .zip(by[*i])
+                        .map(|(x, g)| x * g)
+                        .sum::<f64>()
                 };
                 origins.iter().map(one).sum()
             };
             for _ in 0..20 {
-                let way: Vec<DVec3> =
-                    vertices.iter().map(|_| DVec3::from_array(std::array::from_fn(|_| rng.next() - 0.5))).collect();
-                let moved = |h: f64| vertices.iter().zip(&way).map(|(p, d)| *p + *d * h).collect::<Vec<_>>();
+                let way: Vec<DVec3> = vertices
+                    .iter()
+                    .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.next() - 0.5)))
+                    .collect();
+                let moved = |h: f64| {
+                    vertices.iter().zip(&way).map(|(p, d)| *p + *d * h).collect::<Vec<_>>()
+                };
                 let slope = (sum(&moved(1e-6)) - sum(&moved(-1e-6))) / 2e-6;
                 let along: f64 = found.iter().zip(&way).map(|(g, d)| g.dot(*d)).sum();
                 let scale: f64 = found.iter().zip(&way).map(|(g, d)| g.dot(*d).abs()).sum();

@@ -1,6 +1,8 @@
-//! The rasteriser: the triangles of a solid, cut at the near plane, and the picture of their nearness.
+//! The rasteriser: the triangles of a solid, cut at the near plane, and the picture of
+//! their nearness.
 //!
-//! It does no shading and keeps no state. Which pixels a triangle covers is said in [`super::triangle`].
+//! It does no shading and keeps no state. Which pixels a triangle covers is said in
+//! [`super::triangle`].
 
 use super::Camera;
 use super::candidates::Candidates;
@@ -24,7 +26,8 @@ pub(super) struct Source {
 /// Weights of a triangle that was not cut.
 pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Calls `draw` for each triangle that may touch the image, cut at the near plane. `projected` is that of [`project`].
+/// Calls `draw` for each triangle that may touch the image, cut at the near plane.
+/// `projected` is that of [`project`].
 pub(super) fn each_triangle(
     solid: &Solid,
     camera: &Camera,
@@ -33,9 +36,15 @@ pub(super) fn each_triangle(
 ) {
     for (instance, item) in solid.instances().iter().enumerate() {
         let placement = &Placement::new(camera, &item.affine);
-        mesh_triangles(&item.mesh, placement, camera, &projected.mesh(instance), |triangle, face| {
-            draw(triangle, &Source { instance, face });
-        });
+        mesh_triangles(
+            &item.mesh,
+            placement,
+            camera,
+            &projected.mesh(instance),
+            |triangle, face| {
+                draw(triangle, &Source { instance, face });
+            },
+        );
     }
 }
 
@@ -48,19 +57,24 @@ fn mesh_triangles(
     mut draw: impl FnMut(&Triangle, usize),
 ) {
     if !vertices.whole {
-        return cut_triangles(mesh, placement, camera, vertices, |triangle, face, _| draw(triangle, face));
+        return cut_triangles(mesh, placement, camera, vertices, |triangle, face, _| {
+            draw(triangle, face)
+        });
     }
     let (size, back) = (size(camera.width, camera.height), back(mesh, placement, vertices));
     for (face, corners) in mesh.topology.triangles.iter().enumerate() {
         let Some(places) = vertices.places(corners) else { continue };
-        if let Some(triangle) = Triangle::within(corners.map(|v| vertices.point(v)), places, size, back) {
+        if let Some(triangle) =
+            Triangle::within(corners.map(|v| vertices.point(v)), places, size, back)
+        {
             draw(&triangle, face);
         }
     }
 }
 
-/// Which way triangles turn that need not be drawn, as [`Triangle::new`] has it. With the eye outside, the faces of a body that
-/// are turned away are hidden by others. Counter-clockwise in the scene is counter-clockwise in the image, unless mirrored.
+/// Which way triangles turn that need not be drawn, as [`Triangle::new`] has it. With the
+/// eye outside, the faces of a body that are turned away are hidden by others.
+/// Counter-clockwise in the scene is counter-clockwise in the image, unless mirrored.
 fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
     match mesh.topology.encloses && vertices.whole {
         false => 0.0,
@@ -69,8 +83,9 @@ fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
     }
 }
 
-/// The triangles of a mesh with vertices that are not in front of the near plane. `draw` gets the face, and the weights of its three
-/// corners at each corner of the triangle: other than the identity where the near plane cut it.
+/// The triangles of a mesh with vertices that are not in front of the near plane. `draw`
+/// gets the face, and the weights of its three corners at each corner of the triangle:
+/// other than the identity where the near plane cut it.
 pub(super) fn cut_triangles(
     mesh: &Mesh,
     placement: &Placement,
@@ -81,7 +96,9 @@ pub(super) fn cut_triangles(
     let (size, lens) = (size(camera.width, camera.height), Lens::new(camera));
     for (face, corners) in mesh.topology.triangles.iter().enumerate() {
         let points = corners.map(|v| vertices.point(v));
-        if points.iter().any(|p| p.nearness.is_nan()) || points.iter().all(|p| p.nearness == f64::INFINITY) {
+        if points.iter().any(|p| p.nearness.is_nan())
+            || points.iter().all(|p| p.nearness == f64::INFINITY)
+        {
             continue;
         }
         let corners = corners.map(|v| placement.point(mesh.positions[v as usize].as_dvec3()));
@@ -101,7 +118,8 @@ pub(super) fn cut_triangles(
     }
 }
 
-/// The part of a triangle beyond the near plane as a polygon of at most four corners, each as weights.
+/// The part of a triangle beyond the near plane as a polygon of at most four corners,
+/// each as weights.
 fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
     let mut out = [[0.0; 3]; 4];
     let mut n = 0;
@@ -116,7 +134,8 @@ fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
             push(WHOLE[i]);
         }
         if (beyond[i] >= 0.0) != (beyond[j] >= 0.0) {
-            // From the far end in both of the faces that share the edge: the same point in both.
+            // From the far end in both of the faces that share the edge: the same point
+            // in both.
             let (far, near) = if beyond[i] >= 0.0 { (i, j) } else { (j, i) };
             let u = beyond[far] / (beyond[far] - beyond[near]);
             let mut w = [0.0; 3];
@@ -128,7 +147,8 @@ fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
     (out, n)
 }
 
-/// Draws nearness alone into `buffer` (row by row, refilled here) and returns the depth range of the vertices.
+/// Draws nearness alone into `buffer` (row by row, refilled here) and returns the depth
+/// range of the vertices.
 pub(super) fn draw_nearness(
     solid: &Solid,
     camera: &Camera,
@@ -144,7 +164,15 @@ pub(super) fn draw_nearness(
         let placement = Placement::new(camera, &item.affine);
         let vertices = projected.mesh(i);
         if !vertices.outside(camera) {
-            fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Wanted::All), buffer);
+            fill_mesh(
+                &item.mesh,
+                &placement,
+                camera,
+                &vertices,
+                candidates,
+                (&area, Wanted::All),
+                buffer,
+            );
         }
     }
     range
@@ -157,7 +185,8 @@ pub(super) enum Wanted<'a> {
     All,
     /// At marked pixels of the whole image; nothing is said of others.
     Marked(&'a Marks),
-    /// At those pixels of an area, a byte each, that are not 0; at others that the mesh covers, anything from this least nearness on.
+    /// At those pixels of an area, a byte each, that are not 0; at others that the mesh
+    /// covers, anything from this least nearness on.
     Exact(&'a [u8], f32),
 }
 
@@ -199,7 +228,8 @@ pub(super) fn draw_mesh(
     fill_mesh(mesh, placement, camera, vertices, candidates, (area, wanted), buffer);
 }
 
-/// Keeps the nearer of one mesh and what is there, in the rows of an area; with marks, the area is the whole image.
+/// Keeps the nearer of one mesh and what is there, in the rows of an area; with marks,
+/// the area is the whole image.
 pub(super) fn fill_mesh(
     mesh: &Mesh,
     placement: &Placement,
@@ -210,7 +240,9 @@ pub(super) fn fill_mesh(
     buffer: &mut [f32],
 ) {
     if !vertices.whole {
-        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.keep(buffer, area, wanted.marks()));
+        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| {
+            t.keep(buffer, area, wanted.marks())
+        });
     }
     let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
     vectorised(
@@ -219,8 +251,9 @@ pub(super) fn fill_mesh(
     );
 }
 
-/// As [`fill_mesh`] for a mesh all of whose vertices are in front of the near plane and in the whole image, and `faces` gets the face
-/// of each pixel where this mesh is nearer than what was there.
+/// As [`fill_mesh`] for a mesh all of whose vertices are in front of the near plane and
+/// in the whole image, and `faces` gets the face of each pixel where this mesh is nearer
+/// than what was there.
 pub(super) fn fill_faces(
     mesh: &Mesh,
     placement: &Placement,
@@ -253,11 +286,12 @@ impl Area {
         Area { left: 0, right: camera.width as usize, top: 0, bottom: camera.height as usize }
     }
 
-    /// All pixels that a mesh with these vertices can reach. The whole image if some of them are behind the near plane or not
-    /// usable and others are in view.
+    /// All pixels that a mesh with these vertices can reach. The whole image if some of
+    /// them are behind the near plane or not usable and others are in view.
     pub fn around(vertices: &Vertices<'_>, camera: &Camera) -> Area {
         if !vertices.whole {
-            let any = (0..vertices.len() as u32).any(|v| vertices.point(v).nearness < f64::INFINITY);
+            let any =
+                (0..vertices.len() as u32).any(|v| vertices.point(v).nearness < f64::INFINITY);
             return if any { Area::whole(camera) } else { Area::default() };
         }
         let extent = Extent::between(vertices.least_of_all(), size(camera.width, camera.height));
@@ -286,7 +320,8 @@ impl Area {
     #[inline]
     pub fn common(&self, other: &Area) -> Area {
         let (left, top) = (self.left.max(other.left), self.top.max(other.top));
-        let (right, bottom) = (self.right.min(other.right).max(left), self.bottom.min(other.bottom).max(top));
+        let (right, bottom) =
+            (self.right.min(other.right).max(left), self.bottom.min(other.bottom).max(top));
         Area { left, right, top, bottom }
     }
 

@@ -1,6 +1,8 @@
-//! Shaded pictures for people to look at: a light at the camera, some ambient light, a light background.
+//! Shaded pictures for people to look at: a light at the camera, some ambient light, a
+//! light background.
 //!
-//! Not a physical renderer and not used in inference. Every pixel of the frame gives one pixel of the picture.
+//! Not a physical renderer and not used in inference. Every pixel of the frame gives one
+//! pixel of the picture.
 
 use super::Frame;
 use image::{Rgb, RgbImage};
@@ -34,10 +36,12 @@ pub fn shade(frame: &Frame) -> RgbImage {
         }
         match (frame.normal.get(i), frame.part.get(i)) {
             (Some(n), Some(&part)) => {
-                // A little to the upper left of the camera, so that round things look round.
+                // A little to the upper left of the camera, so that round things look
+                // round.
                 let light = (0.95 * n[2] - 0.18 * n[0] + 0.25 * n[1]).max(0.0);
                 let shine = light.powi(24) * 0.18;
-                Rgb(PARTS[usize::from(part) % PARTS.len()].map(|c| tone(c * (0.28 + 0.72 * light) + shine)))
+                Rgb(PARTS[usize::from(part) % PARTS.len()]
+                    .map(|c| tone(c * (0.28 + 0.72 * light) + shine)))
             }
             _ => Rgb([tone(0.15 + 0.7 * (depth - near) / (far - near).max(f32::MIN_POSITIVE)); 3]),
         }
@@ -68,7 +72,13 @@ mod tests {
 
     #[test]
     fn depth_alone_is_shown_too() {
-        let frame = Frame { width: 2, height: 1, depth: vec![1.0, 2.0], part: Vec::new(), normal: Vec::new() };
+        let frame = Frame {
+            width: 2,
+            height: 1,
+            depth: vec![1.0, 2.0],
+            part: Vec::new(),
+            normal: Vec::new(),
+        };
         let picture = shade(&frame);
         assert!(picture.get_pixel(0, 0)[0] < picture.get_pixel(1, 0)[0]);
     }
@@ -76,7 +86,13 @@ mod tests {
     #[test]
     fn depth_alone_is_grey_from_0_15_to_0_85_of_white() {
         let grey = |depth: Vec<f32>| {
-            let frame = Frame { width: depth.len() as u32, height: 1, depth, part: Vec::new(), normal: Vec::new() };
+            let frame = Frame {
+                width: depth.len() as u32,
+                height: 1,
+                depth,
+                part: Vec::new(),
+                normal: Vec::new(),
+            };
             shade(&frame).pixels().map(|p| p.0).collect::<Vec<_>>()
         };
         assert_eq!(grey(vec![1.0, 1.25, 2.0]), [[38_u8; 3], [83; 3], [217; 3]]);

@@ -1,4 +1,5 @@
-//! Smooth silhouettes: in each face that they cross, the zero set of the (interpolated) facing, many faces at a time.
+//! Smooth silhouettes: in each face that they cross, the zero set of the (interpolated)
+//! facing, many faces at a time.
 
 use super::project::{Lens, Placement, Point, Vertices, beyond_near};
 use crate::geom::{Mesh, Patches, Run, Topology};
@@ -6,7 +7,8 @@ use glam::DVec3;
 
 /// The same for what is left in the end, and for small meshes.
 const FEW: usize = 16;
-/// Faces worked on at a time: so many, a number known beforehand, that loops over them become wide instructions.
+/// Faces worked on at a time: so many, a number known beforehand, that loops over them
+/// become wide instructions.
 pub(super) const MOST: usize = 64;
 
 /// As many bytes as vertices in the longest run, each 1.
@@ -15,7 +17,8 @@ const EACH: u128 = u128::MAX / 255;
 /// A number for each face.
 type Row = [f64; MOST];
 
-/// The faces that silhouettes cross, and what of them lies in each. Reused from mesh to mesh.
+/// The faces that silhouettes cross, and what of them lies in each. Reused from mesh to
+/// mesh.
 #[derive(Default)]
 pub(super) struct Crossed {
     faces: Vec<u32>,
@@ -23,7 +26,8 @@ pub(super) struct Crossed {
     batch: Batch,
 }
 
-/// Segments of silhouettes in the image, some faces at a time. Pairs are the two ends, threes of rows the axes.
+/// Segments of silhouettes in the image, some faces at a time. Pairs are the two ends,
+/// threes of rows the axes.
 pub(super) struct Batch {
     /// The vertices of each face; the first one's sign differs from the others'.
     pub corners: [[u32; 3]; MOST],
@@ -35,7 +39,8 @@ pub(super) struct Batch {
     pub ends: [[Row; 3]; 2],
     /// Pixels.
     pub length: Row,
-    /// Unit vector from the first end to the second, turned so that outward lies to the left of it.
+    /// Unit vector from the first end to the second, turned so that outward lies to the
+    /// left of it.
     pub tangent: [Row; 2],
     /// Unit vector away from the surface.
     pub outward: [Row; 2],
@@ -45,7 +50,8 @@ pub(super) struct Batch {
     pub middle: [Row; 2],
     /// Scene units, there.
     pub depth: Row,
-    /// Position, normal and facing of the corners in the mesh's coordinates; the same corners in the image.
+    /// Position, normal and facing of the corners in the mesh's coordinates; the same
+    /// corners in the image.
     positions: [[Row; 3]; 3],
     normals: [[Row; 3]; 3],
     facing: [Row; 3],
@@ -80,8 +86,8 @@ impl Default for Batch {
 }
 
 impl Crossed {
-    /// Calls `out` with the segments in all faces of a mesh, in their order, some at a time, and how many there are; `facing` and
-    /// whether it is not negative by vertex.
+    /// Calls `out` with the segments in all faces of a mesh, in their order, some at a
+    /// time, and how many there are; `facing` and whether it is not negative by vertex.
     #[inline(always)]
     pub fn each(
         &mut self,
@@ -120,7 +126,10 @@ impl Crossed {
         for (i, (patch, triangles)) in patches.zip(triangles.chunks(Patches::FACES)).enumerate() {
             let (mut some, mut all) = (false, true);
             for run in patch {
-                let Some(bytes) = front.get(run.first..).and_then(|front| front.first_chunk()) else { continue };
+                let Some(bytes) = front.get(run.first..).and_then(|front| front.first_chunk())
+                else {
+                    continue;
+                };
                 let wanted = EACH >> (8 * (Run::MOST - run.count));
                 let own = u128::from_le_bytes(*bytes) & wanted;
                 (some, all) = (some | (own != 0), all & (own == wanted));
@@ -129,8 +138,11 @@ impl Crossed {
                 continue;
             }
             for (face, corners) in (i * Patches::FACES..).zip(triangles) {
-                let [Some(&a), Some(&b), Some(&c)] = corners.map(|v| front.get(v as usize)) else { continue };
-                // Each is written down, and written over unless it counts: a branch could not be foretold.
+                let [Some(&a), Some(&b), Some(&c)] = corners.map(|v| front.get(v as usize)) else {
+                    continue;
+                };
+                // Each is written down, and written over unless it counts: a branch could
+                // not be foretold.
                 if let Some(place) = faces.get_mut(count) {
                     *place = face as u32;
                 }
@@ -156,7 +168,11 @@ impl Batch {
     /// The two ends of a segment in the image.
     #[inline(always)]
     pub fn segment(&self, i: usize) -> [Point; 2] {
-        self.ends.each_ref().map(|[x, y, nearness]| Point { x: x[i], y: y[i], nearness: nearness[i] })
+        self.ends.each_ref().map(|[x, y, nearness]| Point {
+            x: x[i],
+            y: y[i],
+            nearness: nearness[i],
+        })
     }
 
     /// The same as shares of the corners.
@@ -167,23 +183,38 @@ impl Batch {
     }
 
     #[inline(always)]
-    fn set(&mut self, i: usize, corners: [u32; 3], mesh: &Mesh, vertices: &Vertices<'_>, facing: &[f64]) {
+    fn set(
+        &mut self,
+        i: usize,
+        corners: [u32; 3],
+        mesh: &Mesh,
+        vertices: &Vertices<'_>,
+        facing: &[f64],
+    ) {
         self.corners[i] = corners;
         for (k, v) in corners.into_iter().enumerate() {
             let (at, point) = (v as usize, vertices.point(v));
-            let [p, n] =
-                [&mesh.positions, &mesh.normals].map(|list| list.get(at).copied().unwrap_or_default().as_dvec3());
+            let [p, n] = [&mesh.positions, &mesh.normals]
+                .map(|list| list.get(at).copied().unwrap_or_default().as_dvec3());
             for axis in 0..3 {
                 (self.positions[k][axis][i], self.normals[k][axis][i]) = (p[axis], n[axis]);
             }
-            [self.image[k][0][i], self.image[k][1][i], self.image[k][2][i]] = [point.x, point.y, point.nearness];
+            [self.image[k][0][i], self.image[k][1][i], self.image[k][2][i]] =
+                [point.x, point.y, point.nearness];
             self.facing[k][i] = facing.get(at).copied().unwrap_or_default();
         }
     }
 
-    /// Works out the segments in the first `N` faces, of which `count` are set; `whole` if all of the mesh is in view.
+    /// Works out the segments in the first `N` faces, of which `count` are set; `whole`
+    /// if all of the mesh is in view.
     #[inline(always)]
-    fn work<const N: usize>(&mut self, placement: &Placement, lens: &Lens, count: usize, whole: bool) {
+    fn work<const N: usize>(
+        &mut self,
+        placement: &Placement,
+        lens: &Lens,
+        count: usize,
+        whole: bool,
+    ) {
         self.cross::<N>(placement);
         if !whole {
             self.cut(count);
@@ -227,8 +258,10 @@ impl Batch {
     fn cut(&mut self, count: usize) {
         for i in 0..count {
             let nearness = self.image.each_ref().map(|at| at[2][i]);
-            let seen = nearness.iter().any(|n| *n < f64::INFINITY) && !nearness.iter().any(|n| n.is_nan());
-            let ends = self.camera.each_ref().map(|end| DVec3::new(end[0][i], end[1][i], end[2][i]));
+            let seen =
+                nearness.iter().any(|n| *n < f64::INFINITY) && !nearness.iter().any(|n| n.is_nan());
+            let ends =
+                self.camera.each_ref().map(|end| DVec3::new(end[0][i], end[1][i], end[2][i]));
             let part = beyond_near(ends).filter(|_| seen);
             self.there[i] = part.is_some();
             for (end, at) in self.camera.iter_mut().zip(part.unwrap_or(ends)) {
@@ -241,21 +274,38 @@ impl Batch {
     #[inline(always)]
     fn draw<const N: usize, const PINHOLE: bool>(&mut self, lens: &Lens) {
         let lens = Lens { pinhole: PINHOLE, ..*lens };
-        let Batch { camera, normal, image, ends, length, tangent, outward, slack, middle, depth, there, .. } = self;
+        let Batch {
+            camera,
+            normal,
+            image,
+            ends,
+            length,
+            tangent,
+            outward,
+            slack,
+            middle,
+            depth,
+            there,
+            ..
+        } = self;
         for i in 0..N {
-            let [a, b] = camera.each_ref().map(|end| lens.point(DVec3::new(end[0][i], end[1][i], end[2][i])));
+            let [a, b] = camera
+                .each_ref()
+                .map(|end| lens.point(DVec3::new(end[0][i], end[1][i], end[2][i])));
             let (dx, dy) = (b.x - a.x, b.y - a.y);
             let long = (dx * dx + dy * dy).sqrt();
             let (tx, ty) = (dx / long, dy / long);
-            // The plane through the eye with this normal cuts the image in a line at right angles to (x, y) of it.
+            // The plane through the eye with this normal cuts the image in a line at
+            // right angles to (x, y) of it.
             let (nx, ny) = (normal[0][i], normal[1][i]);
             let size = (nx * nx + ny * ny).sqrt();
             let sound = size > 1e-12;
-            let (ox, oy) = (if sound { nx / size } else { ty }, if sound { -ny / size } else { -tx });
+            let (ox, oy) =
+                (if sound { nx / size } else { ty }, if sound { -ny / size } else { -tx });
             let steep = if long > 0.02 { (b.nearness - a.nearness) / long } else { 0.0 };
-            let ahead = image
-                .each_ref()
-                .map(|[x, y, nearness]| nearness[i] - a.nearness - steep * ((x[i] - a.x) * tx + (y[i] - a.y) * ty));
+            let ahead = image.each_ref().map(|[x, y, nearness]| {
+                nearness[i] - a.nearness - steep * ((x[i] - a.x) * tx + (y[i] - a.y) * ty)
+            });
             let most = ahead.into_iter().fold(0.0, |m, x| if x > m { x } else { m });
             slack[i] = if PINHOLE { most / (a.nearness * a.nearness) } else { most };
             let way = if ty * ox - tx * oy < 0.0 { -1.0 } else { 1.0 };

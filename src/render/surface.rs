@@ -1,7 +1,9 @@
-//! How depth moves with the surface: from derivatives by the depth at each pixel to derivatives by the vertices.
+//! How depth moves with the surface: from derivatives by the depth at each pixel to
+//! derivatives by the vertices.
 //!
-//! At a pixel the depth is where its line of sight meets the plane of the face that is seen; which face that is, is taken as it
-//! is. The motion of the outline is the business of [`View::pull_mask`].
+//! At a pixel the depth is where its line of sight meets the plane of the face that is
+//! seen; which face that is, is taken as it is. The motion of the outline is the business
+//! of [`View::pull_mask`].
 
 use super::View;
 use super::project::{Projected, project};
@@ -9,8 +11,9 @@ use super::raster::{each_triangle, empty};
 use glam::DVec3;
 
 impl View {
-    /// The derivatives by each vertex of the solid's meshes in turn, in world coordinates, from those by the depth at each pixel,
-    /// row by row, of the picture whose longer side has `size` pixels. What is not seen counts as 0.
+    /// The derivatives by each vertex of the solid's meshes in turn, in world
+    /// coordinates, from those by the depth at each pixel, row by row, of the picture
+    /// whose longer side has `size` pixels. What is not seen counts as 0.
     pub fn pull_depth(&self, size: u32, by_depth: &[f64]) -> Vec<DVec3> {
         let (solid, camera) = (self.solid(), self.camera().scaled_to(size));
         let mut projected = Projected::default();
@@ -30,7 +33,8 @@ impl View {
                 }
             });
         });
-        let first = |n: usize| solid.instances()[..n].iter().map(|i| i.mesh.positions.len()).sum::<usize>();
+        let first =
+            |n: usize| solid.instances()[..n].iter().map(|i| i.mesh.positions.len()).sum::<usize>();
         let firsts: Vec<usize> = (0..solid.instances().len()).map(first).collect();
         let mut out = vec![DVec3::ZERO; solid.vertex_count()];
         for (i, (face, by)) in faces.iter().zip(by_depth).enumerate() {
@@ -41,7 +45,8 @@ impl View {
             let ray = camera.unproject(x, y, 1.0) - start;
             let item = &solid.instances()[instance];
             let corners = item.mesh.topology.triangles[face];
-            let [a, b, c] = corners.map(|v| item.affine.point(item.mesh.positions[v as usize].as_dvec3()));
+            let [a, b, c] =
+                corners.map(|v| item.affine.point(item.mesh.positions[v as usize].as_dvec3()));
             let normal = (b - a).cross(c - a);
             let slope = normal / normal.dot(ray);
             let hit = start + ray * slope.dot(a - start);
@@ -69,13 +74,19 @@ mod tests {
 
     #[test]
     fn depth_moves_with_the_plane_of_the_face_that_is_seen() {
-        // On the plane z = x / 8, whose depth at a pixel grows by dx / 8 - dz where the line of sight is along -z.
-        let corners = [Vec3::new(-2.0, -2.0, -0.25), Vec3::new(14.0, -2.0, 1.75), Vec3::new(-2.0, 6.0, -0.25)];
+        // On the plane z = x / 8, whose depth at a pixel grows by dx / 8 - dz where the
+        // line of sight is along -z.
+        let corners = [
+            Vec3::new(-2.0, -2.0, -0.25),
+            Vec3::new(14.0, -2.0, 1.75),
+            Vec3::new(-2.0, 6.0, -0.25),
+        ];
         let triangle = solid(corners.to_vec(), vec![[0, 1, 2]]);
         let pinhole = Camera::default_for(3, 3);
         let projection = Projection::Orthographic { units_per_pixel: 1.0, cx: 1.5, cy: 1.5 };
         let parallel = Camera { projection, ..pinhole };
-        // The middle pixel shows the origin, the one to the right of it (1, 0, 1 / 8): the shares of the corners there.
+        // The middle pixel shows the origin, the one to the right of it (1, 0, 1 / 8):
+        // the shares of the corners there.
         for (camera, pixel, shares) in [
             (pinhole, 4, [0.625, 0.125, 0.25]),
             (parallel, 4, [0.625, 0.125, 0.25]),

@@ -13,8 +13,8 @@ pub fn solid(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Solid {
     Solid::new(Arc::new(Mesh::new(positions, triangles, parts).unwrap()))
 }
 
-/// A surface of revolution about y through (radius, height) points given from the bottom up; with `capped`, the ends
-/// that are off the axis are closed by discs.
+/// A surface of revolution about y through (radius, height) points given from the bottom
+/// up; with `capped`, the ends that are off the axis are closed by discs.
 pub fn lathe(profile: &[(f32, f32)], segments: u32, capped: bool) -> Solid {
     let mut points = profile.to_vec();
     if capped {
@@ -68,7 +68,8 @@ pub fn cuboid(half: Vec3) -> Solid {
         let side = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
         half * Vec3::new(side(1), side(2), side(4))
     };
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     solid((0..8).map(corner).collect(), triangles)
 }
@@ -90,7 +91,8 @@ impl Uniform {
         low + (high - low) * self.next()
     }
 
-    /// A triangle of about some size in an image of 40 x 30 pixels, or partly out of it; `halves` puts corners on half pixels.
+    /// A triangle of about some size in an image of 40 x 30 pixels, or partly out of it;
+    /// `halves` puts corners on half pixels.
     pub fn corners(&mut self, size: f64, halves: bool) -> [Point; 3] {
         let middle = [self.between(-2.0, 42.0), self.between(-2.0, 32.0)];
         std::array::from_fn(|_| {
@@ -103,12 +105,15 @@ impl Uniform {
     }
 }
 
-/// The folders of the object data set that hold a camera, with their names, sorted; none when it is not there.
+/// The folders of the object data set that hold a camera, with their names, sorted; none
+/// when it is not there.
 pub fn cases() -> Vec<(String, PathBuf)> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let roots = ["../shared", "../../shared"].map(|at| root.join(at).join("data/objects"));
     let mut out = Vec::new();
-    for folder in roots.iter().filter(|r| r.is_dir()).take(1).flat_map(|r| [r.clone(), r.join("real")]) {
+    for folder in
+        roots.iter().filter(|r| r.is_dir()).take(1).flat_map(|r| [r.clone(), r.join("real")])
+    {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             if entry.path().join("camera.json").is_file() {
                 out.push((entry.file_name().to_string_lossy().into_owned(), entry.path()));
@@ -119,7 +124,8 @@ pub fn cases() -> Vec<(String, PathBuf)> {
     out
 }
 
-/// A sum over contours of their length, weighted by a smooth function of the place, and its derivatives by the pieces.
+/// A sum over contours of their length, weighted by a smooth function of the place, and
+/// its derivatives by the pieces.
 pub fn weighted(c: &Contours) -> (f64, Vec<[f64; 4]>) {
     let one = |((x, y), length): ((&f32, &f32), &f32)| {
         let [x, y, length] = [x, y, length].map(|v| f64::from(*v));
@@ -131,7 +137,8 @@ pub fn weighted(c: &Contours) -> (f64, Vec<[f64; 4]>) {
     (all.iter().map(|a| a.0).sum(), all.iter().map(|a| a.1).collect())
 }
 
-/// The slope of something along a way, from its derivatives by the vertices and where those are before and after.
+/// The slope of something along a way, from its derivatives by the vertices and where
+/// those are before and after.
 pub fn along(by_vertex: &[DVec3], before: &Solid, after: &Solid, way: f64) -> f64 {
     let moved = before.vertices().zip(after.vertices()).map(|(a, b)| (b - a) / way);
     by_vertex.iter().zip(moved).map(|(g, d)| g.dot(d)).sum()

@@ -1,7 +1,9 @@
-//! The pieces of contour of one mesh, hidden or not: silhouettes, creases and boundaries, cut to the image.
+//! The pieces of contour of one mesh, hidden or not: silhouettes, creases and boundaries,
+//! cut to the image.
 //!
-//! It knows neither the other meshes of the solid nor the depth image; `visibility` says which pieces are seen. Invariant:
-//! every piece is finite, inside the image, at most 1.5 pixels long, and a function of mesh, placement and camera alone.
+//! It knows neither the other meshes of the solid nor the depth image; `visibility` says
+//! which pieces are seen. Invariant: every piece is finite, inside the image, at most 1.5
+//! pixels long, and a function of mesh, placement and camera alone.
 
 use super::Camera;
 use super::project::{Fronts, Lens, Placement, Point, Vertices, beyond_near};
@@ -15,8 +17,9 @@ fn usable(p: &Point) -> bool {
     p.nearness < f64::INFINITY
 }
 
-/// Where on the surface a piece comes from: a share of a segment between two points of a face or edge. What silhouettes do besides
-/// moving with these points is said in [`super::wander`].
+/// Where on the surface a piece comes from: a share of a segment between two points of a
+/// face or edge. What silhouettes do besides moving with these points is said in
+/// [`super::wander`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Origin {
     /// Vertices of the mesh; of an edge, its second one twice.
@@ -38,7 +41,8 @@ pub(super) struct Room {
     crossed: Crossed,
 }
 
-/// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices` are its own in the image.
+/// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices`
+/// are its own in the image.
 pub(super) fn trace_mesh(
     mesh: &Mesh,
     placement: &Placement,
@@ -53,17 +57,23 @@ pub(super) fn trace_mesh(
     let lens = Lens::new(camera);
     let mut tracer = Tracer { mesh, placement, vertices, open: true, lens, image, size, out };
     // Through holes too small to be seen nothing is seen.
-    let hole = |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
+    let hole =
+        |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
     tracer.open = mesh.topology.edges.open() && mesh.topology.edges.lines().any(hole);
     let signs = (&fronts.facing[..], &fronts.front[..]);
     vectorised(
         #[inline(always)]
-        || crossed.each(mesh, placement, &lens, vertices, signs, |batch, count| tracer.silhouettes(batch, count)),
+        || {
+            crossed.each(mesh, placement, &lens, vertices, signs, |batch, count| {
+                tracer.silhouettes(batch, count)
+            })
+        },
     );
     tracer.edges();
 }
 
-/// Lines of edges, holes say, that are less than this high and wide together, in pixels, are left out.
+/// Lines of edges, holes say, that are less than this high and wide together, in pixels,
+/// are left out.
 const SPECK: f32 = 0.1;
 
 /// The length in pixels from which on segments are divided.
@@ -94,21 +104,30 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
                 continue;
             }
             let ([a, b], length) = (batch.segment(i), batch.length[i]);
-            let [tangent, direction, middle] =
-                [&batch.tangent, &batch.outward, &batch.middle].map(|pair| [pair[0][i], pair[1][i]]);
+            let [tangent, direction, middle] = [&batch.tangent, &batch.outward, &batch.middle]
+                .map(|pair| [pair[0][i], pair[1][i]]);
             let slack = batch.slack[i];
             let look = match self.open {
                 false => Look::Outward { direction, slack },
                 true => Look::BothSides { direction, slack: [slack; 2] },
             };
-            if length < LONGEST && self.inside(&a) && self.inside(&b) && batch.depth[i].is_finite() {
+            if length < LONGEST && self.inside(&a) && self.inside(&b) && batch.depth[i].is_finite()
+            {
                 // Nearly all are one piece.
                 let piece = self.image.piece(middle, batch.depth[i], tangent, length, &look, false);
                 let (corners, ends) = (batch.corners[i], batch.weights(i));
                 let forward = (b.x - a.x) * tangent[0] + (b.y - a.y) * tangent[1] > 0.0;
                 (self.out)(piece, &Origin { corners, ends, at: 0.5, share: 1.0, forward });
             } else {
-                self.cut(&a, &b, length, tangent, &look, false, (batch.corners[i], batch.weights(i)));
+                self.cut(
+                    &a,
+                    &b,
+                    length,
+                    tangent,
+                    &look,
+                    false,
+                    (batch.corners[i], batch.weights(i)),
+                );
             }
         }
     }
@@ -130,7 +149,9 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
     /// A crease or boundary edge.
     fn edge(&mut self, vertices: [u32; 2], faces: [u32; 2]) {
         let Tracer { mesh, placement, vertices: points, open, .. } = *self;
-        let [Some(from), Some(to)] = vertices.map(|v| mesh.positions.get(v as usize)) else { return };
+        let [Some(from), Some(to)] = vertices.map(|v| mesh.positions.get(v as usize)) else {
+            return;
+        };
         let ends = vertices.map(|v| points.point(v));
         if ends.iter().any(|p| p.nearness.is_nan()) || !ends.iter().any(usable) {
             return;
@@ -144,8 +165,11 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
         let (mut any_front, mut side) = (false, 0.0f64);
         for face in faces {
             let Some(face) = mesh.topology.triangles.get(face as usize) else { continue };
-            // The corner off the edge; the vertices of a crease are split, so positions are compared.
-            let opposite = face.iter().find(|&&v| mesh.positions.get(v as usize).is_some_and(|p| p != from && p != to));
+            // The corner off the edge; the vertices of a crease are split, so positions
+            // are compared.
+            let opposite = face
+                .iter()
+                .find(|&&v| mesh.positions.get(v as usize).is_some_and(|p| p != from && p != to));
             let Some(&opposite) = opposite else { continue };
             let corners = face.map(|v| placement.point(mesh.positions[v as usize].as_dvec3()));
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -171,13 +195,22 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
             let look = Look::BothSides { direction, slack };
             let corners = [vertices[0], vertices[1], vertices[1]];
             let ends = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-            self.cut(&a, &b, length, if side < 0.0 { [-tx, -ty] } else { [tx, ty] }, &look, true, (corners, ends));
+            self.cut(
+                &a,
+                &b,
+                length,
+                if side < 0.0 { [-tx, -ty] } else { [tx, ty] },
+                &look,
+                true,
+                (corners, ends),
+            );
         }
     }
 
     /// A difference of nearness at a point as a difference of depth, at least 0.
     fn in_depth(&self, nearness: f64, at: &Point) -> f64 {
-        let depth = if self.lens.pinhole { nearness / (at.nearness * at.nearness) } else { nearness };
+        let depth =
+            if self.lens.pinhole { nearness / (at.nearness * at.nearness) } else { nearness };
         depth.max(0.0)
     }
 
@@ -189,9 +222,22 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
 
     /// Clips a segment of some length to the image and divides it.
     #[allow(clippy::too_many_arguments)]
-    fn cut(&mut self, a: &Point, b: &Point, length: f64, tangent: [f64; 2], look: &Look, edge: bool, from: Segment) {
+    fn cut(
+        &mut self,
+        a: &Point,
+        b: &Point,
+        length: f64,
+        tangent: [f64; 2],
+        look: &Look,
+        edge: bool,
+        from: Segment,
+    ) {
         let (dx, dy) = (b.x - a.x, b.y - a.y);
-        let part = if self.inside(a) && self.inside(b) { Some((0.0, 1.0)) } else { clip(a, [dx, dy], self.size) };
+        let part = if self.inside(a) && self.inside(b) {
+            Some((0.0, 1.0))
+        } else {
+            clip(a, [dx, dy], self.size)
+        };
         let Some((t0, t1)) = part else { return };
         let length = length * (t1 - t0);
         if !(length > 1e-9 && length.is_finite()) {
@@ -206,13 +252,17 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
             let depth = self.lens.depth(a.nearness + (b.nearness - a.nearness) * t);
             if depth.is_finite() {
                 let origin = Origin { corners: from.0, ends: from.1, at: t, share: step, forward };
-                (self.out)(self.image.piece(at, depth, tangent, length / pieces, look, edge), &origin);
+                (self.out)(
+                    self.image.piece(at, depth, tangent, length / pieces, look, edge),
+                    &origin,
+                );
             }
         }
     }
 }
 
-/// Unit direction and length in pixels; `None` for a segment too short or too long to have one.
+/// Unit direction and length in pixels; `None` for a segment too short or too long to
+/// have one.
 fn tangent(a: &Point, b: &Point) -> Option<[f64; 3]> {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let length = (dx * dx + dy * dy).sqrt();

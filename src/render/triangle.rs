@@ -1,7 +1,8 @@
 //! Triangles and the picture of their nearness.
 //!
-//! Which pixels a triangle covers is said in [`super::coverage`], from rounded corners; nearness comes from the corners as they
-//! were. Eight pixels at a time or by runs: the same numbers.
+//! Which pixels a triangle covers is said in [`super::coverage`], from rounded corners;
+//! nearness comes from the corners as they were. Eight pixels at a time or by runs: the
+//! same numbers.
 
 use super::coverage::Coverage;
 use super::lanes::{LANES, all_bits};
@@ -80,11 +81,20 @@ impl Plane {
         (self.first + self.by_row * (row as f64 + 0.5 - self.corner)) as f32
     }
 
-    /// Keeps the nearer of the lanes from a column of a row on and what is there, at `at` in a buffer. Gives the lanes that are
-    /// nearer, all of their bits set.
+    /// Keeps the nearer of the lanes from a column of a row on and what is there, at `at`
+    /// in a buffer. Gives the lanes that are nearer, all of their bits set.
     #[inline(always)]
-    pub fn keep(&self, buffer: &mut [f32], at: usize, row: usize, from: usize, outside: i32x8) -> f32x8 {
-        let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return f32x8::ZERO };
+    pub fn keep(
+        &self,
+        buffer: &mut [f32],
+        at: usize,
+        row: usize,
+        from: usize,
+        outside: i32x8,
+    ) -> f32x8 {
+        let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
+            return f32x8::ZERO;
+        };
         let there = f32x8::new(*pixels);
         let offset = (from as i32 - self.origin as i32) as f32;
         let along = (f32x8::new(std::array::from_fn(|i| i as f32)) + offset) * self.step;
@@ -99,17 +109,22 @@ impl Plane {
 /// Writes a face into the lanes that are nearer, at `at` in a buffer.
 #[inline(always)]
 pub(super) fn put_face(faces: &mut [u32], at: usize, face: u32, nearer: f32x8) {
-    let Some(pixels) = faces.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return };
+    let Some(pixels) = faces.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
+        return;
+    };
     let nearer: [u32; LANES] = cast(nearer);
     for (pixel, nearer) in pixels.iter_mut().zip(nearer) {
         *pixel = (*pixel & !nearer) | (face & nearer);
     }
 }
 
-/// Keeps the nearer of this and what is there, in the lanes of a triangle, at `at` in a buffer.
+/// Keeps the nearer of this and what is there, in the lanes of a triangle, at `at` in a
+/// buffer.
 #[inline(always)]
 pub(super) fn keep_all(buffer: &mut [f32], at: usize, nearness: f32, outside: i32x8) {
-    let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return };
+    let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
+        return;
+    };
     let (there, q) = (f32x8::new(*pixels), f32x8::splat(nearness));
     *pixels = (q.simd_gt(there) & !all_bits(outside)).bitselect(q, there).to_array();
 }
@@ -137,14 +152,24 @@ pub(super) struct Triangle {
 impl Triangle {
     /// As [`Triangle::new`], in an image of some [`size`](super::place::size).
     #[inline(always)]
-    pub fn within(points: [Point; 3], places: [Place; 3], size: Vec4, back: f64) -> Option<Triangle> {
+    pub fn within(
+        points: [Point; 3],
+        places: [Place; 3],
+        size: Vec4,
+        back: f64,
+    ) -> Option<Triangle> {
         let extent = Extent::around(places, size);
         if extent.is_empty() { None } else { Triangle::new(points, places, extent, back) }
     }
 
     /// `None` when it covers nothing, or shows a back as in [`Coverage::new`].
     #[inline(always)]
-    pub fn new(points: [Point; 3], places: [Place; 3], extent: Extent, back: f64) -> Option<Triangle> {
+    pub fn new(
+        points: [Point; 3],
+        places: [Place; 3],
+        extent: Extent,
+        back: f64,
+    ) -> Option<Triangle> {
         Triangle::covering(Coverage::new(places, || points, extent, back)?, points)
     }
 
@@ -163,8 +188,8 @@ impl Triangle {
         });
     }
 
-    /// Keeps the nearer of the triangle and what is there, in the rows of an area; with marks, at marked pixels at least, and the area is
-    /// the whole image.
+    /// Keeps the nearer of the triangle and what is there, in the rows of an area; with
+    /// marks, at marked pixels at least, and the area is the whole image.
     pub fn keep(&self, buffer: &mut [f32], area: &Area, marks: Option<&Marks>) {
         match marks {
             Some(marks) => self.fill_some(buffer, area.right - area.left, marks),
@@ -172,7 +197,8 @@ impl Triangle {
         }
     }
 
-    /// As [`Triangle::keep`], in a buffer of some columns from `left` on and rows from `top` on.
+    /// As [`Triangle::keep`], in a buffer of some columns from `left` on and rows from
+    /// `top` on.
     #[inline(never)]
     pub fn fill(&self, buffer: &mut [f32], [left, right]: [usize; 2], top: usize) {
         let width = right - left;
@@ -182,7 +208,9 @@ impl Triangle {
                 return;
             }
             let start = (run.row - top) * width;
-            let Some(pixels) = buffer.get_mut(start + from - left..start + to - left) else { return };
+            let Some(pixels) = buffer.get_mut(start + from - left..start + to - left) else {
+                return;
+            };
             for (column, pixel) in (from..).zip(pixels) {
                 let q = run.nearness(column);
                 *pixel = if q > *pixel { q } else { *pixel };
@@ -190,7 +218,8 @@ impl Triangle {
         });
     }
 
-    /// As [`Triangle::fill`] in an area, with the face written where the triangle is nearer.
+    /// As [`Triangle::fill`] in an area, with the face written where the triangle is
+    /// nearer.
     #[inline(never)]
     pub fn fill_faces(&self, buffer: &mut [f32], (faces, face): (&mut [u32], u32), area: &Area) {
         let width = area.right - area.left;
@@ -201,7 +230,10 @@ impl Triangle {
             }
             let start = (run.row - area.top) * width;
             let range = start + from - area.left..start + to - area.left;
-            let (Some(pixels), Some(faces)) = (buffer.get_mut(range.clone()), faces.get_mut(range)) else { return };
+            let (Some(pixels), Some(faces)) = (buffer.get_mut(range.clone()), faces.get_mut(range))
+            else {
+                return;
+            };
             for ((column, pixel), seen) in (from..).zip(pixels).zip(faces) {
                 let q = run.nearness(column);
                 if q > *pixel {
@@ -211,7 +243,8 @@ impl Triangle {
         });
     }
 
-    /// As [`Triangle::fill`] for a whole image of some columns, but pixels that are not marked need not be drawn.
+    /// As [`Triangle::fill`] for a whole image of some columns, but pixels that are not
+    /// marked need not be drawn.
     #[inline(never)]
     fn fill_some(&self, buffer: &mut [f32], width: usize, marks: &Marks) {
         self.runs(|run| {
@@ -278,7 +311,12 @@ mod tests {
             };
             let middle = at(4.0 + place(8.0), 4.0 + place(8.0));
             let far = if round % 3 == 0 { 1e6 } else { 0.0 };
-            let square = [at(-far, -far), at(16.0 + far, -far), at(16.0 + far, 16.0 + far), at(-far, 16.0 + far)];
+            let square = [
+                at(-far, -far),
+                at(16.0 + far, -far),
+                at(16.0 + far, 16.0 + far),
+                at(-far, 16.0 + far),
+            ];
             let fan: Vec<_> = (0..4).map(|i| [square[i], square[(i + 1) % 4], middle]).collect();
             assert!(cover(&fan, 16).iter().all(|&n| n == 1), "round {round}");
         }
@@ -322,7 +360,11 @@ mod tests {
             let mut part = vec![0.5f32; (width - left) * (height - top)];
             triangle.fill(&mut part, [left, width], top);
             for (row, own) in part.chunks(width - left).enumerate() {
-                assert_eq!(own, &by_runs[(top + row) * width + left..(top + row + 1) * width], "round {round}");
+                assert_eq!(
+                    own,
+                    &by_runs[(top + row) * width + left..(top + row + 1) * width],
+                    "round {round}"
+                );
             }
             triangle.fill_some(&mut some, width, &marks);
             let third = |list: &[f32]| list.iter().step_by(3).copied().collect::<Vec<_>>();

@@ -1,7 +1,8 @@
 //! A solid seen by a camera, with its frames and contours computed when first asked for.
 //!
-//! Not a scene graph and not mutable: another pose is another `View`. Invariant: for one image size the frame, the depth and the
-//! contours are computed once, and every caller gets the same `Arc`.
+//! Not a scene graph and not mutable: another pose is another `View`. Invariant: for one
+//! image size the frame, the depth and the contours are computed once, and every caller
+//! gets the same `Arc`.
 
 use super::detail::Drawn;
 use super::{Camera, Change, Channels, Contours, Frame, Scene, backdrop};
@@ -30,8 +31,9 @@ impl View {
         View::with_detail(solid, camera, 0.0)
     }
 
-    /// A view whose contours and depth may show meshes coarser than they are, as long as every vertex left out is within `detail` pixels
-    /// of what is drawn, whatever the size of the picture; 0 for meshes as they are.
+    /// A view whose contours and depth may show meshes coarser than they are, as long as
+    /// every vertex left out is within `detail` pixels of what is drawn, whatever the
+    /// size of the picture; 0 for meshes as they are.
     pub fn with_detail(solid: Solid, camera: Camera, detail: f64) -> View {
         let (frames, depths, contours) = (Mutex::default(), Mutex::default(), Mutex::default());
         View { solid, camera, detail, frames, depths, contours, changes: Mutex::default() }
@@ -52,23 +54,30 @@ impl View {
         self.detail
     }
 
-    /// What contours and depth show in the picture whose longer side has `size` pixels (0 counts as 1).
+    /// What contours and depth show in the picture whose longer side has `size` pixels (0
+    /// counts as 1).
     pub fn scene(&self, size: u32) -> Scene {
         let camera = self.camera.scaled_to(size);
         Scene { solid: self.drawn(&camera).solid, camera }
     }
 
-    /// All channels of the picture whose longer side has `size` pixels (0 counts as 1), of meshes as they are.
+    /// All channels of the picture whose longer side has `size` pixels (0 counts as 1),
+    /// of meshes as they are.
     pub fn frame(&self, size: u32) -> Arc<Frame> {
-        once(&self.frames, size, || Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All))
+        once(&self.frames, size, || {
+            Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All)
+        })
     }
 
-    /// A frame that has depth at least, in the picture whose longer side has `size` pixels (0 counts as 1): cheaper than
-    /// [`View::frame`], and contours of that size that are asked for later use it.
+    /// A frame that has depth at least, in the picture whose longer side has `size`
+    /// pixels (0 counts as 1): cheaper than [`View::frame`], and contours of that size
+    /// that are asked for later use it.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
         self.frame_drawn(size).unwrap_or_else(|| {
             let camera = self.camera.scaled_to(size);
-            once(&self.depths, size, || Frame::render(&self.drawn(&camera).solid, &camera, Channels::Depth))
+            once(&self.depths, size, || {
+                Frame::render(&self.drawn(&camera).solid, &camera, Channels::Depth)
+            })
         })
     }
 
@@ -85,8 +94,8 @@ impl View {
         })
     }
 
-    /// What [`View::contours`] has more and less than those drawn last by this thread, without making the list: in a scene most of which stands
-    /// still; `None` for others.
+    /// What [`View::contours`] has more and less than those drawn last by this thread,
+    /// without making the list: in a scene most of which stands still; `None` for others.
     pub fn change(&self, size: u32) -> Arc<Option<Change>> {
         once(&self.changes, size, || {
             let camera = self.camera.scaled_to(size);
@@ -94,14 +103,16 @@ impl View {
         })
     }
 
-    /// The vector-Jacobian product of [`View::contours`] by the solid's vertices: [`Contours::pull`], 0 for those that are not drawn.
+    /// The vector-Jacobian product of [`View::contours`] by the solid's vertices:
+    /// [`Contours::pull`], 0 for those that are not drawn.
     pub fn pull_contours(&self, size: u32, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
         let camera = self.camera.scaled_to(size);
         let drawn = self.drawn(&camera);
         drawn.by_vertices_of(&self.solid, self.contours(size).pull(&drawn.solid, &camera, by_piece))
     }
 
-    /// How many triangles contours and depth show in the picture whose longer side has `size` pixels.
+    /// How many triangles contours and depth show in the picture whose longer side has
+    /// `size` pixels.
     pub fn triangles(&self, size: u32) -> usize {
         let drawn = self.drawn(&self.camera.scaled_to(size));
         drawn.solid.instances().iter().map(|i| i.mesh.topology.triangles.len()).sum()
@@ -112,7 +123,8 @@ impl View {
         Drawn::new(&self.solid, camera, self.detail)
     }
 
-    /// A frame of all channels that can stand for depth, if it was drawn: that of meshes as they are, so only if they are to be drawn so.
+    /// A frame of all channels that can stand for depth, if it was drawn: that of meshes
+    /// as they are, so only if they are to be drawn so.
     fn frame_drawn(&self, size: u32) -> Option<Arc<Frame>> {
         if self.detail > 0.0 { None } else { find(&lock(&self.frames), size) }
     }
@@ -132,7 +144,8 @@ fn find<T>(entries: &[(u32, Arc<T>)], size: u32) -> Option<Arc<T>> {
     entries.iter().find(|(at, _)| *at == size).map(|(_, value)| value.clone())
 }
 
-/// The entry of a size, computed under the lock when missing: a second thread waits rather than computing it again.
+/// The entry of a size, computed under the lock when missing: a second thread waits
+/// rather than computing it again.
 fn once<T>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> T) -> Arc<T> {
     let mut entries = lock(cache);
     if let Some(value) = find(&entries, size) {

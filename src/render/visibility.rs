@@ -1,9 +1,12 @@
-//! Whether a piece of contour can be seen, decided by looking at the depth image beside it.
+//! Whether a piece of contour can be seen, decided by looking at the depth image beside
+//! it.
 //!
-//! On a contour itself the depth image is ambiguous by a pixel, so the looks go about one pixel to the side. It is not
-//! an exact hidden-line method: things closer together than about a pixel may be confused. A look that leaves the image
-//! is answered by the nearest pixel inside. What a look needs besides the depth image and the object's depth range is worked
-//! out when the piece is made, so a piece can be kept and looked at again when something else has moved.
+//! On a contour itself the depth image is ambiguous by a pixel, so the looks go about one
+//! pixel to the side. It is not an exact hidden-line method: things closer together than
+//! about a pixel may be confused. A look that leaves the image is answered by the nearest
+//! pixel inside. What a look needs besides the depth image and the object's depth range
+//! is worked out when the piece is made, so a piece can be kept and looked at again when
+//! something else has moved.
 
 use super::project::DepthRange;
 
@@ -16,19 +19,22 @@ const TOLERANCE: f64 = 0.006;
 /// Largest slack for the slope of an edge's own faces, as a share of the depth range.
 const EDGE_SLACK: f64 = 0.06;
 
-/// Largest slack for the extent of a silhouette's own face, as a share of the depth range.
+/// Largest slack for the extent of a silhouette's own face, as a share of the depth
+/// range.
 const SILHOUETTE_SLACK: f64 = 0.15;
 
 /// How a piece is looked at.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Look {
-    /// Once, outward; `slack` is how much nearer (scene units) the piece's own face reaches.
+    /// Once, outward; `slack` is how much nearer (scene units) the piece's own face
+    /// reaches.
     Outward {
         /// Unit vector in the image.
         direction: [f64; 2],
         slack: f64,
     },
-    /// To both sides, of which one must be free; `slack` per side is how much nearer the edge's own faces come there.
+    /// To both sides, of which one must be free; `slack` per side is how much nearer the
+    /// edge's own faces come there.
     BothSides {
         /// Unit vector in the image; the second side is the opposite one.
         direction: [f64; 2],
@@ -43,14 +49,16 @@ struct Side {
     pixel: u32,
     /// Whether the place looked at is inside the image.
     inside: bool,
-    /// How much nearer the piece's own faces reach, before it is held against the depth range.
+    /// How much nearer the piece's own faces reach, before it is held against the depth
+    /// range.
     slack: f64,
 }
 
 /// No pixel: there is one less than this in the largest buffer.
 const NOWHERE: u32 = u32::MAX;
 
-/// A piece of contour that may be hidden: a function of its own part and the camera alone.
+/// A piece of contour that may be hidden: a function of its own part and the camera
+/// alone.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
     /// As in [`Contours`](super::Contours).
@@ -66,7 +74,8 @@ pub(super) struct Piece {
     sides: [Side; 2],
 }
 
-/// A look without its pixel: all that decides whether it is free, but the depth there and the depth range.
+/// A look without its pixel: all that decides whether it is free, but the depth there and
+/// the depth range.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Glance {
     depth: f64,
@@ -86,11 +95,13 @@ impl Piece {
         self.sides.get(side).map(|side| side.pixel).filter(|&pixel| pixel != NOWHERE)
     }
 
-    /// The look to the first or the second side, and the pixel that it looks at; `number` is that of the piece.
+    /// The look to the first or the second side, and the pixel that it looks at; `number`
+    /// is that of the piece.
     #[inline]
     pub fn glance(&self, side: u8, number: u32) -> Option<(u32, Glance)> {
         let Side { pixel, inside, slack } = *self.sides.get(usize::from(side))?;
-        let glance = Glance { depth: self.depth, slack, piece: number, side, inside, edge: self.edge };
+        let glance =
+            Glance { depth: self.depth, slack, piece: number, side, inside, edge: self.edge };
         (pixel != NOWHERE).then_some((pixel, glance))
     }
 }
@@ -106,7 +117,8 @@ impl Image {
     /// `None` for an image without pixels, or with more than can be numbered.
     pub fn new(width: u32, height: u32) -> Option<Image> {
         let pixels = u64::from(width) * u64::from(height);
-        (pixels > 0 && pixels < u64::from(NOWHERE)).then_some(Image { width: width as usize, height: height as usize })
+        (pixels > 0 && pixels < u64::from(NOWHERE))
+            .then_some(Image { width: width as usize, height: height as usize })
     }
 
     /// The look at the pixel that holds a position, or the nearest one.
@@ -114,10 +126,15 @@ impl Image {
     fn side(&self, x: f64, y: f64, slack: f64) -> Side {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
         let index = |v: f64, side: usize| v.max(0.0).min((side - 1) as f64) as i32 as usize;
-        Side { pixel: (index(y, self.height) * self.width + index(x, self.width)) as u32, inside, slack }
+        Side {
+            pixel: (index(y, self.height) * self.width + index(x, self.width)) as u32,
+            inside,
+            slack,
+        }
     }
 
-    /// A piece with its middle at a position and depth, of an edge or of a smooth silhouette.
+    /// A piece with its middle at a position and depth, of an edge or of a smooth
+    /// silhouette.
     #[inline(always)]
     pub fn piece(
         &self,
@@ -152,7 +169,8 @@ pub(super) struct Depths<'a> {
 }
 
 impl<'a> Depths<'a> {
-    /// `extent` is the depth range of the object in scene units. `None` unless the sizes agree and are not zero.
+    /// `extent` is the depth range of the object in scene units. `None` unless the sizes
+    /// agree and are not zero.
     pub fn new(depth: &'a [f32], width: u32, height: u32, extent: f64) -> Option<Depths<'a>> {
         let fits = depth.len() == width as usize * height as usize && !depth.is_empty();
         fits.then_some(Depths {
@@ -165,14 +183,16 @@ impl<'a> Depths<'a> {
     /// Whether nothing beside the piece is nearer than its `depth` less the slack.
     #[inline]
     fn free(&self, side: &Side, depth: f64, most: f64) -> bool {
-        f64::from(self.at(side.pixel as usize)) >= self.threshold([depth, side.slack, most], side.inside)
+        f64::from(self.at(side.pixel as usize))
+            >= self.threshold([depth, side.slack, most], side.inside)
     }
 
     /// The least depth that leaves a piece free.
     #[inline]
     fn threshold(&self, [depth, slack, most]: [f64; 3], inside: bool) -> f64 {
         let slack = slack.min(most);
-        // Outside the image only the object itself can be looked at: be generous, its side may bend towards the eye.
+        // Outside the image only the object itself can be looked at: be generous, its
+        // side may bend towards the eye.
         let slack = if inside { slack } else { slack.max(10.0 * self.tolerance) };
         depth - slack - self.tolerance - 1e-6 * depth
     }
@@ -183,10 +203,14 @@ impl<'a> Depths<'a> {
         self.depth.get(pixel).copied().unwrap_or(f32::INFINITY)
     }
 
-    /// The least depth at its pixel that leaves a look free; the greater the depth range, the less.
+    /// The least depth at its pixel that leaves a look free; the greater the depth range,
+    /// the less.
     #[inline]
     pub fn least(&self, glance: &Glance) -> f64 {
-        self.threshold([glance.depth, glance.slack, self.most[usize::from(glance.edge)]], glance.inside)
+        self.threshold(
+            [glance.depth, glance.slack, self.most[usize::from(glance.edge)]],
+            glance.inside,
+        )
     }
 
     /// Whether a depth at its pixel leaves a look free.
@@ -195,9 +219,12 @@ impl<'a> Depths<'a> {
         f64::from(seen) >= self.least(glance)
     }
 
-    /// Less than the least depth that leaves any piece free of a mesh with this depth range.
+    /// Less than the least depth that leaves any piece free of a mesh with this depth
+    /// range.
     pub fn hiding(extent: f64, range: &DepthRange) -> f64 {
-        range.near - (SILHOUETTE_SLACK.max(EDGE_SLACK) + TOLERANCE) * extent * 1.001 - 2e-6 * range.far.abs()
+        range.near
+            - (SILHOUETTE_SLACK.max(EDGE_SLACK) + TOLERANCE) * extent * 1.001
+            - 2e-6 * range.far.abs()
     }
 
     /// Whether a piece is seen.
@@ -245,7 +272,9 @@ mod tests {
         assert!(seen(10.0, [2.0, 4.0], 2.0, &slack, false));
         assert!(!seen(1.0, [2.0, 4.0], 2.0, &slack, false));
         // 0.15 and 0.06 of the depth range, and the tolerance of 0.006.
-        for (depth, silhouette, edge) in [(1.05, true, true), (1.1, true, false), (1.2, false, false)] {
+        for (depth, silhouette, edge) in
+            [(1.05, true, true), (1.1, true, false), (1.2, false, false)]
+        {
             assert_eq!(seen(1.0, [2.0, 4.0], depth, &slack, false), silhouette);
             assert_eq!(seen(1.0, [2.0, 4.0], depth, &slack, true), edge);
         }

@@ -1,16 +1,19 @@
 //! How smooth silhouettes slide over the faces of a mesh when those turn.
 //!
-//! A silhouette is where the interpolated normal is at right angles to the line of sight. On a smooth surface sliding does not
-//! show: the line of sight touches the surface there. A flat face it does not touch, so on coarse meshes sliding moves the contour
-//! across itself, too. Invariant: exact (but for `steady`) where the vertices move together as a rigid body.
+//! A silhouette is where the interpolated normal is at right angles to the line of sight.
+//! On a smooth surface sliding does not show: the line of sight touches the surface
+//! there. A flat face it does not touch, so on coarse meshes sliding moves the contour
+//! across itself, too. Invariant: exact (but for `steady`) where the vertices move
+//! together as a rigid body.
 
 use super::trace::Origin;
 use super::{Camera, Projection};
 use crate::geom::{Instance, Solid};
 use glam::{DMat3, DVec3};
 
-/// The angle between the normals of a face's corners, in radians, below which silhouettes are taken to slide less: a turn that moves
-/// limbs by about a pixel takes them over such faces and on to the next, and what one face adds another takes away.
+/// The angle between the normals of a face's corners, in radians, below which silhouettes
+/// are taken to slide less: a turn that moves limbs by about a pixel takes them over such
+/// faces and on to the next, and what one face adds another takes away.
 pub(super) const STEADY: f64 = 0.1;
 
 /// Derivatives by the turns of normals, until they are taken to the vertices.
@@ -26,10 +29,15 @@ pub(super) struct Wander {
 impl Wander {
     /// Of a solid with so many vertices.
     pub fn new(vertices: usize, steady: f64) -> Wander {
-        Wander { turns: vec![DVec3::ZERO; vertices], steady: steady * steady, normals: (usize::MAX, DMat3::ZERO) }
+        Wander {
+            turns: vec![DVec3::ZERO; vertices],
+            steady: steady * steady,
+            normals: (usize::MAX, DMat3::ZERO),
+        }
     }
 
-    /// Adds what one piece does, by the derivatives by its segment's ends; `out` begins at its mesh's first vertex, `base` of all.
+    /// Adds what one piece does, by the derivatives by its segment's ends; `out` begins
+    /// at its mesh's first vertex, `base` of all.
     pub fn add(
         &mut self,
         instance: &Instance,
@@ -50,7 +58,8 @@ impl Wander {
         let normals = self.normals.1;
         let pinhole = matches!(camera.projection, Projection::Pinhole { .. });
         let corner = |v: u32| {
-            let (p, n) = (instance.mesh.positions.get(v as usize)?, instance.mesh.normals.get(v as usize)?);
+            let (p, n) =
+                (instance.mesh.positions.get(v as usize)?, instance.mesh.normals.get(v as usize)?);
             let (p, n) = (instance.affine.point(p.as_dvec3()), normals * n.as_dvec3());
             Some((p, n, if pinhole { camera.eye - p } else { -camera.forward }))
         };
@@ -63,7 +72,9 @@ impl Wander {
             let square = (facing0 - facing1) * (facing0 - facing1);
             let size = n0.length_squared() * to_eye0.length_squared() * self.steady;
             let by = g.dot(p1 - p0) / (square + size);
-            for (v, n, to_eye, by) in [(odd, n0, to_eye0, -by * facing1), (v, n1, to_eye1, by * facing0)] {
+            for (v, n, to_eye, by) in
+                [(odd, n0, to_eye0, -by * facing1), (v, n1, to_eye1, by * facing0)]
+            {
                 let (turn, shift) = (n.cross(to_eye) * by, n * by);
                 if !(turn.is_finite() && shift.is_finite()) {
                     continue;
@@ -78,20 +89,25 @@ impl Wander {
         }
     }
 
-    /// Adds to the derivatives by the vertices: a normal turns as the faces around it do, by their areas.
+    /// Adds to the derivatives by the vertices: a normal turns as the faces around it do,
+    /// by their areas.
     pub fn pull(&self, solid: &Solid, out: &mut [DVec3]) {
         let mut base = 0;
         let mut faces = Vec::new();
         for instance in solid.instances() {
             let mesh = &instance.mesh;
             let past = base + mesh.positions.len();
-            if let (Some(turns), Some(out)) = (self.turns.get(base..past), out.get_mut(base..past)) {
+            if let (Some(turns), Some(out)) = (self.turns.get(base..past), out.get_mut(base..past))
+            {
                 faces.clear();
                 let mut areas = vec![0.0; turns.len()];
                 let turned = |v: &u32| turns.get(*v as usize).is_some_and(|t| *t != DVec3::ZERO);
                 for corners in mesh.topology.triangles.iter().filter(|t| t.iter().any(turned)) {
                     let Some(face) = Face::new(instance, *corners) else { continue };
-                    corners.iter().filter_map(|v| areas.get_mut(*v as usize).map(|a| *a += face.area)).for_each(drop);
+                    corners
+                        .iter()
+                        .filter_map(|v| areas.get_mut(*v as usize).map(|a| *a += face.area))
+                        .for_each(drop);
                     faces.push(face);
                 }
                 faces.iter().for_each(|face| face.pull(turns, &areas, out));
@@ -114,22 +130,33 @@ struct Face {
 
 impl Face {
     fn new(instance: &Instance, corners: [u32; 3]) -> Option<Face> {
-        let [Some(a), Some(b), Some(c)] = corners.map(|v| instance.mesh.positions.get(v as usize)) else { return None };
+        let [Some(a), Some(b), Some(c)] = corners.map(|v| instance.mesh.positions.get(v as usize))
+        else {
+            return None;
+        };
         let [a, b, c] = [a, b, c].map(|p| instance.affine.point(p.as_dvec3()));
         let across = (b - a).cross(c - a);
         let area = across.length();
         let normal = across / area;
-        normal.is_finite().then_some(Face { corners, opposite: [c - b, a - c, b - a], normal, area })
+        normal.is_finite().then_some(Face {
+            corners,
+            opposite: [c - b, a - c, b - a],
+            normal,
+            area,
+        })
     }
 
-    /// Takes its share of the derivatives by the turns of its corners' normals to the corners.
+    /// Takes its share of the derivatives by the turns of its corners' normals to the
+    /// corners.
     fn pull(&self, turns: &[DVec3], areas: &[f64], out: &mut [DVec3]) {
         let by = |v: &u32| Some(*turns.get(*v as usize)? * (self.area / areas.get(*v as usize)?));
         let by: DVec3 = self.corners.iter().filter_map(by).sum();
         for (v, o) in self.corners.iter().zip(self.opposite) {
             if let Some(place) = out.get_mut(*v as usize) {
-                // A corner that rises tips the face about the opposite edge; one that moves along it turns the face in its plane.
-                *place += self.normal * (by.dot(o) / self.area) - o * (by.dot(self.normal) / (2.0 * self.area));
+                // A corner that rises tips the face about the opposite edge; one that
+                // moves along it turns the face in its plane.
+                *place += self.normal * (by.dot(o) / self.area)
+                    - o * (by.dot(self.normal) / (2.0 * self.area));
             }
         }
     }
@@ -145,15 +172,21 @@ mod tests {
     #[test]
     fn contours_of_coarse_meshes_move_as_differences_say() {
         let mut parallel = Camera::default_for(128, 128);
-        parallel.projection = Projection::Orthographic { units_per_pixel: 0.03, cx: 63.0, cy: 65.0 };
+        parallel.projection =
+            Projection::Orthographic { units_per_pixel: 0.03, cx: 63.0, cy: 65.0 };
         for camera in [Camera::default_for(128, 128), parallel] {
-            for solid in
-                [sphere(12, 8), lathe(&[(0.0, -0.8), (0.5, -0.6), (0.7, 0.0), (0.5, 0.6), (0.0, 0.8)], 9, false)]
-            {
+            for solid in [
+                sphere(12, 8),
+                lathe(&[(0.0, -0.8), (0.5, -0.6), (0.7, 0.0), (0.5, 0.6), (0.0, 0.8)], 9, false),
+            ] {
                 let at = |p: [f64; 7]| -> Solid {
                     let scale = DVec3::new(0.9, 1.0, 1.2) * (1.0 + p[6]);
                     let inner = Affine::new(DVec3::ZERO, DVec3::new(0.3, 0.2, 0.1), scale);
-                    let outer = Affine::new(DVec3::new(p[0], p[1], p[2]), DVec3::new(p[3], p[4], p[5]), DVec3::ONE);
+                    let outer = Affine::new(
+                        DVec3::new(p[0], p[1], p[2]),
+                        DVec3::new(p[3], p[4], p[5]),
+                        DVec3::ONE,
+                    );
                     solid.placed(inner).placed(outer)
                 };
                 let contours = |solid: &Solid| Contours::of(solid, &camera);
@@ -166,7 +199,8 @@ mod tests {
                     let h = 2e-4;
                     let moved = |h: f64| at(std::array::from_fn(|i| if i == k { h } else { 0.0 }));
                     let (before, after) = (moved(-h), moved(h));
-                    let slope = (weighted(&contours(&after)).0 - weighted(&contours(&before)).0) / (2.0 * h);
+                    let slope = (weighted(&contours(&after)).0 - weighted(&contours(&before)).0)
+                        / (2.0 * h);
                     wrong = wrong.max((along(&exact, &before, &after, 2.0 * h) - slope).abs());
                     without = without.max((along(&fixed, &before, &after, 2.0 * h) - slope).abs());
                 }

@@ -15,7 +15,8 @@ pub struct Work {
     pub drawn: u64,
     /// Triangles of those.
     pub triangles: u64,
-    /// Of these, triangles of bodies that hide their own backs, so that those turned away were passed over.
+    /// Of these, triangles of bodies that hide their own backs, so that those turned away
+    /// were passed over.
     pub closed: u64,
     /// Meshes that were as they had been drawn before.
     pub kept: u64,

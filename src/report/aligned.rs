@@ -1,7 +1,9 @@
-//! The chains of a run that has ended in one form, as ArviZ and CmdStan's tools want them: the same columns, and equally many draws.
+//! The chains of a run that has ended in one form, as ArviZ and CmdStan's tools want
+//! them: the same columns, and equally many draws.
 //!
-//! A chain's file grows while it runs, and under a limit of time one chain gets further than another; columns come when the structure of
-//! a scene changes. What does not fit is kept as it came in `draws-N.csv` beside `chain-N.csv`, from which the chain can go on.
+//! A chain's file grows while it runs, and under a limit of time one chain gets further
+//! than another; columns come when the structure of a scene changes. What does not fit is
+//! kept as it came in `draws-N.csv` beside `chain-N.csv`, from which the chain can go on.
 //!
 //! Invariant: whenever the process stops, either file holds all draws of the chain.
 
@@ -17,7 +19,8 @@ pub(super) fn draws_name(chain: u32) -> String {
     format!("chain-{}.csv", u64::from(chain) + 1)
 }
 
-/// The name of the file that keeps all draws of a chain, where it has more than the others.
+/// The name of the file that keeps all draws of a chain, where it has more than the
+/// others.
 pub(super) fn all_name(chain: u32) -> String {
     format!("draws-{}.csv", u64::from(chain) + 1)
 }
@@ -34,13 +37,15 @@ pub(super) struct Found {
     pub(super) draws: u64,
 }
 
-/// Brings the files of so many chains to the same columns and, if `even`, to equally many draws: as many as the chain with the fewest has,
-/// of those that have any. Returns how many each has then, if draws were left out.
+/// Brings the files of so many chains to the same columns and, if `even`, to equally many
+/// draws: as many as the chain with the fewest has, of those that have any. Returns how
+/// many each has then, if draws were left out.
 ///
 /// # Errors
 /// If a file cannot be read or written.
 pub fn align(dir: &Path, chains: u32, even: bool) -> io::Result<Option<u64>> {
-    let found = (0..chains).map(|c| look(&dir.join(draws_name(c)))).collect::<io::Result<Vec<_>>>()?;
+    let found =
+        (0..chains).map(|c| look(&dir.join(draws_name(c)))).collect::<io::Result<Vec<_>>>()?;
     let counts = || found.iter().map(|f| f.draws).filter(|n| *n > 0);
     let (fewest, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
     let keep = if even { fewest } else { most };
@@ -85,7 +90,8 @@ pub(super) fn look(path: &Path) -> io::Result<Found> {
     Ok(found)
 }
 
-/// Writes a chain's file anew, with its first draws in these columns, and keeps the old one.
+/// Writes a chain's file anew, with its first draws in these columns, and keeps the old
+/// one.
 fn rewrite(dir: &Path, chain: u32, found: &Found, columns: &[Column], keep: u64) -> io::Result<()> {
     let path = dir.join(draws_name(chain));
     let file = File::open(&path)?;
@@ -115,7 +121,8 @@ mod tests {
     const NAMES: &str = "lp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__";
 
     fn folder(name: &str) -> PathBuf {
-        let dir = std::env::temp_dir().join(format!("pcadlang-aligned-{name}-{}", std::process::id()));
+        let dir =
+            std::env::temp_dir().join(format!("pcadlang-aligned-{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
         dir
@@ -127,8 +134,9 @@ mod tests {
         let one = format!(
             "# id = 1\n{NAMES},k,w.1\n-1,1,0,0,-1,1,1,0.1\n{NAMES},k,w.1,w.2\n-2,1,0,0,-2,2,2,0.1,0.2\n# steps = 2\n"
         );
-        let two =
-            format!("# id = 2\n{NAMES},k,w.1,e\n-1,1,0,0,-1,1,1,0.3,7\n-1,1,0,0,-1,2,1,0.3,8\n-1,1,0,0,-1,3,1,0.4,9\n");
+        let two = format!(
+            "# id = 2\n{NAMES},k,w.1,e\n-1,1,0,0,-1,1,1,0.3,7\n-1,1,0,0,-1,2,1,0.3,8\n-1,1,0,0,-1,3,1,0.4,9\n"
+        );
         std::fs::write(dir.join("chain-1.csv"), &one).unwrap();
         std::fs::write(dir.join("chain-2.csv"), &two).unwrap();
         // A chain that was ended before it began.
@@ -138,8 +146,14 @@ mod tests {
         let (a, b) = (chain("chain-1.csv"), chain("chain-2.csv"));
         assert_eq!(a.columns, b.columns);
         assert_eq!((a.rows.len(), b.rows.len()), (2, 2));
-        assert!(a.rows[0].values[..2] == [1.0, 0.1] && a.rows[0].values[2..].iter().all(|x| x.is_nan()));
-        assert!(b.rows[1].values[..2] == [1.0, 0.3] && b.rows[1].values[2].is_nan() && b.rows[1].values[3] == 8.0);
+        assert!(
+            a.rows[0].values[..2] == [1.0, 0.1] && a.rows[0].values[2..].iter().all(|x| x.is_nan())
+        );
+        assert!(
+            b.rows[1].values[..2] == [1.0, 0.3]
+                && b.rows[1].values[2].is_nan()
+                && b.rows[1].values[3] == 8.0
+        );
         assert!(a.comments.contains(&("steps".into(), "2".into())));
         // All draws are there still, and are taken up again.
         assert_eq!(chain("draws-2.csv").rows.len(), 3);

@@ -1,6 +1,8 @@
-//! The files of one chain in a run's folder: its draws, and the checkpoint it can go on from.
+//! The files of one chain in a run's folder: its draws, and the checkpoint it can go on
+//! from.
 //!
-//! Invariant: the checkpoint is whole, and what it says is in the file of draws is there, whenever the process or the machine stops.
+//! Invariant: the checkpoint is whole, and what it says is in the file of draws is there,
+//! whenever the process or the machine stops.
 
 use super::aligned::{draws_name, restore};
 use super::checkpoint::SavedChain;
@@ -12,7 +14,8 @@ use crate::infer::draws::{Column, DrawRow, Sink};
 use std::fs::File;
 use std::io::{self, BufReader, Seek, SeekFrom};
 
-/// A sink that writes a chain's draws to its file, keeps as many as there is room for in memory, and keeps checkpoints.
+/// A sink that writes a chain's draws to its file, keeps as many as there is room for in
+/// memory, and keeps checkpoints.
 pub struct ChainFile {
     dir: RunDir,
     chain: u32,
@@ -60,11 +63,12 @@ impl ChainFiles<'_> {
         Ok(self.file(chain, draws, memory.clone(), None))
     }
 
-    /// Takes up the files of a chain where its last checkpoint was; without one it begins anew. Draws after it are cut off: the chain
-    /// makes them again.
+    /// Takes up the files of a chain where its last checkpoint was; without one it begins
+    /// anew. Draws after it are cut off: the chain makes them again.
     ///
     /// # Errors
-    /// If the checkpoint is of another run or version, or the draws before it are not there.
+    /// If the checkpoint is of another run or version, or the draws before it are not
+    /// there.
     pub fn resume(&self, chain: u32, memory: &Memory) -> io::Result<ChainFile> {
         let name = checkpoint_name(chain);
         let bytes = match std::fs::read(self.dir.file(&name)) {
@@ -79,17 +83,22 @@ impl ChainFiles<'_> {
         let name = draws_name(chain);
         let told = |e: io::Error| about(&name, &e, e.kind());
         restore(self.dir.path(), chain).map_err(told)?;
-        let mut file = File::options().read(true).write(true).open(self.dir.file(&name)).map_err(told)?;
+        let mut file =
+            File::options().read(true).write(true).open(self.dir.file(&name)).map_err(told)?;
         let mut memory = memory.clone();
         memory.columns(checkpoint.columns())?;
         let mut rows = 0;
-        let mut reader = DrawReader::new(BufReader::new(&file), checkpoint.columns(), saved.draws_end);
-        while let Some(row) = reader.next_row().map_err(|e| about(&name, e, io::ErrorKind::InvalidData))? {
+        let mut reader =
+            DrawReader::new(BufReader::new(&file), checkpoint.columns(), saved.draws_end);
+        while let Some(row) =
+            reader.next_row().map_err(|e| about(&name, e, io::ErrorKind::InvalidData))?
+        {
             memory.draw(&DrawRow { chain, draw: rows, ..row })?;
             rows += 1;
         }
         if rows != checkpoint.draws() || reader.position() != saved.draws_end {
-            let message = format!("it has {rows} draws, not the {} of the checkpoint", checkpoint.draws());
+            let message =
+                format!("it has {rows} draws, not the {} of the checkpoint", checkpoint.draws());
             return Err(about(&name, message, io::ErrorKind::InvalidData));
         }
         file.set_len(saved.draws_end).map_err(told)?;
@@ -99,7 +108,13 @@ impl ChainFiles<'_> {
         Ok(self.file(chain, draws, memory, Some(checkpoint)))
     }
 
-    fn file(&self, chain: u32, draws: CsvSink, memory: Memory, from: Option<Checkpoint>) -> ChainFile {
+    fn file(
+        &self,
+        chain: u32,
+        draws: CsvSink,
+        memory: Memory,
+        from: Option<Checkpoint>,
+    ) -> ChainFile {
         ChainFile { dir: self.dir.clone(), chain, run: self.run.into(), draws, memory, from }
     }
 }

@@ -1,7 +1,9 @@
-//! The file of a checkpoint: what a chain goes on from, and what tells that it is this run's and whole.
+//! The file of a checkpoint: what a chain goes on from, and what tells that it is this
+//! run's and whole.
 //!
-//! A line of text that says what the file is; the version of the format and a hash of the rest; the rest (CBOR): the version of
-//! pcadlang, the run it belongs to, the length of its file of draws, the chain. Only the version that wrote it goes on from it: another
+//! A line of text that says what the file is; the version of the format and a hash of the
+//! rest; the rest (CBOR): the version of pcadlang, the run it belongs to, the length of
+//! its file of draws, the chain. Only the version that wrote it goes on from it: another
 //! may draw other numbers.
 
 use super::hash::bytes_hash;
@@ -23,7 +25,9 @@ pub enum CheckpointError {
     #[error("the checkpoint is damaged")]
     Damaged,
     /// It was written by another version.
-    #[error("the checkpoint was written by pcadlang {0}; chains may differ under this version, {VERSION}")]
+    #[error(
+        "the checkpoint was written by pcadlang {0}; chains may differ under this version, {VERSION}"
+    )]
     Version(String),
     /// It belongs to another program, data or settings.
     #[error("the checkpoint belongs to another run: the program, its data or its settings differ")]
@@ -46,7 +50,12 @@ pub struct SavedChain {
 impl SavedChain {
     /// A checkpoint of a run, with so many bytes of draws before it.
     pub fn new(run: &str, draws_end: u64, checkpoint: &Checkpoint) -> SavedChain {
-        SavedChain { version: VERSION.into(), run: run.into(), draws_end, chain: checkpoint.to_bytes() }
+        SavedChain {
+            version: VERSION.into(),
+            run: run.into(),
+            draws_end,
+            chain: checkpoint.to_bytes(),
+        }
     }
 
     /// The file.
@@ -83,7 +92,12 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_told() {
-        let saved = SavedChain { version: VERSION.into(), run: "a".into(), draws_end: 7, chain: vec![0xff] };
+        let saved = SavedChain {
+            version: VERSION.into(),
+            run: "a".into(),
+            draws_end: 7,
+            chain: vec![0xff],
+        };
         let whole = saved.to_bytes();
         let error = |bytes: &[u8], run: &str| SavedChain::read(bytes, run).unwrap_err();
         assert!(matches!(error(b"lp__,x\n", "a"), CheckpointError::Format));
@@ -101,7 +115,9 @@ mod tests {
         let other = SavedChain { version: "0.0.1".into(), ..saved }.to_bytes();
         assert_eq!(
             error(&other, "a").to_string(),
-            format!("the checkpoint was written by pcadlang 0.0.1; chains may differ under this version, {VERSION}")
+            format!(
+                "the checkpoint was written by pcadlang 0.0.1; chains may differ under this version, {VERSION}"
+            )
         );
     }
 }

@@ -43,7 +43,9 @@ impl Quantity {
             () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws per chain",
             () if draws().any(|x| x.is_nan()) => "it is missing from some draws",
             () if !draws().all(|x| x.is_finite()) => "it is infinite in some draws",
-            () if self.is_stuck() => "it never moved in any chain, and the chains have different values",
+            () if self.is_stuck() => {
+                "it never moved in any chain, and the chains have different values"
+            }
             () => "it never moved",
         })
     }
@@ -69,7 +71,8 @@ impl ChainDraws {
     }
 }
 
-/// Brings chains to the same columns: those that any of them has, with NaN where a draw has none.
+/// Brings chains to the same columns: those that any of them has, with NaN where a draw
+/// has none.
 pub fn widen(chains: &mut [ChainDraws]) {
     let Some(all) = common(chains) else { return };
     chains.iter_mut().filter(|c| !c.rows.is_empty()).for_each(|c| c.widen(all.clone()));
@@ -86,7 +89,8 @@ fn common(chains: &[ChainDraws]) -> Option<Vec<Column>> {
 /// One number per draw, over all chains.
 #[derive(Clone, Debug)]
 pub struct Quantity {
-    /// Its name: the column's, with `[i]` (from 0, as the language counts) for the element of a vector.
+    /// Its name: the column's, with `[i]` (from 0, as the language counts) for the
+    /// element of a vector.
     pub name: String,
     /// The column it belongs to; `None` for the log joint density.
     pub column: Option<usize>,
@@ -96,9 +100,10 @@ pub struct Quantity {
     pub summary: Summary,
 }
 
-/// Every scalar quantity of some chains, the log joint density (`log_joint`) first, with its summary. Columns are those that any
-/// chain has; what a draw lacks is NaN. A column that says the log joint density again is left out, and
-/// so are the log densities of single observed values.
+/// Every scalar quantity of some chains, the log joint density (`log_joint`) first, with
+/// its summary. Columns are those that any chain has; what a draw lacks is NaN. A column
+/// that says the log joint density again is left out, and so are the log densities of
+/// single observed values.
 pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let mut chains = Cow::Borrowed(chains);
     if common(&chains).is_some() {
@@ -106,7 +111,8 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     }
     let chains = &chains[..];
     let quantity = |name: String, column, value: &dyn Fn(&DrawRow) -> Option<f64>| {
-        let series: Vec<Vec<f64>> = chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
+        let series: Vec<Vec<f64>> =
+            chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
         Quantity { name, column, summary: summary(&series), chains: series }
     };
     let mut out = vec![quantity("log_joint".into(), None, &|r| Some(r.log_joint))];
@@ -114,7 +120,8 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let mut at = 0;
     for (index, column) in columns.iter().enumerate() {
         if column.name == POINTWISE {
-            // There are as many as data, for comparing models (`az.loo`), and nothing of the posterior.
+            // There are as many as data, for comparing models (`az.loo`), and nothing of
+            // the posterior.
             at += column.shape.len();
             continue;
         }
@@ -161,10 +168,19 @@ mod tests {
             rows,
             ..Default::default()
         };
-        let names = |c: ChainDraws| quantities(&[c]).into_iter().map(|q| (q.name, q.chains)).collect::<Vec<_>>();
+        let names = |c: ChainDraws| {
+            quantities(&[c]).into_iter().map(|q| (q.name, q.chains)).collect::<Vec<_>>()
+        };
         let one = names(chain(vec![row(1.0, 1.0), row(2.0, 2.0)]));
-        assert_eq!(one, [("log_joint".into(), vec![vec![1.0, 2.0]]), ("b".into(), vec![vec![7.0, 7.0]])]);
-        assert_eq!(names(chain(vec![row(1.0, 1.0), row(2.0, 3.0)])).len(), 3, "another thing of that name stays");
+        assert_eq!(
+            one,
+            [("log_joint".into(), vec![vec![1.0, 2.0]]), ("b".into(), vec![vec![7.0, 7.0]])]
+        );
+        assert_eq!(
+            names(chain(vec![row(1.0, 1.0), row(2.0, 3.0)])).len(),
+            3,
+            "another thing of that name stays"
+        );
     }
 
     #[test]
@@ -185,7 +201,10 @@ mod tests {
             ..Default::default()
         };
         let q = quantities(&[chain(0.0), chain(1.0)]);
-        assert_eq!(q.iter().map(|q| &*q.name).collect::<Vec<_>>(), ["log_joint", "a", "v[0]", "v[1]"]);
+        assert_eq!(
+            q.iter().map(|q| &*q.name).collect::<Vec<_>>(),
+            ["log_joint", "a", "v[0]", "v[1]"]
+        );
         assert_eq!(q[3].chains, [[0.0, 3.0, 6.0, 9.0], [3.0, 6.0, 9.0, 12.0]]);
         assert_eq!(q[1].summary.mean, 2.0);
         assert_eq!((q[0].column, q[3].column), (None, Some(1)));

@@ -1,8 +1,10 @@
-//! A program on a dataset: one row a case, the table of them, and the keypoints that scorers read.
+//! A program on a dataset: one row a case, the table of them, and the keypoints that
+//! scorers read.
 //!
-//! Not the runs, and no truth: nothing here is compared with anything. Rows are read off `run.json`, so that a case that
-//! was done earlier and one that was done now give the same row. Invariant: the folder holds evaluations only, and its
-//! files are whole or absent.
+//! Not the runs, and no truth: nothing here is compared with anything. Rows are read off
+//! `run.json`, so that a case that was done earlier and one that was done now give the
+//! same row. Invariant: the folder holds evaluations only, and its files are whole or
+//! absent.
 
 use super::RunDirError;
 use super::whole::{is_partial, write_whole};
@@ -24,7 +26,8 @@ pub struct EvaluationDir {
 }
 
 impl EvaluationDir {
-    /// Makes the folder, or takes up one that an earlier evaluation left; nothing is removed.
+    /// Makes the folder, or takes up one that an earlier evaluation left; nothing is
+    /// removed.
     ///
     /// # Errors
     /// If it cannot be made, or holds something and no evaluation.
@@ -54,7 +57,8 @@ impl EvaluationDir {
     /// # Errors
     /// If it cannot be written; an older file of the name is kept then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        write_whole(&self.path, name, bytes).map_err(|error| RunDirError::Io { path: self.file(name), error })
+        write_whole(&self.path, name, bytes)
+            .map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
 }
 
@@ -89,7 +93,8 @@ impl Row {
 
     /// What a `run.json` says. A run that neither ended nor failed is pending.
     pub fn of(case: &str, run: &Value) -> Row {
-        let status = run["state"].as_str().filter(|s| ["done", "failed", "interrupted"].contains(s));
+        let status =
+            run["state"].as_str().filter(|s| ["done", "failed", "interrupted"].contains(s));
         let Some(status) = status else { return Row::pending(case) };
         let sum = |keys: &[&str]| {
             let chains = run["chains"].as_array()?;
@@ -109,9 +114,11 @@ impl Row {
     }
 }
 
-/// The rows as a Markdown table, aligned to be read as text too; what failed is said below it.
+/// The rows as a Markdown table, aligned to be read as text too; what failed is said
+/// below it.
 pub fn markdown(rows: &[Row]) -> String {
-    let head = ["case", "status", "seconds", "wall seconds", "best log joint", "R-hat", "draws", "steps"];
+    let head =
+        ["case", "status", "seconds", "wall seconds", "best log joint", "R-hat", "draws", "steps"];
     let mut cells = vec![head.map(str::to_owned)];
     let fixed = |x: Option<f64>, digits: usize| x.map_or("-".into(), |x| format!("{x:.digits$}"));
     let count = |n: Option<u64>| n.map_or("-".into(), |n| n.to_string());
@@ -122,7 +129,10 @@ pub fn markdown(rows: &[Row]) -> String {
             fixed(r.seconds, 1),
             fixed(r.wall_seconds, 1),
             fixed(r.best_log_joint, 1),
-            r.r_hat_max.map_or_else(|| fixed(None, 2), |x| if x > 100.0 { ">100".into() } else { fixed(Some(x), 2) }),
+            r.r_hat_max.map_or_else(
+                || fixed(None, 2),
+                |x| if x > 100.0 { ">100".into() } else { fixed(Some(x), 2) },
+            ),
             count(r.draws),
             count(r.steps),
         ]);
@@ -131,18 +141,19 @@ pub fn markdown(rows: &[Row]) -> String {
     let widths: [usize; 8] = std::array::from_fn(width);
     // Words to the left, numbers to the right.
     let left = |c: usize| c < 2;
-    let rule: [String; 8] =
-        std::array::from_fn(
-            |c| {
-                if left(c) { "-".repeat(widths[c]) } else { format!("{}:", "-".repeat(widths[c] - 1)) }
-            },
-        );
+    let rule: [String; 8] = std::array::from_fn(|c| {
+        if left(c) { "-".repeat(widths[c]) } else { format!("{}:", "-".repeat(widths[c] - 1)) }
+    });
     cells.insert(1, rule);
     let mut text = String::new();
     for row in &cells {
         for (c, cell) in row.iter().enumerate() {
             let pad = " ".repeat(widths[c] - cell.chars().count());
-            text.push_str(&if left(c) { format!("| {cell}{pad} ") } else { format!("| {pad}{cell} ") });
+            text.push_str(&if left(c) {
+                format!("| {cell}{pad} ")
+            } else {
+                format!("| {pad}{cell} ")
+            });
         }
         text.push_str("|\n");
     }
@@ -154,8 +165,8 @@ pub fn markdown(rows: &[Row]) -> String {
     text
 }
 
-/// The entry of `predictions.json` for a case: the points of its `keypoints.json` without their spread, or null where
-/// there is none, and the seconds it took.
+/// The entry of `predictions.json` for a case: the points of its `keypoints.json` without
+/// their spread, or null where there is none, and the seconds it took.
 pub fn prediction(keypoints: Option<&Value>, seconds: Option<f64>) -> Value {
     let points = keypoints.and_then(|k| k["keypoints"].as_object()).map(|all| {
         let xy = |p: &Value| Some(json!([p.get(0)?.as_f64()?, p.get(1)?.as_f64()?]));
@@ -180,7 +191,9 @@ mod tests {
         assert_eq!((row.status.as_str(), row.draws, row.steps), ("done", Some(15), Some(40)));
         assert_eq!((row.seconds, row.wall_seconds), (Some(2.0), Some(2.5)));
         assert_eq!((row.best_log_joint, row.r_hat_max, &row.error), (Some(-3.25), None, &None));
-        for unfinished in [json!({ "state": "running" }), json!({}), json!([1]), json!({ "state": 3 })] {
+        for unfinished in
+            [json!({ "state": "running" }), json!({}), json!([1]), json!({ "state": 3 })]
+        {
             assert_eq!(Row::of("a", &unfinished), Row::pending("a"));
         }
     }
@@ -222,7 +235,10 @@ mod tests {
         assert_eq!(prediction(Some(&file), Some(9.0)), expected);
         assert_eq!(prediction(None, Some(9.0)), json!({ "keypoints": null, "seconds": 9.0 }));
         for nothing in [json!({ "keypoints": null }), json!({ "keypoints": {} }), json!(3)] {
-            assert_eq!(prediction(Some(&nothing), None), json!({ "keypoints": null, "seconds": 0.0 }));
+            assert_eq!(
+                prediction(Some(&nothing), None),
+                json!({ "keypoints": null, "seconds": 0.0 })
+            );
         }
     }
 

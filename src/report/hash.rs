@@ -2,7 +2,8 @@
 
 use crate::num::fnv1a;
 
-/// The 64-bit FNV-1a hash of a text as 16 hexadecimal digits: tells programs apart, keeps no secrets.
+/// The 64-bit FNV-1a hash of a text as 16 hexadecimal digits: tells programs apart, keeps
+/// no secrets.
 pub fn text_hash(text: &str) -> String {
     bytes_hash(text.as_bytes())
 }

@@ -1,7 +1,8 @@
-//! What a run leaves behind: draws as CmdStan CSV, a run directory, pictures, tables, and a page that shows all of it.
+//! What a run leaves behind: draws as CmdStan CSV, a run directory, pictures, tables, and
+//! a page that shows all of it.
 //!
-//! Nothing here prints or decides; it turns results into text and files. It knows draws, diagnostics and plain pixel
-//! buffers, not programs, traces or the renderer.
+//! Nothing here prints or decides; it turns results into text and files. It knows draws,
+//! diagnostics and plain pixel buffers, not programs, traces or the renderer.
 
 #![doc = include_str!("guide.md")]
 

@@ -1,4 +1,5 @@
-//! The modes that chains stay in, where they disagree: reported one by one, besides the means over all of them.
+//! The modes that chains stay in, where they disagree: reported one by one, besides the
+//! means over all of them.
 
 use super::{Quantity, number, table};
 use crate::infer::diagnostics;
@@ -19,13 +20,17 @@ const SHOWN: (usize, usize) = (5, 8);
 pub struct Mode {
     /// Their numbers, from 1.
     pub chains: Vec<usize>,
-    /// How many of all chains they are. Chains fall where they start: it is no probability.
+    /// How many of all chains they are. Chains fall where they start: it is no
+    /// probability.
     pub share: f64,
-    /// Its probability among the modes ([`Weighed::probabilities`]); none if it cannot be told.
+    /// Its probability among the modes ([`Weighed::probabilities`]); none if it cannot be
+    /// told.
     pub probability: Option<f64>,
-    /// Whether that is by estimates of the evidence, or as if the modes were equally wide.
+    /// Whether that is by estimates of the evidence, or as if the modes were equally
+    /// wide.
     pub by_evidence: bool,
-    /// The logarithm of its evidence and the standard error of that, if there is an estimate ([`diagnostics::log_evidence()`]).
+    /// The logarithm of its evidence and the standard error of that, if there is an
+    /// estimate ([`diagnostics::log_evidence()`]).
     pub log_evidence: Option<[f64; 2]>,
     /// The mean log joint density of their draws.
     #[serde(deserialize_with = "number_or_null")]
@@ -40,13 +45,16 @@ fn number_or_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
-fn numbers_or_null<'de, D: Deserializer<'de>>(from: D) -> Result<IndexMap<String, [f64; 2]>, D::Error> {
+fn numbers_or_null<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<IndexMap<String, [f64; 2]>, D::Error> {
     let read: IndexMap<String, [Option<f64>; 2]> = IndexMap::deserialize(from)?;
     Ok(read.into_iter().map(|(name, m)| (name, m.map(|x| x.unwrap_or(f64::NAN)))).collect())
 }
 
-/// The modes of a run, the most probable first, or the one of most chains where probabilities are not known; none where the chains
-/// agree, or cannot be told apart. `evidence` is what watched the run.
+/// The modes of a run, the most probable first, or the one of most chains where
+/// probabilities are not known; none where the chains agree, or cannot be told apart.
+/// `evidence` is what watched the run.
 pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> {
     let worst = apart(quantities);
     let compared: Vec<&[Vec<f64>]> = worst.iter().take(COMPARED).map(|q| &q.chains[..]).collect();
@@ -55,22 +63,27 @@ pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> 
         return Vec::new();
     }
     let count: usize = groups.iter().map(Vec::len).sum();
-    let mut all: Vec<Mode> = groups.iter().map(|members| mode(quantities, members, count)).collect();
-    let weighed: Vec<Option<Weighed>> = groups.iter().map(|members| evidence.and_then(|e| e.of(members))).collect();
+    let mut all: Vec<Mode> =
+        groups.iter().map(|members| mode(quantities, members, count)).collect();
+    let weighed: Vec<Option<Weighed>> =
+        groups.iter().map(|members| evidence.and_then(|e| e.of(members))).collect();
     let known = |w: &Option<Weighed>| w.and_then(|w| w.evidence).map(|e| [e.value, e.error]);
     all.iter_mut().zip(&weighed).for_each(|(m, w)| m.log_evidence = known(w));
     if let Some(each) = weighed.into_iter().collect::<Option<Vec<Weighed>>>() {
         let (probabilities, by_evidence) = Weighed::probabilities(&each);
-        all.iter_mut().zip(probabilities).for_each(|(m, p)| (m.probability, m.by_evidence) = (Some(p), by_evidence));
+        all.iter_mut()
+            .zip(probabilities)
+            .for_each(|(m, p)| (m.probability, m.by_evidence) = (Some(p), by_evidence));
         all.sort_by(|a, b| b.probability.unwrap_or(0.0).total_cmp(&a.probability.unwrap_or(0.0)));
     }
     all
 }
 
-/// The quantities that chains may disagree on, the worst first. Those that never moved have no R-hat, but may be at several
-/// places.
+/// The quantities that chains may disagree on, the worst first. Those that never moved
+/// have no R-hat, but may be at several places.
 fn apart(quantities: &[Quantity]) -> Vec<&Quantity> {
-    let rank = |q: &Quantity| if q.summary.r_hat.is_nan() { f64::INFINITY } else { q.summary.r_hat };
+    let rank =
+        |q: &Quantity| if q.summary.r_hat.is_nan() { f64::INFINITY } else { q.summary.r_hat };
     let mut worst: Vec<&Quantity> = quantities.iter().filter(|q| rank(q) > DISAGREE).collect();
     worst.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
     worst
@@ -82,7 +95,8 @@ fn mode(quantities: &[Quantity], members: &[usize], count: usize) -> Mode {
         let s = diagnostics::summary(&own);
         [s.mean, s.sd]
     };
-    let all: IndexMap<String, [f64; 2]> = quantities.iter().map(|q| (q.name.clone(), moments(q))).collect();
+    let all: IndexMap<String, [f64; 2]> =
+        quantities.iter().map(|q| (q.name.clone(), moments(q))).collect();
     Mode {
         chains: members.iter().map(|c| c + 1).collect(),
         share: members.len() as f64 / count as f64,
@@ -100,7 +114,8 @@ pub fn modes_table(modes: &[Mode], quantities: &[Quantity]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let mut s = format!("the chains are in {} different modes:\n{}", modes.len(), table::aligned(&rows));
+    let mut s =
+        format!("the chains are in {} different modes:\n{}", modes.len(), table::aligned(&rows));
     if let Some(more) = modes.len().checked_sub(SHOWN.0 + 1) {
         let _ = writeln!(s, "… and {} more modes, in summary.json", more + 1);
     }
@@ -121,10 +136,13 @@ pub(super) fn modes_rows(modes: &[Mode], quantities: &[Quantity]) -> Vec<Vec<Str
     let count: usize = modes.iter().map(|m| m.chains.len()).sum();
     let mut rows = vec![head, row("chains", count.to_string(), &|m| m.chains.len().to_string())];
     if shown.iter().all(|m| m.probability.is_some()) {
-        rows.push(row("probability", String::new(), &|m| number(m.probability.unwrap_or(f64::NAN))));
+        rows.push(row("probability", String::new(), &|m| {
+            number(m.probability.unwrap_or(f64::NAN))
+        }));
     }
     let mean = |q: &Quantity, m: &Mode| m.quantities.get(&q.name).map_or(f64::NAN, |x| x[0]);
-    let differs = |q: &Quantity| modes.iter().any(|m| mean(q, m).to_bits() != mean(q, &modes[0]).to_bits());
+    let differs =
+        |q: &Quantity| modes.iter().any(|m| mean(q, m).to_bits() != mean(q, &modes[0]).to_bits());
     let mut differ = apart(quantities);
     differ.retain(|q| differs(q));
     differ.truncate(SHOWN.1);
@@ -147,9 +165,13 @@ pub(super) fn warning(modes: &[Mode]) -> Option<String> {
         false => format!("the {chains} chains are in {n} different modes"),
     };
     let probable = match (modes[0].probability.map(number), modes[0].by_evidence) {
-        (Some(p), true) => format!("the first has estimated probability {p}, from the evidence of the modes"),
+        (Some(p), true) => {
+            format!("the first has estimated probability {p}, from the evidence of the modes")
+        }
         (Some(p), false) => {
-            format!("the first has probability {p} judged by log density alone, that is, if all modes are equally wide")
+            format!(
+                "the first has probability {p} judged by log density alone, that is, if all modes are equally wide"
+            )
         }
         (None, _) => "the fraction of chains in a mode does not estimate its probability".into(),
     };
@@ -175,11 +197,16 @@ mod tests {
     use crate::infer::diagnostics::summary;
 
     fn noise(seed: u64, centre: f64) -> Vec<f64> {
-        (0..400u64).map(|i| centre + ((i + 1) * (i + seed) * 2_654_435_761 % 1_000_003) as f64 / 1_000_003.0).collect()
+        (0..400u64)
+            .map(|i| {
+                centre + ((i + 1) * (i + seed) * 2_654_435_761 % 1_000_003) as f64 / 1_000_003.0
+            })
+            .collect()
     }
 
     fn quantity(name: &str, centres: [f64; 4]) -> Quantity {
-        let chains: Vec<Vec<f64>> = centres.iter().zip(0..).map(|(c, s)| noise(13 + 977 * s, *c)).collect();
+        let chains: Vec<Vec<f64>> =
+            centres.iter().zip(0..).map(|(c, s)| noise(13 + 977 * s, *c)).collect();
         Quantity { name: name.into(), column: None, summary: summary(&chains), chains }
     }
 
@@ -191,23 +218,35 @@ mod tests {
             quantity("y", [7.0; 4]),
         ];
         let found = modes(&all, None);
-        assert_eq!(found.iter().map(|m| m.chains.clone()).collect::<Vec<_>>(), [vec![1, 3, 4], vec![2]]);
+        assert_eq!(
+            found.iter().map(|m| m.chains.clone()).collect::<Vec<_>>(),
+            [vec![1, 3, 4], vec![2]]
+        );
         assert_eq!((found[0].share, found[1].share), (0.75, 0.25));
-        assert!((found[1].quantities["x"][0] - 30.5).abs() < 0.1 && (found[1].log_joint + 8.5).abs() < 0.1);
+        assert!(
+            (found[1].quantities["x"][0] - 30.5).abs() < 0.1
+                && (found[1].log_joint + 8.5).abs() < 0.1
+        );
         let text = modes_table(&found, &all);
         let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split_whitespace().collect()).collect();
         assert_eq!(lines[0].join(" "), "the chains are in 2 different modes:");
         assert_eq!(lines[2], ["chains", "4", "3", "1"]);
         assert!(lines.iter().any(|l| l[0] == "x") && !lines.iter().any(|l| l[0] == "y"), "{text}");
         assert!(text.lines().all(|l| l.chars().count() <= table::COLUMNS));
-        assert!(warning(&found).is_some_and(|w| w.starts_with("the 4 chains are in 2 different modes")));
+        assert!(
+            warning(&found).is_some_and(|w| w.starts_with("the 4 chains are in 2 different modes"))
+        );
         assert!(serde_json::to_string(&found).is_ok_and(|j| j.contains("\"chains\":[1,3,4]")));
     }
 
     #[test]
     fn chains_that_agree_have_none() {
         let all = [quantity("log_joint", [0.0; 4]), quantity("x", [3.0; 4])];
-        assert!(modes(&all, None).is_empty() && modes_table(&[], &all).is_empty() && warning(&[]).is_none());
+        assert!(
+            modes(&all, None).is_empty()
+                && modes_table(&[], &all).is_empty()
+                && warning(&[]).is_none()
+        );
     }
 
     #[test]

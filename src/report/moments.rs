@@ -1,7 +1,8 @@
-//! Means and variances of named points of the plane or of space, one draw at a time and merged over chains.
+//! Means and variances of named points of the plane or of space, one draw at a time and
+//! merged over chains.
 //!
-//! Invariant: the same draws in the same order give the same bits, and merging chains in order does not depend on when they
-//! ran.
+//! Invariant: the same draws in the same order give the same bits, and merging chains in
+//! order does not depend on when they ran.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
@@ -50,13 +51,14 @@ impl Point {
     }
 }
 
-/// Points by name, in order of first appearance, each of as many axes in all draws. A point need not be in every draw.
+/// Points by name, in order of first appearance, each of as many axes in all draws. A
+/// point need not be in every draw.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Moments(IndexMap<Arc<str>, Point>);
 
 impl Moments {
-    /// Takes a point of a draw (Welford 1962), or the mean and variance of what the draw says of it; one that is not finite is
-    /// left out.
+    /// Takes a point of a draw (Welford 1962), or the mean and variance of what the draw
+    /// says of it; one that is not finite is left out.
     pub fn add(&mut self, name: &Arc<str>, at: &[f64], variance: f64) {
         if at.iter().all(|x| x.is_finite()) && variance.is_finite() {
             let one = Point { count: 1, mean: at.to_vec(), squares: vec![variance; at.len()] };
@@ -71,14 +73,16 @@ impl Moments {
         }
     }
 
-    /// A mixture of others by their shares, which sum to 1; a point that some lack is a mixture of the rest. Counts are summed.
+    /// A mixture of others by their shares, which sum to 1; a point that some lack is a
+    /// mixture of the rest. Counts are summed.
     pub fn mixture(all: &[(f64, &Moments)]) -> Moments {
         let mut mixed = Moments::default();
         for (_, moments) in all {
             mixed.merge(moments);
         }
         for (name, p) in &mut mixed.0 {
-            let own: Vec<(f64, &Point)> = all.iter().filter_map(|(share, m)| Some((*share, m.0.get(name)?))).collect();
+            let own: Vec<(f64, &Point)> =
+                all.iter().filter_map(|(share, m)| Some((*share, m.0.get(name)?))).collect();
             let sum: f64 = own.iter().map(|(share, _)| share).sum();
             if sum <= 0.0 || sum.is_nan() {
                 continue;
@@ -90,7 +94,8 @@ impl Moments {
                     let off = q.mean[axis] - mean;
                     q.squares[axis] / q.freedom() + off * off
                 };
-                p.squares[axis] = freedom * own.iter().map(|(share, q)| share / sum * variance(q)).sum::<f64>();
+                p.squares[axis] =
+                    freedom * own.iter().map(|(share, q)| share / sum * variance(q)).sum::<f64>();
                 p.mean[axis] = mean;
             }
         }
@@ -115,7 +120,11 @@ mod tests {
             (0..n).for_each(|i| m.add(&name, &[centre + f64::from(i % 2)], 0.0));
             m
         };
-        let mixed = Moments::mixture(&[(0.75, &of(0.0, 10_000)), (0.25, &of(8.0, 100)), (0.0, &of(99.0, 70))]);
+        let mixed = Moments::mixture(&[
+            (0.75, &of(0.0, 10_000)),
+            (0.25, &of(8.0, 100)),
+            (0.0, &of(99.0, 70)),
+        ]);
         let (_, p) = mixed.iter().next().unwrap();
         assert!((p.mean[0] - (0.5 + 0.25 * 8.0)).abs() < 1e-12, "{p:?}");
         // Within: 1/4. Between: 3/16 of 8 squared.
@@ -126,7 +135,8 @@ mod tests {
     #[test]
     fn merged_chains_are_as_one_and_as_two_passes() {
         let name: Arc<str> = Arc::from("a");
-        let draws: Vec<[f64; 2]> = (0..50).map(|i| [1e6 + f64::from(i * i % 17), f64::from(i % 5) - 2.0]).collect();
+        let draws: Vec<[f64; 2]> =
+            (0..50).map(|i| [1e6 + f64::from(i * i % 17), f64::from(i % 5) - 2.0]).collect();
         let of = |draws: &[[f64; 2]]| {
             let mut m = Moments::default();
             draws.iter().for_each(|d| m.add(&name, d, 0.0));
@@ -138,13 +148,17 @@ mod tests {
         merged.merge(&Moments::default());
         let n = draws.len() as f64;
         let mean = [0, 1].map(|i| draws.iter().map(|d| d[i]).sum::<f64>() / n);
-        let variance =
-            [0, 1].map(|i| draws.iter().map(|d| (d[i] - mean[i]) * (d[i] - mean[i])).sum::<f64>() / (n - 1.0));
+        let variance = [0, 1].map(|i| {
+            draws.iter().map(|d| (d[i] - mean[i]) * (d[i] - mean[i])).sum::<f64>() / (n - 1.0)
+        });
         let sd = (0.5 * (variance[0] + variance[1])).sqrt();
         for m in [of(&draws), merged] {
             let (_, p) = m.iter().next().unwrap();
             assert_eq!(p.count, 50);
-            assert!((0..2).all(|i| (p.mean[i] - mean[i]).abs() < 1e-8) && (p.sd() - sd).abs() < 1e-8, "{p:?}");
+            assert!(
+                (0..2).all(|i| (p.mean[i] - mean[i]).abs() < 1e-8) && (p.sd() - sd).abs() < 1e-8,
+                "{p:?}"
+            );
         }
         assert_eq!(of(&draws[..1]).iter().next().unwrap().1.sd(), 0.0);
     }

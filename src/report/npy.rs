@@ -1,11 +1,12 @@
-//! Arrays of numbers as numpy reads them: the `.npy` format, version 1.0, little-endian float32, C order
-//! (numpy.lib.format).
+//! Arrays of numbers as numpy reads them: the `.npy` format, version 1.0, little-endian
+//! float32, C order (numpy.lib.format).
 
-/// The bytes of a `.npy` file. `values` has as many numbers as the product of `shape` says; a caller's mistake there
-/// gives a file numpy refuses, not a panic.
+/// The bytes of a `.npy` file. `values` has as many numbers as the product of `shape`
+/// says; a caller's mistake there gives a file numpy refuses, not a panic.
 pub fn f32_array(shape: &[usize], values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     let dims: String = shape.iter().map(|n| format!("{n}, ")).collect();
-    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}), }}", dims.trim_end());
+    let mut header =
+        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}), }}", dims.trim_end());
     // The data start at a multiple of 64 bytes; the header ends in a line break.
     let unpadded = 10 + header.len() + 1;
     header.push_str(&" ".repeat(unpadded.next_multiple_of(64) - unpadded));
@@ -27,7 +28,10 @@ mod tests {
         // numpy.save of the same array, up to the place of the padding.
         assert_eq!(&bytes[..10], b"\x93NUMPY\x01\x00\x76\x00");
         let header = std::str::from_utf8(&bytes[10..128]).unwrap();
-        assert_eq!(header.trim_end(), "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3,), }");
+        assert_eq!(
+            header.trim_end(),
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3,), }"
+        );
         assert!(header.ends_with(" \n"));
         assert_eq!(bytes.len(), 128 + 24);
         assert_eq!(&bytes[132..136], [0, 0, 0x80, 0x7f]);

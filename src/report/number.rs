@@ -1,6 +1,7 @@
 //! Numbers for people.
 
-/// About four significant digits, without a trailing zero too many; `-` for what is not a number.
+/// About four significant digits, without a trailing zero too many; `-` for what is not a
+/// number.
 pub fn number(x: f64) -> String {
     if x.is_nan() {
         return "-".into();
@@ -12,7 +13,8 @@ pub fn number(x: f64) -> String {
     if size != 0.0 && !(1e-4..1e6).contains(&size) {
         return format!("{x:.2e}");
     }
-    let digits = if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) as usize };
+    let digits =
+        if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) as usize };
     let s = format!("{x:.digits$}");
     if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').to_owned() } else { s }
 }
@@ -47,6 +49,9 @@ mod tests {
         ] {
             assert_eq!(number(x), text);
         }
-        assert_eq!((seconds(0.5), seconds(61.0), seconds(125.0)), ("0.50 s".into(), "61 s".into(), "2 min 5 s".into()));
+        assert_eq!(
+            (seconds(0.5), seconds(61.0), seconds(125.0)),
+            ("0.50 s".into(), "61 s".into(), "2 min 5 s".into())
+        );
     }
 }

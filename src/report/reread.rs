@@ -1,7 +1,7 @@
 //! The draws of a run read back from its folder, as they were in memory when it ended.
 //!
-//! Invariant: as many draws are kept, and as many are left out, as the run itself kept and left out
-//! for its summary.
+//! Invariant: as many draws are kept, and as many are left out, as the run itself kept
+//! and left out for its summary.
 
 use super::aligned::{all_name, draws_name, look};
 use super::csv::DrawReader;
@@ -12,16 +12,19 @@ use crate::infer::draws::{DrawRow, Sink};
 use std::fs::File;
 use std::io::{self, BufReader};
 
-/// The draws of each chain of a run, with room for so many numbers of all of them; a line that is
-/// not finished is left out.
+/// The draws of each chain of a run, with room for so many numbers of all of them; a line
+/// that is not finished is left out.
 ///
 /// # Errors
 /// If a file cannot be read, or is none of draws.
 pub fn reread(dir: &RunDir, room: usize) -> io::Result<Vec<ChainDraws>> {
-    let chains: Vec<u32> = (0..u32::MAX).take_while(|c| dir.file(&draws_name(*c)).is_file()).collect();
+    let chains: Vec<u32> =
+        (0..u32::MAX).take_while(|c| dir.file(&draws_name(*c)).is_file()).collect();
     let (mut all, mut even) = (Vec::new(), u64::MAX);
     for chain in &chains {
-        let told = |name: &str, e: io::Error| io::Error::new(e.kind(), format!("{}: {e}", dir.file(name).display()));
+        let told = |name: &str, e: io::Error| {
+            io::Error::new(e.kind(), format!("{}: {e}", dir.file(name).display()))
+        };
         let (short, whole) = (draws_name(*chain), all_name(*chain));
         // Where one chain came further than another, the summary is of what all have.
         let name = match dir.file(&whole).is_file() {
@@ -55,8 +58,9 @@ fn read(dir: &RunDir, name: &str, chain: u32, mut memory: Memory) -> io::Result<
     Ok(())
 }
 
-/// Gives quantities that were read from files the names that they had before, in the same order:
-/// files cannot bear every name. Where there are more or fewer names, they stay as they are.
+/// Gives quantities that were read from files the names that they had before, in the same
+/// order: files cannot bear every name. Where there are more or fewer names, they stay as
+/// they are.
 pub fn rename<'a>(quantities: &mut [Quantity], names: impl ExactSizeIterator<Item = &'a str>) {
     if names.len() == quantities.len() {
         quantities.iter_mut().zip(names).for_each(|(q, name)| name.clone_into(&mut q.name));

@@ -1,7 +1,8 @@
 //! The folder of a run: readable at any moment, never mixed with anything else.
 //!
-//! Invariant: a file written through [`RunDir::write`] is whole or absent; draws are the only files that grow. The folder
-//! holds one run: what an earlier run left is removed before the next one starts.
+//! Invariant: a file written through [`RunDir::write`] is whole or absent; draws are the
+//! only files that grow. The folder holds one run: what an earlier run left is removed
+//! before the next one starts.
 
 use super::whole::{is_partial, write_whole};
 use std::io;
@@ -11,7 +12,8 @@ use std::path::{Path, PathBuf};
 pub const MARK: &str = "run.json";
 /// What it holds while an earlier run is cleared away.
 const CLEARED: &[u8] = b"{}";
-/// What a run writes besides `run.json`, files with numbers, and what its program exports.
+/// What a run writes besides `run.json`, files with numbers, and what its program
+/// exports.
 const WRITTEN: [&str; 19] = [
     "program.pcad",
     "traces.jsonl",
@@ -63,16 +65,20 @@ pub struct RunDir {
 }
 
 impl RunDir {
-    /// Makes the folder. One that holds an earlier run is used again, and what that run left is removed first, so that
-    /// draws and pictures of two runs are never side by side.
+    /// Makes the folder. One that holds an earlier run is used again, and what that run
+    /// left is removed first, so that draws and pictures of two runs are never side by
+    /// side.
     ///
     /// # Errors
     /// If it cannot be made, or holds files that are none of a run's.
     pub fn create(path: &Path) -> Result<RunDir, RunDirError> {
         let io = |error| RunDirError::Io { path: path.to_owned(), error };
         std::fs::create_dir_all(path).map_err(io)?;
-        let names: Vec<_> =
-            std::fs::read_dir(path).map_err(io)?.map(|e| Ok(e?.file_name())).collect::<Result<_, _>>().map_err(io)?;
+        let names: Vec<_> = std::fs::read_dir(path)
+            .map_err(io)?
+            .map(|e| Ok(e?.file_name()))
+            .collect::<Result<_, _>>()
+            .map_err(io)?;
         let names: Vec<&str> = names.iter().map(|n| n.to_str().unwrap_or("")).collect();
         // A run that was killed before its first file was whole leaves only that.
         if !names.contains(&MARK) && names.iter().any(|n| !is_partial(n)) {
@@ -82,9 +88,12 @@ impl RunDir {
         if names.contains(&MARK) {
             write_whole(path, MARK, CLEARED).map_err(io)?;
         }
-        for name in names.into_iter().filter(|n| is_partial(n) || is_numbered(n) || WRITTEN.contains(n)) {
+        for name in
+            names.into_iter().filter(|n| is_partial(n) || is_numbered(n) || WRITTEN.contains(n))
+        {
             let path = path.join(name);
-            if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) }.map_err(io)?;
+            if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) }
+                .map_err(io)?;
         }
         Ok(RunDir { path: path.to_owned() })
     }
@@ -131,7 +140,8 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written; an older file of the name is kept then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        write_whole(&self.path, name, bytes).map_err(|error| RunDirError::Io { path: self.file(name), error })
+        write_whole(&self.path, name, bytes)
+            .map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
 }
 
@@ -145,8 +155,10 @@ fn numbered(parent: &Path, name: &str, n: u32) -> PathBuf {
 
 /// Whether a file holds draws of a chain, its checkpoint, or the picture of a mode.
 fn is_numbered(name: &str) -> bool {
-    let forms = [("chain-", ".csv"), ("draws-", ".csv"), ("chain-", ".checkpoint"), ("mode-", ".png")];
-    let number = forms.iter().find_map(|(before, after)| name.strip_prefix(before)?.strip_suffix(after));
+    let forms =
+        [("chain-", ".csv"), ("draws-", ".csv"), ("chain-", ".checkpoint"), ("mode-", ".png")];
+    let number =
+        forms.iter().find_map(|(before, after)| name.strip_prefix(before)?.strip_suffix(after));
     number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
@@ -156,14 +168,17 @@ mod tests {
 
     /// An empty folder of a test's own.
     fn base(name: &str) -> PathBuf {
-        let base = std::env::temp_dir().join(format!("pcadlang-rundir-{name}-{}", std::process::id()));
+        let base =
+            std::env::temp_dir().join(format!("pcadlang-rundir-{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&base);
         base
     }
 
     fn names(dir: &Path) -> Vec<String> {
-        let mut all: Vec<_> =
-            std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut all: Vec<_> = std::fs::read_dir(dir)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         all.sort();
         all
     }
@@ -180,7 +195,10 @@ mod tests {
         assert!(matches!(RunDir::create(&base.join("b")), Err(RunDirError::Occupied(_))));
         assert_eq!(names(&base.join("b")), ["overlay.png"], "nothing of it is removed");
         std::fs::write(base.join("c"), b"x").unwrap();
-        assert!(matches!(RunDir::create(&base.join("c")), Err(RunDirError::Io { .. })), "a file is no folder");
+        assert!(
+            matches!(RunDir::create(&base.join("c")), Err(RunDirError::Io { .. })),
+            "a file is no folder"
+        );
         std::fs::remove_dir_all(&base).unwrap();
     }
 

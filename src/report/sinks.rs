@@ -5,8 +5,8 @@ use crate::infer::draws::{Column, DrawRow, Sink};
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Keeps the draws of a chain in memory. Clones share them, so that one clone can be handed to the chain and the other
-/// looked into.
+/// Keeps the draws of a chain in memory. Clones share them, so that one clone can be
+/// handed to the chain and the other looked into.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
     draws: Arc<Mutex<ChainDraws>>,
@@ -18,8 +18,8 @@ pub struct Memory {
 const OVERHEAD: usize = 14;
 
 impl Memory {
-    /// Room for so many numbers: when they are used up, every other draw is let go, and from then on only every second one is kept,
-    /// every fourth, and so on.
+    /// Room for so many numbers: when they are used up, every other draw is let go, and
+    /// from then on only every second one is kept, every fourth, and so on.
     pub fn bounded(room: usize) -> Memory {
         Memory { room, ..Memory::default() }
     }
@@ -53,8 +53,15 @@ impl Sink for Memory {
         Ok(())
     }
 
-    fn chain_done(&mut self, _chain: u32, steps: u64, warmup: u64, _seconds: f64) -> io::Result<()> {
-        let said = [("steps", steps), ("warmup_steps", warmup)].map(|(k, v)| (k.to_owned(), v.to_string()));
+    fn chain_done(
+        &mut self,
+        _chain: u32,
+        steps: u64,
+        warmup: u64,
+        _seconds: f64,
+    ) -> io::Result<()> {
+        let said = [("steps", steps), ("warmup_steps", warmup)]
+            .map(|(k, v)| (k.to_owned(), v.to_string()));
         self.lock().comments.extend(said);
         Ok(())
     }
@@ -102,7 +109,10 @@ mod tests {
                 .unwrap();
             let kept = memory.lock();
             assert!(kept.rows.len() <= 100);
-            assert!(kept.rows.iter().zip(0..).all(|(r, i)| r.draw == i * kept.every), "draw {draw}");
+            assert!(
+                kept.rows.iter().zip(0..).all(|(r, i)| r.draw == i * kept.every),
+                "draw {draw}"
+            );
         }
         assert_eq!((memory.draws().every, memory.draws().rows.len()), (1024, 98));
     }

@@ -14,21 +14,25 @@ const SHOWN: usize = 6;
 /// Rows of aligned columns; the first is flush left.
 pub fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+    let width = |c: usize| {
+        rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
+    };
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut s = String::new();
     for row in rows {
         let mut line = String::new();
         for (c, cell) in row.iter().enumerate() {
             let pad = " ".repeat(widths[c] - cell.chars().count());
-            let _ = if c == 0 { write!(line, "{cell}{pad}") } else { write!(line, "  {pad}{cell}") };
+            let _ =
+                if c == 0 { write!(line, "{cell}{pad}") } else { write!(line, "  {pad}{cell}") };
         }
         let _ = writeln!(s, "{}", line.trim_end());
     }
     s
 }
 
-/// Mean, spread, 90 % interval, effective sample size (and that of a second of the kernels' time) and R-hat of each quantity.
+/// Mean, spread, 90 % interval, effective sample size (and that of a second of the
+/// kernels' time) and R-hat of each quantity.
 pub fn quantities(quantities: &[Quantity], kernel_seconds: f64) -> String {
     summaries(quantities, Some(kernel_seconds))
 }
@@ -47,14 +51,19 @@ fn summaries(quantities: &[Quantity], seconds: Option<f64>) -> String {
     let mut left_out = 0;
     let mut run = (None, 0);
     for q in quantities {
-        run = if q.column.is_some() && q.column == run.0 { (q.column, run.1 + 1) } else { (q.column, 1) };
+        run = if q.column.is_some() && q.column == run.0 {
+            (q.column, run.1 + 1)
+        } else {
+            (q.column, 1)
+        };
         if run.1 > SHOWN {
             left_out += 1;
             continue;
         }
         let s = &q.summary;
         let ess = if s.ess_bulk.is_nan() { "-".into() } else { format!("{:.0}", s.ess_bulk) };
-        let cells = [q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess];
+        let cells =
+            [q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess];
         let rate = seconds.and_then(|t| per_second(s.ess_bulk, t)).map_or("-".into(), whole);
         rows.push(row(cells, [rate, super::r_hat_text(s.r_hat)]));
     }
@@ -76,7 +85,8 @@ fn whole(x: f64) -> String {
     if x < 10.0 { number((x * 10.0).round() / 10.0) } else { number(x.round()) }
 }
 
-/// The choices that single-site kernels move least often, over all chains; nothing where there is only one.
+/// The choices that single-site kernels move least often, over all chains; nothing where
+/// there is only one.
 pub fn sites(sites: &[SiteStats]) -> String {
     if sites.len() < 2 {
         return String::new();
@@ -84,8 +94,11 @@ pub fn sites(sites: &[SiteStats]) -> String {
     let mut worst: Vec<&SiteStats> = sites.iter().collect();
     let rate = |s: &SiteStats| s.acceptance().unwrap_or(f64::INFINITY);
     worst.sort_by(|a, b| rate(a).total_cmp(&rate(b)));
-    let mut rows =
-        vec![["single-site moves, least accepted first", "proposals", "accepted"].map(str::to_owned).to_vec()];
+    let mut rows = vec![
+        ["single-site moves, least accepted first", "proposals", "accepted"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
     for s in worst.iter().take(SHOWN) {
         let rate = s.acceptance().map_or("-".into(), |r| format!("{:.0}%", 100.0 * r));
         rows.push(vec![s.address.clone(), s.proposals.to_string(), rate]);
@@ -99,14 +112,21 @@ pub fn sites(sites: &[SiteStats]) -> String {
 
 /// What the kernels did, over all chains.
 pub fn kernels(kernels: &[KernelStats]) -> String {
-    let mut rows = vec![["kernel", "proposals", "accepted", "failed", "time"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["kernel", "proposals", "accepted", "failed", "time"].map(str::to_owned).to_vec()];
     for k in kernels {
         let rate = if k.proposals == 0 {
             "-".into()
         } else {
             format!("{:.0}%", 100.0 * k.accepted as f64 / k.proposals as f64)
         };
-        rows.push(vec![k.name.clone(), k.proposals.to_string(), rate, k.failed.to_string(), super::seconds(k.seconds)]);
+        rows.push(vec![
+            k.name.clone(),
+            k.proposals.to_string(),
+            rate,
+            k.failed.to_string(),
+            super::seconds(k.seconds),
+        ]);
     }
     let mut text = aligned(&narrowed(rows));
     for k in kernels {
@@ -117,16 +137,21 @@ pub fn kernels(kernels: &[KernelStats]) -> String {
     text
 }
 
-/// Names (the first column) are cut in their middle until the lines fit, for their ends tell them apart.
+/// Names (the first column) are cut in their middle until the lines fit, for their ends
+/// tell them apart.
 pub(super) fn narrowed(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
-    let width = |rows: &[Vec<String>], c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max();
-    let others: usize = (1..rows.first().map_or(0, Vec::len)).filter_map(|c| width(&rows, c)).map(|w| w + 2).sum();
+    let width = |rows: &[Vec<String>], c: usize| {
+        rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max()
+    };
+    let others: usize =
+        (1..rows.first().map_or(0, Vec::len)).filter_map(|c| width(&rows, c)).map(|w| w + 2).sum();
     let room = COLUMNS.saturating_sub(others).max(16);
     for name in rows.iter_mut().filter_map(|r| r.first_mut()) {
         let n = name.chars().count();
         if n > room {
             let (head, tail) = (room / 2, room - room / 2 - 1);
-            *name = name.chars().take(head).chain(['…']).chain(name.chars().skip(n - tail)).collect();
+            *name =
+                name.chars().take(head).chain(['…']).chain(name.chars().skip(n - tail)).collect();
         }
     }
     rows
@@ -142,12 +167,22 @@ mod tests {
     use super::*;
 
     fn kernel(name: &str, proposals: u64, accepted: u64) -> KernelStats {
-        KernelStats { name: name.into(), proposals, accepted, seconds: 0.5, failed: 1, ..Default::default() }
+        KernelStats {
+            name: name.into(),
+            proposals,
+            accepted,
+            seconds: 0.5,
+            failed: 1,
+            ..Default::default()
+        }
     }
 
     #[test]
     fn tables_are_aligned_and_kernels_add_up() {
-        let (a, b) = ([kernel("mh(@x)", 100, 25)], [kernel("mh(@x)", 100, 75), kernel("drift(one(@**))", 0, 0)]);
+        let (a, b) = (
+            [kernel("mh(@x)", 100, 25)],
+            [kernel("mh(@x)", 100, 75), kernel("drift(one(@**))", 0, 0)],
+        );
         let all = merged([&a[..], &b[..]]);
         let expected = "\
 kernel           proposals  accepted  failed    time
@@ -164,10 +199,15 @@ drift(one(@**))          0         -       1  0.50 s
             (Some(200.0), None, None)
         );
         assert_eq!([0.04, 3.26, 123.4].map(whole), ["0", "3.3", "123"]);
-        let site = |address: &str, accepted| SiteStats { address: address.into(), proposals: 100, accepted };
+        let site = |address: &str, accepted| SiteStats {
+            address: address.into(),
+            proposals: 100,
+            accepted,
+        };
         assert_eq!(sites(&[site("@x", 5)]), "");
         let text = sites(&[site("@x", 50), site("@y", 5)]);
-        let rows: Vec<&str> = text.lines().skip(1).map(|l| l.split_whitespace().next().unwrap()).collect();
+        let rows: Vec<&str> =
+            text.lines().skip(1).map(|l| l.split_whitespace().next().unwrap()).collect();
         assert_eq!(rows, ["@y", "@x"]);
     }
 
@@ -183,12 +223,12 @@ drift(one(@**))          0         -       1  0.50 s
         let long = format!("{}/last[3]", "deep/".repeat(40));
         let text = quantities(&[of(long), of("é".repeat(200))], 0.5);
         assert!(text.lines().all(|l| l.chars().count() <= COLUMNS), "{text}");
-        assert!(
-            text.lines()
-                .nth(1)
-                .is_some_and(|l| l.starts_with("deep/deep/") && l.contains("…") && l.contains("/last[3] "))
-        );
+        assert!(text.lines().nth(1).is_some_and(|l| l.starts_with("deep/deep/")
+            && l.contains("…")
+            && l.contains("/last[3] ")));
         let many: Vec<Quantity> = (0..9).map(|i| of(format!("v[{i}]"))).collect();
-        assert!(quantities(&many, 0.0).ends_with("… and 3 more elements of vectors, in summary.json\n"));
+        assert!(
+            quantities(&many, 0.0).ends_with("… and 3 more elements of vectors, in summary.json\n")
+        );
     }
 }

@@ -1,7 +1,8 @@
-//! What a reader should know before believing the numbers of a run, and what to do about it.
+//! What a reader should know before believing the numbers of a run, and what to do about
+//! it.
 //!
-//! Thresholds are those of Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021): R-hat of at most 1.01 and 100 effective
-//! draws a chain.
+//! Thresholds are those of Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021): R-hat of
+//! at most 1.01 and 100 effective draws a chain.
 
 use super::Quantity;
 use super::modes::{self, DISAGREE, Mode};
@@ -12,10 +13,18 @@ const JUDGED: u64 = 200;
 /// Draws of a chain before it counts as stuck.
 const STUCK: usize = 50;
 
-/// Sentences for the user, the gravest first; none if all is well. `chains` is the number of chains that were run.
-pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats], chains: usize) -> Vec<String> {
+/// Sentences for the user, the gravest first; none if all is well. `chains` is the number
+/// of chains that were run.
+pub fn warnings(
+    quantities: &[Quantity],
+    modes: &[Mode],
+    kernels: &[KernelStats],
+    chains: usize,
+) -> Vec<String> {
     let mut out = Vec::new();
-    if let Some(q) = quantities.iter().find(|q| q.is_stuck() && q.chains.iter().all(|c| c.len() >= STUCK)) {
+    if let Some(q) =
+        quantities.iter().find(|q| q.is_stuck() && q.chains.iter().all(|c| c.len() >= STUCK))
+    {
         out.push(format!(
             "the chains disagree: {} never moved in any chain, and the chains have different \
              values; use a kernel that updates it, or smaller steps",
@@ -23,7 +32,8 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
         ));
     }
     if let Some((r, name)) = worst(quantities, |q| q.summary.r_hat).filter(|(r, _)| *r > 1.01) {
-        let what = if r > DISAGREE { "the chains disagree" } else { "the chains may not have mixed" };
+        let what =
+            if r > DISAGREE { "the chains disagree" } else { "the chains may not have mixed" };
         let r = if r > 100.0 { "above 100".to_owned() } else { format!("{r:.2}") };
         out.push(format!(
             "{what}: R-hat of {name} is {r} (it should be at most 1.01); run longer with --time or --steps"
@@ -31,15 +41,23 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
     }
     out.extend(modes::warning(modes));
     let wanted = 100 * chains;
-    if let Some((e, name)) = worst(quantities, |q| -q.summary.ess_bulk).filter(|(e, _)| -e < wanted as f64) {
+    if let Some((e, name)) =
+        worst(quantities, |q| -q.summary.ess_bulk).filter(|(e, _)| -e < wanted as f64)
+    {
         let e = -e;
         out.push(format!(
             "low effective sample size: {e:.0} for {name} (at least {wanted} recommended); run \
              longer with --time or --steps"
         ));
     }
-    if quantities.first().is_some_and(|q| q.chains.iter().map(Vec::len).sum::<usize>() > 0 && too_short(q)) {
-        out.push("too few draws to assess convergence: at least 4 per chain are needed; run longer".into());
+    if quantities
+        .first()
+        .is_some_and(|q| q.chains.iter().map(Vec::len).sum::<usize>() > 0 && too_short(q))
+    {
+        out.push(
+            "too few draws to assess convergence: at least 4 per chain are needed; run longer"
+                .into(),
+        );
     }
     for k in kernels.iter().filter(|k| k.proposals >= JUDGED) {
         if 2 * k.failed > k.proposals {
@@ -56,7 +74,10 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
                 k.name, k.divergent, k.proposals
             ));
         } else if k.accepted == 0 {
-            out.push(format!("{} accepted none of {} proposals, so it only costs time", k.name, k.proposals));
+            out.push(format!(
+                "{} accepted none of {} proposals, so it only costs time",
+                k.name, k.proposals
+            ));
         }
     }
     out
@@ -85,11 +106,20 @@ mod tests {
 
     /// Numbers without any order to them, between 0 and 1.
     fn noise(seed: u64, n: u64) -> Vec<f64> {
-        (0..n).map(|i| (((i + 1) * (i + seed) * 2_654_435_761) % 1_000_003) as f64 / 1_000_003.0).collect()
+        (0..n)
+            .map(|i| (((i + 1) * (i + seed) * 2_654_435_761) % 1_000_003) as f64 / 1_000_003.0)
+            .collect()
     }
 
     fn kernel(proposals: u64, accepted: u64, failed: u64) -> KernelStats {
-        KernelStats { name: "mh(@x)".into(), proposals, accepted, seconds: 0.1, failed, ..Default::default() }
+        KernelStats {
+            name: "mh(@x)".into(),
+            proposals,
+            accepted,
+            seconds: 0.1,
+            failed,
+            ..Default::default()
+        }
     }
 
     #[test]
@@ -101,7 +131,9 @@ mod tests {
 
     #[test]
     fn disagreement_is_said_with_the_worst_quantity() {
-        let apart = |by: f64| (0..2).map(|c| noise(c + 13, 500).iter().map(|x| x + by * c as f64).collect()).collect();
+        let apart = |by: f64| {
+            (0..2).map(|c| noise(c + 13, 500).iter().map(|x| x + by * c as f64).collect()).collect()
+        };
         let w = {
             let all = [quantity("near", apart(0.2)), quantity("far", apart(5.0))];
             warnings(&all, &modes(&all, None), &[], 2)
@@ -109,7 +141,8 @@ mod tests {
         assert!(w[0].starts_with("the chains disagree: R-hat of far is"), "{w:?}");
         assert!(w[1].starts_with("the 2 chains are each in a different mode"), "{w:?}");
         assert!(
-            w[2].starts_with("low effective sample size: ") && w[2].contains("for far (at least 200 recommended)"),
+            w[2].starts_with("low effective sample size: ")
+                && w[2].contains("for far (at least 200 recommended)"),
             "{w:?}"
         );
     }
@@ -127,7 +160,10 @@ mod tests {
         assert!(warnings(&[], &[], &[kernel(500, 0, 0)], 2)[0].contains("none of 500"));
         assert!(warnings(&[], &[], &[kernel(500, 0, 400)], 2)[0].contains("400 of 500"));
         assert_eq!(warnings(&[], &[], &[kernel(100, 0, 100)], 2), [""; 0], "too few to judge");
-        assert!(warnings(&[quantity("x", vec![vec![1.0, 2.0]])], &[], &[], 1)[0].starts_with("too few draws"));
+        assert!(
+            warnings(&[quantity("x", vec![vec![1.0, 2.0]])], &[], &[], 1)[0]
+                .starts_with("too few draws")
+        );
         assert_eq!(
             warnings(&[quantity("x", vec![vec![]])], &[], &[], 1),
             [""; 0],

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 /// The ending of files that are being written.
 const PARTIAL: &str = ".partial";
 
-/// Writes a file of a folder; an older one of the name is kept if that fails, and lends the new one its permissions.
+/// Writes a file of a folder; an older one of the name is kept if that fails, and lends
+/// the new one its permissions.
 ///
 /// # Errors
 /// As the file system has it.
@@ -22,11 +23,16 @@ pub fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
 /// A file under its other name.
 pub(super) struct Partial(PathBuf, PathBuf);
 
-/// Writes a file of a folder under another name: it is at its place when it is [ended](Partial::end).
+/// Writes a file of a folder under another name: it is at its place when it is
+/// [ended](Partial::end).
 ///
 /// # Errors
 /// If it cannot be written; nothing is left of it then.
-pub(super) fn begin(folder: &Path, name: &str, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<Partial> {
+pub(super) fn begin(
+    folder: &Path,
+    name: &str,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<Partial> {
     let (path, partial) = (folder.join(name), folder.join(format!(".{name}{PARTIAL}")));
     let written = File::create(&partial).and_then(|mut f| {
         write(&mut f)?;

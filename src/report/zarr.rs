@@ -1,8 +1,11 @@
-//! A run as ArviZ keeps it: `inference.zarr`, a folder in the Zarr format (version 2), that `xarray.open_datatree(…, engine="zarr")` and,
-//! with Zarr's own second version, `arviz.from_zarr` open. Groups: `posterior`, `sample_stats`, `log_likelihood` and `observed_data`.
+//! A run as ArviZ keeps it: `inference.zarr`, a folder in the Zarr format (version 2),
+//! that `xarray.open_datatree(…, engine="zarr")` and, with Zarr's own second version,
+//! `arviz.from_zarr` open. Groups: `posterior`, `sample_stats`, `log_likelihood` and
+//! `observed_data`.
 //!
-//! Arrays have one chunk and no compression: eight bytes a number, little-endian. Vectors have a dimension `NAME_dim_0`, observed values
-//! one dimension `observation` with their names as its coordinate. `/` in names is `.`, as programs have it.
+//! Arrays have one chunk and no compression: eight bytes a number, little-endian. Vectors
+//! have a dimension `NAME_dim_0`, observed values one dimension `observation` with their
+//! names as its coordinate. `/` in names is `.`, as programs have it.
 
 use super::ChainDraws;
 use crate::infer::draws::{Column, DrawRow, POINTWISE, Shape};
@@ -32,12 +35,19 @@ struct Array {
     numbers: Numbers,
 }
 
-/// Writes the draws of a run's chains, with the step size of each one's Hamiltonian kernel if it has one, brought to the same columns before; of chains with draws as many of each as the one with the fewest
-/// has. An older folder is replaced when the new one is whole.
+/// Writes the draws of a run's chains, with the step size of each one's Hamiltonian
+/// kernel if it has one, brought to the same columns before; of chains with draws as many
+/// of each as the one with the fewest has. An older folder is replaced when the new one
+/// is whole.
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write(dir: &Path, chains: &[ChainDraws], step_sizes: &[Option<f64>], points: &[Point]) -> io::Result<()> {
+pub fn write(
+    dir: &Path,
+    chains: &[ChainDraws],
+    step_sizes: &[Option<f64>],
+    points: &[Point],
+) -> io::Result<()> {
     let (place, partial) = (dir.join(ZARR), dir.join(format!(".{ZARR}.partial")));
     remove(&partial)?;
     std::fs::create_dir_all(&partial)?;
@@ -53,7 +63,8 @@ pub fn write(dir: &Path, chains: &[ChainDraws], step_sizes: &[Option<f64>], poin
     store.group("posterior", posterior(columns, &rows, &dims))?;
     let mut stats = sample_stats(&rows, &dims);
     if step_sizes.iter().any(Option::is_some) {
-        let each = step_sizes.iter().flat_map(|s| std::iter::repeat_n(s.unwrap_or(f64::NAN), draws));
+        let each =
+            step_sizes.iter().flat_map(|s| std::iter::repeat_n(s.unwrap_or(f64::NAN), draws));
         let numbers = Numbers::Floats(each.collect());
         stats.push(Array { name: "step_size".into(), dims: dims.clone(), numbers });
     }
@@ -63,11 +74,19 @@ pub fn write(dir: &Path, chains: &[ChainDraws], step_sizes: &[Option<f64>], poin
         let all = |d: &[(String, usize)]| d.iter().chain(&observation).cloned().collect::<Vec<_>>();
         let scores = rows.iter().flat_map(|r| r.values[at..at + n].to_vec()).collect();
         let names = Numbers::Texts(points.iter().map(|p| p.0.clone()).collect());
-        let array = |dims, numbers| Array { name: "observed".into(), dims, numbers: Numbers::Floats(numbers) };
-        let coordinate = Array { name: "observation".into(), dims: observation.clone(), numbers: names };
+        let array = |dims, numbers| Array {
+            name: "observed".into(),
+            dims,
+            numbers: Numbers::Floats(numbers),
+        };
+        let coordinate =
+            Array { name: "observation".into(), dims: observation.clone(), numbers: names };
         store.group("log_likelihood", vec![array(all(&dims), scores)])?;
         store.save("log_likelihood", &coordinate)?;
-        store.group("observed_data", vec![array(observation.clone(), points.iter().map(|p| p.1).collect())])?;
+        store.group(
+            "observed_data",
+            vec![array(observation.clone(), points.iter().map(|p| p.1).collect())],
+        )?;
         store.save("observed_data", &coordinate)?;
     }
     store.end()?;
@@ -136,7 +155,8 @@ fn name_of(name: &str, taken: &mut HashSet<String>) -> String {
             }
         })
         .collect();
-    let plain = if plain.is_empty() || plain.starts_with('.') { format!("_{plain}") } else { plain };
+    let plain =
+        if plain.is_empty() || plain.starts_with('.') { format!("_{plain}") } else { plain };
     let mut all = std::iter::once(plain.clone()).chain((2..).map(|i| format!("{plain}_{i}")));
     all.find(|name| taken.insert(name.to_lowercase())).unwrap_or(plain)
 }
@@ -149,15 +169,20 @@ struct Store {
 }
 
 impl Store {
-    /// Writes a group with its arrays and, for each dimension, the coordinate that counts from 0.
+    /// Writes a group with its arrays and, for each dimension, the coordinate that counts
+    /// from 0.
     fn group(&mut self, name: &str, arrays: Vec<Array>) -> io::Result<()> {
         self.put(&format!("{name}/.zgroup"), json!({ "zarr_format": 2 }))?;
         let by = json!({ "inference_library": "pcadlang", "inference_library_version": env!("CARGO_PKG_VERSION") });
         self.put(&format!("{name}/.zattrs"), by)?;
-        let dims: indexmap::IndexSet<&(String, usize)> = arrays.iter().flat_map(|a| &a.dims).collect();
+        let dims: indexmap::IndexSet<&(String, usize)> =
+            arrays.iter().flat_map(|a| &a.dims).collect();
         for (dim, n) in dims {
             let counts = Numbers::Integers((0..*n as i64).collect());
-            self.save(name, &Array { name: dim.clone(), dims: vec![(dim.clone(), *n)], numbers: counts })?;
+            self.save(
+                name,
+                &Array { name: dim.clone(), dims: vec![(dim.clone(), *n)], numbers: counts },
+            )?;
         }
         arrays.iter().try_for_each(|a| self.save(name, a))
     }
@@ -167,8 +192,12 @@ impl Store {
         let place = format!("{group}/{}", array.name);
         // No value stands for a missing one, or readers would take zeros for that.
         let (kind, bytes): (String, Vec<u8>) = match &array.numbers {
-            Numbers::Floats(xs) => ("<f8".into(), xs.iter().flat_map(|x| x.to_le_bytes()).collect()),
-            Numbers::Integers(xs) => ("<i8".into(), xs.iter().flat_map(|x| x.to_le_bytes()).collect()),
+            Numbers::Floats(xs) => {
+                ("<f8".into(), xs.iter().flat_map(|x| x.to_le_bytes()).collect())
+            }
+            Numbers::Integers(xs) => {
+                ("<i8".into(), xs.iter().flat_map(|x| x.to_le_bytes()).collect())
+            }
             Numbers::Truths(xs) => ("|b1".into(), xs.iter().map(|x| u8::from(*x)).collect()),
             Numbers::Texts(xs) => texts(xs),
         };
@@ -182,7 +211,11 @@ impl Store {
         let dims: Vec<&String> = array.dims.iter().map(|(name, _)| name).collect();
         self.put(&format!("{place}/.zattrs"), json!({ "_ARRAY_DIMENSIONS": dims }))?;
         let chunk = vec!["0"; shape.len()].join(".");
-        if bytes.is_empty() { Ok(()) } else { std::fs::write(self.dir.join(place).join(chunk), bytes) }
+        if bytes.is_empty() {
+            Ok(())
+        } else {
+            std::fs::write(self.dir.join(place).join(chunk), bytes)
+        }
     }
 
     fn put(&mut self, name: &str, value: Value) -> io::Result<()> {
@@ -198,14 +231,19 @@ impl Store {
     /// Writes what all the small files say.
     fn end(self) -> io::Result<()> {
         let all = json!({ "zarr_consolidated_format": 1, "metadata": self.metadata });
-        std::fs::write(self.dir.join(".zmetadata"), serde_json::to_vec_pretty(&all).unwrap_or_default())
+        std::fs::write(
+            self.dir.join(".zmetadata"),
+            serde_json::to_vec_pretty(&all).unwrap_or_default(),
+        )
     }
 }
 
 /// Texts as numpy has them: four bytes a letter, all of one length.
 fn texts(all: &[String]) -> (String, Vec<u8>) {
     let length = all.iter().map(|s| s.chars().count()).max().unwrap_or(0).max(1);
-    let letters = |s: &String| s.chars().map(u32::from).chain(std::iter::repeat(0)).take(length).collect::<Vec<_>>();
+    let letters = |s: &String| {
+        s.chars().map(u32::from).chain(std::iter::repeat(0)).take(length).collect::<Vec<_>>()
+    };
     let bytes = all.iter().flat_map(letters).flat_map(u32::to_le_bytes).collect();
     (format!("<U{length}"), bytes)
 }
@@ -219,21 +257,40 @@ mod tests {
         let dir = std::env::temp_dir().join(format!("pcadlang-zarr-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
-        let row = |x: f64| DrawRow { log_joint: -x, values: vec![x, 2.0 * x, 3.0 * x, -0.5], ..DrawRow::default() };
-        let columns = vec![Column::scalar("S/x"), Column::vector("w", 2), Column::vector(POINTWISE, 1)];
+        let row = |x: f64| DrawRow {
+            log_joint: -x,
+            values: vec![x, 2.0 * x, 3.0 * x, -0.5],
+            ..DrawRow::default()
+        };
+        let columns =
+            vec![Column::scalar("S/x"), Column::vector("w", 2), Column::vector(POINTWISE, 1)];
         let chain = |rows| ChainDraws { columns: columns.clone(), rows, ..ChainDraws::default() };
-        let chains = [chain(vec![row(1.0), row(2.0), row(3.0)]), chain(vec![]), chain(vec![row(4.0), row(5.0)])];
+        let chains = [
+            chain(vec![row(1.0), row(2.0), row(3.0)]),
+            chain(vec![]),
+            chain(vec![row(4.0), row(5.0)]),
+        ];
         for _ in 0..2 {
-            write(&dir, &chains, &[Some(0.25), None, Some(0.5)], &[("y[\u{e4}]".into(), 7.0)]).unwrap();
+            write(&dir, &chains, &[Some(0.25), None, Some(0.5)], &[("y[\u{e4}]".into(), 7.0)])
+                .unwrap();
         }
-        let read = |name: &str| std::fs::read(dir.join(ZARR).join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let floats =
-            |name: &str| read(name).chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect::<Vec<f64>>();
+        let read = |name: &str| {
+            std::fs::read(dir.join(ZARR).join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+        };
+        let floats = |name: &str| {
+            read(name)
+                .chunks(8)
+                .map(|b| f64::from_le_bytes(b.try_into().unwrap()))
+                .collect::<Vec<f64>>()
+        };
         let json = |name: &str| serde_json::from_slice::<Value>(&read(name)).unwrap();
         assert_eq!(floats("posterior/S.x/0.0"), [1.0, 2.0, 4.0, 5.0]);
         assert_eq!(floats("posterior/w/0.0.0"), [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 10.0, 15.0]);
         assert_eq!(json("posterior/w/.zarray")["shape"], json!([2, 2, 2]));
-        assert_eq!(json("posterior/w/.zattrs")["_ARRAY_DIMENSIONS"], json!(["chain", "draw", "w_dim_0"]));
+        assert_eq!(
+            json("posterior/w/.zattrs")["_ARRAY_DIMENSIONS"],
+            json!(["chain", "draw", "w_dim_0"])
+        );
         assert_eq!(floats("sample_stats/lp/0.0"), [-1.0, -2.0, -4.0, -5.0]);
         // Each chain's own, and the one without draws is left out.
         assert_eq!(floats("sample_stats/step_size/0.0"), [0.25, 0.25, 0.5, 0.5]);

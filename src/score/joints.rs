@@ -1,4 +1,5 @@
-//! Joints in a picture against labelled ones: the percentage of correct keypoints (Yang and Ramanan 2013).
+//! Joints in a picture against labelled ones: the percentage of correct keypoints (Yang
+//! and Ramanan 2013).
 
 use indexmap::IndexMap;
 
@@ -17,7 +18,8 @@ pub struct JointsTruth {
 pub struct JointsError {
     /// The number of labelled limb joints.
     pub labelled: usize,
-    /// How many of them were not found within 0.2 torso lengths (PCKt@0.2 counts the others).
+    /// How many of them were not found within 0.2 torso lengths (PCKt@0.2 counts the
+    /// others).
     pub missed: usize,
     /// The mean distance of those that were found at all, in pixels; NaN if none was.
     pub pixels: f64,
@@ -37,10 +39,12 @@ impl JointsTruth {
         self.torso().is_some() && limbs().any(|name| self.joints.contains_key(&name))
     }
 
-    /// How far found joints are off. A joint that was not found counts as missed; without a torso all of them do.
+    /// How far found joints are off. A joint that was not found counts as missed; without
+    /// a torso all of them do.
     pub fn error(&self, found: &IndexMap<String, [f64; 2]>) -> JointsError {
         let torso = self.torso();
-        let (mut error, mut sum, mut seen) = (JointsError { labelled: 0, missed: 0, pixels: f64::NAN }, 0.0, 0u32);
+        let (mut error, mut sum, mut seen) =
+            (JointsError { labelled: 0, missed: 0, pixels: f64::NAN }, 0.0, 0u32);
         for name in limbs() {
             let Some(truth) = self.joints.get(&name) else { continue };
             let d = found.get(&name).map(|at| distance(truth, at)).filter(|d| d.is_finite());
@@ -77,10 +81,15 @@ mod tests {
     #[test]
     fn a_joint_is_found_within_a_fifth_of_the_torso() {
         // The torso is 50 long.
-        let labelled =
-            [("l_shoulder", [0.0, 0.0]), ("r_hip", [30.0, 40.0]), ("l_knee", [0.0, 90.0]), ("nose", [5.0, 5.0])];
+        let labelled = [
+            ("l_shoulder", [0.0, 0.0]),
+            ("r_hip", [30.0, 40.0]),
+            ("l_knee", [0.0, 90.0]),
+            ("nose", [5.0, 5.0]),
+        ];
         let truth = JointsTruth { joints: joints(&labelled) };
-        let found = joints(&[("l_shoulder", [10.0, 0.0]), ("r_hip", [30.0, 50.5]), ("nose", [500.0, 5.0])]);
+        let found =
+            joints(&[("l_shoulder", [10.0, 0.0]), ("r_hip", [30.0, 50.5]), ("nose", [500.0, 5.0])]);
         let e = truth.error(&found);
         assert_eq!((e.labelled, e.missed), (3, 2));
         assert!((e.pixels - 10.25).abs() < 1e-12);

@@ -19,15 +19,19 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// What a quantity costs of which nothing is known: as much as a point mass two standard deviations off.
+    /// What a quantity costs of which nothing is known: as much as a point mass two
+    /// standard deviations off.
     pub const UNKNOWN: f64 = 2.236_067_977_499_79;
 
-    /// The root mean square, over the quantities, of the 2-Wasserstein distance between normals of the two means and standard
-    /// deviations (Givens and Shortt 1984), in standard deviations of the reference: 0 if both agree, 1 for a point mass at the right mean.
+    /// The root mean square, over the quantities, of the 2-Wasserstein distance between
+    /// normals of the two means and standard deviations (Givens and Shortt 1984), in
+    /// standard deviations of the reference: 0 if both agree, 1 for a point mass at the
+    /// right mean.
     pub fn error(&self, found: &IndexMap<String, Normal>) -> f64 {
         let one = |(name, truth): (&String, &Normal)| {
             let found = found.get(name)?;
-            let (mean, sd) = ((found.mean - truth.mean) / truth.sd, (found.sd - truth.sd) / truth.sd);
+            let (mean, sd) =
+                ((found.mean - truth.mean) / truth.sd, (found.sd - truth.sd) / truth.sd);
             let squared = mean * mean + sd * sd;
             squared.is_finite().then_some(squared)
         };
@@ -44,7 +48,9 @@ mod tests {
     #[test]
     fn distances_by_hand() {
         let all = |list: &[(&str, f64, f64)]| -> IndexMap<String, Normal> {
-            list.iter().map(|(n, mean, sd)| ((*n).to_owned(), Normal { mean: *mean, sd: *sd })).collect()
+            list.iter()
+                .map(|(n, mean, sd)| ((*n).to_owned(), Normal { mean: *mean, sd: *sd }))
+                .collect()
         };
         let reference = Reference { quantities: all(&[("a", 1.0, 2.0), ("b", 0.0, 1.0)]) };
         assert_eq!(reference.error(&reference.quantities), 0.0);

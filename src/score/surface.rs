@@ -1,14 +1,16 @@
-//! A visible surface against the true one, in a picture of both (the measures of Kulkarni et al. 2014, section 3.1, after Barron
-//! and Malik 2013).
+//! A visible surface against the true one, in a picture of both (the measures of Kulkarni
+//! et al. 2014, section 3.1, after Barron and Malik 2013).
 
 /// What is seen in each pixel, row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Pixels across.
     pub width: usize,
-    /// Distance along the viewing axis in scene units; not finite, or not above 0, where nothing is seen.
+    /// Distance along the viewing axis in scene units; not finite, or not above 0, where
+    /// nothing is seen.
     pub depth: Vec<f32>,
-    /// Unit normals; x right, y up, z towards the camera. Looked at only where something is seen.
+    /// Unit normals; x right, y up, z towards the camera. Looked at only where something
+    /// is seen.
     pub normal: Vec<[f32; 3]>,
 }
 
@@ -18,10 +20,12 @@ impl Surface {
         (z.is_finite() && z > 0.0).then_some(z)
     }
 
-    /// Width and height of what is seen, in scene units, at its mean depth; `pixel` is the width of a pixel at a depth.
+    /// Width and height of what is seen, in scene units, at its mean depth; `pixel` is
+    /// the width of a pixel at a depth.
     pub fn extent(&self, pixel: impl Fn(f64) -> f64) -> (f64, f64) {
         let w = self.width.max(1);
-        let seen: Vec<(usize, f64)> = (0..self.depth.len()).filter_map(|i| Some((i, self.seen(i)?))).collect();
+        let seen: Vec<(usize, f64)> =
+            (0..self.depth.len()).filter_map(|i| Some((i, self.seen(i)?))).collect();
         let span = |of: fn(usize, usize) -> usize| {
             let at = seen.iter().map(|(i, _)| of(*i, w));
             at.clone().max().zip(at.min()).map_or(0.0, |(hi, lo)| (hi - lo + 1) as f64)
@@ -39,16 +43,20 @@ pub struct SurfaceTruth {
     pub surface: Surface,
     /// The object's height along its axis in scene units: the unit of depth errors.
     pub height: f64,
-    /// Its width in scene units; half of it is what a pixel in only one of two masks costs.
+    /// Its width in scene units; half of it is what a pixel in only one of two masks
+    /// costs.
     pub width: f64,
 }
 
-/// How far a surface is from the true one. "Both" are the pixels where both are, "either" those where one of them is.
+/// How far a surface is from the true one. "Both" are the pixels where both are, "either"
+/// those where one of them is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceError {
-    /// Mean absolute difference of depth over both, up to one shift of all depths, in object heights. NaN if there are none.
+    /// Mean absolute difference of depth over both, up to one shift of all depths, in
+    /// object heights. NaN if there are none.
     pub z_mae: f64,
-    /// The same over either, a pixel of only one at the cost of the object's half width: a small safe answer does not win.
+    /// The same over either, a pixel of only one at the cost of the object's half width:
+    /// a small safe answer does not win.
     pub z_mae_u: f64,
     /// Mean squared distance of unit normals over both. NaN if there are none.
     pub n_mse: f64,
@@ -59,7 +67,8 @@ pub struct SurfaceError {
 }
 
 impl SurfaceTruth {
-    /// How far an answer is off; none (`None`) is as one that nowhere meets the truth. An answer of another size is read at the nearest pixel.
+    /// How far an answer is off; none (`None`) is as one that nowhere meets the truth. An
+    /// answer of another size is read at the nearest pixel.
     pub fn error(&self, found: Option<&Surface>) -> SurfaceError {
         let truth = &self.surface;
         let rows = |s: &Surface| s.depth.len() / s.width.max(1);
@@ -72,7 +81,9 @@ impl SurfaceTruth {
                 (f, nearest(y, rows(f), rows(truth)) * f.width + nearest(x, f.width, truth.width))
             });
             match (truth.seen(i), there.and_then(|(f, j)| Some((f, j, f.seen(j)?)))) {
-                (Some(z), Some((f, j, found))) => both.push((z - found, normal_gap(truth, i, f, j))),
+                (Some(z), Some((f, j, found))) => {
+                    both.push((z - found, normal_gap(truth, i, f, j)))
+                }
                 (Some(_), None) => only_truth += 1,
                 (None, Some(_)) => either += 1,
                 (None, None) => {}
@@ -83,7 +94,13 @@ impl SurfaceTruth {
         let half = self.width / 2.0;
         if both.is_empty() {
             let (z_mae, n_mse) = (f64::NAN, f64::NAN);
-            return SurfaceError { z_mae, z_mae_u: half / self.height, n_mse, n_mse_u: 2.0, iou: 0.0 };
+            return SurfaceError {
+                z_mae,
+                z_mae_u: half / self.height,
+                n_mse,
+                n_mse_u: 2.0,
+                iou: 0.0,
+            };
         }
         let mut gaps: Vec<f64> = both.iter().map(|b| b.0).collect();
         let shift = median(&mut gaps);
@@ -99,7 +116,8 @@ impl SurfaceTruth {
     }
 }
 
-/// The squared distance of two unit normals; 2, as if they were orthogonal, where one is missing.
+/// The squared distance of two unit normals; 2, as if they were orthogonal, where one is
+/// missing.
 fn normal_gap(a: &Surface, i: usize, b: &Surface, j: usize) -> f64 {
     let unit = |s: &Surface, i: usize| {
         let n = s.normal.get(i)?.map(f64::from);
@@ -141,7 +159,8 @@ mod tests {
     #[test]
     fn errors_by_hand() {
         let t = truth();
-        // One pixel off by 1, one missing, one too many, one normal turned by a right angle.
+        // One pixel off by 1, one missing, one too many, one normal turned by a right
+        // angle.
         let mut found = t.surface.clone();
         found.depth = vec![4.0, 5.0, 7.0, f32::INFINITY, 5.0, f32::NAN];
         found.normal[1] = [2.0, 0.0, 0.0];
@@ -162,7 +181,8 @@ mod tests {
     fn other_sizes_are_read_at_the_nearest_pixel() {
         let t = truth();
         let twice = |row: &[f32]| row.iter().flat_map(|z| [*z, *z]).collect::<Vec<f32>>();
-        let rows: Vec<f32> = t.surface.depth.chunks(3).flat_map(|r| [twice(r), twice(r)].concat()).collect();
+        let rows: Vec<f32> =
+            t.surface.depth.chunks(3).flat_map(|r| [twice(r), twice(r)].concat()).collect();
         let found = Surface { width: 6, depth: rows, normal: vec![[0.0, 0.0, 1.0]; 24] };
         assert_eq!(t.error(Some(&found)).z_mae_u, 0.0);
     }

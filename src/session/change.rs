@@ -40,7 +40,8 @@ fn signed(x: f64) -> String {
 }
 
 impl Session {
-    /// `:flip sel`: a Metropolis-Hastings step with proposals from the prior, as the kernel `block` does it.
+    /// `:flip sel`: a Metropolis-Hastings step with proposals from the prior, as the
+    /// kernel `block` does it.
     pub(super) fn flip(&mut self, text: &str) -> Result<Reply, Trouble> {
         let found = self.select(text)?;
         let targets: Vec<_> = found.iter().map(|(_, t)| *t).collect();
@@ -51,7 +52,10 @@ impl Session {
         let weight = match self.trace.regenerate(&targets, self.values()) {
             Ok(weight) => weight,
             Err(e) if e.is_recoverable() => {
-                return Ok(Reply::text(format!("rejected: the log density is undefined there: {}\n", e.message)));
+                return Ok(Reply::text(format!(
+                    "rejected: the log density is undefined there: {}\n",
+                    e.message
+                )));
             }
             Err(e) => return Err(Trouble::run(&self.model, *e)),
         };
@@ -75,7 +79,10 @@ impl Session {
             s += &format!("accepted (log ratio {})\n", signed(weight.log_weight));
         } else {
             self.trace.rollback();
-            s += &format!("rejected (log ratio {}): the state is unchanged\n", signed(weight.log_weight));
+            s += &format!(
+                "rejected (log ratio {}): the state is unchanged\n",
+                signed(weight.log_weight)
+            );
         }
         Ok(Reply::text(s))
     }
@@ -97,9 +104,13 @@ impl Session {
         self.trace.update(&given, self.values()).map_err(|e| Trouble::run(&self.model, *e))?;
         let after = Scores::of(&self.trace);
         if after.joint == f64::NEG_INFINITY && before.joint > f64::NEG_INFINITY {
-            let by: Vec<String> = self.trace.impossible().iter().take(3).map(|(a, _)| a.to_string()).collect();
+            let by: Vec<String> =
+                self.trace.impossible().iter().take(3).map(|(a, _)| a.to_string()).collect();
             self.trace.rollback();
-            return Err(Trouble::plain(format!("that state has probability zero, by {}", by.join(", "))));
+            return Err(Trouble::plain(format!(
+                "that state has probability zero, by {}",
+                by.join(", ")
+            )));
         }
         self.trace.commit();
         self.keep(past);

@@ -24,7 +24,11 @@ const fn command(name: &'static str, takes: &'static str, doc: &'static str) -> 
 pub const COMMANDS: &[Command] = &[
     command("trace", "[SEL]", "List choices with values and log densities: all, or a selection"),
     command("why", "NAME", "Show what a choice depends on, and what depends on it"),
-    command("flip", "SEL", "Propose a new value from the prior; show what changes and whether it is accepted"),
+    command(
+        "flip",
+        "SEL",
+        "Propose a new value from the prior; show what changes and whether it is accepted",
+    ),
     command("set", "NAME VALUE", "Change the value of a param, choice or observation"),
     command("draw", "", "Draw a new state from the prior"),
     command("undo", "", "Undo the last change"),
@@ -40,7 +44,11 @@ pub const COMMANDS: &[Command] = &[
     command("drop", "", "Stop the background run and discard it"),
     command("plot", "NAME", "Histogram and trace plot of a quantity of the last run"),
     command("profile", "", "Time and acceptance rates of the last run, by kernel and choice"),
-    command("render", "[NAME] [FILE]", "Show a picture of the scene, a view or a solid, or write it to FILE"),
+    command(
+        "render",
+        "[NAME] [FILE]",
+        "Show a picture of the scene, a view or a solid, or write it to FILE",
+    ),
     command("list", "", "Show the program"),
     command("edit", "", "Edit the program in your editor ($VISUAL or $EDITOR)"),
     command(
@@ -49,14 +57,19 @@ pub const COMMANDS: &[Command] = &[
         "Write the program to NAME.pcad and the trace to NAME.trace.json; asks before it overwrites",
     ),
     command("save!", "NAME", "The same without asking"),
-    command("load", "NAME", "Load a program, and its trace if there is one, or the folder of a run"),
+    command(
+        "load",
+        "NAME",
+        "Load a program, and its trace if there is one, or the folder of a run",
+    ),
     command("doc", "[NAME]", "Explain a statement, built-in, kernel or command"),
     command("clear", "", "Clear the screen"),
     command("help", "[NAME]", "This list (also ? or help); with a name the same as :doc"),
     command("quit", "", "Quit (also exit, Ctrl-D)"),
 ];
 
-/// Words that are no expression of the language and that people try, for the commands that they mean.
+/// Words that are no expression of the language and that people try, for the commands
+/// that they mean.
 pub(super) fn alias(word: &str) -> Option<&'static str> {
     match word {
         "help" | "?" => Some("help"),
@@ -107,7 +120,9 @@ impl Session {
             "quit" | "q" | "exit" => Ok(Reply { ends: true, ..Reply::default() }),
             _ => {
                 let near = nearest(name, COMMANDS.iter().map(|c| c.name));
-                let hint = near.map_or("`:help` lists the commands".to_owned(), |n| format!("did you mean `:{n}`?"));
+                let hint = near.map_or("`:help` lists the commands".to_owned(), |n| {
+                    format!("did you mean `:{n}`?")
+                });
                 Err(Trouble::plain(format!("there is no command `:{name}`")).hint(hint))
             }
         }
@@ -123,7 +138,9 @@ impl Session {
 
     fn doc(&self, name: &str) -> Result<Reply, Trouble> {
         if name.is_empty() {
-            return Ok(Reply::text("`:doc NAME` explains `observe`, `normal` or `:flip`; Tab completes names\n"));
+            return Ok(Reply::text(
+                "`:doc NAME` explains `observe`, `normal` or `:flip`; Tab completes names\n",
+            ));
         }
         let command = |c: &Command| format!(":{} {}\n\n{}.\n", c.name, c.takes, c.doc);
         let named = |n: &str| COMMANDS.iter().find(|c| c.name == n).map(command);
@@ -139,7 +156,8 @@ impl Session {
             return Ok(Reply::text(text));
         }
         let names: Vec<String> = self.topics().collect();
-        let trouble = Trouble::plain(format!("there is no statement, built-in or command `{name}`"));
+        let trouble =
+            Trouble::plain(format!("there is no statement, built-in or command `{name}`"));
         Err(match nearest(name, names.iter().map(String::as_str)) {
             Some(n) => trouble.hint(format!("did you mean `{n}`?")),
             None => trouble.hint("`:help` lists the commands, `pcadlang doc` all built-ins"),

@@ -20,8 +20,18 @@ const KEYWORDS: &[&str] = &["else", "and", "or", "not", "true", "false"];
 /// The tags that choices have by their distributions.
 const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
 /// What is read from files.
-const READERS: &[&str] =
-    &["image", "csv", "json", "mesh", "armature", "keypoints", "mask", "depth", "contours", "detector"];
+const READERS: &[&str] = &[
+    "image",
+    "csv",
+    "json",
+    "mesh",
+    "armature",
+    "keypoints",
+    "mask",
+    "depth",
+    "contours",
+    "detector",
+];
 
 impl Session {
     /// What the word that ends at byte `at` of a line may become.
@@ -52,7 +62,8 @@ impl Session {
             "set" if is_first => self.complete_choice(before, params()),
             "flip" | "trace" => self.complete_choice(before, self.selections()),
             "infer" if !before.contains(['(', '{']) => {
-                let kernels = self.model.code().builtins.iter().filter(|b| matches!(b.kind, Kind::Inference));
+                let kernels =
+                    self.model.code().builtins.iter().filter(|b| matches!(b.kind, Kind::Inference));
                 let own = self.model.code().kernels.iter().map(|k| k.name.node.to_string());
                 let plans = self.model.plan_names().map(str::to_owned).collect::<Vec<_>>();
                 found(start, word, kernels.map(|b| b.name.to_string()).chain(own).chain(plans))
@@ -65,10 +76,15 @@ impl Session {
     /// A choice by its address or, without the `@`, by its name, and some other words.
     fn complete_choice(&self, before: &str, others: impl Iterator<Item = String>) -> Completion {
         // Keys of addresses may hold spaces.
-        let start = before.rfind(" @").map_or_else(|| before.rfind(char::is_whitespace), Some).map_or(0, |i| i + 1);
+        let start = before
+            .rfind(" @")
+            .map_or_else(|| before.rfind(char::is_whitespace), Some)
+            .map_or(0, |i| i + 1);
         let word = &before[start..];
         let choices = self.trace.choices().into_iter().map(|(a, _, _)| a.to_string());
-        let written = |a: String| if word.starts_with('@') { a } else { a.trim_start_matches('@').to_owned() };
+        let written = |a: String| {
+            if word.starts_with('@') { a } else { a.trim_start_matches('@').to_owned() }
+        };
         found(start, word, choices.map(written).chain(others))
     }
 
@@ -89,11 +105,14 @@ impl Session {
     fn complete_text(&self, before: &str) -> Completion {
         if let Some(start) = open_string(before) {
             let is_program = before[..start - 1].trim_end().ends_with("include");
-            let reads = |name: &&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(*name);
+            let reads =
+                |name: &&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(*name);
             return match is_program || READERS.iter().any(reads) {
-                true => {
-                    found(start, &before[start..], files(&before[start..], if is_program { &[".pcad"] } else { &[] }))
-                }
+                true => found(
+                    start,
+                    &before[start..],
+                    files(&before[start..], if is_program { &[".pcad"] } else { &[] }),
+                ),
                 false => Completion::default(),
             };
         }
@@ -117,10 +136,16 @@ impl Session {
         if word.starts_with(|c: char| c.is_ascii_digit()) {
             return Completion::default();
         }
-        let arguments = enclosing_call(&before[..start]).map(|name| self.arguments(&name)).unwrap_or_default();
+        let arguments =
+            enclosing_call(&before[..start]).map(|name| self.arguments(&name)).unwrap_or_default();
         let globals = self.model.code().globals.keys().map(|n| n.replace('/', "."));
-        let keywords = STATEMENTS.iter().map(|s| s.name).chain(KEYWORDS.iter().copied()).map(str::to_owned);
-        found(start, word, arguments.into_iter().chain(globals).chain(self.builtins()).chain(keywords))
+        let keywords =
+            STATEMENTS.iter().map(|s| s.name).chain(KEYWORDS.iter().copied()).map(str::to_owned);
+        found(
+            start,
+            word,
+            arguments.into_iter().chain(globals).chain(self.builtins()).chain(keywords),
+        )
     }
 
     /// The addresses of choices and observations.
@@ -131,7 +156,12 @@ impl Session {
 
     /// The built-ins that are called by name.
     fn builtins(&self) -> impl Iterator<Item = String> {
-        let all = self.model.code().builtins.iter().filter(|b| b.name.starts_with(|c: char| c.is_ascii_alphabetic()));
+        let all = self
+            .model
+            .code()
+            .builtins
+            .iter()
+            .filter(|b| b.name.starts_with(|c: char| c.is_ascii_alphabetic()));
         all.map(|b| b.full_name())
     }
 
@@ -210,15 +240,18 @@ fn enclosing_call(before: &str) -> Option<String> {
     None
 }
 
-/// Files and folders whose path begins like this one; of files those with one of the endings, if there are any.
+/// Files and folders whose path begins like this one; of files those with one of the
+/// endings, if there are any.
 fn files(word: &str, endings: &[&str]) -> impl Iterator<Item = String> + use<> {
     let folder = word.rfind('/').map_or("", |i| &word[..=i]).to_owned();
     let endings: Vec<String> = endings.iter().map(|e| (*e).to_owned()).collect();
-    let listed = std::fs::read_dir(if folder.is_empty() { Path::new(".") } else { Path::new(&folder) });
+    let listed =
+        std::fs::read_dir(if folder.is_empty() { Path::new(".") } else { Path::new(&folder) });
     listed.into_iter().flatten().flatten().filter_map(move |e| {
         let name = e.file_name().into_string().ok().filter(|n| !n.starts_with('.'))?;
         let is_folder = e.path().is_dir();
-        let fits = is_folder || endings.is_empty() || endings.iter().any(|x| name.ends_with(x.as_str()));
+        let fits =
+            is_folder || endings.is_empty() || endings.iter().any(|x| name.ends_with(x.as_str()));
         fits.then(|| format!("{folder}{name}{}", if is_folder { "/" } else { "" }))
     })
 }

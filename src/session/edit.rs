@@ -1,6 +1,9 @@
-//! Directives: the program grows by them, and the trace is made again with the choices that it had.
+//! Directives: the program grows by them, and the trace is made again with the choices
+//! that it had.
 
-use super::redefine::{Key, Space, forgotten, items, key, to_forget, users, with_item, without_item};
+use super::redefine::{
+    Key, Space, forgotten, items, key, to_forget, users, with_item, without_item,
+};
 use super::{INPUT, Reply, Session, Trouble, exported, exported_operand, shown};
 use crate::diag::SourceMap;
 use crate::lang::code::{BlockKind, Operand};
@@ -33,7 +36,8 @@ struct Entry {
 }
 
 impl Session {
-    /// Adds directives to the program, runs inference blocks among them, and says what came of it.
+    /// Adds directives to the program, runs inference blocks among them, and says what
+    /// came of it.
     pub(super) fn add(&mut self, text: &str) -> Result<Reply, Trouble> {
         if let Some(name) = forgotten(text) {
             return self.forget(name);
@@ -45,7 +49,8 @@ impl Session {
         let known = (self.model.reports().len(), self.model.exports().len());
         let known_names = items(self.text());
         let is_known = |k: &Key| known_names.iter().any(|(n, _)| n.as_ref() == Some(k));
-        let again: Vec<Key> = entry.items.iter().filter_map(|(k, _)| k.clone()).filter(|k| is_known(k)).collect();
+        let again: Vec<Key> =
+            entry.items.iter().filter_map(|(k, _)| k.clone()).filter(|k| is_known(k)).collect();
         if !again.is_empty() {
             said += &self.redefine(&mut entry, &again)?;
             self.keep(past);
@@ -69,12 +74,15 @@ impl Session {
         Ok(Reply::text(said))
     }
 
-    /// Adds items of which some bind names that the program has: these take the place of the old ones, in the text and for all
-    /// that uses them. Says what that is; its values are shown, too.
+    /// Adds items of which some bind names that the program has: these take the place of
+    /// the old ones, in the text and for all that uses them. Says what that is; its
+    /// values are shown, too.
     fn redefine(&mut self, entry: &mut Entry, again: &[Key]) -> Result<String, Trouble> {
         let text = |moved: bool| {
             entry.items.iter().fold(self.text().to_owned(), |text, (name, item)| {
-                let Some(name) = name.as_ref().filter(|k| again.contains(k)) else { return grown(&text, item) };
+                let Some(name) = name.as_ref().filter(|k| again.contains(k)) else {
+                    return grown(&text, item);
+                };
                 match moved {
                     false => with_item(&text, name, item),
                     true => without_item(&text, name).map(|text| grown(&text, item)),
@@ -87,7 +95,12 @@ impl Session {
         // Where the new one needs what was bound since, it can only stand after that.
         let (mut said, new) = match self.rewrite(self.program.edited(&in_place)?) {
             Ok(said) => (said, in_place),
-            Err(first) => match self.program.edited(&moved).map_err(Trouble::from).and_then(|p| self.rewrite(p)) {
+            Err(first) => match self
+                .program
+                .edited(&moved)
+                .map_err(Trouble::from)
+                .and_then(|p| self.rewrite(p))
+            {
                 Ok(said) => (said, moved),
                 Err(_) => return Err(first),
             },
@@ -98,13 +111,17 @@ impl Session {
         }
         for (_, name) in again {
             let users = users(&new, name);
-            let shown: Vec<String> = users.iter().take(MOST_USERS).map(|(_, n)| format!("`{n}`")).collect();
+            let shown: Vec<String> =
+                users.iter().take(MOST_USERS).map(|(_, n)| format!("`{n}`")).collect();
             let more = if users.len() > MOST_USERS { ", …" } else { "" };
             said += &match shown.is_empty() {
                 true => format!("`{name}` is replaced\n"),
                 false => format!("`{name}` is replaced; used by {}{more}\n", shown.join(", ")),
             };
-            let values = users.iter().filter(|(space, _)| *space == Space::Value).map(|(_, n)| Arc::clone(n));
+            let values = users
+                .iter()
+                .filter(|(space, _)| *space == Space::Value)
+                .map(|(_, n)| Arc::clone(n));
             for n in values.take(MOST_USERS) {
                 if !entry.names.contains(&n) {
                     entry.names.push(n);
@@ -112,17 +129,30 @@ impl Session {
             }
         }
         let code = Arc::clone(self.model.code());
-        let is_fn =
-            |n: &Arc<str>| code.blocks.iter().any(|b| matches!(&b.kind, BlockKind::Function { name, .. } if name == n));
+        let is_fn = |n: &Arc<str>| {
+            code.blocks
+                .iter()
+                .any(|b| matches!(&b.kind, BlockKind::Function { name, .. } if name == n))
+        };
         entry.names.retain(|n| !is_fn(n));
         Ok(said)
     }
 
-    /// Draws the choices below some names again, if that gives a state of positive probability; whether it did.
+    /// Draws the choices below some names again, if that gives a state of positive
+    /// probability; whether it did.
     fn redraw(&mut self, names: &[Key]) -> Result<bool, Trouble> {
-        let below = |a: &Address| names.iter().any(|(_, n)| a.segments.first().is_some_and(|s| s.name == *n));
-        let gone: Vec<u64> = self.trace.choices().iter().filter(|(a, ..)| below(a)).map(|(a, ..)| a.hash64()).collect();
-        let kept: Vec<_> = self.trace.constraints().into_iter().filter(|(h, _)| !gone.contains(h)).collect();
+        let below = |a: &Address| {
+            names.iter().any(|(_, n)| a.segments.first().is_some_and(|s| s.name == *n))
+        };
+        let gone: Vec<u64> = self
+            .trace
+            .choices()
+            .iter()
+            .filter(|(a, ..)| below(a))
+            .map(|(a, ..)| a.hash64())
+            .collect();
+        let kept: Vec<_> =
+            self.trace.constraints().into_iter().filter(|(h, _)| !gone.contains(h)).collect();
         let (trace, _) = self.settle(&self.model, &kept, self.trace.replacements())?;
         let is_possible = trace.log_joint() > f64::NEG_INFINITY;
         if is_possible {
@@ -134,17 +164,23 @@ impl Session {
     /// `forget name`: takes an item out of the program.
     fn forget(&mut self, name: &str) -> Result<Reply, Trouble> {
         let key = to_forget(self.text(), name)?;
-        let Some(text) = without_item(self.text(), &key) else { return Err(Trouble::plain("there is no such item")) };
-        let past = self.remember(&format!("forget {name}"));
-        let said = match self.program.edited(&text).map_err(Trouble::from).and_then(|p| self.rewrite(p)) {
-            Ok(said) => said,
-            Err(e) => {
-                let users = users(self.text(), name);
-                let Some((_, first)) = users.first().filter(|_| key.0 != Space::Label) else { return Err(e) };
-                let hint = format!("forget `{first}` first, or bind `{name}` again to replace it");
-                return Err(Trouble::plain(format!("`{first}` uses `{name}`")).hint(hint));
-            }
+        let Some(text) = without_item(self.text(), &key) else {
+            return Err(Trouble::plain("there is no such item"));
         };
+        let past = self.remember(&format!("forget {name}"));
+        let said =
+            match self.program.edited(&text).map_err(Trouble::from).and_then(|p| self.rewrite(p)) {
+                Ok(said) => said,
+                Err(e) => {
+                    let users = users(self.text(), name);
+                    let Some((_, first)) = users.first().filter(|_| key.0 != Space::Label) else {
+                        return Err(e);
+                    };
+                    let hint =
+                        format!("forget `{first}` first, or bind `{name}` again to replace it");
+                    return Err(Trouble::plain(format!("`{first}` uses `{name}`")).hint(hint));
+                }
+            };
         self.keep(past);
         Ok(Reply::text(format!("{said}{}", self.summary())))
     }
@@ -164,7 +200,8 @@ impl Session {
         Ok(Reply::text(said + &self.summary()))
     }
 
-    /// Goes over to another version of the program, with the choices that it shares with this one; gives what is to be said.
+    /// Goes over to another version of the program, with the choices that it shares with
+    /// this one; gives what is to be said.
     pub(super) fn rewrite(&mut self, program: Program) -> Result<String, Trouble> {
         let model = program.clone().compile()?;
         let choices = self.trace.constraints();
@@ -176,7 +213,12 @@ impl Session {
     }
 
     /// What an entry asks for once the program has grown.
-    fn follow(&mut self, entry: &Entry, known: (usize, usize), said: &mut String) -> Result<(), Trouble> {
+    fn follow(
+        &mut self,
+        entry: &Entry,
+        known: (usize, usize),
+        said: &mut String,
+    ) -> Result<(), Trouble> {
         for name in &entry.names {
             let draws = self.looks();
             if let Some(value) = self.trace.global(name, draws) {
@@ -224,9 +266,12 @@ impl Session {
         // What the command line says goes before the default.
         let program = match declared.and_then(|d| d.default.as_ref()) {
             Some(e) if !self.program.is_set(name) => {
-                let (before, after) =
-                    (self.text().get(..e.span.start as usize), self.text().get(e.span.end as usize..));
-                let text = format!("{}{value}{}", before.unwrap_or_default(), after.unwrap_or_default());
+                let (before, after) = (
+                    self.text().get(..e.span.start as usize),
+                    self.text().get(e.span.end as usize..),
+                );
+                let text =
+                    format!("{}{value}{}", before.unwrap_or_default(), after.unwrap_or_default());
                 self.program.edited(&text)?
             }
             _ => (*self.program).clone().set(name, value),
@@ -269,12 +314,14 @@ impl Session {
     /// The value of an operand of the top level.
     fn asked(&mut self, operand: Operand) -> Result<Value, Trouble> {
         let draws = self.looks();
-        let values = self.trace.query(&[operand], draws).map_err(|e| Trouble::run(&self.model, *e))?;
+        let values =
+            self.trace.query(&[operand], draws).map_err(|e| Trouble::run(&self.model, *e))?;
         Ok(values.into_iter().next().unwrap_or_default())
     }
 }
 
-/// Sorts what was typed. What does not parse is kept whole: the compiler says what is wrong.
+/// Sorts what was typed. What does not parse is kept whole: the compiler says what is
+/// wrong.
 fn read(text: &str) -> Entry {
     let text = closed(text);
     let (program, errors) = parse(&text, SourceMap::new().add(INPUT, &text));
@@ -291,7 +338,9 @@ fn read(text: &str) -> Entry {
                 entry.samples.push(e.trim().to_owned());
             }
             // What only has a value is looked at.
-            ItemKind::Stmt(Stmt { kind: StmtKind::Expr(e), .. }) if !matches!(e.kind, ExprKind::Call { .. }) => {
+            ItemKind::Stmt(Stmt { kind: StmtKind::Expr(e), .. })
+                if !matches!(e.kind, ExprKind::Call { .. }) =>
+            {
                 entry.samples.push(slice.trim_end_matches(';').trim().to_owned());
             }
             kind => {
@@ -306,20 +355,25 @@ fn read(text: &str) -> Entry {
         }
     }
     // Comments and the layout stay where nothing is taken out.
-    if entry.samples.is_empty() && !entry.plans.iter().any(|(name, _)| name.is_none()) && !entry.kept.is_empty() {
+    if entry.samples.is_empty()
+        && !entry.plans.iter().any(|(name, _)| name.is_none())
+        && !entry.kept.is_empty()
+    {
         entry.kept = text;
     }
     entry
 }
 
-/// The text with the semicolon that one forgets at a prompt; on a line of its own where a comment ends the text.
+/// The text with the semicolon that one forgets at a prompt; on a line of its own where a
+/// comment ends the text.
 fn closed(text: &str) -> String {
     let parses = |text: &str| parse(text, SourceMap::new().add(INPUT, "")).1.is_empty();
     let ways = [text.to_owned(), format!("{text};"), format!("{text}\n;")];
     ways.into_iter().find(|t| parses(t)).unwrap_or_else(|| text.to_owned())
 }
 
-/// The name that an item binds to a value worth showing: no function, and no single element of a container.
+/// The name that an item binds to a value worth showing: no function, and no single
+/// element of a container.
 fn bound(item: &Item) -> Option<Arc<str>> {
     let (space, name) = key(item).filter(|_| !matches!(item.kind, ItemKind::Fn(_)))?;
     (space == Space::Value && !name.contains('[')).then_some(name)

@@ -1,4 +1,5 @@
-//! What `export e to "file";` writes: a mesh of what is a solid or a view, else the value as text.
+//! What `export e to "file";` writes: a mesh of what is a solid or a view, else the value
+//! as text.
 
 use crate::geom::{glb, obj};
 use crate::lang::builtins::scene::{SolidValue, ViewValue};

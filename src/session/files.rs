@@ -19,14 +19,20 @@ impl Session {
         Ok(Reply::text(self.summary()))
     }
 
-    /// `:save NAME`; asks before it overwrites files that this session neither wrote nor loaded, unless it was told to.
+    /// `:save NAME`; asks before it overwrites files that this session neither wrote nor
+    /// loaded, unless it was told to.
     pub(super) fn save(&mut self, name: &str, overwrites: bool) -> Result<Reply, Trouble> {
         let name = bare(name);
         let (program, trace) = (format!("{name}.pcad"), format!("{name}.trace.json"));
-        let there = [&program, &trace].into_iter().find(|f| Path::new(f).exists() && !self.own_files.contains(*f));
+        let there = [&program, &trace]
+            .into_iter()
+            .find(|f| Path::new(f).exists() && !self.own_files.contains(*f));
         if let Some(file) = there.filter(|_| !overwrites) {
             let question = format!("{file} exists; overwrite it?");
-            return Ok(Reply::request(Request::Confirm { question, then: format!(":save! {name}") }));
+            return Ok(Reply::request(Request::Confirm {
+                question,
+                then: format!(":save! {name}"),
+            }));
         }
         let written = self.program.written_as(&program).map_err(|e| {
             let first = e.diagnostics.first().map_or_else(String::new, |d| d.message.clone());
@@ -35,7 +41,8 @@ impl Session {
         })?;
         let saved = self.trace.save(&written.hash());
         let bytes = serde_json::to_vec(&saved).map_err(|e| Trouble::plain(e.to_string()))?;
-        // The trace first: a program without its trace is whole, a trace beside an older program would be refused.
+        // The trace first: a program without its trace is whole, a trace beside an older
+        // program would be refused.
         for (path, bytes) in [(&trace, &bytes[..]), (&program, self.text().as_bytes())] {
             write_file(Path::new(path), bytes)
                 .map_err(|e| Trouble::plain(format!("cannot write {path}: {}", reason(&e))))?;
@@ -58,9 +65,12 @@ impl Session {
         let (mut said, mut trace) = (note.text, loaded.trace);
         if let Some(saved) = saved_trace(Path::new(&path))? {
             let code = Arc::clone(loaded.model.code());
-            trace = Trace::load(code, loaded.model.hash(), &saved, self.limits.clone()).map_err(|e| {
-                Trouble::plain(format!("{path}: {e}")).hint("without that file the program loads alone")
-            })?;
+            trace = Trace::load(code, loaded.model.hash(), &saved, self.limits.clone()).map_err(
+                |e| {
+                    Trouble::plain(format!("{path}: {e}"))
+                        .hint("without that file the program loads alone")
+                },
+            )?;
             said += &format!("with the trace of {path}\n");
         }
         (self.program, self.model, self.trace) = (loaded.program, loaded.model, trace);

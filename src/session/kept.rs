@@ -19,7 +19,8 @@ pub(super) struct Kept {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Seen {
     pub draws: u64,
-    /// Draws that are another state than the one before, as far as the log joint density tells.
+    /// Draws that are another state than the one before, as far as the log joint density
+    /// tells.
     pub moved: u64,
     pub best: Option<f64>,
     /// The step after which the last draw was recorded, warm-up not counted.

@@ -19,7 +19,8 @@ impl Session {
         let all = selection.is_empty();
         let targets = if all { self.by_address(&Selector::All) } else { self.select(selection)? };
         let t = &self.trace;
-        let mut rows = vec![["choice", "value", "drawn from", "log density"].map(str::to_owned).to_vec()];
+        let mut rows =
+            vec![["choice", "value", "drawn from", "log density"].map(str::to_owned).to_vec()];
         for (address, target) in targets.iter().take(ROWS) {
             let dist = t.dist(*target).map_or_else(String::new, |d| d.name().to_owned());
             let score = number(t.score_of(*target));
@@ -31,11 +32,16 @@ impl Session {
             let observed = t.observations();
             if !observed.is_empty() {
                 let mut rows = vec![["observed", "log density"].map(str::to_owned).to_vec()];
-                rows.extend(observed.iter().take(ROWS).map(|(a, s)| vec![a.to_string(), number(*s)]));
+                rows.extend(
+                    observed.iter().take(ROWS).map(|(a, s)| vec![a.to_string(), number(*s)]),
+                );
                 text += &format!("\n{}{}", aligned(&rows), more(observed.len(), "observations"));
             }
             let parts = [t.log_joint(), t.log_prior(), t.log_likelihood()].map(number);
-            text += &format!("\nlog joint {} = {} (choices) + {} (observed)\n", parts[0], parts[1], parts[2]);
+            text += &format!(
+                "\nlog joint {} = {} (choices) + {} (observed)\n",
+                parts[0], parts[1], parts[2]
+            );
         }
         Ok(Reply::text(text))
     }
@@ -49,7 +55,8 @@ impl Session {
         let expr = match parse_expr(text, file) {
             Ok(e) => e,
             Err(errors) => {
-                let all = errors.into_iter().map(crate::diag::IntoDiagnostic::into_diagnostic).collect();
+                let all =
+                    errors.into_iter().map(crate::diag::IntoDiagnostic::into_diagnostic).collect();
                 return Err(wrong(all, sources));
             }
         };
@@ -60,11 +67,14 @@ impl Session {
         if !found.is_empty() {
             return Ok(found);
         }
-        let known: Vec<String> = self.trace.all_targets().iter().map(|t| self.trace.address(*t).to_string()).collect();
+        let known: Vec<String> =
+            self.trace.all_targets().iter().map(|t| self.trace.address(*t).to_string()).collect();
         let trouble = Trouble::plain(format!("`{text}` selects no choice in the trace"));
         Err(match nearest(text, known.iter().map(String::as_str)) {
             Some(n) => trouble.hint(format!("did you mean `{n}`?")),
-            None if known.is_empty() => trouble.hint("the trace has no choices yet: assume x ~ normal(0, 1)"),
+            None if known.is_empty() => {
+                trouble.hint("the trace has no choices yet: assume x ~ normal(0, 1)")
+            }
             None => trouble.hint("`:trace` shows all of them"),
         })
     }
@@ -73,7 +83,8 @@ impl Session {
     fn by_address(&mut self, selector: &Selector) -> Vec<(Address, Target)> {
         let selection = self.trace.select(selector);
         let t = &self.trace;
-        let mut all: Vec<(Address, Target)> = t.targets(selection).iter().map(|x| (t.address(*x), *x)).collect();
+        let mut all: Vec<(Address, Target)> =
+            t.targets(selection).iter().map(|x| (t.address(*x), *x)).collect();
         all.sort_by(|a, b| a.0.cmp(&b.0));
         all
     }
@@ -88,11 +99,16 @@ pub(super) fn more(rows: usize, what: &str) -> String {
 pub(super) fn impossible(t: &Trace) -> String {
     let found = t.impossible();
     let names: Vec<String> = found.iter().take(5).map(|(a, _)| a.to_string()).collect();
-    let more = if found.len() > 5 { format!(" and {} more", found.len() - 5) } else { String::new() };
-    format!("note: this state has probability zero, by {}{more}; `:draw` draws another one\n", names.join(", "))
+    let more =
+        if found.len() > 5 { format!(" and {} more", found.len() - 5) } else { String::new() };
+    format!(
+        "note: this state has probability zero, by {}{more}; `:draw` draws another one\n",
+        names.join(", ")
+    )
 }
 
-/// A selection as it is written: a plain name or path, `x`, `t["x"]`, means the choice `@x`.
+/// A selection as it is written: a plain name or path, `x`, `t["x"]`, means the choice
+/// `@x`.
 pub(super) fn addressed(text: &str) -> Cow<'_, str> {
     let begins = text.starts_with(|c: char| c.is_alphabetic() || c == '_');
     let name = text.split(['[', '/']).next().unwrap_or(text);

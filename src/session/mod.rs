@@ -1,9 +1,10 @@
-//! A session at a prompt: a program that grows line by line, one trace of it to look at and change, and inference on that, in the
-//! background too.
+//! A session at a prompt: a program that grows line by line, one trace of it to look at
+//! and change, and inference on that, in the background too.
 //!
-//! It knows no terminal and prints nothing: [`Session::enter`] takes what was typed and gives a [`Reply`], which a front end
-//! shows; `complete` and [`crate::syntax::classes`] help it edit lines. Invariants: after an error program and trace are as they were;
-//! the same lines with the same seed give the same replies, but for times.
+//! It knows no terminal and prints nothing: [`Session::enter`] takes what was typed and
+//! gives a [`Reply`], which a front end shows; `complete` and [`crate::syntax::classes`]
+//! help it edit lines. Invariants: after an error program and trace are as they were; the
+//! same lines with the same seed give the same replies, but for times.
 
 mod change;
 mod command;
@@ -42,9 +43,11 @@ use std::time::Duration;
 const INPUT: &str = "<input>";
 /// What a program without a file is called in messages.
 const NAME: &str = "<session>";
-/// How often choices are drawn anew where they lead to no value, or to one of probability zero.
+/// How often choices are drawn anew where they lead to no value, or to one of probability
+/// zero.
 const ATTEMPTS: u64 = 20;
-/// Nodes that the trace may have, about a gigabyte of them: a slip of the pen should not take the machine's memory.
+/// Nodes that the trace may have, about a gigabyte of them: a slip of the pen should not
+/// take the machine's memory.
 const NODES: u32 = 4_000_000;
 /// Choices that may be remembered for `:undo`, over all that can be undone.
 const REMEMBERED: usize = 4_000_000;
@@ -62,7 +65,8 @@ pub struct Session {
     past: VecDeque<Past>,
     /// What was undone since the last change, the last one at the end.
     undone: Vec<Past>,
-    /// Files that this session wrote or loaded: these may be written again without a question.
+    /// Files that this session wrote or loaded: these may be written again without a
+    /// question.
     own_files: BTreeSet<String>,
     /// Counts what was entered: random streams are keyed by it.
     clock: u64,
@@ -92,11 +96,13 @@ impl Session {
         Session::open(Program::named(NAME, "")?, seed, stop).map(|(s, _)| s)
     }
 
-    /// A session of a program with what it was given, and what is to be said of that. `stop` ends evaluations from outside;
-    /// whoever sets it takes it back before the next [`Session::enter`].
+    /// A session of a program with what it was given, and what is to be said of that.
+    /// `stop` ends evaluations from outside; whoever sets it takes it back before the
+    /// next [`Session::enter`].
     ///
     /// # Errors
-    /// What is wrong with the program. Where only data are missing the session is one of its prior.
+    /// What is wrong with the program. Where only data are missing the session is one of
+    /// its prior.
     pub fn open(program: Program, seed: u64, stop: Stop) -> Result<(Session, Reply), Trouble> {
         let limits = Limits { nodes: NODES, stop: stop.after(Duration::ZERO), ..Limits::default() };
         let missing = program.missing_data();
@@ -104,7 +110,9 @@ impl Session {
             [] => (program.eager(Eager::Names), None),
             names => {
                 let names = names.join("`, `");
-                let note = format!("note: `{names}` is not given, so nothing is observed: this is the prior\n");
+                let note = format!(
+                    "note: `{names}` is not given, so nothing is observed: this is the prior\n"
+                );
                 (program.without_data().eager(Eager::NamesOnly), Some(note))
             }
         };
@@ -133,7 +141,8 @@ impl Session {
         Ok((session, Reply::text(note.unwrap_or_default() + &said)))
     }
 
-    /// Who is shown how inference comes along while it is waited for, some times a second.
+    /// Who is shown how inference comes along while it is waited for, some times a
+    /// second.
     pub fn set_watch(&mut self, watch: impl FnMut(&Status) + 'static) {
         self.watch = Some(Box::new(watch));
     }
@@ -175,11 +184,16 @@ impl Session {
 
     /// Where what is only looked at is drawn.
     fn looks(&self) -> Draws {
-        Draws { key: StreamKey::new(self.seed, u32::MAX, Purpose::PREDICT), step: self.clock, lane: 0 }
+        Draws {
+            key: StreamKey::new(self.seed, u32::MAX, Purpose::PREDICT),
+            step: self.clock,
+            lane: 0,
+        }
     }
 
-    /// A trace of a model with choices and observed values taken over where it has them, and what is to be said of that. Other
-    /// choices are drawn; again, a few times, where they lead nowhere.
+    /// A trace of a model with choices and observed values taken over where it has them,
+    /// and what is to be said of that. Other choices are drawn; again, a few times, where
+    /// they lead nowhere.
     fn settle(
         &self,
         model: &Model,
@@ -201,8 +215,15 @@ impl Session {
         ] {
             for lane in 0..ATTEMPTS {
                 let draws = Draws { key, step: self.clock, lane };
-                match Trace::generate(Arc::clone(&code), kept.iter().cloned(), draws, self.limits.clone()) {
-                    Ok((t, _)) if t.log_joint() > f64::NEG_INFINITY => return Ok((t, note.to_owned())),
+                match Trace::generate(
+                    Arc::clone(&code),
+                    kept.iter().cloned(),
+                    draws,
+                    self.limits.clone(),
+                ) {
+                    Ok((t, _)) if t.log_joint() > f64::NEG_INFINITY => {
+                        return Ok((t, note.to_owned()));
+                    }
                     Ok((t, _)) => {
                         let nothing_new = t.choice_count() <= kept.len();
                         impossible.get_or_insert(t);
@@ -231,7 +252,11 @@ impl Session {
     /// Applies the `force` statements of a model after the first so many.
     fn force(&self, model: &Model, trace: &mut Trace, known: usize) -> Result<(), Trouble> {
         let forces = model.code().forces.get(known..).unwrap_or_default();
-        let draws = Draws { key: StreamKey::new(self.seed, 0, Purpose::START), step: self.clock, lane: ATTEMPTS };
+        let draws = Draws {
+            key: StreamKey::new(self.seed, 0, Purpose::START),
+            step: self.clock,
+            lane: ATTEMPTS,
+        };
         crate::infer::force(forces, trace, draws).map_err(|e| Trouble::run(model, *e))
     }
 
@@ -272,7 +297,9 @@ impl Session {
 
     /// `:undo`.
     fn undo(&mut self) -> Result<Reply, Trouble> {
-        let Some(past) = self.past.pop_back() else { return Err(Trouble::plain("there is nothing to undo")) };
+        let Some(past) = self.past.pop_back() else {
+            return Err(Trouble::plain("there is nothing to undo"));
+        };
         match self.exchange(&past) {
             Ok(now) => self.undone.push(now),
             Err(e) => {
@@ -285,7 +312,9 @@ impl Session {
 
     /// `:redo`.
     fn redo(&mut self) -> Result<Reply, Trouble> {
-        let Some(next) = self.undone.pop() else { return Err(Trouble::plain("there is nothing to redo")) };
+        let Some(next) = self.undone.pop() else {
+            return Err(Trouble::plain("there is nothing to redo"));
+        };
         match self.exchange(&next) {
             Ok(now) => self.push(now),
             Err(e) => {
@@ -296,7 +325,8 @@ impl Session {
         Ok(Reply::text(format!("redone: {}\n{}", next.what, self.summary())))
     }
 
-    /// Goes to a remembered state; gives the present one, by which the same step is taken the other way.
+    /// Goes to a remembered state; gives the present one, by which the same step is taken
+    /// the other way.
     fn exchange(&mut self, other: &Past) -> Result<Past, Trouble> {
         let now = self.remember(&other.what);
         self.go_back(other)?;

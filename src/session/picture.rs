@@ -1,4 +1,5 @@
-//! `:render`: what the scene looks like. A picture has no pixels until a front end says how large it shall be.
+//! `:render`: what the scene looks like. A picture has no pixels until a front end says
+//! how large it shall be.
 
 use super::{Reply, Session, Trouble};
 use crate::bank;
@@ -25,10 +26,12 @@ pub struct Picture {
 const LARGEST: u32 = 1024;
 
 impl Picture {
-    /// The pixels: the longer side has between [`pictures::LONGER_SIDE`] and 1024 of them.
+    /// The pixels: the longer side has between [`pictures::LONGER_SIDE`] and 1024 of
+    /// them.
     pub fn pixels(&self) -> RgbImage {
         let camera = self.view.camera();
-        let (width, height) = self.photo.as_ref().map_or((camera.width, camera.height), |p| p.dimensions());
+        let (width, height) =
+            self.photo.as_ref().map_or((camera.width, camera.height), |p| p.dimensions());
         let longer = width.max(height).max(1);
         let scaled = |x: u32| (u64::from(x) * u64::from(LARGEST) / u64::from(longer)).max(1) as u32;
         let fit = |x| if longer > LARGEST { scaled(x) } else { x };
@@ -36,8 +39,8 @@ impl Picture {
     }
 }
 
-/// The surface of a view with its contours and landmarks, over a photograph if there is one: of a picture of this size, enlarged
-/// as [`pictures::picture_size`] has it.
+/// The surface of a view with its contours and landmarks, over a photograph if there is
+/// one: of a picture of this size, enlarged as [`pictures::picture_size`] has it.
 pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u32)) -> RgbImage {
     let large = pictures::picture_size(width, height);
     let (contours, picture) = (view.contours(width.max(height)), view.frame(large.0.max(large.1)));
@@ -48,7 +51,8 @@ pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u
     out
 }
 
-/// Draws where points of the scene were observed, each with a line to where the scene has it, over a picture of `width` x `height`.
+/// Draws where points of the scene were observed, each with a line to where the scene has
+/// it, over a picture of `width` x `height`.
 pub fn detected(out: &mut RgbImage, located: &[Located], (width, height): (u32, u32)) {
     let scale = |[x, y]: [f64; 2]| [x * f64::from(width), y * f64::from(height)];
     let lines: Vec<_> = located.iter().map(|l| [scale(l.own), scale(l.observed)]).collect();
@@ -64,7 +68,15 @@ pub fn drawn(f: &Frame) -> Drawn<'_> {
 
 /// Contours as the reports want them.
 pub fn strokes(c: &Contours) -> Strokes<'_> {
-    Strokes { width: c.width, height: c.height, x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length }
+    Strokes {
+        width: c.width,
+        height: c.height,
+        x: &c.x,
+        y: &c.y,
+        tx: &c.tx,
+        ty: &c.ty,
+        length: &c.length,
+    }
 }
 
 impl Session {
@@ -77,17 +89,22 @@ impl Session {
         let draws = self.looks();
         let operand = match words[..] {
             [] => bank::picture(&mut self.trace, draws).ok_or_else(|| {
-                Trouble::plain("the program has no view and no solid").hint("let view = scene.render(solid);")
+                Trouble::plain("the program has no view and no solid")
+                    .hint("let view = scene.render(solid);")
             })?,
             [name] => self.global(name)?,
             _ => return Err(Trouble::plain("`:render` takes a name and a file that ends in .png")),
         };
-        let values = self.trace.query(&[operand], draws).map_err(|e| Trouble::run(&self.model, *e))?;
+        let values =
+            self.trace.query(&[operand], draws).map_err(|e| Trouble::run(&self.model, *e))?;
         let Some(view) = values.first().and_then(|v| bank::as_view(v, None)) else {
             let what = values.first().map_or("nothing", |v| v.type_name());
-            return Err(Trouble::plain(format!("`{text}` is {what}: only views and solids can be seen")));
+            return Err(Trouble::plain(format!(
+                "`{text}` is {what}: only views and solids can be seen"
+            )));
         };
-        let picture = Picture { view, photo: photo(self.model.code()), file: file.map(PathBuf::from) };
+        let picture =
+            Picture { view, photo: photo(self.model.code()), file: file.map(PathBuf::from) };
         Ok(Reply { picture: Some(picture), ..Reply::default() })
     }
 
@@ -106,9 +123,11 @@ impl Session {
 /// The first photograph among a program's data.
 fn photo(code: &Code) -> Option<Arc<RgbImage>> {
     let of = |o: &Operand| match o {
-        Operand::Const(i) => {
-            code.const_value(*i).downcast::<ImageValue>()?.as_photo().map(|p| Arc::new(p.rgb().clone()))
-        }
+        Operand::Const(i) => code
+            .const_value(*i)
+            .downcast::<ImageValue>()?
+            .as_photo()
+            .map(|p| Arc::new(p.rgb().clone())),
         _ => None,
     };
     code.globals.values().find_map(of)

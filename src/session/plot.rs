@@ -26,7 +26,9 @@ impl Session {
         let trouble = Trouble::plain(format!("the last inference has no quantity `{name}`"));
         Err(match nearest(name, names.clone()) {
             Some(n) => trouble.hint(format!("did you mean `{n}`?")),
-            None => trouble.hint(format!("it has {}", names.take(20).collect::<Vec<_>>().join(", "))),
+            None => {
+                trouble.hint(format!("it has {}", names.take(20).collect::<Vec<_>>().join(", ")))
+            }
         })
     }
 
@@ -65,7 +67,8 @@ fn plotted(q: &Quantity) -> String {
     text
 }
 
-/// How many draws are where: value by value if there are few values, else in bins of one width.
+/// How many draws are where: value by value if there are few values, else in bins of one
+/// width.
 fn histogram(xs: &[f64]) -> Vec<(String, usize)> {
     let mut values = xs.to_vec();
     values.sort_by(f64::total_cmp);
@@ -114,7 +117,10 @@ mod tests {
         assert_eq!(bins.len(), BARS);
         assert!(bins.iter().all(|b| b.1 == 100), "{bins:?}");
         assert_eq!(histogram(&[1.0, 0.0, 1.0]), [("0".to_owned(), 1), ("1".to_owned(), 2)]);
-        assert_eq!((bar(1.0).chars().count(), bar(0.5).as_str(), bar(0.0).as_str()), (WIDTH, &*"█".repeat(25), ""));
+        assert_eq!(
+            (bar(1.0).chars().count(), bar(0.5).as_str(), bar(0.0).as_str()),
+            (WIDTH, &*"█".repeat(25), "")
+        );
         assert_eq!(bar(0.01), "▌");
         let rising: Vec<f64> = (0..200).map(f64::from).collect();
         let c = course(&rising);
@@ -124,7 +130,10 @@ mod tests {
 
     #[test]
     fn huge_values_are_no_trouble() {
-        for xs in [vec![f64::MAX, -f64::MAX, 0.0], (0..50).map(|i| f64::MAX * (f64::from(i) / 25.0 - 1.0)).collect()] {
+        for xs in [
+            vec![f64::MAX, -f64::MAX, 0.0],
+            (0..50).map(|i| f64::MAX * (f64::from(i) / 25.0 - 1.0)).collect(),
+        ] {
             assert_eq!(histogram(&xs).iter().map(|b| b.1).sum::<usize>(), xs.len());
             assert_eq!(course(&xs).chars().count(), xs.len());
         }

@@ -1,4 +1,5 @@
-//! What a program's text binds by name: to replace it when the name is bound again, and to take it out.
+//! What a program's text binds by name: to replace it when the name is bound again, and
+//! to take it out.
 
 use super::Trouble;
 use crate::diag::{SourceMap, nearest};
@@ -32,9 +33,9 @@ pub(super) fn key(item: &Item) -> Option<Key> {
         ItemKind::Kernel(k) => Some((Space::Kernel, Arc::clone(&k.name.node))),
         ItemKind::Infer { name, .. } => name.as_ref().map(|n| (Space::Plan, Arc::clone(&n.node))),
         ItemKind::Stmt(s) => match &s.kind {
-            StmtKind::Assume { name, .. } | StmtKind::Let { name, .. } | StmtKind::Predict { name, .. } => {
-                value(&name.node)
-            }
+            StmtKind::Assume { name, .. }
+            | StmtKind::Let { name, .. }
+            | StmtKind::Predict { name, .. } => value(&name.node),
             // `z[0] ~ d` and `z[1] ~ d` are two elements of one container.
             StmtKind::Draw { target, .. } => value(&Arc::from(print_expr(target))),
             StmtKind::Observe { name, .. } | StmtKind::Factor { name, .. } => {
@@ -85,7 +86,8 @@ pub(super) fn users(text: &str, name: &str) -> Vec<Key> {
     found
 }
 
-/// Whether a text has one of some names, other than as a field or as what it names an observation.
+/// Whether a text has one of some names, other than as a field or as what it names an
+/// observation.
 fn uses(text: &str, names: &[String]) -> bool {
     classes(text).into_iter().any(|(place, class)| {
         let before = text[..place.start].trim_end();

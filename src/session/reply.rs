@@ -32,9 +32,11 @@ pub enum Request {
         /// What to enter then.
         then: String,
     },
-    /// Let the user edit the program's text, and give it to [`Session::replace`](super::Session::replace).
+    /// Let the user edit the program's text, and give it to
+    /// [`Session::replace`](super::Session::replace).
     Edit,
-    /// Open a run's folder, and give the session of that to [`Session::take_over`](super::Session::take_over).
+    /// Open a run's folder, and give the session of that to
+    /// [`Session::take_over`](super::Session::take_over).
     Open(PathBuf),
 }
 

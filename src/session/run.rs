@@ -1,7 +1,9 @@
-//! Inference from the state at hand: in the foreground, where it is waited for, or in the background on a clone of the trace.
+//! Inference from the state at hand: in the foreground, where it is waited for, or in the
+//! background on a clone of the trace.
 //!
-//! Each run is a chain of its own number, so that no stream of random numbers is used twice. What a run finds becomes the
-//! session's state when it is waited for or stopped, and can be undone.
+//! Each run is a chain of its own number, so that no stream of random numbers is used
+//! twice. What a run finds becomes the session's state when it is waited for or stopped,
+//! and can be undone.
 
 use super::kept::{Kept, Seen};
 use super::{INPUT, Reply, Session, Trouble};
@@ -70,7 +72,8 @@ pub struct Status {
     pub elapsed: Duration,
     /// What it does: looking for a start, warm-up, sampling.
     pub phase: &'static str,
-    /// How much of that is done, and of how much: steps where their number was given, else passes of the plan's loop.
+    /// How much of that is done, and of how much: steps where their number was given,
+    /// else passes of the plan's loop.
     pub done: (u64, u64),
     /// Whether it has ended.
     pub is_done: bool,
@@ -95,7 +98,9 @@ impl Session {
         };
         let (plan, steps) = match text.rsplit_once(char::is_whitespace).unwrap_or(("", text)) {
             (plan, count) if count.bytes().all(|b| b.is_ascii_digit()) && !count.is_empty() => {
-                let n = count.parse().map_err(|_| Trouble::plain(format!("{count} steps are too many")))?;
+                let n = count
+                    .parse()
+                    .map_err(|_| Trouble::plain(format!("{count} steps are too many")))?;
                 (plan.trim(), Some(n))
             }
             _ => (text, None),
@@ -119,7 +124,13 @@ impl Session {
             return Ok(Job { what: what.to_owned(), model, plan, steps, note });
         }
         if let Some(body) = model.plan_named(plan) {
-            return Ok(Job { what: plan.to_owned(), model, plan: body, steps, note: String::new() });
+            return Ok(Job {
+                what: plan.to_owned(),
+                model,
+                plan: body,
+                steps,
+                note: String::new(),
+            });
         }
         if plan.starts_with('{') {
             return self.typed(&format!("infer {plan}"), "infer { … }".to_owned(), steps);
@@ -140,7 +151,8 @@ impl Session {
     fn compiled(&self, block: &str) -> Result<(Arc<[KStmt]>, Arc<Model>), Trouble> {
         let program: Program = self.program.and(INPUT, block)?;
         let model = program.compile()?;
-        let plan = model.last_plan().ok_or_else(|| Trouble::plain("this is not an inference block"))?;
+        let plan =
+            model.last_plan().ok_or_else(|| Trouble::plain("this is not an inference block"))?;
         Ok((plan, Arc::new(model)))
     }
 
@@ -158,12 +170,14 @@ impl Session {
         }
         let stop = self.limits.stop.clone();
         let stopped = !self.wait_for(&run, &stop, true)?;
-        // The state that it came to is taken over although a stop was asked for: the question is answered.
+        // The state that it came to is taken over although a stop was asked for: the
+        // question is answered.
         self.limits.stop = Stop::default();
         let adopted = self.adopt(run);
         self.limits.stop = stop;
         self.trace.set_limits(self.limits.clone());
-        let ended = if stopped { "stopped early; its draws are kept, and `:undo` goes back\n" } else { "" };
+        let ended =
+            if stopped { "stopped early; its draws are kept, and `:undo` goes back\n" } else { "" };
         Ok(Reply::text(format!("{note}{}{ended}", adopted?)))
     }
 
@@ -192,7 +206,8 @@ impl Session {
         let is_done = Arc::new(AtomicBool::new(false));
         let thread = {
             let (code, plan) = (Arc::clone(job.model.code()), job.plan);
-            let (progress, mut sink, ended) = (Arc::clone(&progress), kept.clone(), Arc::clone(&is_done));
+            let (progress, mut sink, ended) =
+                (Arc::clone(&progress), kept.clone(), Arc::clone(&is_done));
             std::thread::Builder::new().name(format!("run {number}")).spawn(move || {
                 let result = run_from(&code, &plan, &options, &progress, &mut sink, number, trace);
                 ended.store(true, Ordering::SeqCst);
@@ -201,14 +216,27 @@ impl Session {
                 result
             })
         };
-        let thread = thread.map_err(|e| Trouble::plain(format!("no thread can be started: {e}")))?;
+        let thread =
+            thread.map_err(|e| Trouble::plain(format!("no thread can be started: {e}")))?;
         let base = Arc::clone(&self.model);
         let (what, model, steps, began) = (job.what, job.model, job.steps, Instant::now());
-        Ok(Background { what, number, base, model, progress, steps, kept, began, done, is_done, thread })
+        Ok(Background {
+            what,
+            number,
+            base,
+            model,
+            progress,
+            steps,
+            kept,
+            began,
+            done,
+            is_done,
+            thread,
+        })
     }
 
-    /// Waits until a run is over, or until that is stopped from outside; `ends` says whether the run ends then, which is waited
-    /// for. True if nobody stopped it.
+    /// Waits until a run is over, or until that is stopped from outside; `ends` says
+    /// whether the run ends then, which is waited for. True if nobody stopped it.
     fn wait_for(&mut self, run: &Background, stop: &Stop, ends: bool) -> Result<bool, Trouble> {
         while run.done.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
             if stop.is_asked() {
@@ -240,8 +268,11 @@ impl Session {
         };
         if !Arc::ptr_eq(&run.base, &self.model) {
             self.last = Some(finished);
-            let trouble = Trouble::plain(format!("the program has changed since run {} started", run.number));
-            return Err(trouble.hint("its state cannot be used; `:plot` and `:profile` show what it did"));
+            let trouble =
+                Trouble::plain(format!("the program has changed since run {} started", run.number));
+            return Err(
+                trouble.hint("its state cannot be used; `:plot` and `:profile` show what it did")
+            );
         }
         let mut last = result.last;
         if !Arc::ptr_eq(&run.model, &self.model) {
@@ -252,7 +283,11 @@ impl Session {
         let before = std::mem::replace(&mut self.trace, last).log_joint();
         self.keep(past);
         let (line, means) = (finished.line(), finished.means());
-        let said = format!("{line}{means}log joint {} -> {}\n", number(before), number(self.trace.log_joint()));
+        let said = format!(
+            "{line}{means}log joint {} -> {}\n",
+            number(before),
+            number(self.trace.log_joint())
+        );
         self.last = Some(finished);
         Ok(said)
     }
@@ -261,7 +296,9 @@ impl Session {
     pub(super) fn status(&self) -> Reply {
         Reply::text(match (&self.background, &self.last) {
             (Some(run), _) => run.line(),
-            (None, Some(last)) => format!("nothing runs in the background; last was {}", last.line()),
+            (None, Some(last)) => {
+                format!("nothing runs in the background; last was {}", last.line())
+            }
             (None, None) => "nothing runs in the background, and nothing has run\n".to_owned(),
         })
     }
@@ -295,15 +332,19 @@ impl Session {
     }
 
     fn taken(&mut self) -> Result<Background, Trouble> {
-        self.background.take().ok_or_else(|| Trouble::plain("nothing runs in the background").hint(":infer &"))
+        self.background
+            .take()
+            .ok_or_else(|| Trouble::plain("nothing runs in the background").hint(":infer &"))
     }
 
-    /// The number of the run in the background, and whether it is over: for a front end to say so.
+    /// The number of the run in the background, and whether it is over: for a front end
+    /// to say so.
     pub fn background(&self) -> Option<(u32, bool)> {
         self.background.as_ref().map(|b| (b.number, b.status().is_done))
     }
 
-    /// The draws of the run in the background, or of the last one, and what is to be said of them.
+    /// The draws of the run in the background, or of the last one, and what is to be said
+    /// of them.
     ///
     /// # Errors
     /// If there are none: nothing has run, or what runs is still in warm-up.
@@ -321,7 +362,9 @@ impl Session {
 
     /// `:profile`.
     pub(super) fn profile(&self) -> Result<Reply, Trouble> {
-        let Some(last) = &self.last else { return Err(Trouble::plain("nothing has run yet").hint(":infer")) };
+        let Some(last) = &self.last else {
+            return Err(Trouble::plain("nothing has run yet").hint(":infer"));
+        };
         let mut text = last.line();
         let rate = (last.steps + last.warmup) as f64 / last.seconds;
         text += &format!(
@@ -425,8 +468,13 @@ impl Finished {
 
     /// What was done, in a line.
     fn line(&self) -> String {
-        let warmup = if self.warmup > 0 { format!(" after {} of warm-up", self.warmup) } else { String::new() };
-        let (tried, accepted) = self.kernels.iter().fold((0, 0), |(p, a), k| (p + k.proposals, a + k.accepted));
+        let warmup = if self.warmup > 0 {
+            format!(" after {} of warm-up", self.warmup)
+        } else {
+            String::new()
+        };
+        let (tried, accepted) =
+            self.kernels.iter().fold((0, 0), |(p, a), k| (p + k.proposals, a + k.accepted));
         let accepted = match tried {
             0 => String::new(),
             _ => format!(", {:.0}% of proposals accepted", 100.0 * accepted as f64 / tried as f64),

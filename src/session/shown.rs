@@ -89,7 +89,10 @@ mod tests {
     #[test]
     fn the_largest_values_are_a_few_letters() {
         assert_eq!(whole(&Value::Num(1.0 / 3.0)), "0.3333333333333333");
-        assert_eq!((whole(&Value::Num(1e300)), whole(&Value::Num(-1e-300))), ("1e300".into(), "-1e-300".into()));
+        assert_eq!(
+            (whole(&Value::Num(1e300)), whole(&Value::Num(-1e-300))),
+            ("1e300".into(), "-1e-300".into())
+        );
         assert_eq!(short(&Value::array(vec![1.0 / 3.0; 3])), "[0.3333, 0.3333, 0.3333]");
         // A list of itself, thirty deep: a billion letters if it were written out.
         let mut v = Value::Str("x".into());

@@ -15,7 +15,8 @@ impl Session {
             let trouble = Trouble::plain(format!("`{text}` selects {} choices", found.len()));
             return Err(trouble.hint(format!("ask for one of them: {}, …", first.join(", "))));
         };
-        let (value, score) = (shown::short(&self.trace.value(*target)), number(self.trace.score_of(*target)));
+        let (value, score) =
+            (shown::short(&self.trace.value(*target)), number(self.trace.score_of(*target)));
         let dist = self.trace.dist(*target).map_or_else(String::new, |d| d.name().to_owned());
         let mut s = format!("{address} = {value}, drawn from {dist}, log density {score}\n");
         let origins = self.trace.origins(*target);
@@ -44,7 +45,12 @@ impl Session {
                 Effect::Moved => "may move with it",
                 Effect::Structural => "may appear or vanish",
             };
-            rows.push(vec![r.address.to_string(), what.into(), number(r.log_density), effect.into()]);
+            rows.push(vec![
+                r.address.to_string(),
+                what.into(),
+                number(r.log_density),
+                effect.into(),
+            ]);
         }
         s += &aligned(&rows);
         s += &more(reach.terms.len(), "terms");

@@ -1,8 +1,10 @@
-//! Address literals, `@pose[upperarm_l]/bone#2/rot[{k}]`, and tag selections, `$bone:arm_l`: one token each.
+//! Address literals, `@pose[upperarm_l]/bone#2/rot[{k}]`, and tag selections,
+//! `$bone:arm_l`: one token each.
 //!
-//! A segment is a name, `*` (any one) or `**` (any number), then the occurrence `#n` and keys, in either order.
-//! Segments are separated by `/`; a `.` is read as one. There is no space inside, so `@a / 2` divides and `@a/b` does
-//! not. A computed key `[{…}]` is lexed and parsed like any other expression.
+//! A segment is a name, `*` (any one) or `**` (any number), then the occurrence `#n` and
+//! keys, in either order. Segments are separated by `/`; a `.` is read as one. There is
+//! no space inside, so `@a / 2` divides and `@a/b` does not. A computed key `[{…}]` is
+//! lexed and parsed like any other expression.
 
 use super::ast::{Address, Expr, ExprKind, Key, Segment, SegmentName};
 use super::deep::Deep;
@@ -24,7 +26,8 @@ struct Scanner<'a, 's> {
     depth: u32,
 }
 
-/// The address whose `@` is at `start` and ends at `at`, and its end. After an error it holds what came before.
+/// The address whose `@` is at `start` and ends at `at`, and its end. After an error it
+/// holds what came before.
 pub(super) fn scan(lexer: &mut Lexer<'_>, start: usize, at: usize) -> (Rc<Deep<Address>>, usize) {
     let mut scanner = Scanner { lexer, at, depth: 1 };
     let mut segments = Vec::new();
@@ -63,7 +66,9 @@ impl<'s> Scanner<'_, 's> {
             }
             let mut ahead = self.rest().chars();
             let separated = matches!(ahead.next(), Some('/' | '.'));
-            if !separated || !ahead.next().is_some_and(|c| c.is_ascii_alphabetic() || matches!(c, '_' | '*')) {
+            if !separated
+                || !ahead.next().is_some_and(|c| c.is_ascii_alphabetic() || matches!(c, '_' | '*'))
+            {
                 return Ok(());
             }
             self.at += 1;
@@ -86,7 +91,10 @@ impl<'s> Scanner<'_, 's> {
     fn suffixes(&mut self, segment: &mut Segment) -> Result<(), AddressError> {
         let mut numbered = false;
         loop {
-            let digits = self.rest().strip_prefix('#').map_or(0, |t| t.bytes().take_while(u8::is_ascii_digit).count());
+            let digits = self
+                .rest()
+                .strip_prefix('#')
+                .map_or(0, |t| t.bytes().take_while(u8::is_ascii_digit).count());
             if digits > 0 && !numbered {
                 numbered = true;
                 let occurrence = self.rest()[1..=digits].parse().ok().filter(|n| *n > 0);
@@ -155,10 +163,13 @@ impl<'s> Scanner<'_, 's> {
     }
 }
 
-/// Whether a word that parses as a number is written as the language writes it: neither `+1` nor `.5` nor `1.`.
+/// Whether a word that parses as a number is written as the language writes it: neither
+/// `+1` nor `.5` nor `1.`.
 fn is_number(word: &str) -> bool {
     let digits = word.strip_prefix('-').unwrap_or(word);
-    digits.starts_with(|c: char| c.is_ascii_digit()) && !digits.ends_with('.') && !digits.contains(".e")
+    digits.starts_with(|c: char| c.is_ascii_digit())
+        && !digits.ends_with('.')
+        && !digits.contains(".e")
 }
 
 /// The length of the text before the `}` that closes a computed key.
@@ -199,7 +210,8 @@ impl<'s> Lexer<'s> {
             let (value, end) = self.string(at + 1, at + 2, &['"']);
             (Some(value), end)
         } else {
-            let length = rest.bytes().take_while(|b| b.is_ascii_alphanumeric() || *b == b'_').count();
+            let length =
+                rest.bytes().take_while(|b| b.is_ascii_alphanumeric() || *b == b'_').count();
             let value = Some(&rest[..length]).filter(|value| !value.is_empty());
             (value.map(Arc::from), value.map_or(at, |value| at + 1 + value.len()))
         };

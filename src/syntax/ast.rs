@@ -1,6 +1,8 @@
-//! The syntax tree of a `.pcad` file, as written: names are not resolved and nothing is checked.
+//! The syntax tree of a `.pcad` file, as written: names are not resolved and nothing is
+//! checked.
 //!
-//! Every node carries its [`Span`]. Equality compares spans too; use [`print`](super::print) to compare meaning.
+//! Every node carries its [`Span`]. Equality compares spans too; use
+//! [`print`](super::print) to compare meaning.
 
 use super::span::{Span, Spanned};
 use std::sync::Arc;
@@ -120,7 +122,8 @@ pub struct Param {
     pub default: Option<Expr>,
 }
 
-/// `{ stmt* expr }`: statements and the value of the last expression (nothing, if there is none).
+/// `{ stmt* expr }`: statements and the value of the last expression (nothing, if there
+/// is none).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// The statements.
@@ -369,8 +372,8 @@ pub enum BinaryOp {
     Range,
 }
 
-/// An address pattern: `@pose[upperarm_l]/bone/rot[z]`. Without wildcards or computed keys it names one choice and
-/// everything below it.
+/// An address pattern: `@pose[upperarm_l]/bone/rot[z]`. Without wildcards or computed
+/// keys it names one choice and everything below it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Address {
     /// The segments between slashes.

@@ -1,4 +1,5 @@
-//! What the grammar's actions do: building the tree, and the checks that are easier here than in productions.
+//! What the grammar's actions do: building the tree, and the checks that are easier here
+//! than in productions.
 
 use super::ast::*;
 use super::deep::{Deep, MAX_DEPTH, all, opt};
@@ -14,7 +15,8 @@ pub(crate) struct Builder {
     too_deep: bool,
 }
 
-/// A statement of a body, and whether it is an `if … else …` without a semicolon: as the last one, it is the value.
+/// A statement of a body, and whether it is an `if … else …` without a semicolon: as the
+/// last one, it is the value.
 pub(crate) struct BodyStmt {
     stmt: Deep<Stmt>,
     open_if: bool,
@@ -37,7 +39,8 @@ impl Builder {
         Spanned::new(text, self.span(start, end))
     }
 
-    // Every node that has children goes through `expr` or `body`, so these two keep the limit.
+    // Every node that has children goes through `expr` or `body`, so these two keep the
+    // limit.
 
     /// An expression over parts of the given depth.
     pub fn expr(&mut self, start: usize, parts: Deep<ExprKind>, end: usize) -> Deep<Expr> {
@@ -65,7 +68,8 @@ impl Builder {
         }
         if !self.too_deep {
             self.too_deep = true;
-            self.errors.push(SyntaxError::new(SyntaxErrorKind::TooDeep, Span { end: span.start, ..span }));
+            self.errors
+                .push(SyntaxError::new(SyntaxErrorKind::TooDeep, Span { end: span.start, ..span }));
         }
         Deep::leaf(cut())
     }
@@ -74,19 +78,44 @@ impl Builder {
         self.expr(start, expr.map(|expr| ExprKind::Unary { op, expr: Box::new(expr) }), end)
     }
 
-    pub fn binary(&mut self, start: usize, l: Deep<Expr>, op: BinaryOp, r: Deep<Expr>, end: usize) -> Deep<Expr> {
-        let both = l.and(r).map(|(l, r)| ExprKind::Binary { op, left: Box::new(l), right: Box::new(r) });
+    pub fn binary(
+        &mut self,
+        start: usize,
+        l: Deep<Expr>,
+        op: BinaryOp,
+        r: Deep<Expr>,
+        end: usize,
+    ) -> Deep<Expr> {
+        let both =
+            l.and(r).map(|(l, r)| ExprKind::Binary { op, left: Box::new(l), right: Box::new(r) });
         self.expr(start, both, end)
     }
 
-    pub fn call(&mut self, start: usize, callee: Deep<Expr>, args: Vec<Deep<Arg>>, end: usize) -> Deep<Expr> {
+    pub fn call(
+        &mut self,
+        start: usize,
+        callee: Deep<Expr>,
+        args: Vec<Deep<Arg>>,
+        end: usize,
+    ) -> Deep<Expr> {
         let parts = callee.and(all(args));
-        self.expr(start, parts.map(|(callee, args)| ExprKind::Call { callee: Box::new(callee), args }), end)
+        self.expr(
+            start,
+            parts.map(|(callee, args)| ExprKind::Call { callee: Box::new(callee), args }),
+            end,
+        )
     }
 
-    pub fn index(&mut self, start: usize, base: Deep<Expr>, index: Deep<Expr>, end: usize) -> Deep<Expr> {
+    pub fn index(
+        &mut self,
+        start: usize,
+        base: Deep<Expr>,
+        index: Deep<Expr>,
+        end: usize,
+    ) -> Deep<Expr> {
         let parts = base.and(index);
-        let kind = parts.map(|(base, index)| ExprKind::Index { base: Box::new(base), index: Box::new(index) });
+        let kind = parts
+            .map(|(base, index)| ExprKind::Index { base: Box::new(base), index: Box::new(index) });
         self.expr(start, kind, end)
     }
 
@@ -116,7 +145,13 @@ impl Builder {
     }
 
     /// `if cond { … }`, a statement: nothing happens otherwise, so there can be no value.
-    pub fn if_only(&mut self, at: usize, cond: Deep<Expr>, then: Deep<Body>, end: usize) -> Deep<Expr> {
+    pub fn if_only(
+        &mut self,
+        at: usize,
+        cond: Deep<Expr>,
+        then: Deep<Body>,
+        end: usize,
+    ) -> Deep<Expr> {
         self.no_value(&then.node);
         let empty = Deep::leaf(Body { stmts: Vec::new(), result: None, span: self.span(end, end) });
         self.if_else(at, cond, then, empty, end)
@@ -135,7 +170,12 @@ impl Builder {
     }
 
     /// `target ~ dist`, where the target has to be a name, or one with keys.
-    pub fn draw(&mut self, target: Deep<Expr>, dist: Deep<Expr>, tags: Vec<Deep<Tag>>) -> Deep<StmtKind> {
+    pub fn draw(
+        &mut self,
+        target: Deep<Expr>,
+        dist: Deep<Expr>,
+        tags: Vec<Deep<Tag>>,
+    ) -> Deep<StmtKind> {
         let mut name = &target.node;
         while let ExprKind::Index { base, .. } = &name.kind {
             name = base;
@@ -143,7 +183,11 @@ impl Builder {
         if !matches!(name.kind, ExprKind::Var(_) | ExprKind::Error) {
             self.errors.push(SyntaxError::new(SyntaxErrorKind::DrawTarget, target.node.span));
         }
-        target.and(dist).and(all(tags)).map(|((target, dist), tags)| StmtKind::Draw { target, dist, tags })
+        target.and(dist).and(all(tags)).map(|((target, dist), tags)| StmtKind::Draw {
+            target,
+            dist,
+            tags,
+        })
     }
 
     pub fn stmt(&self, start: usize, kind: Deep<StmtKind>, end: usize) -> BodyStmt {
@@ -157,7 +201,8 @@ impl Builder {
         BodyStmt { stmt, open_if: true }
     }
 
-    /// The statement and value of a body. Without a value of its own, a last `if … else …` is its value.
+    /// The statement and value of a body. Without a value of its own, a last
+    /// `if … else …` is its value.
     pub fn body(
         &mut self,
         start: usize,
@@ -176,7 +221,11 @@ impl Builder {
         }
         let span = self.span(start, end);
         let stmts = all(stmts.into_iter().map(|s| s.stmt).collect());
-        let body = stmts.and(result).map(|(stmts, result)| Body { stmts, result: result.map(Box::new), span });
+        let body = stmts.and(result).map(|(stmts, result)| Body {
+            stmts,
+            result: result.map(Box::new),
+            span,
+        });
         self.limit(span, body, || Body { stmts: Vec::new(), result: None, span })
     }
 }

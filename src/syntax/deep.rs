@@ -1,8 +1,9 @@
 //! Nodes with their depth, so that no tree deeper than [`MAX_DEPTH`] is ever built.
 //!
-//! Everything that walks a tree recurses (also `Drop` and `Clone`), so its depth bounds the stack. It cannot be checked
-//! afterwards: dropping a deep tree would already overflow. So the parser carries the depth along, and cuts the tree
-//! where it passes the limit (see [`Builder`](super::build::Builder)).
+//! Everything that walks a tree recurses (also `Drop` and `Clone`), so its depth bounds
+//! the stack. It cannot be checked afterwards: dropping a deep tree would already
+//! overflow. So the parser carries the depth along, and cuts the tree where it passes the
+//! limit (see [`Builder`](super::build::Builder)).
 
 /// The deepest tree that is built: expressions, bodies and loops inside each other.
 pub const MAX_DEPTH: u32 = 200;

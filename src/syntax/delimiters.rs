@@ -1,8 +1,10 @@
 //! Brackets: which closes which, and what was probably meant where they do not match.
 //!
-//! After [`balance`] every bracket of the tokens has its mate, so that [`recover`](super::recover) can find statements
-//! by hopping over brackets, and one forgotten bracket is one error, not a parse error at the end of the file. If the
-//! brackets match, nothing is changed; only if they do not, indentation and keywords are asked where one is missing.
+//! After [`balance`] every bracket of the tokens has its mate, so that
+//! [`recover`](super::recover) can find statements by hopping over brackets, and one
+//! forgotten bracket is one error, not a parse error at the end of the file. If the
+//! brackets match, nothing is changed; only if they do not, indentation and keywords are
+//! asked where one is missing.
 
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 use super::lexer::Lexeme;
@@ -18,7 +20,8 @@ struct Open {
     /// Its index in the output.
     index: usize,
     close: char,
-    /// The indentation of its line, and that of the next token's line where that begins a line.
+    /// The indentation of its line, and that of the next token's line where that begins a
+    /// line.
     indent: usize,
     inner: Option<usize>,
 }
@@ -41,26 +44,38 @@ pub(crate) struct Balanced<'s> {
     pub errors: Vec<SyntaxError>,
 }
 
-/// The tokens with brackets added, exchanged or left out such that they match, at most [`MAX_NESTING`] inside each
-/// other; no tokens if they are deeper.
+/// The tokens with brackets added, exchanged or left out such that they match, at most
+/// [`MAX_NESTING`] inside each other; no tokens if they are deeper.
 pub(crate) fn balance<'s>(text: &'s str, file: FileId, lexemes: Vec<Lexeme<'s>>) -> Balanced<'s> {
     match mates(&lexemes) {
         Ok(Some(mates)) => Balanced { lexemes, mates, errors: Vec::new() },
         Ok(None) => {
-            let (output, mates) = (Vec::with_capacity(lexemes.len()), Vec::with_capacity(lexemes.len()));
-            let mut b = Balancer { text, file, input: &lexemes, output, mates, open: Vec::new(), errors: Vec::new() };
+            let (output, mates) =
+                (Vec::with_capacity(lexemes.len()), Vec::with_capacity(lexemes.len()));
+            let mut b = Balancer {
+                text,
+                file,
+                input: &lexemes,
+                output,
+                mates,
+                open: Vec::new(),
+                errors: Vec::new(),
+            };
             b.run();
             Balanced { lexemes: b.output, mates: b.mates, errors: b.errors }
         }
         Err(index) => {
-            let span = lexemes.get(index).map_or(Span::new(file, 0, 0), |l| Span::new(file, l.start, l.end));
+            let span = lexemes
+                .get(index)
+                .map_or(Span::new(file, 0, 0), |l| Span::new(file, l.start, l.end));
             let errors = vec![SyntaxError::new(SyntaxErrorKind::TooNested, span)];
             Balanced { lexemes: Vec::new(), mates: Vec::new(), errors }
         }
     }
 }
 
-/// The mates, if all brackets match and no `;` stands in parentheses; the index of the first bracket that is too deep.
+/// The mates, if all brackets match and no `;` stands in parentheses; the index of the
+/// first bracket that is too deep.
 fn mates(lexemes: &[Lexeme<'_>]) -> Result<Option<Vec<usize>>, usize> {
     let mut mates: Vec<usize> = (0..lexemes.len()).collect();
     let mut open: Vec<(usize, char)> = Vec::new();
@@ -110,7 +125,9 @@ impl<'s> Balancer<'_, 's> {
     fn run(&mut self) {
         for (i, lexeme) in self.input.iter().enumerate() {
             let indent = self.indent_if_first(i);
-            if let Some(open) = self.open.last_mut().filter(|open| open.index + 1 == self.output.len()) {
+            if let Some(open) =
+                self.open.last_mut().filter(|open| open.index + 1 == self.output.len())
+            {
                 open.inner = indent;
             }
             self.close_before(i, indent);
@@ -136,18 +153,22 @@ impl<'s> Balancer<'_, 's> {
         self.output.push(lexeme);
     }
 
-    /// Closes what cannot be open before token `i`: parentheses before `;` or a statement, and braces before a
-    /// statement that is indented no further than the line that opened them.
+    /// Closes what cannot be open before token `i`: parentheses before `;` or a
+    /// statement, and braces before a statement that is indented no further than the line
+    /// that opened them.
     fn close_before(&mut self, i: usize, indent: Option<usize>) {
         let Some(lexeme) = self.input.get(i) else { return };
-        let parentheses = self.open.iter().rposition(|open| open.close == '}').map_or(0, |brace| brace + 1);
+        let parentheses =
+            self.open.iter().rposition(|open| open.close == '}').map_or(0, |brace| brace + 1);
         if lexeme.token == Token::Semi {
             return self.close_from(parentheses, Some(i));
         }
         let Some(indent) = indent.filter(|_| starts_statement(self.input, i)) else { return };
         self.close_from(parentheses, Some(i));
         let item = lexeme.token.starts_item();
-        let done = |open: &Open| indent <= open.indent && (item || open.inner.is_some_and(|inner| inner > open.indent));
+        let done = |open: &Open| {
+            indent <= open.indent && (item || open.inner.is_some_and(|inner| inner > open.indent))
+        };
         if let Some(first) = self.open.iter().position(done) {
             self.close_from(first, Some(i));
         }
@@ -161,14 +182,17 @@ impl<'s> Balancer<'_, 's> {
         let mate = if close == '}' {
             // A brace that begins a line closes the one whose line is indented like it.
             let aligned = |open: &Open| open.close == '}' && Some(open.indent) == indent;
-            let inner = brace.is_some_and(|b| indent.is_some_and(|indent| indent < self.open[b].indent));
+            let inner =
+                brace.is_some_and(|b| indent.is_some_and(|indent| indent < self.open[b].indent));
             brace.map(|b| self.open.iter().rposition(aligned).filter(|_| inner).unwrap_or(b))
         } else {
-            // A brace on the same line may be forgotten, one that spans lines is not closed by this.
+            // A brace on the same line may be forgotten, one that spans lines is not
+            // closed by this.
             let line = self.text[..lexeme.start].rfind('\n').map_or(0, |i| i + 1);
             let passed = |open: &&Open| open.close != '}' || self.output[open.index].start >= line;
             let reach = self.open.len() - self.open.iter().rev().take_while(passed).count();
-            let same = self.open[reach..].iter().rposition(|open| open.close == close).map(|p| reach + p);
+            let same =
+                self.open[reach..].iter().rposition(|open| open.close == close).map(|p| reach + p);
             // The wrong one of `)` and `]` is exchanged.
             same.or((self.open.len() > parentheses).then(|| self.open.len() - 1))
         };
@@ -191,14 +215,15 @@ impl<'s> Balancer<'_, 's> {
         }
     }
 
-    /// Closes the open brackets from the `first` on before token `i`, or at the end, and reports the innermost.
+    /// Closes the open brackets from the `first` on before token `i`, or at the end, and
+    /// reports the innermost.
     fn close_from(&mut self, first: usize, i: Option<usize>) {
         let Some(innermost) = self.open[first..].last().copied() else { return };
         let opener = &self.output[innermost.index];
         let span = Span::new(self.file, opener.start, opener.end);
-        let before = i
-            .and_then(|i| self.input.get(i))
-            .map(|l| (format!("`{}`", &self.text[l.start..l.end]), Span::new(self.file, l.start, l.end)));
+        let before = i.and_then(|i| self.input.get(i)).map(|l| {
+            (format!("`{}`", &self.text[l.start..l.end]), Span::new(self.file, l.start, l.end))
+        });
         let open = self.text[opener.start..].chars().next().unwrap_or_default();
         self.errors.push(SyntaxError::new(SyntaxErrorKind::Unclosed { open, before }, span));
         while self.open.len() > first
@@ -236,7 +261,8 @@ pub(crate) fn first_on_line(text: &str, lexemes: &[Lexeme<'_>], i: usize) -> boo
     before == 0 || text.get(before..lexeme.start).is_some_and(|gap| gap.contains('\n'))
 }
 
-/// Whether token `i` is a keyword that starts a statement or item, and not the name of a field or tag.
+/// Whether token `i` is a keyword that starts a statement or item, and not the name of a
+/// field or tag.
 pub(crate) fn starts_statement(lexemes: &[Lexeme<'_>], i: usize) -> bool {
     let at = |i: usize| lexemes.get(i).map(|l| &l.token);
     let Some(token) = at(i) else { return false };

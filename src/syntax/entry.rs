@@ -1,4 +1,5 @@
-//! What an editor or a prompt asks of a text that is still being written: the classes of its words, and whether it goes on.
+//! What an editor or a prompt asks of a text that is still being written: the classes of
+//! its words, and whether it goes on.
 
 use super::lexer::lex;
 use super::span::FileId;
@@ -48,15 +49,20 @@ pub fn classes(text: &str) -> Vec<(Range<usize>, Class)> {
 fn comments(text: &str, gap: Range<usize>, out: &mut Vec<(Range<usize>, Class)>) {
     let mut at = gap.start;
     while let Some(rest) = text.get(at..gap.end) {
-        let Some(start) = rest.find("//").into_iter().chain(rest.find("/*")).min().map(|i| at + i) else { return };
+        let Some(start) = rest.find("//").into_iter().chain(rest.find("/*")).min().map(|i| at + i)
+        else {
+            return;
+        };
         let (end, skip) = if text[start..].starts_with("//") { ("\n", 0) } else { ("*/", 2) };
-        let stop = text[start + skip..gap.end].find(end).map_or(gap.end, |i| start + skip + i + skip);
+        let stop =
+            text[start + skip..gap.end].find(end).map_or(gap.end, |i| start + skip + i + skip);
         out.push((start..stop, Class::Comment));
         at = stop;
     }
 }
 
-/// Whether a text ends within brackets or a comment, or after something that needs a right side: more is to come.
+/// Whether a text ends within brackets or a comment, or after something that needs a
+/// right side: more is to come.
 pub fn goes_on(text: &str) -> bool {
     let (lexemes, errors) = lex(text, 0..text.len(), FileId(0), 0);
     if errors.iter().any(|e| e.kind == super::SyntaxErrorKind::UnterminatedComment) {
@@ -74,7 +80,9 @@ pub fn goes_on(text: &str) -> bool {
             return false;
         }
     }
-    let open = |t: &Token| t.is_infix() || matches!(t, Token::Tilde | Token::Bind | Token::Comma | Token::Arrow);
+    let open = |t: &Token| {
+        t.is_infix() || matches!(t, Token::Tilde | Token::Bind | Token::Comma | Token::Arrow)
+    };
     depth > 0 || lexemes.last().is_some_and(|l| open(&l.token))
 }
 
@@ -105,7 +113,8 @@ mod tests {
     #[test]
     fn every_piece_has_its_class() {
         let text = "assume x /* a */ ~ normal(0.5, 1) #tag; // end\nf(@x[1], $tag, \"s\")";
-        let found: Vec<(&str, Class)> = classes(text).into_iter().map(|(r, c)| (&text[r], c)).collect();
+        let found: Vec<(&str, Class)> =
+            classes(text).into_iter().map(|(r, c)| (&text[r], c)).collect();
         use Class::*;
         let expected = [
             ("assume", Keyword),
@@ -126,7 +135,19 @@ mod tests {
 
     #[test]
     fn no_text_is_too_odd() {
-        for text in ["", "/*", "/*/", "//", "\"", "é@$", "@", "((((", "}{", "/* é */ // ü", "a // b /* c */\n/* d"] {
+        for text in [
+            "",
+            "/*",
+            "/*/",
+            "//",
+            "\"",
+            "é@$",
+            "@",
+            "((((",
+            "}{",
+            "/* é */ // ü",
+            "a // b /* c */\n/* d",
+        ] {
             for (r, _) in classes(text) {
                 assert!(text.get(r.clone()).is_some_and(|t| !t.is_empty()), "{text:?} {r:?}");
             }
@@ -137,7 +158,8 @@ mod tests {
 
     #[test]
     fn what_goes_on_and_what_does_not() {
-        for text in ["fn f(x) {", "let a = [1,", "assume x ~", "1 +", "/* so", "if a { 1 } else {"] {
+        for text in ["fn f(x) {", "let a = [1,", "assume x ~", "1 +", "/* so", "if a { 1 } else {"]
+        {
             assert!(goes_on(text), "{text}");
         }
         for text in ["let a = 1", "f(x)", "}", ") + (", "\"open", "x // {", ""] {
@@ -147,8 +169,15 @@ mod tests {
 
     #[test]
     fn directives_and_expressions() {
-        for text in ["let a = 1", "x ~ normal(0, 1)", "t[1] ~ flip(0.5)", "f(1);", "a = 3", "fn f() { 1 }", "infer { }"]
-        {
+        for text in [
+            "let a = 1",
+            "x ~ normal(0, 1)",
+            "t[1] ~ flip(0.5)",
+            "f(1);",
+            "a = 3",
+            "fn f() { 1 }",
+            "infer { }",
+        ] {
             assert!(is_directive(text), "{text}");
         }
         for text in [

@@ -1,5 +1,5 @@
-//! What can be wrong with a text, and how it is said. The advice on what does not fit the grammar is in
-//! [`advice`](super::advice).
+//! What can be wrong with a text, and how it is said. The advice on what does not fit the
+//! grammar is in [`advice`](super::advice).
 
 use super::advice::Advice;
 use super::deep::MAX_DEPTH;
@@ -47,7 +47,8 @@ pub enum SyntaxErrorKind {
     Unclosed {
         /// The bracket.
         open: char,
-        /// Before what it should have been closed, in words; `None` for the end of the text.
+        /// Before what it should have been closed, in words; `None` for the end of the
+        /// text.
         before: Option<(String, Span)>,
     },
     /// A closing bracket that nothing opened.
@@ -58,7 +59,8 @@ pub enum SyntaxErrorKind {
     TooDeep,
     /// More than [`MAX_TOKENS`].
     TooManyTokens,
-    /// A text over [`MAX_SOURCE_BYTES`](crate::diag::MAX_SOURCE_BYTES): its size in bytes.
+    /// A text over [`MAX_SOURCE_BYTES`](crate::diag::MAX_SOURCE_BYTES): its size in
+    /// bytes.
     TooLarge(usize),
     /// A statement without its semicolon.
     MissingSemicolon {
@@ -105,7 +107,8 @@ impl SyntaxError {
         SyntaxError { kind, span }
     }
 
-    /// Whether the text may only be unfinished: an interactive prompt can ask for another line.
+    /// Whether the text may only be unfinished: an interactive prompt can ask for another
+    /// line.
     pub fn is_incomplete(&self) -> bool {
         matches!(
             self.kind,
@@ -169,7 +172,9 @@ impl IntoDiagnostic for SyntaxError {
 fn unknown_character(c: char, span: Span) -> Diagnostic {
     let shown = match c {
         c if c.is_control() || c.is_whitespace() => format!("U+{:04X}", u32::from(c)),
-        '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{feff}' => format!("U+{:04X}", u32::from(c)),
+        '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{feff}' => {
+            format!("U+{:04X}", u32::from(c))
+        }
         c => format!("`{c}`"),
     };
     let hint = match c {
@@ -188,7 +193,9 @@ fn unknown_character(c: char, span: Span) -> Diagnostic {
         '≠' => Some("write \"not equal\" as `!=`"),
         '…' => Some("a range is written `a .. b`"),
         '∼' | '～' => Some("a random choice is written with `~`"),
-        '→' | '←' | '⇒' => Some("an arm of `mix` is written with `=>`; a choice with `~`, a value with `=`"),
+        '→' | '←' | '⇒' => {
+            Some("an arm of `mix` is written with `=>`; a choice with `~`, a value with `=`")
+        }
         '²' => Some("a power is written `x ** 2`"),
         '³' => Some("a power is written `x ** 3`"),
         '°' => Some("degrees are written `deg(30)`"),
@@ -199,7 +206,9 @@ fn unknown_character(c: char, span: Span) -> Diagnostic {
         '，' => Some("a comma is written `,`"),
         '（' | '）' => Some("parentheses are written `(` and `)`"),
         '?' => Some("a choice between two values is written `if c { a } else { b }`"),
-        '\\' => Some("a function is written `fn(x) { … }`; a statement may continue on the next line"),
+        '\\' => {
+            Some("a function is written `fn(x) { … }`; a statement may continue on the next line")
+        }
         _ => None,
     };
     let diagnostic = Diagnostic::error(format!("unknown character {shown}"), span, "");
@@ -207,7 +216,9 @@ fn unknown_character(c: char, span: Span) -> Diagnostic {
 }
 
 fn foreign_spelling(foreign: Foreign, found: &str, span: Span) -> Diagnostic {
-    let error = |label: &str| Diagnostic::error(format!("`{found}` is not an operator"), span, label.to_owned());
+    let error = |label: &str| {
+        Diagnostic::error(format!("`{found}` is not an operator"), span, label.to_owned())
+    };
     match foreign {
         Foreign::And => error("write `and`"),
         Foreign::Or => error("write `or`"),
@@ -241,14 +252,19 @@ fn foreign_spelling(foreign: Foreign, found: &str, span: Span) -> Diagnostic {
 
 fn malformed_number(found: &str, span: Span) -> Diagnostic {
     let error = Diagnostic::error(format!("`{found}` is not a number"), span, "");
-    let digits = found.len() - found.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').len();
+    let digits =
+        found.len() - found.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').len();
     let (number, tail) = found.split_at(digits);
     match tail.chars().next() {
         None => error.hint("a number has one decimal point; a range is written `1 .. 2`"),
         Some('_') => error.hint("digits are not grouped with `_`"),
         Some('e' | 'E') => error.hint("an exponent is written `1e-3`"),
-        Some('x' | 'X' | 'b' | 'o') if number == "0" => error.hint("numbers are written in decimal"),
-        Some(_) => error.hint(format!("to multiply, write `{number} * {tail}`; a name does not begin with a digit")),
+        Some('x' | 'X' | 'b' | 'o') if number == "0" => {
+            error.hint("numbers are written in decimal")
+        }
+        Some(_) => error.hint(format!(
+            "to multiply, write `{number} * {tail}`; a name does not begin with a digit"
+        )),
     }
 }
 
@@ -290,6 +306,7 @@ fn unclosed(open: char, before: Option<(String, Span)>, span: Span) -> Diagnosti
 fn unexpected(found: &str, expected: &str, advice: Option<Advice>, span: Span) -> Diagnostic {
     let Advice { message, label, hint, .. } = advice.unwrap_or_default();
     let message = message.unwrap_or_else(|| format!("unexpected {found}"));
-    let error = Diagnostic::error(message, span, label.unwrap_or_else(|| format!("expected {expected}")));
+    let error =
+        Diagnostic::error(message, span, label.unwrap_or_else(|| format!("expected {expected}")));
     hint.into_iter().fold(error, Diagnostic::hint)
 }

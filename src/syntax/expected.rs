@@ -9,7 +9,8 @@ const EXPRESSION: [&str; 17] = [
     "to", "when", "coarse",
 ];
 /// Tokens that go on with an expression.
-const OPERATOR: [&str; 16] = ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**"];
+const OPERATOR: [&str; 16] =
+    ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**"];
 /// Tokens that go on with a name or call.
 const SUFFIX: [&str; 3] = ["(", "[", "."];
 
@@ -18,7 +19,8 @@ pub(super) fn names(expected: &[String]) -> BTreeSet<&str> {
     expected.iter().map(|e| e.trim_matches('"')).filter(|e| *e != "a bad statement").collect()
 }
 
-/// Whether a statement could begin. (Where any word could be a field's name, the keywords of statements are expected too.)
+/// Whether a statement could begin. (Where any word could be a field's name, the keywords
+/// of statements are expected too.)
 pub(super) fn is_statement(names: &BTreeSet<&str>) -> bool {
     names.contains("let") && names.contains("for") && !names.contains("in")
 }
@@ -38,7 +40,10 @@ pub(super) fn describe(expected: &[String]) -> String {
     let mut names = names(expected);
     let mut words: Vec<String> = Vec::new();
     if is_statement(&names) {
-        words.push(if names.contains("include") { "a statement or declaration" } else { "a statement" }.to_owned());
+        words.push(
+            if names.contains("include") { "a statement or declaration" } else { "a statement" }
+                .to_owned(),
+        );
         let close = names.contains("}");
         names.clear();
         if close {
@@ -51,15 +56,19 @@ pub(super) fn describe(expected: &[String]) -> String {
     }
     if names.contains("a name") {
         // Words that may also be names.
-        names.retain(|name| !name.starts_with(|c: char| c.is_ascii_lowercase()) || name.contains(' '));
+        names.retain(|name| {
+            !name.starts_with(|c: char| c.is_ascii_lowercase()) || name.contains(' ')
+        });
     }
     let operator = is_operator(&names);
     if operator {
         names.retain(|name| !OPERATOR.contains(name) && !SUFFIX.contains(name));
     }
-    let quoted = |name: &&str| if name.contains(' ') { (*name).to_owned() } else { format!("`{name}`") };
+    let quoted =
+        |name: &&str| if name.contains(' ') { (*name).to_owned() } else { format!("`{name}`") };
     // What ends something is what is most often missing.
-    let (ends, others): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| [";", ")", "]", "}"].contains(*name));
+    let (ends, others): (Vec<&str>, Vec<&str>) =
+        names.iter().partition(|name| [";", ")", "]", "}"].contains(*name));
     let mut all: Vec<String> = ends.iter().chain(&others).map(quoted).collect();
     all.extend(words);
     if operator {
@@ -85,7 +94,10 @@ mod tests {
         assert_eq!(of(&[";"]), "`;`");
         assert_eq!(of(&[",", ")"]), "`)` or `,`");
         assert_eq!(of(&EXPRESSION), "an expression");
-        assert_eq!(of(&[&OPERATOR[..], &SUFFIX, &[";", "~", "a bad statement"]].concat()), "`;`, `~` or an operator");
+        assert_eq!(
+            of(&[&OPERATOR[..], &SUFFIX, &[";", "~", "a bad statement"]].concat()),
+            "`;`, `~` or an operator"
+        );
         assert_eq!(of(&["let", "for", "a number", "(", "}"]), "`}` or a statement");
         assert_eq!(of(&["a name", "to", "when", "{"]), "a name or `{`");
         assert_eq!(of(&[]), "the end of the text");

@@ -1,7 +1,9 @@
-//! Text to tokens: drives logos, scans by hand what logos only opens, and reports what is no token.
+//! Text to tokens: drives logos, scans by hand what logos only opens, and reports what is
+//! no token.
 //!
-//! Every byte is consumed, also after errors, and what was meant is guessed (`&&` becomes `and`), so that the parser
-//! sees a likely program and the rest of the text is still checked. Spans are bytes of the whole text.
+//! Every byte is consumed, also after errors, and what was meant is guessed (`&&` becomes
+//! `and`), so that the parser sees a likely program and the rest of the text is still
+//! checked. Spans are bytes of the whole text.
 
 use super::address;
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
@@ -28,13 +30,19 @@ pub(crate) struct Lexer<'s> {
     /// Where the part being lexed ends.
     pub end: usize,
     pub file: FileId,
-    /// How many addresses this text is inside of: keys may be expressions, which may hold addresses.
+    /// How many addresses this text is inside of: keys may be expressions, which may hold
+    /// addresses.
     pub level: u32,
     pub errors: Vec<SyntaxError>,
 }
 
 /// The tokens of `text[range]`, and the errors.
-pub(crate) fn lex(text: &str, range: Range<usize>, file: FileId, level: u32) -> (Vec<Lexeme<'_>>, Vec<SyntaxError>) {
+pub(crate) fn lex(
+    text: &str,
+    range: Range<usize>,
+    file: FileId,
+    level: u32,
+) -> (Vec<Lexeme<'_>>, Vec<SyntaxError>) {
     let mut lexer = Lexer { text, end: range.end, file, level, errors: Vec::new() };
     let mut lexemes = Vec::new();
     let byte_order_mark = range.start == 0 && text.starts_with('\u{feff}');
@@ -96,7 +104,8 @@ impl<'s> Lexer<'s> {
         Some(&rest[..length]).filter(|name| is_name(name))
     }
 
-    /// Scans a lexeme that starts at `start` and is opened by the text up to `at`: the token and its end.
+    /// Scans a lexeme that starts at `start` and is opened by the text up to `at`: the
+    /// token and its end.
     fn scan(&mut self, open: Open, start: usize, at: usize) -> (Option<Token<'s>>, usize) {
         match open {
             Open::Str => {
@@ -118,8 +127,14 @@ impl<'s> Lexer<'s> {
         }
     }
 
-    /// Reports a spelling that is not of this language: the token that was meant, and its end.
-    fn foreign(&mut self, foreign: Foreign, start: usize, end: usize) -> (Option<Token<'s>>, usize) {
+    /// Reports a spelling that is not of this language: the token that was meant, and its
+    /// end.
+    fn foreign(
+        &mut self,
+        foreign: Foreign,
+        start: usize,
+        end: usize,
+    ) -> (Option<Token<'s>>, usize) {
         let text = &self.text[start..end];
         let meant = match foreign {
             Foreign::And => Token::And,
@@ -146,7 +161,9 @@ impl<'s> Lexer<'s> {
     /// Reports a spelling, once on a line.
     fn foreign_error(&mut self, foreign: Foreign, text: &str, start: usize, end: usize) {
         let kind = SyntaxErrorKind::Foreign(foreign, text.into());
-        let said = |e: &SyntaxError| e.kind == kind && !self.text[e.span.start as usize..start].contains('\n');
+        let said = |e: &SyntaxError| {
+            e.kind == kind && !self.text[e.span.start as usize..start].contains('\n')
+        };
         if !self.errors.iter().any(said) {
             self.error(kind, start, end);
         }
@@ -155,8 +172,11 @@ impl<'s> Lexer<'s> {
     /// A string in quotes that are none here, if it is closed on the same line.
     fn foreign_string(&mut self, start: usize, at: usize) -> (Option<Token<'s>>, usize) {
         let quote = &self.text[start..at];
-        let close: &[char] =
-            if quote == "'" { &['\''] } else { &['"', '“', '”', '„', '«', '»', '‘', '’', '`', '\''] };
+        let close: &[char] = if quote == "'" {
+            &['\'']
+        } else {
+            &['"', '“', '”', '„', '«', '»', '‘', '’', '`', '\'']
+        };
         let line = self.rest(at).split('\n').next().unwrap_or("");
         if !line.contains(close) {
             self.foreign_error(Foreign::Quote, quote, start, at);
@@ -170,7 +190,8 @@ impl<'s> Lexer<'s> {
     /// Reports characters that begin no token; a run of them is one error.
     fn unknown(&mut self, start: usize, end: usize) {
         let text = &self.text[start..end];
-        if let Some(SyntaxError { kind: SyntaxErrorKind::UnknownCharacter(_), span }) = self.errors.last_mut()
+        if let Some(SyntaxError { kind: SyntaxErrorKind::UnknownCharacter(_), span }) =
+            self.errors.last_mut()
             && span.end as usize == start
         {
             span.end = end as u32;

@@ -1,8 +1,10 @@
-//! The surface language: tokens, grammar, syntax tree, spans. Pure: text in, tree and errors out.
+//! The surface language: tokens, grammar, syntax tree, spans. Pure: text in, tree and
+//! errors out.
 //!
-//! The way of a text: `lexer` makes tokens (with `string`, `address`), `delimiters` matches their brackets,
-//! the parser generated from `grammar/pcad.lalrpop` builds the tree through `build`, and `recover` repairs and
-//! parses again where it does not fit, with `advice` on what was probably meant. `format` is the way back.
+//! The way of a text: `lexer` makes tokens (with `string`, `address`), `delimiters`
+//! matches their brackets, the parser generated from `grammar/pcad.lalrpop` builds the
+//! tree through `build`, and `recover` repairs and parses again where it does not fit,
+//! with `advice` on what was probably meant. `format` is the way back.
 
 mod address;
 mod advice;

@@ -14,10 +14,11 @@ use std::ops::Range;
 
 /// Parses a file.
 ///
-/// The program holds what could be parsed: where a statement could not, it has an expression statement of
-/// [`ExprKind::Error`]. Without errors it holds no such expression, and its tree is no deeper than
-/// [`MAX_DEPTH`](super::MAX_DEPTH).
-/// The errors are in the order of the text; after [`MAX_ERRORS`] of them comes [`SyntaxErrorKind::TooManyErrors`].
+/// The program holds what could be parsed: where a statement could not, it has an
+/// expression statement of [`ExprKind::Error`]. Without errors it holds no such
+/// expression, and its tree is no deeper than [`MAX_DEPTH`](super::MAX_DEPTH). The errors
+/// are in the order of the text; after [`MAX_ERRORS`] of them comes
+/// [`SyntaxErrorKind::TooManyErrors`].
 pub fn parse(text: &str, file: FileId) -> (Program, Vec<SyntaxError>) {
     if text.len() > MAX_SOURCE_BYTES {
         let error = SyntaxError::new(SyntaxErrorKind::TooLarge(text.len()), Span::new(file, 0, 0));
@@ -39,7 +40,10 @@ pub fn parse(text: &str, file: FileId) -> (Program, Vec<SyntaxError>) {
 /// What is wrong with the text, in its order.
 pub fn parse_expr(text: &str, file: FileId) -> Result<Expr, Vec<SyntaxError>> {
     if text.len() > MAX_SOURCE_BYTES {
-        return Err(vec![SyntaxError::new(SyntaxErrorKind::TooLarge(text.len()), Span::new(file, 0, 0))]);
+        return Err(vec![SyntaxError::new(
+            SyntaxErrorKind::TooLarge(text.len()),
+            Span::new(file, 0, 0),
+        )]);
     }
     match parse_range(text, 0..text.len(), file, 0) {
         (expr, errors) if errors.is_empty() => Ok(expr.node),
@@ -47,15 +51,27 @@ pub fn parse_expr(text: &str, file: FileId) -> Result<Expr, Vec<SyntaxError>> {
     }
 }
 
-/// Parses the expression in a part of a text, `level` addresses deep; after errors it may be [`ExprKind::Error`].
-pub(crate) fn parse_range(text: &str, range: Range<usize>, file: FileId, level: u32) -> (Deep<Expr>, Vec<SyntaxError>) {
-    let hole = Deep::leaf(Expr { kind: ExprKind::Error, span: Span::new(file, range.start, range.end) });
+/// Parses the expression in a part of a text, `level` addresses deep; after errors it may
+/// be [`ExprKind::Error`].
+pub(crate) fn parse_range(
+    text: &str,
+    range: Range<usize>,
+    file: FileId,
+    level: u32,
+) -> (Deep<Expr>, Vec<SyntaxError>) {
+    let hole =
+        Deep::leaf(Expr { kind: ExprKind::Error, span: Span::new(file, range.start, range.end) });
     // Without what follows the part, errors at its end are placed there.
     let text = &text[..range.end];
     let (lexemes, mut errors) = lex(text, range, file, level);
     let mut balanced = balance(text, file, lexemes);
     add_brackets(&mut errors, &mut balanced);
-    let tokens = Tokens::new(text, file, if level == 0 { "end of the text" } else { "end of the key" }, balanced);
+    let tokens = Tokens::new(
+        text,
+        file,
+        if level == 0 { "end of the text" } else { "end of the key" },
+        balanced,
+    );
     let mut builder = Builder::new(file);
     let expr = match ExpressionParser::new().parse(&mut builder, tokens.iter()) {
         Ok(expr) => expr,
@@ -94,10 +110,12 @@ fn finish(mut errors: Vec<SyntaxError>) -> Vec<SyntaxError> {
     errors
 }
 
-/// Adds the errors about brackets, but for those that a lexeme without an end may have swallowed.
+/// Adds the errors about brackets, but for those that a lexeme without an end may have
+/// swallowed.
 fn add_brackets(errors: &mut Vec<SyntaxError>, balanced: &mut Balanced<'_>) {
     use SyntaxErrorKind::{Address, UnterminatedComment, UnterminatedString};
-    let swallows = |e: &&SyntaxError| matches!(e.kind, UnterminatedString | UnterminatedComment | Address(_));
+    let swallows =
+        |e: &&SyntaxError| matches!(e.kind, UnterminatedString | UnterminatedComment | Address(_));
     let swallowed: Vec<u32> = errors.iter().filter(swallows).map(|e| e.span.start).collect();
     errors.extend(balanced.errors.drain(..).filter(|e| match &e.kind {
         SyntaxErrorKind::Unclosed { before, .. } => {

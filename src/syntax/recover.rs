@@ -1,9 +1,11 @@
-//! Several errors from one text: where it does not parse, the tokens are repaired and parsed again.
+//! Several errors from one text: where it does not parse, the tokens are repaired and
+//! parsed again.
 //!
-//! A repair adds a forgotten `;`, or replaces the statement that holds the error by [`Token::Bad`]. So a bad statement
-//! hides neither the statements after it nor those around it, the grammar needs no error productions, and the work is
-//! bounded: one parse for each error. What follows from an error already reported in the same statement is repaired
-//! without a word.
+//! A repair adds a forgotten `;`, or replaces the statement that holds the error by
+//! [`Token::Bad`]. So a bad statement hides neither the statements after it nor those
+//! around it, the grammar needs no error productions, and the work is bounded: one parse
+//! for each error. What follows from an error already reported in the same statement is
+//! repaired without a word.
 
 use super::advice::{self, Context};
 use super::ast::Program;
@@ -39,7 +41,12 @@ pub(crate) struct Tokens<'s> {
 pub(crate) type Triple<'s> = (usize, Token<'s>, usize);
 
 impl<'s> Tokens<'s> {
-    pub fn new(text: &'s str, file: FileId, end_name: &'static str, balanced: Balanced<'s>) -> Self {
+    pub fn new(
+        text: &'s str,
+        file: FileId,
+        end_name: &'static str,
+        balanced: Balanced<'s>,
+    ) -> Self {
         let Balanced { lexemes, mates, .. } = balanced;
         let (semicolon, dropped) = (vec![false; lexemes.len() + 1], vec![false; lexemes.len()]);
         Tokens { text, file, end_name, lexemes, mates, semicolon, dropped, last: Cell::new(0) }
@@ -56,17 +63,20 @@ impl<'s> Tokens<'s> {
         })
     }
 
-    /// The index of the token that did not fit (the number of tokens at the end of the text), and what would have.
+    /// The index of the token that did not fit (the number of tokens at the end of the
+    /// text), and what would have.
     fn misfit<'e>(&self, error: &'e ParseError<usize, Token<'s>, ()>) -> (usize, &'e [String]) {
         match error {
             ParseError::UnrecognizedEof { expected, .. } => (self.lexemes.len(), expected),
             ParseError::UnrecognizedToken { expected, .. } => (self.last.get(), expected),
-            // Errors of the grammar's own, of a built-in lexer, and extra tokens do not occur.
+            // Errors of the grammar's own, of a built-in lexer, and extra tokens do not
+            // occur.
             _ => (self.last.get(), &[]),
         }
     }
 
-    /// Turns an error of the parser, in a text that is no list of statements, into one for the user.
+    /// Turns an error of the parser, in a text that is no list of statements, into one
+    /// for the user.
     pub fn explain(&self, error: &ParseError<usize, Token<'s>, ()>) -> SyntaxError {
         let (at, expected) = self.misfit(error);
         advice::explain(&Context { tokens: self, at, start: 0, expected, semicolon: false })
@@ -89,21 +99,23 @@ impl<'s> Tokens<'s> {
         self.lexemes.get(i).map(|l| &l.token)
     }
 
-    /// Whether a `;` is missing before token `at`, where one would fit: a line, a block or the text ends, or a statement
-    /// starts.
+    /// Whether a `;` is missing before token `at`, where one would fit: a line, a block
+    /// or the text ends, or a statement starts.
     fn lacks_semicolon(&self, at: usize, expected: &[String]) -> bool {
         let fits = expected.iter().any(|e| e == "\";\"") && at > 0 && !self.semicolon[at];
         fits && match self.token(at) {
             None | Some(Token::RBrace) => true,
             Some(token) if first_on_line(self.text, &self.lexemes, at) => {
-                starts_statement(&self.lexemes, at) || (token.starts_expression() && *token != Token::LBrace)
+                starts_statement(&self.lexemes, at)
+                    || (token.starts_expression() && *token != Token::LBrace)
             }
             Some(_) => starts_statement(&self.lexemes, at),
         }
     }
 
-    /// The statement to give up for an error at token `at`: the innermost that has any tokens. If a statement was to
-    /// begin there (`fresh`), nothing before it belongs to it.
+    /// The statement to give up for an error at token `at`: the innermost that has any
+    /// tokens. If a statement was to begin there (`fresh`), nothing before it belongs to
+    /// it.
     fn statement(&self, at: usize, fresh: bool) -> Option<Range<usize>> {
         let (mut block, mut found) = (0..self.lexemes.len(), None);
         loop {
@@ -129,9 +141,11 @@ impl<'s> Tokens<'s> {
                 Token::LBrace => self.is_block(i) && !self.goes_on(next),
                 _ => false,
             };
-            let begins = starts_statement(&self.lexemes, next) && first_on_line(self.text, &self.lexemes, next);
+            let begins = starts_statement(&self.lexemes, next)
+                && first_on_line(self.text, &self.lexemes, next);
             if ended || begins || self.semicolon[next] {
-                // A statement that broke off before a keyword owns the error at the keyword.
+                // A statement that broke off before a keyword owns the error at the
+                // keyword.
                 if next > at || (next == at && !ended && !fresh) {
                     return start..next;
                 }
@@ -174,17 +188,32 @@ impl<'s> Tokens<'s> {
         use Token::*;
         self.token(i).is_some_and(|t| {
             t.is_infix()
-                || matches!(t, Else | Semi | Comma | RParen | RBracket | Dot | As | With | To | Bind | Tilde | Arrow)
+                || matches!(
+                    t,
+                    Else | Semi
+                        | Comma
+                        | RParen
+                        | RBracket
+                        | Dot
+                        | As
+                        | With
+                        | To
+                        | Bind
+                        | Tilde
+                        | Arrow
+                )
         })
     }
 
-    /// Adds what the actions found, but for what lies in an item with an error: it may only follow from that.
+    /// Adds what the actions found, but for what lies in an item with an error: it may
+    /// only follow from that.
     fn add_new(&self, found: Vec<SyntaxError>, errors: &mut Vec<SyntaxError>) {
         let known: Vec<u32> = errors.iter().map(|e| e.span.start).collect();
         for error in found {
             let at = self.lexemes.partition_point(|l| l.start < error.span.start as usize);
             let item = self.statement_in(&(0..self.lexemes.len()), at, false);
-            let bytes = self.span_at(item.start).start..self.span_at(item.end.saturating_sub(1)).end;
+            let bytes =
+                self.span_at(item.start).start..self.span_at(item.end.saturating_sub(1)).end;
             if !known.iter().any(|start| bytes.contains(start)) {
                 errors.push(error);
             }
@@ -214,9 +243,12 @@ pub(crate) fn parse_program(mut tokens: Tokens<'_>, errors: &mut Vec<SyntaxError
         let statement = tokens.statement(at, is_statement(&names(expected)));
         let start = statement.as_ref().map_or(at, |s| s.start);
         let semicolon = tokens.lacks_semicolon(at, expected);
-        let explained = advice::explain(&Context { tokens: &tokens, at, start, expected, semicolon });
+        let explained =
+            advice::explain(&Context { tokens: &tokens, at, start, expected, semicolon });
         let add_semicolon = matches!(explained.kind, SyntaxErrorKind::MissingSemicolon { .. });
-        let known = earlier.iter().any(|e| (tokens.span_at(start).start..=tokens.span_at(at).end).contains(&e.start));
+        let known = earlier
+            .iter()
+            .any(|e| (tokens.span_at(start).start..=tokens.span_at(at).end).contains(&e.start));
         if !known && tokens.token(at) != Some(&Token::Bad) {
             errors.push(explained);
         }

@@ -1,4 +1,5 @@
-//! What the statements of the language are, for `pcadlang doc`, the prompt and the reference.
+//! What the statements of the language are, for `pcadlang doc`, the prompt and the
+//! reference.
 
 /// A statement, by the word that one looks it up by.
 #[derive(Clone, Copy, Debug)]
@@ -33,11 +34,21 @@ pub enum Place {
     Expression,
 }
 
-const fn model(name: &'static str, form: &'static str, doc: &'static str, example: &'static str) -> Statement {
+const fn model(
+    name: &'static str,
+    form: &'static str,
+    doc: &'static str,
+    example: &'static str,
+) -> Statement {
     Statement { name, form, doc, example, place: Place::Model }
 }
 
-const fn plan(name: &'static str, form: &'static str, doc: &'static str, example: &'static str) -> Statement {
+const fn plan(
+    name: &'static str,
+    form: &'static str,
+    doc: &'static str,
+    example: &'static str,
+) -> Statement {
     Statement { name, form, doc, example, place: Place::Plan }
 }
 

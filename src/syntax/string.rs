@@ -6,15 +6,21 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 impl Lexer<'_> {
-    /// Reads a string that starts at `start` and whose text starts at `at`, up to one of the quotes `close` on the same
-    /// line: its value and its end.
-    pub(super) fn string(&mut self, start: usize, mut at: usize, close: &[char]) -> (Arc<str>, usize) {
+    /// Reads a string that starts at `start` and whose text starts at `at`, up to one of
+    /// the quotes `close` on the same line: its value and its end.
+    pub(super) fn string(
+        &mut self,
+        start: usize,
+        mut at: usize,
+        close: &[char],
+    ) -> (Arc<str>, usize) {
         let mut value = String::new();
         while let Some(c) = self.rest(at).chars().next().filter(|&c| c != '\n') {
             if close.contains(&c) {
                 return (value.into(), at + c.len_utf8());
             }
-            let (c, length) = if c == '\\' { escape(self.rest(at)) } else { (Some(c), c.len_utf8()) };
+            let (c, length) =
+                if c == '\\' { escape(self.rest(at)) } else { (Some(c), c.len_utf8()) };
             match c {
                 Some(c) => value.push(c),
                 None => self.error(SyntaxErrorKind::UnknownEscape, at, at + length),
@@ -27,7 +33,8 @@ impl Lexer<'_> {
     }
 }
 
-/// The character that the escape at the start of the text stands for, and the length of the escape.
+/// The character that the escape at the start of the text stands for, and the length of
+/// the escape.
 fn escape(text: &str) -> (Option<char>, usize) {
     let simple = match text.chars().nth(1) {
         Some('n') => '\n',
@@ -44,7 +51,9 @@ fn escape(text: &str) -> (Option<char>, usize) {
 
 /// `\u{…}` with one to six hexadecimal digits.
 fn unicode_escape(text: &str) -> (Option<char>, usize) {
-    let digits = text.strip_prefix("\\u{").map(|t| t.bytes().take(7).take_while(u8::is_ascii_hexdigit).count());
+    let digits = text
+        .strip_prefix("\\u{")
+        .map(|t| t.bytes().take(7).take_while(u8::is_ascii_hexdigit).count());
     match digits {
         Some(n @ 1..=6) if text[3 + n..].starts_with('}') => {
             (u32::from_str_radix(&text[3..3 + n], 16).ok().and_then(char::from_u32), n + 4)

@@ -1,9 +1,11 @@
 //! The tokens of the language, and what logos can recognise of them by itself.
 //!
-//! Lexing is context-free. Keywords, punctuation, names and numbers are regular and left to logos; lexemes that need
-//! more (strings, block comments, addresses, tag selections) are only opened here, by a [`Token::Open`], and scanned by
-//! hand in [`lexer`](super::lexer). Spellings from other languages are tokens too ([`Token::Foreign`]), so that the
-//! message can say what to write instead; neither of the two reaches the parser.
+//! Lexing is context-free. Keywords, punctuation, names and numbers are regular and left
+//! to logos; lexemes that need more (strings, block comments, addresses, tag selections)
+//! are only opened here, by a [`Token::Open`], and scanned by hand in
+//! [`lexer`](super::lexer). Spellings from other languages are tokens too
+//! ([`Token::Foreign`]), so that the message can say what to write instead; neither of
+//! the two reaches the parser.
 
 use super::ast::Address;
 use super::deep::Deep;
@@ -173,7 +175,8 @@ pub(crate) enum Token<'s> {
     #[token("$", |_| Open::TagSel)]
     Open(Open),
 
-    /// What other languages write, or a slip; reported by the lexer and replaced by what was meant.
+    /// What other languages write, or a slip; reported by the lexer and replaced by what
+    /// was meant.
     #[token("&&", |_| Foreign::And)]
     #[token("||", |_| Foreign::Or)]
     #[token("!", |_| Foreign::Not)]
@@ -197,7 +200,8 @@ pub(crate) enum Token<'s> {
     #[regex(r"[0-9A-Za-z_]*[\p{L}--[A-Za-z]][\p{L}\p{M}\p{N}_]*", |_| Foreign::Name)]
     Foreign(Foreign),
 
-    /// Stands for a statement that did not parse; made by [`recover`](super::recover) only.
+    /// Stands for a statement that did not parse; made by [`recover`](super::recover)
+    /// only.
     Bad,
 }
 
@@ -237,11 +241,14 @@ impl Token<'_> {
         use Token::*;
         self.starts_statement()
             || self.starts_item()
-            || matches!(self, As | To | With | Coarse | In | If | Else | When | Or | And | Not | True | False)
+            || matches!(
+                self,
+                As | To | With | Coarse | In | If | Else | When | Or | And | Not | True | False
+            )
     }
 
-    /// Whether the token starts an item that cannot stand inside a body. `fn` counts only where a name follows it,
-    /// which the caller has to check.
+    /// Whether the token starts an item that cannot stand inside a body. `fn` counts only
+    /// where a name follows it, which the caller has to check.
     pub(crate) fn starts_item(&self) -> bool {
         use Token::*;
         matches!(self, Include | Param | Data | Fn | Kernel | Infer | Report | Export)
@@ -249,7 +256,9 @@ impl Token<'_> {
 
     /// Whether the token starts a statement and cannot stand anywhere else.
     pub(crate) fn starts_statement(&self) -> bool {
-        self.starts_model_statement() || self.starts_inference_statement() || matches!(self, Token::Let | Token::For)
+        self.starts_model_statement()
+            || self.starts_inference_statement()
+            || matches!(self, Token::Let | Token::For)
     }
 
     /// Whether the token starts a statement of models only.
@@ -309,7 +318,8 @@ pub(crate) fn is_keyword(text: &str) -> bool {
     is_name(text) && !matches!(Token::lexer(text).next(), Some(Ok(Token::Name(_))))
 }
 
-/// Whether a text is a name (or a keyword): an ASCII letter or `_`, then letters, digits and `_`.
+/// Whether a text is a name (or a keyword): an ASCII letter or `_`, then letters, digits
+/// and `_`.
 pub(crate) fn is_name(text: &str) -> bool {
     let mut bytes = text.bytes();
     bytes.next().is_some_and(|b| b.is_ascii_alphabetic() || b == b'_')

@@ -1,5 +1,6 @@
-//! Moves of a choice by formulas: they tell the values and scores that follow, and which selections take their other
-//! alternative. The state is the one that an update would lead to.
+//! Moves of a choice by formulas: they tell the values and scores that follow, and which
+//! selections take their other alternative. The state is the one that an update would
+//! lead to.
 
 use super::Trace;
 use super::choices::Target;
@@ -24,10 +25,13 @@ struct Following {
 }
 
 impl Trace {
-    /// Gives a choice with this distribution another value for good, where that changes no structure and can be done in short;
-    /// false, and nothing is done, otherwise: then an update does it.
+    /// Gives a choice with this distribution another value for good, where that changes
+    /// no structure and can be done in short; false, and nothing is done, otherwise: then
+    /// an update does it.
     pub(crate) fn assign(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
-        self.update.is_none() && target.element == NONE && self.graph.assign(&self.code, target.node, dist, value)
+        self.update.is_none()
+            && target.element == NONE
+            && self.graph.assign(&self.code, target.node, dist, value)
     }
 }
 
@@ -65,7 +69,8 @@ impl Graph {
         }
         following.turned = e.turned;
         let (scores, prior, likelihood) = (e.scores, e.prior, e.likelihood);
-        let is_total = |n: NodeId| matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Total(_)));
+        let is_total =
+            |n: NodeId| matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Total(_)));
         if scores.iter().any(|(n, _)| is_total(*n)) || !self.follow(code, following) {
             return false;
         }
@@ -82,7 +87,8 @@ impl Graph {
         true
     }
 
-    /// Gives nodes their new values; false, and nothing is done, if an update has to decide.
+    /// Gives nodes their new values; false, and nothing is done, if an update has to
+    /// decide.
     fn follow(&mut self, code: &Code, following: Following) -> bool {
         if following.turned.is_empty() {
             for (n, value) in following.values {
@@ -105,8 +111,14 @@ impl Graph {
         true
     }
 
-    /// Lets selections hold their other alternatives in place of those they held; `None` if those cannot be computed.
-    fn turn(&mut self, code: &Code, selections: &[NodeId], fresh: &[(NodeId, Value)]) -> Option<()> {
+    /// Lets selections hold their other alternatives in place of those they held; `None`
+    /// if those cannot be computed.
+    fn turn(
+        &mut self,
+        code: &Code,
+        selections: &[NodeId],
+        fresh: &[(NodeId, Value)],
+    ) -> Option<()> {
         // What one takes up before what another lets go: it may be the same.
         for n in selections {
             let (taken, _) = self.ways(code, *n)?;
@@ -135,7 +147,9 @@ impl Graph {
         fresh: &[(NodeId, Value)],
     ) -> Option<()> {
         if self.nodes[d as usize].state == State::Empty {
-            let known = fresh.iter().find(|(n, _)| *n == d && !matches!(self.op(code, d), Op::Select { .. }));
+            let known = fresh
+                .iter()
+                .find(|(n, _)| *n == d && !matches!(self.op(code, d), Op::Select { .. }));
             match known {
                 Some((_, value)) => {
                     self.save(d);
@@ -146,7 +160,8 @@ impl Graph {
                     node.flags |= HELD;
                     let mut read: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
                     self.each_dep(code, d, |r, outside| read.push((r, outside)));
-                    read.into_iter().try_for_each(|(r, outside)| self.take_up(code, r, d, outside, fresh))?;
+                    read.into_iter()
+                        .try_for_each(|(r, outside)| self.take_up(code, r, d, outside, fresh))?;
                 }
                 None => self.demand(code, d).ok()?,
             }

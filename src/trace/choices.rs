@@ -1,8 +1,10 @@
-//! The register of active choices: by address, and by the selections kernels have asked for.
+//! The register of active choices: by address, and by the selections kernels have asked
+//! for.
 //!
-//! Each selection keeps its members in a list, so that one of them is picked in constant time. The order is that of the
-//! hashes of their addresses: a function of the state, not of how it came about. Who appears or leaves in an update is
-//! noted, and entered at its end.
+//! Each selection keeps its members in a list, so that one of them is picked in constant
+//! time. The order is that of the hashes of their addresses: a function of the state, not
+//! of how it came about. Who appears or leaves in an update is noted, and entered at its
+//! end.
 
 use super::demand::Failure;
 use super::graph::Graph;
@@ -44,7 +46,12 @@ pub(crate) struct Members {
 
 impl Members {
     fn new(selector: Selector, hashes: Vec<u64>, targets: Vec<Target>) -> Self {
-        Members { selector, listed: (Arc::new(hashes), Arc::new(targets)), added: Vec::new(), removed: Vec::new() }
+        Members {
+            selector,
+            listed: (Arc::new(hashes), Arc::new(targets)),
+            added: Vec::new(),
+            removed: Vec::new(),
+        }
     }
 
     /// The members in order.
@@ -69,7 +76,8 @@ impl Members {
             return None;
         }
         let before = self.listed.clone();
-        let (hashes, targets) = (Arc::make_mut(&mut self.listed.0), Arc::make_mut(&mut self.listed.1));
+        let (hashes, targets) =
+            (Arc::make_mut(&mut self.listed.0), Arc::make_mut(&mut self.listed.1));
         for (hash, node) in self.removed.drain(..) {
             let first = hashes.partition_point(|h| *h < hash);
             let same = hashes[first..].iter().take_while(|h| **h == hash).count();
@@ -91,14 +99,18 @@ impl Members {
         } else {
             for (hash, target) in self.added.drain(..) {
                 let mut at = hashes.partition_point(|h| *h < hash);
-                while at < hashes.len() && hashes[at] == hash && targets[at].element < target.element {
+                while at < hashes.len()
+                    && hashes[at] == hash
+                    && targets[at].element < target.element
+                {
                     at += 1;
                 }
                 hashes.insert(at, hash);
                 targets.insert(at, target);
             }
         }
-        // What vanished and appeared again left it as it was: sweeps go by whether it is the same list.
+        // What vanished and appeared again left it as it was: sweeps go by whether it is
+        // the same list.
         if self.listed == before {
             self.listed = before;
             return None;
@@ -111,7 +123,8 @@ impl Members {
 pub(crate) struct Choices {
     by_address: FxHashMap<u64, NodeId>,
     pub selections: Vec<Members>,
-    /// Addresses drawn while another choice had them: an error if that one is still there at the end.
+    /// Addresses drawn while another choice had them: an error if that one is still there
+    /// at the end.
     suspects: Vec<(NodeId, NodeId)>,
 }
 
@@ -162,7 +175,8 @@ impl Graph {
             return Selection(i as u32);
         }
         let all = self.choices.selections[0].listed.clone();
-        let listed = all.0.iter().zip(all.1.iter()).filter(|(_, t)| self.selects(code, selector, t));
+        let listed =
+            all.0.iter().zip(all.1.iter()).filter(|(_, t)| self.selects(code, selector, t));
         let (hashes, targets) = listed.map(|(hash, t)| (*hash, *t)).unzip();
         let members = Members::new(selector.clone(), hashes, targets);
         self.choices.selections.push(members);
@@ -178,7 +192,8 @@ impl Graph {
         selector.selects(&facts)
     }
 
-    /// Choices by their place in the program: slot by slot and pass by pass, from the outside in.
+    /// Choices by their place in the program: slot by slot and pass by pass, from the
+    /// outside in.
     pub fn in_program_order(&self, targets: &[Target]) -> Vec<Target> {
         let mut keyed: Vec<_> = targets.iter().map(|t| (self.place(t.node), *t)).collect();
         keyed.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.element.cmp(&b.1.element)));
@@ -200,15 +215,18 @@ impl Graph {
         place
     }
 
-    /// Sorts nodes frame by frame, in an order that is a function of the state: their numbers are one of how it came about.
+    /// Sorts nodes frame by frame, in an order that is a function of the state: their
+    /// numbers are one of how it came about.
     pub fn sort_by_place(&self, nodes: &mut [NodeId]) {
         let frame = |n: NodeId| self.nodes[n as usize].frame;
         let mut frames: Vec<u32> = nodes.iter().map(|n| frame(*n)).collect();
         frames.sort_unstable();
         frames.dedup();
-        let mut places: Vec<_> = frames.iter().map(|f| (self.place(self.frames[*f as usize].base), *f)).collect();
+        let mut places: Vec<_> =
+            frames.iter().map(|f| (self.place(self.frames[*f as usize].base), *f)).collect();
         places.sort_unstable();
-        let ranks: FxHashMap<u32, usize> = places.into_iter().enumerate().map(|(rank, (_, f))| (f, rank)).collect();
+        let ranks: FxHashMap<u32, usize> =
+            places.into_iter().enumerate().map(|(rank, (_, f))| (f, rank)).collect();
         nodes.sort_unstable_by_key(|n| (ranks.get(&frame(*n)), *n));
     }
 
@@ -321,7 +339,8 @@ impl Graph {
         }
     }
 
-    /// Ends an update: selections get their new members, and two choices at one address are an error at the second.
+    /// Ends an update: selections get their new members, and two choices at one address
+    /// are an error at the second.
     pub fn settle_choices(&mut self, code: &Code) -> Result<(), Failure> {
         for i in 0..self.choices.selections.len() {
             if let Some(before) = self.choices.selections[i].apply() {

@@ -1,8 +1,9 @@
 //! The second half of an update: running what is asked for.
 //!
-//! Evaluation is by need and keeps its own stack, so that recursion in a program never becomes recursion here. A stale node
-//! first brings what it reads up to date, in an order in which structure comes before what depends on it, and runs again
-//! only if something it reads has changed.
+//! Evaluation is by need and keeps its own stack, so that recursion in a program never
+//! becomes recursion here. A stale node first brings what it reads up to date, in an
+//! order in which structure comes before what depends on it, and runs again only if
+//! something it reads has changed.
 
 use super::graph::Graph;
 use super::journal::Entry;
@@ -27,11 +28,13 @@ pub(crate) enum Step {
 pub(crate) type Failure = Box<RunError>;
 
 impl Graph {
-    /// Finishes an update: runs new and stale effects, re-scores absorbing choices, drops what nothing holds.
+    /// Finishes an update: runs new and stale effects, re-scores absorbing choices, drops
+    /// what nothing holds.
     pub fn settle(&mut self, code: &Code) -> Result<(), Failure> {
         loop {
             self.run_effects(code)?;
-            // What one node lets go of a choice may take up, so choices come first, but for those that go as well.
+            // What one node lets go of a choice may take up, so choices come first, but
+            // for those that go as well.
             if self.unheld.is_empty() && self.idle.is_empty() {
                 let Some(n) = self.stale_choices.pop() else { break };
                 if self.nodes[n as usize].state == State::Stale {
@@ -40,7 +43,9 @@ impl Graph {
                 continue;
             }
             let doomed = if self.stale_choices.is_empty() { Vec::new() } else { self.doomed(code) };
-            let stays = |n: &NodeId| self.nodes[*n as usize].state == State::Stale && doomed.binary_search(n).is_err();
+            let stays = |n: &NodeId| {
+                self.nodes[*n as usize].state == State::Stale && doomed.binary_search(n).is_err()
+            };
             let next = self.stale_choices.iter().rposition(stays).filter(|_| self.idle.is_empty());
             match next {
                 Some(i) => {
@@ -77,7 +82,10 @@ impl Graph {
             }
             if let Some(Side::Child(c)) = node.side.as_deref() {
                 let frame = &self.frames[c.frame as usize];
-                code.blocks[frame.block as usize].effects.iter().for_each(|s| release(frame.base + s));
+                code.blocks[frame.block as usize]
+                    .effects
+                    .iter()
+                    .for_each(|s| release(frame.base + s));
             }
         }
         doomed.sort_unstable();
@@ -109,8 +117,8 @@ impl Graph {
         Ok(())
     }
 
-    /// Runs an effect or choice, unless an owner on the way to it lets its frame go: outer ones decide whether inner ones
-    /// still exist.
+    /// Runs an effect or choice, unless an owner on the way to it lets its frame go:
+    /// outer ones decide whether inner ones still exist.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
         let mut owners: SmallVec<[NodeId; 8]> = SmallVec::new();
         let mut f = self.nodes[n as usize].frame;
@@ -194,7 +202,8 @@ impl Graph {
         self.settle_node(code, n)
     }
 
-    /// Ends the evaluation of a node with a value that it made, which counts towards the limits.
+    /// Ends the evaluation of a node with a value that it made, which counts towards the
+    /// limits.
     pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Step, Failure> {
         self.count_elements(code, n, &value)?;
         Ok(self.finish(code, n, value))

@@ -1,6 +1,8 @@
-//! Why a trace is as it is: what an update of a choice would reach, and which choices something was made from.
+//! Why a trace is as it is: what an update of a choice would reach, and which choices
+//! something was made from.
 //!
-//! What is reached is told by marking, as an update marks (`mark.rs`), and undoing that. Nothing runs.
+//! What is reached is told by marking, as an update marks (`mark.rs`), and undoing that.
+//! Nothing runs.
 
 use super::graph::Graph;
 use super::node::*;
@@ -27,7 +29,8 @@ pub enum Term {
 pub enum Effect {
     /// Its density is worked out anew; a choice keeps its value.
     Scored,
-    /// Its value may change as well: it moves with its distribution, or is drawn anew if that takes another form.
+    /// Its value may change as well: it moves with its distribution, or is drawn anew if
+    /// that takes another form.
     Moved,
     /// It may vanish, or another one appear: whether it is there depends on what changes.
     Structural,
@@ -68,16 +71,19 @@ impl Trace {
         reach
     }
 
-    /// The choices that a choice's distribution was made from, and those that decide whether it is there; by address.
+    /// The choices that a choice's distribution was made from, and those that decide
+    /// whether it is there; by address.
     pub fn origins(&self, t: Target) -> Vec<Address> {
         self.graph.origins(&self.code, t.node)
     }
 }
 
 impl Trace {
-    /// Where choices are written of which there are none in this state: nothing that is observed asks for them. In the order of the text.
+    /// Where choices are written of which there are none in this state: nothing that is
+    /// observed asks for them. In the order of the text.
     pub fn undrawn(&self) -> Vec<Span> {
-        let there: FxHashSet<u32> = self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
+        let there: FxHashSet<u32> =
+            self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
         let written = self.code.blocks.iter().flat_map(|b| (b.first..).zip(&b.spans));
         let is_choice = |op: &u32| matches!(self.code.ops.get(*op as usize), Some(Op::Draw { .. }));
         let absent = written.filter(|(op, _)| is_choice(op) && !there.contains(op));
@@ -125,13 +131,16 @@ impl Graph {
     fn term_score(&self, n: NodeId) -> f64 {
         let mut sum = ExactSum::default();
         match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Choice(c)) if c.elements != NONE => c.scores.iter().for_each(|s| sum.add(*s)),
+            Some(Side::Choice(c)) if c.elements != NONE => {
+                c.scores.iter().for_each(|s| sum.add(*s))
+            }
             _ => self.put_score(n, &mut sum),
         }
         sum.value()
     }
 
-    /// Whether what decides that a node is there is marked: the condition of a branch around it, what a loop runs over.
+    /// Whether what decides that a node is there is marked: the condition of a branch
+    /// around it, what a loop runs over.
     fn hangs_on_marked(&self, code: &Code, n: NodeId) -> bool {
         let mut deciding = Vec::new();
         self.deciding(code, n, &mut deciding);
@@ -185,7 +194,10 @@ mod tests {
     use crate::trace::Change;
 
     fn trace(text: &str) -> Trace {
-        Model::from_text(text).unwrap_or_else(|e| panic!("{e}")).simulate(3, 0).unwrap_or_else(|e| panic!("{e}"))
+        Model::from_text(text)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .simulate(3, 0)
+            .unwrap_or_else(|e| panic!("{e}"))
     }
 
     fn at(t: &Trace, address: &str) -> Target {
@@ -199,7 +211,8 @@ mod tests {
         let mut t = trace(text);
         for c in [true, false] {
             t.set("@c", c, Default::default()).unwrap();
-            let absent: Vec<&str> = t.undrawn().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
+            let absent: Vec<&str> =
+                t.undrawn().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
             // Of each its distribution.
             assert_eq!(absent, ["normal(0, 1)", if c { "normal(5, 1)" } else { "normal(0, 1)" }]);
         }
@@ -230,7 +243,10 @@ mod tests {
         let reach = t.reached_from(c);
         let terms = spelt(&reach);
         assert!(terms.contains(&"@deep/d Choice Structural".to_owned()), "{terms:?}");
-        assert!(terms.contains(&"@soft Factor Scored".to_owned()) && !terms.iter().any(|t| t.starts_with("@b")));
+        assert!(
+            terms.contains(&"@soft Factor Scored".to_owned())
+                && !terms.iter().any(|t| t.starts_with("@b"))
+        );
         assert_eq!(t.log_joint().to_bits(), before.to_bits(), "nothing has happened");
         // The densities are those that the trace knows.
         let y = reach.terms.iter().find(|r| r.address.to_string() == "@y").unwrap();

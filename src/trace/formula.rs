@@ -1,7 +1,9 @@
-//! Weights of other values of a choice by formulas (see [`crate::lang::formula`]): nothing in the trace changes.
+//! Weights of other values of a choice by formulas (see [`crate::lang::formula`]):
+//! nothing in the trace changes.
 //!
-//! The scores are computed by the same functions as in an update and quantised as there, so the weights are the same to the
-//! last bit. Whatever a formula does not cover makes it give up; then [`super::peek`] or an update decides.
+//! The scores are computed by the same functions as in an update and quantised as there,
+//! so the weights are the same to the last bit. Whatever a formula does not cover makes
+//! it give up; then [`super::peek`] or an update decides.
 
 use super::graph::Graph;
 use super::node::*;
@@ -23,7 +25,8 @@ pub(crate) type Formulas<'c> = SmallVec<[Placed<'c>; 4]>;
 pub(crate) struct Placed<'c> {
     /// The first node of the frame.
     pub base: NodeId,
-    /// The node that has the value: the choice, or an element of a container that is the choice.
+    /// The node that has the value: the choice, or an element of a container that is the
+    /// choice.
     pub entry: NodeId,
     pub formula: &'c Formula,
 }
@@ -56,7 +59,8 @@ pub(crate) struct Evaluation<'a, const N: usize> {
 }
 
 impl Graph {
-    /// The formulas that together tell what another value of a choice does; `None` if there are none in this state.
+    /// The formulas that together tell what another value of a choice does; `None` if
+    /// there are none in this state.
     pub fn formulas<'c>(&self, code: &'c Code, target: NodeId) -> Option<Formulas<'c>> {
         let facts = self.slot_facts(code, target);
         let finite = self.prior.is_fine() && self.likelihood.is_fine();
@@ -90,12 +94,20 @@ impl Graph {
     }
 
     /// Adds a formula, if it sees all that depends on its value.
-    fn add_formula<'c>(&self, entry: NodeId, base: NodeId, formula: &'c Formula, all: &mut Formulas<'c>) -> Option<()> {
+    fn add_formula<'c>(
+        &self,
+        entry: NodeId,
+        base: NodeId,
+        formula: &'c Formula,
+        all: &mut Formulas<'c>,
+    ) -> Option<()> {
         if formula.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
             return None;
         }
         // Two in one frame could move the same score.
-        if !formula.steps.is_empty() && all.iter().any(|p| p.base == base && !p.formula.steps.is_empty()) {
+        if !formula.steps.is_empty()
+            && all.iter().any(|p| p.base == base && !p.formula.steps.is_empty())
+        {
             return None;
         }
         all.push(Placed { base, entry, formula });
@@ -107,9 +119,12 @@ impl Graph {
         Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
     }
 
-    /// The distribution of a choice whose parameters are single numbers, or arrays as they are.
+    /// The distribution of a choice whose parameters are single numbers, or arrays as
+    /// they are.
     pub fn simple_dist(&self, code: &Code, n: NodeId) -> Option<Dist> {
-        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else { return None };
+        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else {
+            return None;
+        };
         let mut read = [Register::Num(0.0); PARAMETERS];
         let read = read.get_mut(..args.len())?;
         let mut e = Evaluation::new(self, code, []);
@@ -122,7 +137,8 @@ impl Graph {
 }
 
 impl<'a> Evaluation<'a, REGISTERS> {
-    /// The log weight of a value of the choice, relative to the present one, with the likelihood raised to a power; `None` if the formulas do not cover it.
+    /// The log weight of a value of the choice, relative to the present one, with the
+    /// likelihood raised to a power; `None` if the formulas do not cover it.
     pub fn weigh(
         &mut self,
         target: NodeId,
@@ -181,7 +197,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 Step::Branch { slot, cond, otherwise } => {
                     let holds = self.truth(cond)?;
                     let node = self.node(slot);
-                    let other = node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
+                    let other =
+                        node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
                     if other && !self.turned.contains(&(self.base + slot)) {
                         if self.turned.is_empty() && !(may_choose && self.can_choose(formula)) {
                             return None;
@@ -198,7 +215,11 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     if !self.graph.is_plain_choice(self.base + slot) {
                         return None;
                     }
-                    let score = self.log_density(builtin, parameters, Register::of(&self.node(slot).value))?;
+                    let score = self.log_density(
+                        builtin,
+                        parameters,
+                        Register::of(&self.node(slot).value),
+                    )?;
                     self.prior.sub(self.node(slot).score);
                     self.prior.add(score);
                     self.scores.push((self.base + slot, score));
@@ -239,7 +260,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
         self.filled |= 1 << into;
     }
 
-    /// Whether its selections can take their other alternatives without letting anything go but computations.
+    /// Whether its selections can take their other alternatives without letting anything
+    /// go but computations.
     fn can_choose(&self, formula: &Formula) -> bool {
         let is_taken = |h: &Held| {
             let node = self.node(h.selection);
@@ -251,15 +273,26 @@ impl<'a> Evaluation<'a, REGISTERS> {
             if node.refs > h.times || !is_taken(h) {
                 return true;
             }
-            let now = formula.held.iter().filter(|other| other.operand == h.operand && is_taken(other)).count();
-            let holds_nothing = matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
+            let now = formula
+                .held
+                .iter()
+                .filter(|other| other.operand == h.operand && is_taken(other))
+                .count();
+            let holds_nothing =
+                matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
             node.refs as usize > now || holds_nothing
         };
-        formula.computed.iter().all(|slot| self.node(*slot).side.is_none()) && formula.held.iter().all(is_kept)
+        formula.computed.iter().all(|slot| self.node(*slot).side.is_none())
+            && formula.held.iter().all(is_kept)
     }
 
     /// The log density of a single number or truth value.
-    fn log_density(&self, builtin: u32, parameters: &[Source; PARAMETERS], x: Register) -> Option<f64> {
+    fn log_density(
+        &self,
+        builtin: u32,
+        parameters: &[Source; PARAMETERS],
+        x: Register,
+    ) -> Option<f64> {
         let builtin = self.code.builtins.get(builtin);
         let parameters = parameters.get(..builtin.args.len())?;
         match (builtin.scalar, x) {
@@ -274,7 +307,9 @@ impl<'a> Evaluation<'a, REGISTERS> {
             }
             (Some(Scalar::Weights { log_probability, .. }), Register::Num(x)) => {
                 match self.read(*parameters.first()?)? {
-                    Register::Other(Value::Array(weights)) if parameters.len() == 1 => log_probability(weights, x),
+                    Register::Other(Value::Array(weights)) if parameters.len() == 1 => {
+                        log_probability(weights, x)
+                    }
                     _ => None,
                 }
             }
@@ -324,7 +359,9 @@ impl<'a, const N: usize> Evaluation<'a, N> {
     fn read(&self, s: Source) -> Option<Register<'a>> {
         let node = match s {
             Source::Register(r) => return Some(self.registers[r as usize]),
-            Source::Operand(Operand::Const(i)) => return Some(Register::of(self.code.const_value(i))),
+            Source::Operand(Operand::Const(i)) => {
+                return Some(Register::of(self.code.const_value(i)));
+            }
             Source::Operand(Operand::Local(slot)) => self.node(slot),
             Source::Operand(o) => &self.graph.nodes[self.graph.resolve(self.frame(), o)? as usize],
         };
@@ -389,7 +426,9 @@ fn family(builtin: &Builtin, parameters: &[Register]) -> Option<Dist> {
     if let Some(Scalar::Family { make, .. }) = builtin.scalar {
         return make(numbers(parameters, &mut [0.0; PARAMETERS])?);
     }
-    if let (Some(Scalar::Weights { make, .. }), [Register::Other(Value::Array(w))]) = (builtin.scalar, parameters) {
+    if let (Some(Scalar::Weights { make, .. }), [Register::Other(Value::Array(w))]) =
+        (builtin.scalar, parameters)
+    {
         return make(w);
     }
     let Kind::Distribution(make) = builtin.kind else { return None };

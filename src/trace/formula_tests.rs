@@ -1,4 +1,5 @@
-//! Formulas against updates: the same weights and the same states, to the last bit, or no answer.
+//! Formulas against updates: the same weights and the same states, to the last bit, or no
+//! answer.
 
 use super::*;
 use crate::trace::{Change, Draws, Selector, Target, Trace};
@@ -8,7 +9,8 @@ fn model(text: &str) -> Model {
     Program::parse(text).unwrap().compile().unwrap()
 }
 
-/// How many weights and moves formulas gave, over states of a walk through the prior; all are compared with updates.
+/// How many weights and moves formulas gave, over states of a walk through the prior; all
+/// are compared with updates.
 fn compared(text: &str) -> [usize; 2] {
     let mut trace = model(text).simulate(1, 0).unwrap();
     let every = Selector::Tag { name: "d".into(), value: None };
@@ -28,11 +30,15 @@ fn compared(text: &str) -> [usize; 2] {
                 let by_formula = {
                     let formulas = trace.graph.formulas(&trace.code, t.node);
                     let mut evaluation = trace.graph.evaluation(&trace.code);
-                    let mut weight =
-                        |power| formulas.as_ref().and_then(|f| evaluation.weigh(t.node, f, &dist, &value, power));
+                    let mut weight = |power| {
+                        formulas
+                            .as_ref()
+                            .and_then(|f| evaluation.weigh(t.node, f, &dist, &value, power))
+                    };
                     weight(1.0).zip(weight(0.3))
                 };
-                let by_update = trace.propose(&[(t, Change::Set(value.clone()))], Draws::default()).unwrap();
+                let by_update =
+                    trace.propose(&[(t, Change::Set(value.clone()))], Draws::default()).unwrap();
                 if let Some((whole, tempered)) = by_formula {
                     weights += 1;
                     let found = [whole, tempered].map(f64::to_bits);
@@ -47,7 +53,8 @@ fn compared(text: &str) -> [usize; 2] {
     [weights, moves]
 }
 
-/// Compares the state that the pending update leads to with the one that a formula assigns, if it does; undoes both.
+/// Compares the state that the pending update leads to with the one that a formula
+/// assigns, if it does; undoes both.
 fn same_state(trace: &mut Trace, t: Target, dist: &Dist, value: &Datum) -> bool {
     let mut updated = trace.clone();
     updated.commit();
@@ -56,13 +63,24 @@ fn same_state(trace: &mut Trace, t: Target, dist: &Dist, value: &Datum) -> bool 
     if !assigned.assign(t, dist, value) {
         return false;
     }
-    let state =
-        |t: &Trace| format!("{:?} {:?} {:?}", t.choices(), t.observations(), [t.log_prior(), t.log_likelihood()]);
+    let state = |t: &Trace| {
+        format!(
+            "{:?} {:?} {:?}",
+            t.choices(),
+            t.observations(),
+            [t.log_prior(), t.log_likelihood()]
+        )
+    };
     assert_eq!(state(&assigned), state(&updated));
     // What is computed, too, and who is told of the next change.
     let same_nodes = |a: &Trace, b: &Trace| {
         for (a, b) in a.graph.nodes.iter().zip(&b.graph.nodes) {
-            assert!(a.value.same(&b.value) && a.state == b.state && a.refs == b.refs && a.flags == b.flags);
+            assert!(
+                a.value.same(&b.value)
+                    && a.state == b.state
+                    && a.refs == b.refs
+                    && a.flags == b.flags
+            );
         }
     };
     same_nodes(&assigned, &updated);

@@ -1,7 +1,8 @@
 //! The graph behind a trace: nodes, frames, who holds whom.
 //!
-//! Invariants between updates: an evaluated node holds each operand it reads, once per reading; a node that nothing holds is
-//! empty; every evaluated node that reads a node of another frame is in that node's list of outside users.
+//! Invariants between updates: an evaluated node holds each operand it reads, once per
+//! reading; a node that nothing holds is empty; every evaluated node that reads a node of
+//! another frame is in that node's list of outside users.
 
 use super::choices::Choices;
 use super::journal::{Before, Entry};
@@ -58,12 +59,15 @@ pub(crate) struct Graph {
     /// The log prior of the choices, and the log density of observations and factors.
     pub prior: ExactSum,
     pub likelihood: ExactSum,
-    /// The log prior of what this update drew from the prior, and of what it would have to draw to be undone.
+    /// The log prior of what this update drew from the prior, and of what it would have
+    /// to draw to be undone.
     pub drawn: ExactSum,
     pub undrawn: ExactSum,
-    /// Elements of choices that this update drew anew: their prior density before it is in `undrawn`.
+    /// Elements of choices that this update drew anew: their prior density before it is
+    /// in `undrawn`.
     pub redrawn: Vec<(NodeId, u32)>,
-    /// The choices that vanished, with their scores at that time. Others may have been scored under other parameters before they did.
+    /// The choices that vanished, with their scores at that time. Others may have been
+    /// scored under other parameters before they did.
     pub retired: Vec<(NodeId, f64)>,
     /// The choices this update removed: node, address hash and stored value.
     pub removed: Vec<(NodeId, u64, Datum)>,
@@ -74,11 +78,13 @@ pub(crate) struct Graph {
     pub vanished: u32,
     pub choices: Choices,
     pub draws: Draws,
-    /// While a program runs for the first time: improper choices may take a value to start from.
+    /// While a program runs for the first time: improper choices may take a value to
+    /// start from.
     pub starting: bool,
     /// Values that choices take when they are first drawn.
     pub constraints: FxHashMap<u64, Constraint>,
-    /// Values observed in place of the program's, by the hash of the observation's address.
+    /// Values observed in place of the program's, by the hash of the observation's
+    /// address.
     pub observed: std::sync::Arc<FxHashMap<u64, Value>>,
     /// During a query: the sums before it, for probes.
     pub before: Option<Before>,
@@ -164,7 +170,9 @@ impl Graph {
                 base
             }
         };
-        for (n, op) in self.nodes[frame.base as usize..frame.base as usize + len].iter_mut().zip(first..) {
+        for (n, op) in
+            self.nodes[frame.base as usize..frame.base as usize + len].iter_mut().zip(first..)
+        {
             n.frame = id;
             n.op = op;
         }
@@ -194,7 +202,10 @@ impl Graph {
                 frame.owner,
                 FaultKind::Limit,
                 format!("the trace grew beyond {} nodes", self.limits.nodes),
-                Some(format!("does the program loop or recurse forever? If not, {}", raise("nodes"))),
+                Some(format!(
+                    "does the program loop or recurse forever? If not, {}",
+                    raise("nodes")
+                )),
             ));
         }
         self.count_operation(code, frame.owner)?;
@@ -265,13 +276,16 @@ impl Graph {
             _ => None,
         }?;
         match self.op(code, frame.owner) {
-            Op::Call { args, .. } => Some((self.nodes[frame.owner as usize].frame, args[i as usize].1)),
+            Op::Call { args, .. } => {
+                Some((self.nodes[frame.owner as usize].frame, args[i as usize].1))
+            }
             _ => None,
         }
     }
 
-    /// Calls `f` with every node `n` holds, structure first, and whether the link is an outside one. The order matters: a
-    /// change of an earlier one may make the later ones irrelevant.
+    /// Calls `f` with every node `n` holds, structure first, and whether the link is an
+    /// outside one. The order matters: a change of an earlier one may make the later ones
+    /// irrelevant.
     pub fn each_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
         let facts = self.slot_facts(code, n);
         if let Some(reads) = &facts.reads {
@@ -309,11 +323,16 @@ impl Graph {
             },
             Op::Select { cond, then, otherwise } => {
                 operand(*cond);
-                operand(if self.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise });
+                operand(if self.nodes[n as usize].flags & OTHERWISE == 0 {
+                    *then
+                } else {
+                    *otherwise
+                });
             }
             // Arguments are held by the parameters that read them.
             Op::Call { callee: Callee::Value(v), .. } => operand(*v),
-            // The first running value is held by the accumulator of the first pass, if there is one.
+            // The first running value is held by the accumulator of the first pass, if
+            // there is one.
             Op::Fold { f: g, over, .. } => {
                 operand(*g);
                 operand(*over);
@@ -326,8 +345,12 @@ impl Graph {
     /// The part of [`Graph::each_dep`] that is not operands.
     pub fn each_side_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
         match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => deps.iter().for_each(|d| f(*d, true)),
-            Some(Side::Child(c)) if c.result != NONE => f(c.result, !self.is_owned_result(code, c.result, n)),
+            Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => {
+                deps.iter().for_each(|d| f(*d, true))
+            }
+            Some(Side::Child(c)) if c.result != NONE => {
+                f(c.result, !self.is_owned_result(code, c.result, n))
+            }
             Some(Side::MemoCall(c)) => {
                 c.deps.iter().for_each(|d| f(*d, true));
                 if c.result != NONE {
@@ -359,10 +382,12 @@ impl Graph {
         }
     }
 
-    /// Whether the link from a frame's result to the frame's owner follows from the block.
+    /// Whether the link from a frame's result to the frame's owner follows from the
+    /// block.
     pub fn is_owned_result(&self, code: &Code, result: NodeId, owner: NodeId) -> bool {
         let f = &self.frames[self.nodes[result as usize].frame as usize];
-        f.owner == owner && code.blocks[f.block as usize].result == Some(Operand::Local(result - f.base))
+        f.owner == owner
+            && code.blocks[f.block as usize].result == Some(Operand::Local(result - f.base))
     }
 
     /// Takes hold of a node.
@@ -388,7 +413,8 @@ impl Graph {
         list
     }
 
-    /// Lets go of a node; what nothing holds any more is emptied at the end of the update.
+    /// Lets go of a node; what nothing holds any more is emptied at the end of the
+    /// update.
     pub fn release(&mut self, dep: NodeId, outside: bool) {
         self.note(Entry::Released(dep, outside));
         let node = &mut self.nodes[dep as usize];
@@ -405,7 +431,8 @@ impl Graph {
         }
     }
 
-    /// Lets go of a frame: its effects are released, and what they alone held goes with them.
+    /// Lets go of a frame: its effects are released, and what they alone held goes with
+    /// them.
     pub fn detach(&mut self, code: &Code, id: FrameId) {
         let frame = &mut self.frames[id as usize];
         if !frame.attached {
@@ -478,7 +505,9 @@ impl Graph {
         match &side {
             Side::Child(c) => self.detach(code, c.frame),
             Side::MemoCall(c) => self.leave_memo(c.memo, &c.key),
-            Side::Loop(l) => l.frames.iter().filter(|f| **f != NONE).for_each(|f| self.detach(code, *f)),
+            Side::Loop(l) => {
+                l.frames.iter().filter(|f| **f != NONE).for_each(|f| self.detach(code, *f))
+            }
             Side::Memo(m) => m.entries.values().for_each(|(f, _)| self.detach(code, *f)),
             _ => {}
         }
@@ -517,17 +546,22 @@ impl Graph {
                 }
                 let of = &self.frames[self.nodes[frame.owner as usize].frame as usize];
                 if let BlockKind::Function { name, .. } = &code.blocks[frame.block as usize].kind {
-                    let span = code.blocks[of.block as usize].spans[(frame.owner - of.base) as usize];
+                    let span =
+                        code.blocks[of.block as usize].spans[(frame.owner - of.base) as usize];
                     calls.push((name.clone(), span));
                 }
                 f = self.nodes[frame.owner as usize].frame;
             }
             calls.reverse();
             let frame = &self.frames[self.nodes[n as usize].frame as usize];
-            (code.blocks[frame.block as usize].spans[(n - frame.base) as usize], self.address_near(code, n))
+            (
+                code.blocks[frame.block as usize].spans[(n - frame.base) as usize],
+                self.address_near(code, n),
+            )
         };
-        // A choice outside of its support, such as a label beyond the number of groups: the state has density zero, whatever it
-        // is an index of. What depends on a choice is evaluated after it is scored.
+        // A choice outside of its support, such as a label beyond the number of groups:
+        // the state has density zero, whatever it is an index of. What depends on a
+        // choice is evaluated after it is scored.
         let is_impossible = kind == FaultKind::Index && self.prior.value() == f64::NEG_INFINITY;
         let kind = if is_impossible { FaultKind::Domain } else { kind };
         Box::new(RunError { kind, message, span, address, calls, hint })

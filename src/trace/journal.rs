@@ -1,7 +1,9 @@
-//! Updates that can be undone: every mutation leaves an entry, and a roll-back replays them backwards.
+//! Updates that can be undone: every mutation leaves an entry, and a roll-back replays
+//! them backwards.
 //!
-//! A node's plain fields are saved once an update, before their first change; structure is saved at each change. The score
-//! sums are saved whole. Nothing is allocated in the steady state: the journal keeps its capacity.
+//! A node's plain fields are saved once an update, before their first change; structure
+//! is saved at each change. The score sums are saved whole. Nothing is allocated in the
+//! steady state: the journal keeps its capacity.
 
 use super::graph::Graph;
 use super::node::*;
@@ -196,7 +198,9 @@ impl Graph {
                 }
                 Entry::ChoiceAdded(n, hash) => self.choices.undo_add(n, hash),
                 Entry::ChoiceRemoved(n, hash) => self.choices.undo_remove(n, hash),
-                Entry::TargetsReplaced { selection, before } => self.choices.undo_targets(selection, before),
+                Entry::TargetsReplaced { selection, before } => {
+                    self.choices.undo_targets(selection, before)
+                }
                 Entry::AddressShadowed(hash, n) => self.choices.undo_shadow(hash, n),
                 Entry::Observed(hash, old) => self.undo_observed(hash, old),
             }
@@ -251,7 +255,9 @@ impl Graph {
             if *u != user {
                 (user, readings) = (*u, 0);
                 if self.nodes[user as usize].state != State::Empty {
-                    self.each_dep(code, user, |d, outside| readings += u32::from(outside && d == n));
+                    self.each_dep(code, user, |d, outside| {
+                        readings += u32::from(outside && d == n)
+                    });
                 }
             }
             let kept = readings > 0;

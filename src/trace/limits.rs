@@ -1,5 +1,6 @@
-//! Bounds on what a program may build and how long one evaluation may take: errors at a place in the program, rather than memory
-//! or patience that run out. The numbers are in `docs/reliability.md`.
+//! Bounds on what a program may build and how long one evaluation may take: errors at a
+//! place in the program, rather than memory or patience that run out. The numbers are in
+//! `docs/reliability.md`.
 
 use super::demand::Failure;
 use super::graph::Graph;
@@ -19,7 +20,8 @@ pub struct Limits {
     pub depth: u32,
     /// Nodes of the trace: at 100 to 200 bytes each, most of its memory.
     pub nodes: u32,
-    /// Elements of all arrays that one update makes, and numbers of its meshes: some eight bytes each.
+    /// Elements of all arrays that one update makes, and numbers of its meshes: some
+    /// eight bytes each.
     pub elements: u64,
     /// Nodes that one update evaluates.
     pub operations: u64,
@@ -29,7 +31,13 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { depth: 10_000, nodes: 20_000_000, elements: 500_000_000, operations: u64::MAX, stop: Stop::default() }
+        Limits {
+            depth: 10_000,
+            nodes: 20_000_000,
+            elements: 500_000_000,
+            operations: u64::MAX,
+            stop: Stop::default(),
+        }
     }
 }
 
@@ -42,13 +50,19 @@ impl Limits {
     /// # Errors
     /// A name that is none of [`Limits::NAMES`], or a number that is too large for it.
     pub fn with(mut self, name: &str, number: u64) -> Result<Limits, String> {
-        let small = || u32::try_from(number).map_err(|_| format!("{name} may be at most {}", u32::MAX));
+        let small =
+            || u32::try_from(number).map_err(|_| format!("{name} may be at most {}", u32::MAX));
         match name {
             "depth" => self.depth = small()?,
             "nodes" => self.nodes = small()?,
             "elements" => self.elements = number,
             "operations" => self.operations = number,
-            _ => return Err(format!("there is no limit `{name}`; the limits are {}", Limits::NAMES.join(", "))),
+            _ => {
+                return Err(format!(
+                    "there is no limit `{name}`; the limits are {}",
+                    Limits::NAMES.join(", ")
+                ));
+            }
         }
         Ok(self)
     }
@@ -59,8 +73,9 @@ pub(super) fn raise(name: &str) -> String {
     format!("raise it with --limit {name}=N")
 }
 
-/// When to give up in the middle of an update: some time after it was asked for, or after time is up. Until then an update may end by
-/// itself, so that a state is left in which everything has run.
+/// When to give up in the middle of an update: some time after it was asked for, or after
+/// time is up. Until then an update may end by itself, so that a state is left in which
+/// everything has run.
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
     asked: Vec<Arc<AtomicBool>>,
@@ -117,7 +132,10 @@ impl Stop {
 
     /// Whether it has been asked for, or this share of the time has gone by.
     pub fn has_used(&self, share: f64) -> bool {
-        self.is_set() || self.time.is_some_and(|(from, t)| from.elapsed().as_secs_f64() >= share * t.as_secs_f64())
+        self.is_set()
+            || self
+                .time
+                .is_some_and(|(from, t)| from.elapsed().as_secs_f64() >= share * t.as_secs_f64())
     }
 }
 
@@ -126,7 +144,8 @@ impl Stop {
 pub(crate) struct Spent {
     operations: u64,
     elements: u64,
-    /// Evaluations since the clock was looked at, over all updates: many short ones take time as well.
+    /// Evaluations since the clock was looked at, over all updates: many short ones take
+    /// time as well.
     since_look: u32,
     /// Since when it should have stopped.
     late: Option<Instant>,
@@ -151,7 +170,8 @@ impl Graph {
         self.spent.operations += 1;
         self.spent.since_look += 1;
         if self.spent.operations > self.limits.operations {
-            let message = format!("one evaluation took more than {} operations", self.limits.operations);
+            let message =
+                format!("one evaluation took more than {} operations", self.limits.operations);
             return Err(self.fail(code, n, FaultKind::Limit, message, Some(raise("operations"))));
         }
         if self.spent.since_look >= BETWEEN_LOOKS { self.look_at_clock(code, n) } else { Ok(()) }
@@ -173,9 +193,15 @@ impl Graph {
         Err(self.fail(code, n, FaultKind::Stopped, message, Some(hint)))
     }
 
-    /// Counts the elements of a value that a node made, and refuses what is too large or too deep to be handled.
+    /// Counts the elements of a value that a node made, and refuses what is too large or
+    /// too deep to be handled.
     #[inline]
-    pub(super) fn count_elements(&mut self, code: &Code, n: NodeId, value: &Value) -> Result<(), Failure> {
+    pub(super) fn count_elements(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        value: &Value,
+    ) -> Result<(), Failure> {
         let made = match value {
             Value::Num(_) | Value::Bool(_) => return Ok(()),
             Value::Array(xs) => xs.len(),
@@ -192,7 +218,10 @@ impl Graph {
         };
         self.spent.elements += made as u64;
         if self.spent.elements > self.limits.elements {
-            let message = format!("the values made by one evaluation have more than {} elements", self.limits.elements);
+            let message = format!(
+                "the values made by one evaluation have more than {} elements",
+                self.limits.elements
+            );
             return Err(self.fail(code, n, FaultKind::Limit, message, Some(raise("elements"))));
         }
         Ok(())

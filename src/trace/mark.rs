@@ -1,8 +1,9 @@
 //! The first half of an update: marking what may have changed.
 //!
-//! Marking follows users, not values, and stops at choices: an absorbing choice keeps its value whatever its distribution
-//! becomes, so only its density is in question (but for those that may have to be drawn anew). The second half ([`super::demand`]) re-runs marked nodes on demand and
-//! stops where values come out equal.
+//! Marking follows users, not values, and stops at choices: an absorbing choice keeps its
+//! value whatever its distribution becomes, so only its density is in question (but for
+//! those that may have to be drawn anew). The second half ([`super::demand`]) re-runs
+//! marked nodes on demand and stops where values come out equal.
 
 use super::graph::Graph;
 use super::node::*;
@@ -10,7 +11,8 @@ use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
 use crate::lang::value::Value;
 
 impl Graph {
-    /// Marks a choice or observation that is about to change, and everything that reads it.
+    /// Marks a choice or observation that is about to change, and everything that reads
+    /// it.
     pub fn mark_target(&mut self, code: &Code, n: NodeId) {
         self.make_stale(code, n);
         self.mark_users(code, n);
@@ -68,7 +70,8 @@ impl Graph {
         }
     }
 
-    /// Marks a user in the same frame. An argument's change goes to the parameter it feeds, past the call itself.
+    /// Marks a user in the same frame. An argument's change goes to the parameter it
+    /// feeds, past the call itself.
     fn mark_static_user(&mut self, code: &Code, n: NodeId, user: NodeId) {
         let (callee, args) = match self.op(code, user) {
             Op::Call { callee, args, .. } => (callee, args),
@@ -82,7 +85,9 @@ impl Graph {
             }
             _ => return self.mark(code, user),
         };
-        let Some(Side::Child(child)) = self.nodes[user as usize].side.as_deref() else { return self.mark(code, user) };
+        let Some(Side::Child(child)) = self.nodes[user as usize].side.as_deref() else {
+            return self.mark(code, user);
+        };
         let child = *child;
         let frame = self.nodes[user as usize].frame;
         if let Callee::Value(v) = callee
@@ -106,7 +111,8 @@ impl Graph {
         }
     }
 
-    /// Marks what reads the result of a pass of a `fold`: the next pass, or the fold itself.
+    /// Marks what reads the result of a pass of a `fold`: the next pass, or the fold
+    /// itself.
     fn mark_next_pass(&mut self, code: &Code, owner: NodeId, frame: FrameId) {
         let pass = self.frames[frame as usize].pass as usize;
         let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else { return };
@@ -148,13 +154,15 @@ impl Graph {
         }
     }
 
-    /// Whether a marked choice may get another value without being a target: a whitened one moves with its distribution; one
-    /// whose key, length or kind changes is drawn anew.
+    /// Whether a marked choice may get another value without being a target: a whitened
+    /// one moves with its distribution; one whose key, length or kind changes is drawn
+    /// anew.
     pub(super) fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
         let node = &self.nodes[n as usize];
         let Op::Draw { dist, keys, .. } = self.op(code, n) else { return false };
         let stale = |o: &Operand| {
-            self.resolve(node.frame, *o).is_some_and(|k| matches!(self.nodes[k as usize].state, State::Stale))
+            self.resolve(node.frame, *o)
+                .is_some_and(|k| matches!(self.nodes[k as usize].state, State::Stale))
         };
         let whole = matches!(node.side.as_deref(), Some(Side::Choice(c)) if c.stored.is_some() || c.elements != NONE);
         whole

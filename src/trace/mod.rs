@@ -1,8 +1,9 @@
 //! Traces: one execution of a program as a dependency graph with dynamic structure.
 //!
-//! Everything is an operation on traces through one small interface: *propose* changes at addresses, get the weight of the
-//! incremental update, *commit* or *roll back*. A choice that no observation asks for is not part of a trace; it is drawn
-//! when a [`query`](Trace::query) asks for it, from its prior given the rest.
+//! Everything is an operation on traces through one small interface: *propose* changes at
+//! addresses, get the weight of the incremental update, *commit* or *roll back*. A choice
+//! that no observation asks for is not part of a trace; it is drawn when a
+//! [`query`](Trace::query) asks for it, from its prior given the rest.
 
 #![doc = include_str!("guide.md")]
 
@@ -14,6 +15,7 @@ mod explain;
 mod formula;
 mod gradient;
 mod graph;
+mod inspect;
 mod journal;
 mod limits;
 mod marginal;
@@ -41,16 +43,15 @@ pub use propose::{Change, Constraint, Draws, Weight};
 pub use save::{SaveError, SavedTrace};
 pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 
-use crate::dist::{Datum, Dist, Support};
-use crate::lang::code::{Code, DistSpec, Op};
+use crate::lang::code::Code;
 pub use crate::lang::error::RunError;
-use crate::lang::value::{Likelihood, Located, Value};
+use crate::lang::value::Value;
 #[doc(hidden)]
 pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
 pub(crate) use marginal::{Explored, Marginal, Sums};
-use node::{NONE, State};
+use node::NONE;
 pub(crate) use peek::Peek;
 use std::sync::Arc;
 
@@ -75,7 +76,8 @@ impl Clone for Trace {
 pub type TraceResult<T> = Result<T, Box<RunError>>;
 
 impl Trace {
-    /// A trace in which nothing has run: queries draw from the prior, observations are ignored.
+    /// A trace in which nothing has run: queries draw from the prior, observations are
+    /// ignored.
     pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
         let graph = Graph::new(&code, limits);
         Trace { code, graph, update: None, identity: Arc::new(()) }
@@ -89,8 +91,8 @@ impl Trace {
         Trace::generate(code, std::iter::empty(), draws, limits).map(|(t, _)| t)
     }
 
-    /// Runs a program with the values of some choices given. The weight is the log joint less the log density of what was
-    /// drawn: the importance weight of the trace.
+    /// Runs a program with the values of some choices given. The weight is the log joint
+    /// less the log density of what was drawn: the importance weight of the trace.
     ///
     /// # Errors
     /// What the program does wrong, with its place.
@@ -125,8 +127,9 @@ impl Trace {
         &self.code
     }
 
-    /// Proposes changes and updates what depends on them. The update is pending until [`Trace::commit`] or
-    /// [`Trace::rollback`]; a second proposal rolls the first back, and its targets must be of the state before that.
+    /// Proposes changes and updates what depends on them. The update is pending until
+    /// [`Trace::commit`] or [`Trace::rollback`]; a second proposal rolls the first back,
+    /// and its targets must be of the state before that.
     ///
     /// # Errors
     /// What goes wrong under the proposed values; the trace is then as before.
@@ -147,7 +150,8 @@ impl Trace {
         self.propose_observed(changes, constraints, &[], draws)
     }
 
-    /// The same, with values in place of observed ones, by the hashes of the observations' addresses.
+    /// The same, with values in place of observed ones, by the hashes of the
+    /// observations' addresses.
     fn propose_observed(
         &mut self,
         changes: &[(Target, Change)],
@@ -167,7 +171,9 @@ impl Trace {
             _ => None,
         };
         let settled = match spread {
-            Some((target, change, spread)) => self.graph.update_by_spread(&self.code, target, change, spread),
+            Some((target, change, spread)) => {
+                self.graph.update_by_spread(&self.code, target, change, spread)
+            }
             None => {
                 self.graph.queue(&self.code, changes);
                 self.graph.settle(&self.code)
@@ -206,8 +212,8 @@ impl Trace {
         self.graph.removed.iter().map(|(_, h, d)| (*h, Constraint::Stored(d.clone()))).collect()
     }
 
-    /// Whether the pending proposal takes away a choice: also one that is drawn anew at the same place, because its form
-    /// changed. What was proposed for it had no effect.
+    /// Whether the pending proposal takes away a choice: also one that is drawn anew at
+    /// the same place, because its form changed. What was proposed for it had no effect.
     pub fn was_removed(&self, t: Target) -> bool {
         self.graph.removed.iter().any(|(n, _, _)| *n == t.node)
     }
@@ -218,7 +224,8 @@ impl Trace {
     /// As [`Trace::propose`].
     pub fn restore(&mut self, saved: &[(u64, Constraint)], draws: Draws) -> TraceResult<()> {
         self.rollback();
-        let values: rustc_hash::FxHashMap<u64, &Constraint> = saved.iter().map(|(h, c)| (*h, c)).collect();
+        let values: rustc_hash::FxHashMap<u64, &Constraint> =
+            saved.iter().map(|(h, c)| (*h, c)).collect();
         let here = self.all_targets();
         let changes: Vec<_> = here
             .iter()
@@ -271,7 +278,8 @@ impl Trace {
         sum.value()
     }
 
-    /// The log density of a choice under its prior given the rest, in the present state, also that of a pending proposal.
+    /// The log density of a choice under its prior given the rest, in the present state,
+    /// also that of a pending proposal.
     pub fn score_of(&self, t: Target) -> f64 {
         let node = &self.graph.nodes[t.node as usize];
         match node.side.as_deref() {
@@ -280,9 +288,11 @@ impl Trace {
         }
     }
 
-    /// The gradient of the log prior plus `power` times the log likelihood, by the unconstrained coordinates of these choices
-    /// one after the other, the log Jacobians of their transforms included (see [`Change::Free`]): in the present state, also that
-    /// of a pending proposal. Discrete choices have no coordinates. Appended to `out`.
+    /// The gradient of the log prior plus `power` times the log likelihood, by the
+    /// unconstrained coordinates of these choices one after the other, the log Jacobians
+    /// of their transforms included (see [`Change::Free`]): in the present state, also
+    /// that of a pending proposal. Discrete choices have no coordinates. Appended to
+    /// `out`.
     ///
     /// # Errors
     /// An operation between a choice and the score of which no derivative is known.
@@ -290,7 +300,8 @@ impl Trace {
         self.weighted_gradient(targets, power, &|_| 1.0, out)
     }
 
-    /// The same with the log density of each choice, observation and factor weighed; Jacobians are not.
+    /// The same with the log density of each choice, observation and factor weighed;
+    /// Jacobians are not.
     ///
     /// # Errors
     /// As [`Trace::gradient`].
@@ -310,223 +321,13 @@ impl Trace {
         self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
     }
 
-    /// Registers a selection; its members are kept up to date from then on.
-    pub fn select(&mut self, selector: &Selector) -> Selection {
-        self.rollback();
-        self.graph.selection(&self.code, selector)
-    }
-
-    /// The choices a selection now has.
-    pub fn targets(&self, selection: Selection) -> &[Target] {
-        self.graph.choices.selections[selection.0 as usize].targets()
-    }
-
-    /// What selections belong to.
-    pub(crate) fn identity(&self) -> &Arc<()> {
-        &self.identity
-    }
-
-    /// The choices a selection now has, as kept: another list as soon as they change.
-    pub(crate) fn listed(&self, selection: Selection) -> &Arc<Vec<Target>> {
-        self.graph.choices.selections[selection.0 as usize].listed()
-    }
-
-    /// The choices a selection now has, in the order of the program: by place in the text and pass of the loops around.
-    pub fn in_program_order(&self, selection: Selection) -> Vec<Target> {
-        self.graph.in_program_order(self.targets(selection))
-    }
-
-    /// All active choices, in the order of the hashes of their addresses.
-    pub fn all_targets(&self) -> &[Target] {
-        self.graph.choices.selections[0].targets()
-    }
-
-    /// The choice at an address, if it is active. An element of a choice has the element's index as last key.
-    pub fn find(&self, address: &Address) -> Option<Target> {
-        if let Some(n) = self.graph.choices.find(address.hash64()) {
-            return Some(Target { node: n, element: NONE });
-        }
-        let mut whole = address.clone();
-        let key = whole.segments.last_mut()?.keys.pop()?;
-        let n = self.graph.choices.find(whole.hash64())?;
-        let elements = match self.graph.nodes[n as usize].side.as_deref() {
-            Some(node::Side::Choice(c)) if c.elements != NONE => c.elements,
-            _ => return None,
-        };
-        let element = key.as_index().filter(|i| *i < elements as usize)?;
-        Some(Target { node: n, element: element as u32 })
-    }
-
-    /// The address of a choice.
-    pub fn address(&self, t: Target) -> Address {
-        let mut a = self.graph.address(&self.code, t.node);
-        if t.element != NONE {
-            choices::push_key(&mut a, t.element);
-        }
-        a
-    }
-
-    /// A hash of the address of a choice, stable between runs.
-    pub fn address_hash(&self, t: Target) -> u64 {
-        let h = self.graph.choice_hash(&self.code, t.node);
-        if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
-    }
-
-    /// Whether a target that was listed before is still a choice of this trace.
-    pub fn is_active(&self, t: Target) -> bool {
-        let node = self.graph.nodes.get(t.node as usize);
-        node.is_some_and(|n| n.state == State::Clean) && matches!(self.graph.op(&self.code, t.node), Op::Draw { .. })
-    }
-
-    /// The value of a choice as the program sees it.
-    pub fn value(&self, t: Target) -> Value {
-        let v = &self.graph.nodes[t.node as usize].value;
-        if t.element == NONE { v.clone() } else { v.element(t.element as usize).unwrap_or_default() }
-    }
-
-    /// The value of a choice in stored form.
-    pub fn stored(&self, t: Target) -> Option<Datum> {
-        if t.element == NONE { self.graph.stored(t.node) } else { self.value(t).to_datum() }
-    }
-
-    /// Where a continuous choice is in the unconstrained space, and the log Jacobian of the transform there: what a
-    /// [`Change::Free`] starts from. `None` for a discrete one.
-    pub fn free(&self, t: Target) -> Option<(Vec<f64>, f64)> {
-        self.free_unless(t, Support::is_discrete)
-    }
-
-    fn free_unless(&self, t: Target, kept: impl Fn(&Support) -> bool) -> Option<(Vec<f64>, f64)> {
-        let (support, stored) = (self.dist(t)?.stored_support(), self.stored(t)?);
-        if kept(&support) {
-            return None;
-        }
-        let mut y = Vec::with_capacity(support.free_dim());
-        support.to_free(&stored, &mut y);
-        let jacobian = support.from_free(&y).1;
-        Some((y, jacobian))
-    }
-
-    /// [`Trace::free`] of a choice that moves there can reach in all its parts: `None` also for one that is discrete in part, which a
-    /// [`Change::Free`] puts at its least value.
-    pub(crate) fn free_to_move(&self, t: Target) -> Option<(Vec<f64>, f64)> {
-        self.free_unless(t, Support::has_discrete_part)
-    }
-
-    /// The distribution a choice now has.
-    pub fn dist(&self, t: Target) -> Option<Dist> {
-        let d = self.graph.dist_of(&self.code, t.node)?;
-        Some(if t.element == NONE { d } else { d.element(t.element as usize) })
-    }
-
-    /// Whether a choice is an array of separately addressed elements.
-    pub fn elements(&self, t: Target) -> Option<usize> {
-        match self.graph.nodes[t.node as usize].side.as_deref() {
-            Some(node::Side::Choice(c)) if c.elements != NONE && t.element == NONE => Some(c.elements as usize),
-            _ => None,
-        }
-    }
-
-    /// How many choices (elements counted one by one) are active.
-    pub fn choice_count(&self) -> usize {
-        self.all_targets().len()
-    }
-
-    /// Named points of the scene as the observations put them (see [`crate::lang::value::Likelihood::located`]).
-    pub fn located(&self) -> Vec<Located> {
-        self.likelihoods().flat_map(|(l, observed)| l.located(observed)).collect()
-    }
-
-    /// Every observation and factor with its log density, in the order of the program's blocks.
-    pub fn observations(&self) -> Vec<(Address, f64)> {
-        self.scored().into_iter().map(|(n, s)| (self.graph.address(&self.code, n), s)).collect()
-    }
-
-    /// What has log density -∞, with its place in the program: observations and factors first, then choices.
-    pub fn impossible(&self) -> Vec<(Address, crate::syntax::span::Span)> {
-        let observed = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY).map(|(n, _)| n);
-        let mut found: Vec<_> = observed.map(|n| (self.graph.address(&self.code, n), self.span(n))).collect();
-        let targets = self.all_targets();
-        let zero = targets.iter().filter(|t| self.score_of(**t) == f64::NEG_INFINITY);
-        let mut chosen: Vec<_> = zero.map(|t| (self.address(*t), self.span(t.node))).collect();
-        chosen.sort_by(|a, b| a.0.cmp(&b.0));
-        found.extend(chosen);
-        found
-    }
-
-    /// Which observations observe what their distributions cannot give, by address, and why.
-    pub(crate) fn outside_support(&self) -> Vec<(Address, String)> {
-        let zero = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY);
-        let why = |(n, _)| Some((self.graph.address(&self.code, n), self.graph.outside_support(&self.code, n)?));
-        zero.filter_map(why).collect()
-    }
-
-    fn span(&self, n: u32) -> crate::syntax::span::Span {
-        let frame = &self.graph.frames[self.graph.nodes[n as usize].frame as usize];
-        self.code.blocks[frame.block as usize].spans[(n - frame.base) as usize]
-    }
-
-    /// Whether an observation's likelihood is no density over its data, so that its scale is a matter of choice.
-    pub fn is_pseudo(&self) -> bool {
-        self.likelihoods().any(|(l, _)| !l.is_proper())
-    }
-
-    /// What is approximate in the likelihoods by their settings, each once.
-    pub fn approximations(&self) -> Vec<String> {
-        let mut all: Vec<String> = Vec::new();
-        for (l, _) in self.likelihoods() {
-            let said = l.approximations().into_iter().map(|what| format!("{}: {what}", l.name()));
-            for what in said {
-                if !all.contains(&what) {
-                    all.push(what);
-                }
-            }
-        }
-        all
-    }
-
-    /// The observations and factors.
-    fn scored_nodes(&self) -> impl Iterator<Item = u32> {
-        let nodes = self.graph.nodes.iter().zip(0..).filter(|(n, _)| n.state == State::Clean).map(|(_, i)| i);
-        nodes.filter(|n| matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. }))
-    }
-
-    fn scored(&self) -> Vec<(u32, f64)> {
-        self.scored_nodes().map(|n| (n, self.score_at(n))).collect()
-    }
-
-    /// The log density of an observation or factor.
-    fn score_at(&self, n: u32) -> f64 {
-        let n = &self.graph.nodes[n as usize];
-        match n.side.as_deref() {
-            Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
-            _ => n.score,
-        }
-    }
-
-    /// The likelihoods that are not distributions, and what is observed under each.
-    fn likelihoods(&self) -> impl Iterator<Item = (&dyn Likelihood, &Value)> {
-        self.scored_nodes().filter_map(|n| {
-            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n) else { return None };
-            let frame = self.graph.nodes[n as usize].frame;
-            let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
-            Some((&**l, self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new())))
-        })
-    }
-
-    /// Every active choice with its address and log density, by address.
-    pub fn choices(&self) -> Vec<(Address, Value, f64)> {
-        let targets = self.all_targets();
-        let mut all: Vec<_> = targets.iter().map(|t| (self.address(*t), self.value(*t), self.score_of(*t))).collect();
-        all.sort_by(|a, b| a.0.cmp(&b.0));
-        all
-    }
-
     /// Whether nothing was committed since the program was run.
     pub(crate) fn is_new(&self) -> bool {
         self.graph.revision == 0
     }
 
-    /// Turns incremental updates off (every proposal re-runs the whole program) or on again; chains are the same either way.
+    /// Turns incremental updates off (every proposal re-runs the whole program) or on
+    /// again; chains are the same either way.
     pub fn set_incremental(&mut self, on: bool) {
         self.graph.incremental = on;
     }
@@ -548,23 +349,31 @@ impl Trace {
         self.graph.watched = Some(Vec::new());
     }
 
-    /// What was executed since [`Trace::watch`]: the text of each expression, where the source is at hand by its span.
+    /// What was executed since [`Trace::watch`]: the text of each expression, where the
+    /// source is at hand by its span.
     #[doc(hidden)]
     pub fn executed(&mut self) -> Vec<crate::syntax::span::Span> {
         let log = self.graph.watched.take().unwrap_or_default();
         log.into_iter().map(|(b, s)| self.code.blocks[b as usize].spans[s as usize]).collect()
     }
 
-    /// Runs the program again from scratch with the same choices: a check that increments and structure are right.
+    /// Runs the program again from scratch with the same choices: a check that increments
+    /// and structure are right.
     ///
     /// # Errors
     /// What the program does wrong.
     pub fn rerun(&self) -> TraceResult<Trace> {
-        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits.clone())
-            .map(|(t, _)| t)
+        Trace::generate(
+            self.present_code(),
+            self.constraints(),
+            Draws::default(),
+            self.graph.limits.clone(),
+        )
+        .map(|(t, _)| t)
     }
 
-    /// Another execution of the same program under the same observations, with the values of some choices given.
+    /// Another execution of the same program under the same observations, with the values
+    /// of some choices given.
     ///
     /// # Errors
     /// What the program does wrong.
@@ -573,7 +382,8 @@ impl Trace {
         constraints: impl IntoIterator<Item = (u64, Constraint)>,
         draws: Draws,
     ) -> TraceResult<Trace> {
-        let mut trace = Trace::generate(self.present_code(), constraints, draws, self.graph.limits.clone())?.0;
+        let mut trace =
+            Trace::generate(self.present_code(), constraints, draws, self.graph.limits.clone())?.0;
         trace.graph.incremental = self.graph.incremental;
         Ok(trace)
     }
@@ -589,7 +399,8 @@ impl Trace {
     /// The choices as constraints for [`Trace::generate`].
     pub fn constraints(&self) -> Vec<(u64, Constraint)> {
         let targets = self.all_targets();
-        let stored = targets.iter().filter_map(|t| self.stored(*t).map(|d| (self.address_hash(*t), d)));
+        let stored =
+            targets.iter().filter_map(|t| self.stored(*t).map(|d| (self.address_hash(*t), d)));
         stored.map(|(h, d)| (h, Constraint::Stored(d))).collect()
     }
 }

@@ -1,7 +1,8 @@
 //! Nodes and frames: the storage of a trace.
 //!
-//! A frame is one instance of a block; its nodes lie side by side, one a slot. A node keeps its last value, what it adds to
-//! the score, and how many evaluated nodes (or effects) hold it. What only structural nodes need is boxed beside it.
+//! A frame is one instance of a block; its nodes lie side by side, one a slot. A node
+//! keeps its last value, what it adds to the score, and how many evaluated nodes (or
+//! effects) hold it. What only structural nodes need is boxed beside it.
 
 use crate::dist::Datum;
 use crate::lang::builtins::Before;
@@ -79,9 +80,11 @@ const _: () = assert!(size_of::<Node>() == 64);
 /// What only some nodes need.
 #[derive(Clone, Debug)]
 pub(crate) enum Side {
-    /// Nodes held besides the operands: the element an index found, the elements a gather read.
+    /// Nodes held besides the operands: the element an index found, the elements a gather
+    /// read.
     Deps(Deps),
-    /// What an incremental function of a host starts from next time, and nodes held besides the operands.
+    /// What an incremental function of a host starts from next time, and nodes held
+    /// besides the operands.
     Kept(Kept),
     /// `if` and calls of user functions.
     Child(Child),
@@ -205,7 +208,8 @@ impl Keys {
 pub(crate) struct Table {
     /// What was read to make it.
     pub deps: Deps,
-    /// By key: the source and the pass of each of its loops; none when one loop's keys are the container's.
+    /// By key: the source and the pass of each of its loops; none when one loop's keys
+    /// are the container's.
     pub entries: Option<Arc<indexmap::IndexMap<SmallVec<[Key; 1]>, Element>>>,
 }
 

@@ -1,9 +1,11 @@
-//! Observed values as part of a trace: reading them, putting others in their place, drawing them anew from their own
-//! distributions given the choices. What simulation-based checks and predictive checks are made of.
+//! Observed values as part of a trace: reading them, putting others in their place,
+//! drawing them anew from their own distributions given the choices. What
+//! simulation-based checks and predictive checks are made of.
 //!
-//! A value put in place of the program's is kept by the observation's address and scored from then on, also when the
-//! observation goes and comes back. Putting it there is a proposal like any other: pending until it is committed, undone by a
-//! roll-back. Not here: scoring ([`super::eval`]).
+//! A value put in place of the program's is kept by the observation's address and scored
+//! from then on, also when the observation goes and comes back. Putting it there is a
+//! proposal like any other: pending until it is committed, undone by a roll-back. Not
+//! here: scoring ([`super::eval`]).
 
 use super::demand::Failure;
 use super::graph::Graph;
@@ -24,7 +26,8 @@ use std::sync::Arc;
 pub struct Observation {
     /// Its address.
     pub address: Address,
-    /// A hash of the address, stable between runs: what [`Trace::set_observed`] knows it by.
+    /// A hash of the address, stable between runs: what [`Trace::set_observed`] knows it
+    /// by.
     pub hash: u64,
     /// The observed value.
     pub value: Value,
@@ -33,9 +36,11 @@ pub struct Observation {
 /// What the observations of a trace would be if they were made again.
 #[derive(Clone, Debug, Default)]
 pub struct Replicate {
-    /// The hash of the address and the new value of each observation that can be drawn, by address.
+    /// The hash of the address and the new value of each observation that can be drawn,
+    /// by address.
     pub values: Vec<(u64, Value)>,
-    /// What cannot: factors, and observations under a likelihood without a sampler. The address, and what it is.
+    /// What cannot: factors, and observations under a likelihood without a sampler. The
+    /// address, and what it is.
     pub silent: Vec<(Address, String)>,
 }
 
@@ -54,8 +59,9 @@ impl Trace {
         all
     }
 
-    /// Draws every observation anew given the choices, in the form of what is observed (as many elements, the same size). The
-    /// trace stays as it is: [`Trace::set_observed`] takes the values.
+    /// Draws every observation anew given the choices, in the form of what is observed
+    /// (as many elements, the same size). The trace stays as it is:
+    /// [`Trace::set_observed`] takes the values.
     ///
     /// # Errors
     /// What goes wrong while a likelihood draws.
@@ -77,11 +83,16 @@ impl Trace {
         }
         all.sort_by(|a, b| a.0.cmp(&b.0));
         silent.sort();
-        Ok(Replicate { values: all.into_iter().map(|(_, hash, value)| (hash, value)).collect(), silent })
+        Ok(Replicate {
+            values: all.into_iter().map(|(_, hash, value)| (hash, value)).collect(),
+            silent,
+        })
     }
 
-    /// Proposes other values in place of what is observed, by the hashes of the observations' addresses. The update is pending
-    /// until [`Trace::commit`] or [`Trace::rollback`]. A value of an observation that does not exist is kept until it does.
+    /// Proposes other values in place of what is observed, by the hashes of the
+    /// observations' addresses. The update is pending until [`Trace::commit`] or
+    /// [`Trace::rollback`]. A value of an observation that does not exist is kept until
+    /// it does.
     ///
     /// # Errors
     /// If a value cannot be scored; the trace is then as before.
@@ -89,8 +100,10 @@ impl Trace {
         self.propose_observed(&[], &[], values, Draws::default())
     }
 
-    /// The log density of each observed value: of each observation the hash of its address and those of its elements, one where what it
-    /// observes has none. In order of the hashes, so that the same observations are in the same order. `None` if there are more than `most`.
+    /// The log density of each observed value: of each observation the hash of its
+    /// address and those of its elements, one where what it observes has none. In order
+    /// of the hashes, so that the same observations are in the same order. `None` if
+    /// there are more than `most`.
     ///
     /// ```
     /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = [1, 2] as y; observe poisson(3) = 2 as k;")?;
@@ -129,11 +142,13 @@ impl Trace {
         Some(all)
     }
 
-    /// The observed values in the order of [`Trace::pointwise`]: each by its name, the observation's address and the number of the
-    /// element, and its number; NaN of what is none.
+    /// The observed values in the order of [`Trace::pointwise`]: each by its name, the
+    /// observation's address and the number of the element, and its number; NaN of what
+    /// is none.
     pub fn points(&self, most: usize) -> Vec<(String, f64)> {
         let Some(scores) = self.pointwise(most) else { return Vec::new() };
-        let mut observed: FxHashMap<u64, Observation> = self.observed().into_iter().map(|o| (o.hash, o)).collect();
+        let mut observed: FxHashMap<u64, Observation> =
+            self.observed().into_iter().map(|o| (o.hash, o)).collect();
         let mut all = Vec::new();
         for (hash, scores) in scores {
             let Some(o) = observed.remove(&hash) else { continue };
@@ -145,10 +160,12 @@ impl Trace {
                 _ => f64::NAN,
             };
             match (o.value.len(), scores.len()) {
-                (Some(n), count) if n == count => {
-                    all.extend((0..n).map(|i| (format!("{name}[{i}]"), o.value.element(i).map_or(f64::NAN, number))))
+                (Some(n), count) if n == count => all.extend((0..n).map(|i| {
+                    (format!("{name}[{i}]"), o.value.element(i).map_or(f64::NAN, number))
+                })),
+                (_, count) => {
+                    all.extend((0..count).map(|_| (name.to_owned(), number(o.value.clone()))))
                 }
-                (_, count) => all.extend((0..count).map(|_| (name.to_owned(), number(o.value.clone())))),
             }
         }
         all
@@ -158,7 +175,9 @@ impl Trace {
     pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
         let (g, code) = (&self.graph, &*self.code);
         let hashed = |n: NodeId| match g.op(code, n) {
-            Op::Observe { site, .. } => Some((g.site_hash(code, g.nodes[n as usize].frame, *site), n)),
+            Op::Observe { site, .. } => {
+                Some((g.site_hash(code, g.nodes[n as usize].frame, *site), n))
+            }
             _ => None,
         };
         self.scored_nodes().filter_map(hashed).collect()
@@ -180,7 +199,8 @@ impl Trace {
         }
     }
 
-    /// What is observed in place of the program's values: another allocation as soon as it changes, for whoever holds it.
+    /// What is observed in place of the program's values: another allocation as soon as
+    /// it changes, for whoever holds it.
     pub(crate) fn replacements(&self) -> &Arc<Observed> {
         &self.graph.observed
     }
@@ -193,7 +213,8 @@ impl Trace {
         if Arc::ptr_eq(&self.graph.observed, &other.graph.observed) {
             return Ok(());
         }
-        let mut values: Vec<_> = other.graph.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
+        let mut values: Vec<_> =
+            other.graph.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
         values.sort_by_key(|(hash, _)| *hash);
         self.set_observed(&values)?;
         self.commit();
@@ -240,8 +261,8 @@ impl Graph {
         }
     }
 
-    /// Why an observation has probability zero whatever its distribution's parameters, if that is so at these: what is observed is not in
-    /// its support.
+    /// Why an observation has probability zero whatever its distribution's parameters, if
+    /// that is so at these: what is observed is not in its support.
     pub(super) fn outside_support(&self, code: &Code, n: NodeId) -> Option<String> {
         let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return None };
         let (mut deps, frame) = (Deps::new(), self.nodes[n as usize].frame);
@@ -252,15 +273,23 @@ impl Graph {
             return None;
         }
         let dist = self.make_dist(code, n, frame, spec, &mut deps).ok()?;
-        let count = dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
+        let count =
+            dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
         let Some(count) = count else { return outside(&dist, observed) };
         (0..count).find_map(|i| outside(&dist.element(i), &observed.element(i)?))
     }
 
     /// A draw of what an observation observes, or what it is that cannot be drawn.
-    fn draw_observed(&self, code: &Code, n: NodeId, rng: &mut Stream) -> Result<Result<Value, String>, Failure> {
+    fn draw_observed(
+        &self,
+        code: &Code,
+        n: NodeId,
+        rng: &mut Stream,
+    ) -> Result<Result<Value, String>, Failure> {
         let frame = self.nodes[n as usize].frame;
-        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return Ok(Err("a factor".into())) };
+        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else {
+            return Ok(Err("a factor".into()));
+        };
         let mut deps = Deps::new();
         let observed = self.observed_value(code, n, *value, &mut deps);
         if let DistSpec::Value(o) = spec
@@ -284,18 +313,26 @@ fn outside(dist: &Dist, observed: &Value) -> Option<String> {
     let x = observed.to_datum()?;
     let support = dist.support();
     let is_truth = support == Support::Boolean && matches!(x, Datum::Num(0.0 | 1.0));
-    let apart = || format!("the observed value {observed} is outside the support of `{}` ({support})", dist.name());
+    let apart = || {
+        format!(
+            "the observed value {observed} is outside the support of `{}` ({support})",
+            dist.name()
+        )
+    };
     (!is_truth && !support.contains(&x)).then(apart)
 }
 
-/// A draw in the form in which a value is scored: element by element where the distribution is over less than the value.
+/// A draw in the form in which a value is scored: element by element where the
+/// distribution is over less than the value.
 fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
     let mut one = |d: &Dist| Value::from_datum(&d.sample(rng));
     if let Some(count) = dist.elements() {
         return Value::from_elements((0..count).map(|i| one(&dist.element(i))).collect());
     }
     match observed {
-        Value::Array(xs) if is_repeated(dist, observed) => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
+        Value::Array(xs) if is_repeated(dist, observed) => {
+            Value::from_elements(xs.iter().map(|_| one(dist)).collect())
+        }
         Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => one(dist),
         Value::List(xs) => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
         _ => one(dist),
@@ -314,7 +351,10 @@ mod tests {
     }
 
     fn trace(text: &str) -> Trace {
-        Model::from_text(text).unwrap_or_else(|e| panic!("{e}")).simulate(1, 0).unwrap_or_else(|e| panic!("{e}"))
+        Model::from_text(text)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .simulate(1, 0)
+            .unwrap_or_else(|e| panic!("{e}"))
     }
 
     const TEXT: &str = "assume x ~ normal(0, 1); assume c ~ flip(0.5);
@@ -331,7 +371,10 @@ mod tests {
         let new = t.replicate(draws(0)).unwrap();
         assert!(new.silent.is_empty());
         let w = t.set_observed(&new.values).unwrap();
-        assert!((t.log_joint() - before.0 - w.log_joint).abs() < 1e-12 && w.log_joint == w.log_likelihood);
+        assert!(
+            (t.log_joint() - before.0 - w.log_joint).abs() < 1e-12
+                && w.log_joint == w.log_likelihood
+        );
         t.rollback();
         assert_eq!(t.log_joint().to_bits(), before.0.to_bits());
         assert!(t.observed().iter().zip(&before.1).all(|(a, b)| a.value.same(&b.value)));
@@ -372,7 +415,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_drawn_is_named() {
-        let t = trace("assume x ~ normal(0, 1); factor(-x * x); observe flat() = x; observe normal(x, 1) = 0;");
+        let t = trace(
+            "assume x ~ normal(0, 1); factor(-x * x); observe flat() = x; observe normal(x, 1) = 0;",
+        );
         let r = t.replicate(draws(0)).unwrap();
         let named: Vec<String> = r.silent.iter().map(|(a, w)| format!("{a}: {w}")).collect();
         assert_eq!(r.values.len(), 1);
@@ -385,7 +430,9 @@ mod tests {
         let t = trace(
             "assume x ~ normal(0, 1); observe normal(x, 2) = [0, 0]; observe mv_normal([x, 0], [[1, 0.5], [0.5, 2]]) = [0, 0];",
         );
-        let Some(Value::Num(x)) = t.choices().first().map(|(_, v, _)| v.clone()) else { panic!("no choice") };
+        let Some(Value::Num(x)) = t.choices().first().map(|(_, v, _)| v.clone()) else {
+            panic!("no choice")
+        };
         let (mut sum, mut cross, n) = (0.0, 0.0, 20_000);
         for step in 0..n {
             let r = t.replicate(draws(step)).unwrap().values;

@@ -1,8 +1,10 @@
-//! The operations of generative functions by name, for users of the library: reading and changing choices and observed values
-//! by address, undoing that, and the density of a part of a trace.
+//! The operations of generative functions by name, for users of the library: reading and
+//! changing choices and observed values by address, undoing that, and the density of a
+//! part of a trace.
 //!
-//! Terms are Gen's (Cusumano-Towner et al. 2019): [`Trace::update`], [`Trace::project`]; `simulate`, `generate`, `propose`,
-//! `regenerate` and `score` are beside them, and a fork of a trace is its clone. Not here: how an update runs.
+//! Terms are Gen's (Cusumano-Towner et al. 2019): [`Trace::update`], [`Trace::project`];
+//! `simulate`, `generate`, `propose`, `regenerate` and `score` are beside them, and a
+//! fork of a trace is its clone. Not here: how an update runs.
 
 use super::node::NodeId;
 use super::{Address, Change, Constraint, Draws, Selector, Target, Trace, TraceResult, Weight};
@@ -18,8 +20,8 @@ use rustc_hash::FxHashMap;
 pub enum Given {
     /// As the program sees it.
     Value(Value),
-    /// As the trace keeps a choice (for a whitened gp the white noise behind it): what [`Update::discarded`] has, so that
-    /// nothing is lost on the way back.
+    /// As the trace keeps a choice (for a whitened gp the white noise behind it): what
+    /// [`Update::discarded`] has, so that nothing is lost on the way back.
     Stored(Datum),
 }
 
@@ -41,12 +43,13 @@ impl<V: Into<Value>> From<V> for Given {
 /// What [`Trace::update`] did.
 #[derive(Clone, Debug)]
 pub struct Update {
-    /// The change of the log joint density less the log density of what was drawn from the prior: of the new state, as an
-    /// importance weight relative to the old one.
+    /// The change of the log joint density less the log density of what was drawn from
+    /// the prior: of the new state, as an importance weight relative to the old one.
     pub log_weight: f64,
     /// The same update as a proposal of an MCMC step.
     pub weight: Weight,
-    /// The values that were replaced and those of the choices that vanished, by address: an update to these leads back.
+    /// The values that were replaced and those of the choices that vanished, by address:
+    /// an update to these leads back.
     pub discarded: Vec<(Address, Given)>,
 }
 
@@ -60,10 +63,12 @@ struct Sorted {
 }
 
 impl Trace {
-    /// The value of a choice, of an element of one, or an observed value, by its address: `@pose[arm_l]/bone`.
+    /// The value of a choice, of an element of one, or an observed value, by its address:
+    /// `@pose[arm_l]/bone`.
     ///
     /// # Errors
-    /// If the trace has no such choice or observation; the message names the nearest address.
+    /// If the trace has no such choice or observation; the message names the nearest
+    /// address.
     pub fn get(&self, address: &str) -> TraceResult<Value> {
         let address: Address = address.parse().map_err(|e| wrong(format!("{e}")))?;
         if let Some(t) = self.find(&address) {
@@ -72,21 +77,29 @@ impl Trace {
         self.observed_at(&address, &self.observation_nodes()).ok_or_else(|| self.unknown(&address))
     }
 
-    /// Gives a choice, an element of one, or an observation a value, and keeps it: [`Trace::update`] and [`Trace::commit`].
+    /// Gives a choice, an element of one, or an observation a value, and keeps it:
+    /// [`Trace::update`] and [`Trace::commit`].
     ///
     /// # Errors
     /// As [`Trace::update`].
-    pub fn set(&mut self, address: &str, value: impl Into<Value>, draws: Draws) -> TraceResult<Update> {
+    pub fn set(
+        &mut self,
+        address: &str,
+        value: impl Into<Value>,
+        draws: Draws,
+    ) -> TraceResult<Update> {
         let address = address.parse().map_err(|e| wrong(format!("{e}")))?;
         let update = self.update(&[(address, Given::Value(value.into()))], draws)?;
         self.commit();
         Ok(update)
     }
 
-    /// Changes choices and observed values by address, leaving the rest: what does not exist yet takes its value when it
-    /// appears, and choices that appear without one are drawn from their prior. Gaussian processes keep the noise behind them
-    /// where their parameters change. The update is pending until [`Trace::commit`] or [`Trace::rollback`]; there is a way back
-    /// also after that ([`Update::discarded`]), bit for bit.
+    /// Changes choices and observed values by address, leaving the rest: what does not
+    /// exist yet takes its value when it appears, and choices that appear without one are
+    /// drawn from their prior. Gaussian processes keep the noise behind them where their
+    /// parameters change. The update is pending until [`Trace::commit`] or
+    /// [`Trace::rollback`]; there is a way back also after that ([`Update::discarded`]),
+    /// bit for bit.
     ///
     /// ```
     /// use pcadlang::Model;
@@ -121,17 +134,20 @@ impl Trace {
     /// ```
     ///
     /// # Errors
-    /// If an address is not in the updated trace (the message names the nearest one that is), if a value does not fit its
-    /// choice, or if the program fails; the trace is then as before.
+    /// If an address is not in the updated trace (the message names the nearest one that
+    /// is), if a value does not fit its choice, or if the program fails; the trace is
+    /// then as before.
     pub fn update(&mut self, given: &[(Address, Given)], draws: Draws) -> TraceResult<Update> {
         self.rollback();
         let mut sorted = self.sort_given(given)?;
-        let proposed = self.propose_observed(&sorted.changes, &sorted.constraints, &sorted.observed, draws);
+        let proposed =
+            self.propose_observed(&sorted.changes, &sorted.constraints, &sorted.observed, draws);
         let mut weight = proposed.map_err(|e| self.misfit_behind(given, e))?;
         let late = self.appeared_observations(given, &sorted);
         let removed = self.graph.removed.clone();
         if !removed.is_empty() || !late.is_empty() {
-            // Addresses may be spelt with what is gone: they are spelt in the state before.
+            // Addresses may be spelt with what is gone: they are spelt in the state
+            // before.
             self.rollback();
             for (n, _, stored) in removed {
                 let address = self.graph.address(&self.code, n);
@@ -140,7 +156,12 @@ impl Trace {
                 }
             }
             sorted.observed.extend(late);
-            weight = self.propose_observed(&sorted.changes, &sorted.constraints, &sorted.observed, draws)?;
+            weight = self.propose_observed(
+                &sorted.changes,
+                &sorted.constraints,
+                &sorted.observed,
+                draws,
+            )?;
         }
         if let Err(e) = self.check_given(given) {
             self.rollback();
@@ -150,8 +171,9 @@ impl Trace {
         Ok(Update { log_weight: self.importance(), weight, discarded: sorted.discarded })
     }
 
-    /// The log density of the choices, observations and factors that a selector selects, in the present state, also that of a
-    /// pending update: of all of them the log joint, bit for bit. Observations have addresses and tags but no kinds.
+    /// The log density of the choices, observations and factors that a selector selects,
+    /// in the present state, also that of a pending update: of all of them the log joint,
+    /// bit for bit. Observations have addresses and tags but no kinds.
     pub fn project(&self, selector: &Selector) -> f64 {
         let (g, code) = (&self.graph, &*self.code);
         let mut sum = ExactSum::default();
@@ -166,14 +188,19 @@ impl Trace {
         sum.value()
     }
 
-    /// The change of the log joint in the pending update less what it drew from the prior.
+    /// The change of the log joint in the pending update less what it drew from the
+    /// prior.
     fn importance(&self) -> f64 {
         let (g, none) = (&self.graph, ExactSum::default());
         let Some(before) = &self.update else { return 0.0 };
-        ExactSum::balance([&g.prior, &g.likelihood, &g.drawn], [&before.prior, &before.likelihood, &none])
+        ExactSum::balance(
+            [&g.prior, &g.likelihood, &g.drawn],
+            [&before.prior, &before.likelihood, &none],
+        )
     }
 
-    /// Tells apart what is given to choices, to observations, and to what is not there yet.
+    /// Tells apart what is given to choices, to observations, and to what is not there
+    /// yet.
     fn sort_given(&self, given: &[(Address, Given)]) -> TraceResult<Sorted> {
         let mut sorted = Sorted::default();
         let nodes = self.nodes_for(given);
@@ -214,7 +241,11 @@ impl Trace {
     }
 
     /// What is given to observations that this update made.
-    fn appeared_observations(&self, given: &[(Address, Given)], sorted: &Sorted) -> Vec<(u64, Value)> {
+    fn appeared_observations(
+        &self,
+        given: &[(Address, Given)],
+        sorted: &Sorted,
+    ) -> Vec<(u64, Value)> {
         let new = |(a, _): &&(Address, Given)| {
             let hash = a.hash64();
             self.find(a).is_none() && !sorted.observed.iter().any(|(h, _)| *h == hash)
@@ -232,7 +263,10 @@ impl Trace {
                 None if nodes.contains_key(&address.hash64()) => {}
                 None => return Err(self.unknown(address)),
                 Some(t) => {
-                    let fits = self.dist(t).zip(self.stored(t)).is_some_and(|(d, x)| d.stored_support().fits(&x));
+                    let fits = self
+                        .dist(t)
+                        .zip(self.stored(t))
+                        .is_some_and(|(d, x)| d.stored_support().fits(&x));
                     if !fits {
                         return Err(self.misfit(address, given));
                     }
@@ -242,7 +276,8 @@ impl Trace {
         Ok(())
     }
 
-    /// The observations, where not all addresses are those of choices: finding them takes a look at all nodes.
+    /// The observations, where not all addresses are those of choices: finding them takes
+    /// a look at all nodes.
     fn nodes_for(&self, given: &[(Address, Given)]) -> FxHashMap<u64, NodeId> {
         match given.iter().all(|(a, _)| self.find(a).is_some()) {
             true => FxHashMap::default(),
@@ -254,12 +289,15 @@ impl Trace {
     fn observed_at(&self, address: &Address, nodes: &FxHashMap<u64, NodeId>) -> Option<Value> {
         let n = *nodes.get(&address.hash64())?;
         let Op::Observe { value, .. } = self.graph.op(&self.code, n) else { return None };
-        Some(self.graph.observed_value(&self.code, n, *value, &mut super::node::Deps::new()).clone())
+        Some(
+            self.graph.observed_value(&self.code, n, *value, &mut super::node::Deps::new()).clone(),
+        )
     }
 
     fn unknown(&self, address: &Address) -> Box<RunError> {
         let (g, code) = (&self.graph, &*self.code);
-        let mut known: Vec<String> = self.all_targets().iter().map(|t| self.address(*t).to_string()).collect();
+        let mut known: Vec<String> =
+            self.all_targets().iter().map(|t| self.address(*t).to_string()).collect();
         known.extend(self.observation_nodes().values().map(|n| g.address(code, *n).to_string()));
         known.sort();
         let text = address.to_string();
@@ -268,7 +306,8 @@ impl Trace {
         wrong(format!("the trace has no choice or observation `{text}`{near}"))
     }
 
-    /// The value of another form than its choice has now, if there is one, that made the program fail.
+    /// The value of another form than its choice has now, if there is one, that made the
+    /// program fail.
     fn misfit_behind(&self, given: &[(Address, Given)], e: Box<RunError>) -> Box<RunError> {
         let misfits = |(address, given): &&(Address, Given)| {
             let dist = self.find(address).and_then(|t| self.dist(t));
@@ -286,7 +325,8 @@ impl Trace {
     fn misfit(&self, address: &Address, given: &Given) -> Box<RunError> {
         let value = given.value();
         let dist = self.find(address).and_then(|t| self.dist(t));
-        let dist = dist.map(|d| format!(", which is drawn from `{}`", d.name())).unwrap_or_default();
+        let dist =
+            dist.map(|d| format!(", which is drawn from `{}`", d.name())).unwrap_or_default();
         wrong(format!("{value} does not fit `{address}`{dist}"))
     }
 }

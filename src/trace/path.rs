@@ -1,4 +1,5 @@
-//! From nodes to addresses. Frames keep a hash of their prefix; the address itself is spelt out when someone looks.
+//! From nodes to addresses. Frames keep a hash of their prefix; the address itself is
+//! spelt out when someone looks.
 
 use super::graph::Graph;
 use super::node::*;
@@ -9,7 +10,8 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Graph {
-    /// The keys of the loops around a frame, up to its function, outermost first; less those the site's target carries.
+    /// The keys of the loops around a frame, up to its function, outermost first; less
+    /// those the site's target carries.
     fn loop_keys(&self, code: &Code, frame: FrameId, carried: u32) -> SmallVec<[Key; 2]> {
         let mut keys = SmallVec::new();
         let mut level = 0;
@@ -47,7 +49,14 @@ impl Graph {
         self.hash_site(code, frame, &code.sites[site as usize], None, own)
     }
 
-    fn hash_site(&self, code: &Code, frame: FrameId, site: &Site, element: Option<&Key>, own: &[Key]) -> u64 {
+    fn hash_site(
+        &self,
+        code: &Code,
+        frame: FrameId,
+        site: &Site,
+        element: Option<&Key>,
+        own: &[Key],
+    ) -> u64 {
         let last = site.segments.len().saturating_sub(1);
         let mut h = self.frames[frame as usize].path;
         for (i, s) in site.segments.iter().enumerate() {
@@ -66,7 +75,13 @@ impl Graph {
     }
 
     /// The address through a site; the mirror image of [`Graph::hash_site`].
-    fn spell_site(&self, code: &Code, frame: FrameId, site: u32, own: &[Key]) -> Vec<AddressSegment> {
+    fn spell_site(
+        &self,
+        code: &Code,
+        frame: FrameId,
+        site: u32,
+        own: &[Key],
+    ) -> Vec<AddressSegment> {
         let mut segments = self.prefix(code, frame);
         self.append_site(code, frame, site, None, own, &mut segments);
         segments
@@ -95,11 +110,16 @@ impl Graph {
             if i == last {
                 keys.extend_from_slice(own);
             }
-            segments.push(AddressSegment { name: Arc::clone(&s.name), occurrence: s.occurrence, keys });
+            segments.push(AddressSegment {
+                name: Arc::clone(&s.name),
+                occurrence: s.occurrence,
+                keys,
+            });
         }
     }
 
-    /// The address prefix of a frame: the calls that lead to its function. Not by recursion: calls may be nested deeply.
+    /// The address prefix of a frame: the calls that lead to its function. Not by
+    /// recursion: calls may be nested deeply.
     fn prefix(&self, code: &Code, frame: FrameId) -> Vec<AddressSegment> {
         let mut calls = Vec::new();
         let mut f = frame;
@@ -108,8 +128,10 @@ impl Graph {
             match code.blocks[here.block as usize].kind {
                 BlockKind::Root => break,
                 BlockKind::Function { .. } => {
-                    let (Op::Call { site, .. } | Op::Map { site, .. } | Op::Fold { site, .. } | Op::Mem { site, .. }) =
-                        self.op(code, here.owner)
+                    let (Op::Call { site, .. }
+                    | Op::Map { site, .. }
+                    | Op::Fold { site, .. }
+                    | Op::Mem { site, .. }) = self.op(code, here.owner)
                     else {
                         break;
                     };
@@ -140,13 +162,16 @@ impl Graph {
                 let own = self.own_keys(code, frame, keys);
                 self.spell_site(code, frame, *site, &own)
             }
-            Op::Observe { site, .. } | Op::Factor { site, .. } => self.spell_site(code, frame, *site, &[]),
+            Op::Observe { site, .. } | Op::Factor { site, .. } => {
+                self.spell_site(code, frame, *site, &[])
+            }
             _ => self.prefix(code, frame),
         };
         Address { segments }
     }
 
-    /// The address a node is executed for: its own, or that of the choice or call around it.
+    /// The address a node is executed for: its own, or that of the choice or call around
+    /// it.
     pub fn address_near(&self, code: &Code, n: NodeId) -> Address {
         let mut address = self.address(code, n);
         if address.segments.is_empty()

@@ -1,9 +1,10 @@
 //! What a choice's other values would weigh, without an update.
 //!
-//! Gibbs updates ask for the weight of every value and keep one. Where a value changes no structure, the weight is that of
-//! the few observations and choices that depend on it, so those are scored beside the trace: nothing is journaled, released
-//! or rolled back. Terms are quantised as in an update, so the weights are the same to the last bit. What would change
-//! structure, or is of a kind not handled here, is left to an update.
+//! Gibbs updates ask for the weight of every value and keep one. Where a value changes no
+//! structure, the weight is that of the few observations and choices that depend on it,
+//! so those are scored beside the trace: nothing is journaled, released or rolled back.
+//! Terms are quantised as in an update, so the weights are the same to the last bit. What
+//! would change structure, or is of a kind not handled here, is left to an update.
 
 use super::choices::Target;
 use super::demand::Failure;
@@ -23,7 +24,8 @@ use smallvec::SmallVec;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Peek {
     target: NodeId,
-    /// Computations, with their values under the value being weighed, and those that only it asks for.
+    /// Computations, with their values under the value being weighed, and those that only
+    /// it asks for.
     values: Vec<(NodeId, Option<Value>)>,
     /// How many of them depend on the choice.
     dependent: usize,
@@ -52,8 +54,10 @@ impl From<Failure> for Obstacle {
 }
 
 impl Trace {
-    /// The log weights that the values of a choice with this distribution would have in an update, each relative to the present state (that
-    /// of the `current` one is 0), with the likelihood raised to a power; `None` for values that the program does not have. False if that takes updates, since structure depends on the choice.
+    /// The log weights that the values of a choice with this distribution would have in
+    /// an update, each relative to the present state (that of the `current` one is 0),
+    /// with the likelihood raised to a power; `None` for values that the program does not
+    /// have. False if that takes updates, since structure depends on the choice.
     pub(crate) fn weigh_values(
         &self,
         target: Target,
@@ -121,12 +125,18 @@ impl Graph {
                     continue;
                 }
                 match self.op(code, m) {
-                    Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. } => {
+                    Op::Prim { .. }
+                    | Op::Array(_)
+                    | Op::Record { .. }
+                    | Op::Index { .. }
+                    | Op::Select { .. } => {
                         peek.values.push((m, None));
                         peek.stack.push(m);
                     }
                     Op::Observe { .. } | Op::Factor { .. } => peek.sinks.push(m),
-                    Op::Draw { dist: DistSpec::Family { .. }, .. } if self.is_plain_choice(m) => peek.sinks.push(m),
+                    Op::Draw { dist: DistSpec::Family { .. }, .. } if self.is_plain_choice(m) => {
+                        peek.sinks.push(m)
+                    }
                     _ => return false,
                 }
             }
@@ -135,7 +145,8 @@ impl Graph {
         let keyed = |n: &NodeId| match self.op(code, *n) {
             Op::Draw { keys, .. } => {
                 let frame = self.nodes[*n as usize].frame;
-                keys.iter().any(|k| self.resolve(frame, *k).is_some_and(|d| d == target || peek.knows(d)))
+                keys.iter()
+                    .any(|k| self.resolve(frame, *k).is_some_and(|d| d == target || peek.knows(d)))
             }
             _ => false,
         };
@@ -154,7 +165,14 @@ impl Graph {
     }
 
     /// The log weight of a value of the choice, relative to the present one.
-    fn peek(&self, code: &Code, peek: &mut Peek, dist: &Dist, value: &Datum, power: f64) -> Result<f64, Obstacle> {
+    fn peek(
+        &self,
+        code: &Code,
+        peek: &mut Peek,
+        dist: &Dist,
+        value: &Datum,
+        power: f64,
+    ) -> Result<f64, Obstacle> {
         peek.values.truncate(peek.dependent);
         peek.values.iter_mut().for_each(|(_, v)| *v = None);
         peek.released.clear();
@@ -170,7 +188,9 @@ impl Graph {
                 Op::Draw { dist: spec, .. } => {
                     let values = self.peek_all(code, peek, &value, node.frame, spec.operands())?;
                     let dist = self.dist_of_values(code, n, spec, &refs(&values))?;
-                    let stored = self.stored(n).filter(|x| dist.elements().is_none() && dist.stored_support().fits(x));
+                    let stored = self
+                        .stored(n)
+                        .filter(|x| dist.elements().is_none() && dist.stored_support().fits(x));
                     let stored = stored.ok_or(Obstacle::Unsuitable)?;
                     if dist.is_stored_whitened() {
                         return Err(Obstacle::Unsuitable);
@@ -191,13 +211,15 @@ impl Graph {
                         Score::Sum(sum) => likelihood.merge(&sum),
                     }
                 }
-                Op::Factor { weight, .. } => match self.peek_operand(code, peek, &value, node.frame, *weight)? {
-                    Value::Num(w) if !w.is_nan() => {
-                        likelihood.sub(node.score);
-                        likelihood.add(w);
+                Op::Factor { weight, .. } => {
+                    match self.peek_operand(code, peek, &value, node.frame, *weight)? {
+                        Value::Num(w) if !w.is_nan() => {
+                            likelihood.sub(node.score);
+                            likelihood.add(w);
+                        }
+                        _ => return Err(Obstacle::Unsuitable),
                     }
-                    _ => return Err(Obstacle::Unsuitable),
-                },
+                }
                 _ => return Err(Obstacle::Unsuitable),
             }
         }
@@ -233,11 +255,21 @@ impl Graph {
         };
         let Value::Container(r) = v else { return Ok(v) };
         let gather = &self.nodes[r.node as usize + 1];
-        if gather.state == State::Clean { Ok(gather.value.clone()) } else { Err(Obstacle::Unsuitable) }
+        if gather.state == State::Clean {
+            Ok(gather.value.clone())
+        } else {
+            Err(Obstacle::Unsuitable)
+        }
     }
 
     /// The value a node would have.
-    fn peek_node(&self, code: &Code, peek: &mut Peek, value: &Value, n: NodeId) -> Result<Value, Obstacle> {
+    fn peek_node(
+        &self,
+        code: &Code,
+        peek: &mut Peek,
+        value: &Value,
+        n: NodeId,
+    ) -> Result<Value, Obstacle> {
         if n == peek.target {
             return Ok(value.clone());
         }
@@ -256,7 +288,9 @@ impl Graph {
                 let made = self.apply_at(n, code.builtins.get(*builtin), &refs(&values));
                 made.map_err(|f| self.fault(code, n, f))?.into_value()
             }
-            Op::Array(items) => Value::from_elements(self.peek_all(code, peek, value, frame, items)?.into_vec()),
+            Op::Array(items) => {
+                Value::from_elements(self.peek_all(code, peek, value, frame, items)?.into_vec())
+            }
             Op::Record { names, values } => {
                 let values = self.peek_all(code, peek, value, frame, values)?;
                 Value::Record(std::sync::Arc::new(names.iter().cloned().zip(values).collect()))
@@ -302,9 +336,13 @@ impl Graph {
         };
         if let Value::Container(r) = whole {
             // The same element as before, if the keys are the same.
-            let depends = |o: &Operand| self.resolve(frame, *o).is_some_and(|d| d == peek.target || peek.knows(d));
+            let depends = |o: &Operand| {
+                self.resolve(frame, *o).is_some_and(|d| d == peek.target || peek.knows(d))
+            };
             return match self.nodes[n as usize].side.as_deref() {
-                Some(Side::Deps(deps)) if deps.len() == 1 && deps[0] != r.node + 1 && !keys.iter().any(depends) => {
+                Some(Side::Deps(deps))
+                    if deps.len() == 1 && deps[0] != r.node + 1 && !keys.iter().any(depends) =>
+                {
                     self.peek_node(code, peek, value, deps[0])
                 }
                 _ => Err(Obstacle::Unsuitable),
@@ -321,8 +359,15 @@ impl Graph {
         Ok(v)
     }
 
-    /// Notes that a node would be let go, with what it alone holds; a choice that nothing else holds would vanish.
-    fn let_go(&self, code: &Code, peek: &mut Peek, frame: FrameId, o: Operand) -> Result<(), Obstacle> {
+    /// Notes that a node would be let go, with what it alone holds; a choice that nothing
+    /// else holds would vanish.
+    fn let_go(
+        &self,
+        code: &Code,
+        peek: &mut Peek,
+        frame: FrameId,
+        o: Operand,
+    ) -> Result<(), Obstacle> {
         let mut gone: SmallVec<[NodeId; 8]> = self.resolve(frame, o).into_iter().collect();
         while let Some(n) = gone.pop() {
             let times = match peek.released.iter_mut().find(|(m, _)| *m == n) {
@@ -340,7 +385,12 @@ impl Graph {
             }
             if !matches!(
                 self.op(code, n),
-                Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. } | Op::Item
+                Op::Prim { .. }
+                    | Op::Array(_)
+                    | Op::Record { .. }
+                    | Op::Index { .. }
+                    | Op::Select { .. }
+                    | Op::Item
             ) {
                 return Err(Obstacle::Unsuitable);
             }
@@ -377,10 +427,16 @@ mod tests {
         for power in [1.0, 0.3] {
             let (mut peek, mut weights) = (Peek::default(), Vec::new());
             let put = |w| weights.push(w);
-            assert!(trace.weigh_values(target, &dist, (&values, current), &mut peek, power, put).unwrap());
+            assert!(
+                trace
+                    .weigh_values(target, &dist, (&values, current), &mut peek, power, put)
+                    .unwrap()
+            );
             assert_eq!(weights.len(), 3);
             for (value, found) in values.iter().zip(weights) {
-                let update = trace.propose(&[(target, Change::Set(value.clone()))], Draws::default()).unwrap();
+                let update = trace
+                    .propose(&[(target, Change::Set(value.clone()))], Draws::default())
+                    .unwrap();
                 trace.rollback();
                 assert_eq!(found, Some(update.tempered(power)), "{value:?}");
             }

@@ -1,4 +1,5 @@
-//! The vocabulary of updates: changes, their random streams, and what an update did to the score.
+//! The vocabulary of updates: changes, their random streams, and what an update did to
+//! the score.
 
 use super::choices::Target;
 use super::graph::Graph;
@@ -9,7 +10,8 @@ use crate::num::ExactSum;
 use crate::rng::{Stream, StreamKey};
 use serde::{Deserialize, Serialize};
 
-/// Where the random numbers of an update come from: one stream for each address, whatever the order of evaluation.
+/// Where the random numbers of an update come from: one stream for each address, whatever
+/// the order of evaluation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Draws {
     /// Seed, chain and purpose.
@@ -30,16 +32,18 @@ impl Draws {
 /// What happens to one choice in an update.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
-    /// It takes this value, in stored form (for a whitened gp: the white noise behind it).
+    /// It takes this value, in stored form (for a whitened gp: the white noise behind
+    /// it).
     Set(Datum),
     /// It takes this value, as the program sees it.
     Value(Datum),
     /// It is drawn anew from its prior, as that is after the update.
     Resample,
-    /// It becomes the image of this point of the unconstrained space under its support, as that is after the update; the
-    /// log Jacobian goes to [`Weight::log_jacobian`].
+    /// It becomes the image of this point of the unconstrained space under its support,
+    /// as that is after the update; the log Jacobian goes to [`Weight::log_jacobian`].
     Free(Vec<f64>),
-    /// It becomes the image of this white noise under its Gaussian prior, as that is after the update.
+    /// It becomes the image of this white noise under its Gaussian prior, as that is
+    /// after the update.
     White(Vec<f64>),
 }
 
@@ -60,12 +64,13 @@ pub enum Constraint {
     Value(Datum),
 }
 
-/// What an update did to the score. Differences are taken between exact sums, so that they do not depend on the order in
-/// which terms changed.
+/// What an update did to the score. Differences are taken between exact sums, so that
+/// they do not depend on the order in which terms changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weight {
-    /// The change of the log joint density, less what was drawn from the prior, plus what an update back would draw from
-    /// it: the log acceptance ratio but for the proposal terms of [`Change::Set`].
+    /// The change of the log joint density, less what was drawn from the prior, plus what
+    /// an update back would draw from it: the log acceptance ratio but for the proposal
+    /// terms of [`Change::Set`].
     pub log_weight: f64,
     /// The change of the log joint density.
     pub log_joint: f64,
@@ -80,7 +85,8 @@ pub struct Weight {
 }
 
 impl Weight {
-    /// The log weight with the likelihood raised to a power. What is impossible is so at every power.
+    /// The log weight with the likelihood raised to a power. What is impossible is so at
+    /// every power.
     pub fn tempered(&self, power: f64) -> f64 {
         if power == 1.0 || self.log_weight.is_infinite() {
             self.log_weight
@@ -124,7 +130,8 @@ impl Graph {
         }
     }
 
-    /// The log prior of what this update would have to draw to be undone: of choices that vanished, as it was before the update.
+    /// The log prior of what this update would have to draw to be undone: of choices that
+    /// vanished, as it was before the update.
     fn undrawn(&self) -> ExactSum {
         let mut sum = self.undrawn.clone();
         let mut retired = self.retired.clone();
@@ -133,7 +140,8 @@ impl Graph {
             for entry in &self.journal {
                 let Entry::Node { id, score, state, .. } = entry else { continue };
                 let first = retired.partition_point(|(n, _)| n < id);
-                // What appeared, or was drawn anew, is undone with what that added to `drawn`.
+                // What appeared, or was drawn anew, is undone with what that added to
+                // `drawn`.
                 if let Some((_, s)) = retired.get_mut(first).filter(|(n, _)| n == id)
                     && *state != State::Empty
                     && !self.redrawn.contains(&(*id, NONE))
@@ -149,9 +157,12 @@ impl Graph {
     /// What the current update did to the score.
     pub fn weight(&self, prior: &ExactSum, likelihood: &ExactSum) -> Weight {
         let none = ExactSum::default();
-        let log_joint = ExactSum::balance([&self.prior, &self.likelihood, &none], [prior, likelihood, &none]);
-        let log_weight =
-            ExactSum::balance([&self.prior, &self.likelihood, &self.drawn], [prior, likelihood, &self.undrawn()]);
+        let log_joint =
+            ExactSum::balance([&self.prior, &self.likelihood, &none], [prior, likelihood, &none]);
+        let log_weight = ExactSum::balance(
+            [&self.prior, &self.likelihood, &self.drawn],
+            [prior, likelihood, &self.undrawn()],
+        );
         Weight {
             log_weight,
             log_joint,

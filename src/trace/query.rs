@@ -1,5 +1,5 @@
-//! Asking a trace for what no observation asks for: values of expressions and names, surrogates of observations. What that
-//! draws is forgotten again.
+//! Asking a trace for what no observation asks for: values of expressions and names,
+//! surrogates of observations. What that draws is forgotten again.
 
 use super::graph::Graph;
 use super::node::Deps;
@@ -8,8 +8,8 @@ use crate::lang::code::{Code, Operand};
 use crate::lang::value::Value;
 
 impl Trace {
-    /// The values of expressions of the top level; what they need and no observation asks for is drawn from its prior
-    /// given the rest, and forgotten again.
+    /// The values of expressions of the top level; what they need and no observation asks
+    /// for is drawn from its prior given the rest, and forgotten again.
     ///
     /// # Errors
     /// What goes wrong while they are evaluated.
@@ -18,7 +18,8 @@ impl Trace {
         self.asked(operands, draws, |_, values| Ok(values))
     }
 
-    /// As [`Trace::query`], and shows the trace with the choices that were drawn for it, before they are forgotten.
+    /// As [`Trace::query`], and shows the trace with the choices that were drawn for it,
+    /// before they are forgotten.
     ///
     /// # Errors
     /// As [`Trace::query`].
@@ -62,14 +63,16 @@ impl Trace {
         Some(self.query(&[operand], draws).map(|mut v| v.swap_remove(0)))
     }
 
-    /// The log density of the coarse surrogate of an observation (`with coarse = …`), by the address it has. It is never
-    /// part of the joint.
+    /// The log density of the coarse surrogate of an observation (`with coarse = …`), by
+    /// the address it has. It is never part of the joint.
     ///
     /// # Errors
-    /// What goes wrong while it is evaluated; `None` if there is no such observation or it has no surrogate.
+    /// What goes wrong while it is evaluated; `None` if there is no such observation or
+    /// it has no surrogate.
     #[doc(hidden)]
     pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
-        let Some((n, _)) = self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
+        let Some((n, _)) =
+            self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
         else {
             return Ok(None);
         };

@@ -95,7 +95,9 @@ impl SavedDatum {
         match d {
             Datum::Num(x) => SavedDatum::Num(Number::new(*x)),
             Datum::Bool(b) => SavedDatum::Bool(*b),
-            Datum::Vec(xs) => SavedDatum::Array(xs.iter().map(|x| SavedDatum::Num(Number::new(*x))).collect()),
+            Datum::Vec(xs) => {
+                SavedDatum::Array(xs.iter().map(|x| SavedDatum::Num(Number::new(*x))).collect())
+            }
             Datum::List(xs) => SavedDatum::Array(xs.iter().map(SavedDatum::new).collect()),
         }
     }
@@ -105,8 +107,10 @@ impl SavedDatum {
             SavedDatum::Bool(b) => Datum::Bool(*b),
             SavedDatum::Num(x) => Datum::Num(x.get()),
             SavedDatum::Array(xs) => {
-                let numbers: Option<Vec<f64>> =
-                    xs.iter().map(|x| if let SavedDatum::Num(x) = x { Some(x.get()) } else { None }).collect();
+                let numbers: Option<Vec<f64>> = xs
+                    .iter()
+                    .map(|x| if let SavedDatum::Num(x) = x { Some(x.get()) } else { None })
+                    .collect();
                 match numbers {
                     Some(v) => Datum::Vec(v.into()),
                     None => Datum::List(xs.iter().map(SavedDatum::datum).collect()),
@@ -165,8 +169,14 @@ impl Trace {
     /// Runs a program with the choices of a saved trace.
     ///
     /// # Errors
-    /// If the trace is of another version or program, or has choices this program does not make.
-    pub fn load(code: Arc<Code>, program: &str, saved: &SavedTrace, limits: Limits) -> Result<Self, SaveError> {
+    /// If the trace is of another version or program, or has choices this program does
+    /// not make.
+    pub fn load(
+        code: Arc<Code>,
+        program: &str,
+        saved: &SavedTrace,
+        limits: Limits,
+    ) -> Result<Self, SaveError> {
         if saved.version != VERSION {
             return Err(SaveError::Version { found: saved.version });
         }
@@ -175,7 +185,8 @@ impl Trace {
         }
         let mut constraints = Vec::with_capacity(saved.choices.len());
         for c in &saved.choices {
-            let hash = u64::from_str_radix(&c.hash, 16).map_err(|_| SaveError::Unknown(c.address.clone()))?;
+            let hash = u64::from_str_radix(&c.hash, 16)
+                .map_err(|_| SaveError::Unknown(c.address.clone()))?;
             constraints.push((hash, Constraint::Stored(c.value.datum())));
         }
         let trace: TraceResult<_> = Trace::generate(code, constraints, Draws::default(), limits);

@@ -67,7 +67,8 @@ pub enum PatternSegment {
     },
 }
 
-/// What is known of a choice when it is registered, or of an observation when it is asked for.
+/// What is known of a choice when it is registered, or of an observation when it is asked
+/// for.
 #[derive(Clone, Debug)]
 pub(crate) struct Facts {
     /// Kinds are of choices; an observation has none.
@@ -90,13 +91,16 @@ impl Pattern {
         Pattern { segments: address.segments.iter().map(segment).collect() }
     }
 
-    /// Whether it can match an address that ends in segments of these names: its last names are among them, in order.
+    /// Whether it can match an address that ends in segments of these names: its last
+    /// names are among them, in order.
     fn may_match(&self, last: &[&str]) -> bool {
         let fits = |rest: &[PatternSegment]| {
             let mut names = last.iter();
             rest.iter().all(|s| match s {
                 PatternSegment::Deep => true,
-                PatternSegment::Segment { name, .. } => names.any(|n| name.as_ref().is_none_or(|name| &**name == *n)),
+                PatternSegment::Segment { name, .. } => {
+                    names.any(|n| name.as_ref().is_none_or(|name| &**name == *n))
+                }
             })
         };
         (0..self.segments.len()).any(|i| fits(&self.segments[i..]))
@@ -116,8 +120,9 @@ fn matches(pattern: &[PatternSegment], address: &[AddressSegment]) -> bool {
         }
         Some((PatternSegment::Segment { name, occurrence, keys }, rest)) => {
             let Some((first, below)) = address.split_first() else { return false };
-            let named =
-                name.as_ref().is_none_or(|n| *n == first.name && occurrence.max(&1) == &first.occurrence.max(1));
+            let named = name
+                .as_ref()
+                .is_none_or(|n| *n == first.name && occurrence.max(&1) == &first.occurrence.max(1));
             let keyed = keys.len() <= first.keys.len()
                 && (rest.is_empty() || keys.len() == first.keys.len())
                 && keys.iter().zip(&first.keys).all(|(p, k)| p.as_ref().is_none_or(|p| p == k));
@@ -127,7 +132,8 @@ fn matches(pattern: &[PatternSegment], address: &[AddressSegment]) -> bool {
 }
 
 impl Selector {
-    /// Whether it selects by address alone what has this address; kinds and tags select nothing.
+    /// Whether it selects by address alone what has this address; kinds and tags select
+    /// nothing.
     pub(crate) fn names(&self, address: &Address) -> bool {
         match self {
             Selector::All => true,
@@ -139,7 +145,8 @@ impl Selector {
         }
     }
 
-    /// Whether it may select by address something whose address ends in segments of these names, with any keys.
+    /// Whether it may select by address something whose address ends in segments of these
+    /// names, with any keys.
     pub(crate) fn may_name(&self, last: &[&str]) -> bool {
         match self {
             Selector::All => true,
@@ -204,12 +211,20 @@ mod tests {
 
     #[test]
     fn a_pattern_selects_what_it_names_and_everything_below() {
-        let a = Address { segments: vec![segment("pose", &["arm"]), segment("bone", &[]), segment("rot", &["z"])] };
+        let a = Address {
+            segments: vec![segment("pose", &["arm"]), segment("bone", &[]), segment("rot", &["z"])],
+        };
         assert!(pattern(&[(Some("pose"), &[])]).matches(&a));
         assert!(pattern(&[(Some("pose"), &[Some("arm")])]).matches(&a));
         assert!(!pattern(&[(Some("pose"), &[Some("leg")])]).matches(&a));
-        assert!(pattern(&[(Some("pose"), &[None]), (Some("bone"), &[]), (Some("rot"), &[])]).matches(&a));
-        assert!(!pattern(&[(Some("pose"), &[]), (Some("bone"), &[])]).matches(&a), "inner keys are not skipped");
+        assert!(
+            pattern(&[(Some("pose"), &[None]), (Some("bone"), &[]), (Some("rot"), &[])])
+                .matches(&a)
+        );
+        assert!(
+            !pattern(&[(Some("pose"), &[]), (Some("bone"), &[])]).matches(&a),
+            "inner keys are not skipped"
+        );
         assert!(pattern(&[(Some("**"), &[]), (Some("rot"), &[Some("z")])]).matches(&a));
         assert!(!pattern(&[(Some("**"), &[]), (Some("rot"), &[Some("x")])]).matches(&a));
         assert!(pattern(&[(None, &[None]), (Some("bone"), &[])]).matches(&a));
@@ -218,7 +233,9 @@ mod tests {
 
     #[test]
     fn what_a_selector_names_it_may_name() {
-        let a = Address { segments: vec![segment("pose", &["arm"]), segment("bone", &[]), segment("rot", &["z"])] };
+        let a = Address {
+            segments: vec![segment("pose", &["arm"]), segment("bone", &[]), segment("rot", &["z"])],
+        };
         let exact = Selector::Address(Pattern::exact(&a));
         let below = Selector::Address(pattern(&[(Some("pose"), &[None]), (Some("**"), &[])]));
         let (all, nothing) = (Box::new(Selector::All), Box::new(Selector::Nothing));

@@ -1,9 +1,11 @@
-//! Updates of one choice whose change spreads through its own frame in a known order (see [`crate::lang::code::Spread`]).
+//! Updates of one choice whose change spreads through its own frame in a known order (see
+//! [`crate::lang::code::Spread`]).
 //!
-//! The general way marks all that may change and asks for it; here the list is known, so each entry runs at once if
-//! something it reads has changed. What is outside of the frame is marked afterwards and runs the general way, and so is what
-//! nothing may ask for any more: run too soon it could fail, or draw choices, though the new state has no use for it. Both ways
-//! give the same values and the same exact sums.
+//! The general way marks all that may change and asks for it; here the list is known, so
+//! each entry runs at once if something it reads has changed. What is outside of the
+//! frame is marked afterwards and runs the general way, and so is what nothing may ask
+//! for any more: run too soon it could fail, or draw choices, though the new state has no
+//! use for it. Both ways give the same values and the same exact sums.
 
 use super::choices::Target;
 use super::demand::{Failure, Step};
@@ -14,8 +16,8 @@ use crate::lang::code::{Code, Spread};
 use crate::lang::value::Value;
 
 impl Graph {
-    /// How the change of a choice spreads, if it can be updated this way in this state, and which of its slots run only if they
-    /// are asked for, a bit each.
+    /// How the change of a choice spreads, if it can be updated this way in this state,
+    /// and which of its slots run only if they are asked for, a bit each.
     pub fn spread_of<'c>(&self, code: &'c Code, target: Target) -> Option<(&'c Spread, u64)> {
         let facts = self.slot_facts(code, target.node);
         let spread = facts.spread.as_ref()?;
@@ -33,7 +35,8 @@ impl Graph {
                 return None;
             }
         }
-        // What is outside may come back to what reads from there: then only the general way has the right order.
+        // What is outside may come back to what reads from there: then only the general
+        // way has the right order.
         let conditional = if leaves || spread.turns { spread.conditional } else { 0 };
         (spread.is_closed || !leaves).then_some((spread, conditional))
     }
@@ -70,7 +73,8 @@ impl Graph {
         }
         for m in std::iter::once(n).chain(spread.slots.iter().map(|slot| base + slot)) {
             let node = &self.nodes[m as usize];
-            if (node.changed == self.epoch || node.state == State::Stale) && self.is_read_outside(m) {
+            if (node.changed == self.epoch || node.state == State::Stale) && self.is_read_outside(m)
+            {
                 self.mark_outside_users(code, m);
             }
         }

@@ -1,5 +1,6 @@
-//! Two traces with the same choices under different scores: one is the trace of a program, the other that of the same program
-//! with surrogates in place of some observations. What delayed acceptance is made of.
+//! Two traces with the same choices under different scores: one is the trace of a
+//! program, the other that of the same program with surrogates in place of some
+//! observations. What delayed acceptance is made of.
 
 use super::propose::{Change, Constraint, Draws, Weight};
 use super::{Selector, Target, Trace, TraceResult};
@@ -9,8 +10,9 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 impl Trace {
-    /// The same choices with the coarse surrogates of the selected observations in their place, also of those that are not
-    /// there now; `None` if none of them has one. An operation in a loop or function changes as a whole.
+    /// The same choices with the coarse surrogates of the selected observations in their
+    /// place, also of those that are not there now; `None` if none of them has one. An
+    /// operation in a loop or function changes as a whole.
     ///
     /// # Errors
     /// What goes wrong while the surrogates are evaluated.
@@ -23,7 +25,10 @@ impl Trace {
         let named = |op: &u32| match &self.code.ops[*op as usize] {
             Op::Observe { coarse: Some(_), site, .. } => {
                 let segments = self.code.sites[*site as usize].segments.iter().map(|s| &*s.name);
-                present.get(op).copied().unwrap_or_else(|| at.may_name(&segments.collect::<Vec<_>>()))
+                present
+                    .get(op)
+                    .copied()
+                    .unwrap_or_else(|| at.may_name(&segments.collect::<Vec<_>>()))
             }
             _ => false,
         };
@@ -32,13 +37,15 @@ impl Trace {
             return Ok(None);
         }
         let code = Arc::new(self.present_code().with_surrogates(&ops));
-        let (mut twin, _) = Trace::generate(code, self.constraints(), Draws::default(), self.graph.limits.clone())?;
+        let (mut twin, _) =
+            Trace::generate(code, self.constraints(), Draws::default(), self.graph.limits.clone())?;
         twin.graph.observed = Arc::clone(&self.graph.observed);
         twin.graph.incremental = self.graph.incremental;
         Ok(Some(twin))
     }
 
-    /// Proposes the values that another trace's choices have. Choices that the other one has not stay as they are.
+    /// Proposes the values that another trace's choices have. Choices that the other one
+    /// has not stay as they are.
     ///
     /// # Errors
     /// As [`Trace::propose`].
@@ -67,7 +74,8 @@ impl Trace {
         own
     }
 
-    /// Whether the pending proposal takes away a choice at one of these addresses, also if another one comes in its place.
+    /// Whether the pending proposal takes away a choice at one of these addresses, also
+    /// if another one comes in its place.
     pub(crate) fn takes_away(&self, addresses: &[u64]) -> bool {
         self.graph.removed.iter().any(|(_, hash, _)| addresses.contains(hash))
     }

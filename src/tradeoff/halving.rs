@@ -1,5 +1,5 @@
-//! Successive halving (Jamieson and Talwalkar 2016): all settings on few cases, the better half of them on more, until a few are left
-//! that have been through all cases.
+//! Successive halving (Jamieson and Talwalkar 2016): all settings on few cases, the
+//! better half of them on more, until a few are left that have been through all cases.
 
 use super::runs::RunRecord;
 use indexmap::IndexMap;
@@ -13,8 +13,9 @@ pub struct Round {
     pub cases: usize,
 }
 
-/// The rounds that the budget is enough for: one of everything if it is, else as few as it takes. `each` is what a setting takes on one
-/// case on average, in seconds of the whole machine.
+/// The rounds that the budget is enough for: one of everything if it is, else as few as
+/// it takes. `each` is what a setting takes on one case on average, in seconds of the
+/// whole machine.
 pub fn rounds(settings: usize, cases: usize, each: f64, budget: f64) -> Vec<Round> {
     let most = cases.max(1).ilog2() as usize + 1;
     let of = |n: usize| -> Vec<Round> {
@@ -22,7 +23,11 @@ pub fn rounds(settings: usize, cases: usize, each: f64, budget: f64) -> Vec<Roun
             .map(|i| Round {
                 settings: settings.div_ceil(1 << i),
                 // Not fewer than three where there are as many: one or two say little.
-                cases: if i + 1 == n { cases } else { cases.div_ceil(1 << (n - 1 - i)).max(cases.min(3)) },
+                cases: if i + 1 == n {
+                    cases
+                } else {
+                    cases.div_ceil(1 << (n - 1 - i)).max(cases.min(3))
+                },
             })
             .collect()
     };
@@ -35,29 +40,35 @@ fn runs_of(rounds: &[Round]) -> usize {
     rounds.iter().enumerate().map(|(i, r)| r.settings * (r.cases.saturating_sub(before(i)))).sum()
 }
 
-/// The settings that go on: those that come first at some time. A setting is as good as its best rank over all times at which it and
-/// others were looked at; of equals, the one of smaller mean rank. A run that failed is worse than any other. `runs` are of the same cases
-/// for all settings.
+/// The settings that go on: those that come first at some time. A setting is as good as
+/// its best rank over all times at which it and others were looked at; of equals, the one
+/// of smaller mean rank. A run that failed is worse than any other. `runs` are of the
+/// same cases for all settings.
 pub fn survivors(settings: &[String], runs: &[RunRecord], keep: usize) -> Vec<String> {
     // Errors by time and setting.
     let mut errors: IndexMap<i64, IndexMap<&str, Vec<f64>>> = IndexMap::new();
     let failed = |setting: &str| runs.iter().any(|r| r.setting == setting && r.failed.is_some());
     for run in runs.iter().filter(|r| settings.contains(&r.setting) && !failed(&r.setting)) {
         for mark in &run.marks {
-            // The end of a run competes at the nearest time at which others are looked at.
+            // The end of a run competes at the nearest time at which others are looked
+            // at.
             let at = mark.at.unwrap_or(mark.seconds);
             let time = (at.max(1e-3).log10() * 4.0).round() as i64;
             let errors = errors.entry(time).or_default().entry(&run.setting).or_default();
             errors.extend(mark.error);
         }
     }
-    let mut ranks: IndexMap<&str, Vec<usize>> = settings.iter().map(|s| (s.as_str(), Vec::new())).collect();
+    let mut ranks: IndexMap<&str, Vec<usize>> =
+        settings.iter().map(|s| (s.as_str(), Vec::new())).collect();
     for at in errors.values().filter(|at| at.len() > 1) {
-        let mean = |xs: &Vec<f64>| if xs.is_empty() { f64::INFINITY } else { xs.iter().sum::<f64>() / xs.len() as f64 };
+        let mean = |xs: &Vec<f64>| {
+            if xs.is_empty() { f64::INFINITY } else { xs.iter().sum::<f64>() / xs.len() as f64 }
+        };
         let mut order: Vec<(&str, f64)> = at.iter().map(|(s, xs)| (*s, mean(xs))).collect();
         order.sort_by(|a, b| a.1.total_cmp(&b.1));
         for (rank, (setting, error)) in order.iter().enumerate() {
-            // Equals all come last among them: when nobody has an answer yet, nobody is first.
+            // Equals all come last among them: when nobody has an answer yet, nobody is
+            // first.
             let last = order.iter().rposition(|o| o.1 == *error).unwrap_or(rank);
             if let Some(all) = ranks.get_mut(setting) {
                 all.push(last);
@@ -68,7 +79,8 @@ pub fn survivors(settings: &[String], runs: &[RunRecord], keep: usize) -> Vec<St
         let mean = all.iter().sum::<usize>() as f64 / all.len().max(1) as f64;
         (all.iter().copied().min().unwrap_or(usize::MAX), mean)
     };
-    let mut order: Vec<(&str, (usize, f64))> = ranks.iter().map(|(s, all)| (*s, value(all))).collect();
+    let mut order: Vec<(&str, (usize, f64))> =
+        ranks.iter().map(|(s, all)| (*s, value(all))).collect();
     order.sort_by(|a, b| a.1.0.cmp(&b.1.0).then(a.1.1.total_cmp(&b.1.1)));
     let kept: Vec<&str> = order.into_iter().take(keep).map(|o| o.0).collect();
     settings.iter().filter(|s| kept.contains(&s.as_str())).cloned().collect()
@@ -85,17 +97,27 @@ mod tests {
         let r = rounds(40, 10, 1.0, 320.0);
         assert_eq!(r, [Round { settings: 40, cases: 5 }, Round { settings: 20, cases: 10 }]);
         assert_eq!(runs_of(&r), 300);
-        let three =
-            [Round { settings: 40, cases: 3 }, Round { settings: 20, cases: 5 }, Round { settings: 10, cases: 10 }];
+        let three = [
+            Round { settings: 40, cases: 3 },
+            Round { settings: 20, cases: 5 },
+            Round { settings: 10, cases: 10 },
+        ];
         assert_eq!(rounds(40, 10, 1.0, 250.0), three);
-        assert_eq!(rounds(3, 1, 1.0, 0.1), [Round { settings: 3, cases: 1 }], "what does not fit is left to the clock");
+        assert_eq!(
+            rounds(3, 1, 1.0, 0.1),
+            [Round { settings: 3, cases: 1 }],
+            "what does not fit is left to the clock"
+        );
     }
 
     #[test]
     fn whoever_is_first_at_some_time_goes_on() {
         let run = |setting: &str, errors: &[(f64, f64)]| RunRecord {
             setting: setting.into(),
-            marks: errors.iter().map(|(t, e)| Mark { at: Some(*t), seconds: *t, error: Some(*e) }).collect(),
+            marks: errors
+                .iter()
+                .map(|(t, e)| Mark { at: Some(*t), seconds: *t, error: Some(*e) })
+                .collect(),
             ..RunRecord::default()
         };
         let runs = [
@@ -109,7 +131,8 @@ mod tests {
         assert_eq!(survivors(&all, &runs, 3), ["never", "early", "late"]);
         assert_eq!(survivors(&all, &[], 4), all);
 
-        // Before there is an answer all are equal, and alone one is not first; a run that failed counts against its setting.
+        // Before there is an answer all are equal, and alone one is not first; a run that
+        // failed counts against its setting.
         let runs = [
             run("early", &[(0.1, 1.0), (1.0, 0.5)]),
             run("late", &[(0.1, 1.0), (1.0, 0.1)]),
@@ -118,7 +141,8 @@ mod tests {
         ];
         assert_eq!(survivors(&all, &runs, 1), ["late"]);
         assert_eq!(survivors(&all, &runs, 3), ["never", "early", "late"]);
-        let failed = RunRecord { setting: "late".into(), failed: Some("no".into()), ..RunRecord::default() };
+        let failed =
+            RunRecord { setting: "late".into(), failed: Some("no".into()), ..RunRecord::default() };
         assert_eq!(survivors(&all, &[&runs[..], &[failed]].concat(), 1), ["early"]);
     }
 }

@@ -16,8 +16,9 @@ pub struct Interval {
 /// The number of resampled sets of cases.
 const RESAMPLED: u64 = 1000;
 
-/// The mean over cases, each case the mean of its runs, and its 90 % interval by resampling cases (Efron 1979; percentiles). Cases are what
-/// differs most, so the interval says what other pictures of the kind would give. NaN where there are none.
+/// The mean over cases, each case the mean of its runs, and its 90 % interval by
+/// resampling cases (Efron 1979; percentiles). Cases are what differs most, so the
+/// interval says what other pictures of the kind would give. NaN where there are none.
 pub fn mean_interval(cases: &[Vec<f64>]) -> Interval {
     let each: Vec<f64> = cases.iter().filter(|c| !c.is_empty()).map(|c| mean(c)).collect();
     if each.is_empty() {
@@ -44,13 +45,20 @@ mod tests {
 
     #[test]
     fn the_interval_is_that_of_the_normal_approximation() {
-        let cases: Vec<Vec<f64>> = (0..100).map(|i| vec![f64::from(i), f64::from(i) + 2.0]).collect();
+        let cases: Vec<Vec<f64>> =
+            (0..100).map(|i| vec![f64::from(i), f64::from(i) + 2.0]).collect();
         let i = mean_interval(&cases);
         assert!((i.mean - 50.5).abs() < 1e-12);
         // The standard error of the mean is 28.87 / 10.
         let half = 1.645 * 2.887;
-        assert!((i.low - (50.5 - half)).abs() < 0.5 && (i.high - (50.5 + half)).abs() < 0.5, "{i:?}");
-        assert_eq!(mean_interval(&[vec![3.0], vec![]]), Interval { mean: 3.0, low: 3.0, high: 3.0 });
+        assert!(
+            (i.low - (50.5 - half)).abs() < 0.5 && (i.high - (50.5 + half)).abs() < 0.5,
+            "{i:?}"
+        );
+        assert_eq!(
+            mean_interval(&[vec![3.0], vec![]]),
+            Interval { mean: 3.0, low: 3.0, high: 3.0 }
+        );
         assert!(mean_interval(&[]).mean.is_nan());
     }
 }

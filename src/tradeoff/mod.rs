@@ -1,6 +1,8 @@
-//! What speed costs in accuracy: settings to try, the runs of them, which are kept, the front, and the presets chosen from it.
+//! What speed costs in accuracy: settings to try, the runs of them, which are kept, the
+//! front, and the presets chosen from it.
 //!
-//! Numbers and text only: the runs themselves, and the truth they are compared with, are the command's business.
+//! Numbers and text only: the runs themselves, and the truth they are compared with, are
+//! the command's business.
 
 mod halving;
 mod interval;

@@ -30,15 +30,22 @@ impl Axes {
     }
 }
 
-/// A plot as SVG: a thin line for each setting over time, its end as a dot with its interval, and the front in colour. `error` says
-/// what the error is; `named` are settings to label, such as presets, with their labels.
+/// A plot as SVG: a thin line for each setting over time, its end as a dot with its
+/// interval, and the front in colour. `error` says what the error is; `named` are
+/// settings to label, such as presets, with their labels.
 pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
-    let shown: Vec<&Row> =
-        rows.iter().filter(|r| r.seconds > 0.0 && [r.seconds, r.error].iter().all(|x| x.is_finite())).collect();
+    let shown: Vec<&Row> = rows
+        .iter()
+        .filter(|r| r.seconds > 0.0 && [r.seconds, r.error].iter().all(|x| x.is_finite()))
+        .collect();
     let seconds = || shown.iter().map(|r| r.seconds.log10());
-    let (low, high) = (seconds().fold(f64::INFINITY, f64::min), seconds().fold(f64::NEG_INFINITY, f64::max));
+    let (low, high) =
+        (seconds().fold(f64::INFINITY, f64::min), seconds().fold(f64::NEG_INFINITY, f64::max));
     let (low, high) = if low < high { (low - 0.05, high + 0.05) } else { (-1.0, 1.0) };
-    let most = shown.iter().map(|r| if r.high.is_finite() { r.high } else { r.error }).fold(1e-9, f64::max);
+    let most = shown
+        .iter()
+        .map(|r| if r.high.is_finite() { r.high } else { r.error })
+        .fold(1e-9, f64::max);
     let top = (most * 1.02).min(f64::MAX);
     let axes = Axes { time: (low, high), top };
     let mut s = format!(
@@ -70,19 +77,27 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
         let (x, y) = (axes.x(r.seconds), axes.y(r.error));
         if r.low.is_finite() && r.high.is_finite() {
             let (low, high) = (axes.y(r.low), axes.y(r.high));
-            let _ = write!(s, "<path d=\"M{x:.1},{low:.1}V{high:.1}\" stroke=\"{colour}\" stroke-width=\"{width}\"/>");
+            let _ = write!(
+                s,
+                "<path d=\"M{x:.1},{low:.1}V{high:.1}\" stroke=\"{colour}\" stroke-width=\"{width}\"/>"
+            );
         }
         let radius = if r.front { 4.0 } else { 2.0 };
-        let title = format!("{}: {:.3} ({:.3} to {:.3}) after {:.2} s", r.setting, r.error, r.low, r.high, r.seconds);
+        let title = format!(
+            "{}: {:.3} ({:.3} to {:.3}) after {:.2} s",
+            r.setting, r.error, r.low, r.high, r.seconds
+        );
         let _ = writeln!(
             s,
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{colour}\"><title>{}</title></circle>",
             text(&title)
         );
     }
-    let mut front: Vec<(f64, f64)> = ends.iter().filter(|r| r.front).map(|r| (r.seconds, r.error)).collect();
+    let mut front: Vec<(f64, f64)> =
+        ends.iter().filter(|r| r.front).map(|r| (r.seconds, r.error)).collect();
     front.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let points: Vec<String> = front.iter().map(|(t, e)| format!("{:.1},{:.1}", axes.x(*t), axes.y(*e))).collect();
+    let points: Vec<String> =
+        front.iter().map(|(t, e)| format!("{:.1},{:.1}", axes.x(*t), axes.y(*e))).collect();
     let _ = writeln!(
         s,
         "<polyline points=\"{}\" fill=\"none\" stroke=\"#d55e00\" stroke-width=\"1.6\"/>",
@@ -93,8 +108,12 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
             let (x, y) = (axes.x(r.seconds), axes.y(r.error));
             // Labels near the right edge stand to the left of their dots.
             let (x, anchor) = if x > WIDTH - 90.0 { (x - 8.0, "end") } else { (x + 8.0, "start") };
-            let _ =
-                writeln!(s, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>", y - 6.0, text(label));
+            let _ = writeln!(
+                s,
+                "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
+                y - 6.0,
+                text(label)
+            );
         }
     }
     s + "</svg>\n"
@@ -111,9 +130,13 @@ fn grid(s: &mut String, axes: &Axes, error: &str) {
             }
             let x = axes.x(t);
             let colour = if i == 0 { "#ddd" } else { "#eee" };
-            let _ = write!(s, "<path d=\"M{x:.1},{EDGE}V{}\" stroke=\"{colour}\"/>", HEIGHT - BOTTOM);
+            let _ =
+                write!(s, "<path d=\"M{x:.1},{EDGE}V{}\" stroke=\"{colour}\"/>", HEIGHT - BOTTOM);
             let y = HEIGHT - BOTTOM + 15.0;
-            let _ = writeln!(s, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\" fill=\"#555\">{t}</text>");
+            let _ = writeln!(
+                s,
+                "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\" fill=\"#555\">{t}</text>"
+            );
         }
     }
     let step = step(axes.top);
@@ -124,7 +147,10 @@ fn grid(s: &mut String, axes: &Axes, error: &str) {
         // Not 0.30000000000000004.
         let e = if e < 1e6 { (e * 1e9).round() / 1e9 } else { e };
         let (x, y) = (LEFT - 6.0, y + 4.0);
-        let _ = writeln!(s, "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"#555\">{e}</text>");
+        let _ = writeln!(
+            s,
+            "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"#555\">{e}</text>"
+        );
     }
     let (x, y) = ((LEFT + WIDTH) / 2.0, HEIGHT - 6.0);
     let _ = writeln!(s, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\">seconds</text>");
@@ -175,8 +201,15 @@ mod tests {
 
     #[test]
     fn only_finite_numbers_are_written() {
-        let some = [row("a<b", 1.0, 0.3, true), row("c", 10.0, 0.1, true), row("d", 3.0, f64::NAN, false)];
-        for rows in [&some[..], &some[..1], &[], &[row("z", 0.0, 0.0, true)], &[row("h", 1e300, 1e300, true)]] {
+        let some =
+            [row("a<b", 1.0, 0.3, true), row("c", 10.0, 0.1, true), row("d", 3.0, f64::NAN, false)];
+        for rows in [
+            &some[..],
+            &some[..1],
+            &[],
+            &[row("z", 0.0, 0.0, true)],
+            &[row("h", 1e300, 1e300, true)],
+        ] {
             let s = plot(rows, "error", &[("c".into(), "accurate".into())]);
             assert!(!s.contains("NaN") && !s.contains("inf"), "{s}");
             assert!(s.starts_with("<svg") && s.ends_with("</svg>\n"));

@@ -1,4 +1,5 @@
-//! Settings chosen from a front, by name and by the time there is, with what they were chosen from.
+//! Settings chosen from a front, by name and by the time there is, with what they were
+//! chosen from.
 
 use super::rows::{self, Row};
 use super::setting::Setting;
@@ -8,7 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Quality {
-    /// The quickest on the front that has at most 1.5 times the error of the most accurate.
+    /// The quickest on the front that has at most 1.5 times the error of the most
+    /// accurate.
     Fast,
     /// The quickest that has at most 1.15 times its error.
     Balanced,
@@ -105,10 +107,11 @@ impl Presets {
         Some(Choice { preset, wanted: format!("--quality {}", quality.name()) })
     }
 
-    /// The best known setting for so many seconds: that of least error among those whose runs were given as much or less; the quickest
-    /// if none was.
+    /// The best known setting for so many seconds: that of least error among those whose
+    /// runs were given as much or less; the quickest if none was.
     pub fn of_time(&self, seconds: f64) -> Option<Choice<'_>> {
-        let within = self.front.iter().filter(|p| p.setting.time.unwrap_or(p.seconds) <= seconds * 1.001);
+        let within =
+            self.front.iter().filter(|p| p.setting.time.unwrap_or(p.seconds) <= seconds * 1.001);
         let preset = within.min_by(|a, b| a.error.total_cmp(&b.error)).or(self.front.first())?;
         Some(Choice { preset, wanted: format!("--time {seconds}s") })
     }
@@ -139,14 +142,18 @@ mod tests {
         let p = presets(&[(0.5, 0.30), (1.0, 0.14), (3.0, 0.113), (30.0, 0.10)]);
         let time = |c: Option<Choice>| c.unwrap().preset.setting.time.unwrap();
         assert_eq!(Quality::ALL.map(|q| time(p.of_quality(q))), [1.0, 3.0, 30.0]);
-        assert_eq!([0.1, 0.5, 2.0, 5.0, 100.0].map(|t| time(p.of_time(t))), [0.5, 0.5, 1.0, 3.0, 30.0]);
+        assert_eq!(
+            [0.1, 0.5, 2.0, 5.0, 100.0].map(|t| time(p.of_time(t))),
+            [0.5, 0.5, 1.0, 3.0, 30.0]
+        );
         assert!(presets(&[]).of_quality(Quality::Fast).is_none());
     }
 
     #[test]
     fn others_in_the_table_are_passed_over() {
         let own = Setting { time: Some(2.0), ..Setting::default() };
-        let other = Setting { program: Some("b.pcad".into()), time: Some(1.0), ..Setting::default() };
+        let other =
+            Setting { program: Some("b.pcad".into()), time: Some(1.0), ..Setting::default() };
         let run = |setting: &Setting, error: f64| RunRecord {
             setting: setting.name(),
             marks: vec![Mark { at: None, seconds: setting.time.unwrap(), error: Some(error) }],

@@ -1,4 +1,5 @@
-//! Settings at times, with their errors: the table, and the front of those that nothing beats.
+//! Settings at times, with their errors: the table, and the front of those that nothing
+//! beats.
 
 use super::interval::{Interval, mean_interval};
 use super::runs::RunRecord;
@@ -11,8 +12,8 @@ use serde::Serialize;
 pub struct Row {
     /// The setting, by its name.
     pub setting: String,
-    /// Whether this is the end of its runs; only ends can be had again by a run of so many seconds, since schedules are cut to the
-    /// time there is.
+    /// Whether this is the end of its runs; only ends can be had again by a run of so
+    /// many seconds, since schedules are cut to the time there is.
     pub end: bool,
     /// Seconds from the start, the mean over its runs.
     pub seconds: f64,
@@ -41,7 +42,8 @@ pub fn rows(settings: &[Setting], runs: &[RunRecord]) -> Vec<Row> {
     let mut all = Vec::new();
     for name in settings.iter().map(Setting::name) {
         let of: Vec<&RunRecord> = runs.iter().filter(|r| r.setting == name).collect();
-        let mut times: Vec<Option<f64>> = of.iter().flat_map(|r| r.marks.iter().map(|m| m.at)).collect();
+        let mut times: Vec<Option<f64>> =
+            of.iter().flat_map(|r| r.marks.iter().map(|m| m.at)).collect();
         times.sort_by(|a, b| a.unwrap_or(f64::INFINITY).total_cmp(&b.unwrap_or(f64::INFINITY)));
         times.dedup();
         all.extend(times.into_iter().filter_map(|at| row(&name, at, &of)));
@@ -69,10 +71,12 @@ fn row(name: &str, at: Option<f64>, runs: &[&RunRecord]) -> Option<Row> {
     let Interval { mean, low, high } = mean_interval(&errors);
     let end = at.is_none();
     let mut scores: IndexMap<String, Vec<f64>> = IndexMap::new();
-    for (name, x) in runs.iter().filter(|_| end).flat_map(|r| &r.scores).filter(|s| s.1.is_finite()) {
+    for (name, x) in runs.iter().filter(|_| end).flat_map(|r| &r.scores).filter(|s| s.1.is_finite())
+    {
         scores.entry(name.clone()).or_default().push(*x);
     }
-    let mut rates: Vec<f64> = runs.iter().filter(|_| end).filter_map(|r| r.ess_per_second).collect();
+    let mut rates: Vec<f64> =
+        runs.iter().filter(|_| end).filter_map(|r| r.ess_per_second).collect();
     rates.sort_by(f64::total_cmp);
     Some(Row {
         setting: name.to_owned(),
@@ -84,21 +88,28 @@ fn row(name: &str, at: Option<f64>, runs: &[&RunRecord]) -> Option<Row> {
         cases: errors.len(),
         runs: n,
         failed: runs.iter().filter(|r| r.failed.is_some()).count(),
-        scores: scores.into_iter().map(|(k, xs)| (k, xs.iter().sum::<f64>() / xs.len() as f64)).collect(),
+        scores: scores
+            .into_iter()
+            .map(|(k, xs)| (k, xs.iter().sum::<f64>() / xs.len() as f64))
+            .collect(),
         ess_per_second: (!rates.is_empty()).then(|| rates[rates.len() / 2]),
         front: false,
     })
 }
 
-/// The Pareto front, from the quickest to the most accurate: ends of settings that have been through as many cases as any, never failed,
-/// and that none of the others is as quick as and better.
+/// The Pareto front, from the quickest to the most accurate: ends of settings that have
+/// been through as many cases as any, never failed, and that none of the others is as
+/// quick as and better.
 pub fn front(rows: &[Row]) -> Vec<usize> {
-    let mut ends: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].end && rows[i].failed == 0).collect();
+    let mut ends: Vec<usize> =
+        (0..rows.len()).filter(|&i| rows[i].end && rows[i].failed == 0).collect();
     let most = ends.iter().map(|&i| rows[i].cases).max();
     ends.retain(|&i| Some(rows[i].cases) == most);
     // Runs of one time differ by hundredths of it.
     let time = |i: usize| (rows[i].seconds.max(1e-9).ln() * 20.0).round();
-    ends.sort_by(|&a, &b| time(a).total_cmp(&time(b)).then(rows[a].error.total_cmp(&rows[b].error)));
+    ends.sort_by(|&a, &b| {
+        time(a).total_cmp(&time(b)).then(rows[a].error.total_cmp(&rows[b].error))
+    });
     let mut best = f64::INFINITY;
     ends.retain(|&i| {
         let better = rows[i].error < best;
@@ -110,17 +121,31 @@ pub fn front(rows: &[Row]) -> Vec<usize> {
 
 /// The table as comma-separated values.
 pub fn to_csv(rows: &[Row]) -> String {
-    let mut scores: Vec<&str> = rows.iter().flat_map(|r| r.scores.keys().map(String::as_str)).collect();
+    let mut scores: Vec<&str> =
+        rows.iter().flat_map(|r| r.scores.keys().map(String::as_str)).collect();
     scores.sort_unstable();
     scores.dedup();
-    let head =
-        ["setting", "end", "seconds", "error", "low", "high", "cases", "runs", "failed", "ess_per_second", "front"];
-    let mut text = head.into_iter().chain(scores.iter().copied()).collect::<Vec<_>>().join(",") + "\n";
+    let head = [
+        "setting",
+        "end",
+        "seconds",
+        "error",
+        "low",
+        "high",
+        "cases",
+        "runs",
+        "failed",
+        "ess_per_second",
+        "front",
+    ];
+    let mut text =
+        head.into_iter().chain(scores.iter().copied()).collect::<Vec<_>>().join(",") + "\n";
     for r in rows {
         let number = |x: f64| format!("{x:.6}");
         let optional = |x: Option<f64>| x.map_or(String::new(), number);
         let mut cells = vec![
-            // The names of settings may hold commas and quotes, as values of parameters do.
+            // The names of settings may hold commas and quotes, as values of parameters
+            // do.
             format!("\"{}\"", r.setting.replace('"', "\"\"")),
             r.end.to_string(),
             format!("{:.3}", r.seconds),
@@ -145,8 +170,11 @@ mod tests {
     use super::*;
 
     fn run(setting: &str, case: &str, marks: &[(Option<f64>, f64, f64)]) -> RunRecord {
-        let mark =
-            |(at, seconds, error): &(Option<f64>, f64, f64)| Mark { at: *at, seconds: *seconds, error: Some(*error) };
+        let mark = |(at, seconds, error): &(Option<f64>, f64, f64)| Mark {
+            at: *at,
+            seconds: *seconds,
+            error: Some(*error),
+        };
         RunRecord {
             setting: setting.into(),
             case: case.into(),
@@ -161,14 +189,19 @@ mod tests {
 
     #[test]
     fn the_front_is_of_ends_through_most_cases() {
-        let both = |s: &str, marks: &[(Option<f64>, f64, f64)]| [run(s, "a", marks), run(s, "b", marks)];
+        let both =
+            |s: &str, marks: &[(Option<f64>, f64, f64)]| [run(s, "a", marks), run(s, "b", marks)];
         let mut runs = Vec::new();
         runs.extend(both("time=1", &[(Some(0.1), 0.1, 0.01), (None, 1.0, 0.5)]));
         runs.extend(both("time=2", &[(None, 2.0, 0.6)]));
         runs.extend(both("time=3", &[(None, 3.0, 0.2)]));
         runs.push(run("time=4", "a", &[(None, 4.0, 0.0)]));
         runs.extend(both("time=5", &[(None, 5.0, 0.1)]));
-        runs.push(RunRecord { setting: "time=5".into(), failed: Some("no".into()), ..RunRecord::default() });
+        runs.push(RunRecord {
+            setting: "time=5".into(),
+            failed: Some("no".into()),
+            ..RunRecord::default()
+        });
         let table = rows(&[1.0, 2.0, 3.0, 4.0, 5.0].map(setting), &runs);
         let on: Vec<&str> = table.iter().filter(|r| r.front).map(|r| r.setting.as_str()).collect();
         assert_eq!(on, ["time=1", "time=3"]);

@@ -29,7 +29,8 @@ pub struct RunRecord {
     pub scores: IndexMap<String, f64>,
     /// Steps of all chains, warm-up included.
     pub steps: u64,
-    /// The smallest effective number of draws of any quantity a second of the run, where it is known.
+    /// The smallest effective number of draws of any quantity a second of the run, where
+    /// it is known.
     pub ess_per_second: Option<f64>,
     /// Why it failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -43,8 +44,8 @@ impl RunRecord {
     }
 }
 
-/// When to look at a run of so many seconds: four times in each power of ten from a tenth of a second, but not just before its end, which
-/// is looked at in any case.
+/// When to look at a run of so many seconds: four times in each power of ten from a tenth
+/// of a second, but not just before its end, which is looked at in any case.
 pub fn marks(time: Option<f64>) -> Vec<f64> {
     let last = time.unwrap_or(1000.0);
     let nice = [1.0, 1.8, 3.2, 5.6];

@@ -5,7 +5,8 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// How a program is run: everything that speed and accuracy depend on, but for the machine.
+/// How a program is run: everything that speed and accuracy depend on, but for the
+/// machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Setting {
@@ -50,7 +51,8 @@ pub enum PlanError {
 type Knobs = IndexMap<String, Value>;
 type Axes = IndexMap<String, Vec<Value>>;
 
-/// A file of settings. Names other than `program`, `chains`, `time`, `steps` and `warmup` are those of parameters.
+/// A file of settings. Names other than `program`, `chains`, `time`, `steps` and `warmup`
+/// are those of parameters.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Plan {
@@ -58,7 +60,8 @@ pub struct Plan {
     pub about: String,
     /// What all settings begin with.
     pub base: Knobs,
-    /// Each value of one name with each of the others, for every setting that does not say it itself.
+    /// Each value of one name with each of the others, for every setting that does not
+    /// say it itself.
     pub cross: Axes,
     /// One name at a time takes other values than in `base`.
     pub vary: Axes,
@@ -66,7 +69,8 @@ pub struct Plan {
     pub also: Vec<Knobs>,
     /// So many settings take every name of `vary` at random.
     pub random: usize,
-    /// These are in the table to be compared with others, and never become presets: those that gain by the error what they lose elsewhere, say.
+    /// These are in the table to be compared with others, and never become presets: those
+    /// that gain by the error what they lose elsewhere, say.
     pub compare: bool,
 }
 
@@ -145,17 +149,31 @@ impl Setting {
     /// If chains or time are out of range.
     pub fn check(&self) -> Result<(), PlanError> {
         let mut again = Setting::default();
-        let known = [("chains", self.chains.map(Value::from)), ("time", self.time.map(Value::from))];
-        known.into_iter().filter_map(|(name, value)| Some((name, value?))).try_for_each(|(n, v)| again.put(n, &v))
+        let known =
+            [("chains", self.chains.map(Value::from)), ("time", self.time.map(Value::from))];
+        known
+            .into_iter()
+            .filter_map(|(name, value)| Some((name, value?)))
+            .try_for_each(|(n, v)| again.put(n, &v))
     }
 
     fn put(&mut self, name: &str, value: &Value) -> Result<(), PlanError> {
-        let fails = |expected| PlanError::Value { name: name.to_owned(), value: value.to_string(), expected };
+        let fails = |expected| PlanError::Value {
+            name: name.to_owned(),
+            value: value.to_string(),
+            expected,
+        };
         let whole = || value.as_u64().ok_or(fails("a whole number"));
         match name {
-            "program" => self.program = Some(value.as_str().ok_or(fails("the name of a program"))?.to_owned()),
+            "program" => {
+                self.program =
+                    Some(value.as_str().ok_or(fails("the name of a program"))?.to_owned())
+            }
             "chains" => {
-                let n = value.as_u64().and_then(|n| u32::try_from(n).ok()).filter(|n| (1..=1024).contains(n));
+                let n = value
+                    .as_u64()
+                    .and_then(|n| u32::try_from(n).ok())
+                    .filter(|n| (1..=1024).contains(n));
                 self.chains = Some(n.ok_or(fails("a whole number from 1 to 1024"))?);
             }
             "time" => {
@@ -186,7 +204,8 @@ mod tests {
             r#"{"base": {"chains": 4, "size": 128}, "cross": {"time": [1, 3]}, "vary": {"size": [64, 128], "chains": [2]},
                 "also": [{"size": 64, "colours": false}, {"time": 30}]}"#,
         );
-        let names: Vec<String> = plan.unwrap().settings().unwrap().iter().map(Setting::name).collect();
+        let names: Vec<String> =
+            plan.unwrap().settings().unwrap().iter().map(Setting::name).collect();
         assert_eq!(
             names,
             [
@@ -205,7 +224,8 @@ mod tests {
 
     #[test]
     fn random_settings_are_the_same_every_time() {
-        let text = r#"{"vary": {"a": [1, 2, 3, 4], "b": [1, 2, 3, 4], "c": ["x", "y"]}, "random": 30}"#;
+        let text =
+            r#"{"vary": {"a": [1, 2, 3, 4], "b": [1, 2, 3, 4], "c": ["x", "y"]}, "random": 30}"#;
         let all = Plan::from_json(text).unwrap().settings().unwrap();
         assert_eq!(all, Plan::from_json(text).unwrap().settings().unwrap());
         assert!(all.iter().filter(|s| s.set.len() == 3).count() > 5);
@@ -213,8 +233,12 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_said() {
-        let of = |text: &str| Plan::from_json(text).and_then(|p| p.settings()).unwrap_err().to_string();
-        assert_eq!(of(r#"{"base": {"chains": 0}}"#), "`chains` cannot be 0: expected a whole number from 1 to 1024");
+        let of =
+            |text: &str| Plan::from_json(text).and_then(|p| p.settings()).unwrap_err().to_string();
+        assert_eq!(
+            of(r#"{"base": {"chains": 0}}"#),
+            "`chains` cannot be 0: expected a whole number from 1 to 1024"
+        );
         assert_eq!(of(r#"{"vary": {"time": [-1]}}"#), "`time` cannot be -1: expected seconds");
         assert!(of(r#"{"bass": {}}"#).starts_with("unknown field `bass`, expected one of"));
     }

@@ -1,8 +1,10 @@
-//! The paper's stochastic comparator: how far the rendered contours lie from the observed ones, scored by a normal density.
-//! A likelihood without a sampler. Lengths are percent of the image diagonal, so a score does not depend on resolution.
-//! In clutter some wrong object often lies closer to the observed edges than the true one; for photographs use
-//! [`ContourRatio`](super::contour_ratio::ContourRatio). Invariant: scores are finite, continuous in positions, and those of the
-//! rendered contours exactly independent of the elements' order.
+//! The paper's stochastic comparator: how far the rendered contours lie from the observed
+//! ones, scored by a normal density. A likelihood without a sampler. Lengths are percent
+//! of the image diagonal, so a score does not depend on resolution. In clutter some wrong
+//! object often lies closer to the observed edges than the true one; for photographs use
+//! [`ContourRatio`](super::contour_ratio::ContourRatio). Invariant: scores are finite,
+//! continuous in positions, and those of the rendered contours exactly independent of the
+//! elements' order.
 
 mod gradient;
 mod reverse;
@@ -24,30 +26,42 @@ pub enum Mode {
     /// One normal density at the mean distance: the paper's letter.
     #[default]
     Mean,
-    /// One normal density for every percent of the diagonal of contour length, each at its own distance.
+    /// One normal density for every percent of the diagonal of contour length, each at
+    /// its own distance.
     Sum,
 }
 
 /// What [`Chamfer`] can be told. The default is the paper's comparator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChamferOptions {
-    /// Standard deviation of the distance, in percent of the diagonal, above 0. Default 0.4.
+    /// Standard deviation of the distance, in percent of the diagonal, above 0. Default
+    /// 0.4.
     pub sigma: f64,
     /// Mean of the distances or a sum of scores. Default mean.
     pub mode: Mode,
-    /// Also measure from the observed contours to the rendered ones: the distance is the mean of both directions' means
-    /// (`Sum`: both directions' scores are added). Of more than 512 observed points an even choice is measured. It
-    /// assumes that the picture holds nothing but the object: in clutter it prefers what lies near all of it. Default off.
+    /// Also measure from the observed contours to the rendered ones: the distance is the
+    /// mean of both directions' means (`Sum`: both directions' scores are added). Of more
+    /// than 512 observed points an even choice is measured. It assumes that the picture
+    /// holds nothing but the object: in clutter it prefers what lies near all of it.
+    /// Default off.
     pub symmetric: bool,
-    /// Distances count as this at most, in percent of the diagonal, above 0. Default none.
+    /// Distances count as this at most, in percent of the diagonal, above 0. Default
+    /// none.
     pub truncate: Option<f64>,
-    /// Adds this many percent of the diagonal per radian between the orientations, at least 0. Default none.
+    /// Adds this many percent of the diagonal per radian between the orientations, at
+    /// least 0. Default none.
     pub oriented: Option<f64>,
 }
 
 impl Default for ChamferOptions {
     fn default() -> Self {
-        ChamferOptions { sigma: 0.4, mode: Mode::Mean, symmetric: false, truncate: None, oriented: None }
+        ChamferOptions {
+            sigma: 0.4,
+            mode: Mode::Mean,
+            symmetric: false,
+            truncate: None,
+            oriented: None,
+        }
     }
 }
 
@@ -66,7 +80,8 @@ pub struct Chamfer {
     percent: f64,
 }
 
-/// Sums over one direction, in steps of 2^-32: exact, so what was added can be taken away again.
+/// Sums over one direction, in steps of 2^-32: exact, so what was added can be taken away
+/// again.
 #[derive(Debug, Clone, Copy, Default)]
 struct Steps {
     length: i64,
@@ -87,12 +102,14 @@ impl Steps {
     }
 
     fn sums(&self) -> Sums {
-        let [length, first, second] = [self.length, self.first, self.second].map(|sum| sum as f64 / FIXED);
+        let [length, first, second] =
+            [self.length, self.first, self.second].map(|sum| sum as f64 / FIXED);
         Sums { length, first, second }
     }
 }
 
-/// What is known of rendered contours of which some may come and go, without those that move; it belongs to one comparator.
+/// What is known of rendered contours of which some may come and go, without those that
+/// move; it belongs to one comparator.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     steps: Steps,
@@ -124,11 +141,12 @@ impl Sums {
 }
 
 impl Chamfer {
-    /// Prepares the observed contours for frames of `width` x `height` pixels. An observed map without contours is as far
-    /// as can be from everything.
+    /// Prepares the observed contours for frames of `width` x `height` pixels. An
+    /// observed map without contours is as far as can be from everything.
     ///
     /// # Errors
-    /// A side outside 1 to 16384 pixels, an option out of its range, or a map whose lists differ in length.
+    /// A side outside 1 to 16384 pixels, an option out of its range, or a map whose lists
+    /// differ in length.
     pub fn prepare(
         map: &ContourMap,
         width: u32,
@@ -152,8 +170,9 @@ impl Chamfer {
         &self.options
     }
 
-    /// The distance in percent of the diagonal: the length-weighted mean of the observed map's distances at the elements,
-    /// averaged with the other direction's if symmetric. With nothing in view, 100.
+    /// The distance in percent of the diagonal: the length-weighted mean of the observed
+    /// map's distances at the elements, averaged with the other direction's if symmetric.
+    /// With nothing in view, 100.
     pub fn distance(&self, elements: &Elements<'_>) -> f64 {
         self.distance_with(elements, &mut Scratch::default())
     }
@@ -163,8 +182,9 @@ impl Chamfer {
         self.mean(self.forth(elements), self.back(elements, scratch))
     }
 
-    /// The log-likelihood. `Mean`: log normal(distance; 0, sigma). `Sum`: that of every element's distance, times its length
-    /// in percent of the diagonal; with nothing in view, a diagonal's length at distance 100.
+    /// The log-likelihood. `Mean`: log normal(distance; 0, sigma). `Sum`: that of every
+    /// element's distance, times its length in percent of the diagonal; with nothing in
+    /// view, a diagonal's length at distance 100.
     pub fn log_likelihood(&self, elements: &Elements<'_>) -> f64 {
         self.log_likelihood_with(elements, &mut Scratch::default())
     }
@@ -174,8 +194,9 @@ impl Chamfer {
         self.score(self.forth(elements), self.back(elements, scratch))
     }
 
-    /// [`Chamfer::log_likelihood`] of contours of which the tally may know those before: the same, bit for bit, at the cost of what changed where
-    /// it is not symmetric. `whole` gives all of them.
+    /// [`Chamfer::log_likelihood`] of contours of which the tally may know those before:
+    /// the same, bit for bit, at the cost of what changed where it is not symmetric.
+    /// `whole` gives all of them.
     pub fn log_likelihood_after<'a>(
         &self,
         step: &Step<'_>,
@@ -209,9 +230,13 @@ impl Chamfer {
 
     fn score(&self, forth: Sums, back: Option<Sums>) -> f64 {
         let sum = |s: Sums| {
-            let s =
-                if s.length > 0.0 { s } else { Sums { length: 100.0, first: 0.0, second: 100.0 * NOTHING * NOTHING } };
-            s.length * self.log_normal(0.0) - 0.5 * s.second / (self.options.sigma * self.options.sigma)
+            let s = if s.length > 0.0 {
+                s
+            } else {
+                Sums { length: 100.0, first: 0.0, second: 100.0 * NOTHING * NOTHING }
+            };
+            s.length * self.log_normal(0.0)
+                - 0.5 * s.second / (self.options.sigma * self.options.sigma)
         };
         let score = match self.options.mode {
             Mode::Mean => self.log_normal(self.mean(forth, back)),
@@ -231,8 +256,8 @@ impl Chamfer {
         self.options.truncate.map_or(d, |t| d.min(t))
     }
 
-    /// Distance at an element, and its derivatives per pixel of the frame and by the angle of the tangent. Inlined, so that what is
-    /// not asked for is not computed.
+    /// Distance at an element, and its derivatives per pixel of the frame and by the
+    /// angle of the tangent. Inlined, so that what is not asked for is not computed.
     #[inline(always)]
     fn read(&self, e: &Element) -> (f32, [f32; 3]) {
         let corners = self.grid.corners(e.x, e.y);
@@ -242,7 +267,12 @@ impl Chamfer {
         } else {
             let (low, high, f) = channels_of(e.tx, e.ty);
             let (a, b) = (corners.read(&self.fields[low]), corners.read(&self.fields[high]));
-            (a.0 + f * (b.0 - a.0), a.1 + f * (b.1 - a.1), a.2 + f * (b.2 - a.2), (b.0 - a.0) * PER_RADIAN)
+            (
+                a.0 + f * (b.0 - a.0),
+                a.1 + f * (b.1 - a.1),
+                a.2 + f * (b.2 - a.2),
+                (b.0 - a.0) * PER_RADIAN,
+            )
         };
         (d, [dx * self.grid.sx, dy * self.grid.sy, turn])
     }
@@ -260,7 +290,11 @@ impl Chamfer {
             #[inline(always)]
             || {
                 for e in elements.in_view() {
-                    own.add(f64::from(e.length * e.weight) * self.percent, self.cut(self.read(&e).0), sign);
+                    own.add(
+                        f64::from(e.length * e.weight) * self.percent,
+                        self.cut(self.read(&e).0),
+                        sign,
+                    );
                 }
                 own
             },
@@ -279,22 +313,29 @@ impl Chamfer {
 
     /// The cost in pixels of one channel's turn.
     fn turn(&self) -> f32 {
-        (self.options.oriented.unwrap_or(0.0) * std::f64::consts::PI / CHANNELS as f64 / self.percent) as f32
+        (self.options.oriented.unwrap_or(0.0) * std::f64::consts::PI
+            / CHANNELS as f64
+            / self.percent) as f32
     }
 }
 
-/// The distance fields: one, or for every channel the least of distance plus orientation cost over the channels' edges.
+/// The distance fields: one, or for every channel the least of distance plus orientation
+/// cost over the channels' edges.
 fn fields(grid: &Edges, oriented: Option<f64>) -> Vec<Vec<f32>> {
     let samples = grid.width as usize * grid.height as usize;
     let Some(cost) = oriented else {
-        return vec![grid.nearest(|_| true).map_or_else(|| vec![NOTHING as f32; samples], |n| n.distance)];
+        return vec![
+            grid.nearest(|_| true).map_or_else(|| vec![NOTHING as f32; samples], |n| n.distance),
+        ];
     };
     let per_channel = (cost * std::f64::consts::PI / CHANNELS as f64) as f32;
-    // Distance and orientation of every channel's nearest edges, of those channels that have edges.
+    // Distance and orientation of every channel's nearest edges, of those channels that
+    // have edges.
     let mut nearest: [Option<(Vec<f32>, Vec<f32>)>; CHANNELS] = Default::default();
     side_by_side(&mut nearest, |k, out| {
         let found = grid.nearest(|e| e.turn.round() as usize % CHANNELS == k);
-        *out = found.map(|n| (n.distance, n.edge.iter().map(|&id| grid.edges[id as usize].turn).collect()));
+        *out = found
+            .map(|n| (n.distance, n.edge.iter().map(|&id| grid.edges[id as usize].turn).collect()));
     });
     let mut fields = vec![vec![NOTHING as f32; samples]; CHANNELS];
     side_by_side(&mut fields, |j, field| {

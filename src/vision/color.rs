@@ -1,5 +1,5 @@
-//! Colours: sRGB bytes, linear light, and CIE L*a*b* (D65). Not colour management: profiles in files are ignored and every
-//! picture is taken to be sRGB (IEC 61966-2-1).
+//! Colours: sRGB bytes, linear light, and CIE L*a*b* (D65). Not colour management:
+//! profiles in files are ignored and every picture is taken to be sRGB (IEC 61966-2-1).
 
 use crate::num::simd::vectorised;
 use std::sync::OnceLock;
@@ -25,8 +25,9 @@ pub fn linear_to_byte(v: f32) -> u8 {
     (linear_to_srgb(f64::from(v).clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
 }
 
-/// X, Y and Z of linear sRGB light relative to the D65 white of sRGB: the IEC 61966-2-1 matrix, rows divided by the white point (its
-/// row sums), so greys have a* = b* = 0 exactly.
+/// X, Y and Z of linear sRGB light relative to the D65 white of sRGB: the IEC 61966-2-1
+/// matrix, rows divided by the white point (its row sums), so greys have a* = b* = 0
+/// exactly.
 #[inline(always)]
 fn linear_to_xyz(rgb: [f32; 3]) -> [f64; 3] {
     let [r, g, b] = [f64::from(rgb[0]), f64::from(rgb[1]), f64::from(rgb[2])];
@@ -58,8 +59,10 @@ pub fn linear_to_lab(rgb: [f32; 3]) -> [f32; 3] {
 /// What a quick L*, a* or b* may be wrong by; many times what it is wrong by.
 const DOUBT: f64 = 1e-10;
 
-/// [`linear_to_lab`] of many colours, several at a time, to the last bit: roots are worked out to 14 digits, and where that leaves open
-/// which of two single precision numbers is the nearest, once in many thousand times and for exact greys, the plain way decides.
+/// [`linear_to_lab`] of many colours, several at a time, to the last bit: roots are
+/// worked out to 14 digits, and where that leaves open which of two single precision
+/// numbers is the nearest, once in many thousand times and for exact greys, the plain way
+/// decides.
 pub fn linear_to_labs(rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let mut out = vec![[f32::NAN; 3]; rgb.len()];
     vectorised(
@@ -87,8 +90,9 @@ pub fn linear_to_labs(rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
     out
 }
 
-/// The cube root of a number between 1e-3 and 1e3, to 1e-14 of itself: a third of the logarithm, as floating point numbers hold it,
-/// and Halley's steps, each of which has three times as many digits right.
+/// The cube root of a number between 1e-3 and 1e3, to 1e-14 of itself: a third of the
+/// logarithm, as floating point numbers hold it, and Halley's steps, each of which has
+/// three times as many digits right.
 #[inline(always)]
 fn quick_cbrt(t: f64) -> f64 {
     let third = (t as f32).to_bits() as i32 as f32 * (1.0 / 3.0) + 709_958_130.0;
@@ -116,23 +120,45 @@ mod tests {
 
     #[test]
     fn lab_of_known_colours() {
-        // Values of the sRGB primaries from the CIE formulas (D65): red (53.24, 80.09, 67.20), blue (32.30, 79.19, -107.86).
+        // Values of the sRGB primaries from the CIE formulas (D65): red (53.24, 80.09,
+        // 67.20), blue (32.30, 79.19, -107.86).
         let near = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(p, q)| (p - q).abs() < 0.05);
         assert!(near(linear_to_lab([1.0, 1.0, 1.0]), [100.0, 0.0, 0.0]));
         assert!(near(linear_to_lab([0.0, 0.0, 0.0]), [0.0, 0.0, 0.0]));
-        assert!(near(linear_to_lab([1.0, 0.0, 0.0]), [53.24, 80.09, 67.20]), "{:?}", linear_to_lab([1.0, 0.0, 0.0]));
-        assert!(near(linear_to_lab([0.0, 0.0, 1.0]), [32.30, 79.19, -107.86]), "{:?}", linear_to_lab([0.0, 0.0, 1.0]));
+        assert!(
+            near(linear_to_lab([1.0, 0.0, 0.0]), [53.24, 80.09, 67.20]),
+            "{:?}",
+            linear_to_lab([1.0, 0.0, 0.0])
+        );
+        assert!(
+            near(linear_to_lab([0.0, 0.0, 1.0]), [32.30, 79.19, -107.86]),
+            "{:?}",
+            linear_to_lab([0.0, 0.0, 1.0])
+        );
     }
 
     #[test]
     fn many_colours_are_as_one_by_one() {
-        let value = |i: u32| linear_table()[(i % 256) as usize] * if i.is_multiple_of(7) { 0.37 } else { 1.0 };
-        let mut colours: Vec<[f32; 3]> = (0..60_000u32).map(|i| [value(i), value(i / 3), value(i * 31 / 5)]).collect();
+        let value = |i: u32| {
+            linear_table()[(i % 256) as usize] * if i.is_multiple_of(7) { 0.37 } else { 1.0 }
+        };
+        let mut colours: Vec<[f32; 3]> =
+            (0..60_000u32).map(|i| [value(i), value(i / 3), value(i * 31 / 5)]).collect();
         colours.extend((0..256).map(|i| [value(i); 3]));
-        colours.extend([[0.0; 3], [1.0, 0.0, 0.0], [4.0, 9.0, 1e3], [f32::NAN, 0.5, 0.5], [-1.0, 0.2, f32::INFINITY]]);
+        colours.extend([
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            [4.0, 9.0, 1e3],
+            [f32::NAN, 0.5, 0.5],
+            [-1.0, 0.2, f32::INFINITY],
+        ]);
         for (lab, rgb) in linear_to_labs(&colours).iter().zip(&colours) {
             let expected = linear_to_lab(*rgb);
-            assert!(lab.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())));
+            assert!(
+                lab.iter()
+                    .zip(expected)
+                    .all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()))
+            );
         }
         for i in 0..100_000 {
             let t = libm::exp(f64::from(i - 50_000) * 1.3e-4);

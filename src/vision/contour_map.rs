@@ -1,4 +1,5 @@
-//! Contours of a picture as points with tangents and strengths: what a detector gives and what comparators take.
+//! Contours of a picture as points with tangents and strengths: what a detector gives and
+//! what comparators take.
 
 use super::gradient::{principal, smoothed};
 use super::nms::{EdgePoint, ridge_offset};
@@ -20,7 +21,8 @@ pub struct ContourMap {
     pub tx: Vec<f32>,
     /// Unit tangents along the contour, y part.
     pub ty: Vec<f32>,
-    /// How sure the detector is, in `0..=1`; larger is surer, the scale is the detector's.
+    /// How sure the detector is, in `0..=1`; larger is surer, the scale is the
+    /// detector's.
     pub strength: Vec<f32>,
 }
 
@@ -50,7 +52,12 @@ impl ContourMap {
     }
 
     /// The map of edge points, with strengths made from their magnitudes.
-    pub(super) fn from_points(width: u32, height: u32, points: &[EdgePoint], strength: impl Fn(f32) -> f32) -> Self {
+    pub(super) fn from_points(
+        width: u32,
+        height: u32,
+        points: &[EdgePoint],
+        strength: impl Fn(f32) -> f32,
+    ) -> Self {
         let mut map = ContourMap::new(width, height);
         for p in points {
             map.push(p.x, p.y, p.normal, strength(p.magnitude));
@@ -58,9 +65,11 @@ impl ContourMap {
         map
     }
 
-    /// A ready contour map (bright = contour, 255 = strength 1). Lines thicker than a pixel are thinned to their strongest, else
-    /// middle, pixels; tangents come from the strengths within about three pixels; points lie between pixels where the
-    /// brightness says so. Areas, which are not contours, shrink to lines in their middle.
+    /// A ready contour map (bright = contour, 255 = strength 1). Lines thicker than a
+    /// pixel are thinned to their strongest, else middle, pixels; tangents come from the
+    /// strengths within about three pixels; points lie between pixels where the
+    /// brightness says so. Areas, which are not contours, shrink to lines in their
+    /// middle.
     pub fn from_image(picture: &GrayImage) -> Self {
         let (width, height) = picture.dimensions();
         let mut map = ContourMap::new(width, height);
@@ -68,8 +77,10 @@ impl ContourMap {
         let bytes = &picture.as_raw()[..w * h];
         let left = thinned(width, height, bytes);
         let values: Vec<f32> = bytes.iter().map(|&b| f32::from(b) / 255.0).collect();
-        // The thin lines, a little widened, tell directions; the given brightness tells offsets.
-        let lines: Vec<f32> = values.iter().zip(&left).map(|(v, &l)| if l { *v } else { 0.0 }).collect();
+        // The thin lines, a little widened, tell directions; the given brightness tells
+        // offsets.
+        let lines: Vec<f32> =
+            values.iter().zip(&left).map(|(v, &l)| if l { *v } else { 0.0 }).collect();
         let soft = smoothed(width, height, &values, 0.7);
         for k in (0..w * h).filter(|&k| left[k]) {
             let (cx, cy) = (k % w, k / w);
@@ -81,8 +92,11 @@ impl ContourMap {
                     let d2 = dx * dx + dy * dy;
                     if d2 > 0.0 && d2 <= 12.0 {
                         let weight = lines[j * w + i] / d2;
-                        spread =
-                            [spread[0] + weight * dx * dx, spread[1] + weight * dx * dy, spread[2] + weight * dy * dy];
+                        spread = [
+                            spread[0] + weight * dx * dx,
+                            spread[1] + weight * dx * dy,
+                            spread[2] + weight * dy * dy,
+                        ];
                     }
                 }
             }
@@ -96,23 +110,27 @@ impl ContourMap {
         map
     }
 
-    /// A grey picture of the map's size: every pixel has the strength of the strongest point in it, 255 for 1.
+    /// A grey picture of the map's size: every pixel has the strength of the strongest
+    /// point in it, 255 for 1.
     pub fn to_image(&self) -> GrayImage {
         let mut out = GrayImage::new(self.width, self.height);
         if self.width == 0 || self.height == 0 {
             return out;
         }
         for ((&x, &y), &s) in self.x.iter().zip(&self.y).zip(&self.strength) {
-            let pixel = out.get_pixel_mut((x as u32).min(self.width - 1), (y as u32).min(self.height - 1));
+            let pixel =
+                out.get_pixel_mut((x as u32).min(self.width - 1), (y as u32).min(self.height - 1));
             *pixel = Luma([pixel.0[0].max((s * 255.0 + 0.5) as u8)]);
         }
         out
     }
 
-    /// The same points for a picture of another size (at least 1 x 1): places and directions are scaled, their number stays.
+    /// The same points for a picture of another size (at least 1 x 1): places and
+    /// directions are scaled, their number stays.
     pub fn scaled_to(&self, width: u32, height: u32) -> ContourMap {
         let (width, height) = (width.max(1), height.max(1));
-        let (sx, sy) = (width as f32 / self.width.max(1) as f32, height as f32 / self.height.max(1) as f32);
+        let (sx, sy) =
+            (width as f32 / self.width.max(1) as f32, height as f32 / self.height.max(1) as f32);
         let mut map = ContourMap::new(width, height);
         map.x = self.x.iter().map(|x| (x * sx).min(width as f32)).collect();
         map.y = self.y.iter().map(|y| (y * sy).min(height as f32)).collect();
@@ -174,7 +192,8 @@ mod tests {
         let map = ContourMap::from_image(&picture);
         assert_eq!(map.to_image(), picture);
         for k in 0..map.len() {
-            let (along, t) = if map.y[k] < 5.0 { (map.tx[k], map.y[k]) } else { (map.ty[k], map.x[k]) };
+            let (along, t) =
+                if map.y[k] < 5.0 { (map.tx[k], map.y[k]) } else { (map.ty[k], map.x[k]) };
             assert!(along.abs() > 0.999 && (t - t.floor() - 0.5).abs() < 1e-4);
         }
     }
@@ -195,7 +214,10 @@ mod tests {
         let mut map = ContourMap::new(10, 20);
         map.push(5.0, 10.0, [0.8, -0.6], 0.5);
         let big = map.scaled_to(20, 20);
-        assert_eq!((big.width, big.height, big.x[0], big.y[0], big.strength[0]), (20, 20, 10.0, 10.0, 0.5));
+        assert_eq!(
+            (big.width, big.height, big.x[0], big.y[0], big.strength[0]),
+            (20, 20, 10.0, 10.0, 0.5)
+        );
         // Tangent (0.6, 0.8) becomes (1.2, 0.8).
         assert!((big.ty[0] / big.tx[0] - 2.0 / 3.0).abs() < 1e-6);
         let back = big.scaled_to(10, 20);

@@ -1,12 +1,15 @@
-//! Contours as a log-likelihood ratio: how much better each rendered piece explains the observed edges near it than the edges
-//! that its surroundings hold anyway. The default contour score for photographs; a pseudo-likelihood without a sampler, since
-//! neighbouring pieces are not independent (hence the weight). Everything but the credit is worked out when it is prepared, so
-//! an evaluation reads a table. Invariant: scores are finite, continuous in positions and orientations, and exactly
-//! independent of the elements' order.
+//! Contours as a log-likelihood ratio: how much better each rendered piece explains the
+//! observed edges near it than the edges that its surroundings hold anyway. The default
+//! contour score for photographs; a pseudo-likelihood without a sampler, since
+//! neighbouring pieces are not independent (hence the weight). Everything but the credit
+//! is worked out when it is prepared, so an evaluation reads a table. Invariant: scores
+//! are finite, continuous in positions and orientations, and exactly independent of the
+//! elements' order.
 //!
-//! For a piece at distance d (percent of the diagonal) from the nearest observed edge of like orientation,
-//! `s = ln((0.75 f(d) + 0.25 b(d)) / b(d))`, where f is a half-normal density and b the density of that distance at the points of
-//! a window round the piece. A piece far from every edge gets ln 0.25; one in dense texture about 0.
+//! For a piece at distance d (percent of the diagonal) from the nearest observed edge of
+//! like orientation, `s = ln((0.75 f(d) + 0.25 b(d)) / b(d))`, where f is a half-normal
+//! density and b the density of that distance at the points of a window round the piece.
+//! A piece far from every edge gets ln 0.25; one in dense texture about 0.
 
 mod background;
 mod credit;
@@ -22,28 +25,33 @@ use crate::platform::threads::side_by_side;
 
 pub use self::credit::Scratch;
 
-/// What [`ContourRatio`] can be told. Lengths are percent of the image diagonal. The defaults were chosen on ten pictures of
-/// 256 x 256 pixels.
+/// What [`ContourRatio`] can be told. Lengths are percent of the image diagonal. The
+/// defaults were chosen on ten pictures of 256 x 256 pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContourRatioOptions {
     /// Share of pieces that have an edge of their own, above 0 and below 1. Default 0.75.
     pub foreground: f64,
-    /// Standard deviation of the half-normal distance of those pieces, above 0. Default 0.4.
+    /// Standard deviation of the half-normal distance of those pieces, above 0. Default
+    /// 0.4.
     pub sd: f64,
     /// Distances from here on count as "no edge near", above 0. Default 3.3.
     pub truncate: f64,
-    /// Side of the window round a piece that tells the background, as a fraction of the picture's sides, above 0 and at most
+    /// Side of the window round a piece that tells the background, as a fraction of the
+    /// picture's sides, above 0 and at most
     /// 2. Default 0.25.
     pub window: f64,
     /// How many times over an observed edge pays, above 0. Default 2.
     pub credit: f64,
     /// Power to which the ratio of `unit` of contour is taken, at least 0. Default 0.5.
     pub weight: f64,
-    /// The length of contour that counts as one observation, above 0. Default 0.5524: two pixels of a 256 x 256 picture.
+    /// The length of contour that counts as one observation, above 0. Default 0.5524: two
+    /// pixels of a 256 x 256 picture.
     pub unit: f64,
-    /// With less contour in view than this (in percent of the diagonal, above 0), a penalty sets in, linear in what is missing. Default 10.
+    /// With less contour in view than this (in percent of the diagonal, above 0), a
+    /// penalty sets in, linear in what is missing. Default 10.
     pub least: f64,
-    /// The penalty with nothing in view, as the length of contour without any edge near that scores as badly; at least 0. Default 1000: ten diagonals of it.
+    /// The penalty with nothing in view, as the length of contour without any edge near
+    /// that scores as badly; at least 0. Default 1000: ten diagonals of it.
     pub nothing: f64,
 }
 
@@ -65,10 +73,20 @@ impl Default for ContourRatioOptions {
 
 impl ContourRatioOptions {
     fn check(&self) -> Result<(), ComparatorError> {
-        check("foreground", "above 0 and below 1", self.foreground, self.foreground > 0.0 && self.foreground < 1.0)?;
+        check(
+            "foreground",
+            "above 0 and below 1",
+            self.foreground,
+            self.foreground > 0.0 && self.foreground < 1.0,
+        )?;
         check("sd", "above 0", self.sd, self.sd > 0.0)?;
         check("truncate", "above 0", self.truncate, self.truncate > 0.0)?;
-        check("window", "above 0 and at most 2", self.window, self.window > 0.0 && self.window <= 2.0)?;
+        check(
+            "window",
+            "above 0 and at most 2",
+            self.window,
+            self.window > 0.0 && self.window <= 2.0,
+        )?;
         check("credit", "above 0", self.credit, self.credit > 0.0)?;
         check("weight", "at least 0", self.weight, self.weight >= 0.0)?;
         check("unit", "above 0", self.unit, self.unit > 0.0)?;
@@ -102,11 +120,12 @@ pub struct ContourRatio {
 const FIXED: f64 = (1u64 << 32) as f64;
 
 impl ContourRatio {
-    /// Prepares the observed contours for frames of `width` x `height` pixels. With no observed contours every piece scores
-    /// ln(1 - foreground).
+    /// Prepares the observed contours for frames of `width` x `height` pixels. With no
+    /// observed contours every piece scores ln(1 - foreground).
     ///
     /// # Errors
-    /// A side outside 1 to 16384 pixels, an option out of its range, or a map whose lists differ in length.
+    /// A side outside 1 to 16384 pixels, an option out of its range, or a map whose lists
+    /// differ in length.
     pub fn prepare(
         map: &ContourMap,
         width: u32,
@@ -121,13 +140,16 @@ impl ContourRatio {
         let none = Cell { score: libm::log(1.0 - options.foreground) as f32, group: NO_GROUP };
         let mut cells = vec![none; samples * CHANNELS];
         side_by_side(cells.chunks_exact_mut(samples), |k, out| {
-            // A channel holds the edges within one channel's width: an element between two channels finds an edge of its own
-            // orientation in both.
+            // A channel holds the edges within one channel's width: an element between
+            // two channels finds an edge of its own orientation in both.
             let near = |e: &Edge| turn_between(e.turn, k as f32) <= 1.0;
             let Some(nearest) = grid.nearest_within(options.truncate, near) else { return };
             let scores = scores(&grid, &nearest.distance, options);
             for ((cell, score), &edge) in out.iter_mut().zip(scores).zip(&nearest.edge) {
-                *cell = Cell { score, group: if score > 0.0 { capacity.group(edge) } else { NO_GROUP } };
+                *cell = Cell {
+                    score,
+                    group: if score > 0.0 { capacity.group(edge) } else { NO_GROUP },
+                };
             }
         });
         let percent = 100.0 / super::elements::diagonal(width, height);
@@ -139,9 +161,10 @@ impl ContourRatio {
         &self.options
     }
 
-    /// The weighted log-likelihood ratio; above 0 if the contours are better explained by the rendered ones than by chance.
-    /// With nothing in view it is not 0 but as bad as `nothing` percent of contour that no edge supports: with the defaults
-    /// -1254.9, below any ordinary contour; from `least` percent of contour on nothing is added.
+    /// The weighted log-likelihood ratio; above 0 if the contours are better explained by
+    /// the rendered ones than by chance. With nothing in view it is not 0 but as bad as
+    /// `nothing` percent of contour that no edge supports: with the defaults -1254.9,
+    /// below any ordinary contour; from `least` percent of contour on nothing is added.
     pub fn log_likelihood(&self, elements: &Elements<'_>) -> f64 {
         self.log_likelihood_with(elements, &mut Scratch::default())
     }
@@ -153,8 +176,9 @@ impl ContourRatio {
         self.score(scratch)
     }
 
-    /// [`ContourRatio::log_likelihood`] of contours of which the scratch may know those before: the same, bit for bit, at the cost of what
-    /// changed. `whole` gives all of them. A scratch belongs to one comparator.
+    /// [`ContourRatio::log_likelihood`] of contours of which the scratch may know those
+    /// before: the same, bit for bit, at the cost of what changed. `whole` gives all of
+    /// them. A scratch belongs to one comparator.
     pub fn log_likelihood_after<'a>(
         &self,
         step: &Step<'_>,
@@ -183,7 +207,8 @@ impl ContourRatio {
     /// Adds what elements bring, or takes it away.
     fn count(&self, elements: &Elements<'_>, sign: i64, scratch: &mut Scratch) {
         let samples = self.grid.width as usize * self.grid.height as usize;
-        // Exact in integers: sums of terms that are rounded one by one do not depend on their order.
+        // Exact in integers: sums of terms that are rounded one by one do not depend on
+        // their order.
         let (mut total, mut length) = (scratch.total, scratch.length);
         for e in elements.in_view() {
             let weight = (f64::from(e.length * e.weight) * self.percent).min(1e4);
@@ -196,7 +221,8 @@ impl ContourRatio {
                     let Some(cell) = self.cells.get(k * samples + at) else { continue };
                     let length = weight * f64::from(part * share);
                     if cell.group == NO_GROUP {
-                        total = total.saturating_add(sign * (length * f64::from(cell.score) * FIXED) as i64);
+                        total = total
+                            .saturating_add(sign * (length * f64::from(cell.score) * FIXED) as i64);
                     } else {
                         scratch.claim(cell.group, length, length * f64::from(cell.score), sign);
                     }

@@ -1,7 +1,9 @@
-//! Depth maps: distance of the surface seen at every pixel, and how likely an observed map is given a rendered one.
+//! Depth maps: distance of the surface seen at every pixel, and how likely an observed
+//! map is given a rendered one.
 //!
-//! A depth is a positive number in the scene's unit of length; `+inf` is background (nothing there) and NaN is missing (not
-//! measured). Missing pixels say nothing: whether a pixel is missing is taken to have nothing to do with the scene.
+//! A depth is a positive number in the scene's unit of length; `+inf` is background
+//! (nothing there) and NaN is missing (not measured). Missing pixels say nothing: whether
+//! a pixel is missing is taken to have nothing to do with the scene.
 
 use super::error::{VisionError, read_bytes};
 use super::npy;
@@ -10,7 +12,8 @@ use crate::num::LN_SQRT_2PI;
 use crate::rng::Stream;
 use std::path::Path;
 
-/// A depth map, row by row. Every value is positive and finite, `+inf` (background) or NaN (missing).
+/// A depth map, row by row. Every value is positive and finite, `+inf` (background) or
+/// NaN (missing).
 #[derive(Clone, Debug)]
 pub struct DepthMap {
     width: u32,
@@ -43,12 +46,13 @@ impl DepthMap {
         &self.data
     }
 
-    /// The map at another size (at least 1 x 1): every pixel is the one its centre falls in, because means across the edge of
-    /// an object are depths of nothing.
+    /// The map at another size (at least 1 x 1): every pixel is the one its centre falls
+    /// in, because means across the edge of an object are depths of nothing.
     pub fn resized(&self, width: u32, height: u32) -> DepthMap {
         let (width, height) = (width.max(1), height.max(1));
-        let pick =
-            |i: u32, from: u32, to: u32| ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as usize;
+        let pick = |i: u32, from: u32, to: u32| {
+            ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as usize
+        };
         let data = (0..height)
             .flat_map(|j| {
                 let row = pick(j, self.height, height) * self.width as usize;
@@ -60,8 +64,9 @@ impl DepthMap {
     }
 }
 
-/// Reads a depth map: a grey PNG (16 or 8 bit; depth = value / `scale`, 0 is background) or a `.npy` array of two axes (depth =
-/// value / `scale`; 0, negative and `inf` are background, NaN is missing).
+/// Reads a depth map: a grey PNG (16 or 8 bit; depth = value / `scale`, 0 is background)
+/// or a `.npy` array of two axes (depth = value / `scale`; 0, negative and `inf` are
+/// background, NaN is missing).
 pub fn load(path: &Path, scale: f64) -> Result<DepthMap, VisionError> {
     let limits = Limits::default();
     decode(&read_bytes(path, limits.max_bytes())?, scale, &limits).map_err(|e| e.in_file(path))
@@ -77,13 +82,21 @@ pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, Vis
         let array = npy::parse(bytes)?;
         let (width, height) = array.picture_size()?;
         limits.check(width, height)?;
-        return DepthMap::new(width, height, array.into_f32().into_iter().map(|v| depth(f64::from(v))).collect());
+        return DepthMap::new(
+            width,
+            height,
+            array.into_f32().into_iter().map(|v| depth(f64::from(v))).collect(),
+        );
     }
     let (picture, _) = decode_dynamic(bytes, limits)?;
     let (width, height) = (picture.width(), picture.height());
     let data = match picture {
-        image::DynamicImage::ImageLuma16(p) => p.pixels().map(|p| depth(f64::from(p.0[0]))).collect(),
-        image::DynamicImage::ImageLuma8(p) => p.pixels().map(|p| depth(f64::from(p.0[0]))).collect(),
+        image::DynamicImage::ImageLuma16(p) => {
+            p.pixels().map(|p| depth(f64::from(p.0[0]))).collect()
+        }
+        image::DynamicImage::ImageLuma8(p) => {
+            p.pixels().map(|p| depth(f64::from(p.0[0]))).collect()
+        }
         _ => {
             return Err(VisionError::Damaged(
                 "a depth map must be a greyscale picture with 16 or 8 bits, but this one has colours".into(),
@@ -99,8 +112,8 @@ pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, Vis
 /// * rendered as background: `(1 - outlier) [background] + outlier Q`;
 /// * Q: background with probability 1/2, else a depth uniform over `range`.
 ///
-/// A density with respect to length plus a unit mass at "background"; it integrates to 1 for every rendered map. Missing
-/// pixels count as 0.
+/// A density with respect to length plus a unit mass at "background"; it integrates to 1
+/// for every rendered map. Missing pixels count as 0.
 #[derive(Clone, Debug)]
 pub struct DepthLikelihood {
     observed: DepthMap,
@@ -110,9 +123,15 @@ pub struct DepthLikelihood {
 }
 
 impl DepthLikelihood {
-    /// The likelihood of `observed` at its own size: `sd` > 0 (unit of depth), `outlier` strictly between 0 and 1, `range` of an
-    /// outlier's depth, which has to hold all of the observed depths.
-    pub fn new(observed: &DepthMap, sd: f64, outlier: f64, range: (f64, f64)) -> Result<Self, VisionError> {
+    /// The likelihood of `observed` at its own size: `sd` > 0 (unit of depth), `outlier`
+    /// strictly between 0 and 1, `range` of an outlier's depth, which has to hold all of
+    /// the observed depths.
+    pub fn new(
+        observed: &DepthMap,
+        sd: f64,
+        outlier: f64,
+        range: (f64, f64),
+    ) -> Result<Self, VisionError> {
         let fail = |name, rule, value| Err(VisionError::Range { name, rule, value });
         if !(sd > 0.0 && sd.is_finite()) {
             return fail("sd", "positive", sd);
@@ -141,13 +160,26 @@ impl DepthLikelihood {
         &self.observed
     }
 
-    /// Log density of the observed map given rendered depths of the same size (`+inf` where nothing is; never NaN).
-    pub fn log_likelihood(&self, rendered: &[f32], width: u32, height: u32) -> Result<f64, VisionError> {
+    /// Log density of the observed map given rendered depths of the same size (`+inf`
+    /// where nothing is; never NaN).
+    pub fn log_likelihood(
+        &self,
+        rendered: &[f32],
+        width: u32,
+        height: u32,
+    ) -> Result<f64, VisionError> {
         self.check(rendered, width, height)?;
-        Ok(self.observed.data.iter().zip(rendered).map(|(&o, &r)| self.log_density(f64::from(o), f64::from(r))).sum())
+        Ok(self
+            .observed
+            .data
+            .iter()
+            .zip(rendered)
+            .map(|(&o, &r)| self.log_density(f64::from(o), f64::from(r)))
+            .sum())
     }
 
-    /// For each pixel the derivative of the log density by its rendered depth; 0 where either is background.
+    /// For each pixel the derivative of the log density by its rendered depth; 0 where
+    /// either is background.
     pub fn slopes(&self, rendered: &[f32]) -> Vec<f64> {
         let slope = |(o, r): (&f32, &f32)| {
             let (o, r) = (f64::from(*o), f64::from(*r));
@@ -163,8 +195,8 @@ impl DepthLikelihood {
         self.observed.data.iter().zip(rendered).map(slope).collect()
     }
 
-    /// For each pixel, how much the log density grows where the object covers it. Beside the object it would have the depth of the
-    /// pixel next to it; further away it is 0.
+    /// For each pixel, how much the log density grows where the object covers it. Beside
+    /// the object it would have the depth of the pixel next to it; further away it is 0.
     pub fn gains(&self, rendered: &[f32]) -> Vec<f64> {
         let width = self.observed.width as usize;
         let depth = |i: usize| rendered.get(i).copied().filter(|r| r.is_finite());
@@ -172,7 +204,8 @@ impl DepthLikelihood {
             let beside = [i.checked_sub(1), Some(i + 1), i.checked_sub(width), Some(i + width)];
             let r = depth(i).or_else(|| beside.into_iter().flatten().find_map(depth));
             r.map_or(0.0, |r| {
-                self.log_density(f64::from(*o), f64::from(r)) - self.log_density(f64::from(*o), f64::INFINITY)
+                self.log_density(f64::from(*o), f64::from(r))
+                    - self.log_density(f64::from(*o), f64::INFINITY)
             })
         };
         self.observed.data.iter().enumerate().map(gain).collect()
@@ -190,7 +223,8 @@ impl DepthLikelihood {
             (true, false) => ln_half - libm::log(self.range.1 - self.range.0),
             (true, true) => {
                 let z = (observed - rendered) / self.sd;
-                let good = libm::log1p(-self.outlier) - 0.5 * z * z - libm::log(self.sd) - LN_SQRT_2PI;
+                let good =
+                    libm::log1p(-self.outlier) - 0.5 * z * z - libm::log(self.sd) - LN_SQRT_2PI;
                 let odd = ln_half - libm::log(self.range.1 - self.range.0);
                 let (most, least) = if good > odd { (good, odd) } else { (odd, good) };
                 most + libm::log1p(libm::exp(least - most))
@@ -208,13 +242,18 @@ impl DepthLikelihood {
             ));
         }
         match rendered.iter().find(|v| v.is_nan()) {
-            Some(&v) => Err(VisionError::Range { name: "rendered depth", rule: "a number", value: f64::from(v) }),
+            Some(&v) => Err(VisionError::Range {
+                name: "rendered depth",
+                rule: "a number",
+                value: f64::from(v),
+            }),
             None => Ok(()),
         }
     }
 
-    /// A depth map drawn given rendered depths of the same size; nothing is missing. Good pixels are drawn from the normal
-    /// distribution as it is, so a depth may come out negative where `sd` is as large as the depths.
+    /// A depth map drawn given rendered depths of the same size; nothing is missing. Good
+    /// pixels are drawn from the normal distribution as it is, so a depth may come out
+    /// negative where `sd` is as large as the depths.
     pub fn simulate(&self, rendered: &[f32], rng: &mut Stream) -> Result<Vec<f32>, VisionError> {
         self.check(rendered, self.observed.width, self.observed.height)?;
         let draw = |&r: &f32| {
@@ -248,23 +287,34 @@ mod tests {
     fn integrates_to_one() {
         let l = likelihood(vec![1.0]);
         for rendered in [2.0, f64::INFINITY] {
-            // Over the whole line: the normal part may leave the range, the uniform part is only inside it.
+            // Over the whole line: the normal part may leave the range, the uniform part
+            // is only inside it.
             let background = libm::exp(l.log_density(f64::INFINITY, rendered));
             let step = 1e-4;
-            let depths: f64 =
-                (0..40000).map(|i| step * libm::exp(l.log_density(0.5 + (f64::from(i) + 0.5) * step, rendered))).sum();
-            assert!((background + depths - 1.0).abs() < 1e-6, "{rendered}: {background} + {depths}");
+            let depths: f64 = (0..40000)
+                .map(|i| {
+                    step * libm::exp(l.log_density(0.5 + (f64::from(i) + 0.5) * step, rendered))
+                })
+                .sum();
+            assert!(
+                (background + depths - 1.0).abs() < 1e-6,
+                "{rendered}: {background} + {depths}"
+            );
         }
     }
 
     #[test]
     fn values_by_hand() {
         let uniform = 0.1 / 4.0;
-        let normal = |z: f64| 0.8 * (-0.5 * z * z).exp() / (0.1 * (2.0 * std::f64::consts::PI).sqrt());
+        let normal =
+            |z: f64| 0.8 * (-0.5 * z * z).exp() / (0.1 * (2.0 * std::f64::consts::PI).sqrt());
         let l = likelihood(vec![1.0, 1.0, INF, INF, f32::NAN, 4.0]);
         let got = l.log_likelihood(&[1.0, INF, 2.0, INF, 3.0, 1.0], 6, 1).unwrap();
-        let want =
-            (normal(0.0) + uniform).ln() + uniform.ln() + 0.1f64.ln() + 0.9f64.ln() + (uniform + normal(30.0)).ln();
+        let want = (normal(0.0) + uniform).ln()
+            + uniform.ln()
+            + 0.1f64.ln()
+            + 0.9f64.ln()
+            + (uniform + normal(30.0)).ln();
         assert!((got - want).abs() < 1e-9, "{got} {want}");
         // Far off costs no more than an outlier, and stays finite.
         assert!(l.log_likelihood(&[1e30, -1e30, 0.0, 0.0, 0.0, 1e38], 6, 1).unwrap().is_finite());
@@ -278,10 +328,15 @@ mod tests {
         let l = likelihood(vec![1.0; n]);
         let mut rng = StreamKey::new(3, 0, Purpose::PREDICT).stream(0, 0, 0);
         let drawn = l.simulate(&vec![2.0; n], &mut rng).unwrap();
-        let share = |f: &dyn Fn(f32) -> bool| drawn.iter().filter(|&&v| f(v)).count() as f64 / n as f64;
+        let share =
+            |f: &dyn Fn(f32) -> bool| drawn.iter().filter(|&&v| f(v)).count() as f64 / n as f64;
         assert!((share(&|v| v == INF) - 0.1).abs() < 0.01);
-        assert!((share(&|v| v.is_finite() && (v - 2.0).abs() > 0.4) - 0.1 * 3.2 / 4.0).abs() < 0.01);
-        assert!((share(&|v| (v - 2.0).abs() < 0.1) - (0.8 * 0.6827 + 0.1 * 0.2 / 4.0)).abs() < 0.015);
+        assert!(
+            (share(&|v| v.is_finite() && (v - 2.0).abs() > 0.4) - 0.1 * 3.2 / 4.0).abs() < 0.01
+        );
+        assert!(
+            (share(&|v| (v - 2.0).abs() < 0.1) - (0.8 * 0.6827 + 0.1 * 0.2 / 4.0)).abs() < 0.015
+        );
     }
 
     #[test]
@@ -296,26 +351,37 @@ mod tests {
             (0.1, 0.1, (0.0, f64::INFINITY)),
             (0.1, 0.1, (2.0, 3.0)),
         ] {
-            assert!(DepthLikelihood::new(&map, sd, outlier, range).is_err(), "{sd} {outlier} {range:?}");
+            assert!(
+                DepthLikelihood::new(&map, sd, outlier, range).is_err(),
+                "{sd} {outlier} {range:?}"
+            );
         }
         assert!(DepthMap::new(2, 2, vec![1.0]).is_err());
     }
 
     #[test]
     fn files_and_sizes() {
-        let grey = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![0u16, 8192]).unwrap();
+        let grey =
+            image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![0u16, 8192]).unwrap();
         let mut png = std::io::Cursor::new(Vec::new());
         image::DynamicImage::ImageLuma16(grey).write_to(&mut png, image::ImageFormat::Png).unwrap();
         let limits = Limits::default();
         let map = decode(png.get_ref(), 4096.0, &limits).unwrap();
         assert_eq!(map.data(), [INF, 2.0]);
         assert!(decode(png.get_ref(), 0.0, &limits).is_err());
-        let body: Vec<u8> = [0.0f32, -1.0, 3.0, f32::NAN].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let body: Vec<u8> =
+            [0.0f32, -1.0, 3.0, f32::NAN].iter().flat_map(|v| v.to_le_bytes()).collect();
         let map = decode(&npy::bytes_of(1, "<f4", "False", "(2, 2)", &body), 1.0, &limits).unwrap();
         assert!(map.data()[..3] == [INF, INF, 3.0] && map.data()[3].is_nan());
         let big = map.resized(4, 4);
-        assert_eq!((big.data()[0], big.data()[5], big.data()[8], big.data()[13]), (INF, INF, 3.0, 3.0));
+        assert_eq!(
+            (big.data()[0], big.data()[5], big.data()[8], big.data()[13]),
+            (INF, INF, 3.0, 3.0)
+        );
         assert_eq!(big.resized(2, 2).data()[2], 3.0);
-        assert!(matches!(load(Path::new("no/such.png"), 1.0).unwrap_err().cause(), VisionError::Missing));
+        assert!(matches!(
+            load(Path::new("no/such.png"), 1.0).unwrap_err().cause(),
+            VisionError::Missing
+        ));
     }
 }

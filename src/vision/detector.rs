@@ -1,5 +1,6 @@
-//! Contour detectors. One is built in, from gradients; those that files describe ([`super::FileDetector`]: structured forests,
-//! networks) and others can take its place behind the trait.
+//! Contour detectors. One is built in, from gradients; those that files describe
+//! ([`super::FileDetector`]: structured forests, networks) and others can take its place
+//! behind the trait.
 
 use super::VisionError;
 use super::color::linear_to_labs;
@@ -11,21 +12,24 @@ use super::resize::fitted;
 
 /// Finds contours in photographs. The same photograph gives the same map, bit by bit.
 pub trait ContourDetector {
-    /// The contours of a photograph. The map may be smaller than the photograph; it has its shape.
+    /// The contours of a photograph. The map may be smaller than the photograph; it has
+    /// its shape.
     ///
     /// # Errors
     /// If the detector cannot work on the photograph: a network may fail while it runs.
     fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError>;
 }
 
-/// Contours as maxima of the colour gradient in L*a*b*. It knows nothing of objects: shadows and textures have edges too.
+/// Contours as maxima of the colour gradient in L*a*b*. It knows nothing of objects:
+/// shadows and textures have edges too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GradientDetector {
     /// Longer side of the picture worked on, pixels; smaller photographs keep their size.
     pub size: u32,
     /// Standard deviation of the smoothing, pixels of the picture worked on.
     pub sigma: f32,
-    /// Points weaker than this are dropped. Thresholds are multiples of the picture's reference gradient.
+    /// Points weaker than this are dropped. Thresholds are multiples of the picture's
+    /// reference gradient.
     pub low: f32,
     /// Points stronger than this are kept, and those hanging together with them.
     pub high: f32,
@@ -37,14 +41,17 @@ impl Default for GradientDetector {
     }
 }
 
-/// Gradients below this many units of L*a*b* a pixel are never contours: half a step of 8-bit grey over a pixel.
+/// Gradients below this many units of L*a*b* a pixel are never contours: half a step of
+/// 8-bit grey over a pixel.
 const FLOOR: f32 = 0.2;
 /// The part of the contour points that are weaker than the reference gradient.
 const REFERENCE_QUANTILE: f64 = 0.9;
-/// Reference gradient of a common photograph, units of L*a*b* a pixel. The reference is the geometric mean of this and the
-/// picture's own, so that a picture of weak edges alone keeps them, but as weaker ones.
+/// Reference gradient of a common photograph, units of L*a*b* a pixel. The reference is
+/// the geometric mean of this and the picture's own, so that a picture of weak edges
+/// alone keeps them, but as weaker ones.
 const COMMON_REFERENCE: f32 = 4.0;
-/// How much more than lightness colour counts: shading and texture change lightness, other objects change colour.
+/// How much more than lightness colour counts: shading and texture change lightness,
+/// other objects change colour.
 const COLOUR_WEIGHT: f32 = 2.0;
 
 impl ContourDetector for GradientDetector {
@@ -72,7 +79,11 @@ impl GradientDetector {
 fn quantile(points: &[EdgePoint], part: f64) -> f32 {
     let mut magnitudes: Vec<f32> = points.iter().map(|p| p.magnitude).collect();
     let at = (part * magnitudes.len().saturating_sub(1) as f64) as usize;
-    if magnitudes.is_empty() { 1.0 } else { *magnitudes.select_nth_unstable_by(at, f32::total_cmp).1 }
+    if magnitudes.is_empty() {
+        1.0
+    } else {
+        *magnitudes.select_nth_unstable_by(at, f32::total_cmp).1
+    }
 }
 
 #[cfg(test)]
@@ -91,7 +102,11 @@ mod tests {
     #[test]
     fn discs_have_their_circle() {
         // The last one differs in colour only.
-        for (a, b) in [([255, 255, 255], [0, 0, 0]), ([90, 90, 90], [120, 120, 120]), ([170, 60, 60], [0, 111, 111])] {
+        for (a, b) in [
+            ([255, 255, 255], [0, 0, 0]),
+            ([90, 90, 90], [120, 120, 120]),
+            ([170, 60, 60], [0, 111, 111]),
+        ] {
             let map = GradientDetector::default().contours(&disc(512, 160.0, a, b));
             assert_eq!((map.width, map.height), (256, 256));
             assert!((450..=700).contains(&map.len()), "{}", map.len());
@@ -136,8 +151,12 @@ mod tests {
     fn brightness_does_not_matter() {
         let strong = GradientDetector::default().contours(&disc(200, 60.0, [255; 3], [60; 3]));
         let weak = GradientDetector::default().contours(&disc(200, 60.0, [120; 3], [100; 3]));
-        let common =
-            weak.to_image().pixels().zip(strong.to_image().pixels()).filter(|(a, b)| a.0[0] > 0 && b.0[0] > 0).count();
+        let common = weak
+            .to_image()
+            .pixels()
+            .zip(strong.to_image().pixels())
+            .filter(|(a, b)| a.0[0] > 0 && b.0[0] > 0)
+            .count();
         assert!(common * 10 > 8 * strong.len(), "{common} {}", strong.len());
     }
 }

@@ -1,7 +1,9 @@
-//! The exact Euclidean distance transform: for every pixel the distance to the nearest set pixel, and which one that is.
-//! Felzenszwalb & Huttenlocher 2012, "Distance transforms of sampled functions", Theory of Computing 8, 415-428: lower envelopes
-//! of parabolas, rows after columns, linear time. Distances are between pixel centres, in pixels, exact up to one rounding. Of
-//! several set pixels as near, the leftmost counts, and of those in one column the upper.
+//! The exact Euclidean distance transform: for every pixel the distance to the nearest
+//! set pixel, and which one that is. Felzenszwalb & Huttenlocher 2012, "Distance
+//! transforms of sampled functions", Theory of Computing 8, 415-428: lower envelopes of
+//! parabolas, rows after columns, linear time. Distances are between pixel centres, in
+//! pixels, exact up to one rounding. Of several set pixels as near, the leftmost counts,
+//! and of those in one column the upper.
 
 use crate::num::simd::vectorised;
 
@@ -14,21 +16,24 @@ pub struct DistanceMap {
     pub height: u32,
     /// Distances, pixels, row by row. Where no pixel is set, all are the map's diagonal.
     pub values: Vec<f32>,
-    /// Index (row * width + column) of a nearest set pixel; `u32::MAX` everywhere where none is set.
+    /// Index (row * width + column) of a nearest set pixel; `u32::MAX` everywhere where
+    /// none is set.
     pub nearest: Vec<u32>,
 }
 
 /// Signed rows to a column without set pixels: farther than any row is.
 const NOWHERE: i32 = i32::MAX / 2;
 
-/// For every pixel the nearest set pixel of its own column, as the number of rows down to it; of two as near the upper one.
+/// For every pixel the nearest set pixel of its own column, as the number of rows down to
+/// it; of two as near the upper one.
 pub(super) struct Columns {
     width: usize,
     away: Vec<i32>,
 }
 
-/// Memory for one row after the other: the parabolas `(x - q)^2 + f(q)` of its lower envelope, from the left. Between columns they
-/// differ by the lines `h - 2 x q` with `h = q^2 + f(q)`.
+/// Memory for one row after the other: the parabolas `(x - q)^2 + f(q)` of its lower
+/// envelope, from the left. Between columns they differ by the lines `h - 2 x q` with
+/// `h = q^2 + f(q)`.
 #[derive(Default)]
 pub(super) struct Envelope {
     q: Vec<f64>,
@@ -36,13 +41,15 @@ pub(super) struct Envelope {
 }
 
 impl Columns {
-    /// The columns of a map of `width` x `height` pixels, at least one; pixels beyond the end of `set` are not set.
+    /// The columns of a map of `width` x `height` pixels, at least one; pixels beyond the
+    /// end of `set` are not set.
     pub fn of(width: usize, height: usize, set: &[bool]) -> Self {
         let mut away = vec![0i32; width * height];
         let (mut above, mut below) = (vec![-NOWHERE; width], vec![NOWHERE; width]);
         let none = vec![false; width];
         let row = |y: usize| set.get(y * width..(y + 1) * width);
-        let last: Vec<bool> = set.iter().skip(set.len() / width * width).copied().chain(none).take(width).collect();
+        let last: Vec<bool> =
+            set.iter().skip(set.len() / width * width).copied().chain(none).take(width).collect();
         let at = |y: usize| row(y).unwrap_or(if y == set.len() / width { &last } else { &[] });
         vectorised(
             #[inline(always)]
@@ -55,19 +62,28 @@ impl Columns {
                 for (y, out) in away.chunks_exact_mut(width).enumerate().rev() {
                     below.iter_mut().for_each(|b| *b += 1);
                     below.iter_mut().zip(at(y)).for_each(|(b, &s)| *b = if s { 0 } else { *b });
-                    out.iter_mut().zip(&below).for_each(|(o, &b)| *o = if b < -*o { b } else { *o });
+                    out.iter_mut()
+                        .zip(&below)
+                        .for_each(|(o, &b)| *o = if b < -*o { b } else { *o });
                 }
             },
         );
         Columns { width, away }
     }
 
-    /// Tells `each` the nearest set pixel (column, rows down to it) of every pixel of a row, from the left; of two as near the left
-    /// one. It is not called where no pixel of the map is set.
+    /// Tells `each` the nearest set pixel (column, rows down to it) of every pixel of a
+    /// row, from the left; of two as near the left one. It is not called where no pixel
+    /// of the map is set.
     ///
-    /// Parabolas on the lower envelope are corners of the lower convex hull of the points `(q, h)`, so no place where two meet has
-    /// to be worked out: all comparisons are of whole numbers, exact in f64 for sides up to 2^17.
-    pub fn nearest(&self, y: usize, envelope: &mut Envelope, mut each: impl FnMut(Option<(usize, i32)>)) {
+    /// Parabolas on the lower envelope are corners of the lower convex hull of the points
+    /// `(q, h)`, so no place where two meet has to be worked out: all comparisons are of
+    /// whole numbers, exact in f64 for sides up to 2^17.
+    pub fn nearest(
+        &self,
+        y: usize,
+        envelope: &mut Envelope,
+        mut each: impl FnMut(Option<(usize, i32)>),
+    ) {
         let Some(away) = self.away.get(y * self.width..(y + 1) * self.width) else { return };
         let Envelope { q, h } = envelope;
         // The last two are kept at hand.
@@ -77,7 +93,9 @@ impl Columns {
         for (column, &a) in away.iter().enumerate().filter(|(_, a)| a.abs() < NOWHERE) {
             let (x, f) = (column as f64, f64::from(a));
             let new = (x, x * x + f * f);
-            while q.len() > 1 && (last.1 - before.1) * (new.0 - last.0) >= (new.1 - last.1) * (last.0 - before.0) {
+            while q.len() > 1
+                && (last.1 - before.1) * (new.0 - last.0) >= (new.1 - last.1) * (last.0 - before.0)
+            {
                 q.pop();
                 h.pop();
                 last = before;
@@ -103,11 +121,20 @@ impl Columns {
         }
     }
 
-    /// As [`Columns::nearest`] with `None` for pixels from which no set pixel is within `reach`, at most [`FARTHEST`]. Much faster
-    /// where set pixels are dense or `reach` is small: columns are looked at from near to far, those of many pixels side by side.
-    pub fn within(&self, y: usize, reach: usize, row: &mut Vec<i32>, mut each: impl FnMut(Option<(usize, i32)>)) {
+    /// As [`Columns::nearest`] with `None` for pixels from which no set pixel is within
+    /// `reach`, at most [`FARTHEST`]. Much faster where set pixels are dense or `reach`
+    /// is small: columns are looked at from near to far, those of many pixels side by
+    /// side.
+    pub fn within(
+        &self,
+        y: usize,
+        reach: usize,
+        row: &mut Vec<i32>,
+        mut each: impl FnMut(Option<(usize, i32)>),
+    ) {
         let Some(away) = self.away.get(y * self.width..(y + 1) * self.width) else { return };
-        // Squared distances, and below them where it is measured to: the least is the nearest, of several the leftmost.
+        // Squared distances, and below them where it is measured to: the least is the
+        // nearest, of several the leftmost.
         let most = reach as i32;
         let bits = (2 * most + 1).ilog2() + 1;
         row.clear();
@@ -144,19 +171,26 @@ impl Columns {
     }
 }
 
-/// The largest reach of [`Columns::within`], pixels: twice its square and its double fit into an `i32`.
+/// The largest reach of [`Columns::within`], pixels: twice its square and its double fit
+/// into an `i32`.
 pub(super) const FARTHEST: usize = 500;
 
 /// Pixels that are worked on side by side.
 const SPAN: usize = 64;
 
-/// The distance transform of a map of `width` x `height` pixels; pixels beyond the end of `set` are not set. When no pixel is
-/// set, all distances are the diagonal and all `nearest` are `u32::MAX`.
+/// The distance transform of a map of `width` x `height` pixels; pixels beyond the end of
+/// `set` are not set. When no pixel is set, all distances are the diagonal and all
+/// `nearest` are `u32::MAX`.
 pub fn distance_transform(width: u32, height: u32, set: &[bool]) -> DistanceMap {
     let (w, h) = (width as usize, height as usize);
     if w * h == 0 || !set.iter().take(w * h).any(|&s| s) {
         let diagonal = libm::hypot(f64::from(width), f64::from(height)) as f32;
-        return DistanceMap { width, height, values: vec![diagonal; w * h], nearest: vec![u32::MAX; w * h] };
+        return DistanceMap {
+            width,
+            height,
+            values: vec![diagonal; w * h],
+            nearest: vec![u32::MAX; w * h],
+        };
     }
     let (mut values, mut nearest) = (Vec::with_capacity(w * h), Vec::with_capacity(w * h));
     let (columns, mut envelope) = (Columns::of(w, h, set), Envelope::default());
@@ -172,10 +206,11 @@ pub fn distance_transform(width: u32, height: u32, set: &[bool]) -> DistanceMap 
 }
 
 impl DistanceMap {
-    /// The distance at a place in pixel coordinates (pixel centres at +0.5) and its derivatives along x and y: bilinear between
-    /// pixel centres. Beyond the outermost centres it is the value at the nearest place between them plus the distance to that
-    /// place, so it is continuous everywhere. At coordinates that are not finite, and in a map without pixels, it is the map's
-    /// diagonal with derivatives 0.
+    /// The distance at a place in pixel coordinates (pixel centres at +0.5) and its
+    /// derivatives along x and y: bilinear between pixel centres. Beyond the outermost
+    /// centres it is the value at the nearest place between them plus the distance to
+    /// that place, so it is continuous everywhere. At coordinates that are not finite,
+    /// and in a map without pixels, it is the map's diagonal with derivatives 0.
     pub fn sample(&self, x: f32, y: f32) -> (f32, f32, f32) {
         let (w, h) = (self.width as usize, self.height as usize);
         if w == 0 || h == 0 || !x.is_finite() || !y.is_finite() {
@@ -209,7 +244,8 @@ mod tests {
     use crate::rng::{Purpose, StreamKey};
 
     fn brute(w: usize, h: usize, set: &[bool]) -> Vec<f32> {
-        let on: Vec<(i64, i64)> = (0..w * h).filter(|&i| set[i]).map(|i| ((i % w) as i64, (i / w) as i64)).collect();
+        let on: Vec<(i64, i64)> =
+            (0..w * h).filter(|&i| set[i]).map(|i| ((i % w) as i64, (i / w) as i64)).collect();
         (0..w * h)
             .map(|i| {
                 let (x, y) = ((i % w) as i64, (i / w) as i64);
@@ -249,14 +285,16 @@ mod tests {
         for (seed, (w, h)) in (0..).zip([(1, 1), (1, 17), (70, 3), (64, 20), (150, 33)]) {
             for (density, reach) in [(0.002, 0), (0.01, 5), (0.2, 3), (0.01, 40), (0.5, FARTHEST)] {
                 let set = random(w, h, density, seed);
-                let (columns, mut envelope, mut line) = (Columns::of(w, h, &set), Envelope::default(), Vec::new());
+                let (columns, mut envelope, mut line) =
+                    (Columns::of(w, h, &set), Envelope::default(), Vec::new());
                 for y in 0..h {
                     let (mut all, mut near) = (Vec::new(), Vec::new());
                     columns.nearest(y, &mut envelope, |found| all.push(found));
                     columns.within(y, reach, &mut line, |found| near.push(found));
                     all.resize(w, None);
-                    let square =
-                        |x: usize, (column, down): (usize, i32)| column.abs_diff(x).pow(2) as i32 + down * down;
+                    let square = |x: usize, (column, down): (usize, i32)| {
+                        column.abs_diff(x).pow(2) as i32 + down * down
+                    };
                     for (x, found) in all.iter_mut().enumerate() {
                         *found = found.filter(|f| square(x, *f) <= (reach * reach) as i32);
                     }
@@ -307,7 +345,10 @@ mod tests {
             let (_, dx, dy) = map.sample(x, y);
             let nx = (map.sample(x + e, y).0 - map.sample(x - e, y).0) / (2.0 * e);
             let ny = (map.sample(x, y + e).0 - map.sample(x, y - e).0) / (2.0 * e);
-            assert!((dx - nx).abs() < 2e-3 && (dy - ny).abs() < 2e-3, "({x}, {y}): {dx} {nx} {dy} {ny}");
+            assert!(
+                (dx - nx).abs() < 2e-3 && (dy - ny).abs() < 2e-3,
+                "({x}, {y}): {dx} {nx} {dy} {ny}"
+            );
             checked += 1;
         }
         assert!(checked > 1500);
@@ -325,6 +366,9 @@ mod tests {
         }
         assert_eq!(map.sample(-9.5, 0.5).0, map.values[0] + 10.0);
         assert_eq!(map.sample(f32::NAN, 0.5).1, 0.0);
-        assert!(map.sample(f32::MAX, f32::MAX).0.is_finite() || map.sample(f32::MAX, f32::MAX).0 == f32::INFINITY);
+        assert!(
+            map.sample(f32::MAX, f32::MAX).0.is_finite()
+                || map.sample(f32::MAX, f32::MAX).0 == f32::INFINITY
+        );
     }
 }

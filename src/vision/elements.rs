@@ -1,12 +1,13 @@
-//! Rendered contours as the comparators read them, and what the comparators have in common: percent of the diagonal, which
-//! elements are in view, and errors. It is not a renderer and knows no meshes. Invariant: an element that is not finite or
-//! lies out of the picture has weight 0, so NaN cannot enter a score.
+//! Rendered contours as the comparators read them, and what the comparators have in
+//! common: percent of the diagonal, which elements are in view, and errors. It is not a
+//! renderer and knows no meshes. Invariant: an element that is not finite or lies out of
+//! the picture has weight 0, so NaN cannot enter a score.
 
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Rendered contour pieces in a frame of `width` x `height` pixels; pixel (0, 0) has its centre at (0.5, 0.5), y down.
-/// If the slices differ in length, the shortest counts.
+/// Rendered contour pieces in a frame of `width` x `height` pixels; pixel (0, 0) has its
+/// centre at (0.5, 0.5), y down. If the slices differ in length, the shortest counts.
 #[derive(Debug, Clone, Copy)]
 pub struct Elements<'a> {
     /// Horizontal positions of the pieces' middles, in pixels.
@@ -38,7 +39,8 @@ pub(super) struct Element {
     pub ty: f32,
     /// Length in pixels, above 0.
     pub length: f32,
-    /// How far it is in view: 1 inside, 0 from half a pixel outside the border, linear between.
+    /// How far it is in view: 1 inside, 0 from half a pixel outside the border, linear
+    /// between.
     pub weight: f32,
     /// Its index in the slices.
     pub index: usize,
@@ -64,7 +66,8 @@ impl Elements<'_> {
     #[inline(always)]
     pub(super) fn in_view(&self) -> impl Iterator<Item = Element> {
         let (w, h) = (self.width as f32, self.height as f32);
-        let lists = self.x.iter().zip(self.y).zip(self.tx.iter().zip(self.ty)).zip(self.length).enumerate();
+        let lists =
+            self.x.iter().zip(self.y).zip(self.tx.iter().zip(self.ty)).zip(self.length).enumerate();
         lists.filter_map(move |(index, (((&x, &y), (&tx, &ty)), &length))| {
             let sound = (x + y + tx + ty + length).is_finite() && length > 0.0;
             let weight = (x.min(w - x).min(y).min(h - y) + 0.5).clamp(0.0, 1.0);
@@ -74,7 +77,8 @@ impl Elements<'_> {
 }
 
 impl Elements<'_> {
-    /// The derivatives by an element's x and y of how far it is in view: in the half pixel at the border, that of the nearest side.
+    /// The derivatives by an element's x and y of how far it is in view: in the half
+    /// pixel at the border, that of the nearest side.
     pub(super) fn view_slope(&self, e: &Element) -> [f64; 2] {
         let (w, h) = (self.width as f32, self.height as f32);
         let sides = [(e.x, 0, 1.0), (w - e.x, 0, -1.0), (e.y, 1, 1.0), (h - e.y, 1, -1.0)];
@@ -88,7 +92,8 @@ impl Elements<'_> {
     }
 }
 
-/// From some rendered contours to others. Contours are told by the address of what stands for them.
+/// From some rendered contours to others. Contours are told by the address of what stands
+/// for them.
 #[derive(Debug, Clone, Copy)]
 pub struct Step<'a> {
     /// Stands for the contours before.
@@ -108,7 +113,8 @@ pub struct Step<'a> {
 impl Step<'_> {
     /// Whether it begins at these contours, and is shorter than beginning from nothing.
     pub(super) fn follows(&self, known: Option<&Arc<()>>) -> bool {
-        self.gone.len() + self.come.len() < self.count && known.is_some_and(|known| Arc::ptr_eq(known, self.from))
+        self.gone.len() + self.come.len() < self.count
+            && known.is_some_and(|known| Arc::ptr_eq(known, self.from))
     }
 
     /// Whether it ends at these contours.
@@ -140,7 +146,9 @@ pub enum ComparatorError {
     #[error("the observed contours are invalid: their lists differ in length")]
     Map,
     /// A quantised picture whose labels do not fit it.
-    #[error("a colour-reduced picture needs one label per pixel, each below the number of colours, 1 to 256")]
+    #[error(
+        "a colour-reduced picture needs one label per pixel, each below the number of colours, 1 to 256"
+    )]
     Labels,
 }
 
@@ -157,7 +165,12 @@ pub(super) fn check_size(width: u32, height: u32) -> Result<(), ComparatorError>
 }
 
 /// An error unless `value` is finite and `holds`.
-pub(super) fn check(option: &'static str, range: &'static str, value: f64, holds: bool) -> Result<(), ComparatorError> {
+pub(super) fn check(
+    option: &'static str,
+    range: &'static str,
+    value: f64,
+    holds: bool,
+) -> Result<(), ComparatorError> {
     if value.is_finite() && holds { Ok(()) } else { Err(ComparatorError::Option { option, range }) }
 }
 
@@ -184,7 +197,8 @@ mod tests {
     #[test]
     fn the_shortest_list_counts() {
         let long: &[f32] = &[1.0; 3];
-        let all = Elements { x: long, y: long, tx: long, ty: long, length: long, width: 9, height: 9 };
+        let all =
+            Elements { x: long, y: long, tx: long, ty: long, length: long, width: 9, height: 9 };
         let two: &[f32] = &[1.0; 2];
         for e in [
             Elements { x: two, ..all },
@@ -201,6 +215,10 @@ mod tests {
     #[test]
     fn sizes() {
         assert_eq!(diagonal(3, 4), 5.0);
-        assert!(check_size(0, 4).is_err() && check_size(4, 16385).is_err() && check_size(1, 16384).is_ok());
+        assert!(
+            check_size(0, 4).is_err()
+                && check_size(4, 16385).is_err()
+                && check_size(1, 16384).is_ok()
+        );
     }
 }

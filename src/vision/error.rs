@@ -1,4 +1,5 @@
-//! What can go wrong with a picture or an array of pixels. Messages say what was wrong with the input, in the user's words.
+//! What can go wrong with a picture or an array of pixels. Messages say what was wrong
+//! with the input, in the user's words.
 
 use std::path::{Path, PathBuf};
 
@@ -61,7 +62,8 @@ pub enum VisionError {
     /// A `.npy` file that cannot be used.
     #[error("not a usable .npy array: {0}")]
     Npy(String),
-    /// A file of a contour detector that cannot be used, or a detector that failed on a picture.
+    /// A file of a contour detector that cannot be used, or a detector that failed on a
+    /// picture.
     #[error("{0}")]
     Detector(String),
     /// Two pictures that should be of one size are not.

@@ -1,5 +1,6 @@
-//! The one thing a camera writes into a picture that helps to place it: the focal length as on 35 mm film (Exif 2.3, tag 0xA405).
-//! Not a general Exif reader. Damaged metadata are the same as none: they never make a picture unreadable.
+//! The one thing a camera writes into a picture that helps to place it: the focal length
+//! as on 35 mm film (Exif 2.3, tag 0xA405). Not a general Exif reader. Damaged metadata
+//! are the same as none: they never make a picture unreadable.
 
 /// TIFF bytes with a byte order.
 struct Tiff<'a> {
@@ -30,7 +31,8 @@ impl Tiff<'_> {
     }
 }
 
-/// The focal length in mm on 35 mm film of an Exif chunk (a TIFF structure), where it says one.
+/// The focal length in mm on 35 mm film of an Exif chunk (a TIFF structure), where it
+/// says one.
 pub fn focal_35mm(chunk: &[u8]) -> Option<f64> {
     let chunk = chunk.strip_prefix(b"Exif\0\0").unwrap_or(chunk);
     let big = match chunk.get(..4)? {
@@ -81,7 +83,8 @@ mod tests {
     fn damaged_chunks_are_none() {
         let good = chunk(6, 35);
         for n in 0..good.len() - 4 {
-            // The last four bytes (next directory) are not needed; the value itself ends right before them.
+            // The last four bytes (next directory) are not needed; the value itself ends
+            // right before them.
             let cut = focal_35mm(&good[..n]);
             assert!(cut.is_none() || n >= good.len() - 6, "{n}");
         }

@@ -1,9 +1,12 @@
-//! Features of pictures: short lists of numbers by which pictures that look alike are found.
+//! Features of pictures: short lists of numbers by which pictures that look alike are
+//! found.
 //!
-//! Contours give pooled distances to the nearest contour, and oriented histograms of contour length in cells as HOG has them
-//! (Dalal & Triggs 2005); keypoints give their positions. The same functions serve rendered and observed pictures, in units of
-//! the longer side about the picture's middle, so that sizes need not agree. Not a comparator: nothing here is a density.
-//! Invariant: features are finite, and as many whatever the picture.
+//! Contours give pooled distances to the nearest contour, and oriented histograms of
+//! contour length in cells as HOG has them (Dalal & Triggs 2005); keypoints give their
+//! positions. The same functions serve rendered and observed pictures, in units of the
+//! longer side about the picture's middle, so that sizes need not agree. Not a
+//! comparator: nothing here is a density. Invariant: features are finite, and as many
+//! whatever the picture.
 
 use super::{ContourMap, Elements, distance_transform};
 
@@ -11,7 +14,8 @@ use super::{ContourMap, Elements, distance_transform};
 const SIDE: usize = 64;
 /// Distances are averaged over blocks of so many pixels.
 const POOL: usize = 4;
-/// Distances beyond this, in pixels of that square, are as far as can be: a sixth of the picture.
+/// Distances beyond this, in pixels of that square, are as far as can be: a sixth of the
+/// picture.
 const FAR: f32 = 10.0;
 /// Cells along a side, and orientations in a cell, of the histograms.
 const CELLS: usize = 8;
@@ -19,11 +23,13 @@ const ORIENTATIONS: usize = 4;
 /// The number of features of contours.
 pub const CONTOUR_FEATURES: usize = (SIDE / POOL) * (SIDE / POOL) + CELLS * CELLS * ORIENTATIONS;
 
-/// How far a picture may be moved to look more like another, in units of its longer side, and the sizes it may take.
+/// How far a picture may be moved to look more like another, in units of its longer side,
+/// and the sizes it may take.
 const SHIFTS: [f32; 3] = [0.0, -0.05, 0.05];
 const SCALES: [f32; 3] = [1.0, 0.9, 1.11];
 
-/// A short piece of contour, in units of the picture's longer side, from its middle; x to the right, y down.
+/// A short piece of contour, in units of the picture's longer side, from its middle; x to
+/// the right, y down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
     /// Its middle.
@@ -34,7 +40,8 @@ pub struct Stroke {
     pub length: f32,
 }
 
-/// A place of a picture of some size in pixels, in units of its longer side from its middle.
+/// A place of a picture of some size in pixels, in units of its longer side from its
+/// middle.
 fn centred(x: f32, y: f32, width: u32, height: u32) -> [f32; 2] {
     let longer = width.max(height).max(1) as f32;
     [(x - width as f32 / 2.0) / longer, (y - height as f32 / 2.0) / longer]
@@ -63,9 +70,10 @@ pub fn observed(m: &ContourMap) -> Vec<Stroke> {
     lists.map(stroke).collect()
 }
 
-/// The features of contours: [`CONTOUR_FEATURES`] numbers. Pooled distances first, from 0 on a contour to 1 far from any,
-/// together weighed as one number; then the square roots of the shares of the length in each cell and orientation, whose squares
-/// sum to 1 where there are contours.
+/// The features of contours: [`CONTOUR_FEATURES`] numbers. Pooled distances first, from 0
+/// on a contour to 1 far from any, together weighed as one number; then the square roots
+/// of the shares of the length in each cell and orientation, whose squares sum to 1 where
+/// there are contours.
 pub fn contour_features(strokes: &[Stroke]) -> Vec<f32> {
     features_of(strokes, &turns(strokes))
 }
@@ -98,13 +106,15 @@ fn pooled_distances(strokes: &[Stroke]) -> Vec<f32> {
     let blocks = SIDE / POOL;
     let mut pooled = vec![0.0; blocks * blocks];
     for (i, d) in distances.iter().enumerate() {
-        pooled[i / SIDE / POOL * blocks + i % SIDE / POOL] += d.min(FAR) / (FAR * (POOL * POOL) as f32);
+        pooled[i / SIDE / POOL * blocks + i % SIDE / POOL] +=
+            d.min(FAR) / (FAR * (POOL * POOL) as f32);
     }
     let weight = 1.0 / blocks as f32;
     pooled.iter().map(|p| p * weight).collect()
 }
 
-/// Length by cell and orientation, each piece shared between the nearest cells and orientations.
+/// Length by cell and orientation, each piece shared between the nearest cells and
+/// orientations.
 fn histograms(strokes: &[Stroke], turns: &[f32]) -> Vec<f32> {
     let mut lengths = vec![0.0f32; CELLS * CELLS * ORIENTATIONS];
     let sound = |s: &Stroke| (s.at[0] + s.at[1] + s.along[0] + s.along[1] + s.length).is_finite();
@@ -118,7 +128,8 @@ fn histograms(strokes: &[Stroke], turns: &[f32]) -> Vec<f32> {
                 }
                 for (o, wo) in split(turn) {
                     let bin = o.rem_euclid(ORIENTATIONS as i32) as usize;
-                    lengths[(row as usize * CELLS + column as usize) * ORIENTATIONS + bin] += s.length * wx * wy * wo;
+                    lengths[(row as usize * CELLS + column as usize) * ORIENTATIONS + bin] +=
+                        s.length * wx * wy * wo;
                 }
             }
         }
@@ -136,12 +147,19 @@ fn split(x: f32) -> [(i32, f32); 2] {
     [(low as i32, 1.0 - (x - low)), (low as i32 + 1, x - low)]
 }
 
-/// The features of keypoints, some of which may be missing: positions in pixels of a picture.
+/// The features of keypoints, some of which may be missing: positions in pixels of a
+/// picture.
 pub fn keypoint_features(points: &[Option<[f64; 2]>], width: u32, height: u32) -> Vec<f32> {
     // What is not there is in the middle, and what is far off is far.
     let near = |x: f64| x.clamp(-1e9, 1e9) as f32;
-    let at = |p: &Option<[f64; 2]>| p.map_or([0.0; 2], |p| centred(near(p[0]), near(p[1]), width, height));
-    points.iter().flat_map(at).map(|v| if v.is_finite() { v.clamp(-10.0, 10.0) } else { 0.0 }).collect()
+    let at = |p: &Option<[f64; 2]>| {
+        p.map_or([0.0; 2], |p| centred(near(p[0]), near(p[1]), width, height))
+    };
+    points
+        .iter()
+        .flat_map(at)
+        .map(|v| if v.is_finite() { v.clamp(-10.0, 10.0) } else { 0.0 })
+        .collect()
 }
 
 /// An observed picture that others are compared with.
@@ -159,8 +177,9 @@ impl Query {
         Query { weights: vec![1.0; features.len()], variants: vec![features] }
     }
 
-    /// Contours, compared also after small shifts (a twentieth of the longer side) and changes of size (a tenth): a scene of
-    /// the right shape should be found though it is not quite in the right place.
+    /// Contours, compared also after small shifts (a twentieth of the longer side) and
+    /// changes of size (a tenth): a scene of the right shape should be found though it is
+    /// not quite in the right place.
     pub fn contours(strokes: &[Stroke]) -> Query {
         let turns = turns(strokes);
         let moved = |(dx, dy, scale): (f32, f32, f32)| {
@@ -170,11 +189,19 @@ impl Query {
         Query { variants: movements().map(moved).collect(), weights: vec![1.0; CONTOUR_FEATURES] }
     }
 
-    /// Keypoints with the confidence in each, compared also after the same movements. Missing ones do not count.
-    pub fn keypoints(points: &[Option<[f64; 2]>], confidence: &[f64], width: u32, height: u32) -> Query {
+    /// Keypoints with the confidence in each, compared also after the same movements.
+    /// Missing ones do not count.
+    pub fn keypoints(
+        points: &[Option<[f64; 2]>],
+        confidence: &[f64],
+        width: u32,
+        height: u32,
+    ) -> Query {
         let here = keypoint_features(points, width, height);
         let moved = |(dx, dy, scale): (f32, f32, f32)| {
-            here.chunks(2).flat_map(|p| [p[0] * scale + dx, p.get(1).map_or(0.0, |y| y * scale + dy)]).collect()
+            here.chunks(2)
+                .flat_map(|p| [p[0] * scale + dx, p.get(1).map_or(0.0, |y| y * scale + dy)])
+                .collect()
         };
         let weight = |(i, p): (usize, &Option<[f64; 2]>)| match p {
             Some(_) => [confidence.get(i).map_or(1.0, |c| *c as f32); 2],
@@ -197,7 +224,8 @@ impl Query {
     /// The squared distance to features of the same kind: of all variants the least.
     pub fn distance(&self, features: &[f32]) -> f32 {
         let to = |v: &Vec<f32>| -> f32 {
-            let terms = v.iter().zip(features).zip(&self.weights).map(|((a, b), w)| w * (a - b) * (a - b));
+            let terms =
+                v.iter().zip(features).zip(&self.weights).map(|((a, b), w)| w * (a - b) * (a - b));
             // NaN, from a detector of the user's, is far from everything.
             Some(terms.sum::<f32>()).filter(|d| !d.is_nan()).unwrap_or(f32::INFINITY)
         };
@@ -207,7 +235,9 @@ impl Query {
 
 /// Shifts and sizes that are tried, the picture as it is first.
 fn movements() -> impl Iterator<Item = (f32, f32, f32)> {
-    SCALES.into_iter().flat_map(|s| SHIFTS.into_iter().flat_map(move |x| SHIFTS.into_iter().map(move |y| (x, y, s))))
+    SCALES.into_iter().flat_map(|s| {
+        SHIFTS.into_iter().flat_map(move |x| SHIFTS.into_iter().map(move |y| (x, y, s)))
+    })
 }
 
 #[cfg(test)]
@@ -260,7 +290,8 @@ mod tests {
         // The second one is on the border: half of it is in view.
         let (x, y): (&[f32], &[f32]) = (&[64.0, 0.0], &[25.0, 50.0]);
         let (tx, ty): (&[f32], &[f32]) = (&[1.0, 0.0], &[0.0, 1.0]);
-        let drawn = rendered(&Elements { x, y, tx, ty, length: &[2.0, 1.0], width: 128, height: 100 });
+        let drawn =
+            rendered(&Elements { x, y, tx, ty, length: &[2.0, 1.0], width: 128, height: 100 });
         let inside = Stroke { at: [0.0, -0.1953125], along: [1.0, 0.0], length: 2.0 / 128.0 };
         let border = Stroke { at: [-0.5, 0.0], along: [0.0, 1.0], length: 0.5 / 128.0 };
         assert_eq!(drawn, [inside, border]);
@@ -279,9 +310,13 @@ mod tests {
         let q = Query::contours(&here);
         let to = |x: f32, r: f32| q.distance(&contour_features(&circle(x, 64.0, r, 128, 128)));
         assert_eq!(to(64.0, 30.0), 0.0);
-        assert!(to(64.0, 30.0) < to(68.0, 30.0) && to(68.0, 30.0) < to(80.0, 30.0) && to(80.0, 30.0) < to(80.0, 10.0));
-        let stiff =
-            Query::new(contour_features(&here)).distance(&contour_features(&circle(70.4, 64.0, 30.0, 128, 128)));
+        assert!(
+            to(64.0, 30.0) < to(68.0, 30.0)
+                && to(68.0, 30.0) < to(80.0, 30.0)
+                && to(80.0, 30.0) < to(80.0, 10.0)
+        );
+        let stiff = Query::new(contour_features(&here))
+            .distance(&contour_features(&circle(70.4, 64.0, 30.0, 128, 128)));
         assert!(to(70.4, 30.0) < 0.2 * stiff, "{} against {stiff}", to(70.4, 30.0));
     }
 
@@ -315,7 +350,8 @@ mod tests {
     #[test]
     fn missing_keypoints_do_not_count() {
         let q = Query::keypoints(&[Some([50.0, 50.0]), None], &[1.0, 1.0], 100, 100);
-        let there = |second: Option<[f64; 2]>| keypoint_features(&[Some([50.0, 50.0]), second], 100, 100);
+        let there =
+            |second: Option<[f64; 2]>| keypoint_features(&[Some([50.0, 50.0]), second], 100, 100);
         assert_eq!(q.distance(&there(Some([0.0, 0.0]))), 0.0);
         assert_eq!(q.distance(&there(None)), 0.0);
         assert!(q.distance(&keypoint_features(&[Some([80.0, 50.0]), None], 100, 100)) > 0.01);

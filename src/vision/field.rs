@@ -1,12 +1,14 @@
-//! Distance to the observed contours as a grid of samples, in percent of the picture's diagonal. The grid is at least
-//! [`FIELD_SIDE`] samples on its longer side whatever the frame, so that a coarse frame reads the same distances as a fine one.
-//! Not a detector, and no likelihood. Invariant: every sample is finite, within 0..=100, and reading is continuous.
+//! Distance to the observed contours as a grid of samples, in percent of the picture's
+//! diagonal. The grid is at least [`FIELD_SIDE`] samples on its longer side whatever the
+//! frame, so that a coarse frame reads the same distances as a fine one. Not a detector,
+//! and no likelihood. Invariant: every sample is finite, within 0..=100, and reading is
+//! continuous.
 
 use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, check_size, diagonal};
 
-/// Least number of samples on the longer side of a field. At 256, reading |d| bilinearly is wrong by 0.1 % of the diagonal
-/// at most.
+/// Least number of samples on the longer side of a field. At 256, reading |d| bilinearly
+/// is wrong by 0.1 % of the diagonal at most.
 pub const FIELD_SIDE: u32 = 256;
 
 /// Number of orientation channels, `PI / 8` apart.
@@ -59,7 +61,8 @@ pub(super) struct Edges {
     pub sy: f32,
     /// Percent of the diagonal per grid unit.
     pub percent: f32,
-    /// The points, in the order of the map, those that are not finite or out of the picture left out.
+    /// The points, in the order of the map, those that are not finite or out of the
+    /// picture left out.
     pub edges: Vec<Edge>,
 }
 
@@ -72,7 +75,8 @@ impl Edges {
             return Err(ComparatorError::Map);
         }
         let longer = width.max(height);
-        let scale = if longer < FIELD_SIDE { f64::from(FIELD_SIDE) / f64::from(longer) } else { 1.0 };
+        let scale =
+            if longer < FIELD_SIDE { f64::from(FIELD_SIDE) / f64::from(longer) } else { 1.0 };
         let side = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
         let (gw, gh) = (side(width), side(height));
         let mx = gw as f32 / map.width.max(1) as f32;
@@ -87,12 +91,20 @@ impl Edges {
                 continue;
             }
             let (tx, ty) = (ux / norm, uy / norm);
-            // A pixel of the map is as long as the line that crosses it: 1 along an axis, sqrt 2 along a diagonal.
+            // A pixel of the map is as long as the line that crosses it: 1 along an axis,
+            // sqrt 2 along a diagonal.
             let half = 0.5 * norm / map.tx[i].abs().max(map.ty[i].abs());
             edges.push(Edge { x, y, tx, ty, half, turn: channel(tx, ty) });
         }
         let percent = (100.0 / diagonal(gw, gh)) as f32;
-        Ok(Edges { width: gw, height: gh, sx: gw as f32 / width as f32, sy: gh as f32 / height as f32, percent, edges })
+        Ok(Edges {
+            width: gw,
+            height: gh,
+            sx: gw as f32 / width as f32,
+            sy: gh as f32 / height as f32,
+            percent,
+            edges,
+        })
     }
 
     /// Where a point of the frame lies between the grid's samples.
@@ -105,7 +117,11 @@ impl Edges {
         let whole = |v: f32| v as i32 as usize;
         let (x0, y0) = (whole(gx).min(w.saturating_sub(2)), whole(gy).min(h.saturating_sub(2)));
         let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
-        Corners { at: [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1], fx: gx - x0 as f32, fy: gy - y0 as f32 }
+        Corners {
+            at: [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1],
+            fx: gx - x0 as f32,
+            fy: gy - y0 as f32,
+        }
     }
 }
 

@@ -1,5 +1,6 @@
-//! The gradient of a colour picture: smoothing and differentiation by Gaussians, and the structure tensor over the channels
-//! (Di Zenzo 1986, "A note on the gradient of a multi-image", CVGIP 33, 116-125). Beyond the border the picture is mirrored.
+//! The gradient of a colour picture: smoothing and differentiation by Gaussians, and the
+//! structure tensor over the channels (Di Zenzo 1986, "A note on the gradient of a
+//! multi-image", CVGIP 33, 116-125). Beyond the border the picture is mirrored.
 
 use crate::num::simd::vectorised;
 
@@ -12,20 +13,23 @@ pub struct Gradient {
     pub height: u32,
     /// Root of the tensor's larger eigenvalue: change per pixel, at least 0.
     pub magnitude: Vec<f32>,
-    /// The structure tensor, `[xx, xy, yy]`: squares of change per pixel, added up over the channels.
+    /// The structure tensor, `[xx, xy, yy]`: squares of change per pixel, added up over
+    /// the channels.
     pub tensor: Vec<[f32; 3]>,
 }
 
 impl Gradient {
-    /// The direction of most change as a unit vector (its sign means nothing). Worked out when it is asked for, which is at few
-    /// pixels; there is none beyond the picture, where it is to the right.
+    /// The direction of most change as a unit vector (its sign means nothing). Worked out
+    /// when it is asked for, which is at few pixels; there is none beyond the picture,
+    /// where it is to the right.
     pub fn normal(&self, pixel: usize) -> [f32; 2] {
         self.tensor.get(pixel).map_or([1.0, 0.0], |&[a, b, c]| principal(a, b, c).1)
     }
 }
 
-/// Samples of a Gaussian at `-r..=r`, sum 1, and of its derivative, exact on straight ramps; `r` is three standard deviations.
-/// Deviations outside 0.1..=100 pixels are taken to be its ends.
+/// Samples of a Gaussian at `-r..=r`, sum 1, and of its derivative, exact on straight
+/// ramps; `r` is three standard deviations. Deviations outside 0.1..=100 pixels are taken
+/// to be its ends.
 fn kernels(sigma: f32) -> (Vec<f64>, Vec<f64>) {
     let s = if sigma.is_nan() { 0.1 } else { f64::from(sigma).clamp(0.1, 100.0) };
     let r = (3.0 * s).ceil() as i32;
@@ -46,8 +50,8 @@ pub(super) fn mirrored(i: i64, n: i64) -> usize {
 /// Values that a filter works on side by side.
 const LANES: usize = 16;
 
-/// Sums `line[i + k] * kernel[k]` over k into `out[i]`, in the order of k and in double precision. `line` has room for a kernel and
-/// for whole lanes beyond `out`.
+/// Sums `line[i + k] * kernel[k]` over k into `out[i]`, in the order of k and in double
+/// precision. `line` has room for a kernel and for whole lanes beyond `out`.
 #[inline(always)]
 fn convolve(line: &[f64], kernel: &[f64], out: &mut [f32]) {
     for (n, out) in out.chunks_mut(LANES).enumerate() {
@@ -62,14 +66,18 @@ fn convolve(line: &[f64], kernel: &[f64], out: &mut [f32]) {
 /// Rows filtered by a kernel of odd length.
 fn along_rows(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
     let reach = kernel.len() / 2;
-    let source: Vec<usize> = (0..width + 2 * reach).map(|i| mirrored(i as i64 - reach as i64, width as i64)).collect();
+    let source: Vec<usize> =
+        (0..width + 2 * reach).map(|i| mirrored(i as i64 - reach as i64, width as i64)).collect();
     let mut line = vec![0.0f64; source.len() + LANES];
     let mut out = vec![0.0f32; data.len()];
     vectorised(
         #[inline(always)]
         || {
             for (row, out) in data.chunks_exact(width).zip(out.chunks_exact_mut(width)) {
-                line[reach..reach + width].iter_mut().zip(row).for_each(|(l, v)| *l = f64::from(*v));
+                line[reach..reach + width]
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(l, v)| *l = f64::from(*v));
                 for i in (0..reach).chain(reach + width..source.len()) {
                     line[i] = f64::from(row[source[i]]);
                 }
@@ -134,8 +142,14 @@ fn most(a: f32, b: f32, c: f32) -> f32 {
     (0.5 * (a + c + libm::hypot(a - c, 2.0 * b))) as f32
 }
 
-/// The gradient of a picture of several channels, smoothed by a Gaussian of `sigma` pixels.
-pub fn colour_gradient<const N: usize>(width: u32, height: u32, pixels: &[[f32; N]], sigma: f32) -> Gradient {
+/// The gradient of a picture of several channels, smoothed by a Gaussian of `sigma`
+/// pixels.
+pub fn colour_gradient<const N: usize>(
+    width: u32,
+    height: u32,
+    pixels: &[[f32; N]],
+    sigma: f32,
+) -> Gradient {
     let mut tensor = vec![[0.0f32; 3]; pixels.len()];
     for c in 0..N {
         let channel: Vec<f32> = pixels.iter().map(|p| p[c]).collect();
@@ -180,7 +194,8 @@ mod tests {
             kernel.iter().zip(-reach..).fold(0.0, |s, (c, k)| s + c * f64::from(at(k))) as f32
         };
         for (w, h) in [(1usize, 1usize), (3, 2), (16, 7), (37, 23)] {
-            let data: Vec<f32> = (0..w * h).map(|i| ((i * 7919) % 613) as f32 / 7.0 - 40.0).collect();
+            let data: Vec<f32> =
+                (0..w * h).map(|i| ((i * 7919) % 613) as f32 / 7.0 - 40.0).collect();
             let (rows, columns) = (along_rows(w, &data, &slope), along_columns(w, &data, &smooth));
             for i in 0..w * h {
                 let (x, y) = ((i % w) as i64, (i / w) as i64);
@@ -194,12 +209,16 @@ mod tests {
     #[test]
     fn opposite_channels_do_not_cancel() {
         // A step of equal luminance: the mean of the channels is flat.
-        let data: Vec<[f32; 2]> = (0..400).map(|i| if i % 20 < 10 { [0.0, 8.0] } else { [8.0, 0.0] }).collect();
+        let data: Vec<[f32; 2]> =
+            (0..400).map(|i| if i % 20 < 10 { [0.0, 8.0] } else { [8.0, 0.0] }).collect();
         let g = colour_gradient(20, 20, &data, 1.0);
         let one: Vec<[f32; 1]> = data.iter().map(|p| [p[0]]).collect();
         let single = colour_gradient(20, 20, &one, 1.0);
         let k = 10 * 20 + 10;
-        assert!((g.magnitude[k] - 2f32.sqrt() * single.magnitude[k]).abs() < 1e-4 && g.magnitude[k] > 3.0);
+        assert!(
+            (g.magnitude[k] - 2f32.sqrt() * single.magnitude[k]).abs() < 1e-4
+                && g.magnitude[k] > 3.0
+        );
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! Masks: which pixels show the object, and how likely an observed mask is given a rendered one.
-//! Not segmentation: masks come from files or from elsewhere in the program.
+//! Masks: which pixels show the object, and how likely an observed mask is given a
+//! rendered one. Not segmentation: masks come from files or from elsewhere in the
+//! program.
 
 use super::error::{VisionError, read_bytes};
 use super::photo::{Limits, decode_dynamic};
@@ -39,7 +40,8 @@ impl Mask {
         &self.data
     }
 
-    /// The mask at another size (at least 1 x 1): a pixel is on the object when at least half of its area is.
+    /// The mask at another size (at least 1 x 1): a pixel is on the object when at least
+    /// half of its area is.
     pub fn resized(&self, width: u32, height: u32) -> Mask {
         let (width, height) = (width.max(1), height.max(1));
         if (width, height) == (self.width, self.height) {
@@ -56,8 +58,9 @@ impl Mask {
     }
 }
 
-/// Reads a mask from a PNG or JPEG (bright pixels are the object; where the picture has transparent pixels, opaque ones are) or a
-/// `.npy` array of two axes (bool: true; numbers: above half of the kind's range, 127 for uint8 and 0.5 for floats, or above 0
+/// Reads a mask from a PNG or JPEG (bright pixels are the object; where the picture has
+/// transparent pixels, opaque ones are) or a `.npy` array of two axes (bool: true;
+/// numbers: above half of the kind's range, 127 for uint8 and 0.5 for floats, or above 0
 /// for uint8 arrays with nothing above 1).
 pub fn load(path: &Path) -> Result<Mask, VisionError> {
     let limits = Limits::default();
@@ -93,8 +96,9 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Mask, VisionError> {
     Mask::new(width, height, grey.pixels().map(|p| p.0[0] >= 128).collect())
 }
 
-/// How likely an observed mask is given a rendered one: every pixel is observed wrongly on its own, with one probability on the
-/// rendered object and another beside it. A density over all masks of one size (their probabilities sum to 1).
+/// How likely an observed mask is given a rendered one: every pixel is observed wrongly
+/// on its own, with one probability on the rendered object and another beside it. A
+/// density over all masks of one size (their probabilities sum to 1).
 #[derive(Clone, Debug)]
 pub struct MaskLikelihood {
     observed: Mask,
@@ -103,8 +107,9 @@ pub struct MaskLikelihood {
 }
 
 impl MaskLikelihood {
-    /// The likelihood of `observed` at its own size. `eps_in`: probability that a pixel of the rendered object is observed as
-    /// background; `eps_out`: that a pixel beside it is observed as object. Both strictly between 0 and 1.
+    /// The likelihood of `observed` at its own size. `eps_in`: probability that a pixel
+    /// of the rendered object is observed as background; `eps_out`: that a pixel beside
+    /// it is observed as object. Both strictly between 0 and 1.
     pub fn new(observed: &Mask, eps_in: f64, eps_out: f64) -> Result<Self, VisionError> {
         for (name, value) in [("eps_in", eps_in), ("eps_out", eps_out)] {
             if !(value > 0.0 && value < 1.0) {
@@ -114,7 +119,8 @@ impl MaskLikelihood {
         Ok(MaskLikelihood { observed: observed.clone(), eps_in, eps_out })
     }
 
-    /// The same at the size that is rendered, once: a pixel is observed on the object when at least half of its area is.
+    /// The same at the size that is rendered, once: a pixel is observed on the object
+    /// when at least half of its area is.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         MaskLikelihood { observed: self.observed.resized(width, height), ..*self }
     }
@@ -127,13 +133,22 @@ impl MaskLikelihood {
     fn check(&self, pixels: usize, width: u32, height: u32) -> Result<(), VisionError> {
         let own = &self.observed;
         if (own.width, own.height) != (width, height) || pixels != own.data.len() {
-            return Err(VisionError::size(own.width, own.height, format!("{width} x {height} ({pixels} pixels)")));
+            return Err(VisionError::size(
+                own.width,
+                own.height,
+                format!("{width} x {height} ({pixels} pixels)"),
+            ));
         }
         Ok(())
     }
 
     /// Log probability of the observed mask given a rendered one of the same size.
-    pub fn log_likelihood(&self, rendered: &[bool], width: u32, height: u32) -> Result<f64, VisionError> {
+    pub fn log_likelihood(
+        &self,
+        rendered: &[bool],
+        width: u32,
+        height: u32,
+    ) -> Result<f64, VisionError> {
         self.check(rendered.len(), width, height)?;
         let mut counts = [[0u64; 2]; 2];
         for (&r, &o) in rendered.iter().zip(&self.observed.data) {
@@ -147,20 +162,32 @@ impl MaskLikelihood {
 
     /// For each pixel, how much the log probability grows if the object covers it.
     pub fn gains(&self) -> Vec<f64> {
-        let (seen, unseen) =
-            (libm::log1p(-self.eps_in) - libm::log(self.eps_out), libm::log(self.eps_in) - libm::log1p(-self.eps_out));
+        let (seen, unseen) = (
+            libm::log1p(-self.eps_in) - libm::log(self.eps_out),
+            libm::log(self.eps_in) - libm::log1p(-self.eps_out),
+        );
         self.observed.data.iter().map(|o| if *o { seen } else { unseen }).collect()
     }
 
-    /// Log probability of the observed mask given the part of every pixel that the rendered object covers (0..=1): a pixel half
-    /// covered is a toss between the two cases. Values of 0 and 1 give [`MaskLikelihood::log_likelihood`].
-    pub fn log_likelihood_coverage(&self, coverage: &[f32], width: u32, height: u32) -> Result<f64, VisionError> {
+    /// Log probability of the observed mask given the part of every pixel that the
+    /// rendered object covers (0..=1): a pixel half covered is a toss between the two
+    /// cases. Values of 0 and 1 give [`MaskLikelihood::log_likelihood`].
+    pub fn log_likelihood_coverage(
+        &self,
+        coverage: &[f32],
+        width: u32,
+        height: u32,
+    ) -> Result<f64, VisionError> {
         self.check(coverage.len(), width, height)?;
         let mut sum = 0.0;
         for (&c, &o) in coverage.iter().zip(&self.observed.data) {
             let c = f64::from(c);
             if !(0.0..=1.0).contains(&c) {
-                return Err(VisionError::Range { name: "coverage", rule: "between 0 and 1", value: c });
+                return Err(VisionError::Range {
+                    name: "coverage",
+                    rule: "between 0 and 1",
+                    value: c,
+                });
             }
             let (hit, miss) = match o {
                 true => (1.0 - self.eps_in, self.eps_out),
@@ -174,8 +201,10 @@ impl MaskLikelihood {
     /// A mask drawn given a rendered one of the same size.
     pub fn simulate(&self, rendered: &[bool], rng: &mut Stream) -> Result<Mask, VisionError> {
         self.check(rendered.len(), self.observed.width, self.observed.height)?;
-        let data =
-            rendered.iter().map(|&r| (rng.uniform() < if r { self.eps_in } else { self.eps_out }) != r).collect();
+        let data = rendered
+            .iter()
+            .map(|&r| (rng.uniform() < if r { self.eps_in } else { self.eps_out }) != r)
+            .collect();
         Ok(Mask { data, ..self.observed })
     }
 }
@@ -195,7 +224,8 @@ mod tests {
             let l = MaskLikelihood::new(&mask, 0.07, 0.2).unwrap();
             a += libm::exp(l.log_likelihood(&hard, 3, 2).unwrap());
             b += libm::exp(l.log_likelihood_coverage(&soft, 3, 2).unwrap());
-            let same = l.log_likelihood_coverage(&hard.map(|h| f32::from(u8::from(h))), 3, 2).unwrap();
+            let same =
+                l.log_likelihood_coverage(&hard.map(|h| f32::from(u8::from(h))), 3, 2).unwrap();
             assert!((same - l.log_likelihood(&hard, 3, 2).unwrap()).abs() < 1e-12);
         }
         assert!((a - 1.0).abs() < 1e-12 && (b - 1.0).abs() < 1e-12);
@@ -204,11 +234,14 @@ mod tests {
     #[test]
     fn draws_have_the_stated_rates() {
         let rendered: Vec<bool> = (0..200 * 200).map(|i| i % 200 < 100).collect();
-        let l = MaskLikelihood::new(&Mask::new(200, 200, rendered.clone()).unwrap(), 0.1, 0.03).unwrap();
+        let l = MaskLikelihood::new(&Mask::new(200, 200, rendered.clone()).unwrap(), 0.1, 0.03)
+            .unwrap();
         let mut rng = StreamKey::new(1, 0, Purpose::PREDICT).stream(0, 0, 0);
         let drawn = l.simulate(&rendered, &mut rng).unwrap();
-        let wrong =
-            |on: bool| (0..40000).filter(|&i| rendered[i] == on && drawn.data[i] != on).count() as f64 / 20000.0;
+        let wrong = |on: bool| {
+            (0..40000).filter(|&i| rendered[i] == on && drawn.data[i] != on).count() as f64
+                / 20000.0
+        };
         // Standard errors are 0.0021 and 0.0012.
         assert!((wrong(true) - 0.1).abs() < 0.01 && (wrong(false) - 0.03).abs() < 0.006);
     }
@@ -226,7 +259,11 @@ mod tests {
         assert!(l.log_likelihood(&[true], 2, 1).is_err());
         assert!(l.log_likelihood_coverage(&[f32::NAN, 0.0], 2, 1).is_err());
         assert!(l.resized(1, 1).observed().data()[0]);
-        assert!(l.resized(4, 2).log_likelihood(&[true, true, false, false, true, true, false, false], 4, 2).is_ok());
+        assert!(
+            l.resized(4, 2)
+                .log_likelihood(&[true, true, false, false, true, true, false, false], 4, 2)
+                .is_ok()
+        );
     }
 
     #[test]
@@ -247,9 +284,15 @@ mod tests {
             out.into_inner()
         };
         let grey = image::GrayImage::from_raw(3, 1, vec![0, 255, 100]).unwrap();
-        assert_eq!(decode(&png(grey.into()), &Limits::default()).unwrap().data(), [false, true, false]);
+        assert_eq!(
+            decode(&png(grey.into()), &Limits::default()).unwrap().data(),
+            [false, true, false]
+        );
         let cut = image::RgbaImage::from_raw(2, 1, vec![255, 255, 255, 0, 0, 0, 0, 255]).unwrap();
         assert_eq!(decode(&png(cut.into()), &Limits::default()).unwrap().data(), [false, true]);
-        assert!(matches!(load(Path::new("no/such.png")).unwrap_err().cause(), VisionError::Missing));
+        assert!(matches!(
+            load(Path::new("no/such.png")).unwrap_err().cause(),
+            VisionError::Missing
+        ));
     }
 }

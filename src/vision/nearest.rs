@@ -1,6 +1,7 @@
-//! Which observed edge is nearest to every sample of a grid, and how far it is: the distance transform's nearest edges of a sample
-//! and its eight neighbours are measured exactly, several samples at a time. Invariant: the result is that of measuring them one by
-//! one; of edges as near the first counts.
+//! Which observed edge is nearest to every sample of a grid, and how far it is: the
+//! distance transform's nearest edges of a sample and its eight neighbours are measured
+//! exactly, several samples at a time. Invariant: the result is that of measuring them
+//! one by one; of edges as near the first counts.
 
 use super::distance_transform::{Columns, Envelope, FARTHEST};
 use super::field::{Edge, Edges};
@@ -15,8 +16,8 @@ pub(super) struct Nearest {
     pub edge: Vec<u32>,
 }
 
-/// The edges that the distance transform finds along a row of samples, one list for each property, with room on both sides where
-/// there is none.
+/// The edges that the distance transform finds along a row of samples, one list for each
+/// property, with room on both sides where there is none.
 struct Row {
     x: Vec<f32>,
     y: Vec<f32>,
@@ -30,12 +31,14 @@ impl Row {
     /// A row of edges too far away to be any sample's.
     fn nothing(width: usize) -> Self {
         let list = |v: f32| vec![v; width + 2];
-        let (x, y, tx, ty, half) = (list(f32::MAX), list(f32::MAX), list(0.0), list(0.0), list(0.0));
+        let (x, y, tx, ty, half) =
+            (list(f32::MAX), list(f32::MAX), list(0.0), list(0.0), list(0.0));
         Row { edge: vec![u32::MAX; x.len()], x, y, tx, ty, half }
     }
 
     fn put(&mut self, at: usize, id: u32, e: &Edge) {
-        (self.x[at], self.y[at], self.tx[at], self.ty[at], self.half[at]) = (e.x, e.y, e.tx, e.ty, e.half);
+        (self.x[at], self.y[at], self.tx[at], self.ty[at], self.half[at]) =
+            (e.x, e.y, e.tx, e.ty, e.half);
         self.edge[at] = id;
     }
 }
@@ -44,17 +47,19 @@ impl Row {
 const FAR: Edge = Edge { x: f32::MAX, y: f32::MAX, tx: 0.0, ty: 0.0, half: 0.0, turn: 0.0 };
 
 impl Edges {
-    /// For each grid pixel the nearest of the chosen edges and the distance in percent of the diagonal; `None` where there
-    /// are no such edges. The candidates are the transform's nearest edges of the pixel and its eight neighbours.
+    /// For each grid pixel the nearest of the chosen edges and the distance in percent of
+    /// the diagonal; `None` where there are no such edges. The candidates are the
+    /// transform's nearest edges of the pixel and its eight neighbours.
     pub fn nearest(&self, chosen: impl Fn(&Edge) -> bool) -> Option<Nearest> {
         self.search(None, chosen)
     }
 
-    /// As [`Edges::nearest`], but where the distance would be `percent` of the diagonal or more, it may be any such number, and the
-    /// edge none.
+    /// As [`Edges::nearest`], but where the distance would be `percent` of the diagonal
+    /// or more, it may be any such number, and the edge none.
     pub fn nearest_within(&self, percent: f64, chosen: impl Fn(&Edge) -> bool) -> Option<Nearest> {
-        // A sample, its neighbour, that neighbour's pixel, and a piece that lies in it with its middle: what is nearer than
-        // asked for at a sample is that much farther from the pixel that has to find it.
+        // A sample, its neighbour, that neighbour's pixel, and a piece that lies in it
+        // with its middle: what is nearer than asked for at a sample is that much farther
+        // from the pixel that has to find it.
         let half = self.edges.iter().map(|e| e.half).fold(0.0, f32::max);
         let reach = (percent / f64::from(self.percent) + f64::from(half)).ceil() + 4.0;
         self.search((reach <= FARTHEST as f64).then_some(reach as usize), chosen)
@@ -70,12 +75,14 @@ impl Edges {
         if !set.contains(&true) {
             return None;
         }
-        let (columns, mut envelope, mut line) = (Columns::of(w, h, &set), Envelope::default(), Vec::new());
+        let (columns, mut envelope, mut line) =
+            (Columns::of(w, h, &set), Envelope::default(), Vec::new());
         let mut fill = |y: usize, row: &mut Row| {
             let mut at = 0;
             let put = |found: Option<(usize, i32)>| {
                 at += 1;
-                let place = found.map(|(column, down)| (y as i64 + i64::from(down)) as usize * w + column);
+                let place =
+                    found.map(|(column, down)| (y as i64 + i64::from(down)) as usize * w + column);
                 match place.map(|p| first[p]) {
                     Some(id) => row.put(at, id, &self.edges[id as usize]),
                     None => row.put(at, u32::MAX, &FAR),
@@ -89,7 +96,9 @@ impl Edges {
         let mut out = Nearest { distance: vec![0.0; w * h], edge: vec![0; w * h] };
         let mut rows = [Row::nothing(w), Row::nothing(w), Row::nothing(w)];
         fill(0, &mut rows[2]);
-        for (y, (distance, edge)) in out.distance.chunks_exact_mut(w).zip(out.edge.chunks_exact_mut(w)).enumerate() {
+        for (y, (distance, edge)) in
+            out.distance.chunks_exact_mut(w).zip(out.edge.chunks_exact_mut(w)).enumerate()
+        {
             rows.rotate_left(1);
             if y + 1 < h {
                 fill(y + 1, &mut rows[2])
@@ -133,7 +142,8 @@ fn closest(rows: &[Row; 3], y: f32, percent: f32, distance: &mut [f32], edge: &m
                 (x2[i], y2[i], tx2[i], ty2[i], half2[i], id2[i]),
             ];
             for (ex, ey, tx, ty, half, id) in candidates {
-                let d = Edge { x: ex, y: ey, tx, ty, half, turn: 0.0 }.distance(i as u32 as f32 + 0.5, y);
+                let d = Edge { x: ex, y: ey, tx, ty, half, turn: 0.0 }
+                    .distance(i as u32 as f32 + 0.5, y);
                 // No branches, so that several are worked out at a time.
                 let nearer = (d < least) | ((d == least) & (id < nearest));
                 least = if nearer { d } else { least };
@@ -152,7 +162,8 @@ mod tests {
     use crate::vision::distance_transform::distance_transform;
     use crate::vision::testing::clutter;
 
-    /// The nearest of the nine edges that the transform finds at a sample and next to it, one by one.
+    /// The nearest of the nine edges that the transform finds at a sample and next to it,
+    /// one by one.
     fn plain(edges: &Edges, chosen: &dyn Fn(&Edge) -> bool) -> Vec<(f32, u32)> {
         let (w, h) = (edges.width as usize, edges.height as usize);
         let mut first = vec![u32::MAX; w * h];
@@ -190,7 +201,11 @@ mod tests {
             for (i, &(d, id)) in expected.iter().enumerate() {
                 assert_eq!((found.distance[i].to_bits(), found.edge[i]), (d.to_bits(), id), "{i}");
                 if d < 3.3 {
-                    assert_eq!((near.distance[i].to_bits(), near.edge[i]), (d.to_bits(), id), "{i}");
+                    assert_eq!(
+                        (near.distance[i].to_bits(), near.edge[i]),
+                        (d.to_bits(), id),
+                        "{i}"
+                    );
                 } else {
                     assert!(near.distance[i] >= 3.3, "{i}");
                 }

@@ -1,4 +1,5 @@
-//! What a network has to be told besides its file: how it likes its picture, which of its outputs is the map, and what that shows.
+//! What a network has to be told besides its file: how it likes its picture, which of its
+//! outputs is the map, and what that shows.
 
 use super::soft_map::Shows;
 
@@ -14,8 +15,8 @@ pub enum Output {
     Named(String),
 }
 
-/// How a network takes a picture and gives a map. The picture's values go from 0 to `white`; what the network gets is that less
-/// `mean`, by `spread`.
+/// How a network takes a picture and gives a map. The picture's values go from 0 to
+/// `white`; what the network gets is that less `mean`, by `spread`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetworkOptions {
     /// Blue before green before red.
@@ -54,7 +55,9 @@ impl NetworkOptions {
         let all = || self.mean.iter().chain(&self.spread);
         let white = self.white > 0.0 && self.white <= 65535.0;
         if !(white && all().all(|v| v.is_finite())) {
-            return Some("`white` must be above 0 and at most 65535, `mean` and `spread` finite numbers");
+            return Some(
+                "`white` must be above 0 and at most 65535, `mean` and `spread` finite numbers",
+            );
         }
         if self.spread.iter().any(|s| *s <= 0.0) {
             return Some("`spread` must be above 0");

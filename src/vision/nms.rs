@@ -1,5 +1,6 @@
-//! Thin contours out of a gradient: suppression of what is not a maximum along the gradient's direction, with places finer than
-//! a pixel, and hysteresis (Canny 1986, "A computational approach to edge detection", PAMI 8, 679-698).
+//! Thin contours out of a gradient: suppression of what is not a maximum along the
+//! gradient's direction, with places finer than a pixel, and hysteresis (Canny 1986, "A
+//! computational approach to edge detection", PAMI 8, 679-698).
 
 use super::gradient::Gradient;
 
@@ -18,7 +19,8 @@ pub struct EdgePoint {
     pub magnitude: f32,
 }
 
-/// Bilinear value at a place counted from the first pixel's centre, clamped to the picture.
+/// Bilinear value at a place counted from the first pixel's centre, clamped to the
+/// picture.
 fn bilinear(width: usize, height: usize, data: &[f32], x: f32, y: f32) -> f32 {
     let (x, y) = (x.clamp(0.0, (width - 1) as f32), y.clamp(0.0, (height - 1) as f32));
     let (i, j) = (x as usize, y as usize);
@@ -29,9 +31,11 @@ fn bilinear(width: usize, height: usize, data: &[f32], x: f32, y: f32) -> f32 {
     top * (1.0 - fy) + bottom * fy
 }
 
-/// Offset of a ridge of `data` from the centre of a pixel along a unit normal, pixels, within 0.7: the peak of the quadratic
-/// through the pixel with the first and second central differences there (Steger 1998, "An unbiased detector of curvilinear
-/// structures", PAMI 20, 113-125). Beyond the border values repeat. 0 where the quadratic has no peak.
+/// Offset of a ridge of `data` from the centre of a pixel along a unit normal, pixels,
+/// within 0.7: the peak of the quadratic through the pixel with the first and second
+/// central differences there (Steger 1998, "An unbiased detector of curvilinear
+/// structures", PAMI 20, 113-125). Beyond the border values repeat. 0 where the quadratic
+/// has no peak.
 pub fn ridge_offset(width: u32, height: u32, data: &[f32], pixel: usize, normal: [f32; 2]) -> f32 {
     let (w, h) = (width as usize, height as usize);
     let (x, y) = (pixel % w, pixel / w);
@@ -44,11 +48,13 @@ pub fn ridge_offset(width: u32, height: u32, data: &[f32], pixel: usize, normal:
     let yy = at(x, down) - 2.0 * at(x, y) + at(x, up);
     let xy = 0.25 * (at(right, down) - at(left, down) - at(right, up) + at(left, up));
     let slope = normal[0] * gx + normal[1] * gy;
-    let bend = normal[0] * normal[0] * xx + 2.0 * normal[0] * normal[1] * xy + normal[1] * normal[1] * yy;
+    let bend =
+        normal[0] * normal[0] * xx + 2.0 * normal[0] * normal[1] * xy + normal[1] * normal[1] * yy;
     if bend < 0.0 { (-slope / bend).clamp(-0.7, 0.7) } else { 0.0 }
 }
 
-/// The direction of most change of a structure tensor but for its sign, right to a millionth and without angles.
+/// The direction of most change of a structure tensor but for its sign, right to a
+/// millionth and without angles.
 fn roughly([a, b, c]: [f32; 3]) -> [f32; 2] {
     let (half, b) = (0.5 * (f64::from(a) - f64::from(c)), f64::from(b));
     let root = (half * half + b * b).sqrt();
@@ -61,8 +67,9 @@ fn roughly([a, b, c]: [f32; 3]) -> [f32; 2] {
 pub fn suppress(gradient: &Gradient, floor: f32) -> Vec<EdgePoint> {
     let (w, h) = (gradient.width as usize, gradient.height as usize);
     let strength = &gradient.magnitude;
-    // A pixel that is below its neighbours in about the right direction, by more than the direction and the rounding of places
-    // can be wrong, is no maximum: most need no angle.
+    // A pixel that is below its neighbours in about the right direction, by more than the
+    // direction and the rounding of places can be wrong, is no maximum: most need no
+    // angle.
     let most = strength.iter().copied().fold(0.0, f32::max);
     let slack = most * (1e-5 + 5e-7 * w.max(h) as f32);
     let mut out = Vec::new();
@@ -88,14 +95,22 @@ pub fn suppress(gradient: &Gradient, floor: f32) -> Vec<EdgePoint> {
     out
 }
 
-/// The points of at least `low` that hang together (8 neighbours) with one of at least `high`, in the given order.
-pub fn hysteresis(width: u32, height: u32, points: &[EdgePoint], low: f32, high: f32) -> Vec<EdgePoint> {
+/// The points of at least `low` that hang together (8 neighbours) with one of at least
+/// `high`, in the given order.
+pub fn hysteresis(
+    width: u32,
+    height: u32,
+    points: &[EdgePoint],
+    low: f32,
+    high: f32,
+) -> Vec<EdgePoint> {
     let (w, h) = (width as usize, height as usize);
     let mut kept = vec![0u8; w * h];
     for p in points.iter().filter(|p| p.magnitude >= low) {
         kept[p.pixel] = 1;
     }
-    let mut todo: Vec<usize> = points.iter().filter(|p| p.magnitude >= high.max(low)).map(|p| p.pixel).collect();
+    let mut todo: Vec<usize> =
+        points.iter().filter(|p| p.magnitude >= high.max(low)).map(|p| p.pixel).collect();
     todo.iter().for_each(|&k| kept[k] = 2);
     while let Some(k) = todo.pop() {
         let (x, y) = (k % w, k / w);
@@ -116,7 +131,8 @@ mod tests {
     use super::*;
     use crate::vision::gradient::colour_gradient;
 
-    /// A picture bright beyond the line `x cos a + y sin a = d`, with exact areas to 1/16.
+    /// A picture bright beyond the line `x cos a + y sin a = d`, with exact areas to
+    /// 1/16.
     fn half_plane(n: usize, angle: f32, d: f32) -> Vec<[f32; 1]> {
         let (c, s) = (libm::cosf(angle), libm::sinf(angle));
         (0..n * n)
@@ -133,12 +149,16 @@ mod tests {
 
     #[test]
     fn straight_edges_are_found_where_they_are() {
-        for (angle, d) in [(0.0f32, 20.0), (0.0, 20.3), (0.4, 26.7), (0.785, 30.1), (1.2, 25.5), (1.57, 19.8)] {
+        for (angle, d) in
+            [(0.0f32, 20.0), (0.0, 20.3), (0.4, 26.7), (0.785, 30.1), (1.2, 25.5), (1.57, 19.8)]
+        {
             let g = colour_gradient(40, 40, &half_plane(40, angle, d), 1.0);
             let points = suppress(&g, 5.0);
             let (c, s) = (libm::cosf(angle), libm::sinf(angle));
-            let inner: Vec<_> =
-                points.iter().filter(|p| (5.0..35.0).contains(&p.x) && (5.0..35.0).contains(&p.y)).collect();
+            let inner: Vec<_> = points
+                .iter()
+                .filter(|p| (5.0..35.0).contains(&p.x) && (5.0..35.0).contains(&p.y))
+                .collect();
             assert!(inner.len() >= 25, "{angle}: {}", inner.len());
             for p in inner {
                 assert!((p.x * c + p.y * s - d).abs() < 0.12, "{angle} {d}: {p:?}");
@@ -159,7 +179,8 @@ mod tests {
             let picture: Vec<[f32; 2]> = (0..60 * 40).map(|_| [next(), next()]).collect();
             let g = colour_gradient(60, 40, &picture, 0.8);
             let plain = |k: &usize| {
-                let (x, y, n, m) = ((k % 60) as f32, (k / 60) as f32, g.normal(*k), g.magnitude[*k]);
+                let (x, y, n, m) =
+                    ((k % 60) as f32, (k / 60) as f32, g.normal(*k), g.magnitude[*k]);
                 let at = |t: f32| bilinear(60, 40, &g.magnitude, x + t * n[0], y + t * n[1]);
                 m > 0.0 && m > at(-1.0) && m >= at(1.0)
             };
@@ -172,9 +193,17 @@ mod tests {
 
     #[test]
     fn hysteresis_follows_weak_points_from_strong_ones() {
-        let point = |pixel, magnitude| EdgePoint { pixel, x: 0.0, y: 0.0, normal: [1.0, 0.0], magnitude };
+        let point =
+            |pixel, magnitude| EdgePoint { pixel, x: 0.0, y: 0.0, normal: [1.0, 0.0], magnitude };
         // A row of ten: strong, weak, weak, none, weak, too weak, strong.
-        let row = [point(0, 9.0), point(1, 3.0), point(2, 3.0), point(4, 3.0), point(5, 1.0), point(6, 9.0)];
+        let row = [
+            point(0, 9.0),
+            point(1, 3.0),
+            point(2, 3.0),
+            point(4, 3.0),
+            point(5, 1.0),
+            point(6, 9.0),
+        ];
         let kept: Vec<usize> = hysteresis(10, 1, &row, 2.0, 8.0).iter().map(|p| p.pixel).collect();
         assert_eq!(kept, [0, 1, 2, 6]);
     }

@@ -1,5 +1,6 @@
-//! Reading numpy's `.npy` arrays (numpy.lib.format, versions 1.0 to 3.0): little-endian float32 and float64, uint8 and bool, in C
-//! order. Not `.npz`, not other kinds of numbers, not Fortran order: those are errors that say what to do.
+//! Reading numpy's `.npy` arrays (numpy.lib.format, versions 1.0 to 3.0): little-endian
+//! float32 and float64, uint8 and bool, in C order. Not `.npz`, not other kinds of
+//! numbers, not Fortran order: those are errors that say what to do.
 
 use super::error::{VisionError, read_bytes};
 use std::path::Path;
@@ -17,7 +18,8 @@ pub enum NpyData {
     Bool(Vec<bool>),
 }
 
-/// An array in C order: the last index runs fastest. It has as many numbers as the product of `shape`.
+/// An array in C order: the last index runs fastest. It has as many numbers as the
+/// product of `shape`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NpyArray {
     /// Length of every axis.
@@ -40,10 +42,14 @@ impl NpyArray {
     /// Width and height of an array of rows (also of shape height x width x 1).
     pub fn picture_size(&self) -> Result<(u32, u32), VisionError> {
         match self.shape[..] {
-            [h, w] | [h, w, 1] if h > 0 && w > 0 => {
-                u32::try_from(w).ok().zip(u32::try_from(h).ok()).ok_or_else(|| bad("it is too large"))
-            }
-            _ => Err(bad(format!("its shape is {:?}; it must have two axes, height and width", self.shape))),
+            [h, w] | [h, w, 1] if h > 0 && w > 0 => u32::try_from(w)
+                .ok()
+                .zip(u32::try_from(h).ok())
+                .ok_or_else(|| bad("it is too large")),
+            _ => Err(bad(format!(
+                "its shape is {:?}; it must have two axes, height and width",
+                self.shape
+            ))),
         }
     }
 }
@@ -81,26 +87,36 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
         v => return Err(bad(format!("its format version {v} is not known"))),
     };
     let end = start + length;
-    let header =
-        std::str::from_utf8(bytes.get(start..end).ok_or_else(cut)?).map_err(|_| bad("its header is not text"))?;
+    let header = std::str::from_utf8(bytes.get(start..end).ok_or_else(cut)?)
+        .map_err(|_| bad("its header is not text"))?;
     let descr = quoted(field(header, "descr")?)
         .ok_or_else(|| bad("its elements are records; only plain numbers are supported"))?;
     if !field(header, "fortran_order")?.starts_with("False") {
         return Err(bad("it is in Fortran order; save numpy.ascontiguousarray(a)"));
     }
     let shape = shape(field(header, "shape")?)?;
-    let count = shape.iter().try_fold(1usize, |n, &k| n.checked_mul(k)).ok_or_else(|| bad("its shape is too large"))?;
+    let count = shape
+        .iter()
+        .try_fold(1usize, |n, &k| n.checked_mul(k))
+        .ok_or_else(|| bad("its shape is too large"))?;
     let body = bytes.get(end..).ok_or_else(cut)?;
     let take = |size: usize| -> Result<&[u8], VisionError> {
         let need = count.checked_mul(size).ok_or_else(|| bad("its shape is too large"))?;
         if body.len() > need {
-            return Err(bad(format!("it has {} bytes of numbers, but its shape needs {need}", body.len())));
+            return Err(bad(format!(
+                "it has {} bytes of numbers, but its shape needs {need}",
+                body.len()
+            )));
         }
         body.get(..need).ok_or_else(cut)
     };
     let data = match descr {
-        "<f4" => NpyData::F32(take(4)?.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()),
-        "<f8" => NpyData::F64(take(8)?.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect()),
+        "<f4" => {
+            NpyData::F32(take(4)?.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect())
+        }
+        "<f8" => {
+            NpyData::F64(take(8)?.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect())
+        }
         "|u1" | "<u1" | "u1" => NpyData::U8(take(1)?.to_vec()),
         "|b1" | "<b1" | "?" => NpyData::Bool(take(1)?.iter().map(|&b| b != 0).collect()),
         other => {
@@ -164,8 +180,10 @@ mod tests {
     #[test]
     fn every_kind_in_both_versions() {
         for version in [1, 2] {
-            let f4: Vec<u8> =
-                [1.5f32, f32::INFINITY, -0.0, 7.0, 8.0, 9.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+            let f4: Vec<u8> = [1.5f32, f32::INFINITY, -0.0, 7.0, 8.0, 9.0]
+                .iter()
+                .flat_map(|v| v.to_le_bytes())
+                .collect();
             let a = parse(&bytes_of(version, "<f4", "False", "(2, 3)", &f4)).unwrap();
             assert_eq!(a.shape, [2, 3]);
             assert_eq!(a.picture_size().unwrap(), (3, 2));
@@ -174,7 +192,10 @@ mod tests {
             let a = parse(&bytes_of(version, "<f8", "False", "(2,)", &f8)).unwrap();
             assert_eq!(a.data, NpyData::F64(vec![0.1, -3.0]));
             let a = parse(&bytes_of(version, "|u1", "False", "(1, 1, 2)", &[3, 255])).unwrap();
-            assert_eq!((a.shape.as_slice(), &a.data), ([1, 1, 2].as_slice(), &NpyData::U8(vec![3, 255])));
+            assert_eq!(
+                (a.shape.as_slice(), &a.data),
+                ([1, 1, 2].as_slice(), &NpyData::U8(vec![3, 255]))
+            );
             let a = parse(&bytes_of(version, "|b1", "False", "()", &[1])).unwrap();
             assert_eq!((a.shape.len(), a.into_f32()), (0, vec![1.0]));
         }
@@ -182,7 +203,9 @@ mod tests {
 
     #[test]
     fn pictures_have_two_axes_and_at_least_one_pixel() {
-        let size = |shape: &[usize]| NpyArray { shape: shape.to_vec(), data: NpyData::U8(Vec::new()) }.picture_size();
+        let size = |shape: &[usize]| {
+            NpyArray { shape: shape.to_vec(), data: NpyData::U8(Vec::new()) }.picture_size()
+        };
         assert_eq!(size(&[1, 1]).unwrap(), (1, 1));
         assert_eq!(size(&[2, 3, 1]).unwrap(), (3, 2));
         for shape in [&[0, 3][..], &[3, 0], &[0, 0], &[3, 0, 1], &[2, 3, 2], &[2], &[]] {
@@ -212,10 +235,16 @@ mod tests {
         assert!(message(&bytes_of(1, "<f4", "True", "(2,)", &[0; 8])).contains("Fortran"));
         assert!(message(&bytes_of(1, "<f4", "False", "(2", &[0; 8])).contains("shape"));
         assert!(message(&bytes_of(1, "<f4", "False", "(-2,)", &[0; 8])).contains("shape"));
-        assert!(message(&bytes_of(2, "<f8", "False", "(99999999999, 99999999999)", &[0; 8])).contains("too large"));
+        assert!(
+            message(&bytes_of(2, "<f8", "False", "(99999999999, 99999999999)", &[0; 8]))
+                .contains("too large")
+        );
         assert!(message(&bytes_of(9, "<f4", "False", "(2,)", &[0; 8])).contains("version 9"));
         let flat = parse(&good).unwrap();
         assert!(flat.picture_size().unwrap_err().to_string().contains("two axes"));
-        assert!(matches!(load(Path::new("no/such.npy"), 9).unwrap_err().cause(), VisionError::Missing));
+        assert!(matches!(
+            load(Path::new("no/such.npy"), 9).unwrap_err().cause(),
+            VisionError::Missing
+        ));
     }
 }

@@ -1,6 +1,7 @@
-//! Photographs: reading PNG and JPEG files (8 or 16 bit, grey, palette, colour, alpha) and shrinking them in linear light.
-//! Not a general picture reader. A [`Photo`] stands upright (Exif orientation applied), is opaque (alpha laid over white, on the
-//! sRGB values as viewers do) and has at least one pixel.
+//! Photographs: reading PNG and JPEG files (8 or 16 bit, grey, palette, colour, alpha)
+//! and shrinking them in linear light. Not a general picture reader. A [`Photo`] stands
+//! upright (Exif orientation applied), is opaque (alpha laid over white, on the sRGB
+//! values as viewers do) and has at least one pixel.
 
 use super::color::{linear_table, linear_to_srgb};
 use super::error::{VisionError, read_bytes};
@@ -9,7 +10,8 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Rg
 use std::io::Cursor;
 use std::path::Path;
 
-/// How large a picture may be. The size in the header is checked before pixels get memory.
+/// How large a picture may be. The size in the header is checked before pixels get
+/// memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// The longest side, pixels.
@@ -30,14 +32,17 @@ impl Limits {
         if width == 0 || height == 0 {
             return Err(VisionError::Damaged("it has no pixels".into()));
         }
-        if width.max(height) > self.max_side || u64::from(width) * u64::from(height) > self.max_pixels {
+        if width.max(height) > self.max_side
+            || u64::from(width) * u64::from(height) > self.max_pixels
+        {
             let Limits { max_side, max_pixels } = *self;
             return Err(VisionError::TooLarge { width, height, max_side, max_pixels });
         }
         Ok(())
     }
 
-    /// The most bytes a file is read from: 16 a pixel, more than any kind that is read here takes uncompressed.
+    /// The most bytes a file is read from: 16 a pixel, more than any kind that is read
+    /// here takes uncompressed.
     pub(crate) fn max_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(16).saturating_add(1 << 20)
     }
@@ -83,7 +88,8 @@ impl Photo {
         &self.rgb
     }
 
-    /// The focal length the camera wrote down, mm as on 35 mm film (a frame of 36 mm x 24 mm).
+    /// The focal length the camera wrote down, mm as on 35 mm film (a frame of 36 mm x 24
+    /// mm).
     pub fn focal_35mm(&self) -> Option<f64> {
         self.focal_35mm
     }
@@ -102,20 +108,31 @@ impl Photo {
         LinearImage { width, height, rgb }
     }
 
-    /// The sRGB values, 0..=1, at `width` x `height` pixels: area-averaged in linear light, or in between if that is larger.
+    /// The sRGB values, 0..=1, at `width` x `height` pixels: area-averaged in linear
+    /// light, or in between if that is larger.
     pub fn srgb(&self, width: u32, height: u32) -> Vec<[f32; 3]> {
-        let values = |rgb: &RgbImage| rgb.pixels().map(|p| p.0.map(|b| f32::from(b) / 255.0)).collect();
+        let values =
+            |rgb: &RgbImage| rgb.pixels().map(|p| p.0.map(|b| f32::from(b) / 255.0)).collect();
         if (width, height) == self.rgb.dimensions() {
             return values(&self.rgb);
         }
         if width > self.rgb.width() || height > self.rgb.height() {
-            return values(&image::imageops::resize(&self.rgb, width, height, image::imageops::FilterType::Triangle));
+            return values(&image::imageops::resize(
+                &self.rgb,
+                width,
+                height,
+                image::imageops::FilterType::Triangle,
+            ));
         }
         let linear = self.linear(width, height).rgb;
-        linear.iter().map(|p| p.map(|v| linear_to_srgb(f64::from(v).clamp(0.0, 1.0)) as f32)).collect()
+        linear
+            .iter()
+            .map(|p| p.map(|v| linear_to_srgb(f64::from(v).clamp(0.0, 1.0)) as f32))
+            .collect()
     }
 
-    /// The photo shrunk, in linear light, to a longer side of at most `longer` pixels; unchanged where it is smaller.
+    /// The photo shrunk, in linear light, to a longer side of at most `longer` pixels;
+    /// unchanged where it is smaller.
     pub fn shrunk(&self, longer: u32) -> Photo {
         let (width, height) = resize::fitted(self.width(), self.height(), longer);
         if (width, height) == self.rgb.dimensions() {
@@ -141,14 +158,20 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Photo, VisionError> {
     Ok(Photo { rgb: over_white(picture), focal_35mm })
 }
 
-/// The decoded picture, upright, in the file's own kind of pixels, and the camera's focal length.
-pub(crate) fn decode_dynamic(bytes: &[u8], limits: &Limits) -> Result<(DynamicImage, Option<f64>), VisionError> {
+/// The decoded picture, upright, in the file's own kind of pixels, and the camera's focal
+/// length.
+pub(crate) fn decode_dynamic(
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<(DynamicImage, Option<f64>), VisionError> {
     let format = format_of(bytes)?;
     if !cfg!(feature = "codecs") {
         return Err(VisionError::NoCodecs);
     }
-    // A PNG begins with its size; a decoder may stumble over an absurd one before it tells.
-    if let (ImageFormat::Png, Some(&[w0, w1, w2, w3, h0, h1, h2, h3])) = (format, bytes.get(16..24)) {
+    // A PNG begins with its size; a decoder may stumble over an absurd one before it
+    // tells.
+    if let (ImageFormat::Png, Some(&[w0, w1, w2, w3, h0, h1, h2, h3])) = (format, bytes.get(16..24))
+    {
         limits.check(u32::from_be_bytes([w0, w1, w2, w3]), u32::from_be_bytes([h0, h1, h2, h3]))?;
     }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
@@ -192,15 +215,18 @@ fn format_of(bytes: &[u8]) -> Result<ImageFormat, VisionError> {
     }
 }
 
-/// Whether a JPEG file has its end marker after the start of its own first scan (thumbnails in the metadata have theirs before).
-/// The decoder fills what is missing with grey, without a word.
+/// Whether a JPEG file has its end marker after the start of its own first scan
+/// (thumbnails in the metadata have theirs before). The decoder fills what is missing
+/// with grey, without a word.
 fn jpeg_ends(bytes: &[u8]) -> bool {
     let mut at = 2;
     loop {
         match bytes.get(at..at + 4) {
             Some([0xff, 0xff, ..]) => at += 1,
             Some([0xff, 0xda, ..]) => {
-                return bytes.get(at..).is_some_and(|rest| rest.windows(2).any(|w| w == [0xff, 0xd9]));
+                return bytes
+                    .get(at..)
+                    .is_some_and(|rest| rest.windows(2).any(|w| w == [0xff, 0xd9]));
             }
             Some([0xff, 0x01 | 0xd0..=0xd8, ..]) => at += 2,
             Some([0xff, _, high, low]) => at += 2 + usize::from(*high) * 256 + usize::from(*low),
@@ -211,9 +237,13 @@ fn jpeg_ends(bytes: &[u8]) -> bool {
 
 fn cause(error: ImageError) -> VisionError {
     match error {
-        ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => VisionError::Truncated,
+        ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+            VisionError::Truncated
+        }
         ImageError::IoError(e) => VisionError::Io(e),
-        ImageError::Limits(_) => VisionError::Damaged("it needs more memory than any picture of permitted size".into()),
+        ImageError::Limits(_) => {
+            VisionError::Damaged("it needs more memory than any picture of permitted size".into())
+        }
         other => {
             let text = other.to_string();
             let lower = text.to_ascii_lowercase();

@@ -33,8 +33,13 @@ fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
 
 fn png_header(width: u32, height: u32) -> Vec<u8> {
     let ihdr = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
-    [b"\x89PNG\r\n\x1a\n".as_slice(), &chunk(b"IHDR", &ihdr), &chunk(b"IDAT", &[0x78, 0x9c]), &chunk(b"IEND", &[])]
-        .concat()
+    [
+        b"\x89PNG\r\n\x1a\n".as_slice(),
+        &chunk(b"IHDR", &ihdr),
+        &chunk(b"IDAT", &[0x78, 0x9c]),
+        &chunk(b"IEND", &[]),
+    ]
+    .concat()
 }
 
 #[test]
@@ -48,16 +53,29 @@ fn every_kind_of_pixel() {
     let photo = read(&encoded(deep, ImageFormat::Png)).unwrap();
     assert_eq!(photo.rgb().as_raw()[..], [0, 0, 0, 100, 100, 100, 255, 255, 255]);
     // Alpha lies over white.
-    let alpha = RgbaImage::from_raw(3, 1, vec![10, 20, 30, 255, 10, 20, 30, 0, 0, 0, 0, 128]).unwrap();
+    let alpha =
+        RgbaImage::from_raw(3, 1, vec![10, 20, 30, 255, 10, 20, 30, 0, 0, 0, 0, 128]).unwrap();
     let photo = read(&encoded(alpha, ImageFormat::Png)).unwrap();
     assert_eq!(photo.rgb().as_raw()[..], [10, 20, 30, 255, 255, 255, 127, 127, 127]);
-    let alpha = ImageBuffer::<Rgba<u16>, _>::from_raw(2, 1, vec![0u16, 65535, 0, 65535, 0, 0, 0, 32768]).unwrap();
+    let alpha =
+        ImageBuffer::<Rgba<u16>, _>::from_raw(2, 1, vec![0u16, 65535, 0, 65535, 0, 0, 0, 32768])
+            .unwrap();
     let photo = read(&encoded(alpha, ImageFormat::Png)).unwrap();
     assert_eq!(photo.rgb().as_raw()[..], [0, 255, 0, 127, 127, 127]);
     let alpha = GrayAlphaImage::from_pixel(1, 1, LumaA([0, 51]));
-    assert_eq!(read(&encoded(alpha, ImageFormat::Png)).unwrap().rgb().as_raw()[..], [204, 204, 204]);
-    let flat = read(&encoded(RgbImage::from_pixel(20, 10, Rgb([200, 100, 50])), ImageFormat::Jpeg)).unwrap();
-    assert!(flat.rgb().pixels().all(|p| p.0.iter().zip([200u8, 100, 50]).all(|(a, b)| a.abs_diff(b) <= 3)));
+    assert_eq!(
+        read(&encoded(alpha, ImageFormat::Png)).unwrap().rgb().as_raw()[..],
+        [204, 204, 204]
+    );
+    let flat = read(&encoded(RgbImage::from_pixel(20, 10, Rgb([200, 100, 50])), ImageFormat::Jpeg))
+        .unwrap();
+    assert!(
+        flat.rgb().pixels().all(|p| p
+            .0
+            .iter()
+            .zip([200u8, 100, 50])
+            .all(|(a, b)| a.abs_diff(b) <= 3))
+    );
     assert!(read(&encoded(grey, ImageFormat::Jpeg)).is_ok());
 }
 
@@ -81,7 +99,8 @@ fn palettes() {
 
 #[test]
 fn orientation_and_focal_length() {
-    let rgb = RgbImage::from_fn(32, 16, |i, _| if i < 16 { Rgb([255, 0, 0]) } else { Rgb([0, 0, 255]) });
+    let rgb =
+        RgbImage::from_fn(32, 16, |i, _| if i < 16 { Rgb([255, 0, 0]) } else { Rgb([0, 0, 255]) });
     let jpeg = encoded(rgb, ImageFormat::Jpeg);
     let with = |orientation| {
         let body = [b"Exif\0\0".as_slice(), &exif::chunk(orientation, 28)].concat();
@@ -106,7 +125,10 @@ fn orientation_and_focal_length() {
 #[test]
 fn bad_bytes_say_what_is_wrong() {
     assert!(matches!(read(b""), Err(VisionError::Empty)));
-    assert!(matches!(read(b"hello, I am no picture"), Err(VisionError::NotAnImage(" (it is text)"))));
+    assert!(matches!(
+        read(b"hello, I am no picture"),
+        Err(VisionError::NotAnImage(" (it is text)"))
+    ));
     assert!(matches!(read(b"GIF89a\x01\0"), Err(VisionError::NotAnImage(_))));
     assert!(matches!(read(b"\x89PN"), Err(VisionError::Truncated)));
     for format in [ImageFormat::Png, ImageFormat::Jpeg] {
@@ -115,7 +137,10 @@ fn bad_bytes_say_what_is_wrong() {
         // The last bytes of a PNG are its end chunk, after all pixels.
         for n in (9..good.len() - 14).step_by(good.len() / 50) {
             let error = read(&good[..n]).unwrap_err();
-            assert!(matches!(error, VisionError::Truncated | VisionError::Damaged(_)), "{format:?} {n}: {error}");
+            assert!(
+                matches!(error, VisionError::Truncated | VisionError::Damaged(_)),
+                "{format:?} {n}: {error}"
+            );
         }
         let half = read(&good[..good.len() / 2]).unwrap_err();
         assert!(matches!(half, VisionError::Truncated), "{format:?}: {half:?}");
@@ -138,7 +163,10 @@ fn size_is_checked_before_pixels() {
     assert!(matches!(read(&png_header(0, 5)), Err(VisionError::Damaged(_))));
     assert!(matches!(read(&png_header(16385, 1)), Err(VisionError::TooLarge { .. })));
     assert!(matches!(read(&png_header(10001, 10000)), Err(VisionError::TooLarge { .. })));
-    assert!(matches!(read(&png_header(100, 100)), Err(VisionError::Truncated | VisionError::Damaged(_))));
+    assert!(matches!(
+        read(&png_header(100, 100)),
+        Err(VisionError::Truncated | VisionError::Damaged(_))
+    ));
     let long = read(&encoded(colours(16384, 1), ImageFormat::Png)).unwrap();
     assert_eq!((long.width(), long.height()), (16384, 1));
     let small = Limits { max_side: 10, max_pixels: 50 };
@@ -158,7 +186,10 @@ fn files() {
         load(&folder.join(name), &Limits::default())
     };
     assert!(matches!(write("empty.png", b"").unwrap_err().cause(), VisionError::Empty));
-    assert!(matches!(write("text.png", b"some text").unwrap_err().cause(), VisionError::NotAnImage(_)));
+    assert!(matches!(
+        write("text.png", b"some text").unwrap_err().cause(),
+        VisionError::NotAnImage(_)
+    ));
     // The content decides, not the name.
     assert!(write("really_a_jpeg.png", &encoded(colours(8, 8), ImageFormat::Jpeg)).is_ok());
     assert!(load(&folder, &Limits::default()).is_err());
@@ -168,7 +199,8 @@ fn files() {
 #[test]
 fn shrinking_is_in_linear_light() {
     // Black and white stripes of a pixel: half the light is sRGB 188, not 128.
-    let stripes = Photo::from_rgb(RgbImage::from_fn(64, 32, |i, _| Rgb([(i % 2 * 255) as u8; 3]))).unwrap();
+    let stripes =
+        Photo::from_rgb(RgbImage::from_fn(64, 32, |i, _| Rgb([(i % 2 * 255) as u8; 3]))).unwrap();
     let small = stripes.shrunk(32);
     assert_eq!((small.width(), small.height()), (32, 16));
     assert!(small.rgb().as_raw().iter().all(|&v| v == 188));

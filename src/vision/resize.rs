@@ -1,7 +1,9 @@
-//! Area-averaged resizing: every target pixel is the mean of the source over the rectangle it covers, so the mean of the whole
-//! is kept. Not for enlarging beautifully: enlarged pixels become blocks.
+//! Area-averaged resizing: every target pixel is the mean of the source over the
+//! rectangle it covers, so the mean of the whole is kept. Not for enlarging beautifully:
+//! enlarged pixels become blocks.
 
-/// Pixels `first..` of the source that a target pixel covers on one axis, with weights that sum to 1.
+/// Pixels `first..` of the source that a target pixel covers on one axis, with weights
+/// that sum to 1.
 fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
     let ratio = f64::from(from) / f64::from(to);
     (0..to)
@@ -11,14 +13,16 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
             let (a, b) = (end(i), end(i + 1));
             let first = a.floor() as usize;
             let last = (b.ceil() as usize).clamp(first + 1, from as usize);
-            let weights = (first..last).map(|s| ((b.min((s + 1) as f64) - a.max(s as f64)) / ratio).max(0.0)).collect();
+            let weights = (first..last)
+                .map(|s| ((b.min((s + 1) as f64) - a.max(s as f64)) / ratio).max(0.0))
+                .collect();
             (first, weights)
         })
         .collect()
 }
 
-/// Area-averaged resizing of a picture whose rows are made on demand: `row(j, buffer)` fills row `j` (of `width` pixels).
-/// A side of 0 gives an empty picture.
+/// Area-averaged resizing of a picture whose rows are made on demand: `row(j, buffer)`
+/// fills row `j` (of `width` pixels). A side of 0 gives an empty picture.
 pub fn resize_rows<const N: usize>(
     (width, height): (u32, u32),
     (to_width, to_height): (u32, u32),
@@ -58,14 +62,16 @@ pub fn resize_rows<const N: usize>(
     out
 }
 
-/// The size with the longer side at most `longer` (at least 1) and the same shape; never larger than the original.
+/// The size with the longer side at most `longer` (at least 1) and the same shape; never
+/// larger than the original.
 pub fn fitted(width: u32, height: u32, longer: u32) -> (u32, u32) {
     let (side, longer) = (width.max(height), longer.max(1));
     if side <= longer {
         return (width, height);
     }
     let scale = |v: u32| {
-        ((u64::from(v) * u64::from(longer) + u64::from(side) / 2) / u64::from(side)).clamp(1, u64::from(longer)) as u32
+        ((u64::from(v) * u64::from(longer) + u64::from(side) / 2) / u64::from(side))
+            .clamp(1, u64::from(longer)) as u32
     };
     (scale(width), scale(height))
 }

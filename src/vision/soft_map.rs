@@ -1,5 +1,5 @@
-//! Maps that detectors make of a picture, one number a pixel, and the contours in them: along ridges of a map of contours, around
-//! what stands out in a map of objects.
+//! Maps that detectors make of a picture, one number a pixel, and the contours in them:
+//! along ridges of a map of contours, around what stands out in a map of objects.
 
 use super::contour_map::ContourMap;
 use super::gradient::{Gradient, colour_gradient, smoothed};
@@ -32,31 +32,37 @@ pub struct SoftMap {
 const FLOOR: f32 = 0.01;
 
 impl SoftMap {
-    /// The contours in it, after smoothing by a Gaussian of `sigma` pixels. The strength of a point is the map's value there, or of
-    /// an object's contour how high the step is, if it is sharp.
+    /// The contours in it, after smoothing by a Gaussian of `sigma` pixels. The strength
+    /// of a point is the map's value there, or of an object's contour how high the step
+    /// is, if it is sharp.
     pub fn contours(&self, sigma: f32) -> ContourMap {
         let (width, height) = (self.width, self.height);
         match self.shows {
             Shows::Contours => {
                 let ridges = ridges(width, height, &self.values, sigma);
-                // Beside a ridge the map bends the other way, and more; a maximum along it is none across it.
-                let bends = |p: &EdgePoint| ridges.tensor[p.pixel][0] + ridges.tensor[p.pixel][2] > 0.0;
+                // Beside a ridge the map bends the other way, and more; a maximum along
+                // it is none across it.
+                let bends =
+                    |p: &EdgePoint| ridges.tensor[p.pixel][0] + ridges.tensor[p.pixel][2] > 0.0;
                 let points = suppress(&ridges, FLOOR).into_iter().filter(bends);
                 let points: Vec<EdgePoint> =
                     points.map(|p| EdgePoint { magnitude: self.around(p.pixel), ..p }).collect();
                 ContourMap::from_points(width, height, &points, |m| m)
             }
             Shows::Objects => {
-                let pixels: Vec<[f32; 1]> = self.values.iter().map(|v| [v.clamp(0.0, 1.0)]).collect();
+                let pixels: Vec<[f32; 1]> =
+                    self.values.iter().map(|v| [v.clamp(0.0, 1.0)]).collect();
                 // The steepest slope of a step of 1 once it is smoothed.
                 let step = 1.0 / (f64::from(sigma) * (2.0 * std::f64::consts::PI).sqrt()) as f32;
-                let points = suppress(&colour_gradient(width, height, &pixels, sigma), FLOOR * step);
+                let points =
+                    suppress(&colour_gradient(width, height, &pixels, sigma), FLOOR * step);
                 ContourMap::from_points(width, height, &points, |m| m / step)
             }
         }
     }
 
-    /// The largest value within a pixel: smoothing moves ridges a little and flattens them.
+    /// The largest value within a pixel: smoothing moves ridges a little and flattens
+    /// them.
     fn around(&self, pixel: usize) -> f32 {
         let (w, h) = (self.width as usize, self.height as usize);
         let (x, y) = (pixel % w, pixel / w);
@@ -66,8 +72,8 @@ impl SoftMap {
     }
 }
 
-/// The smoothed map as if it were a gradient: its values for magnitudes, and for a tensor how it bends, so that the direction of
-/// most change is the one across a ridge.
+/// The smoothed map as if it were a gradient: its values for magnitudes, and for a tensor
+/// how it bends, so that the direction of most change is the one across a ridge.
 fn ridges(width: u32, height: u32, values: &[f32], sigma: f32) -> Gradient {
     let (w, h) = (width as usize, height as usize);
     let magnitude = smoothed(width, height, values, sigma);
@@ -81,7 +87,8 @@ fn ridges(width: u32, height: u32, values: &[f32], sigma: f32) -> Gradient {
             let middle = 2.0 * soft[j * w + i];
             let xx = soft[j * w + left] + soft[j * w + right] - middle;
             let yy = soft[up + i] + soft[down + i] - middle;
-            let xy = 0.25 * (soft[down + right] + soft[up + left] - soft[down + left] - soft[up + right]);
+            let xy = 0.25
+                * (soft[down + right] + soft[up + left] - soft[down + left] - soft[up + right]);
             tensor.push([-xx, -xy, -yy]);
         }
     }
@@ -99,12 +106,19 @@ mod tests {
     }
 
     fn ring(map: &ContourMap, middle: f32, radius: f32, off: f32) {
-        assert!((map.len() as f32 - 2.0 * std::f32::consts::PI * radius).abs() < 0.35 * 6.3 * radius, "{}", map.len());
+        assert!(
+            (map.len() as f32 - 2.0 * std::f32::consts::PI * radius).abs() < 0.35 * 6.3 * radius,
+            "{}",
+            map.len()
+        );
         for k in 0..map.len() {
             let (x, y) = (map.x[k] - middle, map.y[k] - middle);
             let r = x.hypot(y);
             assert!((r - radius).abs() < off, "{r}");
-            assert!(((map.tx[k] * x + map.ty[k] * y) / r).abs() < 0.1, "a tangent crosses the contour");
+            assert!(
+                ((map.tx[k] * x + map.ty[k] * y) / r).abs() < 0.1,
+                "a tangent crosses the contour"
+            );
         }
     }
 
@@ -119,7 +133,11 @@ mod tests {
         ring(&found, 48.0, 30.0, 0.15);
         for k in 0..found.len() {
             let expected = 0.5 + 0.3 * (found.x[k] - 48.0) / 30.0;
-            assert!((found.strength[k] - expected).abs() < 0.05, "{} {expected}", found.strength[k]);
+            assert!(
+                (found.strength[k] - expected).abs() < 0.05,
+                "{} {expected}",
+                found.strength[k]
+            );
         }
     }
 

@@ -1,5 +1,6 @@
-//! Scenes for the comparators' tests: circles and random strokes, as rendered pieces and as observed maps. Positions are given
-//! as fractions of the frame, so the same scene exists at every resolution.
+//! Scenes for the comparators' tests: circles and random strokes, as rendered pieces and
+//! as observed maps. Positions are given as fractions of the frame, so the same scene
+//! exists at every resolution.
 
 use super::contour_map::ContourMap;
 use super::elements::Elements;
@@ -29,7 +30,8 @@ impl Pieces {
         self.length.push(length);
     }
 
-    /// A circle of pieces about a pixel long; the middle and radius as fractions of the width.
+    /// A circle of pieces about a pixel long; the middle and radius as fractions of the
+    /// width.
     pub fn circle(mut self, cx: f32, cy: f32, r: f32) -> Self {
         let w = self.width as f32;
         let n = (std::f32::consts::TAU * r * w).ceil().max(8.0);
@@ -92,8 +94,8 @@ impl Pieces {
         r
     }
 
-    /// Counts the derivatives by x, y, length and angle that differ from central differences of a score, which may do so where
-    /// a difference straddles a bend.
+    /// Counts the derivatives by x, y, length and angle that differ from central
+    /// differences of a score, which may do so where a difference straddles a bend.
     pub fn differing(&self, found: &[[f64; 4]], score: impl Fn(&Elements<'_>) -> f64) -> usize {
         let h = 1.0f32 / 128.0;
         let differs = |i: usize, k: usize| {
@@ -101,7 +103,10 @@ impl Pieces {
             let numeric = (at(h) - at(-h)) / f64::from(2.0 * h);
             (numeric - found[i][k]).abs() > 2e-3 * (numeric.abs() + 1e-2)
         };
-        (0..found.len()).flat_map(|i| (0..4).map(move |k| (i, k))).filter(|(i, k)| differs(*i, *k)).count()
+        (0..found.len())
+            .flat_map(|i| (0..4).map(move |k| (i, k)))
+            .filter(|(i, k)| differs(*i, *k))
+            .count()
     }
 
     /// Moved by some pixels.
@@ -128,14 +133,23 @@ pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
     for _ in 0..n {
         let (x, y, angle) = (next() * width as f32, next() * height as f32, next() * 3.1);
         for i in 0..12 {
-            pieces.push(x + i as f32 * libm::cosf(angle), y + i as f32 * libm::sinf(angle), angle, 1.0);
+            pieces.push(
+                x + i as f32 * libm::cosf(angle),
+                y + i as f32 * libm::sinf(angle),
+                angle,
+                1.0,
+            );
         }
     }
     pieces
 }
 
-/// Pieces that come and go, some of each step, each time with all that are there; the steps are told by what they were and are.
-pub(super) fn comings_and_goings(all: &Pieces, mut each: impl FnMut(&super::elements::Step<'_>, &Pieces)) {
+/// Pieces that come and go, some of each step, each time with all that are there; the
+/// steps are told by what they were and are.
+pub(super) fn comings_and_goings(
+    all: &Pieces,
+    mut each: impl FnMut(&super::elements::Step<'_>, &Pieces),
+) {
     let only = |keep: &dyn Fn(usize) -> bool| {
         let mut some = Pieces::new(all.width, all.height);
         for i in (0..all.x.len()).filter(|i| keep(*i)) {
@@ -144,7 +158,9 @@ pub(super) fn comings_and_goings(all: &Pieces, mut each: impl FnMut(&super::elem
         some
     };
     // Now a few, now most of them.
-    let there = |step: usize, i: usize| (i * 7919 + step * [1, 31, 977][step % 3]) % 100 > [20, 25, 90][step % 3];
+    let there = |step: usize, i: usize| {
+        (i * 7919 + step * [1, 31, 977][step % 3]) % 100 > [20, 25, 90][step % 3]
+    };
     let mut from = std::sync::Arc::new(());
     for step in 1..40 {
         let (whole, moves) = (only(&|i| there(step, i)), |i: usize| i % 5 == 2);
@@ -152,7 +168,8 @@ pub(super) fn comings_and_goings(all: &Pieces, mut each: impl FnMut(&super::elem
         let come = only(&|i| !moves(i) && !there(step - 1, i) && there(step, i));
         let moving = only(&|i| moves(i) && there(step, i));
         let to = std::sync::Arc::new(());
-        let ([gone, come, moving], count) = ([&gone, &come, &moving].map(Pieces::elements), whole.x.len());
+        let ([gone, come, moving], count) =
+            ([&gone, &come, &moving].map(Pieces::elements), whole.x.len());
         each(&super::elements::Step { from: &from, to: &to, gone, come, moving, count }, &whole);
         from = to;
     }

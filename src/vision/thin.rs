@@ -1,16 +1,19 @@
-//! Thinning a map of strengths to lines one pixel wide without tearing them: pixels are removed from the weakest to the
-//! strongest, and from the rim inwards among equals, as long as the lines around stay connected (ordered homotopic thinning,
-//! Pudney 1998, "Distance-ordered homotopic thinning", CVIU 72, 404-413).
+//! Thinning a map of strengths to lines one pixel wide without tearing them: pixels are
+//! removed from the weakest to the strongest, and from the rim inwards among equals, as
+//! long as the lines around stay connected (ordered homotopic thinning, Pudney 1998,
+//! "Distance-ordered homotopic thinning", CVIU 72, 404-413).
 
 use super::distance_transform::distance_transform;
 
 /// The eight neighbours in circular order, from the north.
-const RING: [(i64, i64); 8] = [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
+const RING: [(i64, i64); 8] =
+    [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
 
 /// Which pixels of a map (0: nothing) are left; `width * height` values.
 pub(super) fn thinned(width: u32, height: u32, map: &[u8]) -> Vec<bool> {
     let (w, h) = (width as usize, height as usize);
-    // With an empty pixel on every side, so that all pixels of the map have eight neighbours.
+    // With an empty pixel on every side, so that all pixels of the map have eight
+    // neighbours.
     let across = w + 2;
     let mut strength = vec![0u8; across * (h + 2)];
     for (row, out) in map.chunks_exact(w.max(1)).zip(strength.chunks_exact_mut(across).skip(1)) {
@@ -39,21 +42,29 @@ pub(super) fn thinned(width: u32, height: u32, map: &[u8]) -> Vec<bool> {
             !remove
         });
         if order.len() == before {
-            return set.chunks_exact(across).skip(1).take(h).flat_map(|row| &row[1..=w]).copied().collect();
+            return set
+                .chunks_exact(across)
+                .skip(1)
+                .take(h)
+                .flat_map(|row| &row[1..=w])
+                .copied()
+                .collect();
         }
     }
 }
 
-/// For every set of neighbours (bit i: the i-th of [`RING`]) whether those that are set stay in one piece, and the empty ones too,
-/// without the pixel: the 8-connectivity number is 1 (Yokoi, Toriwaki & Fukumura 1975), which is false inside areas and for lone
-/// pixels.
+/// For every set of neighbours (bit i: the i-th of [`RING`]) whether those that are set
+/// stay in one piece, and the empty ones too, without the pixel: the 8-connectivity
+/// number is 1 (Yokoi, Toriwaki & Fukumura 1975), which is false inside areas and for
+/// lone pixels.
 const SIMPLE: [bool; 256] = {
     let mut table = [false; 256];
     let mut ring = 0;
     while ring < 256 {
         let (mut number, mut i) = (0, 0);
         while i < 8 {
-            let empty = [ring >> i & 1 == 0, ring >> (i + 1) & 1 == 0, ring >> ((i + 2) % 8) & 1 == 0];
+            let empty =
+                [ring >> i & 1 == 0, ring >> (i + 1) & 1 == 0, ring >> ((i + 2) % 8) & 1 == 0];
             if empty[0] && !(empty[1] && empty[2]) {
                 number += 1;
             }
@@ -65,12 +76,14 @@ const SIMPLE: [bool; 256] = {
     table
 };
 
-/// Whether a pixel is the end of a line, rather than of a spur: one neighbour, or two side by side, that are neither much
-/// stronger nor deeper inside.
+/// Whether a pixel is the end of a line, rather than of a spur: one neighbour, or two
+/// side by side, that are neither much stronger nor deeper inside.
 fn is_end(k: usize, ring: u8, around: &[usize; 8], strength: &[u8], depth: &[f32]) -> bool {
     let close = ring & ring.rotate_left(1) != 0;
     let few = ring.count_ones() == 1 || ring.count_ones() == 2 && close;
-    let weak = |n: usize| 10 * u16::from(strength[k]) >= 8 * u16::from(strength[n]) && depth[k] >= depth[n] - 0.3;
+    let weak = |n: usize| {
+        10 * u16::from(strength[k]) >= 8 * u16::from(strength[n]) && depth[k] >= depth[n] - 0.3
+    };
     few && (0..8).filter(|i| ring >> i & 1 == 1).all(|i| weak(around[i]))
 }
 
@@ -131,7 +144,11 @@ mod tests {
                 }
                 let set = thinned(30, 30, &map);
                 assert_eq!(pieces(30, &set), 1, "{thick} {upright}");
-                assert!((22 - thick..=23).contains(&count(&set)), "{thick} {upright}: {}", count(&set));
+                assert!(
+                    (22 - thick..=23).contains(&count(&set)),
+                    "{thick} {upright}: {}",
+                    count(&set)
+                );
                 let middle = 12.0 + (thick as f32 - 1.0) / 2.0;
                 for k in (0..900).filter(|&k| set[k]) {
                     let across = if upright { k % 30 } else { k / 30 } as f32;

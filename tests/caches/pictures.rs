@@ -8,7 +8,11 @@ use std::sync::Arc;
 
 fn ball(at: f64, radius: f64) -> Solid {
     let mesh = Arc::new(sphere(radius, 12).unwrap());
-    Solid::new(mesh).placed(Affine::new(DVec3::new(at, 0.3 * at, 0.2 * at), DVec3::ZERO, DVec3::ONE))
+    Solid::new(mesh).placed(Affine::new(
+        DVec3::new(at, 0.3 * at, 0.2 * at),
+        DVec3::ZERO,
+        DVec3::ONE,
+    ))
 }
 
 /// Cameras that differ from the first in one field each, and what that is.
@@ -21,8 +25,12 @@ fn cameras(projection: Projection) -> Vec<(String, Camera)> {
         all.push((what, other));
     };
     type Of = fn(&mut Camera) -> &mut DVec3;
-    let vectors: [(&str, Of); 4] =
-        [("eye", |c| &mut c.eye), ("right", |c| &mut c.right), ("up", |c| &mut c.up), ("forward", |c| &mut c.forward)];
+    let vectors: [(&str, Of); 4] = [
+        ("eye", |c| &mut c.eye),
+        ("right", |c| &mut c.right),
+        ("up", |c| &mut c.up),
+        ("forward", |c| &mut c.forward),
+    ];
     for (name, of) in vectors {
         for axis in 0..3 {
             add(format!("{name}[{axis}]"), &|c| of(c)[axis] += 0.03);
@@ -57,7 +65,8 @@ fn cameras(projection: Projection) -> Vec<(String, Camera)> {
     all
 }
 
-/// Contours drawn at once, of layers, and before a backdrop, through views with frames and without.
+/// Contours drawn at once, of layers, and before a backdrop, through views with frames
+/// and without.
 #[test]
 fn pictures_of_another_camera() {
     let members: Vec<Solid> = (0..8).map(|i| ball(0.4 * f64::from(i) - 1.4, 0.5)).collect();
@@ -66,19 +75,34 @@ fn pictures_of_another_camera() {
     let moved = Solid::group(&[&members[..3], &[ball(-0.1, 0.8)], &members[4..]].concat());
     let solids = [("at once", &members[0], &members[1]), ("of parts", &still, &moved)];
     let (cx, cy) = (36.0, 28.0);
-    let projections =
-        [Projection::Pinhole { focal_px: 130.0, cx, cy }, Projection::Orthographic { units_per_pixel: 0.06, cx, cy }];
+    let projections = [
+        Projection::Pinhole { focal_px: 130.0, cx, cy },
+        Projection::Orthographic { units_per_pixel: 0.06, cx, cy },
+    ];
     for ((how, a, b), projection) in solids.iter().flat_map(|s| projections.map(|p| (s, p))) {
         let cameras = cameras(projection);
         let base = cameras[0].1;
         for (what, camera) in &cameras {
             let seen = |eye: &Camera| {
-                (contour_bits(&Contours::of(a, eye)), frame_bits(&Frame::render(a, eye, Channels::Depth)))
+                (
+                    contour_bits(&Contours::of(a, eye)),
+                    frame_bits(&Frame::render(a, eye, Channels::Depth)),
+                )
             };
             let differs = seen(camera) != seen(&base);
-            assert!(differs == (what != "nothing"), "{how}, {what}: the picture shows nothing of it");
-            for (solid, eye) in [(a, &base), (b, &base), (a, &base), (a, camera), (b, camera), (a, camera), (a, &base)]
-            {
+            assert!(
+                differs == (what != "nothing"),
+                "{how}, {what}: the picture shows nothing of it"
+            );
+            for (solid, eye) in [
+                (a, &base),
+                (b, &base),
+                (a, &base),
+                (a, camera),
+                (b, camera),
+                (a, camera),
+                (a, &base),
+            ] {
                 let here = contour_bits(&Contours::of(solid, eye));
                 let there = afresh(|| contour_bits(&Contours::of(solid, eye)));
                 assert!(here == there, "{how}: contours with another {what} of the camera");
@@ -92,36 +116,48 @@ fn pictures_of_another_camera() {
                 };
                 let (view, other) = (view(), view());
                 let counted = change(&view).map_or(view.contours(72).len(), |c| c.1);
-                assert_eq!(counted, afresh(|| other.contours(72).len()), "{how}: what changed with another {what}");
+                assert_eq!(
+                    counted,
+                    afresh(|| other.contours(72).len()),
+                    "{how}: what changed with another {what}"
+                );
             }
         }
     }
 }
 
-/// The kind of projection alone: a scene so large that one number is good as focal length and as size of a pixel.
+/// The kind of projection alone: a scene so large that one number is good as focal length
+/// and as size of a pixel.
 #[test]
 fn pictures_of_another_kind_of_camera() {
     let by = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(800.0));
-    let members: Vec<Solid> = (0..6).map(|i| ball(0.4 * f64::from(i) - 1.0, 0.5).placed(by)).collect();
+    let members: Vec<Solid> =
+        (0..6).map(|i| ball(0.4 * f64::from(i) - 1.0, 0.5).placed(by)).collect();
     let moved = Solid::group(&[&members[..5], &[ball(1.1, 0.3).placed(by)]].concat());
     let still = Solid::group(&members);
     let (scale, cx, cy) = (80.0, 36.0, 28.0);
-    let kinds =
-        [Projection::Pinhole { focal_px: scale, cx, cy }, Projection::Orthographic { units_per_pixel: scale, cx, cy }];
+    let kinds = [
+        Projection::Pinhole { focal_px: scale, cx, cy },
+        Projection::Orthographic { units_per_pixel: scale, cx, cy },
+    ];
     let mut seen = Vec::new();
     for i in 0..8 {
         let base = Camera { projection: kinds[i % 2], ..Camera::default_for(72, 56) };
         let camera = Camera { eye: DVec3::new(0.0, 0.0, 6400.0), ..base };
         for solid in [&still, &moved, &still] {
             let here = contour_bits(&Contours::of(solid, &camera));
-            assert!(here == afresh(|| contour_bits(&Contours::of(solid, &camera))), "another kind of projection");
+            assert!(
+                here == afresh(|| contour_bits(&Contours::of(solid, &camera))),
+                "another kind of projection"
+            );
             seen.push(here);
         }
     }
     assert!(seen[0] != seen[3] && seen[0] != seen[1] && seen[0].len() > 100);
 }
 
-/// Another mesh at the same place, in the memory of one that is gone; another placement by one number.
+/// Another mesh at the same place, in the memory of one that is gone; another placement
+/// by one number.
 #[test]
 fn pictures_of_another_mesh_and_placement() {
     let camera = Camera::default_for(64, 64);
@@ -144,7 +180,8 @@ fn pictures_of_another_mesh_and_placement() {
     for k in 0..12 {
         let mut numbers = base.0.to_cols_array();
         numbers[k] += 0.05;
-        let other = check("another placement", &placed(Affine(glam::DAffine3::from_cols_array(&numbers))));
+        let other =
+            check("another placement", &placed(Affine(glam::DAffine3::from_cols_array(&numbers))));
         assert!(other != first, "number {k} of a placement is not seen");
         assert!(check("the placement again", &placed(base)) == first);
     }
@@ -158,7 +195,10 @@ fn pictures_of_another_mesh_and_placement() {
     for (k, field) in fields.iter().enumerate() {
         let mut other = Mesh::clone(&mesh);
         field(&mut other);
-        check(&format!("a mesh with another field {k}"), &with(&Solid::new(Arc::new(other)).placed(base)));
+        check(
+            &format!("a mesh with another field {k}"),
+            &with(&Solid::new(Arc::new(other)).placed(base)),
+        );
         assert!(check("the mesh again", &placed(base)) == first);
     }
 }
@@ -175,7 +215,11 @@ fn meshes_at_other_details() {
             for camera in [Camera::default_for(200, 200), near] {
                 let see = |solid: Solid| {
                     let view = View::with_detail(solid, camera, detail);
-                    (contour_bits(&view.contours(size)), frame_bits(&view.depth(size)), view.triangles(size))
+                    (
+                        contour_bits(&view.contours(size)),
+                        frame_bits(&view.depth(size)),
+                        view.triangles(size),
+                    )
                 };
                 let here = see(shared.clone());
                 assert!(here == afresh(|| see(make())), "detail {detail} at {size} pixels");

@@ -18,9 +18,12 @@ const SIZE: [u32; 2] = [96, 64];
 fn observed(kind: &str) -> Value {
     let [w, h] = SIZE;
     match kind {
-        "mask" => Value::object(MaskValue::new(Mask::new(w, h, (0..w * h).map(|i| inside(i, w)).collect()).unwrap())),
+        "mask" => Value::object(MaskValue::new(
+            Mask::new(w, h, (0..w * h).map(|i| inside(i, w)).collect()).unwrap(),
+        )),
         "depth" => {
-            let depth = (0..w * h).map(|i| if inside(i, w) { 7.0 + i as f32 * 1e-4 } else { f32::INFINITY });
+            let depth = (0..w * h)
+                .map(|i| if inside(i, w) { 7.0 + i as f32 * 1e-4 } else { f32::INFINITY });
             Value::object(DepthValue::new(DepthMap::new(w, h, depth.collect()).unwrap()))
         }
         _ => {
@@ -29,12 +32,15 @@ fn observed(kind: &str) -> Value {
                 let base = if inside(y * w + x, w) { [150, 60, 50] } else { [70, 110, 140] };
                 image::Rgb(base.map(|b: u32| (b + noise) as u8))
             };
-            Value::object(ImageValue::photo(Photo::from_rgb(image::RgbImage::from_fn(w, h, colour)).unwrap()))
+            Value::object(ImageValue::photo(
+                Photo::from_rgb(image::RgbImage::from_fn(w, h, colour)).unwrap(),
+            ))
         }
     }
 }
 
-/// Writes `<base,step>` as base, or base + step if p[i] is 1, `<a|b>` as one or the other; gives how many.
+/// Writes `<base,step>` as base, or base + step if p[i] is 1, `<a|b>` as one or the
+/// other; gives how many.
 fn written(text: &str) -> (String, usize) {
     let (mut out, mut count, mut rest) = (String::new(), 0, text);
     while let Some((before, after)) = rest.split_once('<') {
@@ -91,9 +97,13 @@ const COMPARED: [(&str, &str); 6] = [
 
 fn program(kind: &str, compared: &str) -> (Model, usize) {
     let (text, count) = written(&format!("{SCENE} observe {compared};"));
-    let data = if kind == "image" { "data seen: image;".into() } else { format!("data seen = {kind}();") };
-    let text = format!("include \"std/scene.pcad\" as scene; {data} assume p ~ iid(normal(0, 1), {count}); {text}");
-    let model = Program::parse(&text).map(|p| p.observe("seen", observed(kind))).and_then(Program::compile);
+    let data =
+        if kind == "image" { "data seen: image;".into() } else { format!("data seen = {kind}();") };
+    let text = format!(
+        "include \"std/scene.pcad\" as scene; {data} assume p ~ iid(normal(0, 1), {count}); {text}"
+    );
+    let model =
+        Program::parse(&text).map(|p| p.observe("seen", observed(kind))).and_then(Program::compile);
     (model.unwrap_or_else(|e| panic!("{e}\n{text}")), count)
 }
 
@@ -131,9 +141,14 @@ fn scores_of_other_arguments() {
             );
             shows += usize::from(found.to_bits() != base.to_bits());
             put(&mut here, &address, 0.0.into());
-            assert_eq!(here.log_likelihood().to_bits(), base.to_bits(), "{compared}: argument {k} and back");
+            assert_eq!(
+                here.log_likelihood().to_bits(),
+                base.to_bits(),
+                "{compared}: argument {k} and back"
+            );
         }
-        // A few say nothing of this picture: the depth of the point looked at, a shift along the line of sight, levels of detail.
+        // A few say nothing of this picture: the depth of the point looked at, a shift
+        // along the line of sight, levels of detail.
         println!("{shows} of {count} show: {compared}");
         assert!(shows + 5 >= count, "{compared}: {shows} of {count} arguments change the score");
     }

@@ -16,10 +16,13 @@ fn surfaces_of_other_numbers() {
     };
     let round = |points: usize, least: f64| {
         let at = |i: usize| std::f64::consts::PI * i as f64 / (points - 1) as f64;
-        let r = (0..points).map(|i| if i % (points - 1) == 0 { least } else { libm::sin(at(i)).max(least) }).collect();
+        let r = (0..points)
+            .map(|i| if i % (points - 1) == 0 { least } else { libm::sin(at(i)).max(least) })
+            .collect();
         Profile { y: (0..points).map(|i| -libm::cos(at(i))).collect(), r }
     };
-    let flat_bottom = Profile { y: vec![0.0, 0.0, 0.2, 0.4, 0.6, 0.8], r: vec![0.0, 0.5, 0.5, 0.45, 0.4, 0.4] };
+    let flat_bottom =
+        Profile { y: vec![0.0, 0.0, 0.2, 0.4, 0.6, 0.8], r: vec![0.0, 0.5, 0.5, 0.45, 0.4, 0.4] };
     let above = |p: Profile, by: f64| Profile { y: p.y.iter().map(|y| y + by).collect(), ..p };
     let one = || vec![profile(6, 0.4)];
     type Asked = (&'static str, Vec<Profile>, u32, f64, Caps);
@@ -33,9 +36,27 @@ fn surfaces_of_other_numbers() {
         ("the upper cap", one(), 12, 0.0, Caps::Top),
         ("no cap", one(), 12, 0.0, Caps::None),
         ("two parts", vec![profile(6, 0.4), above(profile(6, 0.4), 1.0)], 12, 0.0, Caps::Both),
-        ("two parts that meet", vec![profile(6, 0.5), above(profile(6, 0.5), 1.0)], 12, 0.0, Caps::Both),
-        ("two parts that meet at an angle", vec![profile(6, 0.5), above(profile(6, 2.0), 1.0)], 12, 0.0, Caps::Both),
-        ("two parts that bend", vec![profile(6, 0.5), above(profile(6, 0.2), 1.0)], 12, 0.0, Caps::Both),
+        (
+            "two parts that meet",
+            vec![profile(6, 0.5), above(profile(6, 0.5), 1.0)],
+            12,
+            0.0,
+            Caps::Both,
+        ),
+        (
+            "two parts that meet at an angle",
+            vec![profile(6, 0.5), above(profile(6, 2.0), 1.0)],
+            12,
+            0.0,
+            Caps::Both,
+        ),
+        (
+            "two parts that bend",
+            vec![profile(6, 0.5), above(profile(6, 0.2), 1.0)],
+            12,
+            0.0,
+            Caps::Both,
+        ),
         // The same strips, and a crease between the first two or none.
         ("a disc of its own", vec![flat_bottom], 12, 0.0, Caps::None),
         (
@@ -47,13 +68,21 @@ fn surfaces_of_other_numbers() {
         ),
         ("a dome", vec![round(9, 0.0)], 12, 0.0, Caps::None),
         ("a round tube", vec![round(9, 0.2)], 12, 0.0, Caps::None),
-        ("parts of other numbers", vec![profile(5, 0.5), above(profile(7, 0.5), 1.0)], 12, 0.0, Caps::Both),
+        (
+            "parts of other numbers",
+            vec![profile(5, 0.5), above(profile(7, 0.5), 1.0)],
+            12,
+            0.0,
+            Caps::Both,
+        ),
         ("radii", vec![profile(6, 0.3)], 12, 0.0, Caps::Both),
     ];
     let make = |(_, parts, sides, thickness, caps): &Asked| {
         // A wall is of a vessel that is open.
         let caps = if *thickness > 0.0 { Caps::Bottom } else { *caps };
-        lathe(parts, *sides, *thickness, caps).map(|m| mesh_bits(&m)).unwrap_or_else(|e| format!("{e}"))
+        lathe(parts, *sides, *thickness, caps)
+            .map(|m| mesh_bits(&m))
+            .unwrap_or_else(|e| format!("{e}"))
     };
     for a in &all {
         for b in &all {
@@ -81,14 +110,20 @@ fn surfaces_of_other_numbers() {
 fn bodies_in_other_poses() {
     let body = shipped::human("human.lod2").unwrap();
     let stout = Arc::new(body.shaped(&[("heavy", 0.7)]).unwrap());
-    let rest: Vec<JointPose> =
-        (0..body.rig().joints().len()).map(|i| JointPose::turned(DVec3::new(0.1, 0.02 * i as f64, 0.0))).collect();
+    let rest: Vec<JointPose> = (0..body.rig().joints().len())
+        .map(|i| JointPose::turned(DVec3::new(0.1, 0.02 * i as f64, 0.0)))
+        .collect();
     let bits = |body: &Arc<_>, pose: &[JointPose], rules: &Rules| -> Vec<String> {
         let posed = pcadlang::geom::armature::Armature::posed(body, pose, rules).unwrap();
-        let landmarks = posed.landmarks().iter().map(|l| format!("{:?}", l.position.to_array().map(f64::to_bits)));
+        let landmarks = posed
+            .landmarks()
+            .iter()
+            .map(|l| format!("{:?}", l.position.to_array().map(f64::to_bits)));
         let meshes = posed.instances().iter().map(|i| {
             let numbers = i.mesh.positions.iter().chain(&i.mesh.normals).flat_map(|v| v.to_array());
-            numbers.fold(0u64, |h, x| (h ^ u64::from(x.to_bits())).wrapping_mul(0x100000001b3)).to_string()
+            numbers
+                .fold(0u64, |h, x| (h ^ u64::from(x.to_bits())).wrapping_mul(0x100000001b3))
+                .to_string()
         });
         landmarks.chain(meshes).collect()
     };
@@ -126,7 +161,9 @@ fn bodies_in_other_poses() {
             assert!(here == afresh(|| bits(&body, &pose, &rules)), "joint {joint}: another {what}");
             assert!(bits(&body, &rest, &rules) == first, "joint {joint}: {what}, and back");
             assert!(
-                here != first || ["-0", "the turn in the last bit"].contains(&what) || what.contains("hardly"),
+                here != first
+                    || ["-0", "the turn in the last bit"].contains(&what)
+                    || what.contains("hardly"),
                 "{what}"
             );
         }
@@ -134,10 +171,17 @@ fn bodies_in_other_poses() {
     // Where turns are about nothing, signs of 0 are all that differs.
     for sign in [0.0, -0.0, 0.0] {
         let pose = vec![JointPose::turned(DVec3::splat(sign)); rest.len()];
-        assert!(bits(&body, &pose, &rules) == afresh(|| bits(&body, &pose, &rules)), "turned by {sign}");
+        assert!(
+            bits(&body, &pose, &rules) == afresh(|| bits(&body, &pose, &rules)),
+            "turned by {sign}"
+        );
     }
     let other = bits(&stout, &rest, &rules);
-    assert!(other != first && other == afresh(|| bits(&stout, &rest, &rules)) && bits(&body, &rest, &rules) == first);
+    assert!(
+        other != first
+            && other == afresh(|| bits(&stout, &rest, &rules))
+            && bits(&body, &rest, &rules) == first
+    );
 }
 
 fn turned(turn: Turn, by: DVec3) -> Turn {

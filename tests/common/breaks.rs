@@ -1,4 +1,5 @@
-//! Chains that are broken off and go on from a checkpoint, and the same chains without a break.
+//! Chains that are broken off and go on from a checkpoint, and the same chains without a
+//! break.
 #![allow(dead_code)]
 
 use pcadlang::Model;
@@ -56,20 +57,30 @@ impl Sink for Keep {
     }
 }
 
-fn go(model: &Model, options: &RunOptions, from: Option<Checkpoint>, each: bool) -> (Rows, Vec<Vec<u8>>, String) {
+fn go(
+    model: &Model,
+    options: &RunOptions,
+    from: Option<Checkpoint>,
+    each: bool,
+) -> (Rows, Vec<Vec<u8>>, String) {
     let (kept, progress) = (Arc::new(Mutex::new(Kept::default())), Arc::new(Progress::default()));
     progress.checkpoints.store(1, Ordering::Relaxed);
     let sink = Keep { kept: Arc::clone(&kept), progress: Arc::clone(&progress), from, each };
-    let done = model.run_into(options, 1, &progress, vec![Box::new(sink)]).unwrap_or_else(|e| panic!("{e}"));
-    let done = done.into_iter().next().unwrap().unwrap_or_else(|e| panic!("{}", model.chain_error(e)));
-    let counts: Vec<_> = done.kernels.iter().map(|k| (&k.name, k.proposals, k.accepted, k.failed)).collect();
+    let done = model
+        .run_into(options, 1, &progress, vec![Box::new(sink)])
+        .unwrap_or_else(|e| panic!("{e}"));
+    let done =
+        done.into_iter().next().unwrap().unwrap_or_else(|e| panic!("{}", model.chain_error(e)));
+    let counts: Vec<_> =
+        done.kernels.iter().map(|k| (&k.name, k.proposals, k.accepted, k.failed)).collect();
     let best = done.best.as_ref().map(|b| b.0.to_bits());
     let end = format!("{} {} {counts:?} {:?} {best:?}", done.steps, done.warmup, done.sites);
     let kept = std::mem::take(&mut *kept.lock().unwrap());
     (kept.rows, kept.checkpoints, end)
 }
 
-/// Breaks a chain off at about so many of its steps, warm-up included, and asserts that it goes on as it would have.
+/// Breaks a chain off at about so many of its steps, warm-up included, and asserts that
+/// it goes on as it would have.
 pub fn same_after_breaks(what: &str, model: &Model, options: &RunOptions, breaks: usize) {
     let (rows, _, end) = go(model, options, None, false);
     let (kept, checkpoints, _) = go(model, options, None, true);
@@ -80,9 +91,16 @@ pub fn same_after_breaks(what: &str, model: &Model, options: &RunOptions, breaks
         let checkpoint = Checkpoint::from_bytes(bytes).unwrap_or_else(|e| panic!("{what}: {e}"));
         let (step, draws) = (checkpoint.steps(), checkpoint.draws() as usize);
         let (rest, _, other_end) = go(model, options, Some(checkpoint), false);
-        assert_eq!(rows.len(), draws + rest.len(), "{what}: broken off at step {step}, the numbers of draws differ");
+        assert_eq!(
+            rows.len(),
+            draws + rest.len(),
+            "{what}: broken off at step {step}, the numbers of draws differ"
+        );
         let differ = rows[draws..].iter().zip(&rest).position(|(a, b)| a != b);
-        assert_eq!(differ, None, "{what}: broken off at step {step}, draw {draws}; the first that differs after it");
+        assert_eq!(
+            differ, None,
+            "{what}: broken off at step {step}, draw {draws}; the first that differs after it"
+        );
         assert_eq!(end, other_end, "{what}: broken off at step {step}");
     }
 }

@@ -4,7 +4,8 @@
 use pcadlang::dist::*;
 use std::sync::Arc;
 
-/// The distribution of a family with these parameters, as tables of reference values write them.
+/// The distribution of a family with these parameters, as tables of reference values
+/// write them.
 pub fn made(family: &str, p: &[f64]) -> Dist {
     match (family, p) {
         ("normal", [a, b]) => Dist::Normal(Normal::new(*a, *b).unwrap()),
@@ -29,13 +30,17 @@ pub fn made(family: &str, p: &[f64]) -> Dist {
         ("weibull", [a, b]) => Dist::Weibull(Weibull::new(*a, *b).unwrap()),
         ("neg_binomial", [a, b]) => Dist::NegBinomial(NegBinomial::new(*a, *b).unwrap()),
         ("geometric", [a]) => Dist::Geometric(Geometric::new(*a).unwrap()),
-        ("multinomial", [n, w @ ..]) => Dist::Multinomial(Arc::new(Multinomial::new(*n, w).unwrap())),
+        ("multinomial", [n, w @ ..]) => {
+            Dist::Multinomial(Arc::new(Multinomial::new(*n, w).unwrap()))
+        }
         ("lkj", [n, eta]) => Dist::Lkj(Arc::new(Lkj::new(*n, *eta).unwrap())),
         ("wishart", [df, scale @ ..]) => {
             let scale = nalgebra::DMatrix::from_row_slice(3, 3, scale);
             Dist::Wishart(Arc::new(Wishart::new(*df, &scale).unwrap()))
         }
-        ("uniform_discrete", [a, b]) => Dist::UniformDiscrete(UniformDiscrete::new(*a, *b).unwrap()),
+        ("uniform_discrete", [a, b]) => {
+            Dist::UniformDiscrete(UniformDiscrete::new(*a, *b).unwrap())
+        }
         ("binomial", [a, b]) => Dist::Binomial(Binomial::new(*a, *b).unwrap()),
         ("poisson", [a]) => Dist::Poisson(Poisson::new(*a).unwrap()),
         ("categorical", p) => Dist::Categorical(Categorical::new(p).unwrap()),
@@ -52,7 +57,9 @@ pub fn made(family: &str, p: &[f64]) -> Dist {
 pub fn datum(family: &str, x: &[f64]) -> Datum {
     match x {
         [x] => Datum::Num(*x),
-        rows if matches!(family, "lkj" | "wishart") => Datum::List(rows.chunks(3).map(|r| r.to_vec().into()).collect()),
+        rows if matches!(family, "lkj" | "wishart") => {
+            Datum::List(rows.chunks(3).map(|r| r.to_vec().into()).collect())
+        }
         _ => x.to_vec().into(),
     }
 }

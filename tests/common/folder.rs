@@ -19,7 +19,8 @@ pub struct Done {
 
 impl Folder {
     pub fn new(name: &str) -> Folder {
-        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
+        let path =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&path);
         std::fs::create_dir_all(&path).unwrap();
         Folder(path)
@@ -73,13 +74,14 @@ impl Folder {
         let o = c.args(args).output().unwrap();
         let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
         let (out, err) = (text(&o.stdout), text(&o.stderr));
-        let code = o.status.code().unwrap_or_else(|| panic!("{args:?} was killed: {:?}\n{err}", o.status));
+        let code =
+            o.status.code().unwrap_or_else(|| panic!("{args:?} was killed: {:?}\n{err}", o.status));
         assert!(!err.contains("panicked") && !out.contains("panicked"), "{args:?} panics:\n{err}");
         Done { code, out, err }
     }
 
-    /// Runs a command that must fail as a program or data error: exit code 1, a first line that holds `says`, nothing new
-    /// in the folder.
+    /// Runs a command that must fail as a program or data error: exit code 1, a first
+    /// line that holds `says`, nothing new in the folder.
     pub fn refuses(&self, args: &[&str], says: &str) {
         let before = self.files();
         let d = self.run(args);
@@ -87,7 +89,11 @@ impl Folder {
         let first = d.err.lines().find(|l| !l.starts_with("note:")).unwrap_or_default();
         assert!(first.starts_with("error"), "{args:?}: the first line is no error: {}", d.err);
         assert!(first.contains(says), "{args:?}: {says:?} is not in the first line of\n{}", d.err);
-        assert!(first.chars().count() < 400, "{args:?}: the first line is {} letters long", first.chars().count());
+        assert!(
+            first.chars().count() < 400,
+            "{args:?}: the first line is {} letters long",
+            first.chars().count()
+        );
         assert_eq!(self.files(), before, "{args:?} leaves something");
     }
 

@@ -22,7 +22,9 @@ impl Writer {
         };
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let number = self.accessors.len();
-        self.views.push(json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() }));
+        self.views.push(
+            json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() }),
+        );
         let count = bytes.len() / (width * size);
         self.accessors.push(json!({ "bufferView": number, "componentType": component, "type": shape, "count": count }));
         self.bytes.extend_from_slice(bytes);
@@ -82,23 +84,28 @@ pub fn packed(document: &Value, bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A body as a skinned GLB: its points times a matrix, its joints below a node with these properties.
+/// A body as a skinned GLB: its points times a matrix, its joints below a node with these
+/// properties.
 pub fn skinned(body: &Armature, to_file: DMat3, root: &Value) -> Vec<u8> {
     let mut w = Writer::default();
     let at = |p: DVec3| (to_file * p).to_array();
     let flat = |p: &glam::Vec3| at(p.as_dvec3()).map(|x| x as f32);
     let positions = w.floats("VEC3", &body.positions().iter().flat_map(flat).collect::<Vec<f32>>());
     let indices = w.words("SCALAR", body.triangles().as_flattened());
-    let joints = w.shorts("VEC4", &body.influences().iter().flat_map(|i| i.joints).collect::<Vec<u16>>());
-    let weights = w.floats("VEC4", &body.influences().iter().flat_map(|i| i.weights).collect::<Vec<f32>>());
+    let joints =
+        w.shorts("VEC4", &body.influences().iter().flat_map(|i| i.joints).collect::<Vec<u16>>());
+    let weights =
+        w.floats("VEC4", &body.influences().iter().flat_map(|i| i.weights).collect::<Vec<f32>>());
     let all = body.rig().joints();
     let bind = |h: DVec3| {
         let [x, y, z] = at(-h).map(|x| x as f32);
         [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
     };
     let binds = w.floats("MAT4", &all.iter().flat_map(|j| bind(j.head)).collect::<Vec<f32>>());
-    // The joints' nodes come first, so that numbers agree; then the mesh, then the node above.
-    let children = |of: Option<usize>| (0..all.len()).filter(|c| all[*c].parent == of).collect::<Vec<usize>>();
+    // The joints' nodes come first, so that numbers agree; then the mesh, then the node
+    // above.
+    let children =
+        |of: Option<usize>| (0..all.len()).filter(|c| all[*c].parent == of).collect::<Vec<usize>>();
     let mut nodes: Vec<Value> = (0..all.len())
         .map(|j| {
             let start = all[j].parent.map_or(DVec3::ZERO, |p| all[p].head);
@@ -129,7 +136,8 @@ pub fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::new();
     for three in bytes.chunks(3) {
-        let bits = three.iter().fold(0u32, |b, x| b << 8 | u32::from(*x)) << (8 * (3 - three.len()));
+        let bits =
+            three.iter().fold(0u32, |b, x| b << 8 | u32::from(*x)) << (8 * (3 - three.len()));
         for k in 0..4 {
             let letter = char::from(LETTERS[(bits >> (18 - 6 * k) & 63) as usize]);
             out.push(if k <= three.len() { letter } else { '=' });

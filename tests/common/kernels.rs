@@ -1,5 +1,6 @@
-//! Which kernels the tests of kernels run: the tests read these lists, and so does the table of `docs/kernels.md`
-//! (`tests/kernels.rs`). A kernel is added to a proof by adding a line here; a row of the table follows by itself.
+//! Which kernels the tests of kernels run: the tests read these lists, and so does the
+//! table of `docs/kernels.md` (`tests/kernels.rs`). A kernel is added to a proof by
+//! adding a line here; a row of the table follows by itself.
 #![allow(dead_code)]
 
 /// A kernel and, every other time, one that reaches everything.
@@ -46,7 +47,8 @@ pub mod exact {
         "delayed(nuts(@x), @y)",
         "delayed(pull(0.8), @y)",
     ];
-    /// A mixture whose labels are summed out, and a chain of labels that depend on each other.
+    /// A mixture whose labels are summed out, and a chain of labels that depend on each
+    /// other.
     pub const SUMMED_OUT: &[&str] = &[
         "nuts(@m, marginal = @z)",
         "hmc(@m, steps = 5, marginal = @z)",
@@ -61,7 +63,8 @@ pub mod exact {
         "abc(mh(@p), eps = 0.5)",
         "abc(mh(@p), eps = 0.5, particles = 10, moves = 2)",
     ];
-    pub const DEPENDENT_SUPPORT: &[&str] = &["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"];
+    pub const DEPENDENT_SUPPORT: &[&str] =
+        &["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"];
     pub const RECURSION: &[&str] = &[
         "mh(one(@**))",
         "gibbs(one(@**))",
@@ -79,8 +82,14 @@ pub mod exact {
         "mh(@c); elliptical(one($gaussian));",
         "temper(mh(one(@**)), levels = 3);",
     ];
-    pub const HIDDEN_MARKOV: &[&str] =
-        &["gibbs(one(@s))", "mh(one(@s))", "drift(one(@s))", "gibbs(each(@s))", "mh(each(@s))", "drift(each(@s))"];
+    pub const HIDDEN_MARKOV: &[&str] = &[
+        "gibbs(one(@s))",
+        "mh(one(@s))",
+        "drift(one(@s))",
+        "gibbs(each(@s))",
+        "mh(each(@s))",
+        "drift(each(@s))",
+    ];
     pub const OPEN_UNIVERSE: &[&str] = &[
         "mh(one($discrete)); drift(one($continuous));",
         "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));",
@@ -237,13 +246,24 @@ pub mod balance {
     pub const NEIGHBOURS_OF_SOME: &[&str] =
         &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")];
     /// The same choices always.
-    pub const FIXED: &[&[&str]] = &[DISCRETE, SUPPORT, MIXTURE, MAPS, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
+    pub const FIXED: &[&[&str]] =
+        &[DISCRETE, SUPPORT, MIXTURE, MAPS, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
     /// Choices that appear, vanish, change form or are shared.
-    pub const CHANGING: &[&[&str]] =
-        &[STRUCTURE, SURROGATE, SAME_NAME, SHARED, MOVING, ELEMENTS, SHARED_GROUPS, NEIGHBOURS, NEIGHBOURS_OF_SOME];
+    pub const CHANGING: &[&[&str]] = &[
+        STRUCTURE,
+        SURROGATE,
+        SAME_NAME,
+        SHARED,
+        MOVING,
+        ELEMENTS,
+        SHARED_GROUPS,
+        NEIGHBOURS,
+        NEIGHBOURS_OF_SOME,
+    ];
 }
 
-/// Parameters and data by turns, data as choices (`tests/balance.rs`); `%` is the selection.
+/// Parameters and data by turns, data as choices (`tests/balance.rs`); `%` is the
+/// selection.
 pub const BY_TURNS: &[&str] = &["mh(one(%))", "block(%)", "drift(%, 0.7)", "drift(one(%), 1)"];
 
 /// Simulation-based calibration and Geweke's test (`tests/calibration.rs`).
@@ -263,16 +283,21 @@ pub const CALIBRATED: &[&str] = &[
     "knn(one(@**), bank = \"b\", k = 2); block(@**);",
 ];
 
-/// Simulation-based calibration only: `smc` and `abc` go on with an estimate made under the data of the step before, which
-/// Geweke's test replaces.
-pub const RANKED: &[&str] = &["smc(drift(one(@**)), particles = 20)", "smc(mh(one(@**)), particles = 10)"];
-/// The same on counts, where simulated data are within `eps` only if they are equal: then `abc` is exact.
-pub const RANKED_ON_COUNTS: &[&str] = &["abc(mh(one(@**)), eps = 0.5)", "abc(block(@**), eps = 0.5)"];
+/// Simulation-based calibration only: `smc` and `abc` go on with an estimate made under
+/// the data of the step before, which Geweke's test replaces.
+pub const RANKED: &[&str] =
+    &["smc(drift(one(@**)), particles = 20)", "smc(mh(one(@**)), particles = 10)"];
+/// The same on counts, where simulated data are within `eps` only if they are equal: then
+/// `abc` is exact.
+pub const RANKED_ON_COUNTS: &[&str] =
+    &["abc(mh(one(@**)), eps = 0.5)", "abc(block(@**), eps = 0.5)"];
 
-/// Chains that are the same bit for bit with and without incremental updates, on any number of threads (`tests/trace.rs`).
+/// Chains that are the same bit for bit with and without incremental updates, on any
+/// number of threads (`tests/trace.rs`).
 pub const INCREMENTAL: &str = "mix { 0.3 => mh(one(@**)); 0.2 => gibbs(one($finite)); 0.2 => drift(one(@**)); 0.2 => elliptical(one($gaussian)); 0.1 => block(@**); 0.1 => slice(one($continuous)); }";
 
-/// A column of the table: what it is called, what the test shows, where it is, the statements it runs.
+/// A column of the table: what it is called, what the test shows, where it is, the
+/// statements it runs.
 pub struct Proof {
     pub name: &'static str,
     pub shows: &'static str,
@@ -342,7 +367,9 @@ impl Proof {
     /// Whether a kernel is among the statements.
     pub fn runs(&self, kernel: &str) -> bool {
         let call = format!("{kernel}(");
-        let begins = |text: &str, i: usize| !text[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '@');
+        let begins = |text: &str, i: usize| {
+            !text[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '@')
+        };
         let named = |text: &&str| text.match_indices(&call).any(|(i, _)| begins(text, i));
         self.statements.iter().copied().flatten().any(named)
     }

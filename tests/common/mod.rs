@@ -27,7 +27,8 @@ pub fn run_with(text: &str, options: &RunOptions, chains: usize, threads: usize)
     draws
 }
 
-/// Three draws from the prior, which have nothing to do with the data: neighbours that mislead.
+/// Three draws from the prior, which have nothing to do with the data: neighbours that
+/// mislead.
 pub fn wrong_neighbours(model: &Model) -> Neighbours {
     let draw = |i| Latent::all(&model.simulate(9, i).unwrap_or_else(|e| panic!("{e}")));
     Neighbours::new((0..3).map(draw).collect(), &(3..40).map(draw).collect::<Vec<_>>())
@@ -42,7 +43,8 @@ pub fn variance(xs: &[f64]) -> f64 {
     xs.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / (xs.len() as f64 - 1.0)
 }
 
-/// The Monte Carlo standard error of the mean by batch means: honest for correlated draws.
+/// The Monte Carlo standard error of the mean by batch means: honest for correlated
+/// draws.
 pub fn standard_error(xs: &[f64]) -> f64 {
     let batches = 40;
     let size = xs.len() / batches;
@@ -50,12 +52,19 @@ pub fn standard_error(xs: &[f64]) -> f64 {
     (variance(&means) / batches as f64).sqrt()
 }
 
-/// Asserts that a posterior mean is right within 5 standard errors (batch means of 40 batches: a false alarm has a chance
-/// of about 1e-5), and that the error is small enough for the test to mean something.
+/// Asserts that a posterior mean is right within 5 standard errors (batch means of 40
+/// batches: a false alarm has a chance of about 1e-5), and that the error is small enough
+/// for the test to mean something.
 pub fn assert_mean(what: &str, xs: &[f64], expected: f64, tolerance: f64) {
     let (m, se) = (mean(xs), standard_error(xs));
-    assert!(5.0 * se < tolerance, "{what}: the standard error {se} is too large to tell {tolerance}; run longer");
-    assert!((m - expected).abs() < 5.0 * se + 1e-12, "{what}: mean {m} (se {se}), expected {expected}");
+    assert!(
+        5.0 * se < tolerance,
+        "{what}: the standard error {se} is too large to tell {tolerance}; run longer"
+    );
+    assert!(
+        (m - expected).abs() < 5.0 * se + 1e-12,
+        "{what}: mean {m} (se {se}), expected {expected}"
+    );
 }
 
 /// Integrates f over a..b by Simpson's rule with n (even) intervals.
@@ -70,8 +79,9 @@ pub fn normal_pdf(x: f64, m: f64, sd: f64) -> f64 {
     (-0.5 * z * z).exp() / (sd * (2.0 * std::f64::consts::PI).sqrt())
 }
 
-/// The largest distance between the distribution of these draws and a continuous one, times the root of their number
-/// (Kolmogorov and Smirnov): for independent draws above 2.5 with a chance of 8e-6.
+/// The largest distance between the distribution of these draws and a continuous one,
+/// times the root of their number (Kolmogorov and Smirnov): for independent draws above
+/// 2.5 with a chance of 8e-6.
 pub fn kolmogorov_smirnov(xs: &[f64], cdf: impl Fn(f64) -> f64) -> f64 {
     let mut sorted = xs.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,4 +1,5 @@
-//! What a tape of a trace's density says, against proposals in the trace and reverse passes through it.
+//! What a tape of a trace's density says, against proposals in the trace and reverse
+//! passes through it.
 
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Change, Draws, Target, Trace};
@@ -14,7 +15,8 @@ pub struct Told {
     pub asked: u32,
 }
 
-/// Compares at the present state and at some points around it: densities to the last bit, gradients to rounding.
+/// Compares at the present state and at some points around it: densities to the last bit,
+/// gradients to rounding.
 pub fn compare_tape(trace: &mut Trace, what: &str) -> Told {
     let mut told = Told::default();
     let mut places: Vec<(Target, Vec<f64>)> = Vec::new();
@@ -33,7 +35,9 @@ pub fn compare_tape(trace: &mut Trace, what: &str) -> Told {
     let flat: Vec<f64> = places.iter().flat_map(|p| p.1.iter().copied()).collect();
     assert_eq!(here, flat, "{what}: the coordinates of the state");
     let (mut by_tape, mut by_trace) = (Vec::new(), Vec::new());
-    if tape.gradient(&here, 0.7, &mut by_tape) && trace.gradient(&targets, 0.7, &mut by_trace).is_ok() {
+    if tape.gradient(&here, 0.7, &mut by_tape)
+        && trace.gradient(&targets, 0.7, &mut by_trace).is_ok()
+    {
         close(&by_tape, &by_trace, what);
     }
     let mut rng = StreamKey::new(3, 0, Purpose::KERNEL).stream(0, 0, 0);
@@ -51,17 +55,26 @@ pub fn compare_tape(trace: &mut Trace, what: &str) -> Told {
             trace.rollback();
             continue;
         };
-        let proposed = proposed.unwrap_or_else(|e| panic!("{what}\na tape has a density where there is none: {e}"));
-        assert_eq!((proposed.appeared, proposed.vanished), (0, 0), "{what}\nstructure changes unnoticed");
+        let proposed = proposed
+            .unwrap_or_else(|e| panic!("{what}\na tape has a density where there is none: {e}"));
+        assert_eq!(
+            (proposed.appeared, proposed.vanished),
+            (0, 0),
+            "{what}\nstructure changes unnoticed"
+        );
         for (found, expected, part) in [
             (w.log_weight, proposed.log_weight, "weight"),
             (w.log_likelihood, proposed.log_likelihood, "likelihood"),
             (w.log_jacobian, proposed.log_jacobian, "Jacobian"),
         ] {
-            assert!(found.to_bits() == expected.to_bits(), "{what}\n{part} {found}, by a proposal {expected}");
+            assert!(
+                found.to_bits() == expected.to_bits(),
+                "{what}\n{part} {found}, by a proposal {expected}"
+            );
         }
         by_trace.clear();
-        let known = w.log_weight.is_finite() && trace.gradient(&targets, 0.7, &mut by_trace).is_ok();
+        let known =
+            w.log_weight.is_finite() && trace.gradient(&targets, 0.7, &mut by_trace).is_ok();
         if known && tape.gradient(&y, 0.7, &mut by_tape) {
             close(&by_tape, &by_trace, what);
         }

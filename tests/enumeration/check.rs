@@ -1,5 +1,6 @@
-//! One program and one plan: each pass of the plan begins in an independent exact draw from the posterior, so what it ends in is an
-//! exact draw as well if the plan leaves the posterior invariant. The draws are independent, so exact tests apply.
+//! One program and one plan: each pass of the plan begins in an independent exact draw
+//! from the posterior, so what it ends in is an exact draw as well if the plan leaves the
+//! posterior invariant. The draws are independent, so exact tests apply.
 
 use super::plans::Plan;
 use super::posterior::Posterior;
@@ -16,7 +17,8 @@ const BINS: usize = 8;
 
 /// What came of it.
 pub enum Said {
-    /// How the draws fell, how they pool, and the share of passes that ended in another state than they began in.
+    /// How the draws fell, how they pool, and the share of passes that ended in another
+    /// state than they began in.
     Counted(Counts, Pooled, f64),
     /// The plan says that it cannot do this.
     Refused(String),
@@ -24,7 +26,8 @@ pub enum Said {
     Failed(String),
 }
 
-/// Puts the chain in an exact draw whenever it records one, and counts what it had made of the last.
+/// Puts the chain in an exact draw whenever it records one, and counts what it had made
+/// of the last.
 struct Restart {
     posterior: Arc<Posterior>,
     seed: u64,
@@ -57,7 +60,9 @@ impl Watch for Restart {
                     seen.moved += u64::from(to != from);
                     seen.ended.push(to);
                 }
-                None => seen.failed = Some(format!("a state that cannot be: {:?}", trace.choices())),
+                None => {
+                    seen.failed = Some(format!("a state that cannot be: {:?}", trace.choices()))
+                }
             }
         }
         let mut rng = StreamKey::new(self.seed, 0, Purpose::TRUTH).stream(seen.begun, 0, 0);
@@ -103,25 +108,32 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
     };
     let banks = statements.contains("knn").then(|| {
         // Neighbours that have nothing to do with the data, and few of them.
-        let all: Vec<_> = (0..12).filter_map(|i| model.simulate(9, i).ok()).map(|t| Latent::all(&t)).collect();
+        let all: Vec<_> =
+            (0..12).filter_map(|i| model.simulate(9, i).ok()).map(|t| Latent::all(&t)).collect();
         Arc::new(Neighbours::new(all.iter().take(3).cloned().collect(), &all)) as _
     });
-    let watch = Arc::new(Restart { posterior: Arc::clone(posterior), seed, seen: Mutex::default() });
+    let watch =
+        Arc::new(Restart { posterior: Arc::clone(posterior), seed, seen: Mutex::default() });
     let watched: Arc<dyn Watch> = watch.clone();
     let options = RunOptions { seed, watch: Some(watched), banks, ..RunOptions::default() };
     let plan = match model.plan() {
         Ok((plan, _)) => plan,
         Err(e) => return Said::Failed(format!("{e}")),
     };
-    let done = run_from(model.code(), &plan, &options, &Progress::default(), &mut Discard, 0, trace);
+    let done =
+        run_from(model.code(), &plan, &options, &Progress::default(), &mut Discard, 0, trace);
     let Ok(seen) = watch.seen.lock() else { return Said::Failed("the watch failed".into()) };
     if let Some(e) = &seen.failed {
         return Said::Failed(e.clone());
     }
     match done {
         Ok(_) => count(posterior, &seen),
-        Err(ChainError::Run(e)) if e.message.contains("cannot be summed out") => Said::Refused(e.message.clone()),
-        Err(ChainError::Run(e)) if e.message.contains("only the surrogate depends") => Said::Refused(e.message.clone()),
+        Err(ChainError::Run(e)) if e.message.contains("cannot be summed out") => {
+            Said::Refused(e.message.clone())
+        }
+        Err(ChainError::Run(e)) if e.message.contains("only the surrogate depends") => {
+            Said::Refused(e.message.clone())
+        }
         Err(e) => Said::Failed(format!("{e:?}")),
     }
 }
@@ -159,13 +171,17 @@ fn count(posterior: &Posterior, seen: &Seen) -> Said {
         let n: u64 = bins.iter().sum();
         // How many have it is a matter of the kinds; where it is there it is uniform.
         if n == draws {
-            counts
-                .cells
-                .extend(bins.iter().enumerate().map(|(b, c)| (format!("continuous {d}, bin {b}"), uniform, *c)));
+            counts.cells.extend(
+                bins.iter()
+                    .enumerate()
+                    .map(|(b, c)| (format!("continuous {d}, bin {b}"), uniform, *c)),
+            );
         } else {
             let share: f64 = seen_share(posterior, d);
             let cells = bins.iter().enumerate();
-            counts.cells.extend(cells.map(|(b, c)| (format!("continuous {d}, bin {b}"), uniform * share, *c)));
+            counts.cells.extend(
+                cells.map(|(b, c)| (format!("continuous {d}, bin {b}"), uniform * share, *c)),
+            );
         }
         pooled.add(n, &bins.map(|c| (uniform, c)));
     }
@@ -191,13 +207,15 @@ impl std::fmt::Debug for Visits {
 
 impl Watch for Visits {
     fn draw(&self, _chain: u32, trace: &mut Trace, _draws: Draws) {
-        if let (Ok(mut counts), Some((kind, _))) = (self.counts.lock(), self.posterior.place(trace)) {
+        if let (Ok(mut counts), Some((kind, _))) = (self.counts.lock(), self.posterior.place(trace))
+        {
             counts[kind] += 1.0;
         }
     }
 }
 
-/// The distance in total variation between the kinds of states of four chains of a plan and the posterior.
+/// The distance in total variation between the kinds of states of four chains of a plan
+/// and the posterior.
 pub fn distance(text: &str, plan: &str, posterior: &Arc<Posterior>, seed: u64) -> f64 {
     let longer = plan.replace("repeat 1000 {", "repeat 3000 { collect 1;");
     let model = Program::parse(&format!("{text}\n{longer}")).and_then(Program::compile);

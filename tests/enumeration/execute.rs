@@ -1,18 +1,22 @@
-//! Running programs by need, one execution for each way that their discrete choices can come out: the posterior by enumeration.
+//! Running programs by need, one execution for each way that their discrete choices can
+//! come out: the posterior by enumeration.
 //!
-//! It shares nothing with the engine but the language: it walks trees, and asks anew for each execution.
+//! It shares nothing with the engine but the language: it walks trees, and asks anew for
+//! each execution.
 
 use super::gaussian::{Affine, Gaussian, MOST};
 use super::program::{Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Right};
 use std::collections::HashMap;
 
-/// Cells of the grid that a choice is integrated over. Numbers that programs compare it with are at edges.
+/// Cells of the grid that a choice is integrated over. Numbers that programs compare it
+/// with are at edges.
 pub const CELLS: usize = 240;
 /// The grid ends this far from 0, in both directions.
 pub const REACH: f64 = 5.0;
 /// The width of a cell.
 pub const WIDTH: f64 = 2.0 * REACH / CELLS as f64;
-/// Where the two points of a cell are at which densities are worked out, from its middle, in cells (Gauss and Legendre).
+/// Where the two points of a cell are at which densities are worked out, from its middle,
+/// in cells (Gauss and Legendre).
 pub const POINT: f64 = 0.288_675_134_594_812_9;
 
 /// Where a point is.
@@ -78,7 +82,8 @@ struct Run<'p> {
     known: HashMap<(usize, Id), Val>,
     passes: HashMap<(usize, usize), usize>,
     entries: HashMap<(usize, u64), usize>,
-    /// The number of the value that each choice takes, in the order in which they are asked for, and how many values it has.
+    /// The number of the value that each choice takes, in the order in which they are
+    /// asked for, and how many values it has.
     script: Vec<(usize, usize)>,
     asked: usize,
     out: Execution,
@@ -128,14 +133,22 @@ impl<'p> Run<'p> {
             match item {
                 Item::Def(d) => top.push(d),
                 Item::Loop(_, defs, _) => {
-                    let drawn = |d: &'p Def| if let Def::Draw(n, d) = d { Some((*n, (i, d))) } else { None };
+                    let drawn = |d: &'p Def| {
+                        if let Def::Draw(n, d) = d { Some((*n, (i, d))) } else { None }
+                    };
                     containers.extend(defs.iter().filter_map(drawn));
                 }
                 Item::Effect(_) | Item::Function(_) | Item::Memo(_) => {}
             }
         }
-        let root =
-            Frame { parent: None, defs: &[], prefix: String::new(), pass: None, args: Vec::new(), keys: Vec::new() };
+        let root = Frame {
+            parent: None,
+            defs: &[],
+            prefix: String::new(),
+            pass: None,
+            args: Vec::new(),
+            keys: Vec::new(),
+        };
         Run {
             program,
             integration,
@@ -182,8 +195,21 @@ impl<'p> Run<'p> {
         Ok(f)
     }
 
-    fn frame(&mut self, parent: usize, defs: &'p [Def], prefix: String, pass: Option<usize>) -> usize {
-        self.frames.push(Frame { parent: Some(parent), defs, prefix, pass, args: Vec::new(), keys: Vec::new() });
+    fn frame(
+        &mut self,
+        parent: usize,
+        defs: &'p [Def],
+        prefix: String,
+        pass: Option<usize>,
+    ) -> usize {
+        self.frames.push(Frame {
+            parent: Some(parent),
+            defs,
+            prefix,
+            pass,
+            args: Vec::new(),
+            keys: Vec::new(),
+        });
         self.frames.len() - 1
     }
 
@@ -211,7 +237,8 @@ impl<'p> Run<'p> {
                 self.out.log_weight += match d {
                     Dist::Normal(m, s) => {
                         let (m, s) = (self.affine(m, f)?, self.number(s, f)?);
-                        let residual = Affine::number(*y).plus(&m.times(&Affine::number(-1.0)).ok_or(Unsuitable)?);
+                        let residual = Affine::number(*y)
+                            .plus(&m.times(&Affine::number(-1.0)).ok_or(Unsuitable)?);
                         match s > 0.0 {
                             false => f64::NEG_INFINITY,
                             true if m.is_number() => normal(residual.constant, s),
@@ -239,12 +266,17 @@ impl<'p> Run<'p> {
         }
     }
 
-    /// The values of a discrete distribution with their log probabilities; none where its parameters are no parameters.
+    /// The values of a discrete distribution with their log probabilities; none where its
+    /// parameters are no parameters.
     fn values(&mut self, d: &'p Dist, f: usize) -> Result<Vec<(f64, f64)>> {
         Ok(match d {
             Dist::Flip(p) => {
                 let p = self.number(p, f)?;
-                if (0.0..=1.0).contains(&p) { vec![(0.0, (1.0 - p).ln()), (1.0, p.ln())] } else { Vec::new() }
+                if (0.0..=1.0).contains(&p) {
+                    vec![(0.0, (1.0 - p).ln()), (1.0, p.ln())]
+                } else {
+                    Vec::new()
+                }
             }
             Dist::Categorical(w) => {
                 let w = w.iter().map(|w| self.number(w, f)).collect::<Result<Vec<f64>>>()?;
@@ -269,7 +301,9 @@ impl<'p> Run<'p> {
                     return Err(Unsuitable);
                 }
                 let own = Affine::choice(i);
-                self.out.residuals.push((own.plus(&m.times(&Affine::number(-1.0)).ok_or(Unsuitable)?), s));
+                self.out
+                    .residuals
+                    .push((own.plus(&m.times(&Affine::number(-1.0)).ok_or(Unsuitable)?), s));
                 self.out.continuous.push(address);
                 return Ok(Val::Num(own));
             }
@@ -312,12 +346,17 @@ impl<'p> Run<'p> {
             if let Some((_, v)) = self.frames[f].keys.iter().find(|(k, _)| *k == n) {
                 return Ok(*v);
             }
-            let found = if let Some((_, e, home)) = self.frames[f].args.iter().find(|(k, _, _)| *k == n).copied() {
+            let found = if let Some((_, e, home)) =
+                self.frames[f].args.iter().find(|(k, _, _)| *k == n).copied()
+            {
                 Some(self.eval(e, home)?)
             } else {
                 let named = |d: &&'p Def| matches!(d, Def::Let(k, _) | Def::Draw(k, _) if *k == n);
-                let def =
-                    if f == 0 { self.top.iter().copied().find(named) } else { self.frames[f].defs.iter().find(named) };
+                let def = if f == 0 {
+                    self.top.iter().copied().find(named)
+                } else {
+                    self.frames[f].defs.iter().find(named)
+                };
                 def.map(|d| self.define(d, f)).transpose()?
             };
             if let Some(v) = found {
@@ -346,8 +385,10 @@ impl<'p> Run<'p> {
                     }
                     Right::Call(g, args) => {
                         let g: &'p Function = &self.program.functions[*g];
-                        let inner = self.frame(0, &g.body.defs, format!("{binding}/{}", g.name), None);
-                        self.frames[inner].args = g.params.iter().zip(args).map(|(p, a)| (*p, a, f)).collect();
+                        let inner =
+                            self.frame(0, &g.body.defs, format!("{binding}/{}", g.name), None);
+                        self.frames[inner].args =
+                            g.params.iter().zip(args).map(|(p, a)| (*p, a, f)).collect();
                         self.eval(&g.body.result, inner)
                     }
                     Right::Memo(g, arg) => {
@@ -445,7 +486,11 @@ impl<'p> Run<'p> {
                 // An array has all its elements, whichever is read.
                 let values = all.iter().map(|e| self.eval(e, f)).collect::<Result<Vec<Val>>>()?;
                 let k = self.number(k, f)?;
-                values.get(k as usize).copied().filter(|_| k >= 0.0 && k == k.trunc()).ok_or(Unsuitable)
+                values
+                    .get(k as usize)
+                    .copied()
+                    .filter(|_| k >= 0.0 && k == k.trunc())
+                    .ok_or(Unsuitable)
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Values that are affine in Gaussian choices, and what such choices are given observations that are.
+//! Values that are affine in Gaussian choices, and what such choices are given
+//! observations that are.
 
 /// The most Gaussian choices of an execution.
 pub const MOST: usize = 6;
@@ -53,7 +54,8 @@ pub struct Gaussian {
 const LOG_SQRT_TAU: f64 = 0.918_938_533_204_672_8;
 
 impl Gaussian {
-    /// `n` choices; every residual is normal around 0 with a standard deviation. That of the prior of choice `i` has slope 1 by it.
+    /// `n` choices; every residual is normal around 0 with a standard deviation. That of
+    /// the prior of choice `i` has slope 1 by it.
     pub fn new(n: usize, residuals: &[(Affine, f64)]) -> Gaussian {
         let mut precision = vec![vec![0.0; n]; n];
         let mut pull = vec![0.0; n];
@@ -85,7 +87,8 @@ impl Gaussian {
         g
     }
 
-    /// The factor's transpose solved for white noise: where the noise takes the choices, away from 0.
+    /// The factor's transpose solved for white noise: where the noise takes the choices,
+    /// away from 0.
     fn coloured(&self, white: &[f64]) -> Vec<f64> {
         let n = white.len();
         let mut x = vec![0.0; n];
@@ -103,7 +106,11 @@ impl Gaussian {
 
     /// The log density of the draw that white noise makes.
     pub fn log_density(&self, white: &[f64]) -> f64 {
-        white.iter().enumerate().map(|(i, z)| self.factor[i][i].ln() - LOG_SQRT_TAU - 0.5 * z * z).sum()
+        white
+            .iter()
+            .enumerate()
+            .map(|(i, z)| self.factor[i][i].ln() - LOG_SQRT_TAU - 0.5 * z * z)
+            .sum()
     }
 
     /// The white noise that a draw was made from.

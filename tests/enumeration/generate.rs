@@ -1,11 +1,13 @@
-//! Random programs whose posteriors can be enumerated: a few discrete choices that conditions join, tables, loops, functions, `mem`,
-//! choices and observations that come and go, and continuous choices that all of them share.
+//! Random programs whose posteriors can be enumerated: a few discrete choices that
+//! conditions join, tables, loops, functions, `mem`, choices and observations that come
+//! and go, and continuous choices that all of them share.
 
 use super::execute::Integration;
 use super::program::{Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Right};
 use pcadlang::rng::{Purpose, Stream, StreamKey};
 
-/// What expressions may read: discrete names with their greatest value, and numbers that may be affine in Gaussian choices.
+/// What expressions may read: discrete names with their greatest value, and numbers that
+/// may be affine in Gaussian choices.
 #[derive(Clone, Default)]
 struct Scope {
     truths: Vec<Expr>,
@@ -36,7 +38,8 @@ pub fn program(seed: u64) -> (Program, Integration) {
     let mut rng = StreamKey::new(seed, 0, Purpose::VALUES).stream(0, 0, 0);
     let integration = if rng.uniform() < 0.25 { Integration::Grid } else { Integration::Gaussian };
     let (program, scope) = (Program::default(), Scope::default());
-    let mut g = Generator { rng, program, integration, scope, functions: Vec::new(), memos: Vec::new() };
+    let mut g =
+        Generator { rng, program, integration, scope, functions: Vec::new(), memos: Vec::new() };
     g.fill();
     (g.program, integration)
 }
@@ -295,8 +298,9 @@ impl Generator {
         let outside = self.scope.clone();
         let mut defs = Vec::new();
         for _ in 0..draws {
-            let is_gaussian =
-                self.integration == Integration::Gaussian && !self.scope.reals.is_empty() && self.chance(0.3);
+            let is_gaussian = self.integration == Integration::Gaussian
+                && !self.scope.reals.is_empty()
+                && self.chance(0.3);
             if is_gaussian {
                 let (d, n) = (self.gaussian(), self.program.name("u"));
                 defs.push(Def::Draw(n, d));
@@ -388,11 +392,15 @@ impl Generator {
             let own = Expr::Element(z, boxed(Expr::Pass));
             if self.chance(0.3) {
                 // A chain of states.
-                let before = Expr::Element(z, boxed(Expr::Add(boxed(Expr::Pass), boxed(Expr::Num(-1.0)))));
+                let before =
+                    Expr::Element(z, boxed(Expr::Add(boxed(Expr::Pass), boxed(Expr::Num(-1.0)))));
                 let (a, b, c) = (self.tenths(1, 9), self.tenths(1, 9), self.tenths(1, 9));
                 let next = Expr::If(boxed(before), boxed(Expr::Num(a)), boxed(Expr::Num(b)));
                 let first = Expr::Equal(boxed(Expr::Pass), boxed(Expr::Num(0.0)));
-                defs.push(Def::Draw(z, Dist::Flip(Expr::If(boxed(first), boxed(Expr::Num(c)), boxed(next)))));
+                defs.push(Def::Draw(
+                    z,
+                    Dist::Flip(Expr::If(boxed(first), boxed(Expr::Num(c)), boxed(next))),
+                ));
                 self.know(own, None);
                 drawn.push((z, None));
             } else {
@@ -425,8 +433,10 @@ impl Generator {
         match self.rng.index(6) {
             0 => {
                 let p = self.probability(2);
-                let softer =
-                    Expr::Add(boxed(Expr::Mul(boxed(p.clone()), boxed(Expr::Num(0.7)))), boxed(Expr::Num(0.1)));
+                let softer = Expr::Add(
+                    boxed(Expr::Mul(boxed(p.clone()), boxed(Expr::Num(0.7)))),
+                    boxed(Expr::Num(0.1)),
+                );
                 let coarse = self.coarse(Dist::Flip(softer), Dist::Flip(Expr::Num(0.4)));
                 Effect::Observe(name, Dist::Flip(p), f64::from(u8::from(self.chance(0.5))), coarse)
             }
@@ -450,7 +460,8 @@ impl Generator {
                     Some(x) if self.chance(0.2) => {
                         let at = 0.25 * (self.rng.index(9) as f64 - 4.0);
                         let side = Expr::Less(boxed(x), boxed(Expr::Num(at)));
-                        let none = Expr::If(boxed(side), boxed(Expr::Num(-1.0)), boxed(Expr::Num(s)));
+                        let none =
+                            Expr::If(boxed(side), boxed(Expr::Num(-1.0)), boxed(Expr::Num(s)));
                         Expr::If(boxed(self.condition(1)), boxed(Expr::Num(s)), boxed(none))
                     }
                     _ => self.spread(s),

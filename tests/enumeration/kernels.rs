@@ -1,4 +1,5 @@
-//! The kernels that random programs run, as statements of a plan; what summing out is told to sum stands for `%`.
+//! The kernels that random programs run, as statements of a plan; what summing out is
+//! told to sum stands for `%`.
 #![allow(dead_code)]
 
 /// Kernels for any choices.
@@ -29,7 +30,8 @@ pub const CONTINUOUS: &[&str] = &[
     "modes($continuous, tries = 10, keep = 3, steps = 10);",
 ];
 /// Kernels within `delayed`, which they are all run in.
-pub const REVERSIBLE: &[&str] = &["mh(one(@**))", "gibbs(one($finite))", "block(@**)", "drift(one(@**), 0.7)"];
+pub const REVERSIBLE: &[&str] =
+    &["mh(one(@**))", "gibbs(one($finite))", "block(@**)", "drift(one(@**), 0.7)"];
 /// Kernels that others can be summed out of.
 pub const SUMMING: &[&str] = &[
     "hmc($continuous, steps = 2, marginal = %);",
@@ -37,4 +39,5 @@ pub const SUMMING: &[&str] = &[
     "nuts($continuous, max_depth = 2, marginal = %);",
 ];
 /// All of them.
-pub const ALL: &[&[&str]] = &[ANY, DISCRETE, CONTINUOUS, REVERSIBLE, SUMMING, &["delayed(mh(one(@**)), @y);"]];
+pub const ALL: &[&[&str]] =
+    &[ANY, DISCRETE, CONTINUOUS, REVERSIBLE, SUMMING, &["delayed(mh(one(@**)), @y);"]];

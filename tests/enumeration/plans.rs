@@ -1,11 +1,13 @@
-//! What is run on a program: every kernel, every grouping of what is summed out, the default plan, random mixes.
+//! What is run on a program: every kernel, every grouping of what is summed out, the
+//! default plan, random mixes.
 
 use super::kernels::{ANY, CONTINUOUS, DISCRETE, REVERSIBLE, SUMMING};
 use super::posterior::Posterior;
 use super::program::{Def, Dist, Effect, Item, Program};
 use pcadlang::rng::Stream;
 
-/// Statements, the kernels that they need declared, and the class that their draws are pooled in.
+/// Statements, the kernels that they need declared, and the class that their draws are
+/// pooled in.
 #[derive(Clone)]
 pub struct Plan {
     pub class: String,
@@ -14,7 +16,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// How many draws a first look takes: fewer of what costs most, so that more programs are looked at.
+    /// How many draws a first look takes: fewer of what costs most, so that more programs
+    /// are looked at.
     pub fn first_look(&self) -> u64 {
         if self.statements.contains("marginal") { 60 } else { 200 }
     }
@@ -62,25 +65,35 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
     if posterior.has_continuous {
         some(CONTINUOUS, 2, rng);
     }
-    // Every grouping where there are few choices, else some of them and the whole; a step costs as much as joint values.
-    let sites: Vec<(&String, usize)> = posterior.discrete.iter().map(|(a, values)| (a, *values)).collect();
+    // Every grouping where there are few choices, else some of them and the whole; a step
+    // costs as much as joint values.
+    let sites: Vec<(&String, usize)> =
+        posterior.discrete.iter().map(|(a, values)| (a, *values)).collect();
     if posterior.has_continuous && !sites.is_empty() {
         let whole = (1u64 << sites.len().min(60)) - 1;
         let groupings: Vec<u64> = match sites.len() {
             1 | 2 => (1..=whole).collect(),
-            _ => [whole].into_iter().chain((0..1).map(|_| 1 + rng.index(whole as usize) as u64)).collect(),
+            _ => [whole]
+                .into_iter()
+                .chain((0..1).map(|_| 1 + rng.index(whole as usize) as u64))
+                .collect(),
         };
         for g in groupings {
             let (mut chosen, mut joint) = (Vec::new(), 1);
             let begin = rng.index(sites.len());
-            for (i, (site, values)) in sites.iter().enumerate().cycle().skip(begin).take(sites.len()) {
+            for (i, (site, values)) in
+                sites.iter().enumerate().cycle().skip(begin).take(sites.len())
+            {
                 if g >> i & 1 == 1 && joint * values <= MOST_JOINT {
                     joint *= values;
                     chosen.push(site.as_str());
                 }
             }
             let k = SUMMING[rng.index(SUMMING.len())];
-            all.push(Plan::of(format!("{} summing out", class(k)), k.replace('%', &chosen.join(" + "))));
+            all.push(Plan::of(
+                format!("{} summing out", class(k)),
+                k.replace('%', &chosen.join(" + ")),
+            ));
         }
     }
     let coarse = with_surrogates(p);
@@ -94,16 +107,20 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
     if rng.uniform() < 0.5 {
         all.push(Plan::of("default plan", default));
     } else {
-        let pool: Vec<String> = all.iter().map(|p| p.statements.trim_end_matches(';').to_owned()).collect();
+        let pool: Vec<String> =
+            all.iter().map(|p| p.statements.trim_end_matches(';').to_owned()).collect();
         let kernels: String = all.iter().map(|p| &*p.kernels).collect();
-        let arm = |rng: &mut Stream| format!("{:?} => {};", 0.2 + rng.uniform(), pool[rng.index(pool.len())]);
+        let arm = |rng: &mut Stream| {
+            format!("{:?} => {};", 0.2 + rng.uniform(), pool[rng.index(pool.len())])
+        };
         let arms: String = (0..2 + rng.index(3)).map(|_| arm(rng) + " ").collect();
         all.push(Plan { kernels, ..Plan::of("mix", format!("repeat 2 {{ mix {{ {arms}}} }}")) });
     }
     all
 }
 
-/// A kernel of the program's own: it proposes one or two top-level choices that are always there, by where they are.
+/// A kernel of the program's own: it proposes one or two top-level choices that are
+/// always there, by where they are.
 fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
     let mut proposals = Vec::new();
     for item in &p.items {
@@ -116,7 +133,9 @@ fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
         let (a, b, c) = (tenths(1, rng), tenths(1, rng), tenths(4, rng));
         proposals.push(match d {
             Dist::Flip(_) => format!("propose {at} ~ flip({a:?});"),
-            Dist::Normal(..) => format!("propose {at} ~ normal({a:?} * value({at}) + {b:?}, {c:?});"),
+            Dist::Normal(..) => {
+                format!("propose {at} ~ normal({a:?} * value({at}) + {b:?}, {c:?});")
+            }
             Dist::Categorical(values) => {
                 let others = format!(", {b:?}, {c:?}");
                 let others = if values.len() == 2 { &others[..others.len() / 2] } else { &others };
@@ -133,5 +152,8 @@ fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
     if !proposals.is_empty() && rng.uniform() < 0.5 {
         body += &format!(" {}", proposals[rng.index(proposals.len())]);
     }
-    Some(Plan { kernels: format!("kernel moved() {{ {body} }}\n"), ..Plan::of("own kernel", "moved();") })
+    Some(Plan {
+        kernels: format!("kernel moved() {{ {body} }}\n"),
+        ..Plan::of("own kernel", "moved();")
+    })
 }

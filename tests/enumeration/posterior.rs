@@ -23,7 +23,8 @@ enum Continuous {
 struct Grid {
     /// The log density at the two points of each cell.
     points: Vec<[f64; 2]>,
-    /// By cell: the running sum of the probabilities, and the slope of the log density by the cell's width.
+    /// By cell: the running sum of the probabilities, and the slope of the log density by
+    /// the cell's width.
     sums: Vec<f64>,
     slopes: Vec<f64>,
 }
@@ -39,8 +40,8 @@ impl Grid {
         let mut total = 0.0;
         for [a, b] in &self.points {
             let slope = if a.is_finite() && b.is_finite() { (b - a) / (2.0 * POINT) } else { 0.0 };
-            let mass =
-                (0.5 * (a + b) - top).exp() * if slope.abs() < 1e-9 { 1.0 } else { 2.0 * (slope / 2.0).sinh() / slope };
+            let mass = (0.5 * (a + b) - top).exp()
+                * if slope.abs() < 1e-9 { 1.0 } else { 2.0 * (slope / 2.0).sinh() / slope };
             total += if mass.is_finite() { mass } else { 0.0 };
             self.sums.push(total);
             self.slopes.push(slope);
@@ -49,7 +50,8 @@ impl Grid {
         top + total.ln()
     }
 
-    /// Whether it is over well within the grid on both sides; beyond, what a kernel does right would look wrong.
+    /// Whether it is over well within the grid on both sides; beyond, what a kernel does
+    /// right would look wrong.
     fn ends_within(&self) -> bool {
         let margin = CELLS / 40;
         self.sums[margin] < 1e-5 && self.sums[CELLS - margin] > 1.0 - 1e-5
@@ -61,7 +63,8 @@ impl Grid {
         let before = if cell == 0 { 0.0 } else { self.sums[cell - 1] };
         let share = ((u - before) / (self.sums[cell] - before)).clamp(0.0, 1.0);
         let slope = self.slopes[cell];
-        let within = if slope.abs() < 1e-9 { share } else { (share * slope.exp_m1()).ln_1p() / slope };
+        let within =
+            if slope.abs() < 1e-9 { share } else { (share * slope.exp_m1()).ln_1p() / slope };
         (cell as f64 + within) * WIDTH - REACH
     }
 
@@ -71,7 +74,8 @@ impl Grid {
         let cell = (at as usize).min(CELLS - 1);
         let before = if cell == 0 { 0.0 } else { self.sums[cell - 1] };
         let (slope, within) = (self.slopes[cell], at - cell as f64);
-        let share = if slope.abs() < 1e-9 { within } else { (within * slope).exp_m1() / slope.exp_m1() };
+        let share =
+            if slope.abs() < 1e-9 { within } else { (within * slope).exp_m1() / slope.exp_m1() };
         before + (self.sums[cell] - before) * share
     }
 }
@@ -81,7 +85,8 @@ struct Kind {
     probability: f64,
     discrete: Vec<(String, f64, bool)>,
     continuous: Continuous,
-    /// The log weight of all but the continuous choices and what depends on them, and that of all.
+    /// The log weight of all but the continuous choices and what depends on them, and
+    /// that of all.
     log_weight: f64,
     log_total: f64,
 }
@@ -90,7 +95,8 @@ struct Kind {
 pub struct Posterior {
     kinds: Vec<Kind>,
     by_key: BTreeMap<Key, usize>,
-    /// The addresses of all discrete choices that any state has, and how many values each has at most.
+    /// The addresses of all discrete choices that any state has, and how many values each
+    /// has at most.
     pub discrete: BTreeMap<String, usize>,
     pub has_continuous: bool,
 }
@@ -103,8 +109,12 @@ impl Posterior {
     /// `None` if it cannot be enumerated, or if there is nothing to it.
     pub fn of(program: &Program, integration: Integration) -> Option<Posterior> {
         let most = if integration == Integration::Grid { 100 } else { 400 };
-        let mut p =
-            Posterior { kinds: Vec::new(), by_key: BTreeMap::new(), discrete: BTreeMap::new(), has_continuous: false };
+        let mut p = Posterior {
+            kinds: Vec::new(),
+            by_key: BTreeMap::new(),
+            discrete: BTreeMap::new(),
+            has_continuous: false,
+        };
         executions(program, integration, most, |e| p.enter(e, integration)).ok()?;
         for kind in &mut p.kinds {
             kind.log_total = match &mut kind.continuous {
@@ -134,10 +144,18 @@ impl Posterior {
             let continuous = match (integration, e.continuous.first()) {
                 (_, None) => Continuous::None,
                 (Integration::Grid, Some(x)) => Continuous::Grid(x.clone(), Grid::new()),
-                (Integration::Gaussian, _) => Continuous::Gaussian(e.continuous.clone(), e.gaussian()),
+                (Integration::Gaussian, _) => {
+                    Continuous::Gaussian(e.continuous.clone(), e.gaussian())
+                }
             };
             let (discrete, log_weight) = (e.discrete.clone(), e.log_weight);
-            self.kinds.push(Kind { probability: 0.0, discrete, continuous, log_weight, log_total: 0.0 });
+            self.kinds.push(Kind {
+                probability: 0.0,
+                discrete,
+                continuous,
+                log_weight,
+                log_total: 0.0,
+            });
         }
         if let (Continuous::Grid(_, grid), Some(at)) = (&mut self.kinds[i].continuous, e.point) {
             grid.points[at / 2][at % 2] = e.log_weight;
@@ -161,7 +179,8 @@ impl Posterior {
         self.kinds.iter().map(|k| k.probability).fold(0.0, f64::max)
     }
 
-    /// A draw, as what a trace is made of, and its log joint density if that is known exactly.
+    /// A draw, as what a trace is made of, and its log joint density if that is known
+    /// exactly.
     pub fn draw(&self, rng: &mut Stream) -> (Vec<(u64, Constraint)>, Option<f64>) {
         let weights: Vec<f64> = self.kinds.iter().map(|k| k.probability).collect();
         let kind = &self.kinds[rng.weighted(&weights, weights.iter().sum())];
@@ -191,15 +210,18 @@ impl Posterior {
         (state, log_joint)
     }
 
-    /// Which kind of state a trace is in, and the places of its continuous choices under their conditional, in 0 to 1, all independent and
-    /// uniform. `None` for a state that cannot be.
+    /// Which kind of state a trace is in, and the places of its continuous choices under
+    /// their conditional, in 0 to 1, all independent and uniform. `None` for a state that
+    /// cannot be.
     pub fn place(&self, trace: &Trace) -> Option<(usize, Vec<f64>)> {
         let (mut discrete, mut numbers) = (Key::new(), BTreeMap::new());
         for (address, value, _) in trace.choices() {
             let a = address.to_string();
             match value {
                 Value::Bool(b) => discrete.push((a, format!("{}", u8::from(b)))),
-                Value::Num(x) if self.discrete.contains_key(&a) => discrete.push((a, format!("{x}"))),
+                Value::Num(x) if self.discrete.contains_key(&a) => {
+                    discrete.push((a, format!("{x}")))
+                }
                 Value::Num(x) => drop(numbers.insert(a, x)),
                 _ => return None,
             }
@@ -209,11 +231,17 @@ impl Posterior {
         let places = match &self.kinds[i].continuous {
             Continuous::None => numbers.is_empty().then(Vec::new)?,
             Continuous::Gaussian(addresses, g) => {
-                let x: Option<Vec<f64>> = addresses.iter().map(|a| numbers.get(a).copied()).collect();
+                let x: Option<Vec<f64>> =
+                    addresses.iter().map(|a| numbers.get(a).copied()).collect();
                 let x = x.filter(|x| x.len() == numbers.len())?;
-                g.whitened(&x).iter().map(|z| 0.5 * statrs::function::erf::erfc(-z / 2.0f64.sqrt())).collect()
+                g.whitened(&x)
+                    .iter()
+                    .map(|z| 0.5 * statrs::function::erf::erfc(-z / 2.0f64.sqrt()))
+                    .collect()
             }
-            Continuous::Grid(address, grid) => vec![grid.below(*numbers.get(address).filter(|_| numbers.len() == 1)?)],
+            Continuous::Grid(address, grid) => {
+                vec![grid.below(*numbers.get(address).filter(|_| numbers.len() == 1)?)]
+            }
         };
         Some((i, places))
     }

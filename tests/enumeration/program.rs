@@ -71,7 +71,8 @@ pub struct Function {
 
 #[derive(Clone, Debug)]
 pub enum Effect {
-    /// An observation of a number (truth values are 0 and 1) under a name, maybe with a surrogate.
+    /// An observation of a number (truth values are 0 and 1) under a name, maybe with a
+    /// surrogate.
     Observe(Id, Dist, f64, Option<Dist>),
     Factor(Expr),
     Guarded(Expr, Vec<Effect>),
@@ -108,7 +109,8 @@ impl Program {
     }
 
     fn expr(&self, e: &Expr) -> String {
-        let two = |a: &Expr, op: &str, b: &Expr| format!("({} {op} {})", self.expr(a), self.expr(b));
+        let two =
+            |a: &Expr, op: &str, b: &Expr| format!("({} {op} {})", self.expr(a), self.expr(b));
         match e {
             Expr::Num(x) => format!("({x:?})"),
             Expr::Truth(b) => format!("{b}"),
@@ -147,10 +149,17 @@ impl Program {
             Def::Let(n, right) => {
                 let right = match right {
                     Right::Plain(e) => self.expr(e),
-                    Right::Call(f, args) => format!("{}({})", self.functions[*f].name, self.list(args)),
+                    Right::Call(f, args) => {
+                        format!("{}({})", self.functions[*f].name, self.list(args))
+                    }
                     Right::Memo(f, arg) => format!("{}({})", self.memos[*f].name, self.expr(arg)),
                     Right::Branch(c, a, b) => {
-                        format!("if {} {{ {} }} else {{ {} }}", self.expr(c), self.body(a), self.body(b))
+                        format!(
+                            "if {} {{ {} }} else {{ {} }}",
+                            self.expr(c),
+                            self.body(a),
+                            self.body(b)
+                        )
                     }
                 };
                 format!("let {} = {right};", self.names[*n])
@@ -166,8 +175,14 @@ impl Program {
     fn effect(&self, e: &Effect) -> String {
         match e {
             Effect::Observe(name, d, y, coarse) => {
-                let value = if matches!(d, Dist::Flip(_)) { format!("{}", *y != 0.0) } else { format!("{y:?}") };
-                let coarse = coarse.as_ref().map_or(String::new(), |c| format!(" with coarse = {}", self.dist(c)));
+                let value = if matches!(d, Dist::Flip(_)) {
+                    format!("{}", *y != 0.0)
+                } else {
+                    format!("{y:?}")
+                };
+                let coarse = coarse
+                    .as_ref()
+                    .map_or(String::new(), |c| format!(" with coarse = {}", self.dist(c)));
                 format!("observe {} = {value}{coarse} as {};", self.dist(d), self.names[*name])
             }
             Effect::Factor(w) => format!("factor({});", self.expr(w)),
@@ -181,7 +196,9 @@ impl Program {
 
 impl Display for Program {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let params = |g: &Function| g.params.iter().map(|p| self.names[*p].clone()).collect::<Vec<_>>().join(", ");
+        let params = |g: &Function| {
+            g.params.iter().map(|p| self.names[*p].clone()).collect::<Vec<_>>().join(", ")
+        };
         for item in &self.items {
             match item {
                 Item::Function(i) => {
@@ -190,13 +207,20 @@ impl Display for Program {
                 }
                 Item::Memo(i) => {
                     let g = &self.memos[*i];
-                    writeln!(f, "let {} = mem(fn({}) {{ {} }});", g.name, params(g), self.body(&g.body))?;
+                    writeln!(
+                        f,
+                        "let {} = mem(fn({}) {{ {} }});",
+                        g.name,
+                        params(g),
+                        self.body(&g.body)
+                    )?;
                 }
                 Item::Def(d) => writeln!(f, "{}", self.def(d, false, true))?,
                 Item::Effect(e) => writeln!(f, "{}", self.effect(e))?,
                 Item::Loop(n, defs, effects) => {
                     let mut inner = String::new();
-                    defs.iter().try_for_each(|d| writeln!(inner, "  {}", self.def(d, true, false)))?;
+                    defs.iter()
+                        .try_for_each(|d| writeln!(inner, "  {}", self.def(d, true, false)))?;
                     effects.iter().try_for_each(|e| writeln!(inner, "  {}", self.effect(e)))?;
                     writeln!(f, "for i in 0 .. {n} {{\n{inner}}}")?;
                 }

@@ -1,8 +1,10 @@
-//! Whether independent draws have a distribution that is known, with the chance of a false alarm stated.
+//! Whether independent draws have a distribution that is known, with the chance of a
+//! false alarm stated.
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// Counts of draws in cells whose probabilities are known. Sets of cells may overlap: each cell is judged by itself.
+/// Counts of draws in cells whose probabilities are known. Sets of cells may overlap:
+/// each cell is judged by itself.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
     pub draws: u64,
@@ -11,8 +13,8 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// A bound on the chance that right draws are as far off as the worst cell: twice the exact binomial tail beyond its count, times
-    /// the number of cells (Bonferroni).
+    /// A bound on the chance that right draws are as far off as the worst cell: twice the
+    /// exact binomial tail beyond its count, times the number of cells (Bonferroni).
     pub fn p_value(&self) -> (f64, String) {
         let mut worst = (1.0, String::new());
         let cells = self.cells.len() as f64;
@@ -29,15 +31,19 @@ impl Counts {
             };
             if tail * cells < worst.0 {
                 let share = *count as f64 / self.draws as f64;
-                worst = (tail * cells, format!("{name}: {share:.4} of {} draws, expected {p:.4}", self.draws));
+                worst = (
+                    tail * cells,
+                    format!("{name}: {share:.4} of {} draws, expected {p:.4}", self.draws),
+                );
             }
         }
         worst
     }
 }
 
-/// Pearson's statistic over many tables of disjoint cells, centred and scaled by its exact mean and variance under the right
-/// distribution: small deviations that many programs share add up.
+/// Pearson's statistic over many tables of disjoint cells, centred and scaled by its
+/// exact mean and variance under the right distribution: small deviations that many
+/// programs share add up.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pooled {
     pub tables: u64,

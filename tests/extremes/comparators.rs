@@ -1,4 +1,5 @@
-//! Distance transforms and comparators: pictures without contours and full of them, spreads from 1e-300 to 1e300, numbers that are none.
+//! Distance transforms and comparators: pictures without contours and full of them,
+//! spreads from 1e-300 to 1e300, numbers that are none.
 
 use super::points::Points;
 use super::table::agree;
@@ -6,9 +7,9 @@ use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::vision::chamfer::Mode;
 use pcadlang::vision::keypoints::{Detection, RelativeDepthLikelihood};
 use pcadlang::vision::{
-    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap, Elements,
-    GradientDetector, KeypointLikelihood, KeypointOptions, Mask, MaskLikelihood, Photo, Region, RegionOptions,
-    distance_transform,
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
+    DepthMap, Elements, GradientDetector, KeypointLikelihood, KeypointOptions, Mask,
+    MaskLikelihood, Photo, Region, RegionOptions, distance_transform,
 };
 
 /// Pieces of contour that own their lists.
@@ -30,7 +31,9 @@ impl Pieces {
 
     /// One at each pixel's middle.
     fn full(size: (u32, u32)) -> Pieces {
-        let all = (0..size.1).flat_map(|j| (0..size.0).map(move |i| [i as f32 + 0.5, j as f32 + 0.5, 1.0, 0.0, 1.0]));
+        let all = (0..size.1).flat_map(|j| {
+            (0..size.0).map(move |i| [i as f32 + 0.5, j as f32 + 0.5, 1.0, 0.0, 1.0])
+        });
         all.fold(Pieces::new(size), Pieces::with)
     }
 
@@ -54,20 +57,18 @@ fn square(size: (u32, u32)) -> Pieces {
     (0..steps).fold(Pieces::new(size), |p, k| {
         let (x, y) = (w * (0.25 + 0.5 * along(k)), h * (0.25 + 0.5 * along(k)));
         let (dx, dy) = (0.5 * w / steps as f32, 0.5 * h / steps as f32);
-        p.with([x, 0.25 * h, 1.0, 0.0, dx]).with([x, 0.75 * h, 1.0, 0.0, dx]).with([0.25 * w, y, 0.0, 1.0, dy]).with([
-            0.75 * w,
-            y,
-            0.0,
-            1.0,
-            dy,
-        ])
+        p.with([x, 0.25 * h, 1.0, 0.0, dx])
+            .with([x, 0.75 * h, 1.0, 0.0, dx])
+            .with([0.25 * w, y, 0.0, 1.0, dy])
+            .with([0.75 * w, y, 0.0, 1.0, dy])
     })
 }
 
 /// Pictures' contours: none, one, all, ordinary ones, and such as are no numbers.
 fn scenes(size: (u32, u32)) -> Vec<(&'static str, Pieces)> {
     let middle = [size.0 as f32 / 2.0, size.1 as f32 / 2.0];
-    let one = |x: f32, y: f32, tx: f32, ty: f32, length: f32| square(size).with([x, y, tx, ty, length]);
+    let one =
+        |x: f32, y: f32, tx: f32, ty: f32, length: f32| square(size).with([x, y, tx, ty, length]);
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     vec![
         ("nothing", Pieces::new(size)),
@@ -90,8 +91,12 @@ fn distances_are_exact_in_pictures_of_any_kind() {
         let pixels = w * h;
         let diagonal = ((w * w + h * h) as f64).sqrt() as f32;
         let of = |set: &[bool]| distance_transform(w as u32, h as u32, set);
-        points.check(of(&vec![false; pixels]).values.iter().all(|d| *d == diagonal), || format!("{w} x {h}, none set"));
-        points.check(of(&vec![true; pixels]).values.iter().all(|d| *d == 0.0), || format!("{w} x {h}, all set"));
+        points.check(of(&vec![false; pixels]).values.iter().all(|d| *d == diagonal), || {
+            format!("{w} x {h}, none set")
+        });
+        points.check(of(&vec![true; pixels]).values.iter().all(|d| *d == 0.0), || {
+            format!("{w} x {h}, all set")
+        });
         points.check(of(&[]).values.len() == pixels, || format!("{w} x {h}, no list"));
         for place in [0, pixels - 1, pixels / 2] {
             let mut set = vec![false; pixels];
@@ -101,13 +106,25 @@ fn distances_are_exact_in_pictures_of_any_kind() {
                 let (dx, dy) = ((i % w).abs_diff(place % w), (i / w).abs_diff(place / w));
                 ((dx * dx + dy * dy) as f64).sqrt() as f32
             };
-            let right = (0..pixels).all(|i| map.values[i] == exact(i) && map.nearest[i] == place as u32);
+            let right =
+                (0..pixels).all(|i| map.values[i] == exact(i) && map.nearest[i] == place as u32);
             points.check(right, || format!("{w} x {h}, {place} set"));
-            let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 1e30, -1e30, 0.0, 1e-45];
+            let odd = [
+                f32::NAN,
+                f32::INFINITY,
+                f32::NEG_INFINITY,
+                f32::MAX,
+                f32::MIN,
+                1e30,
+                -1e30,
+                0.0,
+                1e-45,
+            ];
             for x in odd {
                 for (x, y) in [(x, 0.5), (0.5, x), (x, x)] {
                     let (d, dx, dy) = map.sample(x, y);
-                    let right = d >= 0.0 && [dx, dy].iter().all(|s| s.is_finite() && s.abs() <= 1.5);
+                    let right =
+                        d >= 0.0 && [dx, dy].iter().all(|s| s.is_finite() && s.abs() <= 1.5);
                     points.check(right && (d.is_finite() || x.abs() == f32::MAX), || {
                         format!("{w} x {h} at {x}, {y}: {d}, {dx}, {dy}")
                     });
@@ -128,10 +145,14 @@ fn chamfer_scores_anything_against_anything() {
         let map = map.map();
         for sigma in SPREADS {
             for (mode, symmetric) in [(Mode::Mean, false), (Mode::Mean, true), (Mode::Sum, true)] {
-                let options = ChamferOptions { sigma, mode, symmetric, ..ChamferOptions::default() };
+                let options =
+                    ChamferOptions { sigma, mode, symmetric, ..ChamferOptions::default() };
                 let chamfer = Chamfer::prepare(&map, size.0, size.1, &options).unwrap();
                 for (drawn, pieces) in scenes(size) {
-                    let (d, p) = (chamfer.distance(&pieces.elements()), chamfer.log_likelihood(&pieces.elements()));
+                    let (d, p) = (
+                        chamfer.distance(&pieces.elements()),
+                        chamfer.log_likelihood(&pieces.elements()),
+                    );
                     let mut right = (0.0..=100.0).contains(&d) && p.is_finite();
                     if mode == Mode::Mean {
                         let z = d / sigma;
@@ -141,12 +162,17 @@ fn chamfer_scores_anything_against_anything() {
                     let nothing = ["nothing", "without length"].contains(&drawn);
                     right &= !nothing || symmetric || d == 100.0;
                     points.check(right, || {
-                        format!("{drawn} on {seen}, sigma {sigma:e}, {mode:?}, {symmetric}: {d}, {p:e}")
+                        format!(
+                            "{drawn} on {seen}, sigma {sigma:e}, {mode:?}, {symmetric}: {d}, {p:e}"
+                        )
                     });
                     let mut slopes = Vec::new();
-                    let by = chamfer.gradient(&pieces.elements(), &mut Default::default(), &mut slopes);
+                    let by =
+                        chamfer.gradient(&pieces.elements(), &mut Default::default(), &mut slopes);
                     let right = !by.is_nan() && slopes.iter().flatten().all(|s| !s.is_nan());
-                    points.check(right, || format!("{drawn} on {seen}, sigma {sigma:e}: a slope is NaN ({by:e})"));
+                    points.check(right, || {
+                        format!("{drawn} on {seen}, sigma {sigma:e}: a slope is NaN ({by:e})")
+                    });
                 }
             }
         }
@@ -170,11 +196,14 @@ fn contour_ratios_score_anything_against_anything() {
     for (seen, map) in scenes(size) {
         for sd in [1e-300, 1e-6, 0.4, 1e6, 1e300] {
             for truncate in [1e-300, 3.3, 1e300] {
-                let options = ContourRatioOptions { sd, truncate, ..ContourRatioOptions::default() };
+                let options =
+                    ContourRatioOptions { sd, truncate, ..ContourRatioOptions::default() };
                 let ratio = ContourRatio::prepare(&map.map(), size.0, size.1, &options).unwrap();
                 for (drawn, pieces) in scenes(size) {
                     let p = ratio.log_likelihood(&pieces.elements());
-                    points.check(p.is_finite(), || format!("{drawn} on {seen}, sd {sd:e}, truncate {truncate:e}: {p}"));
+                    points.check(p.is_finite(), || {
+                        format!("{drawn} on {seen}, sd {sd:e}, truncate {truncate:e}: {p}")
+                    });
                 }
             }
         }
@@ -208,7 +237,9 @@ fn depths_masks_and_keypoints_score_anything() {
         points.check(p.is_some_and(f64::is_finite), || format!("depths with sd {sd:e}: {p:?}"));
         let Ok(l) = likelihood else { continue };
         let numbers = [l.slopes(&rendered), l.gains(&rendered)].concat();
-        points.check(numbers.iter().all(|v| !v.is_nan()), || format!("depths with sd {sd:e}: {numbers:?}"));
+        points.check(numbers.iter().all(|v| !v.is_nan()), || {
+            format!("depths with sd {sd:e}: {numbers:?}")
+        });
     }
     for share in [1e-300, 1e-16, 0.5, 1.0 - 1e-16] {
         let mask = Mask::new(3, 1, vec![true, false, true]).unwrap();
@@ -229,21 +260,33 @@ fn depths_masks_and_keypoints_score_anything() {
     for bad in [0.0, 1.0, -1.0, f64::NAN, f64::INFINITY] {
         let mask = Mask::new(1, 1, vec![true]).unwrap();
         points.check(MaskLikelihood::new(&mask, bad, 0.1).is_err(), || format!("a share of {bad}"));
-        points.check(DepthLikelihood::new(&observed, 1.0, bad, (0.0, 1e38)).is_err(), || format!("outliers {bad}"));
+        points.check(DepthLikelihood::new(&observed, 1.0, bad, (0.0, 1e38)).is_err(), || {
+            format!("outliers {bad}")
+        });
     }
     for (sd, outlier) in [(1e-300, 1e-300), (0.1, 0.05), (1e8, 0.999)] {
         let l = RelativeDepthLikelihood::new(sd, outlier).unwrap();
-        for (seen, model) in [(0.0, 0.0), (1e-300, 1e300), (-1e150, 0.0), (0.3, f64::INFINITY), (0.3, f64::NAN)] {
+        for (seen, model) in
+            [(0.0, 0.0), (1e-300, 1e300), (-1e150, 0.0), (0.3, f64::INFINITY), (0.3, f64::NAN)]
+        {
             let (p, slope) = (l.log_density(seen, model), l.slope(seen, model));
-            points.check(p.is_finite() && slope.is_finite(), || format!("depth {seen} {model} {sd}: {p} {slope}"));
+            points.check(p.is_finite() && slope.is_finite(), || {
+                format!("depth {seen} {model} {sd}: {p} {slope}")
+            });
         }
     }
     for sd in [1e-300, 1e-6, 1.0, 1e6, 1e8] {
-        let l =
-            KeypointLikelihood::new(640.0, 480.0, 0.0, &KeypointOptions { sd, ..KeypointOptions::default() }).unwrap();
+        let l = KeypointLikelihood::new(
+            640.0,
+            480.0,
+            0.0,
+            &KeypointOptions { sd, ..KeypointOptions::default() },
+        )
+        .unwrap();
         for c in [0.0, 1e-300, 320.0, -1e150, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
             for confidence in [0.0, 1e-300, 1.0, 7.0, f64::NAN] {
-                let seen = Detection::new([320.0, 240.0], confidence).or([([1e9, -1e300], 1e-300)].into_iter());
+                let seen = Detection::new([320.0, 240.0], confidence)
+                    .or([([1e9, -1e300], 1e-300)].into_iter());
                 let p = l.log_density(&seen, Some([c, 240.0]));
                 let g = l.gradient(&seen, [c, 240.0]);
                 let (at, variance) = l.located(&seen, [c, 240.0]);
@@ -268,30 +311,48 @@ fn photographs_of_one_colour_and_of_noise_are_read() {
         ("one pixel", 1, 1, &|_, _| 128),
         ("a line", 300, 1, &|x, _| (x % 2 * 255) as u8),
         ("a checkerboard", 64, 48, &|x, y| ((x + y) % 2 * 255) as u8),
-        ("noise", 64, 48, &|x, y| StreamKey::new(7, x, Purpose::VALUES).stream(0, y.into(), 0).index(256) as u8),
+        ("noise", 64, 48, &|x, y| {
+            StreamKey::new(7, x, Purpose::VALUES).stream(0, y.into(), 0).index(256) as u8
+        }),
     ];
     for (name, w, h, colour) in pictures {
-        let photo = Photo::from_rgb(image::RgbImage::from_fn(w, h, |x, y| image::Rgb([colour(x, y); 3]))).unwrap();
+        let photo =
+            Photo::from_rgb(image::RgbImage::from_fn(w, h, |x, y| image::Rgb([colour(x, y); 3])))
+                .unwrap();
         let map = GradientDetector::default().contours(&photo);
         let inside = |l: &[f32], most: u32| l.iter().all(|v| (0.0..=most as f32).contains(v));
-        points.check(inside(&map.x, w) && inside(&map.y, h), || format!("{name}: contours beyond the picture"));
+        points.check(inside(&map.x, w) && inside(&map.y, h), || {
+            format!("{name}: contours beyond the picture")
+        });
         points.check(!["black", "white", "one pixel"].contains(&name) || map.is_empty(), || {
             format!("{name}: {}", map.len())
         });
         for (drawn, pieces) in scenes((w, h)) {
             let chamfer = Chamfer::prepare(&map, w, h, &ChamferOptions::default()).unwrap();
             let ratio = ContourRatio::prepare(&map, w, h, &ContourRatioOptions::default()).unwrap();
-            let p = [chamfer.log_likelihood(&pieces.elements()), ratio.log_likelihood(&pieces.elements())];
+            let p = [
+                chamfer.log_likelihood(&pieces.elements()),
+                ratio.log_likelihood(&pieces.elements()),
+            ];
             points.check(p.iter().all(|p| p.is_finite()), || format!("{drawn} on {name}: {p:?}"));
         }
         for prior in [1e-6, 0.5, 1e6] {
             for power in [0.0, 1e-300, 1.0, 1e300] {
-                let options = RegionOptions { prior, power, tile_power: 0.1, shading: 0.1, ..RegionOptions::default() };
+                let options = RegionOptions {
+                    prior,
+                    power,
+                    tile_power: 0.1,
+                    shading: 0.1,
+                    ..RegionOptions::default()
+                };
                 let region = Region::prepare(&photo, w, h, &options).unwrap();
                 for group in [0, 1, 255] {
                     let pixels = (w * h) as usize;
-                    let p = region.log_likelihood(&vec![group; pixels], &vec![[f32::NAN; 3]; pixels]);
-                    points.check(!p.is_nan(), || format!("{name}, prior {prior}, power {power:e}, group {group}: {p}"));
+                    let p =
+                        region.log_likelihood(&vec![group; pixels], &vec![[f32::NAN; 3]; pixels]);
+                    points.check(!p.is_nan(), || {
+                        format!("{name}, prior {prior}, power {power:e}, group {group}: {p}")
+                    });
                 }
             }
         }

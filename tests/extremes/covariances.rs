@@ -1,4 +1,5 @@
-//! Covariance functions against the table; covariance matrices of any condition: a factor whose product is the matrix, or an error.
+//! Covariance functions against the table; covariance matrices of any condition: a factor
+//! whose product is the matrix, or an error.
 
 use super::points::Points;
 use super::table::{agree, rows};
@@ -39,7 +40,8 @@ fn factor(n: usize, colour: impl Fn(&[f64]) -> Option<Datum>) -> DMatrix<f64> {
     DMatrix::from_columns(&(0..n).map(column).map(nalgebra::DVector::from_vec).collect::<Vec<_>>())
 }
 
-/// How far the product of the factor is from the matrix, in units of the matrix's largest entry.
+/// How far the product of the factor is from the matrix, in units of the matrix's largest
+/// entry.
 fn residual(l: &DMatrix<f64>, k: &DMatrix<f64>) -> f64 {
     // In a unit in which squares of entries of L are numbers.
     let most = k.amax();
@@ -63,16 +65,23 @@ fn processes_of_any_bandwidth_have_factors() {
             for name in names {
                 for bandwidth in [1e-300, 1e-6, 1.0, 1e6, 1e300] {
                     for sd in if n == 2 { &[1e-150, 1.0, 1e150][..] } else { &[1.0] } {
-                        let p = if name == "periodic" { vec![7.0, bandwidth, *sd] } else { vec![bandwidth, *sd] };
+                        let p = if name == "periodic" {
+                            vec![7.0, bandwidth, *sd]
+                        } else {
+                            vec![bandwidth, *sd]
+                        };
                         let cov = function(name, &p);
                         let gp = Gp::new(vec![0.0; n], &cov, &at, true);
                         let right = gp.as_ref().is_ok_and(|gp| {
                             let l = factor(n, |z| gp.colour(z));
-                            let jitter = DMatrix::from_diagonal_element(n, n, 1e-6 * cov.variance());
+                            let jitter =
+                                DMatrix::from_diagonal_element(n, n, 1e-6 * cov.variance());
                             let density = gp.log_density(&vec![0.0; n].into());
                             residual(&l, &(cov.matrix(&at) + jitter)) < 1e-13 && density.is_finite()
                         });
-                        points.check(right, || format!("{cov} at {n} points, spacing {kind}: {:?}", gp.err()));
+                        points.check(right, || {
+                            format!("{cov} at {n} points, spacing {kind}: {:?}", gp.err())
+                        });
                     }
                 }
             }
@@ -83,14 +92,18 @@ fn processes_of_any_bandwidth_have_factors() {
         for name in &names[..3] {
             let cov = function(name, &[1.0, sd]);
             let e = Gp::new(vec![0.0; 2], &cov, &[0.0, 1.0], true).err().map(|e| e.to_string());
-            let said = e.as_ref().is_some_and(|e| e.contains(name) && e.contains("positive definite"));
+            let said =
+                e.as_ref().is_some_and(|e| e.contains(name) && e.contains("positive definite"));
             points.check(said, || format!("{cov}: {e:?}"));
         }
     }
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let cov = function("sq_exp", &[1.0, 1.0]);
-        points.check(Gp::new(vec![0.0; 2], &cov, &[0.0, bad], true).is_err(), || format!("at {bad}"));
-        points.check(Gp::new(vec![0.0, bad], &cov, &[0.0, 1.0], true).is_err(), || format!("mean {bad}"));
+        points
+            .check(Gp::new(vec![0.0; 2], &cov, &[0.0, bad], true).is_err(), || format!("at {bad}"));
+        points.check(Gp::new(vec![0.0, bad], &cov, &[0.0, 1.0], true).is_err(), || {
+            format!("mean {bad}")
+        });
         for bad in [bad, 0.0, -1.0] {
             points.check(Covariance::sq_exp(bad, 1.0).is_err(), || format!("length {bad}"));
             points.check(Covariance::periodic(1.0, 1.0, bad).is_err(), || format!("sd {bad}"));
@@ -109,16 +122,23 @@ fn at_zero(k: &DMatrix<f64>) -> Result<(MvNormal, f64), String> {
 
 const LN_TAU: f64 = 1.837_877_066_409_345_6;
 
-/// A factor with a residual of rounding and the right determinant, as far as the condition lets it be known; or, from a condition of
-/// 1e15 on, an error that says so.
+/// A factor with a residual of rounding and the right determinant, as far as the
+/// condition lets it be known; or, from a condition of 1e15 on, an error that says so.
 fn factors(k: &DMatrix<f64>, log_det: f64, condition: f64) -> Result<(), String> {
     let n = k.nrows();
     match at_zero(k) {
         Ok((d, p)) => {
-            let (off, far) = (residual(&factor(n, |z| d.colour(z)), k), (-2.0 * p - n as f64 * LN_TAU - log_det).abs());
+            let (off, far) = (
+                residual(&factor(n, |z| d.colour(z)), k),
+                (-2.0 * p - n as f64 * LN_TAU - log_det).abs(),
+            );
             let bound = n as f64 * condition * f64::EPSILON + 1e-12 * log_det.abs().max(1.0);
             let right = off <= n as f64 * f64::EPSILON && (far <= bound || condition > 1e15);
-            if right { Ok(()) } else { Err(format!("residual {off:e}, log determinant off by {far:e} of {bound:e}")) }
+            if right {
+                Ok(())
+            } else {
+                Err(format!("residual {off:e}, log determinant off by {far:e} of {bound:e}"))
+            }
         }
         Err(e) if condition > 1e15 && e.contains("must be positive definite") => Ok(()),
         Err(e) => Err(e),
@@ -135,12 +155,16 @@ fn matrices_of_any_condition_factor_or_say_so() {
             let k = DMatrix::from_row_slice(2, 2, &[1.0, 1.0 - d, 1.0 - d, 1.0]) * unit;
             let log_det = d.ln() + (2.0 - d).ln() + 2.0 * unit.ln();
             let end = factors(&k, log_det, (2.0 - d) / d);
-            points.check(end.is_ok(), || format!("correlation 1 - 2^-{power}, times {unit:e}: {}", end.unwrap_err()));
+            points.check(end.is_ok(), || {
+                format!("correlation 1 - 2^-{power}, times {unit:e}: {}", end.unwrap_err())
+            });
         }
     }
     // Hilbert's, the rounded ones.
     for r in rows("hilbert") {
-        let (n, [log_det, condition]) = (r.point[0] as usize, &r.values[..]) else { panic!("{}", r.line) };
+        let (n, [log_det, condition]) = (r.point[0] as usize, &r.values[..]) else {
+            panic!("{}", r.line)
+        };
         let k = DMatrix::from_fn(n, n, |i, j| 1.0 / (i + j + 1) as f64);
         let end = factors(&k, *log_det, *condition);
         points.check(end.is_ok(), || format!("{}: {}", r.line, end.unwrap_err()));

@@ -1,4 +1,5 @@
-//! Log densities and their gradients against the table, and where there is no density to speak of.
+//! Log densities and their gradients against the table, and where there is no density to
+//! speak of.
 
 use super::points::Points;
 use super::table::{agree, rows};
@@ -27,8 +28,9 @@ fn gradients_agree_with_the_table() {
         let got: Vec<f64> = got.iter().flat_map(|g| g.x.iter().chain(&g.params)).copied().collect();
         let is_discrete = got.len() == r.parameters.len();
         let by = if is_discrete { &[][..] } else { &r.point[..] }.iter().chain(&r.parameters);
-        // Or of 1e-9 in the change of the log density while the number changes by a factor of e; with terms as large as a shape,
-        // or as the square of how far a bound is in standard deviations, 1e-12 of it.
+        // Or of 1e-9 in the change of the log density while the number changes by a
+        // factor of e; with terms as large as a shape, or as the square of how far a
+        // bound is in standard deviations, 1e-12 of it.
         let shapes = match r.name {
             "beta" => 2,
             "gamma" | "inv_gamma" | "student_t" => 1,
@@ -38,10 +40,13 @@ fn gradients_agree_with_the_table() {
             ("truncated_normal", [mean, sd, lo, _]) if lo.is_finite() => ((lo - mean) / sd).powi(2),
             _ => 0.0,
         };
-        let little = r.parameters[..shapes].iter().fold(bound.max(1e3), |most: f64, s| most.max(*s)) * 1e-12;
+        let little =
+            r.parameters[..shapes].iter().fold(bound.max(1e3), |most: f64, s| most.max(*s)) * 1e-12;
         let right = got.len() == r.values.len()
             && r.values.iter().zip(&got).zip(by).all(|((v, g), by)| {
-                v.is_nan() && !g.is_nan() || agree(*g, *v, 1e-9, 0.0) || ((v - g) * by).abs() < little
+                v.is_nan() && !g.is_nan()
+                    || agree(*g, *v, 1e-9, 0.0)
+                    || ((v - g) * by).abs() < little
             });
         points.check(right, || format!("{}: got {got:?}", r.line));
     }
@@ -80,7 +85,9 @@ fn log_densities_agree_with_formulas() {
     let never = f64::NEG_INFINITY;
     for x in [0.0, 5e-324, -1e-300, 1e150, 1e300, f64::MAX, f64::INFINITY, never, f64::NAN] {
         let got = Dist::Flat(Flat::default()).log_density_num(x);
-        points.check(got == if x.is_finite() { 0.0 } else { never }, || format!("flat at {x}: {got}"));
+        points.check(got == if x.is_finite() { 0.0 } else { never }, || {
+            format!("flat at {x}: {got}")
+        });
     }
     for p in [0.0, 5e-324, 1e-300, 1e-16, 1.0 - 1e-16, 1.0f64] {
         let d = Dist::Flip(Flip::new(p).unwrap());
@@ -93,8 +100,11 @@ fn log_densities_agree_with_formulas() {
         let d = Dist::Categorical(Categorical::new(weights).unwrap());
         for x in [0.0, 1.0, 2.0, 3.0, -1.0, 0.5, 1e300, f64::NAN] {
             let weight = (0..3).find(|i| *i as f64 == x).map_or(0.0, |i| weights[i]);
-            let (got, expected) = (d.log_density_num(x), weight.ln() - weights.iter().sum::<f64>().ln());
-            points.check(agree(got, expected, 1e-12, 1e-12), || format!("categorical({weights:?}) at {x}: {got}"));
+            let (got, expected) =
+                (d.log_density_num(x), weight.ln() - weights.iter().sum::<f64>().ln());
+            points.check(agree(got, expected, 1e-12, 1e-12), || {
+                format!("categorical({weights:?}) at {x}: {got}")
+            });
         }
     }
     for scale in [1e-300, 1e-150, 1.0, 1e150, 1e300] {
@@ -103,7 +113,11 @@ fn log_densities_agree_with_formulas() {
         let sum: f64 = xs.iter().map(|x| one.log_density_num(*x)).sum();
         let iid = Dist::Iid(Arc::new(Iid::new(one.clone(), 3).unwrap()));
         let ordered = Dist::Ordered(Arc::new(Ordered::new(one, 3).unwrap()));
-        let cases = [(&iid, xs, sum), (&ordered, xs, sum + 6f64.ln()), (&ordered, [xs[1], xs[0], xs[2]], never)];
+        let cases = [
+            (&iid, xs, sum),
+            (&ordered, xs, sum + 6f64.ln()),
+            (&ordered, [xs[1], xs[0], xs[2]], never),
+        ];
         for (d, x, expected) in cases {
             let got = d.log_density(&x.to_vec().into());
             points.check(agree(got, expected, 1e-12, 1e-12), || {

@@ -1,9 +1,11 @@
-//! Diagnostics of draws of any size, of constants, infinities and NaN: the same as of draws of size 1, or the outcome that is stated.
+//! Diagnostics of draws of any size, of constants, infinities and NaN: the same as of
+//! draws of size 1, or the outcome that is stated.
 
 use super::points::Points;
 use super::table::agree;
 use pcadlang::infer::diagnostics::{
-    Summary, ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, modes, quantile, r_hat, summary,
+    Summary, ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, modes, quantile,
+    r_hat, summary,
 };
 use pcadlang::rng::{Purpose, StreamKey};
 
@@ -47,10 +49,13 @@ fn the_unit_of_draws_does_not_matter() {
         let right = got.iter().zip(lengths).all(|(g, l)| agree(*g, l * unit, 1e-12, 0.0));
         points.check(right, || format!("2^{power}: {got:?}, expected {lengths:?} times {unit:e}"));
         points.check(bare == plain, || format!("2^{power}: {bare:?}, expected {plain:?}"));
-        let others = |x: &[Vec<f64>]| [ess_mean(x), ess_quantile(x, 0.25), ess_bulk(x), ess_tail(x), r_hat(x)];
+        let others = |x: &[Vec<f64>]| {
+            [ess_mean(x), ess_quantile(x, 0.25), ess_bulk(x), ess_tail(x), r_hat(x)]
+        };
         points.check(others(&x) == others(&draws), || format!("2^{power}: {:?}", others(&x)));
         let errors = [mcse_mean(&x), mcse_sd(&x)];
-        let right = agree(errors[0], lengths[5] * unit, 1e-12, 0.0) && agree(errors[1], lengths[6] * unit, 1e-12, 0.0);
+        let right = agree(errors[0], lengths[5] * unit, 1e-12, 0.0)
+            && agree(errors[1], lengths[6] * unit, 1e-12, 0.0);
         points.check(right, || format!("2^{power}: {errors:?}"));
     }
     points.finish();
@@ -70,9 +75,13 @@ fn outcomes_are_stated() {
             let s = summary(&vec![vec![c; 50]; count]);
             // The mean is rounded, and with it what depends on it.
             let little = 4e-15 * c.abs();
-            let right = agree(s.mean, c, 4e-15, 0.0) && s.sd <= little && [s.q05, s.q50, s.q95].iter().all(|q| *q == c);
+            let right = agree(s.mean, c, 4e-15, 0.0)
+                && s.sd <= little
+                && [s.q05, s.q50, s.q95].iter().all(|q| *q == c);
             points.check(right, || format!("{count} constant chains of {c:e}: {s:?}"));
-            points.check(s.ess_bulk == 50.0 * count as f64 && s.r_hat.is_nan(), || format!("{c:e}: {s:?}"));
+            points.check(s.ess_bulk == 50.0 * count as f64 && s.r_hat.is_nan(), || {
+                format!("{c:e}: {s:?}")
+            });
             let unsure = s.mcse_sd > little || s.mcse_mean > little;
             points.check(!unsure && !s.mcse_mean.is_nan(), || format!("{c:e}: {s:?}"));
         }
@@ -85,14 +94,16 @@ fn outcomes_are_stated() {
             let unknown = [s.ess_bulk, s.ess_tail, s.r_hat, s.mcse_mean, s.mcse_sd, s.sd];
             points.check(unknown.iter().all(|v| v.is_nan()), || format!("{odd} at {at}: {s:?}"));
             let quantiles = [s.q05, s.q50, s.q95];
-            let right = quantiles.iter().all(|q| if odd.is_nan() { q.is_nan() } else { q.is_finite() });
+            let right =
+                quantiles.iter().all(|q| if odd.is_nan() { q.is_nan() } else { q.is_finite() });
             points.check(right && same(s.mean, odd), || format!("{odd} at {at}: {s:?}"));
         }
     }
     let x = [vec![inf; 20], vec![-inf; 20]];
     let s = summary(&x);
     points.check(s.mean.is_nan() && s.q05 == -inf && s.q95 == inf, || format!("{s:?}"));
-    // Between two order statistics, wherever they are; between infinities of both signs there is no number.
+    // Between two order statistics, wherever they are; between infinities of both signs
+    // there is no number.
     let cases: [(&[f64], f64, f64); 12] = [
         (&[-f64::MAX, f64::MAX], 0.5, 0.0),
         (&[-f64::MAX, f64::MAX], 0.75, 0.75 * f64::MAX - 0.25 * f64::MAX),
@@ -116,7 +127,12 @@ fn outcomes_are_stated() {
         let at = |c: f64| {
             chains()
                 .iter()
-                .map(|x| x.iter().map(|x| c + 1e-3 * c.abs() * x).map(|x| x.clamp(f64::MIN, f64::MAX)).collect())
+                .map(|x| {
+                    x.iter()
+                        .map(|x| c + 1e-3 * c.abs() * x)
+                        .map(|x| x.clamp(f64::MIN, f64::MAX))
+                        .collect()
+                })
                 .take(2)
                 .collect::<Vec<Vec<f64>>>()
         };

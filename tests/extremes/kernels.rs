@@ -1,5 +1,6 @@
-//! Every kernel on posteriors of scales 1e-150 to 1e150, far from the data, at ends of supports, under log weights of 1e300: the state
-//! stays finite and in its support, and the running score is that of a fresh run bit for bit.
+//! Every kernel on posteriors of scales 1e-150 to 1e150, far from the data, at ends of
+//! supports, under log weights of 1e300: the state stays finite and in its support, and
+//! the running score is that of a fresh run bit for bit.
 
 use super::points::Points;
 use crate::common::{assert_mean, integrate, normal_pdf, run};
@@ -15,7 +16,10 @@ const SCALES: [&str; 5] = ["1e-150", "1e-8", "1", "1e8", "1e150"];
 const POSTERIORS: &[(&str, &str)] = &[
     ("normal", "assume x ~ normal(0, S); observe normal(x, S) = S;"),
     ("40 sd away", "assume x ~ normal(0, S); observe normal(x, S) = 40 * S;"),
-    ("log weights of 1e300", "assume x ~ normal(0, S); factor(-1e300 * (x / S) * (x / S)); observe normal(x, S) = S;"),
+    (
+        "log weights of 1e300",
+        "assume x ~ normal(0, S); factor(-1e300 * (x / S) * (x / S)); observe normal(x, S) = S;",
+    ),
     ("truncated", "assume x ~ truncated_normal(0, S, 0, 3 * S); observe normal(x, S) = S;"),
     ("truncated far out", "assume x ~ truncated_normal(0, S, 38 * S); observe normal(x, S) = S;"),
     ("bounded", "assume x ~ uniform(0, S); observe normal(x, S) = S;"),
@@ -83,7 +87,10 @@ fn watched(text: &str, seed: u64) -> Result<ChainResult, String> {
     let faults = Arc::new(Faults::default());
     let options = RunOptions { seed, watch: Some(faults.clone()), ..RunOptions::default() };
     let chains = model.run_into(&options, 1, &Progress::default(), vec![Box::new(Discard)]);
-    let chain = chains.map_err(|e| e.to_string())?.remove(0).map_err(|e| model.chain_error(e).to_string())?;
+    let chain = chains
+        .map_err(|e| e.to_string())?
+        .remove(0)
+        .map_err(|e| model.chain_error(e).to_string())?;
     match faults.0.lock().unwrap().first() {
         Some(fault) => Err(fault.clone()),
         None => Ok(chain),
@@ -111,7 +118,9 @@ fn states_stay_valid_at_every_scale() {
                 let counts = if kernel.starts_with("smc") { [3, 6] } else { [100, 200] };
                 let text = program(posterior, kernel, scale, counts);
                 let end = watched(&text, seed as u64).and_then(|chain| rescored(&chain.last));
-                points.check(end.is_ok(), || format!("{name}, {kernel}, {scale}: {}", end.unwrap_err()));
+                points.check(end.is_ok(), || {
+                    format!("{name}, {kernel}, {scale}: {}", end.unwrap_err())
+                });
             }
         }
     }
@@ -125,14 +134,23 @@ fn means_are_right_at_every_scale() {
     let seen = |z: f64| normal_pdf(1.0, z, 1.0) * normal_pdf(z, 0.0, 1000.0);
     let normal = |z: f64| seen(z) * normal_pdf(z, 0.0, 1.0);
     let positive = |z: f64| seen(z) * normal_pdf(z.ln(), 0.0, 1.0) / z;
-    let mean =
-        |f: &dyn Fn(f64) -> f64, from| integrate(|z| z * f(z), from, 20.0, 40_000) / integrate(f, from, 20.0, 40_000);
+    let mean = |f: &dyn Fn(f64) -> f64, from| {
+        integrate(|z| z * f(z), from, 20.0, 40_000) / integrate(f, from, 20.0, 40_000)
+    };
     let cases: [(usize, f64, &[&str]); 2] = [
         (0, mean(&normal, -20.0), &["mh(@x)", "block(@x)", "elliptical(@x)", "wide()"]),
         (
             6,
             mean(&positive, 1e-9),
-            &["mh(@x)", "drift(@x)", "hmc(@x, steps = 4)", "mala(@x)", "nuts(@x)", "slice(@x)", "scaled()"],
+            &[
+                "mh(@x)",
+                "drift(@x)",
+                "hmc(@x, steps = 4)",
+                "mala(@x)",
+                "nuts(@x)",
+                "slice(@x)",
+                "scaled()",
+            ],
         ),
     ];
     for (posterior, expected, kernels) in cases {
@@ -153,7 +171,8 @@ fn means_are_right_at_every_scale() {
 #[test]
 fn scales_are_learnt_from_far_away() {
     let mut points = Points::of("learnt scales");
-    // Chains start within 2 of 0 with steps of about 1; the posterior is normal(1, 1) in units of the scale.
+    // Chains start within 2 of 0 with steps of about 1; the posterior is normal(1, 1) in
+    // units of the scale.
     for kernel in ["drift(@x)", "slice(@x)", "nuts(@x)", "hmc(@x, steps = 4)", "mala(@x)"] {
         for scale in ["1e-30", "1e-12", "1", "1e6"] {
             let text = format!(
@@ -182,18 +201,24 @@ fn finite_choices_weigh_1e300() {
         ("[1e-300, 0, -1e300]", &[0.0, 1.0]),
     ];
     for (weights, possible) in cases {
-        for kernel in ["gibbs(@k)", "mh(@k)", "drift(@k)", "block(@k)", "smc(mh(@k), particles = 8)"] {
+        for kernel in
+            ["gibbs(@k)", "mh(@k)", "drift(@k)", "block(@k)", "smc(mh(@k), particles = 8)"]
+        {
             let text = format!(
                 "assume k ~ categorical([1e300, 1e300, 1e300]); factor({weights}[k]);
                  infer {{ warmup 50 {{ {kernel}; }} repeat 4000 {{ {kernel}; collect k; }} }}"
             );
             let draws = &run(&text, 9, 1)["k"];
-            let share = |k: f64| draws.iter().filter(|d| **d == k).count() as f64 / draws.len() as f64;
+            let share =
+                |k: f64| draws.iter().filter(|d| **d == k).count() as f64 / draws.len() as f64;
             let right = (0..3).map(f64::from).all(|k| {
-                let expected = if possible.contains(&k) { 1.0 / possible.len() as f64 } else { 0.0 };
+                let expected =
+                    if possible.contains(&k) { 1.0 / possible.len() as f64 } else { 0.0 };
                 (share(k) - expected).abs() < 0.06 && (expected > 0.0 || share(k) == 0.0)
             });
-            points.check(right, || format!("{kernel} under {weights}: {:?}", [share(0.0), share(1.0), share(2.0)]));
+            points.check(right, || {
+                format!("{kernel} under {weights}: {:?}", [share(0.0), share(1.0), share(2.0)])
+            });
         }
     }
     points.finish();
@@ -212,7 +237,11 @@ fn score_is_kept(points: &mut Points, steps: u64, seeds: std::ops::Range<u64>) {
     for seed in seeds {
         let end = watched(&LONG.replace("COUNT", &steps.to_string()), seed).and_then(|chain| {
             let accepted: u64 = chain.kernels.iter().map(|k| k.accepted).sum();
-            assert!(chain.steps == steps && accepted > steps / 50, "{} steps, {accepted} accepted", chain.steps);
+            assert!(
+                chain.steps == steps && accepted > steps / 50,
+                "{} steps, {accepted} accepted",
+                chain.steps
+            );
             rescored(&chain.last)
         });
         points.check(end.is_ok(), || format!("seed {seed}, {steps} steps: {}", end.unwrap_err()));

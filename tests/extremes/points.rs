@@ -1,4 +1,5 @@
-//! Counts checked points, gathers those that are wrong, and holds the counts against the table of `docs/extremes.md`.
+//! Counts checked points, gathers those that are wrong, and holds the counts against the
+//! table of `docs/extremes.md`.
 
 const DOCUMENT: &str = include_str!("../../docs/extremes.md");
 
@@ -25,9 +26,18 @@ impl Points {
     /// All points are right, and as many as the document says.
     pub fn finish(self) {
         let Points { subject, checked, wrong } = self;
-        assert!(wrong.is_empty(), "{subject}: {} of {checked} are wrong:\n{}", wrong.len(), wrong.join("\n"));
+        assert!(
+            wrong.is_empty(),
+            "{subject}: {} of {checked} are wrong:\n{}",
+            wrong.len(),
+            wrong.join("\n")
+        );
         let documented = documented().find(|(name, _)| *name == subject).map(|(_, n)| n);
-        assert_eq!(documented, Some(checked), "docs/extremes.md should say {checked} points for \"{subject}\"");
+        assert_eq!(
+            documented,
+            Some(checked),
+            "docs/extremes.md should say {checked} points for \"{subject}\""
+        );
     }
 }
 
@@ -43,6 +53,7 @@ fn documented() -> impl Iterator<Item = (&'static str, usize)> {
 fn there_are_at_least_2000_points() {
     let total: usize = documented().map(|(_, n)| n).sum();
     assert!(total >= 2000, "{total}");
-    let said = DOCUMENT.lines().find_map(|l| l.strip_prefix("Together ")?.split(' ').next()?.parse().ok());
+    let said =
+        DOCUMENT.lines().find_map(|l| l.strip_prefix("Together ")?.split(' ').next()?.parse().ok());
     assert_eq!(said, Some(total), "docs/extremes.md should say: Together {total} points");
 }

@@ -1,4 +1,5 @@
-//! Pictures of objects of any size and place by any camera; single precision against rays in double precision.
+//! Pictures of objects of any size and place by any camera; single precision against rays
+//! in double precision.
 
 use super::points::Points;
 use glam::{DVec3, Vec3};
@@ -7,8 +8,9 @@ use pcadlang::render::{Camera, Channels, Contours, Frame, Projection};
 use pcadlang::rng::{Purpose, StreamKey};
 use std::sync::Arc;
 
-/// The greatest relative error of a depth where a surface is seen at less than 60 degrees from its normal; where it is seen at a
-/// slant, also where the ray hits it: so many pixels.
+/// The greatest relative error of a depth where a surface is seen at less than 60 degrees
+/// from its normal; where it is seen at a slant, also where the ray hits it: so many
+/// pixels.
 const DEPTH_ERROR: f64 = 1e-6;
 const PLACE_ERROR: f64 = 1e-3;
 
@@ -33,13 +35,21 @@ impl Face {
         let mut first = 0;
         let mut faces = Vec::new();
         for instance in solid.instances() {
-            faces.extend(instance.mesh.topology.triangles.iter().map(|t| Face(t.map(|v| corners[first + v as usize]))));
+            faces.extend(
+                instance
+                    .mesh
+                    .topology
+                    .triangles
+                    .iter()
+                    .map(|t| Face(t.map(|v| corners[first + v as usize]))),
+            );
             first += instance.mesh.positions.len();
         }
         faces
     }
 
-    /// How far along the ray it is hit (Möller and Trumbore 1997), and the share of the nearest side: within 0 to 1/3 it is hit.
+    /// How far along the ray it is hit (Möller and Trumbore 1997), and the share of the
+    /// nearest side: within 0 to 1/3 it is hit.
     fn hit(&self, eye: DVec3, ray: DVec3) -> Option<(f64, f64)> {
         let Face([a, b, c]) = *self;
         let (u, v, from) = (b - a, c - a, eye - a);
@@ -64,17 +74,21 @@ fn ray(camera: &Camera, x: f64, y: f64) -> (DVec3, DVec3) {
 /// The nearest hit beyond the near plane: its depth and face.
 fn nearest<'a>(faces: &'a [Face], camera: &Camera, x: f64, y: f64) -> Option<(f64, &'a Face)> {
     let (eye, ray) = ray(camera, x, y);
-    let hits =
-        faces.iter().filter_map(|f| f.hit(eye, ray).filter(|h| h.0 >= Camera::NEAR && h.1 >= 0.0).map(|h| (h.0, f)));
+    let hits = faces.iter().filter_map(|f| {
+        f.hit(eye, ray).filter(|h| h.0 >= Camera::NEAR && h.1 >= 0.0).map(|h| (h.0, f))
+    });
     hits.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Whether a picture's depths are those of rays: everywhere, but where a ray a thousandth of a pixel away would tell something else.
+/// Whether a picture's depths are those of rays: everywhere, but where a ray a thousandth
+/// of a pixel away would tell something else.
 fn as_by_rays(solid: &Solid, camera: &Camera) -> Result<f64, String> {
     let (frame, faces) = (Frame::render(solid, camera, Channels::Depth), Face::all(solid));
     // Of parallel rays depths are as exact as the farthest one.
     let far = solid.vertices().map(|v| camera.project(v).2.abs()).fold(0.0, f64::max);
-    let unit = |depth: f64| if matches!(camera.projection, Projection::Pinhole { .. }) { depth } else { far };
+    let unit = |depth: f64| {
+        if matches!(camera.projection, Projection::Pinhole { .. }) { depth } else { far }
+    };
     let mut worst = 0.0f64;
     for row in 0..camera.height {
         for column in 0..camera.width {
@@ -92,7 +106,8 @@ fn as_by_rays(solid: &Solid, camera: &Camera) -> Result<f64, String> {
                 (-1.0, -1.0),
             ];
             let depth = |(i, j): (f64, f64)| {
-                nearest(&faces, camera, x + PLACE_ERROR * i, y + PLACE_ERROR * j).map_or(f64::INFINITY, |h| h.0)
+                nearest(&faces, camera, x + PLACE_ERROR * i, y + PLACE_ERROR * j)
+                    .map_or(f64::INFINITY, |h| h.0)
             };
             let (eye, way) = ray(camera, x, y);
             let exact = nearest(&faces, camera, x, y);
@@ -101,14 +116,18 @@ fn as_by_rays(solid: &Solid, camera: &Camera) -> Result<f64, String> {
                 && way.normalize().dot(face.normal()).abs() > 0.5
             {
                 let error = (got - expected).abs() / unit(expected);
-                let beside = faces.iter().any(|f| f.hit(eye, way).is_some_and(|h| h.1.abs() < 1e-3));
+                let beside =
+                    faces.iter().any(|f| f.hit(eye, way).is_some_and(|h| h.1.abs() < 1e-3));
                 if !beside {
                     worst = worst.max(error);
                 }
             }
-            let (least, most) =
-                around.map(depth).into_iter().fold((f64::INFINITY, 0.0f64), |(l, m), d| (l.min(d), m.max(d)));
-            let within = |depth: f64| if depth.is_finite() { DEPTH_ERROR * unit(depth) } else { 0.0 };
+            let (least, most) = around
+                .map(depth)
+                .into_iter()
+                .fold((f64::INFINITY, 0.0f64), |(l, m), d| (l.min(d), m.max(d)));
+            let within =
+                |depth: f64| if depth.is_finite() { DEPTH_ERROR * unit(depth) } else { 0.0 };
             if !(got >= least - within(least) && got <= most + within(most)) {
                 return Err(format!("pixel {column}, {row}: {got}, rays {least} to {most}"));
             }
@@ -122,7 +141,11 @@ fn single_precision_is_near_double_precision() {
     let mut points = Points::of("depth against rays");
     let mut worst = 0.0f64;
     let mut random = StreamKey::new(51, 0, Purpose::VALUES).stream(0, 0, 0);
-    let shapes = [ball(16), block(), Solid::group(&[placed(&ball(8), [0.6, 0.3, 0.5], [0.0; 3], 0.7), block()])];
+    let shapes = [
+        ball(16),
+        block(),
+        Solid::group(&[placed(&ball(8), [0.6, 0.3, 0.5], [0.0; 3], 0.7), block()]),
+    ];
     for round in 0..90 {
         let mut between = |low: f64, high: f64| low + (high - low) * random.uniform();
         // From far away to across the near plane and around the camera.
@@ -133,12 +156,16 @@ fn single_precision_is_near_double_precision() {
         let solid = placed(&shapes[round / 3 % 3], place, turn, scale);
         let mut camera = Camera::default_for(24, 18);
         if round % 5 == 0 {
-            camera.projection = Projection::Orthographic { units_per_pixel: 0.1 * scale, cx: 12.0, cy: 9.0 };
+            camera.projection =
+                Projection::Orthographic { units_per_pixel: 0.1 * scale, cx: 12.0, cy: 9.0 };
         }
-        // Of a body that hides its own, faces are seen from outside: with the eye inside there is nothing to see.
+        // Of a body that hides its own, faces are seen from outside: with the eye inside
+        // there is nothing to see.
         let end = as_by_rays(&open(&solid), &camera);
         worst = worst.max(end.clone().unwrap_or(0.0));
-        points.check(end.is_ok(), || format!("round {round}, scale {scale}, at {place:?}: {}", end.unwrap_err()));
+        points.check(end.is_ok(), || {
+            format!("round {round}, scale {scale}, at {place:?}: {}", end.unwrap_err())
+        });
     }
     println!("the greatest relative error of a depth: {worst:e}");
     points.finish();
@@ -148,18 +175,24 @@ fn single_precision_is_near_double_precision() {
 fn open(solid: &Solid) -> Solid {
     let instance = |i: &pcadlang::geom::Instance| {
         let topology = Topology { encloses: false, ..(*i.mesh.topology).clone() };
-        Solid::new(Arc::new(Mesh { topology: Arc::new(topology), ..(*i.mesh).clone() })).placed(i.affine)
+        Solid::new(Arc::new(Mesh { topology: Arc::new(topology), ..(*i.mesh).clone() }))
+            .placed(i.affine)
     };
     Solid::group(&solid.instances().iter().map(instance).collect::<Vec<_>>())
 }
 
 /// Depths are above 0, contours finite, and both channels agree; what is seen, in pixels.
 fn sound(solid: &Solid, camera: &Camera) -> Result<usize, String> {
-    let (frame, all) = (Frame::render(solid, camera, Channels::Depth), Frame::render(solid, camera, Channels::All));
+    let (frame, all) = (
+        Frame::render(solid, camera, Channels::Depth),
+        Frame::render(solid, camera, Channels::All),
+    );
     if frame.depth.len() != camera.pixels() || frame.depth.iter().any(|d| d.is_nan()) {
         return Err("depths are missing or NaN".into());
     }
-    if matches!(camera.projection, Projection::Pinhole { .. }) && frame.depth.iter().any(|d| *d <= 0.0) {
+    if matches!(camera.projection, Projection::Pinhole { .. })
+        && frame.depth.iter().any(|d| *d <= 0.0)
+    {
         return Err("depths that are not above 0".into());
     }
     if frame.depth.iter().zip(&all.depth).any(|(a, b)| a.to_bits() != b.to_bits()) {
@@ -179,8 +212,8 @@ fn sound(solid: &Solid, camera: &Camera) -> Result<usize, String> {
 /// Powers of ten from 1e-300 to 1e300.
 fn magnitudes() -> Vec<f64> {
     [
-        -300, -200, -150, -100, -46, -40, -38, -30, -20, -10, -6, -3, -1, 0, 1, 3, 6, 10, 18, 19, 20, 30, 38, 39, 46,
-        77, 100, 150, 154, 200, 300,
+        -300, -200, -150, -100, -46, -40, -38, -30, -20, -10, -6, -3, -1, 0, 1, 3, 6, 10, 18, 19,
+        20, 30, 38, 39, 46, 77, 100, 150, 154, 200, 300,
     ]
     .iter()
     .map(|p| 10f64.powi(*p))
@@ -198,8 +231,11 @@ fn objects_of_any_size_and_place_are_drawn() {
         for thing in [ball(16), block()] {
             for m in magnitudes() {
                 let small = sound(&placed(&thing, [0.0; 3], [0.1, 0.2, 0.3], m), camera);
-                // Less than a pixel is at most that; what is before the camera and larger than the picture fills it.
-                let right = small.as_ref().is_ok_and(|seen| if m < 0.01 { *seen <= 1 } else { m != 1.0 || *seen > 20 });
+                // Less than a pixel is at most that; what is before the camera and larger
+                // than the picture fills it.
+                let right = small
+                    .as_ref()
+                    .is_ok_and(|seen| if m < 0.01 { *seen <= 1 } else { m != 1.0 || *seen > 20 });
                 points.check(right, || format!("scaled by {m:e}: {small:?}"));
                 let wall = sound(&placed(&thing, [0.0, 0.0, -2.0 * m], [0.0; 3], m), camera);
                 // What is a thousand million units away is out of sight.
@@ -215,8 +251,11 @@ fn objects_of_any_size_and_place_are_drawn() {
                     points.check(right, || format!("at {away:?}: {end:?}"));
                 }
                 let end = sound(&placed(&thing, [0.0; 3], [m, -m, m], 1.0), camera);
-                points.check(end.as_ref().is_ok_and(|seen| *seen > 20), || format!("turned by {m:e}: {end:?}"));
-                let flat = thing.placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, m, 1.0)));
+                points.check(end.as_ref().is_ok_and(|seen| *seen > 20), || {
+                    format!("turned by {m:e}: {end:?}")
+                });
+                let flat =
+                    thing.placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, m, 1.0)));
                 let end = sound(&flat, camera);
                 points.check(end.is_ok(), || format!("one axis scaled by {m:e}: {end:?}"));
             }
@@ -239,28 +278,59 @@ fn objects_of_any_size_and_place_are_drawn() {
 fn meshes_of_any_numbers_are_drawn() {
     let mut points = Points::of("meshes of any numbers");
     let camera = Camera::default_for(40, 30);
-    let corners =
-        [Vec3::new(-0.7, -0.6, 0.2), Vec3::new(0.8, -0.5, -0.4), Vec3::new(0.1, 0.9, 0.3), Vec3::new(0.2, 0.1, 7.0)];
+    let corners = [
+        Vec3::new(-0.7, -0.6, 0.2),
+        Vec3::new(0.8, -0.5, -0.4),
+        Vec3::new(0.1, 0.9, 0.3),
+        Vec3::new(0.2, 0.1, 7.0),
+    ];
     let raw = |positions: Vec<Vec3>| {
         let triangles = vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]];
         let normals = vec![Vec3::Z; positions.len()];
-        let topology = Topology { parts: vec![0; triangles.len()], triangles, part_count: 1, ..Topology::default() };
+        let topology = Topology {
+            parts: vec![0; triangles.len()],
+            triangles,
+            part_count: 1,
+            ..Topology::default()
+        };
         Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::new(topology) }))
     };
-    let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 1e30, 1e19, 1e-45, 1e-30, 8.0, 7.999];
+    let odd = [
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::MAX,
+        f32::MIN,
+        1e30,
+        1e19,
+        1e-45,
+        1e-30,
+        8.0,
+        7.999,
+    ];
     for value in odd {
         for vertex in 0..4 {
             for axis in 0..3 {
                 let mut positions = corners.to_vec();
                 positions[vertex][axis] = value;
                 let end = sound(&raw(positions.clone()), &camera);
-                points.check(end.is_ok(), || format!("{value} at {axis} of vertex {vertex}: {end:?}"));
-                let made = Mesh::new(positions, vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]], vec![0; 4]);
-                points.check(made.is_ok() == value.is_finite(), || format!("{value}: {:?}", made.err()));
+                points.check(end.is_ok(), || {
+                    format!("{value} at {axis} of vertex {vertex}: {end:?}")
+                });
+                let made = Mesh::new(
+                    positions,
+                    vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]],
+                    vec![0; 4],
+                );
+                points.check(made.is_ok() == value.is_finite(), || {
+                    format!("{value}: {:?}", made.err())
+                });
             }
         }
     }
-    for (i, bad) in [0.0, -1.0, 1e-31, 1e7, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().enumerate() {
+    for (i, bad) in
+        [0.0, -1.0, 1e-31, 1e7, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().enumerate()
+    {
         points.check(sphere(bad, 16).is_err(), || format!("a radius of {bad}, {i}"));
         points.check(cuboid(DVec3::new(1.0, bad, 1.0)).is_err(), || format!("an edge of {bad}"));
     }
@@ -278,7 +348,10 @@ fn any_camera_gives_a_picture() {
             let cameras = [
                 Camera { projection: Projection::Pinhole { focal_px: sign * m, cx, cy }, ..plain },
                 Camera { projection: Projection::Pinhole { focal_px, cx: sign * m, cy }, ..plain },
-                Camera { projection: Projection::Orthographic { units_per_pixel: sign * m, cx, cy }, ..plain },
+                Camera {
+                    projection: Projection::Orthographic { units_per_pixel: sign * m, cx, cy },
+                    ..plain
+                },
                 Camera { eye: DVec3::new(0.0, 0.0, sign * m), ..plain },
                 Camera { eye: DVec3::new(sign * m, 0.0, 8.0), ..plain },
             ];
@@ -291,8 +364,14 @@ fn any_camera_gives_a_picture() {
     for odd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0] {
         let plain = Camera::default_for(40, 30);
         let cameras = [
-            Camera { projection: Projection::Pinhole { focal_px: odd, cx: 20.0, cy: 15.0 }, ..plain },
-            Camera { projection: Projection::Orthographic { units_per_pixel: odd, cx: 20.0, cy: 15.0 }, ..plain },
+            Camera {
+                projection: Projection::Pinhole { focal_px: odd, cx: 20.0, cy: 15.0 },
+                ..plain
+            },
+            Camera {
+                projection: Projection::Orthographic { units_per_pixel: odd, cx: 20.0, cy: 15.0 },
+                ..plain
+            },
             Camera { eye: DVec3::new(0.0, odd, 8.0), ..plain },
             Camera { forward: DVec3::splat(odd), ..plain },
         ];
@@ -308,12 +387,16 @@ fn any_camera_gives_a_picture() {
 fn pictures_of_any_size_are_drawn() {
     let mut points = Points::of("sizes of pictures");
     let wall = placed(&block(), [0.0, 0.0, -1000.0], [0.0; 3], 1000.0);
-    for (width, height) in [(1, 1), (1, 2), (3, 1), (1, 8192), (8192, 1), (8192, 8), (2, 8192), (513, 511)] {
+    for (width, height) in
+        [(1, 1), (1, 2), (3, 1), (1, 8192), (8192, 1), (8192, 8), (2, 8192), (513, 511)]
+    {
         let camera = Camera::default_for(width, height);
         let end = sound(&wall, &camera);
         points.check(end == Ok(camera.pixels()), || format!("{width} x {height}: {end:?}"));
         let end = sound(&placed(&ball(24), [0.0; 3], [0.0; 3], 2.0), &camera);
-        points.check(end.as_ref().is_ok_and(|seen| *seen > 0), || format!("{width} x {height}: {end:?}"));
+        points.check(end.as_ref().is_ok_and(|seen| *seen > 0), || {
+            format!("{width} x {height}: {end:?}")
+        });
         let frame = Frame::render(&wall, &camera, Channels::Depth);
         // Its front is at 0, and so are 8 units before the camera.
         let right = frame.depth.iter().all(|d| (f64::from(*d) / 8.0 - 1.0).abs() < DEPTH_ERROR);
@@ -325,8 +408,11 @@ fn pictures_of_any_size_are_drawn() {
     let middle = frame.depth[4096 * 8192 + 4096];
     points.check((middle - 7.0).abs() < 0.02, || format!("a depth of {middle}"));
     let seen = frame.mask().filter(|m| *m).count() as f64 / camera.pixels() as f64;
-    // A sphere of radius 1 at 8 has an outline of radius 8 / sqrt(63) at its middle's depth, where 4.4 units are seen.
+    // A sphere of radius 1 at 8 has an outline of radius 8 / sqrt(63) at its middle's
+    // depth, where 4.4 units are seen.
     let expected = std::f64::consts::PI * (64.0 / 63.0) / (4.4 * 4.4);
-    points.check((seen / expected - 1.0).abs() < 0.01, || format!("a share of {seen}, expected {expected}"));
+    points.check((seen / expected - 1.0).abs() < 0.01, || {
+        format!("a share of {seen}, expected {expected}")
+    });
     points.finish();
 }

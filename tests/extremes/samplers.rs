@@ -1,4 +1,5 @@
-//! Draws at extreme parameters against distribution functions of the table (Kolmogorov and Smirnov's distance at its points).
+//! Draws at extreme parameters against distribution functions of the table (Kolmogorov
+//! and Smirnov's distance at its points).
 
 use super::points::Points;
 use super::table::{Row, rows};
@@ -31,14 +32,18 @@ fn draws_follow_their_distribution_functions() {
 fn draws_stay_inside_and_can_be_scored() {
     let mut points = Points::of("draws in their support");
     let rows = rows("density");
-    for (site, group) in rows.chunk_by(|a, b| a.name == b.name && a.parameters == b.parameters).enumerate() {
+    for (site, group) in
+        rows.chunk_by(|a, b| a.name == b.name && a.parameters == b.parameters).enumerate()
+    {
         let d = made(group[0].name, &group[0].parameters);
         let mut rng = StreamKey::new(32, 0, Purpose::VALUES).stream(0, site as u64, 0);
         let bad = (0..200).map(|_| d.sample(&mut rng)).find(|x| {
             let p = d.log_density(x);
             !d.support().contains(x) || p.is_nan() || p == f64::NEG_INFINITY
         });
-        points.check(bad.is_none(), || format!("{d:?} drew {bad:?}: {}", d.log_density(bad.as_ref().unwrap())));
+        points.check(bad.is_none(), || {
+            format!("{d:?} drew {bad:?}: {}", d.log_density(bad.as_ref().unwrap()))
+        });
     }
     points.finish();
 }

@@ -1,4 +1,5 @@
-//! Reference values by mpmath: `tests/data/make_extremes_reference.py` says what the columns are.
+//! Reference values by mpmath: `tests/data/make_extremes_reference.py` says what the
+//! columns are.
 
 const TABLE: &str = include_str!("../data/extremes_reference.csv");
 
@@ -17,14 +18,17 @@ pub fn rows(kind: &str) -> Vec<Row> {
     let numbers = |s: &str| s.split_whitespace().map(|x| x.parse().unwrap()).collect();
     let row = |line: &'static str| {
         let fields: Vec<&str> = line.split(',').collect();
-        let [of, name, parameters, point, values, region] = fields[..] else { panic!("bad row {line}") };
+        let [of, name, parameters, point, values, region] = fields[..] else {
+            panic!("bad row {line}")
+        };
         let (parameters, point, values) = (numbers(parameters), numbers(point), numbers(values));
         (of == kind).then_some(Row { name, parameters, point, values, region, line })
     };
     TABLE.lines().skip(1).filter_map(row).collect()
 }
 
-/// Whether a value has at most this relative error, or this absolute one; infinities must be the same.
+/// Whether a value has at most this relative error, or this absolute one; infinities must
+/// be the same.
 pub fn agree(got: f64, expected: f64, relative: f64, absolute: f64) -> bool {
     got == expected || (got - expected).abs() <= (relative * expected.abs()).max(absolute)
 }

@@ -56,7 +56,8 @@ fn values_and_jacobians_agree_with_the_table() {
     for r in rows("to") {
         let mut got = Vec::new();
         support(&r).to_free(&Datum::Num(r.point[0]), &mut got);
-        points.check(agree(got[0], r.values[0], 1e-12, 1e-12), || format!("{}: got {got:?}", r.line));
+        points
+            .check(agree(got[0], r.values[0], 1e-12, 1e-12), || format!("{}: got {got:?}", r.line));
     }
     points.finish();
 }
@@ -81,7 +82,9 @@ fn there_and_back_from_anywhere() {
                 && back.iter().all(|b| b.is_finite())
                 && slope.len() == s.free_dim()
                 && slope.iter().all(|g| !g.is_nan());
-            points.check(right, || format!("{s:?} at {y}: {x:?}, {jacobian}, back {back:?}, slopes {slope:?}"));
+            points.check(right, || {
+                format!("{s:?} at {y}: {x:?}, {jacobian}, back {back:?}, slopes {slope:?}")
+            });
         }
     }
     points.finish();

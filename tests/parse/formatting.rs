@@ -1,4 +1,5 @@
-//! Formatting changes spaces, line ends and commas before closing brackets, and nothing else.
+//! Formatting changes spaces, line ends and commas before closing brackets, and nothing
+//! else.
 
 use super::generator::Generator;
 use super::{bare, program, shown};
@@ -6,7 +7,8 @@ use pcadlang::syntax::{SyntaxErrorKind, WIDTH, format, parse, print, span::FileI
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// What formatting a text gives, which means the same and stays as it is when formatted again.
+/// What formatting a text gives, which means the same and stays as it is when formatted
+/// again.
 fn formatted(text: &str) -> String {
     let once = format(text).unwrap_or_else(|errors| panic!("{}\n{text}", shown(text, errors)));
     let (again, errors) = parse(&once, FileId(0));
@@ -58,7 +60,11 @@ fn shipped_programs_are_formatted() {
     let errors = Path::new("programs/errors");
     for path in found.iter().filter(|path| !path.starts_with(errors)) {
         let text = std::fs::read_to_string(path).unwrap();
-        assert!(format(&text).unwrap() == text, "{0}: cargo run --release -- fmt {0}", path.display());
+        assert!(
+            format(&text).unwrap() == text,
+            "{0}: cargo run --release -- fmt {0}",
+            path.display()
+        );
     }
 }
 
@@ -73,8 +79,14 @@ fn files_of_other_systems() {
     assert_eq!(format("").unwrap(), "");
     assert_eq!(format("\n\n// alone").unwrap(), "// alone\n");
     assert_eq!(format("\u{feff}let a=1;").unwrap(), "let a = 1;\n");
-    assert_eq!(format("let a=1; // one\r\n\r\n\r\nb;\r\n").unwrap(), "let a = 1; // one\r\n\r\nb;\r\n");
-    assert_eq!(format("fn f() {\n\tx ~ normal(0, 1);\n\tx\n}").unwrap(), "fn f() {\n  x ~ normal(0, 1);\n  x\n}\n");
+    assert_eq!(
+        format("let a=1; // one\r\n\r\n\r\nb;\r\n").unwrap(),
+        "let a = 1; // one\r\n\r\nb;\r\n"
+    );
+    assert_eq!(
+        format("fn f() {\n\tx ~ normal(0, 1);\n\tx\n}").unwrap(),
+        "fn f() {\n  x ~ normal(0, 1);\n  x\n}\n"
+    );
 }
 
 #[test]
@@ -90,7 +102,8 @@ fn difficult_texts() {
     });
 }
 
-/// A canonical text with other spaces and with comments, each with a number, and how many those are.
+/// A canonical text with other spaces and with comments, each with a number, and how many
+/// those are.
 fn scattered(text: &str, bytes: &[u8]) -> (String, usize) {
     let (mut out, mut comments) = (String::new(), 0);
     let mut bytes = bytes.iter().cycle();

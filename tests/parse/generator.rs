@@ -1,15 +1,18 @@
-//! Random well-formed programs: every tree that the parser can make, from a string of bytes that decides each choice.
+//! Random well-formed programs: every tree that the parser can make, from a string of
+//! bytes that decides each choice.
 //!
-//! Bytes run out after a while; from then on every choice is the simplest one, so trees are finite, and shrinking the
-//! bytes shrinks the program.
+//! Bytes run out after a while; from then on every choice is the simplest one, so trees
+//! are finite, and shrinking the bytes shrinks the program.
 
 use pcadlang::syntax::ast::*;
 use pcadlang::syntax::span::{Span, Spanned};
 use std::sync::Arc;
 
-const NAMES: [&str; 10] = ["a", "x1", "_", "S_L", "to", "when", "coarse", "upperarm_l", "dataset", "e1"];
+const NAMES: [&str; 10] =
+    ["a", "x1", "_", "S_L", "to", "when", "coarse", "upperarm_l", "dataset", "e1"];
 const WORDS: [&str; 6] = ["b", "data", "if", "true", "fn", "with"];
-const TEXTS: [&str; 8] = ["", "a b", "\"", "\\", "} // ;]", "é\n\t\u{1f600}", "\u{0}\u{9b}\u{2028}", "/*"];
+const TEXTS: [&str; 8] =
+    ["", "a b", "\"", "\\", "} // ;]", "é\n\t\u{1f600}", "\u{0}\u{9b}\u{2028}", "/*"];
 const NUMBERS: [f64; 9] = [0.0, 1.0, 0.1, 12.5, 1e300, 5e-324, 1e16, 123456789.125, f64::MAX];
 const BINARY: [BinaryOp; 16] = [
     BinaryOp::Add,
@@ -111,9 +114,11 @@ impl<'a> Generator<'a> {
             }
             3 => ItemKind::Data(self.declaration()),
             4 => ItemKind::Fn(FnDecl { name: self.name(), lambda: self.lambda() }),
-            5 => {
-                ItemKind::Kernel(KernelDecl { name: self.name(), params: self.many(0, Self::param), body: self.plan() })
-            }
+            5 => ItemKind::Kernel(KernelDecl {
+                name: self.name(),
+                params: self.many(0, Self::param),
+                body: self.plan(),
+            }),
             6 => ItemKind::Infer { name: self.maybe(Self::name), body: self.plan() },
             7 => ItemKind::Report { exprs: self.many(1, Self::expr), file: self.maybe(Self::file) },
             8 => ItemKind::Export { expr: self.expr(), file: self.file() },
@@ -152,7 +157,11 @@ impl<'a> Generator<'a> {
                 expr: self.expr(),
                 tags: self.many(0, Self::tag),
             },
-            2 => StmtKind::Draw { target: self.target(), dist: self.expr(), tags: self.many(0, Self::tag) },
+            2 => StmtKind::Draw {
+                target: self.target(),
+                dist: self.expr(),
+                tags: self.many(0, Self::tag),
+            },
             3 => StmtKind::Let { name: self.name(), expr: self.expr() },
             4 => StmtKind::Observe {
                 dist: self.expr(),
@@ -166,7 +175,11 @@ impl<'a> Generator<'a> {
             8 => StmtKind::Freeze(self.expr()),
             9 => StmtKind::Forget(self.expr()),
             10 => StmtKind::Sample(self.expr()),
-            11 => StmtKind::For { var: self.name(), iter: self.expr(), body: self.many(0, Self::stmt) },
+            11 => StmtKind::For {
+                var: self.name(),
+                iter: self.expr(),
+                body: self.many(0, Self::stmt),
+            },
             _ => StmtKind::Expr(self.conditional()),
         };
         Stmt { kind, span: Span::default() }
@@ -195,9 +208,11 @@ impl<'a> Generator<'a> {
                 1 => KStmtKind::Warmup { count: g.expr(), body: g.plan() },
                 2 => KStmtKind::Repeat { count: g.expr(), body: g.plan() },
                 3 => KStmtKind::Every { count: g.expr(), body: g.plan() },
-                4 => {
-                    KStmtKind::Mix(g.many(1, |g| MixArm { weight: g.expr(), kernel: g.expr(), span: Span::default() }))
-                }
+                4 => KStmtKind::Mix(g.many(1, |g| MixArm {
+                    weight: g.expr(),
+                    kernel: g.expr(),
+                    span: Span::default(),
+                })),
                 5 => KStmtKind::For { var: g.name(), iter: g.expr(), body: g.plan() },
                 6 => KStmtKind::StopWhen(g.expr()),
                 7 => KStmtKind::Collect(g.many(1, Self::expr)),
@@ -213,7 +228,11 @@ impl<'a> Generator<'a> {
     fn conditional(&mut self) -> Expr {
         let otherwise = match self.pick(3) {
             0 => Body { stmts: Vec::new(), result: None, span: Span::default() },
-            1 => Body { stmts: Vec::new(), result: Some(Box::new(self.conditional())), span: Span::default() },
+            1 => Body {
+                stmts: Vec::new(),
+                result: Some(Box::new(self.conditional())),
+                span: Span::default(),
+            },
             _ => self.body(),
         };
         let (cond, then) = (self.boxed(), Box::new(self.body()));

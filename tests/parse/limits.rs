@@ -1,7 +1,9 @@
 //! Texts made to exhaust the stack, the memory or the patience of a parser.
 
 use pcadlang::diag::MAX_SOURCE_BYTES;
-use pcadlang::syntax::{MAX_DEPTH, MAX_NESTING, MAX_TOKENS, SyntaxErrorKind, parse, parse_expr, print, span::FileId};
+use pcadlang::syntax::{
+    MAX_DEPTH, MAX_NESTING, MAX_TOKENS, SyntaxErrorKind, parse, parse_expr, print, span::FileId,
+};
 
 const MANY: usize = 100_000;
 
@@ -56,7 +58,9 @@ fn towers(n: usize) -> Vec<(&'static str, String)> {
 fn towers_are_errors() {
     for (what, text) in towers(MANY) {
         let errors = on_small_stack(text);
-        let deep = |e: &SyntaxErrorKind| matches!(e, SyntaxErrorKind::TooDeep | SyntaxErrorKind::TooNested);
+        let deep = |e: &SyntaxErrorKind| {
+            matches!(e, SyntaxErrorKind::TooDeep | SyntaxErrorKind::TooNested)
+        };
         assert_eq!(errors.len(), 1, "{what}: {errors:?}");
         assert!(errors.iter().all(deep), "{what}: {errors:?}");
     }
@@ -77,9 +81,10 @@ fn towers_without_a_roof_are_errors_too() {
             assert!((1..=21).contains(&errors.len()), "{what}: {errors:?}");
         }
     }
-    for open in
-        ["(", "[", "{", "f(", "fn() {", "- (", "@a[{", "/*", "\"", "if a {", "infer {", "{ a: ", ")", "}", "]", ")("]
-    {
+    for open in [
+        "(", "[", "{", "f(", "fn() {", "- (", "@a[{", "/*", "\"", "if a {", "infer {", "{ a: ",
+        ")", "}", "]", ")(",
+    ] {
         let errors = on_small_stack(open.repeat(MANY));
         assert!((1..=21).contains(&errors.len()), "{open}: {errors:?}");
     }
@@ -120,7 +125,8 @@ fn long_is_not_deep() {
 
 #[test]
 fn large_texts_are_refused() {
-    let errors = |text: &str| parse(text, FileId(0)).1.into_iter().map(|e| e.kind).collect::<Vec<_>>();
+    let errors =
+        |text: &str| parse(text, FileId(0)).1.into_iter().map(|e| e.kind).collect::<Vec<_>>();
     assert_eq!(errors(&" ".repeat(MAX_SOURCE_BYTES)), []);
     let size = MAX_SOURCE_BYTES + 1;
     assert_eq!(errors(&" ".repeat(size)), [SyntaxErrorKind::TooLarge(size)]);

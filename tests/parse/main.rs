@@ -1,5 +1,6 @@
-//! The parser against its specification: the sample programs, precedence, spans, printing, recovery, limits, rubbish.
-//! What is said about mistakes is tested in `tests/errors.rs`.
+//! The parser against its specification: the sample programs, precedence, spans,
+//! printing, recovery, limits, rubbish. What is said about mistakes is tested in
+//! `tests/errors.rs`.
 
 mod formatting;
 mod fuzz;

@@ -34,7 +34,9 @@ fn levels_from_loose_to_tight() {
 fn chains_associate() {
     for op in ["or", "and", "+", "-", "*", "/", "%", "&"] {
         same(&format!("a {op} b {op} c"), &format!("(a {op} b) {op} c"));
-        let ExprKind::Binary { right, .. } = expr(&format!("a {op} (b {op} c)")).kind else { panic!() };
+        let ExprKind::Binary { right, .. } = expr(&format!("a {op} (b {op} c)")).kind else {
+            panic!()
+        };
         assert!(matches!(right.kind, ExprKind::Binary { .. }), "{op}: parentheses count");
     }
     same("a - b + c", "(a - b) + c");

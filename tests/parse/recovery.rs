@@ -15,7 +15,10 @@ fn a_bad_statement_hides_nothing() {
     let text = "let a = 1;\nlet b = +;\nlet c = 3;\nlet d = (4;\nlet e = 5\nlet f = 6;\ng g g;\nlet h = 8;";
     let (program, errors) = recover(text);
     // `d` and `e` are repaired, so that they are still declared.
-    assert_eq!(program, "let a = 1;\n<error>;\nlet c = 3;\nlet d = 4;\nlet e = 5;\nlet f = 6;\n<error>;\nlet h = 8;\n");
+    assert_eq!(
+        program,
+        "let a = 1;\n<error>;\nlet c = 3;\nlet d = 4;\nlet e = 5;\nlet f = 6;\n<error>;\nlet h = 8;\n"
+    );
     assert_eq!(errors, 4);
 }
 
@@ -26,9 +29,16 @@ fn blocks_survive_a_bad_statement_inside() {
     let (program, errors) = parse(text, FileId(0));
     assert_eq!(errors.len(), 5, "{}", shown(text, errors));
     let text = print(&program);
-    for part in
-        ["fn f(x) {", "a ~ normal(x, 1);", "c\n", "} else { d }", "repeat 10 {", "mh(@x);", "1 => a;", "3 => c;"]
-    {
+    for part in [
+        "fn f(x) {",
+        "a ~ normal(x, 1);",
+        "c\n",
+        "} else { d }",
+        "repeat 10 {",
+        "mh(@x);",
+        "1 => a;",
+        "3 => c;",
+    ] {
         assert!(text.contains(part), "{part} in\n{text}");
     }
     assert!(text.contains("collect a;") && text.ends_with("let z = 1;\n"), "{text}");
@@ -79,7 +89,17 @@ fn one_mistake_is_one_error() {
 
 #[test]
 fn there_is_an_end_to_errors() {
-    for text in ["let = 1;\n", "a b;\n", "\u{1} ;\n", ")", "x = 1;\n", "fn f() { a b; }\n", "\"\n", "@ ", "1.2.3;\n"] {
+    for text in [
+        "let = 1;\n",
+        "a b;\n",
+        "\u{1} ;\n",
+        ")",
+        "x = 1;\n",
+        "fn f() { a b; }\n",
+        "\"\n",
+        "@ ",
+        "1.2.3;\n",
+    ] {
         let (_, errors) = parse(&text.repeat(1000), FileId(0));
         assert_eq!(errors.len(), MAX_ERRORS + 1, "{text}");
         assert_eq!(errors.last().unwrap().kind, SyntaxErrorKind::TooManyErrors, "{text}");
@@ -89,9 +109,16 @@ fn there_is_an_end_to_errors() {
 #[test]
 fn unfinished_texts_are_told_from_wrong_ones() {
     let incomplete = |text: &str| parse(text, FileId(0)).1.iter().any(|e| e.is_incomplete());
-    for text in
-        ["infer {", "let x = f(1,", "let x =", "let x", "let x = 1", "/* a", "fn f(x) { let y = [1,", "if c { 1 } else"]
-    {
+    for text in [
+        "infer {",
+        "let x = f(1,",
+        "let x =",
+        "let x",
+        "let x = 1",
+        "/* a",
+        "fn f(x) { let y = [1,",
+        "if c { 1 } else",
+    ] {
         assert!(incomplete(text), "{text}");
     }
     for text in ["let x = 1;", "let x = ;", "x)", "let x = \"a", "fn f(x) { b b; }", ""] {
@@ -101,7 +128,8 @@ fn unfinished_texts_are_told_from_wrong_ones() {
 
 /// Whether a program has a hole, looking at statements only.
 fn has_hole(program: &Program) -> bool {
-    let hole = |stmt: &Stmt| matches!(&stmt.kind, StmtKind::Expr(Expr { kind: ExprKind::Error, .. }));
+    let hole =
+        |stmt: &Stmt| matches!(&stmt.kind, StmtKind::Expr(Expr { kind: ExprKind::Error, .. }));
     program.items.iter().any(|item: &Item| matches!(&item.kind, ItemKind::Stmt(stmt) if hole(stmt)))
 }
 

@@ -1,4 +1,5 @@
-//! Printing and parsing again is the identity, and no pair of parentheses is printed in vain.
+//! Printing and parsing again is the identity, and no pair of parentheses is printed in
+//! vain.
 
 use super::generator::Generator;
 use super::{bare, shown};
@@ -7,7 +8,12 @@ use proptest::prelude::*;
 
 /// A configuration without a file of past failures: each is to become a test of its own.
 fn cases(cases: u32) -> ProptestConfig {
-    ProptestConfig { cases, failure_persistence: None, max_shrink_iters: 20_000, ..ProptestConfig::default() }
+    ProptestConfig {
+        cases,
+        failure_persistence: None,
+        max_shrink_iters: 20_000,
+        ..ProptestConfig::default()
+    }
 }
 
 proptest! {
@@ -136,15 +142,16 @@ fn no_parentheses_in_vain() {
         assert_eq!(print_expr(&expr), text);
         // Taking any pair away changes the meaning.
         for (open, _) in text.match_indices('(') {
-            let call =
-                text[..open].ends_with(|c: char| c.is_alphanumeric() || c == ')') && !text[..open].ends_with("if");
+            let call = text[..open].ends_with(|c: char| c.is_alphanumeric() || c == ')')
+                && !text[..open].ends_with("if");
             let mut depth = 0;
             let close = text[open..].find(|c| {
                 depth += i32::from(c == '(') - i32::from(c == ')');
                 depth == 0
             });
             let close = open + close.unwrap();
-            let without = format!("{}{}{}", &text[..open], &text[open + 1..close], &text[close + 1..]);
+            let without =
+                format!("{}{}{}", &text[..open], &text[open + 1..close], &text[close + 1..]);
             if let Ok(other) = parse_expr(&without, FileId(0)) {
                 assert!(call || bare(&other) != bare(&expr), "{text}: {without}");
             }

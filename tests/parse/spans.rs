@@ -71,5 +71,8 @@ fn byte_order_mark_and_line_ends_count_as_bytes() {
     map.add("crlf.pcad", text);
     assert_eq!(map.locate(errors[0].span), "crlf.pcad:2:9");
     let (_, errors) = parse("let a = 1;\u{feff}", FileId(0));
-    assert!(matches!(errors[0].kind, SyntaxErrorKind::UnknownCharacter('\u{feff}')), "only at the start");
+    assert!(
+        matches!(errors[0].kind, SyntaxErrorKind::UnknownCharacter('\u{feff}')),
+        "only at the start"
+    );
 }

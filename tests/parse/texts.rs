@@ -14,7 +14,14 @@ fn numbers() {
         ExprKind::Num(x) => x,
         other => panic!("{other:?}"),
     };
-    let all = [("0", 0.0), ("007", 7.0), ("1.5", 1.5), ("2e3", 2000.0), ("2E-3", 0.002), ("1.25e+2", 125.0)];
+    let all = [
+        ("0", 0.0),
+        ("007", 7.0),
+        ("1.5", 1.5),
+        ("2e3", 2000.0),
+        ("2E-3", 0.002),
+        ("1.25e+2", 125.0),
+    ];
     for (text, x) in all {
         assert_eq!(value(text), x);
     }
@@ -30,7 +37,19 @@ fn numbers() {
 
 #[test]
 fn numbers_print_as_the_shortest_text_that_reads_the_same() {
-    for x in [0.0, 1.0, 0.1, 1e21, 1e22, 1.5e-7, f64::MAX, f64::MIN_POSITIVE, f64::from_bits(1), 123456789.0, 1e16] {
+    for x in [
+        0.0,
+        1.0,
+        0.1,
+        1e21,
+        1e22,
+        1.5e-7,
+        f64::MAX,
+        f64::MIN_POSITIVE,
+        f64::from_bits(1),
+        123456789.0,
+        1e16,
+    ] {
         let text = print_expr(&expr(&format!("{x:?}")));
         assert!(matches!(expr(&text).kind, ExprKind::Num(y) if y == x), "{text}");
         assert!(text.len() <= 24, "{text}");
@@ -79,7 +98,9 @@ fn keywords_may_be_fields_and_tags_but_no_names() {
         assert!(!errors(&format!("let {word} = 1;")).is_empty(), "{word}");
     }
     for word in ["to", "when", "coarse", "_", "_1", "lets", "x2", "dataset", "Infer"] {
-        program(&format!("let {word} = {word}; fn {word}({word}) {{ {word} }} y.{word}; z ~ {word}({word} = {word});"));
+        program(&format!(
+            "let {word} = {word}; fn {word}({word}) {{ {word} }} y.{word}; z ~ {word}({word} = {word});"
+        ));
     }
 }
 
@@ -152,7 +173,11 @@ fn texts_that_are_none() {
     assert!(program("\u{feff}").items.is_empty());
     assert!(parse_expr("", FileId(0)).is_err());
     assert_eq!(errors("\0"), [SyntaxErrorKind::UnknownCharacter('\0')]);
-    assert_eq!(errors("let a\0\0\0 = 1;"), [SyntaxErrorKind::UnknownCharacter('\0')], "a run is one error");
+    assert_eq!(
+        errors("let a\0\0\0 = 1;"),
+        [SyntaxErrorKind::UnknownCharacter('\0')],
+        "a run is one error"
+    );
     assert!(parse_expr("1; 2", FileId(0)).is_err());
     assert!(parse_expr("let a = 1;", FileId(0)).is_err());
 }

@@ -1,7 +1,7 @@
 //! The cases of a dataset: their names, pictures and cameras.
 //!
-//! Invariant: nothing else in a dataset is opened. A truth that lies beside the pictures, or in other fields of
-//! `annotations.json`, cannot reach a run.
+//! Invariant: nothing else in a dataset is opened. A truth that lies beside the pictures,
+//! or in other fields of `annotations.json`, cannot reach a run.
 
 use crate::cli::{Failure, files, plain};
 use pcadlang::lang::load::reason;
@@ -77,7 +77,11 @@ impl Dataset {
                 )));
             }
             if !seen.insert(&case.name) {
-                return Err(plain(format!("{}: the case {} occurs twice", path.display(), case.name)));
+                return Err(plain(format!(
+                    "{}: the case {} occurs twice",
+                    path.display(),
+                    case.name
+                )));
             }
         }
         Ok(dataset)
@@ -85,7 +89,11 @@ impl Dataset {
 }
 
 /// Whether all names of `--only` are those of cases.
-pub fn known<'a>(dataset: &Path, only: &[String], names: impl Iterator<Item = &'a str>) -> Result<(), Failure> {
+pub fn known<'a>(
+    dataset: &Path,
+    only: &[String],
+    names: impl Iterator<Item = &'a str>,
+) -> Result<(), Failure> {
     let names: Vec<&str> = names.collect();
     match only.iter().find(|n| !names.contains(&n.as_str())) {
         None => Ok(()),
@@ -94,7 +102,10 @@ pub fn known<'a>(dataset: &Path, only: &[String], names: impl Iterator<Item = &'
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("there are {}", names.join(", ")),
             };
-            Err(Failure::Plain(format!("{}: there is no case {n:?}", dataset.display()), Some(hint)))
+            Err(Failure::Plain(
+                format!("{}: there is no case {n:?}", dataset.display()),
+                Some(hint),
+            ))
         }
     }
 }
@@ -108,7 +119,9 @@ fn people(path: &Path) -> Result<Dataset, Failure> {
     let mut cases = Vec::new();
     for Person { id, image } in all.people {
         // The picture lies in the dataset.
-        if image.is_empty() || Path::new(&image).components().any(|c| !matches!(c, Component::Normal(_))) {
+        if image.is_empty()
+            || Path::new(&image).components().any(|c| !matches!(c, Component::Normal(_)))
+        {
             return Err(plain(format!(
                 "{}: the image of {id}, {image:?}, is not a file in the same folder",
                 file.display()

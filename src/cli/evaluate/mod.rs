@@ -1,7 +1,8 @@
-//! `pcadlang evaluate`: a program on every case of a dataset, and files that scorers read.
+//! `pcadlang evaluate`: a program on every case of a dataset, and files that scorers
+//! read.
 //!
-//! Invariant: after every case all files are whole, and say what has been done so far; a case counts as done only if its
-//! `run.json` says so, with these settings.
+//! Invariant: after every case all files are whole, and say what has been done so far; a
+//! case counts as done only if its `run.json` says so, with these settings.
 
 mod dataset;
 mod observed;
@@ -13,7 +14,9 @@ use super::{earlier, edges};
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
 pub use observed::{Detections, Items, observations_for};
-use pcadlang::report::evaluation::{EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction};
+use pcadlang::report::evaluation::{
+    EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction,
+};
 use pcadlang::report::{RunDir, bytes_hash, r_hat_text, seconds};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
@@ -98,7 +101,8 @@ fn line(row: &Row) -> String {
 }
 
 impl<'a> Evaluation<'a> {
-    /// Everything that can be wrong with program, dataset or folder is said before the first case is run.
+    /// Everything that can be wrong with program, dataset or folder is said before the
+    /// first case is run.
     fn prepare(a: &'a Evaluate) -> Result<Evaluation<'a>, Failure> {
         let Dataset { layout, cases, skipped } = Dataset::open(&a.dataset)?;
         dataset::known(&a.dataset, &a.only, cases.iter().map(|c| c.name.as_str()))?;
@@ -113,17 +117,22 @@ impl<'a> Evaluation<'a> {
         let task = |case: Case| {
             let camera = case.camera.clone().or_else(|| a.given.camera.clone());
             let case = Case { camera: camera.clone(), ..case };
-            let observe = observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
+            let observe = observations_for(&case, detections.as_ref())
+                .iter()
+                .map(|o| items.spec(o))
+                .collect();
             let given = Given { camera, ..a.given.clone() };
             let mut job = Job { observe, ..Job::of(given, a.sampling.clone()) };
             said = quality::apply(&mut job, detections.is_some())?;
-            let inputs = bytes_hash(&[observed::bytes(&case, detections.as_ref()), edges.clone()].concat());
+            let inputs =
+                bytes_hash(&[observed::bytes(&case, detections.as_ref()), edges.clone()].concat());
             let record = job::record(&job, &hash, &inputs);
             let chosen = a.only.is_empty() || a.only.contains(&case.name);
             Ok(Task { case, job, record, chosen, row: None })
         };
         let tasks = cases.into_iter().map(task).collect::<Result<_, Failure>>()?;
-        let mut e = Evaluation { a, layout, dir, tasks, head: Map::new(), interrupt: Interrupt::listen() };
+        let mut e =
+            Evaluation { a, layout, dir, tasks, head: Map::new(), interrupt: Interrupt::listen() };
         e.take_up()?;
         e.head = e.head();
         if let Some(said) = said {
@@ -132,7 +141,9 @@ impl<'a> Evaluation<'a> {
         for name in skipped {
             e.say(&format!("note: {name} has no image and is skipped"));
         }
-        for t in e.tasks.iter().filter(|t| detections.is_some() && t.chosen && t.job.observe.len() < 2) {
+        for t in
+            e.tasks.iter().filter(|t| detections.is_some() && t.chosen && t.job.observe.len() < 2)
+        {
             e.say(&format!("note: no keypoints for {}: it runs on its picture alone", t.case.name));
         }
         Ok(e)
@@ -154,7 +165,11 @@ impl<'a> Evaluation<'a> {
         }
         match other {
             Some((folder, differences)) if !self.a.fresh => Err(Failure::Plain(
-                format!("{} was run with different settings: {}", folder.display(), differences.join(", ")),
+                format!(
+                    "{} was run with different settings: {}",
+                    folder.display(),
+                    differences.join(", ")
+                ),
                 Some("choose another folder with --out, or redo all cases with --fresh".into()),
             )),
             _ => Ok(()),
@@ -181,7 +196,8 @@ impl<'a> Evaluation<'a> {
         head
     }
 
-    /// Runs a case; what there is to say of it is read off its folder, as for a case that was done before.
+    /// Runs a case; what there is to say of it is read off its folder, as for a case that
+    /// was done before.
     fn run(&self, i: usize) -> (Row, Option<Failure>) {
         let t = &self.tasks[i];
         let begun = Instant::now();
@@ -227,7 +243,9 @@ impl<'a> Evaluation<'a> {
 
     /// Writes what is known so far.
     fn save(&self) -> Result<(), Failure> {
-        let write = |name: &str, bytes: &[u8]| self.dir.write(name, bytes).map_err(|e| plain(e.to_string()));
+        let write = |name: &str, bytes: &[u8]| {
+            self.dir.write(name, bytes).map_err(|e| plain(e.to_string()))
+        };
         let json = |v: &Value| serde_json::to_vec_pretty(v).unwrap_or_default();
         // This one first: it marks the folder.
         write(MARK, &json(&self.summary()))?;
@@ -238,13 +256,18 @@ impl<'a> Evaluation<'a> {
         Ok(())
     }
 
-    /// Where each person's joints were found: null where a run failed or its scene has none.
+    /// Where each person's joints were found: null where a run failed or its scene has
+    /// none.
     fn predictions(&self) -> Map<String, Value> {
-        let ended =
-            self.tasks.iter().filter_map(|t| t.row.as_ref()).filter(|r| ["done", "failed"].contains(&&*r.status));
+        let ended = self
+            .tasks
+            .iter()
+            .filter_map(|t| t.row.as_ref())
+            .filter(|r| ["done", "failed"].contains(&&*r.status));
         let entry = |row: &Row| {
             let file = self.dir.file(&row.case).join("keypoints.json");
-            let found = std::fs::read(file).ok().and_then(|b| serde_json::from_slice::<Value>(&b).ok());
+            let found =
+                std::fs::read(file).ok().and_then(|b| serde_json::from_slice::<Value>(&b).ok());
             let found = found.filter(|_| row.status == "done");
             (row.case.clone(), prediction(found.as_ref(), row.seconds.or(row.wall_seconds)))
         };

@@ -22,7 +22,10 @@ impl Detections {
     pub fn open(path: PathBuf) -> Result<Detections, Failure> {
         match serde_json::from_slice(&files::read(&path)?) {
             Ok(Value::Object(people)) => Ok(Detections { path, people }),
-            Ok(_) => Err(plain(format!("{}: expected a JSON object with one entry per case", path.display()))),
+            Ok(_) => Err(plain(format!(
+                "{}: expected a JSON object with one entry per case",
+                path.display()
+            ))),
             Err(e) => Err(plain(format!("{}: {e}", path.display()))),
         }
     }
@@ -33,7 +36,8 @@ impl Detections {
     }
 }
 
-/// Something to observe: what it is, its file, and the entry of the file where it holds several.
+/// Something to observe: what it is, its file, and the entry of the file where it holds
+/// several.
 pub type Observation = (&'static str, PathBuf, Option<String>);
 
 /// What a case gives: its picture, and its keypoints if there are any.
@@ -45,12 +49,19 @@ pub fn observations_for(case: &Case, detections: Option<&Detections>) -> Vec<Obs
     all
 }
 
-/// The bytes that the draws of a case depend on: those of its files, and of its entry among the keypoints.
+/// The bytes that the draws of a case depend on: those of its files, and of its entry
+/// among the keypoints.
 pub fn bytes(case: &Case, detections: Option<&Detections>) -> Vec<u8> {
     // A file that cannot be read is an error when the case is run.
     let mut all = std::fs::read(&case.image).unwrap_or_default();
     all.extend(case.camera.as_ref().and_then(|c| std::fs::read(c).ok()).unwrap_or_default());
-    all.extend(detections.and_then(|d| d.of(&case.name)).map(Value::to_string).unwrap_or_default().into_bytes());
+    all.extend(
+        detections
+            .and_then(|d| d.of(&case.name))
+            .map(Value::to_string)
+            .unwrap_or_default()
+            .into_bytes(),
+    );
     all
 }
 
@@ -65,12 +76,15 @@ impl Items {
     pub fn of(program: &Program, keypoints: bool) -> Result<Items, Failure> {
         let data = program.interface().data;
         let of_kind = |kind: &str| {
-            let mut all = data.iter().filter(|d| d.ty.as_deref() == Some(kind)).map(|d| d.name.clone());
+            let mut all =
+                data.iter().filter(|d| d.ty.as_deref() == Some(kind)).map(|d| d.name.clone());
             (all.next(), all.next().is_some())
         };
         let only = |kind: &str| match of_kind(kind) {
             (Some(name), false) => Ok(name),
-            (Some(_), true) => Err(plain(format!("the program observes several items of kind `{kind}`, expected one"))),
+            (Some(_), true) => Err(plain(format!(
+                "the program observes several items of kind `{kind}`, expected one"
+            ))),
             (None, _) => match data.iter().find(|d| d.name == kind) {
                 Some(d) => Ok(d.name.clone()),
                 None => Err(Failure::Plain(
@@ -79,12 +93,19 @@ impl Items {
                 )),
             },
         };
-        Ok(Items { image: only(IMAGE)?, keypoints: keypoints.then(|| only(KEYPOINTS)).transpose()? })
+        Ok(Items {
+            image: only(IMAGE)?,
+            keypoints: keypoints.then(|| only(KEYPOINTS)).transpose()?,
+        })
     }
 
     /// An observation as `--observe` takes it.
     pub fn spec(&self, (what, path, id): &Observation) -> String {
-        let name = if *what == IMAGE { &self.image } else { self.keypoints.as_ref().unwrap_or(&self.image) };
+        let name = if *what == IMAGE {
+            &self.image
+        } else {
+            self.keypoints.as_ref().unwrap_or(&self.image)
+        };
         let id = id.as_ref().map_or(String::new(), |id| format!("#{id}"));
         format!("{name}={}{id}", path.display())
     }

@@ -18,7 +18,12 @@ pub fn encode(picture: &RgbImage, columns: u32, full_colors: bool) -> String {
         for x in 0..columns {
             let pair = (*small.get_pixel(x, 2 * y), *small.get_pixel(x, 2 * y + 1));
             if colors != Some(pair) {
-                let _ = write!(out, "\x1b[38;{};48;{}m", color(pair.0, full_colors), color(pair.1, full_colors));
+                let _ = write!(
+                    out,
+                    "\x1b[38;{};48;{}m",
+                    color(pair.0, full_colors),
+                    color(pair.1, full_colors)
+                );
                 colors = Some(pair);
             }
             out.push('▀');
@@ -43,7 +48,8 @@ fn nearest(r: u8, g: u8, b: u8) -> u8 {
     let [sr, sg, sb] = [r, g, b].map(step);
     let mean = (i32::from(r) + i32::from(g) + i32::from(b)) / 3;
     let grey = ((mean - 3) / 10).clamp(0, 23);
-    let distance = |c: [i32; 3]| [r, g, b].iter().zip(c).map(|(x, y)| (i32::from(*x) - y).pow(2)).sum::<i32>();
+    let distance =
+        |c: [i32; 3]| [r, g, b].iter().zip(c).map(|(x, y)| (i32::from(*x) - y).pow(2)).sum::<i32>();
     let (in_cube, in_grey) = (distance([sr, sg, sb].map(level)), distance([8 + 10 * grey; 3]));
     if in_grey < in_cube { 232 + grey as u8 } else { (16 + 36 * sr + 6 * sg + sb) as u8 }
 }
@@ -80,7 +86,11 @@ mod tests {
         for (x, y, p) in picture.enumerate_pixels() {
             assert_eq!(rows[y as usize][x as usize], p.0, "{x} {y}");
         }
-        assert_eq!(decode(&encode(&picture, 12, true)).len(), 6, "half as wide, half as high, in pairs");
+        assert_eq!(
+            decode(&encode(&picture, 12, true)).len(),
+            6,
+            "half as wide, half as high, in pairs"
+        );
         assert_eq!(encode(&RgbImage::new(0, 0), 80, true), "");
     }
 

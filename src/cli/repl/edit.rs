@@ -23,7 +23,8 @@ pub fn edited(text: &str) -> Result<String, Failure> {
         Ok(status) => return Err(wrong(format!("ended with {status}; nothing has changed"))),
         Err(e) => return Err(wrong(format!("cannot be started: {e}"))),
     }
-    std::fs::read_to_string(&draft.0).map_err(|e| plain(format!("the edited text cannot be read: {e}")))
+    std::fs::read_to_string(&draft.0)
+        .map_err(|e| plain(format!("the edited text cannot be read: {e}")))
 }
 
 /// The user's editor.
@@ -33,13 +34,15 @@ fn editor() -> String {
     set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| usual.into())
 }
 
-/// A file for the editor, in a folder that is the user's alone; both are removed in the end.
+/// A file for the editor, in a folder that is the user's alone; both are removed in the
+/// end.
 struct Draft(PathBuf);
 
 impl Draft {
     fn new(text: &str) -> Result<Draft, Failure> {
         let folder = std::env::temp_dir().join(format!("pcadlang-{}", std::process::id()));
-        let wrong = |e: std::io::Error| plain(format!("cannot write below {}: {e}", folder.display()));
+        let wrong =
+            |e: std::io::Error| plain(format!("cannot write below {}: {e}", folder.display()));
         folder_of_ones_own(&folder).map_err(wrong)?;
         let draft = Draft(folder.join("session.pcad"));
         std::fs::write(&draft.0, text).map_err(wrong)?;

@@ -103,7 +103,12 @@ impl Hinter for Help {
 impl Completer for Help {
     type Candidate = Pair;
 
-    fn complete(&self, line: &str, at: usize, _: &Context<'_>) -> Result<(usize, Vec<Pair>), ReadlineError> {
+    fn complete(
+        &self,
+        line: &str,
+        at: usize,
+        _: &Context<'_>,
+    ) -> Result<(usize, Vec<Pair>), ReadlineError> {
         let found = self.session.borrow().complete(line, at);
         let pair = |w: String| Pair { display: w.clone(), replacement: w };
         Ok((found.start, found.words.into_iter().map(pair).collect()))
@@ -125,7 +130,11 @@ impl Highlighter for Help {
     }
 
     fn highlight_prompt<'b, 's: 'b, 'p: 'b>(&'s self, prompt: &'p str, _: bool) -> Cow<'b, str> {
-        if self.colors { Cow::Owned(format!("\x1b[1;34m{prompt}\x1b[0m")) } else { Cow::Borrowed(prompt) }
+        if self.colors {
+            Cow::Owned(format!("\x1b[1;34m{prompt}\x1b[0m"))
+        } else {
+            Cow::Borrowed(prompt)
+        }
     }
 
     fn highlight_char(&self, _: &str, _: usize, _: CmdKind) -> bool {
@@ -135,7 +144,11 @@ impl Highlighter for Help {
 
 /// A line with colours.
 fn colored(line: &str) -> String {
-    let command = if line.starts_with(':') { line.find(char::is_whitespace).unwrap_or(line.len()) } else { 0 };
+    let command = if line.starts_with(':') {
+        line.find(char::is_whitespace).unwrap_or(line.len())
+    } else {
+        0
+    };
     let (head, rest) = line.split_at(command);
     let mut out = if head.is_empty() { String::new() } else { format!("\x1b[1;35m{head}\x1b[0m") };
     let mut at = 0;
@@ -165,7 +178,9 @@ mod tests {
 
     #[test]
     fn colours_change_no_letter() {
-        for line in [":flip @x[1] // é", "assume x ~ normal(0, 1) #tag;", "\"open", ":", "", "let é = /* c"] {
+        for line in
+            [":flip @x[1] // é", "assume x ~ normal(0, 1) #tag;", "\"open", ":", "", "let é = /* c"]
+        {
             let mut plain = String::new();
             for (i, part) in colored(line).split("\x1b[").enumerate() {
                 plain += if i == 0 { part } else { part.split_once('m').unwrap().1 };
@@ -173,7 +188,8 @@ mod tests {
             assert_eq!(plain, line);
         }
         assert!(
-            colored("let x = 1").contains("\x1b[1;35mlet\x1b[0m") && colored(":flip @x").contains("\x1b[33m@x\x1b[0m")
+            colored("let x = 1").contains("\x1b[1;35mlet\x1b[0m")
+                && colored(":flip @x").contains("\x1b[33m@x\x1b[0m")
         );
     }
 }

@@ -4,7 +4,11 @@ use pcadlang::report::html::base64;
 
 /// What shows a PNG at the cursor.
 pub fn encode(png: &[u8]) -> String {
-    format!("\x1b]1337;File=inline=1;size={};preserveAspectRatio=1:{}\x07\n", png.len(), base64(png))
+    format!(
+        "\x1b]1337;File=inline=1;size={};preserveAspectRatio=1:{}\x07\n",
+        png.len(),
+        base64(png)
+    )
 }
 
 #[cfg(test)]
@@ -17,7 +21,10 @@ mod tests {
         let picture = noise(31, 17);
         let png = png_of(&picture);
         let sent = encode(&png);
-        let body = sent.strip_prefix("\x1b]1337;File=").and_then(|s| s.trim_end().strip_suffix('\x07')).unwrap();
+        let body = sent
+            .strip_prefix("\x1b]1337;File=")
+            .and_then(|s| s.trim_end().strip_suffix('\x07'))
+            .unwrap();
         let (settings, data) = body.split_once(':').unwrap();
         assert!(settings.contains("inline=1") && settings.contains(&format!("size={}", png.len())));
         assert_eq!(image::load_from_memory(&unbase64(data)).unwrap().to_rgb8(), picture);

@@ -8,7 +8,8 @@ const CHUNK: usize = 4096;
 /// What shows a PNG at the cursor.
 pub fn encode(png: &[u8]) -> String {
     let data = base64(png);
-    let chunks: Vec<&str> = data.as_bytes().chunks(CHUNK).filter_map(|c| std::str::from_utf8(c).ok()).collect();
+    let chunks: Vec<&str> =
+        data.as_bytes().chunks(CHUNK).filter_map(|c| std::str::from_utf8(c).ok()).collect();
     let mut out = String::with_capacity(data.len() + 64 * chunks.len());
     for (i, chunk) in chunks.iter().enumerate() {
         let more = u8::from(i + 1 < chunks.len());

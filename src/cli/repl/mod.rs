@@ -33,7 +33,8 @@ const CONTINUED: &str = "    > ";
 pub fn repl(a: &Repl) -> Result<(), Failure> {
     let interrupts = Arc::new(Interrupts::default());
     let (session, said) = open(a, Stop::when(Arc::clone(&interrupts.asked)))?;
-    let is_live = std::io::stdin().is_terminal() && std::io::stdout().is_terminal() && !a.transcript;
+    let is_live =
+        std::io::stdin().is_terminal() && std::io::stdout().is_terminal() && !a.transcript;
     // If no handler can be set, the system's own stays.
     let heard = Arc::clone(&interrupts);
     let _ = ctrlc::set_handler(move || {
@@ -45,7 +46,8 @@ pub fn repl(a: &Repl) -> Result<(), Failure> {
     });
     let shown = Rc::new(Cell::new(false));
     let session = Rc::new(RefCell::new(session));
-    let mut front = Front { session, seed: a.seed, graphics: graphics(a), draft: None, shown, interrupts };
+    let mut front =
+        Front { session, seed: a.seed, graphics: graphics(a), draft: None, shown, interrupts };
     print(&said.text);
     if is_live { front.prompt() } else { front.script(a.transcript) }
 }
@@ -129,14 +131,18 @@ struct Interrupts {
 impl Front {
     /// Reads entries from the terminal.
     fn prompt(&mut self) -> Result<(), Failure> {
-        let wrong = |e: rustyline::error::ReadlineError| plain(format!("the terminal cannot be used: {e}"));
+        let wrong =
+            |e: rustyline::error::ReadlineError| plain(format!("the terminal cannot be used: {e}"));
         let mut lines = Lines::new(Rc::clone(&self.session), has_colors()).map_err(wrong)?;
         let shown = Rc::clone(&self.shown);
         self.session.borrow_mut().set_watch(move |s| {
             error_text!("\r\x1b[K{}", progress(s));
             shown.set(true);
         });
-        print_line!("pcadlang {}: :help lists the commands, Tab completes, Ctrl-D leaves", env!("CARGO_PKG_VERSION"));
+        print_line!(
+            "pcadlang {}: :help lists the commands, Tab completes, Ctrl-D leaves",
+            env!("CARGO_PKG_VERSION")
+        );
         let (mut told, mut warned) = (None, None);
         loop {
             let background = self.session.borrow().background();
@@ -164,7 +170,9 @@ impl Front {
             let background = self.session.borrow().background().map(|(number, _)| number);
             match background.filter(|_| leaves && warned != background) {
                 Some(number) => {
-                    print_line!("run {number} would be lost: `:stop` keeps its state; press Ctrl-D again to quit");
+                    print_line!(
+                        "run {number} would be lost: `:stop` keeps its state; press Ctrl-D again to quit"
+                    );
                     warned = background;
                 }
                 None if leaves => return Ok(()),
@@ -173,7 +181,8 @@ impl Front {
         }
     }
 
-    /// Reads entries as a script; a recording shows them too, and errors among what is said.
+    /// Reads entries as a script; a recording shows them too, and errors among what is
+    /// said.
     fn script(&mut self, transcript: bool) -> Result<(), Failure> {
         let mut lines = std::io::stdin().lock().lines();
         while let Some(entry) = next_entry(&mut lines, transcript)? {
@@ -227,8 +236,12 @@ impl Front {
             Some(Request::Edit) => reply = self.edit()?,
             Some(Request::Open(folder)) => {
                 let seed = self.seed;
-                let (other, _) = reopened(&folder, seed, Stop::when(Arc::clone(&self.interrupts.asked)))?;
-                reply = self.session.borrow_mut().take_over(other, &format!(":load {}", folder.display()));
+                let (other, _) =
+                    reopened(&folder, seed, Stop::when(Arc::clone(&self.interrupts.asked)))?;
+                reply = self
+                    .session
+                    .borrow_mut()
+                    .take_over(other, &format!(":load {}", folder.display()));
             }
         }
         if reply.clears && std::io::stdout().is_terminal() {

@@ -18,7 +18,8 @@ const COLUMNS: u32 = 72;
 pub fn told_by(variable: impl Fn(&str) -> Option<String>, is_terminal: bool) -> Graphics {
     let get = |name| variable(name).unwrap_or_default();
     let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
-    let is = |names: &[&str]| names.iter().any(|n| term.contains(n) || program.eq_ignore_ascii_case(n));
+    let is =
+        |names: &[&str]| names.iter().any(|n| term.contains(n) || program.eq_ignore_ascii_case(n));
     let blocks = match get("COLORTERM").as_str() {
         "truecolor" | "24bit" => Graphics::Blocks,
         _ => Graphics::Blocks256,
@@ -39,18 +40,25 @@ pub fn told_by(variable: impl Fn(&str) -> Option<String>, is_terminal: bool) -> 
     }
 }
 
-/// The letters that show a picture; a file is written where there is no other way, or if the user named one.
+/// The letters that show a picture; a file is written where there is no other way, or if
+/// the user named one.
 pub fn shown(picture: &Picture, graphics: Graphics) -> Result<String, Failure> {
     let pixels = picture.pixels();
     let encoded = |p: &RgbImage| png(p).map_err(|e| plain(e.to_string()));
     if picture.file.is_some() || graphics == Graphics::File {
         let path = picture.file.clone().unwrap_or_else(|| unused(Path::new("")));
         files::write(&path, &encoded(&pixels)?)?;
-        return Ok(format!("{}: {} x {} pixels\n", path.display(), pixels.width(), pixels.height()));
+        return Ok(format!(
+            "{}: {} x {} pixels\n",
+            path.display(),
+            pixels.width(),
+            pixels.height()
+        ));
     }
     let longer = pixels.width().max(pixels.height()).max(1);
     let scaled = |x: u32| (x * LONGER_SIDE / longer).max(1);
-    let fitting = || resize(&pixels, scaled(pixels.width()), scaled(pixels.height()), FilterType::Triangle);
+    let fitting =
+        || resize(&pixels, scaled(pixels.width()), scaled(pixels.height()), FilterType::Triangle);
     Ok(match graphics {
         Graphics::Kitty => kitty::encode(&encoded(&fitting())?),
         Graphics::Iterm => iterm::encode(&encoded(&fitting())?),
@@ -67,7 +75,9 @@ fn columns() -> u32 {
 
 /// The first of `render.png`, `render-2.png`, … that does not exist yet.
 fn unused(folder: &Path) -> PathBuf {
-    let name = |n: u32| folder.join(if n == 1 { "render.png".to_owned() } else { format!("render-{n}.png") });
+    let name = |n: u32| {
+        folder.join(if n == 1 { "render.png".to_owned() } else { format!("render-{n}.png") })
+    };
     (1..10_000).map(name).find(|p| !p.exists()).unwrap_or_else(|| name(10_000))
 }
 
@@ -78,18 +88,31 @@ mod tests {
     #[test]
     fn terminals_are_told_by_their_environment() {
         let told = |vars: &[(&str, &str)]| {
-            let get = |name: &str| vars.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_owned());
+            let get =
+                |name: &str| vars.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_owned());
             told_by(get, true)
         };
         assert_eq!(told(&[("TERM", "xterm-kitty")]), Graphics::Kitty);
         assert_eq!(told(&[("TERM", "xterm-256color"), ("KITTY_WINDOW_ID", "1")]), Graphics::Kitty);
-        assert_eq!(told(&[("TERM", "xterm-256color"), ("TERM_PROGRAM", "iTerm.app")]), Graphics::Iterm);
+        assert_eq!(
+            told(&[("TERM", "xterm-256color"), ("TERM_PROGRAM", "iTerm.app")]),
+            Graphics::Iterm
+        );
         assert_eq!(told(&[("TERM", "foot")]), Graphics::Sixel);
-        assert_eq!(told(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor")]), Graphics::Blocks);
+        assert_eq!(
+            told(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor")]),
+            Graphics::Blocks
+        );
         assert_eq!(told(&[("TERM", "xterm-256color")]), Graphics::Blocks256);
-        assert_eq!(told(&[("TERM", "tmux-256color"), ("TMUX", "x"), ("KITTY_WINDOW_ID", "1")]), Graphics::Blocks256);
+        assert_eq!(
+            told(&[("TERM", "tmux-256color"), ("TMUX", "x"), ("KITTY_WINDOW_ID", "1")]),
+            Graphics::Blocks256
+        );
         assert_eq!(told(&[("TERM", "dumb")]), Graphics::File);
         assert_eq!(told(&[]), Graphics::File);
-        assert_eq!(told_by(|n| (n == "TERM").then(|| "xterm-kitty".to_owned()), false), Graphics::File);
+        assert_eq!(
+            told_by(|n| (n == "TERM").then(|| "xterm-kitty".to_owned()), false),
+            Graphics::File
+        );
     }
 }

@@ -1,5 +1,5 @@
-//! Sixels: six rows at a time, colour by colour, in a fixed palette of 252 colours with the error passed on to neighbours
-//! (Floyd and Steinberg 1976).
+//! Sixels: six rows at a time, colour by colour, in a fixed palette of 252 colours with
+//! the error passed on to neighbours (Floyd and Steinberg 1976).
 
 use image::RgbImage;
 use std::fmt::Write;
@@ -71,7 +71,8 @@ fn quantised(picture: &RgbImage) -> Vec<u8> {
     let mut rows = [vec![[0.0f32; 3]; width + 2], vec![[0.0f32; 3]; width + 2]];
     for row in picture.rows() {
         for (x, p) in row.enumerate() {
-            let wanted = [0, 1, 2].map(|c| (f32::from(p.0[c]) + rows[0][x + 1][c]).clamp(0.0, 255.0));
+            let wanted =
+                [0, 1, 2].map(|c| (f32::from(p.0[c]) + rows[0][x + 1][c]).clamp(0.0, 255.0));
             let digit = |c: usize| (wanted[c] / 255.0 * (STEPS[c] - 1) as f32).round() as usize;
             let index = (digit(0) * STEPS[1] + digit(1)) * STEPS[2] + digit(2);
             let got = color(index);
@@ -97,7 +98,8 @@ mod tests {
 
     /// The indices that a terminal would paint.
     fn decode(sent: &str) -> (usize, usize, Vec<Option<u8>>) {
-        let body = sent.strip_prefix("\x1bPq").and_then(|s| s.trim_end().strip_suffix("\x1b\\")).unwrap();
+        let body =
+            sent.strip_prefix("\x1bPq").and_then(|s| s.trim_end().strip_suffix("\x1b\\")).unwrap();
         let (size, body) = body.strip_prefix('"').unwrap().split_once('#').unwrap();
         let size: Vec<usize> = size.split(';').map(|n| n.parse().unwrap()).collect();
         let (width, height) = (size[2], size[3]);
@@ -148,7 +150,8 @@ mod tests {
         let picture = RgbImage::from_pixel(60, 60, image::Rgb([100, 150, 33]));
         let all = quantised(&picture);
         for c in 0..3 {
-            let mean = all.iter().map(|i| color(usize::from(*i))[c]).sum::<f32>() / all.len() as f32;
+            let mean =
+                all.iter().map(|i| color(usize::from(*i))[c]).sum::<f32>() / all.len() as f32;
             assert!((mean - f32::from(picture.get_pixel(0, 0).0[c])).abs() < 2.0, "{c} {mean}");
         }
     }

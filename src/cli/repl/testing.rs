@@ -5,8 +5,8 @@ use image::{Rgb, RgbImage};
 /// A picture whose pixels differ.
 pub fn noise(width: u32, height: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| {
-        let h =
-            (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503).wrapping_mul(x + 7)).wrapping_mul(2_246_822_519);
+        let h = (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503).wrapping_mul(x + 7))
+            .wrapping_mul(2_246_822_519);
         Rgb([(h >> 24) as u8, (h >> 16) as u8, (h >> 8) as u8])
     })
 }
@@ -28,7 +28,8 @@ pub fn unbase64(text: &str) -> Vec<u8> {
     let mut out = Vec::new();
     for four in text.as_bytes().chunks(4) {
         let known: Vec<u8> = four.iter().filter(|c| **c != b'=').map(|c| digit(*c)).collect();
-        let word = known.iter().enumerate().fold(0u32, |w, (i, d)| w | u32::from(*d) << (18 - 6 * i));
+        let word =
+            known.iter().enumerate().fold(0u32, |w, (i, d)| w | u32::from(*d) << (18 - 6 * i));
         out.extend((0..known.len() - 1).map(|i| (word >> (16 - 8 * i)) as u8));
     }
     out

@@ -1,6 +1,7 @@
 //! Cases with a known answer: what a program is given of them, and the truth.
 //!
-//! Invariant: the truth reaches the scores only; what a run observes is what `evaluate` would give it.
+//! Invariant: the truth reaches the scores only; what a run observes is what `evaluate`
+//! would give it.
 
 use super::truth::{self, Truth};
 use crate::cli::args::Tradeoff;
@@ -38,7 +39,11 @@ const REFERENCE: &str = "reference.json";
 pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
     let folders = folders(&a.cases)?;
     if folders.iter().any(|f| f.join(REFERENCE).is_file()) {
-        return folders.iter().filter(|f| f.join(REFERENCE).is_file()).map(|f| posterior(f, program)).collect();
+        return folders
+            .iter()
+            .filter(|f| f.join(REFERENCE).is_file())
+            .map(|f| posterior(f, program))
+            .collect();
     }
     let Dataset { layout, cases, .. } = Dataset::open(&a.cases)?;
     let detections = a.keypoints.clone().map(Detections::open).transpose()?;
@@ -52,14 +57,22 @@ pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
         let camera = case.camera.clone().or_else(|| a.given.camera.clone());
         let folder = a.cases.join(&case.name);
         let (found, said) = match &mut truths {
-            Some(people) => (people.shift_remove(&case.name).map(Truth::Joints), vec![a.cases.join(truth::LABELS)]),
+            Some(people) => (
+                people.shift_remove(&case.name).map(Truth::Joints),
+                vec![a.cases.join(truth::LABELS)],
+            ),
             None => (
                 truth::surface(&folder, camera.as_deref())?.map(Truth::Surface),
-                truth::SURFACE.iter().map(|name| folder.join(name)).filter(|p| p.is_file()).collect(),
+                truth::SURFACE
+                    .iter()
+                    .map(|name| folder.join(name))
+                    .filter(|p| p.is_file())
+                    .collect(),
             ),
         };
         let Some(truth) = found else { continue };
-        let observe = observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
+        let observe =
+            observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
         all.push(Case { name: case.name, observe, camera, truth, said });
     }
     match all.is_empty() {
@@ -77,7 +90,8 @@ pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
 /// The folders of a folder, by name.
 fn folders(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     let entries = std::fs::read_dir(path).map_err(|e| plain(format!("{}: {e}", path.display())))?;
-    let mut all: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_dir()).collect();
+    let mut all: Vec<PathBuf> =
+        entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_dir()).collect();
     all.sort();
     Ok(all)
 }

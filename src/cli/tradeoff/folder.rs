@@ -1,6 +1,8 @@
-//! The folder of a tradeoff: runs as they are done, and the table, front and plot made of them.
+//! The folder of a tradeoff: runs as they are done, and the table, front and plot made of
+//! them.
 //!
-//! Invariant: a run that is in the journal is whole; everything else is made from it again.
+//! Invariant: a run that is in the journal is whole; everything else is made from it
+//! again.
 
 use crate::cli::{Failure, plain};
 use pcadlang::report::write_file;
@@ -31,7 +33,9 @@ impl Folder {
     pub fn open(path: &Path, head: &Map<String, Value>, fresh: bool) -> Result<Folder, Failure> {
         let fails = |e: std::io::Error| plain(format!("{}: {e}", path.display()));
         std::fs::create_dir_all(path).map_err(fails)?;
-        let marked = std::fs::read(path.join(MARK)).ok().and_then(|b| serde_json::from_slice::<Value>(&b).ok());
+        let marked = std::fs::read(path.join(MARK))
+            .ok()
+            .and_then(|b| serde_json::from_slice::<Value>(&b).ok());
         let journal = path.join(JOURNAL);
         let mut before = Vec::new();
         let mut spent = 0.0;
@@ -44,13 +48,15 @@ impl Folder {
             }
             Some(_) if fresh => whole(&journal, &[])?,
             Some(other) => {
-                if let Some((key, _)) = head.iter().find(|(k, v)| !agrees(k, v, &other[k.as_str()])) {
+                if let Some((key, _)) = head.iter().find(|(k, v)| !agrees(k, v, &other[k.as_str()]))
+                {
                     let hint = "choose another folder with --out, or measure everything again with --fresh";
                     let message = format!("{}: {key} has changed", path.display());
                     return Err(Failure::Plain(message, Some(hint.into())));
                 }
                 let text = std::fs::read_to_string(&journal).unwrap_or_default();
-                // A line that an interruption cut off is not whole. What failed is tried again.
+                // A line that an interruption cut off is not whole. What failed is tried
+                // again.
                 let runs = text.lines().filter_map(|l| serde_json::from_str(l).ok());
                 before = runs.filter(|r: &RunRecord| r.failed.is_none()).collect();
                 whole(&journal, &before)?;

@@ -1,7 +1,9 @@
-//! `pcadlang tradeoff`: what speed costs in accuracy, over settings and cases with known answers.
+//! `pcadlang tradeoff`: what speed costs in accuracy, over settings and cases with known
+//! answers.
 //!
-//! Invariant: what has been run is on the disk before anything else is; table, front, plot and presets are made of that alone, so
-//! that an interrupted sitting and one that ran through write the same.
+//! Invariant: what has been run is on the disk before anything else is; table, front,
+//! plot and presets are made of that alone, so that an interrupted sitting and one that
+//! ran through write the same.
 
 mod cases;
 mod folder;
@@ -54,10 +56,12 @@ struct Sitting<'a> {
 pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let mut s = Sitting::prepare(a)?;
-    let each = s.settings.iter().map(|x| x.time.unwrap_or(10.0)).sum::<f64>() / s.settings.len().max(1) as f64;
+    let each = s.settings.iter().map(|x| x.time.unwrap_or(10.0)).sum::<f64>()
+        / s.settings.len().max(1) as f64;
     let each = OVERHEAD * each * f64::from(a.seeds) / s.jobs as f64;
     let plan = rounds(s.settings.len(), s.cases.len(), each, a.budget.as_secs_f64());
-    let (mut names, mut out_of_time) = (s.settings.iter().map(Setting::name).collect::<Vec<_>>(), false);
+    let (mut names, mut out_of_time) =
+        (s.settings.iter().map(Setting::name).collect::<Vec<_>>(), false);
     for (i, round) in plan.iter().enumerate() {
         // Means over the same cases for all.
         let before = i.checked_sub(1).and_then(|i| plan.get(i)).map_or(0, |r| r.cases);
@@ -77,7 +81,11 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     }
     s.show();
     if let Some(first) = failed.first() {
-        s.say(&format!("warning: {} of {} runs failed; the first: {first}", failed.len(), runs.len()));
+        s.say(&format!(
+            "warning: {} of {} runs failed; the first: {first}",
+            failed.len(),
+            runs.len()
+        ));
     }
     match (interrupt.asked(), out_of_time) {
         (true, _) => Err(Failure::Interrupted),
@@ -105,8 +113,10 @@ impl<'a> Sitting<'a> {
         let jobs = a.jobs.map_or((machine / threads).max(1), |n| n as usize);
         // Cases of people share files: each is read once.
         let files: BTreeSet<PathBuf> = cases.iter().flat_map(Case::files).collect();
-        let inputs: String =
-            files.iter().map(|path| std::fs::read(path).map(|b| bytes_hash(&b)).unwrap_or_default()).collect();
+        let inputs: String = files
+            .iter()
+            .map(|path| std::fs::read(path).map(|b| bytes_hash(&b)).unwrap_or_default())
+            .collect();
         let head = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "program": a.given.program,
@@ -121,10 +131,22 @@ impl<'a> Sitting<'a> {
         let Value::Object(head) = head else { return Err(plain("no settings")) };
         let mut folder = Folder::open(&a.out, &head, a.fresh)?;
         // What a sitting that was killed used up is not written, but its runs are.
-        let ran = folder.before.iter().filter_map(|r| r.marks.last()).map(|m| m.seconds).sum::<f64>();
+        let ran =
+            folder.before.iter().filter_map(|r| r.marks.last()).map(|m| m.seconds).sum::<f64>();
         folder.spent = folder.spent.max(ran / jobs as f64);
         let runs = Mutex::new(folder.before.clone());
-        let s = Sitting { a, settings, candidates, cases, folder, head, runs, begun: Instant::now(), jobs, threads };
+        let s = Sitting {
+            a,
+            settings,
+            candidates,
+            cases,
+            folder,
+            head,
+            runs,
+            begun: Instant::now(),
+            jobs,
+            threads,
+        };
         s.write()?;
         Ok(s)
     }
@@ -134,7 +156,10 @@ impl<'a> Sitting<'a> {
         let names: HashSet<String> = self.settings.iter().map(Setting::name).collect();
         let cases: HashSet<&str> = self.cases.iter().map(|c| c.name.as_str()).collect();
         let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
-        runs.iter().filter(|r| names.contains(&r.setting) && cases.contains(r.case.as_str())).cloned().collect()
+        runs.iter()
+            .filter(|r| names.contains(&r.setting) && cases.contains(r.case.as_str()))
+            .cloned()
+            .collect()
     }
 
     /// Those on the first so many cases.
@@ -150,16 +175,27 @@ impl<'a> Sitting<'a> {
         self.folder.spent + self.begun.elapsed().as_secs_f64()
     }
 
-    /// Runs settings on the first of the cases, those that were not run before; whether the budget was enough.
-    fn round(&mut self, names: &[String], cases: usize, interrupt: &Interrupt) -> Result<bool, Failure> {
+    /// Runs settings on the first of the cases, those that were not run before; whether
+    /// the budget was enough.
+    fn round(
+        &mut self,
+        names: &[String],
+        cases: usize,
+        interrupt: &Interrupt,
+    ) -> Result<bool, Failure> {
         let known: HashSet<(String, String, u64)> =
             self.done().into_iter().map(|r| (r.setting, r.case, r.seed)).collect();
-        let settings: Vec<&Setting> = self.settings.iter().filter(|s| names.contains(&s.name())).collect();
+        let settings: Vec<&Setting> =
+            self.settings.iter().filter(|s| names.contains(&s.name())).collect();
         let mut tasks = Vec::new();
         for case in &self.cases[..cases.min(self.cases.len())] {
             for seed in 1..=u64::from(self.a.seeds) {
                 let new = |s: &&&Setting| !known.contains(&(s.name(), case.name.clone(), seed));
-                tasks.extend(settings.iter().filter(new).map(|setting| Task { setting, case, seed }));
+                tasks.extend(settings.iter().filter(new).map(|setting| Task {
+                    setting,
+                    case,
+                    seed,
+                }));
             }
         }
         let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -169,8 +205,13 @@ impl<'a> Sitting<'a> {
             for _ in 0..self.jobs.min(tasks.len()) {
                 scope.spawn(|| {
                     while !over() {
-                        let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                        let Some(run) = work::run(self.a, *task, self.threads as u32, interrupt) else { break };
+                        let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else {
+                            break;
+                        };
+                        let Some(run) = work::run(self.a, *task, self.threads as u32, interrupt)
+                        else {
+                            break;
+                        };
                         if let Err(e) = self.folder.keep(&run) {
                             *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(e);
                             break;
@@ -204,7 +245,8 @@ impl<'a> Sitting<'a> {
             self.cases.len(),
             self.threads,
         );
-        let needs = if self.a.keypoints.is_some() { vec!["keypoints".to_owned()] } else { Vec::new() };
+        let needs =
+            if self.a.keypoints.is_some() { vec!["keypoints".to_owned()] } else { Vec::new() };
         let mut front = Preset::front(&self.candidates, rows);
         for preset in &mut front {
             // What all runs were told is part of what was measured.
@@ -224,7 +266,9 @@ impl<'a> Sitting<'a> {
         self.folder.mark(head)?;
         self.folder.write("table.csv", to_csv(&rows).as_bytes())?;
         let mut named: Vec<(String, String)> = Vec::new();
-        for (quality, choice) in Quality::ALL.iter().filter_map(|q| Some((q.name(), presets.of_quality(*q)?))) {
+        for (quality, choice) in
+            Quality::ALL.iter().filter_map(|q| Some((q.name(), presets.of_quality(*q)?)))
+        {
             let setting = choice.preset.setting.name();
             match named.iter_mut().find(|n| n.0 == setting) {
                 Some((_, label)) => *label += &format!(", {quality}"),
@@ -236,7 +280,8 @@ impl<'a> Sitting<'a> {
         if let Some(path) = &self.a.presets
             && !presets.front.is_empty()
         {
-            pcadlang::report::write_file(path, &text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
+            pcadlang::report::write_file(path, &text)
+                .map_err(|e| plain(format!("{}: {e}", path.display())))?;
         }
         Ok(())
     }
@@ -252,7 +297,14 @@ impl<'a> Sitting<'a> {
         let mut front: Vec<&Row> = rows.iter().filter(|r| r.front).collect();
         front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
         for r in front {
-            print_line!("{:>9}  {:.4} ({:.4} to {:.4})  {}", seconds(r.seconds), r.error, r.low, r.high, r.setting);
+            print_line!(
+                "{:>9}  {:.4} ({:.4} to {:.4})  {}",
+                seconds(r.seconds),
+                r.error,
+                r.low,
+                r.high,
+                r.setting
+            );
         }
         for q in Quality::ALL {
             if let Some(c) = presets.of_quality(q) {

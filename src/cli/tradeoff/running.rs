@@ -32,19 +32,30 @@ impl Sink for Running {
             Shape::Scalar => vec![c.name.clone()],
             Shape::Vector(n) => (0..n).map(|i| format!("{}[{i}]", c.name)).collect(),
         };
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).names = columns.iter().flat_map(names).collect();
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).names =
+            columns.iter().flat_map(names).collect();
         Ok(())
     }
 
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
         let mut s = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let one =
-            Sums { names: Vec::new(), count: 1.0, mean: row.values.clone(), squares: vec![0.0; row.values.len()] };
+        let one = Sums {
+            names: Vec::new(),
+            count: 1.0,
+            mean: row.values.clone(),
+            squares: vec![0.0; row.values.len()],
+        };
         s.merge(&one);
         Ok(())
     }
 
-    fn chain_done(&mut self, _chain: u32, _steps: u64, _warmup: u64, _seconds: f64) -> io::Result<()> {
+    fn chain_done(
+        &mut self,
+        _chain: u32,
+        _steps: u64,
+        _warmup: u64,
+        _seconds: f64,
+    ) -> io::Result<()> {
         Ok(())
     }
 }
@@ -108,7 +119,10 @@ mod tests {
         chains.iter().for_each(|c| all.merge(&c.sums()));
         let n = all.normals();
         assert_eq!(n.keys().collect::<Vec<_>>(), ["a", "v[0]", "v[1]"]);
-        assert!((n["a"].mean - 4.5).abs() < 1e-12 && (n["a"].sd - 9.166_666_666_666_666f64.sqrt()).abs() < 1e-12);
+        assert!(
+            (n["a"].mean - 4.5).abs() < 1e-12
+                && (n["a"].sd - 9.166_666_666_666_666f64.sqrt()).abs() < 1e-12
+        );
         assert!((n["v[0]"].mean - 28.5).abs() < 1e-12 && (n["v[1]"].sd - n["a"].sd).abs() < 1e-12);
     }
 }

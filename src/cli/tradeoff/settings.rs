@@ -54,7 +54,8 @@ pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>
     Ok(hashes)
 }
 
-/// The files of settings with their names: those that are named, or the program's own, `NAME.settings.json`.
+/// The files of settings with their names: those that are named, or the program's own,
+/// `NAME.settings.json`.
 fn files(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
     let named = a.settings.iter().map(|path| {
         let text = String::from_utf8(crate::cli::files::read(path)?)

@@ -23,9 +23,13 @@ impl Truth {
     /// What the error of an answer is, for tables and plots.
     pub fn error_name(&self) -> &'static str {
         match self {
-            Truth::Surface(_) => "depth error over the union of estimated and true mask (Z-MAE-U, object heights)",
+            Truth::Surface(_) => {
+                "depth error over the union of estimated and true mask (Z-MAE-U, object heights)"
+            }
             Truth::Joints(_) => "fraction of joints not within 0.2 torso lengths (1 - PCKt@0.2)",
-            Truth::Posterior(_) => "distance from the reference posterior (its standard deviations)",
+            Truth::Posterior(_) => {
+                "distance from the reference posterior (its standard deviations)"
+            }
         }
     }
 }
@@ -45,14 +49,17 @@ struct Meta {
     object_width: f64,
 }
 
-/// The true surface of a case: `gt.npz` with `depth` and `normals`, or `depth.npy` and `normals.npy`. Depth is along the viewing axis in
-/// scene units, 0 or not finite where there is nothing. The object's size is that of `meta.json` (`object_height` along its axis,
-/// `object_width`), or else that of what is seen. None if there is no truth.
+/// The true surface of a case: `gt.npz` with `depth` and `normals`, or `depth.npy` and
+/// `normals.npy`. Depth is along the viewing axis in scene units, 0 or not finite where
+/// there is nothing. The object's size is that of `meta.json` (`object_height` along its
+/// axis, `object_width`), or else that of what is seen. None if there is no truth.
 pub fn surface(folder: &Path, camera: Option<&Path>) -> Result<Option<SurfaceTruth>, Failure> {
     let (archive, single) = (folder.join("gt.npz"), folder.join("depth.npy"));
     let (depth, normals) = if archive.is_file() {
         let bytes = files::read(&archive)?;
-        let member = |name: &str| member(&bytes, name).map_err(|e| plain(format!("{}: {e}", archive.display())));
+        let member = |name: &str| {
+            member(&bytes, name).map_err(|e| plain(format!("{}: {e}", archive.display())))
+        };
         (member("depth")?, member("normals")?)
     } else if single.is_file() {
         let read = |path: &Path| npy::load(path, MOST_BYTES).map_err(|e| plain(e.to_string()));
@@ -68,14 +75,19 @@ pub fn surface(folder: &Path, camera: Option<&Path>) -> Result<Option<SurfaceTru
         Some(n) if n.shape == [height as usize, width as usize, 3] => {
             n.into_f32().chunks_exact(3).map(|n| [n[0], n[1], n[2]]).collect()
         }
-        Some(n) => return Err(wrong(format!("normals have the shape {:?}, depth {height} x {width}", n.shape))),
+        Some(n) => {
+            return Err(wrong(format!(
+                "normals have the shape {:?}, depth {height} x {width}",
+                n.shape
+            )));
+        }
         None => Vec::new(),
     };
     let surface = Surface { width: width as usize, depth: depth.into_f32(), normal };
     let meta = folder.join("meta.json");
     let (object_width, object_height) = if meta.is_file() {
-        let meta: Meta =
-            serde_json::from_slice(&files::read(&meta)?).map_err(|e| plain(format!("{}: {e}", meta.display())))?;
+        let meta: Meta = serde_json::from_slice(&files::read(&meta)?)
+            .map_err(|e| plain(format!("{}: {e}", meta.display())))?;
         (meta.object_width, meta.object_height)
     } else {
         let camera = seen_by(camera, width, height)?;
@@ -126,19 +138,20 @@ struct Person {
     keypoints: IndexMap<String, Vec<f64>>,
 }
 
-/// The labelled joints of the people of a dataset: `{NAME: [x, y, v], …}`, not labelled where v is 0. People whose labels are not
-/// enough for a score are left out.
+/// The labelled joints of the people of a dataset: `{NAME: [x, y, v], …}`, not labelled
+/// where v is 0. People whose labels are not enough for a score are left out.
 pub fn people(dataset: &Path) -> Result<IndexMap<String, JointsTruth>, Failure> {
     let path = dataset.join(LABELS);
-    let all: Annotations =
-        serde_json::from_slice(&files::read(&path)?).map_err(|e| plain(format!("{}: {e}", path.display())))?;
+    let all: Annotations = serde_json::from_slice(&files::read(&path)?)
+        .map_err(|e| plain(format!("{}: {e}", path.display())))?;
     let labelled = |k: &Vec<f64>| match k[..] {
         [x, y] => Some([x, y]),
         [x, y, v, ..] if v > 0.0 => Some([x, y]),
         _ => None,
     };
     let joints = |p: Person| {
-        let joints: IndexMap<_, _> = p.keypoints.iter().filter_map(|(n, k)| Some((n.clone(), labelled(k)?))).collect();
+        let joints: IndexMap<_, _> =
+            p.keypoints.iter().filter_map(|(n, k)| Some((n.clone(), labelled(k)?))).collect();
         Some((p.id, JointsTruth { joints })).filter(|(_, truth)| truth.is_enough())
     };
     Ok(all.people.into_iter().filter_map(joints).collect())
@@ -155,7 +168,9 @@ pub fn reference(text: &[u8]) -> Result<Reference, String> {
     if all.is_empty() {
         return Err("it contains no quantities".into());
     }
-    if let Some((name, _)) = all.iter().find(|(_, m)| !(m.mean.is_finite() && m.sd > 0.0 && m.sd.is_finite())) {
+    if let Some((name, _)) =
+        all.iter().find(|(_, m)| !(m.mean.is_finite() && m.sd > 0.0 && m.sd.is_finite()))
+    {
         return Err(format!("{name}: expected a mean and a positive standard deviation"));
     }
     let normal = |m: Moments| Normal { mean: m.mean, sd: m.sd };

@@ -59,16 +59,25 @@ pub struct Task<'a> {
     pub seed: u64,
 }
 
-/// Runs a task on so many threads. A program that fails gives a record that says so; an interrupt gives none.
+/// Runs a task on so many threads. A program that fails gives a record that says so; an
+/// interrupt gives none.
 pub fn run(a: &Tradeoff, task: Task, threads: u32, interrupt: &Interrupt) -> Option<RunRecord> {
     let Task { setting, case, seed } = task;
-    let record = RunRecord { setting: setting.name(), case: case.name.clone(), seed, ..RunRecord::default() };
+    let record = RunRecord {
+        setting: setting.name(),
+        case: case.name.clone(),
+        seed,
+        ..RunRecord::default()
+    };
     match measure(a, task, threads, interrupt, record.clone()) {
         _ if interrupt.asked() => None,
         Ok(record) => Some(record),
         Err(failure) => {
             let said = failure.to_string();
-            Some(RunRecord { failed: Some(said.trim_start_matches("error: ").to_owned()), ..record })
+            Some(RunRecord {
+                failed: Some(said.trim_start_matches("error: ").to_owned()),
+                ..record
+            })
         }
     }
 }
@@ -130,23 +139,35 @@ fn measure(
     let (results, mut snapshots) = std::thread::scope(|scope| {
         let looking = scope.spawn(|| {
             let ahead = |t: f64| Duration::from_secs_f64(t).saturating_sub(begun.elapsed());
-            let looks = times.iter().map_while(|&t| (!ending.within(ahead(t))).then(|| watched.look(Some(t))));
+            let looks = times
+                .iter()
+                .map_while(|&t| (!ending.within(ahead(t))).then(|| watched.look(Some(t))));
             looks.collect::<Vec<_>>()
         });
-        let results = ending.of(|| ready.model.run_into(&options, threads as usize, &progress, sinks));
+        let results =
+            ending.of(|| ready.model.run_into(&options, threads as usize, &progress, sinks));
         (results, looking.join().unwrap_or_default())
     });
     snapshots.push(watched.look(None));
-    let chains = results?.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| ready.model.chain_error(e))?;
+    let chains = results?
+        .into_iter()
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| ready.model.chain_error(e))?;
     record.steps = chains.iter().map(|c| c.steps + c.warmup).sum();
     if let Truth::Posterior(reference) = &task.case.truth {
         let found = snapshots.last().map(|s| s.sums.normals()).unwrap_or_default();
-        if let Some(name) = reference.quantities.keys().find(|name| !found.is_empty() && !found.contains_key(*name)) {
-            return Err(plain(format!("the reference has `{name}`, which the program does not collect")));
+        if let Some(name) =
+            reference.quantities.keys().find(|name| !found.is_empty() && !found.contains_key(*name))
+        {
+            return Err(plain(format!(
+                "the reference has `{name}`, which the program does not collect"
+            )));
         }
         let draws: Vec<_> = memories.iter().map(Memory::draws).collect();
-        let of = quantities(&draws).into_iter().filter(|q| reference.quantities.contains_key(&q.name));
-        let smallest = of.map(|q| q.summary.ess_bulk).filter(|e| e.is_finite()).min_by(f64::total_cmp);
+        let of =
+            quantities(&draws).into_iter().filter(|q| reference.quantities.contains_key(&q.name));
+        let smallest =
+            of.map(|q| q.summary.ess_bulk).filter(|e| e.is_finite()).min_by(f64::total_cmp);
         let seconds = snapshots.last().map_or(f64::NAN, |s| s.seconds);
         record.ess_per_second = smallest.map(|ess| ess / seconds);
     }
@@ -163,16 +184,32 @@ fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexM
     let all: Vec<(&str, f64)> = match truth {
         Truth::Surface(truth) => {
             let found = best_view(ready, s).map(|view| {
-                let frame =
-                    view.frame(ready.size().map_or(view.camera().width.max(view.camera().height), |(w, h)| w.max(h)));
-                Surface { width: frame.width as usize, depth: frame.depth.clone(), normal: frame.normal.clone() }
+                let frame = view.frame(
+                    ready
+                        .size()
+                        .map_or(view.camera().width.max(view.camera().height), |(w, h)| w.max(h)),
+                );
+                Surface {
+                    width: frame.width as usize,
+                    depth: frame.depth.clone(),
+                    normal: frame.normal.clone(),
+                }
             });
             let e = truth.error(found.as_ref());
-            vec![("error", e.z_mae_u), ("z_mae", e.z_mae), ("n_mse", e.n_mse), ("n_mse_u", e.n_mse_u), ("iou", e.iou)]
+            vec![
+                ("error", e.z_mae_u),
+                ("z_mae", e.z_mae),
+                ("n_mse", e.n_mse),
+                ("n_mse_u", e.n_mse_u),
+                ("iou", e.iou),
+            ]
         }
         Truth::Joints(truth) => {
-            let mut found: IndexMap<String, [f64; 2]> =
-                s.joints.iter().filter_map(|(name, p)| Some((name.to_owned(), *p.mean.first_chunk()?))).collect();
+            let mut found: IndexMap<String, [f64; 2]> = s
+                .joints
+                .iter()
+                .filter_map(|(name, p)| Some((name.to_owned(), *p.mean.first_chunk()?)))
+                .collect();
             // Before the first draw the best state speaks.
             if let Some(view) = best_view(ready, s).filter(|_| found.is_empty()) {
                 let at = joints.positions(&ViewValue(view)).into_iter();
@@ -180,7 +217,12 @@ fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexM
             }
             let e = truth.error(&found);
             let share = e.missed as f64 / e.labelled.max(1) as f64;
-            vec![("error", share), ("pixels", e.pixels), ("joints", e.labelled as f64), ("missed", e.missed as f64)]
+            vec![
+                ("error", share),
+                ("pixels", e.pixels),
+                ("joints", e.labelled as f64),
+                ("missed", e.missed as f64),
+            ]
         }
         Truth::Posterior(truth) => vec![("error", truth.error(&s.sums.normals()))],
     };

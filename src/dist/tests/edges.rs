@@ -34,14 +34,21 @@ fn poles_and_ends() {
     assert_eq!(at("weibull", &[0.5, 1.0], 0.0), NEVER);
     assert_eq!(at("laplace", &[1.0, 0.5], 1.0), 0.0);
     assert_eq!(at("von_mises", &[0.0, 1.0], -std::f64::consts::PI), NEVER);
-    assert_eq!(at("von_mises", &[7.0, 2.0], 1.0), at("von_mises", &[7.0 - std::f64::consts::TAU, 2.0], 1.0));
+    assert_eq!(
+        at("von_mises", &[7.0, 2.0], 1.0),
+        at("von_mises", &[7.0 - std::f64::consts::TAU, 2.0], 1.0)
+    );
     assert_eq!(at("neg_binomial", &[2.0, 1.0], 0.0), 0.0);
     assert_eq!(at("neg_binomial", &[2.0, 1.0], 1.0), NEVER);
     assert_eq!(at("geometric", &[1.0], 0.0), 0.0);
     assert_eq!(at("flat", &[], -1e300), 0.0);
     assert_eq!(make("multinomial", &[0.0, 1.0, 1.0]).log_density(&vec![0.0, 0.0].into()), 0.0);
-    assert_eq!(make("lkj", &[1.0, 2.0]).log_density(&Datum::List(vec![vec![1.0].into()].into())), 0.0);
-    let shares = |alpha: &[f64], x: [f64; 3]| make("dirichlet", alpha).log_density(&x.to_vec().into());
+    assert_eq!(
+        make("lkj", &[1.0, 2.0]).log_density(&Datum::List(vec![vec![1.0].into()].into())),
+        0.0
+    );
+    let shares =
+        |alpha: &[f64], x: [f64; 3]| make("dirichlet", alpha).log_density(&x.to_vec().into());
     assert_eq!(shares(&[0.5, 1.0, 2.0], [0.0, 0.5, 0.5]), f64::INFINITY);
     assert_eq!(shares(&[0.5, 1.0, 2.0], [0.0, 1.0, 0.0]), NEVER);
     assert_eq!(shares(&[1.0, 1.0, 1.0], [0.0, 1.0, 0.0]), 2f64.ln());
@@ -135,10 +142,16 @@ fn zoo() -> Vec<Dist> {
     }
     all.push(make("flat", &[1.0, INF]));
     all.push(make("flat", &[-INF, -1.0]));
-    let extremes = vec![make("beta", &[0.01, 0.01]), make("cauchy", &[0.0, 1e300]), make("gamma", &[1e-3, 1.0])];
+    let extremes = vec![
+        make("beta", &[0.01, 0.01]),
+        make("cauchy", &[0.0, 1e300]),
+        make("gamma", &[1e-3, 1.0]),
+    ];
     all.push(Dist::Mixture(Arc::new(Mixture::new(&[1.0, 1e-300, 0.0], extremes).unwrap())));
-    let gp =
-        |centred| Gp::new(vec![0.0; 3], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0, 1.0], centred).unwrap();
+    let gp = |centred| {
+        Gp::new(vec![0.0; 3], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0, 1.0], centred)
+            .unwrap()
+    };
     all.push(Dist::Gp(Arc::new(gp(false))));
     all.push(Dist::Gp(Arc::new(gp(true))));
     all
@@ -146,11 +159,29 @@ fn zoo() -> Vec<Dist> {
 
 #[test]
 fn nothing_is_ever_nan() {
-    let extremes = [0.0, -0.0, 1.0, -1.0, 0.5, 1e-320, 1e-300, 1e300, -1e300, f64::MAX, f64::MIN, 1e16, 40.0, 2.5];
+    let extremes = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.5,
+        1e-320,
+        1e-300,
+        1e300,
+        -1e300,
+        f64::MAX,
+        f64::MIN,
+        1e16,
+        40.0,
+        2.5,
+    ];
     let infinite = [f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
     for d in zoo() {
         for x in extremes.into_iter().chain(infinite) {
-            let others = [vec![x; 3].into(), Datum::List(vec![Datum::Num(x), Datum::Num(0.5), Datum::Num(x)].into())];
+            let others = [
+                vec![x; 3].into(),
+                Datum::List(vec![Datum::Num(x), Datum::Num(0.5), Datum::Num(x)].into()),
+            ];
             let matrix = Datum::List(vec![vec![x; 3].into(); 3].into());
             let triangle = Datum::List(
                 (0..3)
@@ -170,7 +201,10 @@ fn nothing_is_ever_nan() {
                     assert_eq!(p, NEVER, "{d:?} at {x:?}");
                 }
                 if let Some(g) = d.gradient(&x) {
-                    assert!(g.x.iter().chain(&g.params).all(|g| !g.is_nan()), "{d:?} at {x:?}: {g:?}");
+                    assert!(
+                        g.x.iter().chain(&g.params).all(|g| !g.is_nan()),
+                        "{d:?} at {x:?}: {g:?}"
+                    );
                 }
             }
         }
@@ -193,15 +227,22 @@ fn extreme_draws_are_in_the_support() {
             let x = d.sample(&mut rng);
             assert!(d.support().contains(&x), "{d:?} drew {x:?}");
             let s = d.sample_stored(&mut rng);
-            assert!(d.stored_support().contains(&s) && d.log_density_stored(&s) > NEVER, "{d:?} drew {s:?}");
+            assert!(
+                d.stored_support().contains(&s) && d.log_density_stored(&s) > NEVER,
+                "{d:?} drew {s:?}"
+            );
         }
     }
 }
 
 #[test]
 fn other_kinds_of_values_are_impossible() {
-    let kinds =
-        [Datum::Num(0.0), Datum::Bool(false), vec![0.25; 4].into(), Datum::List(vec![Datum::Bool(true)].into())];
+    let kinds = [
+        Datum::Num(0.0),
+        Datum::Bool(false),
+        vec![0.25; 4].into(),
+        Datum::List(vec![Datum::Bool(true)].into()),
+    ];
     for d in zoo() {
         for x in &kinds {
             if !d.support().fits(x) && !is_truth(&d, x) {
@@ -219,8 +260,14 @@ fn bad_parameters_are_errors_that_say_so() {
     assert_eq!(message("normal", &[0.0, -0.3]), "normal: sd must be positive and finite, got -0.3");
     assert_eq!(message("uniform", &[2.0, 1.0]), "uniform: lo must be below hi, got 2 and 1");
     assert_eq!(message("flip", &[1.5]), "flip: p must be between 0 and 1, got 1.5");
-    assert_eq!(message("categorical", &[0.0, 0.0]), "categorical: weights must have a positive, finite sum, got 0");
-    assert_eq!(message("binomial", &[2.5, 0.5]), "binomial: n must be an integer of at most 2^53, got 2.5");
+    assert_eq!(
+        message("categorical", &[0.0, 0.0]),
+        "categorical: weights must have a positive, finite sum, got 0"
+    );
+    assert_eq!(
+        message("binomial", &[2.5, 0.5]),
+        "binomial: n must be an integer of at most 2^53, got 2.5"
+    );
     let sizes = [
         ("normal", 2),
         ("lognormal", 2),
@@ -270,7 +317,10 @@ fn bad_parameters_are_errors_that_say_so() {
         message("truncated_normal", &[0.0, 1e-300, 1.0, 2.0]),
         "truncated_normal: lo to hi must be within 1e150 sd of the mean, got 1 and 2"
     );
-    assert_eq!(message("multinomial", &[3.0, 0.0]), "multinomial: weights must have a positive, finite sum, got 0");
+    assert_eq!(
+        message("multinomial", &[3.0, 0.0]),
+        "multinomial: weights must have a positive, finite sum, got 0"
+    );
     assert_eq!(message("geometric", &[0.0]), "geometric: p must be above 0 and at most 1, got 0");
     assert_eq!(message("lkj", &[0.0, 1.0]), "lkj: n must be between 1 and 1000, got 0");
     assert!(try_make("uniform", &[-1e308, 1e308]).is_err());
@@ -279,11 +329,16 @@ fn bad_parameters_are_errors_that_say_so() {
 
 #[test]
 fn finite_supports_list_their_values() {
-    let numbers = |d: &Dist| d.support().finite_values().map(|v| v.iter().filter_map(Datum::num).collect::<Vec<_>>());
+    let numbers = |d: &Dist| {
+        d.support().finite_values().map(|v| v.iter().filter_map(Datum::num).collect::<Vec<_>>())
+    };
     assert_eq!(numbers(&make("binomial", &[3.0, 0.5])), Some(vec![0.0, 1.0, 2.0, 3.0]));
     assert_eq!(numbers(&make("uniform_discrete", &[-1.0, 1.0])), Some(vec![-1.0, 0.0, 1.0]));
     assert_eq!(numbers(&make("categorical", &[1.0, 1.0])), Some(vec![0.0, 1.0]));
-    assert_eq!(make("flip", &[0.5]).support().finite_values(), Some(vec![Datum::Bool(false), Datum::Bool(true)]));
+    assert_eq!(
+        make("flip", &[0.5]).support().finite_values(),
+        Some(vec![Datum::Bool(false), Datum::Bool(true)])
+    );
     for d in [make("poisson", &[1.0]), make("binomial", &[1e9, 0.5]), make("normal", &[0.0, 1.0])] {
         assert_eq!(d.support().finite_values(), None);
         assert!(!d.support().is_finite());
@@ -303,7 +358,8 @@ fn elements_are_distributions_of_their_own() {
     assert_eq!(product.element_log_density(2, &Datum::Num(0.0)), NEVER);
     let none = Dist::Iid(Arc::new(Iid::new(parts[0].clone(), 0).unwrap()));
     assert_eq!(none.log_density(&none.sample(&mut stream(602))), 0.0);
-    let gp = Gp::new(vec![0.0; 2], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0], false).unwrap();
+    let gp =
+        Gp::new(vec![0.0; 2], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0], false).unwrap();
     let two = Dist::Iid(Arc::new(Iid::new(Dist::Gp(Arc::new(gp)), 2).unwrap()));
     assert!(!two.element(0).is_stored_whitened() && two.is_gaussian());
 }

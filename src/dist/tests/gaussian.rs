@@ -1,4 +1,5 @@
-//! Gaussian vectors and processes: against dense linear algebra, whitening, extreme covariances.
+//! Gaussian vectors and processes: against dense linear algebra, whitening, extreme
+//! covariances.
 
 use super::*;
 use nalgebra::{DMatrix, DVector};
@@ -7,7 +8,9 @@ fn dense(mean: &[f64], cov: &DMatrix<f64>, x: &[f64]) -> f64 {
     let r = DVector::from_iterator(x.len(), x.iter().zip(mean).map(|(x, m)| x - m));
     let lu = cov.clone().lu();
     let n = x.len() as f64;
-    -0.5 * (r.dot(&lu.solve(&r).unwrap()) + lu.determinant().ln() + n * (2.0 * std::f64::consts::PI).ln())
+    -0.5 * (r.dot(&lu.solve(&r).unwrap())
+        + lu.determinant().ln()
+        + n * (2.0 * std::f64::consts::PI).ln())
 }
 
 fn grid(n: usize, step: f64) -> Vec<f64> {
@@ -26,7 +29,10 @@ fn vectors_agree_with_dense_algebra() {
         assert!((d.log_density(&x.to_vec().into()) - expected).abs() < 1e-12);
     }
     let bad = |m| MvNormal::from_cov(&mean, &m).unwrap_err().to_string();
-    assert!(bad(square(3, &[1.0, 2.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 1.0])).contains("positive definite"));
+    assert!(
+        bad(square(3, &[1.0, 2.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 1.0]))
+            .contains("positive definite")
+    );
     assert!(bad(square(3, &[1.0, 0.5, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0, 1.0])).contains("symmetric"));
     assert!(bad(DMatrix::identity(2, 2)).contains("2 x 2"));
     assert!(bad(DMatrix::from_element(3, 3, f64::NAN)).contains("must be finite"));
@@ -70,7 +76,10 @@ fn processes_agree_with_dense_algebra() {
         let d = Gp::new(mean.clone(), &k, &at, true).unwrap();
         let Datum::Vec(x) = d.sample(&mut stream(701)) else { panic!() };
         let (got, expected) = (d.log_density(&Datum::Vec(Arc::clone(&x))), dense(&mean, &cov, &x));
-        assert!((got - expected).abs() < 1e-7 * (1.0 + expected.abs()), "{k}: {got} against {expected}");
+        assert!(
+            (got - expected).abs() < 1e-7 * (1.0 + expected.abs()),
+            "{k}: {got} against {expected}"
+        );
     }
 }
 
@@ -82,7 +91,10 @@ fn covariance_functions_have_their_formulas() {
     let r = 3f64.sqrt() * d / 0.5;
     close(Covariance::matern32(0.5, 2.0).unwrap().at_distance(d), 4.0 * (1.0 + r) * (-r).exp());
     let r = 5f64.sqrt() * d / 0.5;
-    close(Covariance::matern52(0.5, 2.0).unwrap().at_distance(d), 4.0 * (1.0 + r + r * r / 3.0) * (-r).exp());
+    close(
+        Covariance::matern52(0.5, 2.0).unwrap().at_distance(d),
+        4.0 * (1.0 + r + r * r / 3.0) * (-r).exp(),
+    );
     let periodic = Covariance::periodic(0.3, 0.5, 2.0).unwrap();
     let s = (std::f64::consts::PI * d / 0.3).sin() / 0.5;
     close(periodic.at_distance(d), 4.0 * (-2.0 * s * s).exp());
@@ -91,7 +103,10 @@ fn covariance_functions_have_their_formulas() {
     assert_eq!(Covariance::white(2.0).unwrap().at_distance(0.0), 0.0);
     let text = (Covariance::sq_exp(0.5, 2.0).unwrap() + Covariance::white(0.1).unwrap())
         * Covariance::matern32(1.0, 1.0).unwrap();
-    assert_eq!(text.to_string(), "(sq_exp(length = 0.5, sd = 2) + white(sd = 0.1)) * matern32(length = 1, sd = 1)");
+    assert_eq!(
+        text.to_string(),
+        "(sq_exp(length = 0.5, sd = 2) + white(sd = 0.1)) * matern32(length = 1, sd = 1)"
+    );
     assert_eq!(
         Covariance::sq_exp(0.0, 1.0).unwrap_err().to_string(),
         "sq_exp: length must be positive and finite, got 0"
@@ -150,7 +165,12 @@ fn extreme_covariances_factor() {
     assert!(Gp::new(vec![], &k, &[], false).is_ok());
     let huge = Covariance::sq_exp(1.0, 1e200).unwrap();
     let e = Gp::new(vec![0.0; 3], &huge, &grid(3, 1.0), false).unwrap_err().to_string();
-    assert!(e.starts_with("gp: cov must make a positive definite matrix, got sq_exp(length = 1, sd = 1"), "{e}");
+    assert!(
+        e.starts_with(
+            "gp: cov must make a positive definite matrix, got sq_exp(length = 1, sd = 1"
+        ),
+        "{e}"
+    );
     assert!(e.ends_with("at 3 points"), "{e}");
     assert!(Gp::new(vec![0.0; 2], &k, &[0.0, f64::NAN], false).is_err());
     assert!(Gp::new(vec![0.0; 2], &k, &[0.0], false).is_err());

@@ -10,7 +10,10 @@ fn difference(f: impl Fn(f64) -> f64, x: f64) -> f64 {
 }
 
 fn close(got: f64, expected: f64, what: &str) {
-    assert!((got - expected).abs() <= 1e-6 * (1.0 + expected.abs()), "{what}: {got} against {expected}");
+    assert!(
+        (got - expected).abs() <= 1e-6 * (1.0 + expected.abs()),
+        "{what}: {got} against {expected}"
+    );
 }
 
 #[test]
@@ -53,7 +56,11 @@ fn numbers() {
             assert_eq!(g.params.len(), p.len());
             assert_eq!(g.x.len(), d.support().gradient_dim());
             if let [by_x] = g.x[..] {
-                close(by_x, difference(|x| d.log_density_num(x), *x), &format!("{family}{p:?} by x at {x}"));
+                close(
+                    by_x,
+                    difference(|x| d.log_density_num(x), *x),
+                    &format!("{family}{p:?} by x at {x}"),
+                );
             }
             for i in 0..p.len() {
                 if (*family, i) == ("binomial", 0) {
@@ -65,7 +72,11 @@ fn numbers() {
                     p[i] = v;
                     make(family, &p).log_density_num(*x)
                 };
-                close(g.params[i], difference(at, p[i]), &format!("{family}{p:?} by parameter {i} at {x}"));
+                close(
+                    g.params[i],
+                    difference(at, p[i]),
+                    &format!("{family}{p:?} by parameter {i} at {x}"),
+                );
             }
         }
     }
@@ -75,7 +86,8 @@ fn numbers() {
 fn infinite_bounds_and_flat_densities() {
     let half = make("truncated_normal", &[0.5, 2.0, 8.0, INF]);
     let g = half.gradient(&Datum::Num(9.0)).unwrap();
-    let by_lo = difference(|lo| make("truncated_normal", &[0.5, 2.0, lo, INF]).log_density_num(9.0), 8.0);
+    let by_lo =
+        difference(|lo| make("truncated_normal", &[0.5, 2.0, lo, INF]).log_density_num(9.0), 8.0);
     close(g.params[2], by_lo, "by the lower bound");
     assert_eq!(g.params[3], 0.0);
     let flat = make("flat", &[]).gradient(&Datum::Num(9.0)).unwrap();
@@ -97,7 +109,11 @@ fn infinite_bounds_and_flat_densities() {
 fn truth_values() {
     for x in [false, true] {
         let g = make("flip", &[0.3]).gradient(&Datum::Bool(x)).unwrap();
-        close(g.params[0], difference(|p| make("flip", &[p]).log_density_bool(x), 0.3), "flip by p");
+        close(
+            g.params[0],
+            difference(|p| make("flip", &[p]).log_density_bool(x), 0.3),
+            "flip by p",
+        );
         assert!(g.x.is_empty());
     }
     assert!(make("flip", &[0.0]).gradient(&Datum::Bool(true)).is_none());
@@ -105,7 +121,8 @@ fn truth_values() {
 
 #[test]
 fn shares() {
-    // Off the simplex the formula goes on; the density there is taken from the definition.
+    // Off the simplex the formula goes on; the density there is taken from the
+    // definition.
     let (alpha, x) = ([0.5, 2.0, 3.5], [0.2, 0.3, 0.5]);
     let g = make("dirichlet", &alpha).gradient(&x.to_vec().into()).unwrap();
     for i in 0..3 {
@@ -145,10 +162,16 @@ fn vectors_and_products() {
             mean[i] = v;
             MvNormal::from_cov(&mean, &cov).unwrap().log_density(&three(&at))
         };
-        close(mv.gradient(&three(&at)).unwrap().params[i], difference(f, mean[i]), "mv_normal by the mean");
+        close(
+            mv.gradient(&three(&at)).unwrap().params[i],
+            difference(f, mean[i]),
+            "mv_normal by the mean",
+        );
     }
-    let by_scale =
-        difference(|v| Iid::new(make("student_t", &[3.0, 0.0, v]), 3).unwrap().log_density(&three(&at)), 1.0);
+    let by_scale = difference(
+        |v| Iid::new(make("student_t", &[3.0, 0.0, v]), 3).unwrap().log_density(&three(&at)),
+        1.0,
+    );
     close(iid.gradient(&three(&at)).unwrap().params[2], by_scale, "iid by a shared parameter");
 
     let product = Product::new(parts).unwrap();

@@ -16,7 +16,8 @@ fn wishart(df: f64, scale: &[f64]) -> Wishart {
 fn distance(mut xs: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
     xs.sort_by(f64::total_cmp);
     let n = xs.len() as f64;
-    xs.iter().enumerate().map(|(i, x)| ((i as f64 + 0.5) / n - cdf(*x)).abs()).fold(0.0, f64::max) * n.sqrt()
+    xs.iter().enumerate().map(|(i, x)| ((i as f64 + 0.5) / n - cdf(*x)).abs()).fold(0.0, f64::max)
+        * n.sqrt()
 }
 
 #[test]
@@ -33,7 +34,8 @@ fn correlations_have_beta_marginals() {
                 &l * l.transpose()
             })
             .collect();
-        // Every correlation is 2 beta(a, a) - 1 with a = eta + n / 2 - 1 (Lewandowski et al. 2009).
+        // Every correlation is 2 beta(a, a) - 1 with a = eta + n / 2 - 1 (Lewandowski et
+        // al. 2009).
         let a = eta + 0.5 * n as f64 - 1.0;
         let marginal = Beta::new(a, a).unwrap();
         for i in 0..n {
@@ -69,7 +71,8 @@ fn correlation_factors_integrate_to_one() {
     for i in -40..=40 {
         for j in -40..=40 {
             for k in -40..=40 {
-                let (x, jacobian) = s.from_free(&[h * f64::from(i), h * f64::from(j), h * f64::from(k)]);
+                let (x, jacobian) =
+                    s.from_free(&[h * f64::from(i), h * f64::from(j), h * f64::from(k)]);
                 total += (d.log_density(&x) + jacobian).exp() * h * h * h;
             }
         }
@@ -85,7 +88,8 @@ fn covariance_factors_integrate_to_one() {
     for i in -60..=20 {
         for j in -75..=75 {
             for k in -60..=20 {
-                let (x, jacobian) = s.from_free(&[h * f64::from(i), h * f64::from(j), h * f64::from(k)]);
+                let (x, jacobian) =
+                    s.from_free(&[h * f64::from(i), h * f64::from(j), h * f64::from(k)]);
                 total += (d.log_density(&x) + jacobian).exp() * h * h * h;
             }
         }
@@ -117,9 +121,15 @@ fn wishart_draws_have_their_moments() {
         for j in 0..3 {
             let expected = df * v[(i, j)];
             let variance = df * (v[(i, j)] * v[(i, j)] + v[(i, i)] * v[(j, j)]);
-            assert!((mean[(i, j)] - expected).abs() < 5.0 * (variance / f64::from(n)).sqrt(), "mean at ({i}, {j})");
+            assert!(
+                (mean[(i, j)] - expected).abs() < 5.0 * (variance / f64::from(n)).sqrt(),
+                "mean at ({i}, {j})"
+            );
             let got = squares[(i, j)] - mean[(i, j)] * mean[(i, j)];
-            assert!((got / variance - 1.0).abs() < 0.06, "variance at ({i}, {j}): {got} against {variance}");
+            assert!(
+                (got / variance - 1.0).abs() < 0.06,
+                "variance at ({i}, {j}): {got} against {variance}"
+            );
         }
     }
     // A diagonal entry is chi-squared.
@@ -129,8 +139,15 @@ fn wishart_draws_have_their_moments() {
     assert!(k < 2.2, "{k}");
 }
 
-/// Gradients of log p(x(y)) + log |dx/dy| through the transform, and by the last parameter.
-fn check_gradient(d: &dyn Distribution, moved: &dyn Fn(f64) -> f64, at: f64, y: &[f64], which: usize) {
+/// Gradients of log p(x(y)) + log |dx/dy| through the transform, and by the last
+/// parameter.
+fn check_gradient(
+    d: &dyn Distribution,
+    moved: &dyn Fn(f64) -> f64,
+    at: f64,
+    y: &[f64],
+    which: usize,
+) {
     let s = d.support();
     let (x, _) = s.from_free(y);
     let g = d.gradient(&x).unwrap();
@@ -146,10 +163,18 @@ fn check_gradient(d: &dyn Distribution, moved: &dyn Fn(f64) -> f64, at: f64, y: 
             d.log_density(&x) + jacobian
         };
         let expected = (total(h) - total(-h)) / (2.0 * h);
-        assert!((got[j] - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{j}: {} against {expected}", got[j]);
+        assert!(
+            (got[j] - expected).abs() < 1e-6 * (1.0 + expected.abs()),
+            "{j}: {} against {expected}",
+            got[j]
+        );
     }
     let expected = (moved(at + h) - moved(at - h)) / (2.0 * h);
-    assert!((g.params[which] - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{:?} against {expected}", g.params);
+    assert!(
+        (g.params[which] - expected).abs() < 1e-6 * (1.0 + expected.abs()),
+        "{:?} against {expected}",
+        g.params
+    );
 }
 
 #[test]
@@ -167,9 +192,13 @@ fn gradients_are_those_of_differences() {
 #[test]
 fn what_is_no_factor_is_impossible() {
     let d = make("lkj", &[2.0, 1.0]);
-    let rows = |xs: [f64; 4]| Datum::List(vec![vec![xs[0], xs[1]].into(), vec![xs[2], xs[3]].into()].into());
+    let rows = |xs: [f64; 4]| {
+        Datum::List(vec![vec![xs[0], xs[1]].into(), vec![xs[2], xs[3]].into()].into())
+    };
     assert_eq!(d.log_density(&rows([1.0, 0.0, 0.6, 0.8])), (0.5f64).ln());
-    for bad in [[1.0, 0.1, 0.6, 0.8], [1.0, 0.0, 0.6, 0.9], [1.0, 0.0, 0.6, -0.8], [-1.0, 0.0, 0.6, 0.8]] {
+    for bad in
+        [[1.0, 0.1, 0.6, 0.8], [1.0, 0.0, 0.6, 0.9], [1.0, 0.0, 0.6, -0.8], [-1.0, 0.0, 0.6, 0.8]]
+    {
         assert_eq!(d.log_density(&rows(bad)), f64::NEG_INFINITY, "{bad:?}");
     }
     let w = wishart(2.0, &[1.0, 0.0, 0.0, 1.0]);
@@ -177,7 +206,10 @@ fn what_is_no_factor_is_impossible() {
         assert_eq!(w.log_density(&rows(bad)), f64::NEG_INFINITY, "{bad:?}");
     }
     let message = |df: f64, s: &[f64]| Wishart::new(df, &square(2, s)).unwrap_err().to_string();
-    assert_eq!(message(1.0, &[1.0, 0.0, 0.0, 1.0]), "wishart: df must be above the number of rows minus 1, got 1");
+    assert_eq!(
+        message(1.0, &[1.0, 0.0, 0.0, 1.0]),
+        "wishart: df must be above the number of rows minus 1, got 1"
+    );
     assert!(message(3.0, &[1.0, 0.5, 0.0, 1.0]).contains("lower triangular"));
     assert!(message(3.0, &[1.0, 0.0, 0.0, 0.0]).contains("positive diagonal"));
     assert!(Wishart::new(3.0, &DMatrix::zeros(0, 0)).is_err());
@@ -186,14 +218,17 @@ fn what_is_no_factor_is_impossible() {
 #[test]
 fn whitened_vectors_follow_their_parameters() {
     let cov = square(2, &[2.0, 0.6, 0.6, 1.0]);
-    let d = |m: f64| Dist::MvNormal(Arc::new(MvNormal::from_cov(&[m, 0.0], &cov).unwrap().to_whitened()));
+    let d = |m: f64| {
+        Dist::MvNormal(Arc::new(MvNormal::from_cov(&[m, 0.0], &cov).unwrap().to_whitened()))
+    };
     let z = d(1.0).sample_stored(&mut stream(802));
     let (near, far) = (numbers(&d(1.0).realise(&z)), numbers(&d(5.0).realise(&z)));
     assert!((far[0] - near[0] - 4.0).abs() < 1e-12 && (far[1] - near[1]).abs() < 1e-12);
     assert_eq!(d(1.0).log_density_stored(&z), d(5.0).log_density_stored(&z));
     let back = d(1.0).unrealise(&d(1.0).realise(&z)).unwrap();
     assert!(numbers(&back).iter().zip(numbers(&z)).all(|(a, b)| (a - b).abs() < 1e-12));
-    // The densities of the two forms differ by the map's Jacobian, the factor's determinant.
+    // The densities of the two forms differ by the map's Jacobian, the factor's
+    // determinant.
     let x = d(1.0).realise(&z);
     let jacobian = 0.5 * cov.determinant().ln();
     assert!((d(1.0).log_density_stored(&z) - d(1.0).log_density(&x) - jacobian).abs() < 1e-12);

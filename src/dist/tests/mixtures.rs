@@ -12,10 +12,18 @@ fn pair(mean: [f64; 2], cov: f64) -> Dist {
 
 #[test]
 fn densities_are_weighted_means() {
-    let parts = vec![make("normal", &[0.0, 1.0]), make("normal", &[3.0, 0.5]), make("uniform", &[-1.0, 1.0])];
+    let parts = vec![
+        make("normal", &[0.0, 1.0]),
+        make("normal", &[3.0, 0.5]),
+        make("uniform", &[-1.0, 1.0]),
+    ];
     let d = mixed(&[1.0, 2.0, 5.0], parts.clone());
     for x in [-0.5, 0.0, 2.9, -1.5] {
-        let p: f64 = parts.iter().zip([1.0, 2.0, 5.0]).map(|(d, w)| w / 8.0 * d.log_density_num(x).exp()).sum();
+        let p: f64 = parts
+            .iter()
+            .zip([1.0, 2.0, 5.0])
+            .map(|(d, w)| w / 8.0 * d.log_density_num(x).exp())
+            .sum();
         assert!((d.log_density(&Datum::Num(x)) - p.ln()).abs() < 1e-12);
         let shares = d.responsibilities(&Datum::Num(x)).unwrap();
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-14);
@@ -33,7 +41,10 @@ fn densities_are_weighted_means() {
 fn gradients_go_by_responsibilities() {
     let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-7 * (1.0 + b.abs()), "{a} against {b}");
     let make_it = |p: [f64; 6]| {
-        mixed(&p[..2], vec![make("normal", &p[2..4]), make("truncated_normal", &[p[4], p[5], -0.5, INF])])
+        mixed(
+            &p[..2],
+            vec![make("normal", &p[2..4]), make("truncated_normal", &[p[4], p[5], -0.5, INF])],
+        )
     };
     let p = [1.0, 2.5, 0.3, 1.2, 1.0, 0.7];
     for x in [0.2, 1.5, -1.0] {
@@ -101,19 +112,42 @@ fn components_must_have_the_same_kind_of_values() {
         message(&[1.0, 1.0], vec![number.clone(), flip.clone()]),
         "mixture: components must have the same kind of values, got normal, flip"
     );
-    assert!(message(&[1.0, 1.0], vec![number.clone(), pair([0.0; 2], 0.0)]).contains("the same kind"));
-    assert!(message(&[1.0, 1.0], vec![number.clone(), make("poisson", &[1.0])]).contains("the same kind"));
-    assert!(message(&[1.0], vec![number.clone(), number.clone()]).contains("one number per component"));
+    assert!(
+        message(&[1.0, 1.0], vec![number.clone(), pair([0.0; 2], 0.0)]).contains("the same kind")
+    );
+    assert!(
+        message(&[1.0, 1.0], vec![number.clone(), make("poisson", &[1.0])])
+            .contains("the same kind")
+    );
+    assert!(
+        message(&[1.0], vec![number.clone(), number.clone()]).contains("one number per component")
+    );
     assert!(message(&[], vec![]).contains("weights"));
-    assert!(message(&[-1.0, 2.0], vec![number.clone(), number.clone()]).starts_with("mixture: weights"));
+    assert!(
+        message(&[-1.0, 2.0], vec![number.clone(), number.clone()]).starts_with("mixture: weights")
+    );
     assert!(message(&[1.0], vec![make("flat", &[])]).contains("proper"));
-    let supports = |a: &str, p: &[f64], b: &str, q: &[f64]| mixed(&[1.0, 1.0], vec![make(a, p), make(b, q)]).support();
+    let supports = |a: &str, p: &[f64], b: &str, q: &[f64]| {
+        mixed(&[1.0, 1.0], vec![make(a, p), make(b, q)]).support()
+    };
     assert_eq!(supports("gamma", &[1.0, 1.0], "weibull", &[1.0, 1.0]), Support::Positive);
-    assert_eq!(supports("gamma", &[1.0, 1.0], "uniform", &[-3.0, 1.0]), Support::AtLeast { lo: -3.0 });
-    assert_eq!(supports("beta", &[1.0, 1.0], "uniform", &[-3.0, 0.5]), Support::Interval { lo: -3.0, hi: 1.0 });
-    assert_eq!(supports("poisson", &[1.0], "binomial", &[4.0, 0.5]), Support::Integers { lo: 0, hi: None });
+    assert_eq!(
+        supports("gamma", &[1.0, 1.0], "uniform", &[-3.0, 1.0]),
+        Support::AtLeast { lo: -3.0 }
+    );
+    assert_eq!(
+        supports("beta", &[1.0, 1.0], "uniform", &[-3.0, 0.5]),
+        Support::Interval { lo: -3.0, hi: 1.0 }
+    );
+    assert_eq!(
+        supports("poisson", &[1.0], "binomial", &[4.0, 0.5]),
+        Support::Integers { lo: 0, hi: None }
+    );
     let vectors = Dist::Iid(Arc::new(Iid::new(number.clone(), 2).unwrap()));
-    assert_eq!(mixed(&[1.0, 1.0], vec![vectors, pair([0.0; 2], 0.3)]).support(), Support::Vector(2));
+    assert_eq!(
+        mixed(&[1.0, 1.0], vec![vectors, pair([0.0; 2], 0.3)]).support(),
+        Support::Vector(2)
+    );
     assert_eq!(mixed(&[1.0, 2.0], vec![flip.clone(), flip]).support(), Support::Boolean);
 }
 
@@ -121,7 +155,9 @@ fn components_must_have_the_same_kind_of_values() {
 fn improper_distributions_say_so() {
     assert!(make("flat", &[]).is_improper() && !make("normal", &[0.0, 1.0]).is_improper());
     assert!(Iid::new(make("flat", &[]), 2).unwrap().is_improper());
-    assert!(Product::new(vec![make("normal", &[0.0, 1.0]), make("flat", &[])]).unwrap().is_improper());
+    assert!(
+        Product::new(vec![make("normal", &[0.0, 1.0]), make("flat", &[])]).unwrap().is_improper()
+    );
     assert!(Ordered::new(make("flat", &[]), 2).unwrap().is_improper());
     let message = |d: Dist| Ordered::new(d, 2).unwrap_err().to_string();
     assert_eq!(

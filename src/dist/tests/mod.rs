@@ -1,5 +1,5 @@
-//! Tests of the families as a whole: samplers, gradients, transforms, normalisation, edges. Values of log densities are checked in
-//! `tests/dist_reference.rs`.
+//! Tests of the families as a whole: samplers, gradients, transforms, normalisation,
+//! edges. Values of log densities are checked in `tests/dist_reference.rs`.
 
 mod edges;
 mod gaussian;
@@ -43,7 +43,9 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
         "half_normal" => Dist::HalfNormal(HalfNormal::new(p[0])?),
         "half_cauchy" => Dist::HalfCauchy(HalfCauchy::new(p[0], p[1])?),
         "student_t" => Dist::StudentT(StudentT::new(p[0], p[1], p[2])?),
-        "truncated_normal" => Dist::TruncatedNormal(Arc::new(TruncatedNormal::new(p[0], p[1], p[2], p[3])?)),
+        "truncated_normal" => {
+            Dist::TruncatedNormal(Arc::new(TruncatedNormal::new(p[0], p[1], p[2], p[3])?))
+        }
         "inv_gamma" => Dist::InvGamma(InvGamma::new(p[0], p[1])?),
         "cauchy" => Dist::Cauchy(Cauchy::new(p[0], p[1])?),
         "laplace" => Dist::Laplace(Laplace::new(p[0], p[1])?),

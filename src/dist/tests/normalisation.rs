@@ -95,8 +95,10 @@ fn angles_sides_and_heavy_tails_integrate_to_one() {
         let n = 2000;
         let h = std::f64::consts::TAU / f64::from(n);
         // Equal steps around the circle: exact for periodic functions as smooth as these.
-        let total: f64 =
-            (1..=n).map(|i| d.log_density_num(-std::f64::consts::PI + h * f64::from(i)).exp()).sum::<f64>() * h;
+        let total: f64 = (1..=n)
+            .map(|i| d.log_density_num(-std::f64::consts::PI + h * f64::from(i)).exp())
+            .sum::<f64>()
+            * h;
         assert!((total - 1.0).abs() < 1e-9, "{p:?}: {total}");
     }
     // The Laplace density has a kink, so each side by itself.
@@ -106,17 +108,24 @@ fn angles_sides_and_heavy_tails_integrate_to_one() {
         (-4000..1000).map(|i| at(0.01 * f64::from(i))).sum::<f64>() * 0.01
     };
     assert!((side(1.0) - 0.5).abs() < 1e-9 && (side(-1.0) - 0.5).abs() < 1e-9);
-    // The Cauchy distribution's tails are too heavy for the rule; over the angle it is uniform.
+    // The Cauchy distribution's tails are too heavy for the rule; over the angle it is
+    // uniform.
     let d = make("cauchy", &[1.0, 0.5]);
     for t in [-1.5f64, -0.2, 0.0, 1.4] {
         let x = 1.0 + 0.5 * t.tan();
-        assert!((d.log_density_num(x).exp() * 0.5 / (t.cos() * t.cos()) * std::f64::consts::PI - 1.0).abs() < 1e-12);
+        assert!(
+            (d.log_density_num(x).exp() * 0.5 / (t.cos() * t.cos()) * std::f64::consts::PI - 1.0)
+                .abs()
+                < 1e-12
+        );
     }
 }
 
 #[test]
 fn counts_of_kinds_sum_to_one() {
-    for (n, weights) in [(0, [1.0, 1.0, 1.0]), (7, [0.2, 3.0, 1.0]), (40, [1.0, 0.0, 2.0]), (90, [1.0, 5.0, 2.0])] {
+    for (n, weights) in
+        [(0, [1.0, 1.0, 1.0]), (7, [0.2, 3.0, 1.0]), (40, [1.0, 0.0, 2.0]), (90, [1.0, 5.0, 2.0])]
+    {
         let d = Multinomial::new(f64::from(n), &weights).unwrap();
         let mut total = 0.0;
         for i in 0..=n {
@@ -151,11 +160,16 @@ fn vectors_integrate_to_one() {
     check(&Ordered::new(make("normal", &[1.0, 1.5]), 2).unwrap(), 40.0, 0.05);
     check(&Ordered::new(make("uniform", &[0.0, 3.0]), 2).unwrap(), 40.0, 0.05);
     let one = make("normal", &[0.0, 1.0]);
-    let pair = |m: f64| Dist::Product(Arc::new(Product::new(vec![make("normal", &[m, 0.7]), one.clone()]).unwrap()));
+    let pair = |m: f64| {
+        Dist::Product(Arc::new(Product::new(vec![make("normal", &[m, 0.7]), one.clone()]).unwrap()))
+    };
     check(&Mixture::new(&[1.0, 3.0], vec![pair(-2.0), pair(1.0)]).unwrap(), 12.0, 0.05);
     // Numbers on intervals that do not agree.
-    let mixed = Mixture::new(&[1.0, 1.0], vec![make("gamma", &[2.0, 1.0]), make("normal", &[0.0, 2.0])]).unwrap();
+    let mixed =
+        Mixture::new(&[1.0, 1.0], vec![make("gamma", &[2.0, 1.0]), make("normal", &[0.0, 2.0])])
+            .unwrap();
     assert_eq!(mixed.support(), Support::Real);
-    let total: f64 = (-40_000..40_000).map(|i| mixed.log_density(&Datum::Num(f64::from(i) * 1e-3)).exp()).sum();
+    let total: f64 =
+        (-40_000..40_000).map(|i| mixed.log_density(&Datum::Num(f64::from(i) * 1e-3)).exp()).sum();
     assert!((total * 1e-3 - 1.0).abs() < 1e-6, "{total}");
 }

@@ -1,5 +1,5 @@
-//! Draws against distribution functions that do not come from here (Kolmogorov-Smirnov), or against the probabilities of the
-//! reference-checked log densities (chi-square).
+//! Draws against distribution functions that do not come from here (Kolmogorov-Smirnov),
+//! or against the probabilities of the reference-checked log densities (chi-square).
 
 use super::*;
 use crate::num::{log_normal_cdf, normal_cdf};
@@ -20,8 +20,9 @@ fn draws(d: &Dist, site: u64) -> Vec<f64> {
         .collect()
 }
 
-/// sqrt(n) times the greatest distance between the draws' distribution function and the given one, looked at from above so that
-/// draws piled up at the ends of the doubles are right.
+/// sqrt(n) times the greatest distance between the draws' distribution function and the
+/// given one, looked at from above so that draws piled up at the ends of the doubles are
+/// right.
 fn distance(mut xs: Vec<f64>, cdf: &dyn Fn(f64) -> f64) -> f64 {
     xs.sort_by(f64::total_cmp);
     let n = xs.len() as f64;
@@ -34,7 +35,8 @@ fn continuous_draws_follow_their_distribution_functions() {
     type Cdf = Box<dyn Fn(f64) -> f64>;
     let beta = |a, b| -> Cdf { Box::new(move |x| s::Beta::new(a, b).unwrap().cdf(x)) };
     let gamma = |a, b| -> Cdf { Box::new(move |x| s::Gamma::new(a, b).unwrap().cdf(x)) };
-    let student = |v, m, k| -> Cdf { Box::new(move |x| s::StudentsT::new(m, k, v).unwrap().cdf(x)) };
+    let student =
+        |v, m, k| -> Cdf { Box::new(move |x| s::StudentsT::new(m, k, v).unwrap().cdf(x)) };
     let between = |lo, hi| -> Cdf {
         let (from, all) = (normal_cdf(lo), normal_cdf(hi) - normal_cdf(lo));
         Box::new(move |x| (normal_cdf(x) - from) / all)
@@ -54,8 +56,16 @@ fn continuous_draws_follow_their_distribution_functions() {
         ("gamma", vec![1000.0, 1.0], gamma(1000.0, 1.0)),
         ("exponential", vec![0.2], Box::new(|x| -(-0.2 * x).exp_m1())),
         ("half_normal", vec![2.0], Box::new(|x| 2.0 * normal_cdf(x / 2.0) - 1.0)),
-        ("half_cauchy", vec![-1.0, 3.0], Box::new(|x: f64| ((x + 1.0) / 3.0).atan() * std::f64::consts::FRAC_2_PI)),
-        ("student_t", vec![1.0, 0.0, 1.0], Box::new(|x: f64| 0.5 + x.atan() * std::f64::consts::FRAC_1_PI)),
+        (
+            "half_cauchy",
+            vec![-1.0, 3.0],
+            Box::new(|x: f64| ((x + 1.0) / 3.0).atan() * std::f64::consts::FRAC_2_PI),
+        ),
+        (
+            "student_t",
+            vec![1.0, 0.0, 1.0],
+            Box::new(|x: f64| 0.5 + x.atan() * std::f64::consts::FRAC_1_PI),
+        ),
         ("student_t", vec![4.0, 1.0, 0.5], student(4.0, 1.0, 0.5)),
         ("student_t", vec![0.2, 0.0, 1.0], student(0.2, 0.0, 1.0)),
         ("student_t", vec![500.0, 0.0, 1.0], student(500.0, 0.0, 1.0)),
@@ -77,13 +87,27 @@ fn continuous_draws_follow_their_distribution_functions() {
             vec![5.0, 0.1, -INF, 2.0],
             Box::new(|x: f64| (log_normal_cdf((x - 5.0) / 0.1) - log_normal_cdf(-30.0)).exp()),
         ),
-        ("inv_gamma", vec![3.5, 2.0], Box::new(|x: f64| 1.0 - s::Gamma::new(3.5, 2.0).unwrap().cdf(1.0 / x))),
-        ("inv_gamma", vec![0.2, 2.0], Box::new(|x: f64| 1.0 - s::Gamma::new(0.2, 2.0).unwrap().cdf(1.0 / x))),
-        ("cauchy", vec![1.0, 3.0], Box::new(|x: f64| 0.5 + ((x - 1.0) / 3.0).atan() * std::f64::consts::FRAC_1_PI)),
+        (
+            "inv_gamma",
+            vec![3.5, 2.0],
+            Box::new(|x: f64| 1.0 - s::Gamma::new(3.5, 2.0).unwrap().cdf(1.0 / x)),
+        ),
+        (
+            "inv_gamma",
+            vec![0.2, 2.0],
+            Box::new(|x: f64| 1.0 - s::Gamma::new(0.2, 2.0).unwrap().cdf(1.0 / x)),
+        ),
+        (
+            "cauchy",
+            vec![1.0, 3.0],
+            Box::new(|x: f64| 0.5 + ((x - 1.0) / 3.0).atan() * std::f64::consts::FRAC_1_PI),
+        ),
         (
             "laplace",
             vec![0.0, 2.0],
-            Box::new(|x: f64| if x < 0.0 { 0.5 * (x / 2.0).exp() } else { 1.0 - 0.5 * (-x / 2.0).exp() }),
+            Box::new(
+                |x: f64| if x < 0.0 { 0.5 * (x / 2.0).exp() } else { 1.0 - 0.5 * (-x / 2.0).exp() },
+            ),
         ),
         ("weibull", vec![0.4, 3.0], Box::new(|x: f64| -(-(x / 3.0).powf(0.4)).exp_m1())),
         ("weibull", vec![7.0, 3.0], Box::new(|x: f64| -(-(x / 3.0).powf(7.0)).exp_m1())),
@@ -195,7 +219,10 @@ fn draws_have_the_stated_moments() {
     assert!(make("student_t", &[1.0, 0.0, 1.0]).mean().is_none());
     assert!(make("half_cauchy", &[0.0, 1.0]).mean().is_none());
     assert!(make("cauchy", &[0.0, 1.0]).mean().is_none());
-    assert!(make("inv_gamma", &[1.0, 1.0]).mean().is_none() && make("inv_gamma", &[2.0, 1.0]).sd().is_none());
+    assert!(
+        make("inv_gamma", &[1.0, 1.0]).mean().is_none()
+            && make("inv_gamma", &[2.0, 1.0]).sd().is_none()
+    );
     // Cut at the mean: the two halves of a normal.
     for (lo, hi, side) in [(1.0, INF, 1.0), (-INF, 1.0, -1.0)] {
         let mean = make("truncated_normal", &[1.0, 2.0, lo, hi]).mean().unwrap();
@@ -222,7 +249,9 @@ fn certain_draws_are_certain() {
     for (p, x) in [(0.0, false), (1.0, true)] {
         assert!((0..500).all(|_| make("flip", &[p]).sample(&mut rng) == Datum::Bool(x)));
     }
-    let heads = (0..DRAWS).filter(|_| make("flip", &[0.3]).sample(&mut rng) == Datum::Bool(true)).count() as f64;
+    let heads = (0..DRAWS)
+        .filter(|_| make("flip", &[0.3]).sample(&mut rng) == Datum::Bool(true))
+        .count() as f64;
     assert!((heads / DRAWS as f64 - 0.3).abs() < 0.013, "{heads}");
 }
 
@@ -248,13 +277,18 @@ fn shares_have_beta_marginals() {
 
 #[test]
 fn angles_fill_cells_of_equal_probability() {
-    for (i, p) in [[1.0, 1e-9], [0.5, 0.7], [-3.0, 3.0], [3.1, 50.0], [0.0, 1e5]].into_iter().enumerate() {
+    for (i, p) in
+        [[1.0, 1e-9], [0.5, 0.7], [-3.0, 3.0], [3.1, 50.0], [0.0, 1e5]].into_iter().enumerate()
+    {
         let d = make("von_mises", &p);
         let xs = draws(&d, 420 + i as u64);
         // The distribution function by steps around the mean, from its opposite on.
         let (steps, reach) = (20_000, PI.min(12.0 / p[1].sqrt()));
         let h = 2.0 * reach / f64::from(steps);
-        let at = |k: i32| make("von_mises", &[0.0, p[1]]).log_density_num(-reach + h * (f64::from(k) + 0.5)).exp() * h;
+        let at = |k: i32| {
+            make("von_mises", &[0.0, p[1]]).log_density_num(-reach + h * (f64::from(k) + 0.5)).exp()
+                * h
+        };
         let mut sums = vec![0.0];
         (0..steps).for_each(|k| sums.push(sums[k as usize] + at(k)));
         let turned: Vec<f64> = xs.iter().map(|x| ((x - p[0] + PI).rem_euclid(TAU)) - PI).collect();
@@ -281,7 +315,8 @@ fn counts_of_kinds_have_binomial_marginals() {
     }
     // Two counts together: n p q less.
     let (mean, n) = ([4.0, 6.0], DRAWS as f64);
-    let covariance: f64 = xs.iter().map(|x| (numbers(x)[0] - mean[0]) * (numbers(x)[3] - mean[1])).sum::<f64>() / n;
+    let covariance: f64 =
+        xs.iter().map(|x| (numbers(x)[0] - mean[0]) * (numbers(x)[3] - mean[1])).sum::<f64>() / n;
     assert!((covariance + 12.0 / 3.0 / 2.0).abs() < 0.1, "{covariance}");
 }
 

@@ -1,4 +1,5 @@
-//! The maps to unconstrained space: round trips, Jacobians and gradients by finite differences, extreme points.
+//! The maps to unconstrained space: round trips, Jacobians and gradients by finite
+//! differences, extreme points.
 
 use super::*;
 use nalgebra::DMatrix;
@@ -29,7 +30,13 @@ fn supports() -> Vec<Support> {
         Support::Product(Box::new(Support::Positive), 3),
         Support::Product(Box::new(Support::Simplex(3)), 2),
         Support::Each(
-            vec![Support::Interval { lo: 0.0, hi: 1.0 }, Support::Boolean, Support::Simplex(3), Support::Real].into(),
+            vec![
+                Support::Interval { lo: 0.0, hi: 1.0 },
+                Support::Boolean,
+                Support::Simplex(3),
+                Support::Real,
+            ]
+            .into(),
         ),
     ]
 }
@@ -37,7 +44,8 @@ fn supports() -> Vec<Support> {
 fn points(s: &Support) -> Vec<Vec<f64>> {
     let mut rng = stream(500);
     // Gaps add up: far ones would leave an interval to rounding.
-    let spread = if matches!(s, Support::Ascending(one, _) if **one != Support::Real) { 0.5 } else { 2.0 };
+    let spread =
+        if matches!(s, Support::Ascending(one, _) if **one != Support::Real) { 0.5 } else { 2.0 };
     (0..20).map(|_| (0..s.free_dim()).map(|_| spread * rng.standard_normal()).collect()).collect()
 }
 
@@ -57,7 +65,10 @@ fn there_and_back() {
             let mut back = vec![7.0];
             s.to_free(&x, &mut back);
             assert_eq!(back.len(), 1 + y.len());
-            assert!(y.iter().zip(&back[1..]).all(|(a, b)| same(&s, *a, *b)), "{s:?}: {y:?} against {back:?}");
+            assert!(
+                y.iter().zip(&back[1..]).all(|(a, b)| same(&s, *a, *b)),
+                "{s:?}: {y:?} against {back:?}"
+            );
         }
     }
 }
@@ -74,14 +85,20 @@ fn points_at_an_end_or_beyond_are_the_nearest_inside() {
         assert_eq!(kept(&between, -2.0 - by), (-2f64).next_up());
         assert_eq!(kept(&between, 5.0 + by), 5f64.next_down());
     }
-    assert!(kept(&Support::Positive, INF) > 1e300 && kept(&above, INF) > 1e300 && kept(&below, -INF) < -1e300);
+    assert!(
+        kept(&Support::Positive, INF) > 1e300
+            && kept(&above, INF) > 1e300
+            && kept(&below, -INF) < -1e300
+    );
 }
 
 #[test]
 fn products_are_made_part_by_part() {
     let dice = Support::Product(Box::new(Support::Integers { lo: 1, hi: Some(6) }), 3);
     assert_eq!(dice.from_free(&[]), (Datum::from(vec![1.0; 3]), 0.0));
-    for one in [Support::Simplex(2), Support::Vector(1), Support::Ascending(Box::new(Support::Real), 1)] {
+    for one in
+        [Support::Simplex(2), Support::Vector(1), Support::Ascending(Box::new(Support::Real), 1)]
+    {
         let s = Support::Product(Box::new(one.clone()), 2);
         let (x, jacobian) = s.from_free(&[0.3, -0.8]);
         let parts = [0.3, -0.8].map(|y| one.from_free(&[y]));
@@ -91,17 +108,26 @@ fn products_are_made_part_by_part() {
     }
 }
 
-/// The coordinates that a density of `s` is by: all numbers, but for the last share of each simplex.
+/// The coordinates that a density of `s` is by: all numbers, but for the last share of
+/// each simplex.
 fn independent(s: &Support, x: &Datum) -> Vec<f64> {
     match (s, x) {
         (Support::Simplex(n), x) => numbers(x)[..n - 1].to_vec(),
         (Support::Counts { .. }, _) => Vec::new(),
-        (Support::CorrelationFactor(n), x) => (0..*n).flat_map(|i| numbers(x)[i * n..i * n + i].to_vec()).collect(),
-        (Support::CovarianceFactor(n), x) => (0..*n).flat_map(|i| numbers(x)[i * n..=i * n + i].to_vec()).collect(),
-        (Support::Product(one, n), x) => (0..*n).flat_map(|i| independent(one, &x.element(i).unwrap())).collect(),
-        (Support::Each(all), x) => {
-            all.iter().enumerate().flat_map(|(i, s)| independent(s, &x.element(i).unwrap())).collect()
+        (Support::CorrelationFactor(n), x) => {
+            (0..*n).flat_map(|i| numbers(x)[i * n..i * n + i].to_vec()).collect()
         }
+        (Support::CovarianceFactor(n), x) => {
+            (0..*n).flat_map(|i| numbers(x)[i * n..=i * n + i].to_vec()).collect()
+        }
+        (Support::Product(one, n), x) => {
+            (0..*n).flat_map(|i| independent(one, &x.element(i).unwrap())).collect()
+        }
+        (Support::Each(all), x) => all
+            .iter()
+            .enumerate()
+            .flat_map(|(i, s)| independent(s, &x.element(i).unwrap()))
+            .collect(),
         _ => numbers(x),
     }
 }
@@ -124,7 +150,11 @@ fn jacobians_are_those_of_finite_differences() {
             let columns: Vec<Vec<f64>> = (0..n).map(column).collect();
             let det = DMatrix::from_fn(n, n, |i, j| columns[j][i]).determinant().abs();
             let (_, jacobian) = s.from_free(&y);
-            assert!((det.ln() - jacobian).abs() < 1e-5, "{s:?} at {y:?}: {} against {jacobian}", det.ln());
+            assert!(
+                (det.ln() - jacobian).abs() < 1e-5,
+                "{s:?} at {y:?}: {} against {jacobian}",
+                det.ln()
+            );
         }
     }
 }
@@ -133,7 +163,8 @@ fn jacobians_are_those_of_finite_differences() {
 fn gradients_pull_back() {
     // For log p = sum of sin(w_i x_i), with a weight for each number.
     let weight = |i: usize| 0.5 + i as f64;
-    let log_p = |x: &Datum| numbers(x).iter().enumerate().map(|(i, x)| (weight(i) * x).sin()).sum::<f64>();
+    let log_p =
+        |x: &Datum| numbers(x).iter().enumerate().map(|(i, x)| (weight(i) * x).sin()).sum::<f64>();
     for s in supports() {
         for y in points(&s) {
             let total = |y: &[f64]| {
@@ -153,9 +184,14 @@ fn gradients_pull_back() {
                 up[j] += 1e-6;
                 down[j] -= 1e-6;
                 let expected = (total(&up) - total(&down)) / 2e-6;
-                // Where x itself is large, the phase of the sine is what limits the difference.
+                // Where x itself is large, the phase of the sine is what limits the
+                // difference.
                 let scale = 1.0 + expected.abs() + by_x.iter().map(|b| b.abs()).sum::<f64>();
-                assert!((got[j] - expected).abs() < 1e-4 * scale, "{s:?} at {y:?}: {} against {expected}", got[j]);
+                assert!(
+                    (got[j] - expected).abs() < 1e-4 * scale,
+                    "{s:?} at {y:?}: {} against {expected}",
+                    got[j]
+                );
             }
         }
     }
@@ -164,7 +200,19 @@ fn gradients_pull_back() {
 #[test]
 fn extreme_points_stay_finite_and_inside() {
     for s in supports() {
-        for far in [-1e308, -1e4, -800.0, -40.0, 40.0, 800.0, 1e4, 1e308, f64::INFINITY, f64::NEG_INFINITY, f64::NAN] {
+        for far in [
+            -1e308,
+            -1e4,
+            -800.0,
+            -40.0,
+            40.0,
+            800.0,
+            1e4,
+            1e308,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
+        ] {
             let (x, jacobian) = s.from_free(&vec![far; s.free_dim()]);
             assert!(s.contains(&x) && jacobian.is_finite(), "{s:?} at {far}: {x:?}, {jacobian}");
             let mut back = Vec::new();
@@ -198,7 +246,8 @@ fn extreme_points_stay_finite_and_inside() {
 #[test]
 fn values_that_do_not_fit_have_as_many_coordinates() {
     for s in supports() {
-        for x in [Datum::Bool(true), Datum::Num(0.5), vec![0.5].into(), Datum::List(vec![].into())] {
+        for x in [Datum::Bool(true), Datum::Num(0.5), vec![0.5].into(), Datum::List(vec![].into())]
+        {
             let mut y = Vec::new();
             s.to_free(&x, &mut y);
             assert_eq!(y.len(), s.free_dim(), "{s:?} {x:?}");

@@ -1,4 +1,5 @@
-//! Any distribution between bounds: normalised, exact in the tails, drawn right, with its derivatives; bounds without sense.
+//! Any distribution between bounds: normalised, exact in the tails, drawn right, with its
+//! derivatives; bounds without sense.
 
 use super::*;
 use crate::dist::truncated;
@@ -35,7 +36,10 @@ fn cut(family: &str, p: &[f64], lo: f64, hi: f64) -> Dist {
 }
 
 fn close(found: f64, wanted: f64, tolerance: f64) {
-    assert!(found == wanted || (found - wanted).abs() <= tolerance * wanted.abs().max(1.0), "{found} is not {wanted}");
+    assert!(
+        found == wanted || (found - wanted).abs() <= tolerance * wanted.abs().max(1.0),
+        "{found} is not {wanted}"
+    );
 }
 
 #[test]
@@ -45,12 +49,15 @@ fn densities_integrate_to_one() {
             let d = cut(family, p, lo, hi);
             let n = 4000;
             let h = (hi - lo) / f64::from(n);
-            let sum: f64 = (0..n).map(|i| d.log_density_num(lo + (f64::from(i) + 0.5) * h).exp() * h).sum();
+            let sum: f64 =
+                (0..n).map(|i| d.log_density_num(lo + (f64::from(i) + 0.5) * h).exp() * h).sum();
             assert!((sum - 1.0).abs() < 1e-5, "{family}{p:?} {lo} {hi}: {sum}");
         }
     }
     for (family, p) in DISCRETE {
-        for (lo, hi) in [(1.0, 3.0), (0.5, 2.0), (2.0, 2.0), (-5.0, 4.0), (1.0, INF), (-INF, 3.0), (3.0, 400.0)] {
+        for (lo, hi) in
+            [(1.0, 3.0), (0.5, 2.0), (2.0, 2.0), (-5.0, 4.0), (1.0, INF), (-INF, 3.0), (3.0, 400.0)]
+        {
             let d = cut(family, p, lo, hi);
             let sum: f64 = (-5..500).map(|k| d.log_density_num(f64::from(k)).exp()).sum();
             assert!((sum - 1.0).abs() < 1e-12, "{family}{p:?} {lo} {hi}: {sum}");
@@ -72,16 +79,34 @@ fn far_tails_are_exact() {
         close(cut("gamma", &[1.0, rate], lo, INF).log_density_num(lo), rate.ln(), 1e-6);
     }
     // Q(2, x) = (1 + x) e^-x.
-    close(cut("gamma", &[2.0, 1.0], 3000.0, INF).log_density_num(3000.0), (3000f64 / 3001.0).ln(), 1e-9);
+    close(
+        cut("gamma", &[2.0, 1.0], 3000.0, INF).log_density_num(3000.0),
+        (3000f64 / 3001.0).ln(),
+        1e-9,
+    );
     // I_x(a, 1) = x^a: the density at the upper bound is a / x.
-    close(cut("beta", &[300.0, 1.0], 0.0, 1e-3).log_density_num(1e-3), (300.0 / 1e-3f64).ln(), 1e-12);
+    close(
+        cut("beta", &[300.0, 1.0], 0.0, 1e-3).log_density_num(1e-3),
+        (300.0 / 1e-3f64).ln(),
+        1e-12,
+    );
     // The tail of a Cauchy is 1 / (pi x) (1 - 1 / (3 x^2) …).
     close(cut("cauchy", &[0.0, 1.0], 1e8, INF).log_density_num(1e8), -(1e8f64.ln()), 1e-12);
     close(cut("half_cauchy", &[0.0, 1.0], 1e8, INF).log_density_num(1e8), -(1e8f64.ln()), 1e-12);
-    // Student's t with 2 degrees of freedom: P(T > t) = (1 - t / sqrt(2 + t^2)) / 2, near 1 / (2 t^2) far out.
-    close(cut("student_t", &[2.0, 0.0, 1.0], -INF, -1e7).log_density_num(-1e7), (2.0 / 1e7f64).ln(), 1e-12);
-    // mpmath, 40 digits: lognormal(0, 1) above e^20; poisson(1) from 200 on; binomial(1000, 0.001) from 100 on.
-    close(cut("lognormal", &[0.0, 1.0], 20f64.exp(), INF).log_density_num(20f64.exp()), -17.001_783_162_107_41, 1e-13);
+    // Student's t with 2 degrees of freedom: P(T > t) = (1 - t / sqrt(2 + t^2)) / 2, near
+    // 1 / (2 t^2) far out.
+    close(
+        cut("student_t", &[2.0, 0.0, 1.0], -INF, -1e7).log_density_num(-1e7),
+        (2.0 / 1e7f64).ln(),
+        1e-12,
+    );
+    // mpmath, 40 digits: lognormal(0, 1) above e^20; poisson(1) from 200 on;
+    // binomial(1000, 0.001) from 100 on.
+    close(
+        cut("lognormal", &[0.0, 1.0], 20f64.exp(), INF).log_density_num(20f64.exp()),
+        -17.001_783_162_107_41,
+        1e-13,
+    );
     let ratio = |from: i32, term: &dyn Fn(f64) -> f64| {
         let (mut sum, mut t) = (1.0, 1.0);
         for k in from..from + 200 {
@@ -108,7 +133,9 @@ fn far_tails_are_exact() {
 fn tails_of_integers_are_sums() {
     for (family, p) in DISCRETE {
         let d = make(family, p);
-        let sum = |from: i32, to: i32| (from..=to).map(|k| d.log_density_num(f64::from(k)).exp()).sum::<f64>();
+        let sum = |from: i32, to: i32| {
+            (from..=to).map(|k| d.log_density_num(f64::from(k)).exp()).sum::<f64>()
+        };
         for k in -4..16 {
             for x in [f64::from(k), f64::from(k) + 0.5] {
                 let tails = d.tails(x).unwrap();
@@ -144,7 +171,10 @@ fn slopes_are_those_of_differences() {
                 let h = 1e-4;
                 let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
                 let found = g.params[i];
-                assert!((found - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{family} {i} {lo} {hi}: {found} {slope}");
+                assert!(
+                    (found - slope).abs() < 1e-6 * (1.0 + slope.abs()),
+                    "{family} {i} {lo} {hi}: {found} {slope}"
+                );
             }
             for (i, bound) in [*lo, *hi].into_iter().enumerate() {
                 if discrete || !bound.is_finite() {
@@ -166,7 +196,8 @@ fn slopes_are_those_of_differences() {
     // A mixture, by its weights and by what it mixes.
     let mix = |p: [f64; 4]| {
         let parts = vec![make("normal", &[p[2], 1.0]), make("gamma", &[2.0, p[3]])];
-        truncated(&Dist::Mixture(Arc::new(Mixture::new(&p[..2], parts).unwrap())), 0.4, 3.0).unwrap()
+        truncated(&Dist::Mixture(Arc::new(Mixture::new(&p[..2], parts).unwrap())), 0.4, 3.0)
+            .unwrap()
     };
     let p = [0.7, 1.1, 0.2, 1.4];
     let g = mix(p).gradient(&Datum::Num(0.9)).unwrap();
@@ -199,11 +230,15 @@ fn draws_follow_the_distribution() {
             let whole = d.log_density_num(middle);
             let Ok(part) = truncated(&make(family, p), lo, middle) else { continue };
             let wanted = (whole - part.log_density_num(middle)).exp();
-            assert!((share - wanted).abs() < 0.04, "{family} {lo} {hi}: {share} of draws, {wanted} expected");
+            assert!(
+                (share - wanted).abs() < 0.04,
+                "{family} {lo} {hi}: {share} of draws, {wanted} expected"
+            );
         }
     }
     let far = cut("gamma", &[2.0, 1.0], 3000.0, INF);
-    let mean = (0..2000).map(|_| far.sample(&mut rng).num().unwrap() - 3000.0).sum::<f64>() / 2000.0;
+    let mean =
+        (0..2000).map(|_| far.sample(&mut rng).num().unwrap() - 3000.0).sum::<f64>() / 2000.0;
     assert!((mean - 1.0).abs() < 0.1, "{mean}");
 }
 
@@ -228,14 +263,32 @@ fn bounds_without_sense_are_errors() {
     assert_eq!(message(&gamma, 2.0, 1.0), "truncated: lo must be below hi, got 2 and 1");
     assert!(message(&gamma, 1.0, 1.0).contains("an interval without width has no density"));
     assert!(message(&gamma, f64::NAN, 1.0).contains("must be numbers"));
-    assert!(message(&gamma, -2.0, -1.0).contains("must overlap the support of `d`, got -2 and -1 of gamma"));
+    assert!(
+        message(&gamma, -2.0, -1.0)
+            .contains("must overlap the support of `d`, got -2 and -1 of gamma")
+    );
     assert!(message(&make("poisson", &[2.0]), 1.2, 1.8).contains("must overlap"));
-    assert!(message(&make("geometric", &[1.0]), 1.0, INF).contains("must contain some of the probability"));
+    assert!(
+        message(&make("geometric", &[1.0]), 1.0, INF)
+            .contains("must contain some of the probability")
+    );
     assert!(message(&make("flat", &[]), 0.0, INF).contains("give the bounds to `flat(lo, hi)`"));
-    assert!(message(&make("von_mises", &[0.0, 1.0]), 0.0, 1.0).contains("must not be a distribution of angles"));
-    assert!(message(&make("dirichlet", &[1.0, 1.0]), 0.0, 1.0).contains("must be a distribution of single numbers"));
-    assert!(message(&make("flip", &[0.5]), 0.0, 1.0).contains("must be a distribution of single numbers"));
-    assert!(message(&truncated(&gamma, 0.0, 1.0).unwrap(), 0.0, 0.5).contains("must not be truncated already"));
+    assert!(
+        message(&make("von_mises", &[0.0, 1.0]), 0.0, 1.0)
+            .contains("must not be a distribution of angles")
+    );
+    assert!(
+        message(&make("dirichlet", &[1.0, 1.0]), 0.0, 1.0)
+            .contains("must be a distribution of single numbers")
+    );
+    assert!(
+        message(&make("flip", &[0.5]), 0.0, 1.0)
+            .contains("must be a distribution of single numbers")
+    );
+    assert!(
+        message(&truncated(&gamma, 0.0, 1.0).unwrap(), 0.0, 0.5)
+            .contains("must not be truncated already")
+    );
     assert!(message(&make("normal", &[0.0, 1.0]), 2.0, 1.0).contains("must be below hi"));
 }
 
@@ -243,18 +296,29 @@ fn bounds_without_sense_are_errors() {
 fn flat_priors_on_half_lines() {
     let positive = make("flat", &[0.0, INF]);
     assert_eq!(positive.support(), Support::AtLeast { lo: 0.0 });
-    assert_eq!((positive.log_density_num(1e300), positive.log_density_num(-1e-300)), (0.0, f64::NEG_INFINITY));
-    assert!(positive.is_improper() && make("flat", &[-INF, 3.0]).support() == Support::AtMost { hi: 3.0 });
+    assert_eq!(
+        (positive.log_density_num(1e300), positive.log_density_num(-1e-300)),
+        (0.0, f64::NEG_INFINITY)
+    );
+    assert!(
+        positive.is_improper()
+            && make("flat", &[-INF, 3.0]).support() == Support::AtMost { hi: 3.0 }
+    );
     let mut rng = stream(701);
     assert!((0..1000).all(|_| (0.13..7.4).contains(&positive.sample(&mut rng).num().unwrap())));
     let message = |p: &[f64]| try_make("flat", p).unwrap_err().to_string();
     assert!(message(&[0.0, 1.0]).contains("between two finite bounds use uniform(lo, hi)"));
-    assert!(message(&[INF, INF]).contains("must have numbers") && message(&[f64::NAN, 1.0]).contains("be numbers"));
+    assert!(
+        message(&[INF, INF]).contains("must have numbers")
+            && message(&[f64::NAN, 1.0]).contains("be numbers")
+    );
 }
 
 #[test]
 fn unlike_priors_in_order() {
-    let parts = || vec![make("normal", &[0.0, 1.0]), make("gamma", &[2.0, 1.0]), make("normal", &[3.0, 2.0])];
+    let parts = || {
+        vec![make("normal", &[0.0, 1.0]), make("gamma", &[2.0, 1.0]), make("normal", &[3.0, 2.0])]
+    };
     let d = Ordered::of(parts()).unwrap();
     let x: Datum = vec![-0.3, 0.8, 2.0].into();
     let sum: f64 = parts().iter().zip([-0.3, 0.8, 2.0]).map(|(p, x)| p.log_density_num(x)).sum();
@@ -262,7 +326,10 @@ fn unlike_priors_in_order() {
     assert_eq!(d.log_density(&vec![0.9, 0.8, 2.0].into()), f64::NEG_INFINITY);
     assert_eq!(d.log_density(&vec![-0.9, -0.8, 2.0].into()), f64::NEG_INFINITY);
     assert_eq!(d.support(), Support::Ascending(Box::new(Support::Real), 3));
-    assert!(Distribution::is_improper(&d), "it is not normalised, so nothing may take it for what it draws");
+    assert!(
+        Distribution::is_improper(&d),
+        "it is not normalised, so nothing may take it for what it draws"
+    );
     let g = Distribution::gradient(&d, &x).unwrap();
     assert_eq!((g.x.len(), g.params.len()), (3, 6));
     close(g.params[0], -0.3, 1e-14);
@@ -271,7 +338,8 @@ fn unlike_priors_in_order() {
         assert!(d.log_density(&d.sample(&mut rng)).is_finite());
     }
     // Never in order by chance: sorted.
-    let apart = Ordered::of(vec![make("normal", &[50.0, 1.0]), make("normal", &[0.0, 1.0])]).unwrap();
+    let apart =
+        Ordered::of(vec![make("normal", &[50.0, 1.0]), make("normal", &[0.0, 1.0])]).unwrap();
     assert!(apart.support().contains(&apart.sample(&mut rng)));
     assert!(Ordered::of(vec![make("poisson", &[1.0])]).is_err());
 }

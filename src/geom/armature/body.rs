@@ -1,9 +1,10 @@
-//! Bodies: a rig with a mesh skinned to it, cut into parts by bone, so that a pose that differs in one joint shares the meshes
-//! of the parts it does not move.
+//! Bodies: a rig with a mesh skinned to it, cut into parts by bone, so that a pose that
+//! differs in one joint shares the meshes of the parts it does not move.
 //!
-//! Linear blend skinning: vertex' = sum of w_k M[k] vertex. A triangle belongs to the part of the joint that weighs most in
-//! it. The surface is taken as smooth and closed: it has silhouettes, no creases, and no contour where parts meet.
-//! Single precision for vertices. Invariant: the meshes of a pose do not depend on the poses asked for before.
+//! Linear blend skinning: vertex' = sum of w_k M[k] vertex. A triangle belongs to the
+//! part of the joint that weighs most in it. The surface is taken as smooth and closed:
+//! it has silhouettes, no creases, and no contour where parts meet. Single precision for
+//! vertices. Invariant: the meshes of a pose do not depend on the poses asked for before.
 
 use super::morph::{Anchor, Morph};
 use super::recent;
@@ -16,7 +17,8 @@ use std::sync::{Arc, LazyLock, OnceLock};
 /// The most joints that move one vertex.
 pub const MOST_WEIGHTS: usize = 4;
 
-/// The joints that move a vertex, in rig order's numbers, with weights that sum to 1; those beyond have weight 0.
+/// The joints that move a vertex, in rig order's numbers, with weights that sum to 1;
+/// those beyond have weight 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Influence {
     /// The joints.
@@ -60,13 +62,15 @@ pub(super) struct Skin {
     morphs: Vec<Morph>,
     /// What each keypoint follows.
     anchors: Vec<Anchor>,
-    /// The vertices before any change of shape, and coarser versions of the parts they make, by part.
+    /// The vertices before any change of shape, and coarser versions of the parts they
+    /// make, by part.
     rest: Arc<LazySurface>,
     levels: OnceLock<Vec<Vec<Level>>>,
 }
 
 impl Levels for Skin {
-    /// Made of the whole body when first asked for, so that parts meet in the same vertices.
+    /// Made of the whole body when first asked for, so that parts meet in the same
+    /// vertices.
     fn levels(&self, part: usize) -> &[Level] {
         let all = self.levels.get_or_init(|| {
             let parts = self.parts.iter().map(|p| (&*p.vertices, &*p.topology));
@@ -101,11 +105,13 @@ pub struct Armature {
 }
 
 impl Armature {
-    /// A mesh on a rig: for each vertex the joints that move it, as numbers in rig order with weights.
+    /// A mesh on a rig: for each vertex the joints that move it, as numbers in rig order
+    /// with weights.
     ///
     /// # Errors
-    /// A count of influences other than the mesh's of vertices, a weight that is negative or not finite, weights that do not
-    /// sum to 1 (to a thousandth), a joint that is not there, a mesh without area.
+    /// A count of influences other than the mesh's of vertices, a weight that is negative
+    /// or not finite, weights that do not sum to 1 (to a thousandth), a joint that is not
+    /// there, a mesh without area.
     pub fn new(
         rig: Rig,
         positions: Vec<Vec3>,
@@ -128,7 +134,9 @@ impl Armature {
                 return Err(GeomError::invalid(format!("vertex {v} has a skin weight of {w}")));
             }
             if (sum - 1.0).abs() > 1e-3 {
-                return Err(GeomError::invalid(format!("the skin weights of vertex {v} sum to {sum}, not to 1")));
+                return Err(GeomError::invalid(format!(
+                    "the skin weights of vertex {v} sum to {sum}, not to 1"
+                )));
             }
             i.weights = i.weights.map(|w| w / sum);
             for (j, w) in i.joints.iter_mut().zip(i.weights) {
@@ -145,7 +153,8 @@ impl Armature {
         }
         let parts = parts(rig.joints().len(), &triangles, &influences);
         let surface = Surface::new(positions, &triangles);
-        let anchors = rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &surface.positions)).collect();
+        let anchors =
+            rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &surface.positions)).collect();
         let lazy: LazySurface = LazyLock::new(Box::new(|| surface));
         LazyLock::force(&lazy);
         let (surface, levels) = (Arc::new(lazy), OnceLock::new());
@@ -205,8 +214,9 @@ impl Armature {
         self.clothed(amounts, 0.0)
     }
 
-    /// As [`Armature::shaped`], with the surface so far off along its normals, those at rest before any change of shape; in the
-    /// mesh's units. Joints and keypoints stay where they are.
+    /// As [`Armature::shaped`], with the surface so far off along its normals, those at
+    /// rest before any change of shape; in the mesh's units. Joints and keypoints stay
+    /// where they are.
     ///
     /// # Errors
     /// As [`Armature::shaped`]; cloth that is not finite.
@@ -221,10 +231,15 @@ impl Armature {
         for (name, amount) in amounts {
             let Some(k) = self.skin.morphs.iter().position(|m| *m.name == **name) else {
                 let all: Vec<&str> = self.morphs().collect();
-                return Err(GeomError::invalid(format!("the body has no morph `{name}`; it has {}", all.join(", "))));
+                return Err(GeomError::invalid(format!(
+                    "the body has no morph `{name}`; it has {}",
+                    all.join(", ")
+                )));
             };
             if !amount.is_finite() {
-                return Err(GeomError::domain(format!("the amount of the morph `{name}` must be finite")));
+                return Err(GeomError::domain(format!(
+                    "the amount of the morph `{name}` must be finite"
+                )));
             }
             let m = &self.skin.morphs[k];
             m.move_joints(*amount, &mut heads, &mut tails);
@@ -245,7 +260,8 @@ impl Armature {
         }))
     }
 
-    /// With joints and keypoints moved at rest by so much, and the vertices by a function of their places.
+    /// With joints and keypoints moved at rest by so much, and the vertices by a function
+    /// of their places.
     pub(super) fn reshaped(
         &self,
         heads: &[DVec3],
@@ -266,8 +282,9 @@ impl Armature {
         }
     }
 
-    /// The body in a pose: one instance a part, numbered by joint, and its keypoints as landmarks. Parts that the last poses
-    /// of this thread moved in the same way are shared with them.
+    /// The body in a pose: one instance a part, numbered by joint, and its keypoints as
+    /// landmarks. Parts that the last poses of this thread moved in the same way are
+    /// shared with them.
     ///
     /// # Errors
     /// A pose that is not finite, or takes vertices too far to be numbers.
@@ -290,21 +307,32 @@ impl Armature {
         }))
     }
 
-    /// From the derivatives by the body at rest to that by the amount of a morph; `None` if it has no such morph.
+    /// From the derivatives by the body at rest to that by the amount of a morph; `None`
+    /// if it has no such morph.
     pub fn pull_morph(&self, name: &str, by: &RestGradient) -> Option<f64> {
         let m = self.skin.morphs.iter().find(|m| *m.name == *name)?;
-        let dot = |offsets: &[DVec3], by: &[DVec3]| offsets.iter().zip(by).map(|(d, g)| d.dot(*g)).sum::<f64>();
-        let points = self.skin.anchors.iter().zip(&by.keypoints).map(|(anchor, g)| m.at(*anchor).dot(*g));
+        let dot = |offsets: &[DVec3], by: &[DVec3]| {
+            offsets.iter().zip(by).map(|(d, g)| d.dot(*g)).sum::<f64>()
+        };
+        let points =
+            self.skin.anchors.iter().zip(&by.keypoints).map(|(anchor, g)| m.at(*anchor).dot(*g));
         let vertices = m.vertices.iter().zip(&by.vertices).map(|(d, g)| d.as_dvec3().dot(*g));
-        Some(dot(&m.heads, &by.heads) + dot(&m.tails, &by.tails) + points.sum::<f64>() + vertices.sum::<f64>())
+        Some(
+            dot(&m.heads, &by.heads)
+                + dot(&m.tails, &by.tails)
+                + points.sum::<f64>()
+                + vertices.sum::<f64>(),
+        )
     }
 
-    /// From the derivatives by the body at rest to that by its cloth; see [`Armature::clothed`].
+    /// From the derivatives by the body at rest to that by its cloth; see
+    /// [`Armature::clothed`].
     pub fn pull_cloth(&self, by: &RestGradient) -> f64 {
         self.skin.rest.normals.iter().zip(&by.vertices).map(|(n, g)| n.as_dvec3().dot(*g)).sum()
     }
 
-    /// From derivatives by the vertices of a posed body's meshes in turn to those by the body's own; the parts share some.
+    /// From derivatives by the vertices of a posed body's meshes in turn to those by the
+    /// body's own; the parts share some.
     pub fn pull_parts(&self, by_vertex: &[DVec3]) -> Vec<DVec3> {
         let mut all = vec![DVec3::ZERO; self.skin.influences.len()];
         for (v, g) in self.skin.parts.iter().flat_map(|p| &p.vertices).zip(by_vertex) {
@@ -330,18 +358,28 @@ impl Armature {
             let v = *v as usize;
             let (p, n) = (rest.positions[v], rest.normals[v]);
             let Influence { joints, weights } = &self.skin.influences[v];
-            let m =
-                if weights[0] == 1.0 { transforms[usize::from(joints[0])] } else { blend(joints, weights, transforms) };
+            let m = if weights[0] == 1.0 {
+                transforms[usize::from(joints[0])]
+            } else {
+                blend(joints, weights, transforms)
+            };
             positions.push(m.transform_point3a(p.into()).into());
-            normals.push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
+            normals
+                .push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
         }
         let mesh = Arc::new(Mesh { positions, normals, topology: Arc::clone(&part.topology) });
         let detail = Detail::posed(Arc::clone(&self.skin) as Arc<dyn Levels>, number);
-        Instance { mesh, affine: Affine::IDENTITY, first_part: part.joint, detail: Some(Arc::new(detail)) }
+        Instance {
+            mesh,
+            affine: Affine::IDENTITY,
+            first_part: part.joint,
+            detail: Some(Arc::new(detail)),
+        }
     }
 
-    /// The vector-Jacobian product of posing, from the derivatives of something by the body's posed vertices (in the order of
-    /// [`Armature::positions`]) and by its keypoints, to those by the joints' transforms; for [`Rig::transforms_vjp`].
+    /// The vector-Jacobian product of posing, from the derivatives of something by the
+    /// body's posed vertices (in the order of [`Armature::positions`]) and by its
+    /// keypoints, to those by the joints' transforms; for [`Rig::transforms_vjp`].
     pub fn transforms_gradient(&self, by_vertex: &[DVec3], by_keypoint: &[DVec3]) -> Vec<DAffine3> {
         let zero = DAffine3 { matrix3: glam::DMat3::ZERO, translation: DVec3::ZERO };
         let mut out = vec![zero; self.rig.joints().len()];
@@ -360,18 +398,27 @@ impl Armature {
         out
     }
 
-    /// The posed vertices, in the order of [`Armature::positions`]: what [`Armature::posed`] draws, whole.
+    /// The posed vertices, in the order of [`Armature::positions`]: what
+    /// [`Armature::posed`] draws, whole.
     ///
     /// # Errors
     /// A pose that is not finite.
-    pub fn posed_vertices(&self, pose: &[JointPose], rules: &Rules) -> Result<Vec<DVec3>, GeomError> {
+    pub fn posed_vertices(
+        &self,
+        pose: &[JointPose],
+        rules: &Rules,
+    ) -> Result<Vec<DVec3>, GeomError> {
         let t = self.rig.transforms(pose, rules)?;
         let all = self.positions().iter().zip(&self.skin.influences);
         Ok(all.map(|(p, i)| i.blend(&t, p.as_dvec3())).collect())
     }
 }
 
-fn blend(joints: &[u16; MOST_WEIGHTS], weights: &[f32; MOST_WEIGHTS], transforms: &[Affine3A]) -> Affine3A {
+fn blend(
+    joints: &[u16; MOST_WEIGHTS],
+    weights: &[f32; MOST_WEIGHTS],
+    transforms: &[Affine3A],
+) -> Affine3A {
     let mut m = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
     for (j, w) in joints.iter().zip(weights).take_while(|(_, w)| **w > 0.0) {
         let t = &transforms[usize::from(*j)];
@@ -381,12 +428,14 @@ fn blend(joints: &[u16; MOST_WEIGHTS], weights: &[f32; MOST_WEIGHTS], transforms
     m
 }
 
-/// What takes normals along: see [`crate::geom::Affine::normal_matrix`]; here without mirrors.
+/// What takes normals along: see [`crate::geom::Affine::normal_matrix`]; here without
+/// mirrors.
 fn cofactor(m: &Mat3A) -> Mat3A {
     Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// The parts by the joint that weighs most in each triangle; of equals, the first in rig order.
+/// The parts by the joint that weighs most in each triangle; of equals, the first in rig
+/// order.
 fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Part> {
     let mut by_joint: Vec<Vec<[u32; 3]>> = vec![Vec::new(); joints];
     let mut sums = vec![0.0f64; joints];
@@ -432,7 +481,12 @@ fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec
             encloses: true,
             ..Topology::default()
         };
-        parts.push(Part { joint: joint as u16, topology: Arc::new(topology), vertices, joints: used });
+        parts.push(Part {
+            joint: joint as u16,
+            topology: Arc::new(topology),
+            vertices,
+            joints: used,
+        });
     }
     parts
 }

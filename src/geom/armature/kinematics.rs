@@ -1,13 +1,15 @@
 //! From a pose to where each joint takes the points it carries.
 //!
-//! M[j] = M[parent] T(head + d) R S T(-head), as transforms of points at rest. R turns the whole subtree; S acts on the bone's own
-//! region, and on the subtree only if asked. A location t is a *handle*: in rig order, for a joint b with t != 0, one sweep
-//! over its ancestors a, from its parent to the nearest stop (included) or the root, turns each, with its subtree, by
-//! 1 / (number of those ancestors) of the shortest arc from (p_b - p_a) to (p_b + t - p_a); what is left becomes d, so that the
-//! head of b ends at p_b + t. Positions p are those of the pose so far.
+//! M[j] = M[parent] T(head + d) R S T(-head), as transforms of points at rest. R turns
+//! the whole subtree; S acts on the bone's own region, and on the subtree only if asked.
+//! A location t is a *handle*: in rig order, for a joint b with t != 0, one sweep over
+//! its ancestors a, from its parent to the nearest stop (included) or the root, turns
+//! each, with its subtree, by 1 / (number of those ancestors) of the shortest arc from
+//! (p_b - p_a) to (p_b + t - p_a); what is left becomes d, so that the head of b ends at
+//! p_b + t. Positions p are those of the pose so far.
 //!
-//! A pure function of the pose: never iterated to convergence, and t = 0 changes nothing. It is smooth, except where a handle
-//! is pulled straight through an ancestor.
+//! A pure function of the pose: never iterated to convergence, and t = 0 changes nothing.
+//! It is smooth, except where a handle is pulled straight through an ancestor.
 
 use super::pose::Motion;
 use super::{JointPose, Rig, Rules};
@@ -33,18 +35,24 @@ impl<T: Real> Place<T> {
 pub struct JointGradient {
     /// By the location.
     pub location: DVec3,
-    /// By the rotation vector, or the angles; for a matrix, by a small rotation vector applied after it.
+    /// By the rotation vector, or the angles; for a matrix, by a small rotation vector
+    /// applied after it.
     pub turn: DVec3,
     /// By the scale.
     pub scale: DVec3,
 }
 
 impl Rig {
-    /// Where each joint takes points at rest, by joint in rig order. Joints beyond the end of `pose` rest.
+    /// Where each joint takes points at rest, by joint in rig order. Joints beyond the
+    /// end of `pose` rest.
     ///
     /// # Errors
     /// A pose that is not finite.
-    pub fn transforms(&self, pose: &[JointPose], rules: &Rules) -> Result<Vec<DAffine3>, GeomError> {
+    pub fn transforms(
+        &self,
+        pose: &[JointPose],
+        rules: &Rules,
+    ) -> Result<Vec<DAffine3>, GeomError> {
         let motions = self.motions(pose, |x| x)?;
         let places = places(self, motions, rules, false);
         let affine = |p: &Place<f64>| DAffine3 {
@@ -54,8 +62,8 @@ impl Rig {
         Ok(places.iter().map(affine).collect())
     }
 
-    /// The vector-Jacobian product of [`Rig::transforms`]: from the derivatives of something by each transform (matrix and
-    /// translation) to those by the pose.
+    /// The vector-Jacobian product of [`Rig::transforms`]: from the derivatives of
+    /// something by each transform (matrix and translation) to those by the pose.
     ///
     /// # Errors
     /// A pose that is not finite.
@@ -74,7 +82,8 @@ impl Rig {
         })?;
         let places = places(self, motions, rules, true);
         let outputs = places.iter().zip(by_transform).flat_map(|(p, g)| {
-            let linear = p.linear.transposed().0.concat().into_iter().zip(g.matrix3.to_cols_array());
+            let linear =
+                p.linear.transposed().0.concat().into_iter().zip(g.matrix3.to_cols_array());
             linear.chain(p.shift.0.into_iter().zip(g.translation.to_array())).collect::<Vec<_>>()
         });
         let slopes = tape.reverse(outputs);
@@ -100,13 +109,21 @@ impl Rig {
 }
 
 /// The transforms; `all` also runs handles that do not pull, for their derivatives.
-fn places<T: Real>(rig: &Rig, mut motions: Vec<Motion<T>>, rules: &Rules, all: bool) -> Vec<Place<T>> {
-    let Some(zero) = motions.first().map(|m| m.location.0[0].constant(0.0)) else { return Vec::new() };
+fn places<T: Real>(
+    rig: &Rig,
+    mut motions: Vec<Motion<T>>,
+    rules: &Rules,
+    all: bool,
+) -> Vec<Place<T>> {
+    let Some(zero) = motions.first().map(|m| m.location.0[0].constant(0.0)) else {
+        return Vec::new();
+    };
     let vector = |v: DVec3| V3(v.to_array().map(|x| zero.constant(x)));
     let heads: Vec<V3<T>> = rig.joints().iter().map(|j| vector(j.head)).collect();
     let mut pulled = vec![V3([zero; 3]); motions.len()];
     let mut chain = Vec::new();
-    let unscaled = |motions: &[Motion<T>], pulled: &[V3<T>]| forward(rig, &heads, motions, pulled, |m| m.turn);
+    let unscaled =
+        |motions: &[Motion<T>], pulled: &[V3<T>]| forward(rig, &heads, motions, pulled, |m| m.turn);
     let mut now = unscaled(&motions, &pulled);
     for b in 0..motions.len() {
         let t = motions[b].location;
@@ -134,7 +151,8 @@ fn places<T: Real>(rig: &Rig, mut motions: Vec<Motion<T>>, rules: &Rules, all: b
         }
         now = unscaled(&motions, &pulled);
         let left = target - now[b].point(heads[b]);
-        pulled[b] = rig.joints()[b].parent.map_or(left, |up| now[up].linear.transposed().apply(left));
+        pulled[b] =
+            rig.joints()[b].parent.map_or(left, |up| now[up].linear.transposed().apply(left));
         now = unscaled(&motions, &pulled);
     }
     if rules.inherit_scale {
@@ -172,10 +190,15 @@ fn forward<T: Real>(
 
 /// The rotation by a share of the shortest arc from the direction of u to that of v.
 fn part_of_arc<T: Real>(u: V3<T>, v: V3<T>, share: f64) -> M3<T> {
-    // Only directions matter: lengths near 1 keep squares from overflowing, and their derivatives are 0.
+    // Only directions matter: lengths near 1 keep squares from overflowing, and their
+    // derivatives are 0.
     let unit = |v: V3<T>| {
         let longest = v.0.iter().fold(0.0, |m: f64, x| m.max(x.value().abs()));
-        if longest > 0.0 && longest.is_finite() { v.scale(v.0[0].constant(1.0 / longest)) } else { v }
+        if longest > 0.0 && longest.is_finite() {
+            v.scale(v.0[0].constant(1.0 / longest))
+        } else {
+            v
+        }
     };
     let (u, v) = (unit(u), unit(v));
     let (w, c) = (u.cross(v), u.dot(v));
@@ -189,7 +212,8 @@ fn part_of_arc<T: Real>(u: V3<T>, v: V3<T>, share: f64) -> M3<T> {
         w.scale(c.recip() * c.constant(share))
     } else if cv < 0.0 {
         // Straight back: about a fixed axis at right angles to u.
-        let axis = DVec3::from_array(u.0.map(Real::value)).any_orthonormal_vector() * (std::f64::consts::PI * share);
+        let axis = DVec3::from_array(u.0.map(Real::value)).any_orthonormal_vector()
+            * (std::f64::consts::PI * share);
         V3(axis.to_array().map(|x| c.constant(x)))
     } else {
         w

@@ -33,7 +33,11 @@ fn some_pose(k: f64) -> Vec<JointPose> {
                 0 => Turn::Vector(DVec3::new(wave(i, 0.7), wave(i, 1.7), wave(i, 2.9))),
                 _ => Turn::Angles(DVec3::new(wave(i, 0.9), wave(i, 1.9), wave(i, 3.1))),
             },
-            scale: DVec3::new(1.0 + 0.2 * wave(i, 0.3), 1.0 + 0.2 * wave(i, 0.4), 1.0 + 0.2 * wave(i, 0.5)),
+            scale: DVec3::new(
+                1.0 + 0.2 * wave(i, 0.3),
+                1.0 + 0.2 * wave(i, 0.4),
+                1.0 + 0.2 * wave(i, 0.5),
+            ),
         })
         .collect()
 }
@@ -50,11 +54,17 @@ fn the_rest_is_the_identity() {
         assert!(t.translation.length() < 1e-15);
     }
     // Without locations, handles play no part whatever stops there are.
-    let still: Vec<JointPose> = some_pose(0.4).iter().map(|p| JointPose { location: DVec3::ZERO, ..*p }).collect();
+    let still: Vec<JointPose> =
+        some_pose(0.4).iter().map(|p| JointPose { location: DVec3::ZERO, ..*p }).collect();
     let all = Rules { stops: vec![true; 7], ..Rules::default() };
-    assert_eq!(rig.transforms(&still, &Rules::default()).unwrap(), rig.transforms(&still, &all).unwrap());
+    assert_eq!(
+        rig.transforms(&still, &Rules::default()).unwrap(),
+        rig.transforms(&still, &all).unwrap()
+    );
     let motions = rig.motions(&still, |x| x).unwrap();
-    for (a, b) in places(&rig, motions, &all, true).iter().zip(rig.transforms(&still, &all).unwrap()) {
+    for (a, b) in
+        places(&rig, motions, &all, true).iter().zip(rig.transforms(&still, &all).unwrap())
+    {
         let rows = b.matrix3.transpose().to_cols_array_2d();
         assert!(
             a.linear.0.concat().iter().zip(rows.concat()).all(|(a, b)| (a - b).abs() < 1e-14),
@@ -88,11 +98,18 @@ fn scale_acts_on_the_bone_alone_unless_inherited() {
     let own = rig.transforms(&pose, &Rules::default()).unwrap();
     let (spine, neck) = (rig.joints()[1].head, rig.joints()[2].head);
     let at = DVec3::new(0.1, 0.2, 0.0);
-    assert!((own[1].transform_point3(spine + at) - (spine + DVec3::new(0.1, 0.4, 0.0))).length() < 1e-14);
-    assert!((own[2].transform_point3(neck) - neck).length() < 1e-14);
-    let inherited = rig.transforms(&pose, &Rules { inherit_scale: true, ..Rules::default() }).unwrap();
     assert!(
-        (inherited[2].transform_point3(neck) - (spine + (neck - spine) * DVec3::new(1.0, 2.0, 1.0))).length() < 1e-14
+        (own[1].transform_point3(spine + at) - (spine + DVec3::new(0.1, 0.4, 0.0))).length()
+            < 1e-14
+    );
+    assert!((own[2].transform_point3(neck) - neck).length() < 1e-14);
+    let inherited =
+        rig.transforms(&pose, &Rules { inherit_scale: true, ..Rules::default() }).unwrap();
+    assert!(
+        (inherited[2].transform_point3(neck)
+            - (spine + (neck - spine) * DVec3::new(1.0, 2.0, 1.0)))
+        .length()
+            < 1e-14
     );
 }
 
@@ -108,9 +125,12 @@ fn one_handle_ends_where_it_is_pulled_and_stops_stop() {
         let t = rig.transforms(&pose, &rules).unwrap();
         let now = heads(&rig, &t);
         assert!((now[b] - rest[b] - pose[b].location).length() < 1e-12, "{b} {stop}");
-        // The stop turns, but does not move; nothing above it does either, nor does the other chain.
+        // The stop turns, but does not move; nothing above it does either, nor does the
+        // other chain.
         assert!((now[stop] - rest[stop]).length() < 1e-12);
-        let turned = |j: usize| (t[j].matrix3 - DMat3::IDENTITY).to_cols_array().iter().any(|x| x.abs() > 1e-6);
+        let turned = |j: usize| {
+            (t[j].matrix3 - DMat3::IDENTITY).to_cols_array().iter().any(|x| x.abs() > 1e-6)
+        };
         let mut above = rig.joints()[stop].parent;
         while let Some(a) = above {
             assert!(!turned(a), "{a} is above the stop");
@@ -152,8 +172,9 @@ fn gradients_agree_with_differences() {
         pose[5].location = DVec3::ZERO;
         pose[2].turn = Turn::Matrix(DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7));
         let wave = |a: usize| libm::cos(0.37 * a as f64 + k);
-        let adjoint: Vec<DAffine3> =
-            (0..7).map(|j| DAffine3::from_cols_array(&std::array::from_fn(|i| wave(12 * j + i)))).collect();
+        let adjoint: Vec<DAffine3> = (0..7)
+            .map(|j| DAffine3::from_cols_array(&std::array::from_fn(|i| wave(12 * j + i))))
+            .collect();
         let value = |pose: &[JointPose]| -> f64 {
             let t = rig.transforms(pose, &rules).unwrap();
             let dot = |(a, b): (&DAffine3, &DAffine3)| -> f64 {
@@ -171,13 +192,18 @@ fn gradients_agree_with_differences() {
                         (0, _) => p.location[c % 3] += h,
                         (2, _) => p.scale[c % 3] += h,
                         (_, Turn::Vector(v) | Turn::Angles(v)) => v[c % 3] += h,
-                        (_, Turn::Matrix(m)) => *m = DMat3::from_axis_angle(DVec3::AXES[c % 3], h) * *m,
+                        (_, Turn::Matrix(m)) => {
+                            *m = DMat3::from_axis_angle(DVec3::AXES[c % 3], h) * *m
+                        }
                     }
                     value(&pose)
                 };
                 let numeric = (moved(1e-5) - moved(-1e-5)) / 2e-5;
                 let g = [gradient[j].location, gradient[j].turn, gradient[j].scale][c / 3][c % 3];
-                assert!((g - numeric).abs() < 1e-6 * (1.0 + numeric.abs()), "joint {j}, number {c}: {g} {numeric}");
+                assert!(
+                    (g - numeric).abs() < 1e-6 * (1.0 + numeric.abs()),
+                    "joint {j}, number {c}: {g} {numeric}"
+                );
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Armatures: trees of joints that move a mesh, as in Kulkarni et al. 2014, section 2.1.2.
+//! Armatures: trees of joints that move a mesh, as in Kulkarni et al. 2014, section
+//! 2.1.2.
 
 pub mod autorig;
 mod body;

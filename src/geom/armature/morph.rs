@@ -1,11 +1,13 @@
-//! Morphs: linear offsets of a body's shape at rest, added up before it is posed (a blend shape).
+//! Morphs: linear offsets of a body's shape at rest, added up before it is posed (a blend
+//! shape).
 
 use super::rig::{Keypoint, Rig};
 use crate::geom::GeomError;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Offsets for every vertex and joint at rest, in the mesh's units; an amount of 1 adds them once.
+/// Offsets for every vertex and joint at rest, in the mesh's units; an amount of 1 adds
+/// them once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Morph {
     /// Its name.
@@ -27,9 +29,13 @@ impl Morph {
                 self.name, counts[0], counts[1], counts[2]
             )));
         }
-        let finite =
-            self.vertices.iter().all(|v| v.is_finite()) && self.heads.iter().chain(&self.tails).all(|v| v.is_finite());
-        if finite { Ok(()) } else { Err(GeomError::invalid(format!("the morph `{}` is not finite", self.name))) }
+        let finite = self.vertices.iter().all(|v| v.is_finite())
+            && self.heads.iter().chain(&self.tails).all(|v| v.is_finite());
+        if finite {
+            Ok(())
+        } else {
+            Err(GeomError::invalid(format!("the morph `{}` is not finite", self.name)))
+        }
     }
 
     pub(super) fn move_vertices(&self, amount: f64, positions: &mut [Vec3]) {
@@ -68,7 +74,10 @@ impl Anchor {
             return Anchor::Head(k.joint);
         }
         let distance = |p: &Vec3| (p.as_dvec3() - k.rest).length_squared();
-        let near = positions.iter().enumerate().min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
+        let near = positions
+            .iter()
+            .enumerate()
+            .min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
         Anchor::Vertex(near.map_or(0, |(v, _)| v))
     }
 }

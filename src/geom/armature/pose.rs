@@ -1,4 +1,5 @@
-//! Poses: what each joint of a rig does. Plain numbers; how they move a body is the business of `kinematics`.
+//! Poses: what each joint of a rig does. Plain numbers; how they move a body is the
+//! business of `kinematics`.
 
 use crate::geom::GeomError;
 use crate::geom::real::{M3, Real, V3};
@@ -28,7 +29,8 @@ pub struct JointPose {
 
 impl JointPose {
     /// The rest.
-    pub const REST: JointPose = JointPose { location: DVec3::ZERO, turn: Turn::Vector(DVec3::ZERO), scale: DVec3::ONE };
+    pub const REST: JointPose =
+        JointPose { location: DVec3::ZERO, turn: Turn::Vector(DVec3::ZERO), scale: DVec3::ONE };
 
     /// A turn by a rotation vector.
     pub fn turned(v: DVec3) -> JointPose {
@@ -50,7 +52,8 @@ impl JointPose {
 /// How poses move a body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rules {
-    /// By joint: whether it stops the pull of location handles below it. Joints beyond the end do not.
+    /// By joint: whether it stops the pull of location handles below it. Joints beyond
+    /// the end do not.
     pub stops: Vec<bool>,
     /// Whether a joint's scale acts on its descendants too.
     pub inherit_scale: bool,
@@ -65,8 +68,8 @@ pub(super) struct Motion<T> {
 }
 
 impl JointPose {
-    /// With a maker of numbers: first the location, then the turn's three (for a matrix, a small rotation vector applied
-    /// after it), then the scale.
+    /// With a maker of numbers: first the location, then the turn's three (for a matrix,
+    /// a small rotation vector applied after it), then the scale.
     pub(super) fn motion<T: Real>(&self, mut number: impl FnMut(f64) -> T) -> Motion<T> {
         let mut vector = |v: DVec3| V3(v.to_array().map(&mut number));
         let location = vector(self.location);
@@ -75,7 +78,10 @@ impl JointPose {
             Turn::Angles(v) => M3::from_angles(vector(v)),
             Turn::Matrix(m) => {
                 let small = vector(DVec3::ZERO);
-                let constant = M3(m.transpose().to_cols_array_2d().map(|row| row.map(|x| small.0[0].constant(x))));
+                let constant = M3(m
+                    .transpose()
+                    .to_cols_array_2d()
+                    .map(|row| row.map(|x| small.0[0].constant(x))));
                 M3::from_rotation_vector(small).times(constant)
             }
         };

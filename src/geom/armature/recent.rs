@@ -1,6 +1,8 @@
-//! The meshes of the last poses of each thread, by part: a pose that moves a part as one of them did shares its mesh.
+//! The meshes of the last poses of each thread, by part: a pose that moves a part as one
+//! of them did shares its mesh.
 //!
-//! Only saves work: what it gives equals what would be made. Sharing matters to renderers, which keep what they drew of a mesh.
+//! Only saves work: what it gives equals what would be made. Sharing matters to
+//! renderers, which keep what they drew of a mesh.
 
 use super::Armature;
 use crate::geom::Instance;
@@ -8,7 +10,8 @@ use glam::Affine3A;
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
 
-/// Bodies remembered, and poses of each part: the present one and what a few proposals tried.
+/// Bodies remembered, and poses of each part: the present one and what a few proposals
+/// tried.
 const BODIES: usize = 4;
 const POSES: usize = 4;
 
@@ -25,7 +28,8 @@ thread_local! {
     static KNOWN: RefCell<Vec<Known>> = const { RefCell::new(Vec::new()) };
 }
 
-/// What transforms are told by: equal numbers are not enough, 0 and -0 may make other zeros.
+/// What transforms are told by: equal numbers are not enough, 0 and -0 may make other
+/// zeros.
 fn bits(t: &Affine3A) -> [u32; 12] {
     t.to_cols_array().map(f32::to_bits)
 }
@@ -46,7 +50,8 @@ pub(super) fn parts(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Instan
         parts
             .map(|((i, part), poses)| {
                 let own = || part.joints.iter().map(|j| &transforms[usize::from(*j)]);
-                match poses.iter().position(|(moved, _)| moved.iter().map(bits).eq(own().map(bits))) {
+                match poses.iter().position(|(moved, _)| moved.iter().map(bits).eq(own().map(bits)))
+                {
                     Some(i) => poses[..=i].rotate_right(1),
                     None => {
                         poses.truncate(POSES - 1);

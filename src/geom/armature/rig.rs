@@ -1,7 +1,9 @@
-//! Rigs: a tree of joints, and named points that ride on them. It has no mesh and no pose.
+//! Rigs: a tree of joints, and named points that ride on them. It has no mesh and no
+//! pose.
 //!
-//! Rest frames are aligned with the world, so a joint's rotation turns about the world's axes through its rest head.
-//! Invariant: joints are in rig order, parents before children, and there is at least one.
+//! Rest frames are aligned with the world, so a joint's rotation turns about the world's
+//! axes through its rest head. Invariant: joints are in rig order, parents before
+//! children, and there is at least one.
 
 use crate::geom::GeomError;
 use glam::DVec3;
@@ -57,22 +59,32 @@ pub struct NamedJoint {
 }
 
 impl Rig {
-    /// A rig from joints in any order; they keep it as far as parents can come before children.
+    /// A rig from joints in any order; they keep it as far as parents can come before
+    /// children.
     ///
     /// # Errors
-    /// No joint or more than 4096, two of one name, a parent that is not there, a joint that is its own ancestor, a
-    /// position that is not finite.
+    /// No joint or more than 4096, two of one name, a parent that is not there, a joint
+    /// that is its own ancestor, a position that is not finite.
     pub fn new(given: Vec<NamedJoint>) -> Result<Rig, GeomError> {
         if given.is_empty() || given.len() > MOST_JOINTS {
-            return Err(GeomError::invalid(format!("a rig has 1 to {MOST_JOINTS} joints, not {}", given.len())));
+            return Err(GeomError::invalid(format!(
+                "a rig has 1 to {MOST_JOINTS} joints, not {}",
+                given.len()
+            )));
         }
         let mut index = std::collections::BTreeMap::new();
         for (i, j) in given.iter().enumerate() {
             if index.insert(j.name.as_str(), i).is_some() {
-                return Err(GeomError::invalid(format!("two joints of the rig are called `{}`", j.name)));
+                return Err(GeomError::invalid(format!(
+                    "two joints of the rig are called `{}`",
+                    j.name
+                )));
             }
             if !(j.head.is_finite() && j.tail.is_finite()) {
-                return Err(GeomError::invalid(format!("the position of joint `{}` is not finite", j.name)));
+                return Err(GeomError::invalid(format!(
+                    "the position of joint `{}` is not finite",
+                    j.name
+                )));
             }
         }
         let mut parents = Vec::with_capacity(given.len());
@@ -80,7 +92,10 @@ impl Rig {
             parents.push(match &j.parent {
                 None => None,
                 Some(p) => Some(*index.get(p.as_str()).ok_or_else(|| {
-                    GeomError::invalid(format!("joint `{}` has the parent `{p}`, which is not in the rig", j.name))
+                    GeomError::invalid(format!(
+                        "joint `{}` has the parent `{p}`, which is not in the rig",
+                        j.name
+                    ))
                 })?),
             });
         }
@@ -90,14 +105,18 @@ impl Rig {
         while placed.len() < given.len() {
             let before = placed.len();
             for i in 0..given.len() {
-                let ready = order[i] == usize::MAX && parents[i].is_none_or(|p| order[p] != usize::MAX);
+                let ready =
+                    order[i] == usize::MAX && parents[i].is_none_or(|p| order[p] != usize::MAX);
                 if ready {
                     order[i] = placed.len();
                     placed.push(i);
                 }
             }
             if placed.len() == before {
-                return Err(GeomError::invalid(format!("the rig has a cycle: {}", cycle(&given, &parents, &order))));
+                return Err(GeomError::invalid(format!(
+                    "the rig has a cycle: {}",
+                    cycle(&given, &parents, &order)
+                )));
             }
         }
         let joints = placed.iter().map(|&i| Joint {
@@ -112,8 +131,12 @@ impl Rig {
     /// With named points: name, joint, place at rest.
     ///
     /// # Errors
-    /// A joint that the rig does not have, two points of one name, a place that is not finite.
-    pub fn with_keypoints(mut self, points: Vec<(String, String, DVec3)>) -> Result<Rig, GeomError> {
+    /// A joint that the rig does not have, two points of one name, a place that is not
+    /// finite.
+    pub fn with_keypoints(
+        mut self,
+        points: Vec<(String, String, DVec3)>,
+    ) -> Result<Rig, GeomError> {
         for (name, joint, rest) in points {
             let Some(j) = self.find(&joint) else {
                 return Err(GeomError::invalid(format!(
@@ -121,10 +144,14 @@ impl Rig {
                 )));
             };
             if self.keypoints.iter().any(|k| *k.name == *name) {
-                return Err(GeomError::invalid(format!("two keypoints of the rig are called `{name}`")));
+                return Err(GeomError::invalid(format!(
+                    "two keypoints of the rig are called `{name}`"
+                )));
             }
             if !rest.is_finite() {
-                return Err(GeomError::invalid(format!("the position of keypoint `{name}` is not finite")));
+                return Err(GeomError::invalid(format!(
+                    "the position of keypoint `{name}` is not finite"
+                )));
             }
             self.keypoints.push(Keypoint { name: name.into(), joint: j, rest });
         }
@@ -186,15 +213,24 @@ mod tests {
     use super::*;
 
     fn joint(name: &str, parent: Option<&str>) -> NamedJoint {
-        NamedJoint { name: name.into(), parent: parent.map(Into::into), head: DVec3::ZERO, tail: DVec3::Y }
+        NamedJoint {
+            name: name.into(),
+            parent: parent.map(Into::into),
+            head: DVec3::ZERO,
+            tail: DVec3::Y,
+        }
     }
 
     #[test]
     fn parents_come_before_children() {
-        let rig = Rig::new(vec![joint("c", Some("b")), joint("a", None), joint("b", Some("a"))]).unwrap();
+        let rig =
+            Rig::new(vec![joint("c", Some("b")), joint("a", None), joint("b", Some("a"))]).unwrap();
         let names: Vec<&str> = rig.joints().iter().map(|j| &*j.name).collect();
         assert_eq!(names, ["a", "b", "c"]);
-        assert_eq!(rig.joints().iter().map(|j| j.parent).collect::<Vec<_>>(), [None, Some(0), Some(1)]);
+        assert_eq!(
+            rig.joints().iter().map(|j| j.parent).collect::<Vec<_>>(),
+            [None, Some(0), Some(1)]
+        );
         assert_eq!([0, 1, 2].map(|i| rig.placed(i).unwrap()), [2, 0, 1]);
     }
 
@@ -202,13 +238,27 @@ mod tests {
     fn broken_rigs_are_refused_by_name() {
         let e = |joints| Rig::new(joints).unwrap_err().to_string();
         assert_eq!(e(vec![]), "a rig has 1 to 4096 joints, not 0");
-        assert_eq!(e(vec![joint("a", None), joint("a", None)]), "two joints of the rig are called `a`");
-        assert_eq!(e(vec![joint("a", Some("x"))]), "joint `a` has the parent `x`, which is not in the rig");
-        let round = vec![joint("r", None), joint("a", Some("c")), joint("b", Some("a")), joint("c", Some("b"))];
+        assert_eq!(
+            e(vec![joint("a", None), joint("a", None)]),
+            "two joints of the rig are called `a`"
+        );
+        assert_eq!(
+            e(vec![joint("a", Some("x"))]),
+            "joint `a` has the parent `x`, which is not in the rig"
+        );
+        let round = vec![
+            joint("r", None),
+            joint("a", Some("c")),
+            joint("b", Some("a")),
+            joint("c", Some("b")),
+        ];
         assert_eq!(e(round), "the rig has a cycle: c -> b -> a -> c");
         assert_eq!(e(vec![joint("a", Some("a"))]), "the rig has a cycle: a -> a");
         let rig = Rig::new(vec![joint("a", None)]).unwrap();
-        let e = rig.with_keypoints(vec![("nose".into(), "head".into(), DVec3::ZERO)]).unwrap_err().to_string();
+        let e = rig
+            .with_keypoints(vec![("nose".into(), "head".into(), DVec3::ZERO)])
+            .unwrap_err()
+            .to_string();
         assert_eq!(e, "keypoint `nose` is attached to the joint `head`, which is not in the rig");
     }
 }

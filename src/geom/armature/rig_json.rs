@@ -1,8 +1,8 @@
 //! Rig and morph files: JSON beside an OBJ mesh.
 //!
-//! `{"mesh": "body.obj", "morphs": "body.morphs.json", "joints": [{"name", "parent", "head", "tail"}], "weights": [[[joint,
-//! weight], …] by vertex], "keypoints": {name: {"joint", "rest"}}}`; `morphs` and `keypoints` may be left out, and so may
-//! `tail`. Joints are given by number in `weights`, in the order of `joints`. Other fields are not read.
+//! `{"mesh": "body.obj", "morphs": "body.morphs.json", "joints": [{"name", "parent", "head", "tail"}], "weights": [[[joint, weight], …] by vertex], "keypoints": {name: {"joint", "rest"}}}`;
+//! `morphs` and `keypoints` may be left out, and so may `tail`. Joints are given by
+//! number in `weights`, in the order of `joints`. Other fields are not read.
 
 use super::{Influence, MOST_WEIGHTS, Morph, NamedJoint, Rig};
 use crate::geom::GeomError;
@@ -61,14 +61,15 @@ struct JsonMorph {
 }
 
 fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8], what: &str) -> Result<T, GeomError> {
-    serde_json::from_slice(bytes).map_err(|e| GeomError::invalid(format!("cannot read the {what} file: {e}")))
+    serde_json::from_slice(bytes)
+        .map_err(|e| GeomError::invalid(format!("cannot read the {what} file: {e}")))
 }
 
 /// Reads a rig file.
 ///
 /// # Errors
-/// JSON of another layout, a rig that [`Rig::new`] refuses, a vertex without weights or with more than
-/// [`MOST_WEIGHTS`], a joint number that is not there.
+/// JSON of another layout, a rig that [`Rig::new`] refuses, a vertex without weights or
+/// with more than [`MOST_WEIGHTS`], a joint number that is not there.
 pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
     let file: JsonRig = read(bytes, "rig")?;
     let count = file.joints.len();
@@ -78,12 +79,15 @@ pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
         head: j.head.into(),
         tail: j.tail.unwrap_or(j.head).into(),
     });
-    let keypoints = file.keypoints.into_iter().map(|(name, k)| (name, k.joint, DVec3::from(k.rest)));
+    let keypoints =
+        file.keypoints.into_iter().map(|(name, k)| (name, k.joint, DVec3::from(k.rest)));
     let rig = Rig::new(joints.collect())?.with_keypoints(keypoints.collect())?;
     let influence = |(v, weights): (usize, &Vec<(usize, f32)>)| {
         let mut i = Influence::default();
         if weights.is_empty() {
-            return Err(GeomError::invalid(format!("vertex {v} has no skin weight, so no joint would move it")));
+            return Err(GeomError::invalid(format!(
+                "vertex {v} has no skin weight, so no joint would move it"
+            )));
         }
         if weights.len() > MOST_WEIGHTS {
             let n = weights.len();
@@ -96,17 +100,22 @@ pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
         weights.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (k, (joint, weight)) in weights.iter().enumerate() {
             let placed = rig.placed(*joint).and_then(|j| u16::try_from(j).ok());
-            let missing =
-                || GeomError::invalid(format!("vertex {v} is moved by joint {joint}, but the rig has {count} joints"));
+            let missing = || {
+                GeomError::invalid(format!(
+                    "vertex {v} is moved by joint {joint}, but the rig has {count} joints"
+                ))
+            };
             (i.joints[k], i.weights[k]) = (placed.ok_or_else(missing)?, *weight);
         }
         Ok(i)
     };
-    let influences = file.weights.iter().enumerate().map(influence).collect::<Result<Vec<_>, _>>()?;
+    let influences =
+        file.weights.iter().enumerate().map(influence).collect::<Result<Vec<_>, _>>()?;
     Ok(RigFile { rig, mesh: file.mesh, morphs: file.morphs, influences })
 }
 
-/// Reads a file of morphs for a rig, whose joints it gives in the order of the rig's file.
+/// Reads a file of morphs for a rig, whose joints it gives in the order of the rig's
+/// file.
 ///
 /// # Errors
 /// JSON of another layout, or fewer or more joints than the rig has.
@@ -116,7 +125,9 @@ pub fn morphs_from_json(bytes: &[u8], rig: &Rig) -> Result<Vec<Morph>, GeomError
     let by_rig = |name: &str, given: &[[f64; 3]]| {
         if given.len() != count {
             let n = given.len();
-            return Err(GeomError::invalid(format!("the morph `{name}` moves {n} joints; the rig has {count}")));
+            return Err(GeomError::invalid(format!(
+                "the morph `{name}` moves {n} joints; the rig has {count}"
+            )));
         }
         let mut out = vec![DVec3::ZERO; count];
         for (i, d) in given.iter().enumerate() {
@@ -153,12 +164,22 @@ mod tests {
 
     #[test]
     fn joints_are_numbered_as_in_the_file() {
-        let f = rig("[[[0, 0.25], [1, 0.75]], [[0, 1]]]", r#", "keypoints": {"k": {"joint": "b", "rest": [1, 2, 3]}}"#);
+        let f = rig(
+            "[[[0, 0.25], [1, 0.75]], [[0, 1]]]",
+            r#", "keypoints": {"k": {"joint": "b", "rest": [1, 2, 3]}}"#,
+        );
         let f = f.unwrap();
-        assert_eq!(f.influences[0].joints[..2], [0, 1], "rig order has a first, and the heavier joint comes first");
+        assert_eq!(
+            f.influences[0].joints[..2],
+            [0, 1],
+            "rig order has a first, and the heavier joint comes first"
+        );
         assert_eq!(f.influences[0].weights, [0.75, 0.25, 0.0, 0.0]);
         assert_eq!(f.influences[1].joints[0], 1);
-        assert_eq!((f.rig.keypoints()[0].joint, f.rig.keypoints()[0].rest), (1, DVec3::new(1.0, 2.0, 3.0)));
+        assert_eq!(
+            (f.rig.keypoints()[0].joint, f.rig.keypoints()[0].rest),
+            (1, DVec3::new(1.0, 2.0, 3.0))
+        );
         let m = r#"{"morphs": {"tall": {"vertices": [[0, 1, 0]], "heads": [[0, 1, 0], [0, 2, 0]], "tails": [[0, 0, 0], [0, 3, 0]]}}}"#;
         let m = morphs_from_json(m.as_bytes(), &f.rig).unwrap();
         assert_eq!((m[0].heads[0].y, m[0].heads[1].y, m[0].tails[0].y), (2.0, 1.0, 3.0));
@@ -169,7 +190,10 @@ mod tests {
         let e = |weights: &str| rig(weights, "").unwrap_err().to_string();
         assert_eq!(e("[[[0, 1]], []]"), "vertex 1 has no skin weight, so no joint would move it");
         assert_eq!(e("[[[2, 1]]]"), "vertex 0 is moved by joint 2, but the rig has 2 joints");
-        assert!(e("[[[0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2]]]").starts_with("vertex 0 has 5 skin weights"));
+        assert!(
+            e("[[[0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2]]]")
+                .starts_with("vertex 0 has 5 skin weights")
+        );
         assert!(e("7").starts_with("cannot read the rig file: invalid type: integer `7`"));
         assert!(rig_from_json(b"{").is_err());
     }

@@ -1,4 +1,5 @@
-//! Other proportions: bones made longer or shorter at rest, with what hangs on them moved along.
+//! Other proportions: bones made longer or shorter at rest, with what hangs on them moved
+//! along.
 
 use super::{Armature, Influence, RestGradient, Rig};
 use crate::geom::{GeomError, outer};
@@ -35,8 +36,9 @@ impl Stretch {
 }
 
 impl Armature {
-    /// The same body with some bones longer or shorter, by joint in rig order. A joint's parent takes its head along; a
-    /// vertex goes where the joints that move it take it, by their weights; a keypoint where its joint does.
+    /// The same body with some bones longer or shorter, by joint in rig order. A joint's
+    /// parent takes its head along; a vertex goes where the joints that move it take it,
+    /// by their weights; a keypoint where its joint does.
     ///
     /// # Errors
     /// A joint that is not there, a factor that is not positive and finite.
@@ -46,7 +48,8 @@ impl Armature {
         let joints = || self.rig().joints().iter().enumerate();
         let heads: Vec<DVec3> = joints().map(|(i, j)| offset(i, j.head)).collect();
         let tails: Vec<DVec3> = joints().map(|(i, j)| offset(i, j.tail)).collect();
-        let points: Vec<DVec3> = self.rig().keypoints().iter().map(|k| offset(k.joint, k.rest)).collect();
+        let points: Vec<DVec3> =
+            self.rig().keypoints().iter().map(|k| offset(k.joint, k.rest)).collect();
         let skin = self.skin();
         Ok(self.reshaped(&heads, &tails, &points, move |positions| {
             for (p, i) in positions.iter_mut().zip(&skin.influences) {
@@ -57,8 +60,9 @@ impl Armature {
 }
 
 impl Armature {
-    /// The vector-Jacobian product of [`Armature::stretched`], from the derivatives of something by the stretched body at rest: by
-    /// each factor, or those along the axes (of a factor along the bone the first counts), and by this body at rest.
+    /// The vector-Jacobian product of [`Armature::stretched`], from the derivatives of
+    /// something by the stretched body at rest: by each factor, or those along the axes
+    /// (of a factor along the bone the first counts), and by this body at rest.
     ///
     /// # Errors
     /// As [`Armature::stretched`].
@@ -69,11 +73,15 @@ impl Armature {
     ) -> Result<(Vec<DVec3>, RestGradient), GeomError> {
         let rig = self.rig();
         let (joints, stretches) = (rig.joints(), stretches(rig, by_joint)?);
-        let linear: Vec<DMat3> =
-            joints.iter().zip(&stretches).map(|(joint, s)| s.linear(joint.tail - joint.head)).collect();
+        let linear: Vec<DMat3> = joints
+            .iter()
+            .zip(&stretches)
+            .map(|(joint, s)| s.linear(joint.tail - joint.head))
+            .collect();
         // A joint takes a point x to L (x - head) + head'.
         let (mut by_linear, mut by_new_head) = (vec![DMat3::ZERO; joints.len()], by.heads.clone());
-        let mut out = RestGradient { heads: vec![DVec3::ZERO; joints.len()], ..RestGradient::default() };
+        let mut out =
+            RestGradient { heads: vec![DVec3::ZERO; joints.len()], ..RestGradient::default() };
         let heads = &mut out.heads;
         let mut take = |j: usize, x: DVec3, g: DVec3| {
             let back = linear[j].transpose() * g;
@@ -118,7 +126,8 @@ impl Armature {
                     factors[j] = DVec3::splat(along.dot(g * along));
                     let turn = (g + g.transpose()) * along * (f - 1.0);
                     let across = turn - along * along.dot(turn);
-                    let by_bone = if along == DVec3::ZERO { DVec3::ZERO } else { across / bone.length() };
+                    let by_bone =
+                        if along == DVec3::ZERO { DVec3::ZERO } else { across / bone.length() };
                     out.heads[j] -= by_bone;
                     if let Some(tail) = out.tails.get_mut(j) {
                         *tail += by_bone;
@@ -139,7 +148,9 @@ fn stretches(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<Stretch>, G
         };
         if !stretch.usable() {
             let name = &rig.joints()[*j].name;
-            return Err(GeomError::domain(format!("the stretch of `{name}` must be positive and finite")));
+            return Err(GeomError::domain(format!(
+                "the stretch of `{name}` must be positive and finite"
+            )));
         }
         *place = *stretch;
     }

@@ -1,5 +1,6 @@
-//! The vector-Jacobian product of posing by rotation vectors, from forces on points to torques about joints: as much work as
-//! there are joints. [`Rig::transforms_vjp`] is the plain way, for any pose.
+//! The vector-Jacobian product of posing by rotation vectors, from forces on points to
+//! torques about joints: as much work as there are joints. [`Rig::transforms_vjp`] is the
+//! plain way, for any pose.
 
 use super::{Armature, Influence, JointPose, Rules, Turn};
 use crate::geom::GeomError;
@@ -28,8 +29,9 @@ pub struct BodyGradient {
 }
 
 impl Armature {
-    /// The vector-Jacobian product of [`Armature::posed`] by rotation vectors: from the derivatives of something by the posed
-    /// keypoints and vertices (in the order of [`Armature::positions`]; none: nothing depends on them). `None` for a pose with
+    /// The vector-Jacobian product of [`Armature::posed`] by rotation vectors: from the
+    /// derivatives of something by the posed keypoints and vertices (in the order of
+    /// [`Armature::positions`]; none: nothing depends on them). `None` for a pose with
     /// anything but rotation vectors, or scales that are inherited.
     ///
     /// # Errors
@@ -42,13 +44,16 @@ impl Armature {
         by_vertex: &[DVec3],
     ) -> Result<Option<BodyGradient>, GeomError> {
         let rig = self.rig();
-        let plain = |p: &JointPose| p.location == DVec3::ZERO && p.scale == DVec3::ONE && vector(p).is_some();
+        let plain = |p: &JointPose| {
+            p.location == DVec3::ZERO && p.scale == DVec3::ONE && vector(p).is_some()
+        };
         if rules.inherit_scale || !pose.iter().all(plain) {
             return Ok(None);
         }
         let transforms = rig.transforms(pose, rules)?;
         let count = rig.joints().len();
-        // Of everything that hangs on a joint: the sum of the derivatives (forces), and of p x g (torques about the origin).
+        // Of everything that hangs on a joint: the sum of the derivatives (forces), and
+        // of p x g (torques about the origin).
         let (mut force, mut torque) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
         let mut hang = |joint: usize, rest: DVec3, g: DVec3| {
             let t = &transforms[joint];
@@ -74,7 +79,10 @@ impl Armature {
             // The head is where its parent puts it, and its own turn leaves it there.
             let pivot = transforms[j].transform_point3(joint.head);
             let local = up.transpose() * (t - pivot.cross(f));
-            turns[j] = transposed_left_jacobian(pose.get(j).and_then(vector).unwrap_or(DVec3::ZERO), local);
+            turns[j] = transposed_left_jacobian(
+                pose.get(j).and_then(vector).unwrap_or(DVec3::ZERO),
+                local,
+            );
             // x -> R (x - h) + h.
             heads[j] = (up.transpose() - transforms[j].matrix3.transpose()) * f;
             if let Some(p) = joint.parent {
@@ -94,13 +102,17 @@ fn vector(p: &JointPose) -> Option<DVec3> {
     }
 }
 
-/// J' t with exp(w + dw) = exp(J dw) exp(w): J = I + a [w]x + b [w]x^2 with a = (1 - cos |w|) / |w|^2, b = (|w| - sin |w|) / |w|^3.
+/// J' t with exp(w + dw) = exp(J dw) exp(w): J = I + a [w]x + b [w]x^2 with a = (1 - cos
+/// |w|) / |w|^2, b = (|w| - sin |w|) / |w|^3.
 fn transposed_left_jacobian(w: DVec3, t: DVec3) -> DVec3 {
     let square = w.length_squared();
     let angle = square.sqrt();
     let (a, b) = if angle < 1e-3 {
         // Series: what is left out is below the rounding of doubles.
-        (0.5 - square / 24.0 + square * square / 720.0, 1.0 / 6.0 - square / 120.0 + square * square / 5040.0)
+        (
+            0.5 - square / 24.0 + square * square / 720.0,
+            1.0 / 6.0 - square / 120.0 + square * square / 5040.0,
+        )
     } else {
         ((1.0 - libm::cos(angle)) / square, (angle - libm::sin(angle)) / (square * angle))
     };
@@ -114,7 +126,12 @@ mod tests {
 
     #[test]
     fn the_left_jacobian_is_that_of_differences() {
-        for w in [DVec3::ZERO, DVec3::new(1e-5, 2e-4, -1e-4), DVec3::new(0.3, -1.2, 0.5), DVec3::new(2.0, 1.0, -2.5)] {
+        for w in [
+            DVec3::ZERO,
+            DVec3::new(1e-5, 2e-4, -1e-4),
+            DVec3::new(0.3, -1.2, 0.5),
+            DVec3::new(2.0, 1.0, -2.5),
+        ] {
             let (x, g) = (DVec3::new(0.3, -0.4, 1.1), DVec3::new(0.7, 0.2, -0.6));
             let f = |w: DVec3| (glam::DQuat::from_scaled_axis(w) * x).dot(g);
             let torque = (glam::DQuat::from_scaled_axis(w) * x).cross(g);

@@ -1,9 +1,12 @@
-//! Fewer and fewer triangles through some of a mesh's own vertices: half-edge collapses in the order of quadric errors (Garland and
-//! Heckbert 1997, *Surface simplification using quadric error metrics*).
+//! Fewer and fewer triangles through some of a mesh's own vertices: half-edge collapses
+//! in the order of quadric errors (Garland and Heckbert 1997, *Surface simplification
+//! using quadric error metrics*).
 //!
-//! Points that lie on a line (a crease, a boundary, where parts meet, a seam between normals) move along that line alone, ends and
-//! crossings of lines not at all. No face turns over, and by the link condition no collapse changes what kind of surface it is: what
-//! was closed stays closed. Invariant: the result depends on the mesh alone, ties go to lower numbers.
+//! Points that lie on a line (a crease, a boundary, where parts meet, a seam between
+//! normals) move along that line alone, ends and crossings of lines not at all. No face
+//! turns over, and by the link condition no collapse changes what kind of surface it is:
+//! what was closed stays closed. Invariant: the result depends on the mesh alone, ties go
+//! to lower numbers.
 
 use super::quadric::Quadric;
 use crate::geom::NO_FACE;
@@ -18,11 +21,13 @@ use std::collections::BinaryHeap;
 const FEWEST: usize = 100;
 /// Above this many triangles levels halve them, below they leave seven in ten.
 const MANY: usize = 10_000;
-/// What an edge's squared length adds to the squared distances: among equals the shortest goes first.
+/// What an edge's squared length adds to the squared distances: among equals the shortest
+/// goes first.
 const BY_LENGTH: f64 = 1e-3;
 /// A face turns by at most 60 degrees in one step: the cosine.
 const LEAST_TURN_COS: f64 = 0.5;
-/// The least quality that a face may come to: 1 for an equilateral one, 0 for one without area.
+/// The least quality that a face may come to: 1 for an equilateral one, 0 for one without
+/// area.
 const LEAST_QUALITY: f64 = 0.08;
 
 /// Edges that show or mean something, in bits. One can be several.
@@ -73,8 +78,10 @@ pub(super) fn decimate(fine: &Fine) -> Vec<Step> {
     while let Some(Reverse((_, from))) = queue.pop() {
         let Plan { to, stale, .. } = surface.plans[from as usize];
         surface.plans[from as usize].queued = false;
-        // What lies around may have changed meanwhile; costs mostly rise, so few go in too late.
-        let collapse = if stale { None } else { surface.collapse(from, to, &surface.neighbours(from)) };
+        // What lies around may have changed meanwhile; costs mostly rise, so few go in
+        // too late.
+        let collapse =
+            if stale { None } else { surface.collapse(from, to, &surface.neighbours(from)) };
         let Some(collapse) = collapse else {
             surface.enqueue(from, &mut queue);
             continue;
@@ -169,7 +176,8 @@ impl<'a> Surface<'a> {
                 for p in points {
                     surface.around[p as usize].push(f as u32);
                     if let Some(normal) = plane {
-                        surface.quadrics[p as usize] += Quadric::plane(normal, surface.at[p as usize]);
+                        surface.quadrics[p as usize] +=
+                            Quadric::plane(normal, surface.at[p as usize]);
                     }
                 }
             }
@@ -179,9 +187,13 @@ impl<'a> Surface<'a> {
     }
 
     fn find_lines(&mut self, fine: &Fine) {
-        let is_crease: FxHashSet<Pair> =
-            fine.creases.iter().map(|e| pair(self.point[e[0] as usize], self.point[e[1] as usize])).collect();
-        let faces: Vec<u32> = (0..self.triangles.len() as u32).filter(|f| self.left[*f as usize]).collect();
+        let is_crease: FxHashSet<Pair> = fine
+            .creases
+            .iter()
+            .map(|e| pair(self.point[e[0] as usize], self.point[e[1] as usize]))
+            .collect();
+        let faces: Vec<u32> =
+            (0..self.triangles.len() as u32).filter(|f| self.left[*f as usize]).collect();
         let welded: Vec<[u32; 3]> = faces.iter().map(|f| self.points(*f)).collect();
         let mut seen: FxHashSet<Pair> = FxHashSet::default();
         for (f, c, g, _) in pair_edges(&welded, |_, _| false) {
@@ -214,7 +226,8 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// A plane through an edge at right angles to a face beside it keeps collapses from moving the line sideways.
+    /// A plane through an edge at right angles to a face beside it keeps collapses from
+    /// moving the line sideways.
     fn keep_line(&mut self, a: u32, b: u32, face: u32) {
         let [p, q] = [a, b].map(|p| self.at[p as usize]);
         let across = (q - p).cross(normal(self.points(face).map(|p| self.at[p as usize])));
@@ -237,13 +250,15 @@ impl<'a> Surface<'a> {
     /// The points that share an edge with a point, each once, in rising order.
     fn neighbours(&self, point: u32) -> SmallVec<[u32; 16]> {
         let faces = self.around[point as usize].iter();
-        let mut all: SmallVec<[u32; 16]> = faces.flat_map(|f| self.points(*f)).filter(|p| *p != point).collect();
+        let mut all: SmallVec<[u32; 16]> =
+            faces.flat_map(|f| self.points(*f)).filter(|p| *p != point).collect();
         all.sort_unstable();
         all.dedup();
         all
     }
 
-    /// Puts a point into the queue with the best collapse that it may do, if there is one.
+    /// Puts a point into the queue with the best collapse that it may do, if there is
+    /// one.
     fn enqueue(&mut self, from: u32, queue: &mut Queue) {
         let lines = self.lines_at[from as usize];
         if lines != 0 && lines != 2 {
@@ -255,10 +270,13 @@ impl<'a> Surface<'a> {
             let sum = self.quadrics[from as usize] + self.quadrics[to as usize];
             (sum.at(there) + BY_LENGTH * here.distance_squared(there)).to_bits()
         };
-        let ways = ours.iter().filter(|to| lines == 0 || self.lines.contains_key(&pair(from, **to)));
+        let ways =
+            ours.iter().filter(|to| lines == 0 || self.lines.contains_key(&pair(from, **to)));
         let mut ways: SmallVec<[(u64, u32); 16]> = ways.map(|to| (cost(*to), *to)).collect();
         ways.sort_unstable();
-        if let Some((cost, to)) = ways.into_iter().find(|(_, to)| self.collapse(from, *to, &ours).is_some()) {
+        if let Some((cost, to)) =
+            ways.into_iter().find(|(_, to)| self.collapse(from, *to, &ours).is_some())
+        {
             self.plans[from as usize] = Plan { to, queued: true, stale: false };
             queue.push(Reverse((cost, from)));
         }
@@ -288,13 +306,17 @@ impl<'a> Surface<'a> {
         let theirs = self.neighbours(to);
         let common = ours.iter().filter(|p| theirs.binary_search(p).is_ok()).count();
         let faces = if kind(to) & BOUNDARY != 0 { 1 } else { 2 };
-        if apexes.len() != faces || common != faces || apexes.iter().any(|p| self.around[*p as usize].len() < 2) {
+        if apexes.len() != faces
+            || common != faces
+            || apexes.iter().any(|p| self.around[*p as usize].len() < 2)
+        {
             return None;
         }
         if self.lines_at[from as usize] != 0 {
             // Along a line of one kind, and not onto another line.
             let other = ours.iter().copied().find(|p| *p != to && kind(*p) != 0)?;
-            if kind(to) == 0 || kind(other) != kind(to) || self.lines.contains_key(&pair(other, to)) {
+            if kind(to) == 0 || kind(other) != kind(to) || self.lines.contains_key(&pair(other, to))
+            {
                 return None;
             }
         }
@@ -312,7 +334,10 @@ impl<'a> Surface<'a> {
             let before = points.map(|p| self.at[p as usize]);
             let after = points.map(|p| if p == from { goal } else { self.at[p as usize] });
             let (a, b) = (normal(before), normal(after));
-            let (dot, least) = (a.dot(b), LEAST_TURN_COS * LEAST_TURN_COS * a.length_squared() * b.length_squared());
+            let (dot, least) = (
+                a.dot(b),
+                LEAST_TURN_COS * LEAST_TURN_COS * a.length_squared() * b.length_squared(),
+            );
             // Written so that NaN is refused.
             if !(dot > 0.0 && dot * dot >= least) || (is_sliver(after) && !is_sliver(before)) {
                 return None;
@@ -354,7 +379,8 @@ impl<'a> Surface<'a> {
         self.lines.remove(&pair(from, to));
         let near: SmallVec<[u32; 16]> = self.neighbours(to);
         // Neighbours of the point that went are now those of the other.
-        if let Some((other, kind)) = near.iter().find_map(|p| self.lines.remove(&pair(from, *p)).map(|kind| (*p, kind)))
+        if let Some((other, kind)) =
+            near.iter().find_map(|p| self.lines.remove(&pair(from, *p)).map(|kind| (*p, kind)))
         {
             self.lines.insert(pair(other, to), kind);
         }
@@ -373,7 +399,12 @@ impl<'a> Surface<'a> {
         Step {
             triangles: kept().map(|f| self.triangles[f]).collect(),
             parts: kept().map(|f| self.parts.get(f).copied().unwrap_or(0)).collect(),
-            creases: self.lines.iter().filter(|(_, kind)| **kind & CREASE != 0).map(|(key, _)| *key).collect(),
+            creases: self
+                .lines
+                .iter()
+                .filter(|(_, kind)| **kind & CREASE != 0)
+                .map(|(key, _)| *key)
+                .collect(),
             merged: self.merged.clone(),
         }
     }
@@ -384,8 +415,10 @@ fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Whether a triangle's quality, its area to that of an equilateral one with the same squares of edges, is too low.
+/// Whether a triangle's quality, its area to that of an equilateral one with the same
+/// squares of edges, is too low.
 fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
-    let around = LEAST_QUALITY * (a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a));
+    let around =
+        LEAST_QUALITY * (a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a));
     12.0 * normal([a, b, c]).length_squared() < around * around
 }

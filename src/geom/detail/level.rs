@@ -1,8 +1,9 @@
-//! One coarser version of meshes of a topology: which vertices it keeps, and for each it leaves out the point of the coarse surface
-//! that was nearest when it was made.
+//! One coarser version of meshes of a topology: which vertices it keeps, and for each it
+//! leaves out the point of the coarse surface that was nearest when it was made.
 //!
-//! That point is told by shares of three kept vertices, so it moves with them, and its distance from the vertex left out bounds how far
-//! the vertex is from the coarse surface in any other pose. Invariant: indices fit the mesh that the level was made of.
+//! That point is told by shares of three kept vertices, so it moves with them, and its
+//! distance from the vertex left out bounds how far the vertex is from the coarse surface
+//! in any other pose. Invariant: indices fit the mesh that the level was made of.
 
 use super::Coarse;
 use super::decimate::Step;
@@ -36,11 +37,14 @@ impl Level {
     pub(super) fn new(positions: &[Vec3], fine: &Topology, step: &Step) -> Level {
         let mut own = vec![u32::MAX; positions.len()];
         step.triangles.iter().flatten().for_each(|v| own[*v as usize] = 0);
-        let vertices: Arc<[u32]> = (0..positions.len() as u32).filter(|v| own[*v as usize] == 0).collect();
+        let vertices: Arc<[u32]> =
+            (0..positions.len() as u32).filter(|v| own[*v as usize] == 0).collect();
         vertices.iter().enumerate().for_each(|(i, v)| own[*v as usize] = i as u32);
-        let triangles: Vec<[u32; 3]> = step.triangles.iter().map(|t| t.map(|v| own[v as usize])).collect();
+        let triangles: Vec<[u32; 3]> =
+            step.triangles.iter().map(|t| t.map(|v| own[v as usize])).collect();
         let point = weld(positions);
-        let edges = if fine.edges.is_empty() { Edges::default() } else { edges(&point, &triangles, step) };
+        let edges =
+            if fine.edges.is_empty() { Edges::default() } else { edges(&point, &triangles, step) };
         let topology = Topology {
             triangles,
             parts: step.parts.clone(),
@@ -54,7 +58,8 @@ impl Level {
         let mut used = vec![false; positions.len()];
         fine.triangles.iter().flatten().for_each(|v| used[*v as usize] = true);
         let left_out = (0..positions.len()).filter(|v| used[*v] && own[*v] == u32::MAX);
-        let mut bounds: Vec<(f64, Bound)> = left_out.map(|v| near.bound(v as u32, step.merged[v])).collect();
+        let mut bounds: Vec<(f64, Bound)> =
+            left_out.map(|v| near.bound(v as u32, step.merged[v])).collect();
         bounds.sort_by(|a, b| b.0.total_cmp(&a.0));
         let deviation = bounds.first().map_or(0.0, |b| b.0);
         Level {
@@ -70,8 +75,8 @@ impl Level {
         Level { bounds: Vec::new(), ..self }
     }
 
-    /// Whether a vertex left out may be farther than `most` from this level of a mesh with other positions. A position that is not a
-    /// number is.
+    /// Whether a vertex left out may be farther than `most` from this level of a mesh
+    /// with other positions. A position that is not a number is.
     pub fn strays(&self, positions: &[Vec3], most: f64) -> bool {
         let most = (most * most) as f32;
         let at = |v: u32| positions.get(v as usize).copied().unwrap_or(Vec3::NAN);
@@ -89,11 +94,16 @@ impl Level {
 }
 
 fn edges(point: &[u32], triangles: &[[u32; 3]], step: &Step) -> Edges {
-    let welded: Vec<[u32; 3]> = step.triangles.iter().map(|t| t.map(|v| point[v as usize])).collect();
+    let welded: Vec<[u32; 3]> =
+        step.triangles.iter().map(|t| t.map(|v| point[v as usize])).collect();
     let all = pair_edges(&welded, |_, _| false).into_iter().map(|(f, c, g, _)| {
         let (a, b) = (welded[f][c], welded[f][(c + 1) % 3]);
         let crease = g != NO_FACE && step.creases.contains(&(a.min(b), a.max(b)));
-        Edge { vertices: [triangles[f][c], triangles[f][(c + 1) % 3]], faces: [f as u32, g], crease }
+        Edge {
+            vertices: [triangles[f][c], triangles[f][(c + 1) % 3]],
+            faces: [f as u32, g],
+            crease,
+        }
     });
     all.collect()
 }
@@ -103,14 +113,16 @@ struct Near<'a> {
     positions: &'a [Vec3],
     point: &'a [u32],
     triangles: &'a [[u32; 3]],
-    /// The triangles around each point: those of point `p` are `list[first[p]..first[p + 1]]`.
+    /// The triangles around each point: those of point `p` are
+    /// `list[first[p]..first[p + 1]]`.
     first: Vec<u32>,
     list: Vec<u32>,
 }
 
 impl<'a> Near<'a> {
     fn new(positions: &'a [Vec3], point: &'a [u32], triangles: &'a [[u32; 3]]) -> Near<'a> {
-        let corners = || triangles.iter().enumerate().flat_map(|(f, t)| t.iter().map(move |v| (f, *v)));
+        let corners =
+            || triangles.iter().enumerate().flat_map(|(f, t)| t.iter().map(move |v| (f, *v)));
         let mut first = vec![0u32; positions.len() + 1];
         corners().for_each(|(_, v)| first[point[v as usize] as usize + 1] += 1);
         (0..positions.len()).for_each(|p| first[p + 1] += first[p]);
@@ -128,15 +140,18 @@ impl<'a> Near<'a> {
         &self.list[self.first[p] as usize..self.first[p + 1] as usize]
     }
 
-    /// The nearest point to a vertex on the triangles around another, and from there on to neighbours as long as it is on the rim of one
-    /// and they are nearer; its distance, infinite where there are no triangles.
+    /// The nearest point to a vertex on the triangles around another, and from there on
+    /// to neighbours as long as it is on the rim of one and they are nearer; its
+    /// distance, infinite where there are no triangles.
     fn bound(&self, vertex: u32, merged: u32) -> (f64, Bound) {
         let p = self.at(vertex);
-        let mut best = (f64::INFINITY, Bound { vertex, corners: [u32::MAX; 3], shares: [f32::NAN; 3] });
+        let mut best =
+            (f64::INFINITY, Bound { vertex, corners: [u32::MAX; 3], shares: [f32::NAN; 3] });
         self.around(merged).iter().for_each(|f| best = self.nearer(p, *f, best));
         while best.1.shares.contains(&0.0) {
             let before = best.0;
-            let ends = best.1.corners.into_iter().zip(best.1.shares).filter(|(_, share)| *share > 0.0);
+            let ends =
+                best.1.corners.into_iter().zip(best.1.shares).filter(|(_, share)| *share > 0.0);
             ends.flat_map(|(v, _)| self.around(v)).for_each(|f| best = self.nearer(p, *f, best));
             if best.0 >= before {
                 break;
@@ -151,7 +166,11 @@ impl<'a> Near<'a> {
         let shares = nearest(p, corners.map(|v| self.at(v)));
         let there = corners.iter().zip(shares).map(|(v, s)| self.at(*v) * s).sum::<DVec3>();
         let d = there.distance_squared(p);
-        if d < best.0 { (d, Bound { corners, shares: shares.map(|s| s as f32), ..best.1 }) } else { best }
+        if d < best.0 {
+            (d, Bound { corners, shares: shares.map(|s| s as f32), ..best.1 })
+        } else {
+            best
+        }
     }
 
     fn at(&self, v: u32) -> DVec3 {
@@ -159,7 +178,8 @@ impl<'a> Near<'a> {
     }
 }
 
-/// The shares of a triangle's corners in its point nearest to `p` (Ericson 2005, *Real-time collision detection*, 5.1.5).
+/// The shares of a triangle's corners in its point nearest to `p` (Ericson 2005,
+/// *Real-time collision detection*, 5.1.5).
 fn nearest(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let (d1, d2) = (ab.dot(p - a), ac.dot(p - a));

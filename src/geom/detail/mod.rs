@@ -1,8 +1,10 @@
-//! Coarser versions of meshes that keep some of their vertices, for pictures in which the difference cannot be seen.
+//! Coarser versions of meshes that keep some of their vertices, for pictures in which the
+//! difference cannot be seen.
 //!
-//! Not other shapes: a coarser version has positions and normals of the mesh itself, so what depends on its vertices is known by the
-//! mesh's. It knows how far the vertices it leaves out are from it. Invariant: which versions there are depends on how a mesh was made
-//! (a lathe's points, a file, a body at rest), never on what was asked for before.
+//! Not other shapes: a coarser version has positions and normals of the mesh itself, so
+//! what depends on its vertices is known by the mesh's. It knows how far the vertices it
+//! leaves out are from it. Invariant: which versions there are depends on how a mesh was
+//! made (a lathe's points, a file, a body at rest), never on what was asked for before.
 
 mod decimate;
 mod level;
@@ -31,7 +33,9 @@ pub struct Coarse {
 impl Coarse {
     /// Of some of a mesh's vertices, joined like this.
     fn of(mesh: &Mesh, vertices: Arc<[u32]>, topology: Arc<Topology>) -> Coarse {
-        let pick = |list: &[Vec3]| vertices.iter().filter_map(|v| list.get(*v as usize)).copied().collect();
+        let pick = |list: &[Vec3]| {
+            vertices.iter().filter_map(|v| list.get(*v as usize)).copied().collect()
+        };
         let (positions, normals) = (pick(&mesh.positions), pick(&mesh.normals));
         Coarse { mesh: Arc::new(Mesh { positions, normals, topology }), vertices }
     }
@@ -70,7 +74,8 @@ impl Detail {
         Detail { source, ball: OnceLock::new(), made: Mutex::default() }
     }
 
-    /// Of a mesh that will be seen many times: coarser versions are worked out once, in about a second for 100,000 triangles.
+    /// Of a mesh that will be seen many times: coarser versions are worked out once, in
+    /// about a second for 100,000 triangles.
     pub(super) fn rigid() -> Detail {
         Detail::new(Source::Rigid(OnceLock::new()))
     }
@@ -85,13 +90,19 @@ impl Detail {
         Detail::new(Source::Turned(turned))
     }
 
-    /// The coarsest version of the mesh it belongs to that is at most `error` (the mesh's units) from every vertex it leaves out; `None`
-    /// if that is the mesh itself.
+    /// The coarsest version of the mesh it belongs to that is at most `error` (the mesh's
+    /// units) from every vertex it leaves out; `None` if that is the mesh itself.
     pub(super) fn within(&self, mesh: &Mesh, error: f64) -> Option<Arc<Coarse>> {
-        let last = |levels: &[Level], fits: &dyn Fn(&Level) -> bool| levels.iter().rposition(fits).map(|i| (0, i));
+        let last = |levels: &[Level], fits: &dyn Fn(&Level) -> bool| {
+            levels.iter().rposition(fits).map(|i| (0, i))
+        };
         let key = match &self.source {
-            Source::Rigid(levels) => last(rigid_levels(levels, mesh), &|level| level.deviation <= error),
-            Source::Posed(levels, part) => last(levels.levels(*part), &|level| !level.strays(&mesh.positions, error)),
+            Source::Rigid(levels) => {
+                last(rigid_levels(levels, mesh), &|level| level.deviation <= error)
+            }
+            Source::Posed(levels, part) => {
+                last(levels.levels(*part), &|level| !level.strays(&mesh.positions, error))
+            }
             Source::Turned(turned) => turned.steps(error).map(|s| (s.sides, s.rings)),
         }?;
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
@@ -101,7 +112,9 @@ impl Detail {
         let coarse = Arc::new(match &self.source {
             Source::Rigid(levels) => rigid_levels(levels, mesh).get(key.1)?.of(mesh),
             Source::Posed(levels, part) => levels.levels(*part).get(key.1)?.of(mesh),
-            Source::Turned(turned) => turned.coarse(mesh, turned::Steps { sides: key.0, rings: key.1 }),
+            Source::Turned(turned) => {
+                turned.coarse(mesh, turned::Steps { sides: key.0, rings: key.1 })
+            }
         });
         made.push((key, Arc::clone(&coarse)));
         Some(coarse)
@@ -118,29 +131,44 @@ impl Detail {
 }
 
 fn rigid_levels<'a>(levels: &'a OnceLock<Vec<Level>>, mesh: &Mesh) -> &'a [Level] {
-    levels.get_or_init(|| levels_of(&mesh.positions, &mesh.topology).into_iter().map(Level::rigid).collect())
+    levels.get_or_init(|| {
+        levels_of(&mesh.positions, &mesh.topology).into_iter().map(Level::rigid).collect()
+    })
 }
 
-/// The levels of the parts of a smooth body, each with its own list of the body's vertices: the body is made coarser as a whole, so that
-/// parts of one level meet where they did.
-pub(super) fn levels_of_parts(positions: &[Vec3], parts: &[(&[u32], &Topology)]) -> Vec<Vec<Level>> {
-    let triangles = parts.iter().flat_map(|(own, t)| t.triangles.iter().map(|t| t.map(|v| own[v as usize])));
-    let numbers = parts.iter().zip(0u16..).flat_map(|((_, t), i)| t.triangles.iter().map(move |_| i));
+/// The levels of the parts of a smooth body, each with its own list of the body's
+/// vertices: the body is made coarser as a whole, so that parts of one level meet where
+/// they did.
+pub(super) fn levels_of_parts(
+    positions: &[Vec3],
+    parts: &[(&[u32], &Topology)],
+) -> Vec<Vec<Level>> {
+    let triangles =
+        parts.iter().flat_map(|(own, t)| t.triangles.iter().map(|t| t.map(|v| own[v as usize])));
+    let numbers =
+        parts.iter().zip(0u16..).flat_map(|((_, t), i)| t.triangles.iter().map(move |_| i));
     let (triangles, numbers): (Vec<_>, Vec<_>) = (triangles.collect(), numbers.collect());
     let steps = decimate(&Fine { positions, triangles: &triangles, parts: &numbers, creases: &[] });
     let mut of_part = vec![u32::MAX; positions.len()];
     let one = |((own, topology), number): (&(&[u32], &Topology), u16)| {
         let at: Vec<Vec3> = own.iter().map(|v| positions[*v as usize]).collect();
         own.iter().zip(0..).for_each(|(v, i)| of_part[*v as usize] = i);
-        // Where a point joins parts that share no edge, one of them may get a vertex that it does not have: no levels from there on.
+        // Where a point joins parts that share no edge, one of them may get a vertex that
+        // it does not have: no levels from there on.
         let mine = |v: u32| Some(of_part[v as usize]).filter(|i| *i != u32::MAX);
         let part = |step: &Step| {
-            let theirs = step.triangles.iter().zip(&step.parts).filter(|(_, part)| **part == number);
+            let theirs =
+                step.triangles.iter().zip(&step.parts).filter(|(_, part)| **part == number);
             let triangles = theirs.map(|([a, b, c], _)| Some([mine(*a)?, mine(*b)?, mine(*c)?]));
             let triangles = triangles.collect::<Option<Vec<[u32; 3]>>>()?;
-            let merged = own.iter().map(|v| mine(step.merged[*v as usize])).collect::<Option<Vec<u32>>>()?;
+            let merged =
+                own.iter().map(|v| mine(step.merged[*v as usize])).collect::<Option<Vec<u32>>>()?;
             let parts = vec![0; triangles.len()];
-            Some(Level::new(&at, topology, &Step { triangles, parts, creases: FxHashSet::default(), merged }))
+            Some(Level::new(
+                &at,
+                topology,
+                &Step { triangles, parts, creases: FxHashSet::default(), merged },
+            ))
         };
         let levels = steps.iter().map_while(part).collect();
         own.iter().for_each(|v| of_part[*v as usize] = u32::MAX);
@@ -151,8 +179,14 @@ pub(super) fn levels_of_parts(positions: &[Vec3], parts: &[(&[u32], &Topology)])
 
 /// The levels of a mesh, ever coarser.
 fn levels_of(positions: &[Vec3], topology: &Topology) -> Vec<Level> {
-    let creases: Vec<[u32; 2]> = topology.edges.iter().filter(|e| e.crease).map(|e| e.vertices).collect();
-    let fine = Fine { positions, triangles: &topology.triangles, parts: &topology.parts, creases: &creases };
+    let creases: Vec<[u32; 2]> =
+        topology.edges.iter().filter(|e| e.crease).map(|e| e.vertices).collect();
+    let fine = Fine {
+        positions,
+        triangles: &topology.triangles,
+        parts: &topology.parts,
+        creases: &creases,
+    };
     decimate(&fine).iter().map(|step| Level::new(positions, topology, step)).collect()
 }
 

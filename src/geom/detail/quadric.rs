@@ -1,8 +1,10 @@
-//! Sums of squared distances to planes (Garland and Heckbert 1997): how far a point is from all the faces it stands for.
+//! Sums of squared distances to planes (Garland and Heckbert 1997): how far a point is
+//! from all the faces it stands for.
 
 use glam::DVec3;
 
-/// A sum of squared distances to planes, as a function of the point: p' A p + 2 b' p + c with a symmetric A.
+/// A sum of squared distances to planes, as a function of the point: p' A p + 2 b' p + c
+/// with a symmetric A.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Quadric {
     /// xx, yy, zz.
@@ -52,7 +54,10 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_squared_distances() {
-        let planes = [(DVec3::new(2.0, -1.0, 0.5), DVec3::X), (DVec3::new(0.1, 0.7, 3.0), DVec3::new(1.0, 2.0, 3.0))];
+        let planes = [
+            (DVec3::new(2.0, -1.0, 0.5), DVec3::X),
+            (DVec3::new(0.1, 0.7, 3.0), DVec3::new(1.0, 2.0, 3.0)),
+        ];
         let p = DVec3::new(-0.4, 1.3, 0.8);
         let (mut sum, mut plain) = (Quadric::default(), 0.0);
         for (n, through) in planes.map(|(n, q)| (n.normalize(), q)) {

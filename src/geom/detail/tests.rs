@@ -1,4 +1,5 @@
-//! Coarser meshes are closed where the mesh was, keep their lines, and are as near as they say.
+//! Coarser meshes are closed where the mesh was, keep their lines, and are as near as
+//! they say.
 
 use super::*;
 use crate::geom::edges::{pair_edges, smooth_normals, weld};
@@ -8,11 +9,17 @@ use crate::geom::{Caps, NO_FACE, Profile, Solid, lathe, obj, sphere};
 fn lumpy(sides: u32) -> Mesh {
     let ball = sphere(1.0, sides).unwrap();
     let lump = |p: &Vec3| {
-        let lumps = libm::sinf(4.0 * p.x + 1.0) * libm::sinf(5.0 * p.y) * libm::sinf(3.0 * p.z + 2.0);
+        let lumps =
+            libm::sinf(4.0 * p.x + 1.0) * libm::sinf(5.0 * p.y) * libm::sinf(3.0 * p.z + 2.0);
         *p * (1.0 + 0.1 * lumps)
     };
     let count = ball.topology.triangles.len();
-    Mesh::new(ball.positions.iter().map(lump).collect(), ball.topology.triangles.clone(), vec![0; count]).unwrap()
+    Mesh::new(
+        ball.positions.iter().map(lump).collect(),
+        ball.topology.triangles.clone(),
+        vec![0; count],
+    )
+    .unwrap()
 }
 
 /// A cup: a crease round its bottom, a boundary round its mouth, two parts.
@@ -27,7 +34,12 @@ fn corners(mesh: &Mesh, face: &[u32; 3]) -> [DVec3; 3] {
 }
 
 fn volume(mesh: &Mesh) -> f64 {
-    mesh.topology.triangles.iter().map(|t| corners(mesh, t)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+    mesh.topology
+        .triangles
+        .iter()
+        .map(|t| corners(mesh, t))
+        .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+        .sum()
 }
 
 /// How far the farthest of some points is from a mesh: every triangle is looked at.
@@ -39,7 +51,9 @@ fn farthest(points: &[Vec3], mesh: &Mesh) -> f64 {
             // The plane where the foot is inside, else the edges.
             let n = (b - a).cross(c - a);
             let foot = p - n * (p - a).dot(n) / n.length_squared();
-            let inside = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (*v - *u).cross(foot - *u).dot(n) >= 0.0);
+            let inside = [(a, b), (b, c), (c, a)]
+                .iter()
+                .all(|(u, v)| (*v - *u).cross(foot - *u).dot(n) >= 0.0);
             let edge = |u: DVec3, v: DVec3| {
                 let t = ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0);
                 p.distance(u + (v - u) * t)
@@ -56,8 +70,12 @@ fn a_closed_mesh_stays_closed_and_outward() {
     let mesh = lumpy(48);
     assert!(mesh.topology.edges.iter().all(|e| !e.crease));
     let levels = levels_of(&mesh.positions, &mesh.topology);
-    let counts: Vec<usize> = levels.iter().map(|l| l.of(&mesh).mesh.topology.triangles.len()).collect();
-    assert!(levels.len() > 5 && counts.windows(2).all(|w| w[1] < w[0]) && counts.last() < Some(&160), "{counts:?}");
+    let counts: Vec<usize> =
+        levels.iter().map(|l| l.of(&mesh).mesh.topology.triangles.len()).collect();
+    assert!(
+        levels.len() > 5 && counts.windows(2).all(|w| w[1] < w[0]) && counts.last() < Some(&160),
+        "{counts:?}"
+    );
     for level in &levels {
         let coarse = level.of(&mesh).mesh;
         let t = &coarse.topology;
@@ -76,7 +94,10 @@ fn a_closed_mesh_stays_closed_and_outward() {
         assert!((volume(&coarse) / volume(&mesh) - 1.0).abs() < 0.3 * level.deviation.sqrt());
         for (i, v) in level.vertices.iter().enumerate() {
             let at = *v as usize;
-            assert_eq!((coarse.positions[i], coarse.normals[i]), (mesh.positions[at], mesh.normals[at]));
+            assert_eq!(
+                (coarse.positions[i], coarse.normals[i]),
+                (mesh.positions[at], mesh.normals[at])
+            );
         }
     }
     assert!(levels[0].deviation < 0.5 * levels[levels.len() - 1].deviation);
@@ -96,16 +117,22 @@ fn creases_boundaries_and_parts_stay_where_they_are() {
         assert!(open.len() > 5 && open.iter().all(|e| e.vertices.iter().all(|v| at(*v).y == top)));
         assert!(creases.len() > 5);
         for e in &creases {
-            assert!(e.vertices.iter().all(|v| at(*v).y == 0.0 && at(*v).length() > 0.49), "the rim of the bottom");
+            assert!(
+                e.vertices.iter().all(|v| at(*v).y == 0.0 && at(*v).length() > 0.49),
+                "the rim of the bottom"
+            );
             let up = |f: u32| t.triangles[f as usize].iter().any(|v| at(*v).y > 0.0);
             assert!(up(e.faces[0]) != up(e.faces[1]), "between bottom and wall");
         }
         // Each closes to one ring, and the bottom keeps its part and its normals.
         for ring in [&open, &creases] {
             let points = weld(&coarse.positions);
-            let mut ends: Vec<u32> = ring.iter().flat_map(|e| e.vertices).map(|v| points[v as usize]).collect();
+            let mut ends: Vec<u32> =
+                ring.iter().flat_map(|e| e.vertices).map(|v| points[v as usize]).collect();
             ends.sort_unstable();
-            assert!(ends.chunks(2).all(|two| two[0] == two[1]) && ends.windows(3).all(|w| w[0] != w[2]));
+            assert!(
+                ends.chunks(2).all(|two| two[0] == two[1]) && ends.windows(3).all(|w| w[0] != w[2])
+            );
         }
         for (face, part) in t.triangles.iter().zip(&t.parts) {
             assert_eq!(*part == 2, face.iter().all(|v| at(*v).y == 0.0));
@@ -189,10 +216,14 @@ fn parts_of_a_body_still_meet() {
         topology.triangles.push(t.map(&mut local));
         topology.parts.push(0);
     }
-    let open = |faces: &[[u32; 3]]| pair_edges(faces, |_, _| false).iter().filter(|e| e.2 == NO_FACE).count();
+    let open = |faces: &[[u32; 3]]| {
+        pair_edges(faces, |_, _| false).iter().filter(|e| e.2 == NO_FACE).count()
+    };
     let lists: Vec<(&[u32], &Topology)> = parts.iter().map(|(own, t)| (&own[..], t)).collect();
     let all = levels_of_parts(&mesh.positions, &lists);
-    assert!(all.len() == 9 && all.iter().all(|levels| levels.len() == all[0].len() && levels.len() > 3));
+    assert!(
+        all.len() == 9 && all.iter().all(|levels| levels.len() == all[0].len() && levels.len() > 3)
+    );
     let normals = smooth_normals(&mesh.positions, &mesh.triangles);
     for k in 0..all[0].len() {
         let mut faces = Vec::new();
@@ -213,7 +244,12 @@ fn parts_of_a_body_still_meet() {
 #[test]
 fn poor_meshes_do_no_harm() {
     let raw = |positions: Vec<Vec3>, triangles: Vec<[u32; 3]>| {
-        let topology = Topology { parts: vec![0; triangles.len()], triangles, part_count: 1, ..Topology::default() };
+        let topology = Topology {
+            parts: vec![0; triangles.len()],
+            triangles,
+            part_count: 1,
+            ..Topology::default()
+        };
         Mesh { normals: vec![Vec3::Y; positions.len()], positions, topology: Arc::new(topology) }
     };
     let mut state = 1u32;
@@ -221,14 +257,18 @@ fn poor_meshes_do_no_harm() {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (state >> 8) % n
     };
-    let some: Vec<Vec3> = (0..60).map(|_| Vec3::new(random(9) as f32, random(9) as f32, random(3) as f32)).collect();
+    let some: Vec<Vec3> =
+        (0..60).map(|_| Vec3::new(random(9) as f32, random(9) as f32, random(3) as f32)).collect();
     let soup: Vec<[u32; 3]> = (0..900).map(|_| [random(60), random(60), random(60)]).collect();
     let mut holed = lumpy(32);
     holed.positions[100] = Vec3::NAN;
     holed.positions[200] = Vec3::INFINITY;
     let big = lumpy(32);
     let huge = Mesh { positions: big.positions.iter().map(|p| *p * 1e30).collect(), ..big.clone() };
-    let flat = Mesh { positions: big.positions.iter().map(|p| Vec3::new(p.x, 0.0, 0.0)).collect(), ..big.clone() };
+    let flat = Mesh {
+        positions: big.positions.iter().map(|p| Vec3::new(p.x, 0.0, 0.0)).collect(),
+        ..big.clone()
+    };
     let meshes = [
         raw(Vec::new(), Vec::new()),
         raw(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]),

@@ -1,7 +1,9 @@
-//! Coarser surfaces of revolution: every so many meridians, every so many rings of each strip.
+//! Coarser surfaces of revolution: every so many meridians, every so many rings of each
+//! strip.
 //!
-//! Ends of strips stay, and with them poles and creases; so do rings where parts meet. Invariant: which rings a step keeps depends on
-//! the numbers of points and parts alone, so few topologies serve a profile that moves.
+//! Ends of strips stay, and with them poles and creases; so do rings where parts meet.
+//! Invariant: which rings a step keeps depends on the numbers of points and parts alone,
+//! so few topologies serve a profile that moves.
 
 use super::Coarse;
 use crate::geom::Mesh;
@@ -19,7 +21,8 @@ pub(in crate::geom) struct Turned {
     /// Whether the path ends where it begins.
     pub closed: bool,
     pub part_count: u16,
-    /// For each step between rings (1, 2, 4, …) how far points of the path left out are from it; found when asked for.
+    /// For each step between rings (1, 2, 4, …) how far points of the path left out are
+    /// from it; found when asked for.
     strays: OnceLock<Vec<f64>>,
 }
 
@@ -35,17 +38,26 @@ impl Turned {
         Turned { strips, sides, closed, part_count, strays: OnceLock::new() }
     }
 
-    /// The steps with the fewest triangles whose surface is nowhere farther than `most` from the vertices left out, if not every vertex
-    /// is kept. The distance is at most that of the path's points from the coarser path, and the sagitta r (1 - cos(pi / sides)).
+    /// The steps with the fewest triangles whose surface is nowhere farther than `most`
+    /// from the vertices left out, if not every vertex is kept. The distance is at most
+    /// that of the path's points from the coarser path, and the sagitta r (1 - cos(pi /
+    /// sides)).
     pub(super) fn steps(&self, most: f64) -> Option<Steps> {
         let radius = self.strips.iter().flat_map(|s| &s.points).fold(0.0, |r: f64, p| r.max(p.0));
         let fits = |(i, stray): (usize, &f64)| {
             let rings = 1 << i;
             let sagitta = |step: u32| match step {
                 1 => 0.0,
-                _ => radius * (1.0 - libm::cos(core::f64::consts::PI * f64::from(step) / f64::from(self.sides))),
+                _ => {
+                    radius
+                        * (1.0
+                            - libm::cos(
+                                core::f64::consts::PI * f64::from(step) / f64::from(self.sides),
+                            ))
+                }
             };
-            let is_step = |step: &u32| self.sides.is_multiple_of(*step) && stray + sagitta(*step) <= most;
+            let is_step =
+                |step: &u32| self.sides.is_multiple_of(*step) && stray + sagitta(*step) <= most;
             let sides = (1..=self.sides / FEWEST_SIDES.min(self.sides)).rev().find(is_step)?;
             Some(Steps { sides, rings })
         };
@@ -58,7 +70,8 @@ impl Turned {
     fn strays(&self) -> &[f64] {
         self.strays.get_or_init(|| {
             let longest = self.strips.iter().map(|s| s.points.len()).max().unwrap_or(0);
-            let stray = |rings| self.strips.iter().map(|s| stray(s, &kept(s, rings))).fold(0.0, f64::max);
+            let stray =
+                |rings| self.strips.iter().map(|s| stray(s, &kept(s, rings))).fold(0.0, f64::max);
             (0..=longest.ilog2()).map(|i| stray(1 << i)).collect()
         })
     }
@@ -82,13 +95,18 @@ impl Turned {
                 vertices.extend((0..count).map(|k| starts[*ring] + k * steps.sides));
             }
             let parts = rings.iter().take(rings.len() - 1).map(|ring| s.parts[*ring]).collect();
-            strips.push(Strip { points: rings.iter().map(|ring| s.points[*ring]).collect(), parts, blend: s.blend });
+            strips.push(Strip {
+                points: rings.iter().map(|ring| s.points[*ring]).collect(),
+                parts,
+                blend: s.blend,
+            });
         }
         Coarse::of(mesh, vertices.into(), topology_of(&strips, sides, self.closed, self.part_count))
     }
 }
 
-/// The rings of a strip that are kept: its ends, where parts meet, and one of so many between.
+/// The rings of a strip that are kept: its ends, where parts meet, and one of so many
+/// between.
 fn kept(s: &Strip, step: usize) -> Vec<usize> {
     let last = s.points.len() - 1;
     (0..=last).filter(|i| *i == last || *i % step == 0 || s.parts[*i - 1] != s.parts[*i]).collect()

@@ -1,4 +1,5 @@
-//! Accessors: typed views into buffers. Invariant: an [`Elements`] lies whole within its buffer.
+//! Accessors: typed views into buffers. Invariant: an [`Elements`] lies whole within its
+//! buffer.
 
 use super::container::{self, Read};
 use super::json::Document;
@@ -35,22 +36,38 @@ pub(super) struct Elements<'a> {
 }
 
 impl<'a> Data<'a> {
-    pub fn new(document: &'a Document, bin: Option<&'a [u8]>, read: &Read) -> Result<Data<'a>, GeomError> {
+    pub fn new(
+        document: &'a Document,
+        bin: Option<&'a [u8]>,
+        read: &Read,
+    ) -> Result<Data<'a>, GeomError> {
         Ok(Data { document, buffers: container::buffers(document, bin, read)? })
     }
 
-    /// The elements of an accessor that must be of this shape (`SCALAR`, `VEC3`, …) and of one of these types.
-    pub fn elements(&self, index: usize, shape: &str, components: &[u32]) -> Result<Elements<'_>, GeomError> {
-        let wrong = |what: String| GeomError::invalid(format!("accessor {index} of the glTF file {what}"));
+    /// The elements of an accessor that must be of this shape (`SCALAR`, `VEC3`, …) and
+    /// of one of these types.
+    pub fn elements(
+        &self,
+        index: usize,
+        shape: &str,
+        components: &[u32],
+    ) -> Result<Elements<'_>, GeomError> {
+        let wrong =
+            |what: String| GeomError::invalid(format!("accessor {index} of the glTF file {what}"));
         let a = self.document.accessors.get(index).ok_or_else(|| wrong("does not exist".into()))?;
         if a.sparse.is_some() {
-            return Err(wrong("is sparse, which is not supported; export without sparse accessors".into()));
+            return Err(wrong(
+                "is sparse, which is not supported; export without sparse accessors".into(),
+            ));
         }
         if a.shape != shape {
             return Err(wrong(format!("must be of type {shape}, not {}", a.shape)));
         }
         if !components.contains(&a.component_type) {
-            return Err(wrong(format!("has components of type {}, expected one of {components:?}", a.component_type)));
+            return Err(wrong(format!(
+                "has components of type {}, expected one of {components:?}",
+                a.component_type
+            )));
         }
         if a.count > MOST_ELEMENTS {
             return Err(wrong(format!("has {} elements; at most {MOST_ELEMENTS}", a.count)));
@@ -67,11 +84,19 @@ impl<'a> Data<'a> {
             _ => 4,
         };
         let view = a.buffer_view.ok_or_else(|| wrong("has no bytes (no bufferView)".into()))?;
-        let view = self.document.buffer_views.get(view).ok_or_else(|| wrong(format!("uses a missing view {view}")))?;
-        let buffer = self.buffers.get(view.buffer).ok_or_else(|| wrong("uses a buffer that does not exist".into()))?;
+        let view = self
+            .document
+            .buffer_views
+            .get(view)
+            .ok_or_else(|| wrong(format!("uses a missing view {view}")))?;
+        let buffer = self
+            .buffers
+            .get(view.buffer)
+            .ok_or_else(|| wrong("uses a buffer that does not exist".into()))?;
         let stride = view.byte_stride.filter(|s| *s > 0).unwrap_or(width * size);
         let bytes = || {
-            let view = buffer.get(view.byte_offset..view.byte_offset.checked_add(view.byte_length)?)?;
+            let view =
+                buffer.get(view.byte_offset..view.byte_offset.checked_add(view.byte_length)?)?;
             let length = match a.count.checked_sub(1) {
                 None => 0,
                 Some(before) => before.checked_mul(stride)?.checked_add(width * size)?,
@@ -85,7 +110,8 @@ impl<'a> Data<'a> {
 }
 
 impl Elements<'_> {
-    /// Component `k` of element `i` as stored; fractions of the largest integer where the accessor is normalised.
+    /// Component `k` of element `i` as stored; fractions of the largest integer where the
+    /// accessor is normalised.
     pub fn get(&self, i: usize, k: usize) -> f64 {
         let at = i * self.stride + k * self.size;
         let byte = |k: usize| self.bytes.get(at + k).copied().unwrap_or_default();

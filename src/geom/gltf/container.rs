@@ -1,4 +1,5 @@
-//! The outside of a glTF file: the chunks of a GLB, and buffers within it, beside it, or in `data:` addresses.
+//! The outside of a glTF file: the chunks of a GLB, and buffers within it, beside it, or
+//! in `data:` addresses.
 
 use super::json::{Document, Node};
 use crate::geom::GeomError;
@@ -10,14 +11,22 @@ pub type Read<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 /// The most buffers of a file.
 const MOST_BUFFERS: usize = 1024;
 /// Extensions that a file may require without their changing its triangles.
-const HARMLESS: [&str; 7] =
-    ["KHR_materials", "KHR_texture", "EXT_texture", "MSFT_texture", "KHR_lights", "KHR_mesh_quantization", "KHR_xmp"];
+const HARMLESS: [&str; 7] = [
+    "KHR_materials",
+    "KHR_texture",
+    "EXT_texture",
+    "MSFT_texture",
+    "KHR_lights",
+    "KHR_mesh_quantization",
+    "KHR_xmp",
+];
 
 fn invalid(message: impl Into<String>) -> GeomError {
     GeomError::invalid(message)
 }
 
-/// Whether bytes are those of a glTF file: a GLB, or JSON with the key `asset`, or what is called `.gltf` or `.glb`.
+/// Whether bytes are those of a glTF file: a GLB, or JSON with the key `asset`, or what
+/// is called `.gltf` or `.glb`.
 pub fn is_gltf(file: &str, bytes: &[u8]) -> bool {
     #[derive(serde::Deserialize)]
     struct Head {
@@ -38,8 +47,8 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
 pub(super) fn open(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), GeomError> {
     let (text, bin) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let document: Document =
-        serde_json::from_slice(text).map_err(|e| invalid(format!("cannot read the glTF file: {e}")))?;
+    let document: Document = serde_json::from_slice(text)
+        .map_err(|e| invalid(format!("cannot read the glTF file: {e}")))?;
     let version = &document.asset.version;
     if !version.starts_with("2.") {
         return Err(invalid(format!("only glTF version 2 is supported, not {version}")));
@@ -49,7 +58,9 @@ pub(super) fn open(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), GeomError>
         Some(x) if x.contains("compression") => Err(invalid(format!(
             "the glTF file is compressed ({x}), which is not supported; export without compression"
         ))),
-        Some(x) => Err(invalid(format!("the glTF file requires the extension {x}, which is not supported"))),
+        Some(x) => Err(invalid(format!(
+            "the glTF file requires the extension {x}, which is not supported"
+        ))),
     }
 }
 
@@ -83,7 +94,9 @@ pub(super) fn buffers<'a>(
 ) -> Result<Vec<Cow<'a, [u8]>>, GeomError> {
     let count = document.buffers.len();
     if count > MOST_BUFFERS {
-        return Err(invalid(format!("the glTF file has {count} buffers; at most {MOST_BUFFERS} are supported")));
+        return Err(invalid(format!(
+            "the glTF file has {count} buffers; at most {MOST_BUFFERS} are supported"
+        )));
     }
     let mut all = Vec::with_capacity(count);
     for (i, b) in document.buffers.iter().enumerate() {
@@ -91,18 +104,21 @@ pub(super) fn buffers<'a>(
             (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
             (None, _) => return Err(invalid(format!("buffer {i} of the glTF file has no URI"))),
             (Some(uri), _) => Cow::Owned(match uri.strip_prefix("data:") {
-                Some(rest) => {
-                    data(rest).ok_or_else(|| invalid(format!("buffer {i} of the glTF file is not base64")))?
-                }
+                Some(rest) => data(rest)
+                    .ok_or_else(|| invalid(format!("buffer {i} of the glTF file is not base64")))?,
                 None if uri.contains("://") => {
-                    return Err(invalid(format!("buffer {i} of the glTF file is at {uri}: only files are supported")));
+                    return Err(invalid(format!(
+                        "buffer {i} of the glTF file is at {uri}: only files are supported"
+                    )));
                 }
                 None => read(&unescaped(uri)).map_err(invalid)?,
             }),
         };
         if bytes.len() < b.byte_length {
             let (has, says) = (bytes.len(), b.byte_length);
-            return Err(invalid(format!("buffer {i} of the glTF file has {has} bytes, but declares {says}")));
+            return Err(invalid(format!(
+                "buffer {i} of the glTF file has {has} bytes, but declares {says}"
+            )));
         }
         all.push(bytes);
     }
@@ -187,6 +203,9 @@ mod tests {
         assert!(is_gltf("a", b"glTF"));
         assert!(is_gltf("a.json", br#" {"scene": 0, "asset": {"version": "2.0"}}"#));
         assert!(is_gltf("a.GLB", b"") && is_gltf("a.gltf", b"{"));
-        assert!(!is_gltf("a.rig.json", br#"{"mesh": "a.obj", "joints": []}"#) && !is_gltf("gl.obj", b"v 0 0 0"));
+        assert!(
+            !is_gltf("a.rig.json", br#"{"mesh": "a.obj", "joints": []}"#)
+                && !is_gltf("gl.obj", b"v 0 0 0")
+        );
     }
 }

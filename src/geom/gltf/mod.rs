@@ -1,8 +1,10 @@
-//! Reading glTF 2.0 (Khronos, glTF 2.0 specification): the triangles of the default scene, and skins as a rig.
+//! Reading glTF 2.0 (Khronos, glTF 2.0 specification): the triangles of the default
+//! scene, and skins as a rig.
 //!
-//! `.glb` and `.gltf`, with buffers inside, beside, or in `data:` addresses. Materials, the file's own normals, cameras,
-//! animations and morph targets are not read; sparse accessors and compressed meshes are refused. Invariant: every index is
-//! checked before it is used, so no bytes can make it stumble.
+//! `.glb` and `.gltf`, with buffers inside, beside, or in `data:` addresses. Materials,
+//! the file's own normals, cameras, animations and morph targets are not read; sparse
+//! accessors and compressed meshes are refused. Invariant: every index is checked before
+//! it is used, so no bytes can make it stumble.
 
 mod access;
 mod container;
@@ -34,7 +36,8 @@ pub struct Loaded {
     pub names: Vec<String>,
     /// The joints, if a mesh has a skin, each with a keypoint of its name at its head.
     pub rig: Option<Rig>,
-    /// By vertex: what moves it. A vertex of a mesh that neither has a skin nor hangs on a joint has none.
+    /// By vertex: what moves it. A vertex of a mesh that neither has a skin nor hangs on
+    /// a joint has none.
     pub influences: Vec<Option<Influence>>,
 }
 
@@ -42,8 +45,9 @@ pub struct Loaded {
 ///
 /// # Errors
 /// [`GeomError::Invalid`]: bytes that are not glTF 2.0, or less than they say; what cannot be read (see above); nodes that
-/// form no tree; references and vertex numbers to what is not there; places that are not finite; a skin without weights; more
-/// than five million triangles, 65535 meshes or 4096 joints; no triangles.
+/// form no tree; references and vertex numbers to what is not there; places that are not
+/// finite; a skin without weights; more than five million triangles, 65535 meshes or 4096
+/// joints; no triangles.
 pub fn load(bytes: &[u8], frame: &FileFrame, read: &Read) -> Result<Loaded, GeomError> {
     let (document, bin) = container::open(bytes)?;
     let data = access::Data::new(&document, bin, read)?;
@@ -62,8 +66,8 @@ impl Loaded {
         Mesh::new(self.positions, self.triangles, self.parts)
     }
 
-    /// What the joints move, as a body; other meshes are left out. Vertices that differ in nothing that is read, but in
-    /// their texture or normal, are one.
+    /// What the joints move, as a body; other meshes are left out. Vertices that differ
+    /// in nothing that is read, but in their texture or normal, are one.
     ///
     /// # Errors
     /// No skin, and as [`Armature::new`]: weights that do not sum to 1.

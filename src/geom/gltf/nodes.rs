@@ -24,12 +24,19 @@ impl Nodes {
         for (i, n) in nodes.iter().enumerate() {
             for c in &n.children {
                 let Some(parent) = parents.get_mut(*c) else {
-                    let message = format!("node `{}` has the child {c}, but there are {} nodes", name(i), nodes.len());
+                    let message = format!(
+                        "node `{}` has the child {c}, but there are {} nodes",
+                        name(i),
+                        nodes.len()
+                    );
                     return Err(GeomError::invalid(message));
                 };
                 if let Some(other) = parent.replace(i) {
                     let (a, b) = (name(other), name(i));
-                    return Err(GeomError::invalid(format!("node `{}` is a child of `{a}` and of `{b}`", name(*c))));
+                    return Err(GeomError::invalid(format!(
+                        "node `{}` is a child of `{a}` and of `{b}`",
+                        name(*c)
+                    )));
                 }
             }
         }
@@ -49,7 +56,8 @@ impl Nodes {
         match document.scenes.get(document.scene.unwrap_or(0)) {
             Some(scene) => {
                 for i in &scene.nodes {
-                    let missing = || GeomError::invalid(format!("the scene refers to the missing node {i}"));
+                    let missing =
+                        || GeomError::invalid(format!("the scene refers to the missing node {i}"));
                     *drawn.get_mut(*i).ok_or_else(missing)? = true;
                 }
             }
@@ -61,7 +69,10 @@ impl Nodes {
             let local = local(&nodes[*i]);
             global[*i] = parents[*i].map_or(local, |p| global[p] * local);
             if !global[*i].is_finite() {
-                return Err(GeomError::invalid(format!("the position of node `{}` is not finite", name(*i))));
+                return Err(GeomError::invalid(format!(
+                    "the position of node `{}` is not finite",
+                    name(*i)
+                )));
             }
             drawn[*i] |= parents[*i].is_some_and(|p| drawn[p]);
         }
@@ -80,7 +91,11 @@ fn local(n: &Node) -> DAffine3 {
         if length > 0.0 { q / length } else { DQuat::IDENTITY }
     });
     let scale = n.scale.map_or(DVec3::ONE, DVec3::from);
-    DAffine3::from_scale_rotation_translation(scale, rotation, n.translation.map_or(DVec3::ZERO, DVec3::from))
+    DAffine3::from_scale_rotation_translation(
+        scale,
+        rotation,
+        n.translation.map_or(DVec3::ZERO, DVec3::from),
+    )
 }
 
 /// A cycle among the nodes that have no place in the order, as text.

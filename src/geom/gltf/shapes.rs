@@ -1,4 +1,5 @@
-//! The triangles of a scene: those of every node's mesh, brought to the scene's space; a part for each node.
+//! The triangles of a scene: those of every node's mesh, brought to the scene's space; a
+//! part for each node.
 
 use super::access::{Data, F32, I8, I16, MOST_ELEMENTS, U8, U16, U32};
 use super::container::name_of;
@@ -22,7 +23,12 @@ pub(super) fn collect(
     let mut out = Loaded { rig, ..Loaded::default() };
     for (i, node) in data.document.nodes.iter().enumerate().filter(|(i, _)| nodes.drawn[*i]) {
         let Some(m) = node.mesh else { continue };
-        let missing = || GeomError::invalid(format!("node `{}` refers to the missing mesh {m}", name_of(node, i)));
+        let missing = || {
+            GeomError::invalid(format!(
+                "node `{}` refers to the missing mesh {m}",
+                name_of(node, i)
+            ))
+        };
         let mesh = data.document.meshes.get(m).ok_or_else(missing)?;
         let called = [&node.name, &mesh.name].into_iter().flatten().find(|s| !s.is_empty());
         let name = called.cloned().unwrap_or_else(|| format!("mesh_{m}"));
@@ -54,7 +60,9 @@ pub(super) fn collect(
         }
         if out.triangles.len() > before {
             if out.names.len() >= MOST_PARTS {
-                return Err(GeomError::invalid(format!("the glTF file has more than {MOST_PARTS} meshes")));
+                return Err(GeomError::invalid(format!(
+                    "the glTF file has more than {MOST_PARTS} meshes"
+                )));
             }
             out.parts.resize(out.triangles.len(), out.names.len() as u16);
             out.names.push(name);
@@ -66,7 +74,8 @@ pub(super) fn collect(
     Ok(out)
 }
 
-/// Adds a primitive's vertices; gives its triangles, numbered among all, or none where it has points or lines.
+/// Adds a primitive's vertices; gives its triangles, numbered among all, or none where it
+/// has points or lines.
 fn add(
     data: &Data,
     p: &Primitive,
@@ -80,14 +89,18 @@ fn add(
         0..=3 => return Ok(None),
         4..=6 => {}
         _ => {
-            return Err(GeomError::invalid(format!("{what} has mode {mode}, which glTF does not define")));
+            return Err(GeomError::invalid(format!(
+                "{what} has mode {mode}, which glTF does not define"
+            )));
         }
     }
     let Some(positions) = p.attributes.get("POSITION") else { return Ok(None) };
     let positions = data.elements(*positions, "VEC3", &[F32, I8, U8, I16, U16])?;
     let (first, count) = (out.positions.len(), positions.count);
     if first + count > MOST_ELEMENTS {
-        return Err(GeomError::invalid(format!("the glTF file has more than {MOST_ELEMENTS} vertices")));
+        return Err(GeomError::invalid(format!(
+            "the glTF file has more than {MOST_ELEMENTS} vertices"
+        )));
     }
     let corners: Vec<u32> = match p.indices {
         None => (0..count as u32).collect(),
@@ -102,13 +115,22 @@ fn add(
     let mut faces: Vec<[u32; 3]> = match mode {
         4 => corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
         5 => {
-            let turned = |(i, c): (usize, &[u32])| if i % 2 == 0 { [c[0], c[1], c[2]] } else { [c[0], c[2], c[1]] };
+            let turned = |(i, c): (usize, &[u32])| {
+                if i % 2 == 0 { [c[0], c[1], c[2]] } else { [c[0], c[2], c[1]] }
+            };
             corners.windows(3).enumerate().map(turned).collect()
         }
-        _ => corners.get(1..).unwrap_or_default().windows(2).map(|c| [c[0], c[1], corners[0]]).collect(),
+        _ => corners
+            .get(1..)
+            .unwrap_or_default()
+            .windows(2)
+            .map(|c| [c[0], c[1], corners[0]])
+            .collect(),
     };
     if out.triangles.len() + faces.len() > MOST_TRIANGLES {
-        return Err(GeomError::invalid(format!("the glTF file has more than {MOST_TRIANGLES} triangles")));
+        return Err(GeomError::invalid(format!(
+            "the glTF file has more than {MOST_TRIANGLES} triangles"
+        )));
     }
     let mirror = to_scene.matrix3.determinant() < 0.0;
     for f in &mut faces {

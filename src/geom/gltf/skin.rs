@@ -1,9 +1,10 @@
 //! Skins: which nodes are joints, where they are at rest, and what moves each vertex.
 //!
-//! Rest is the bind pose. A skin's vertices and joints are brought to the scene by its root joint: global transform times
-//! inverse bind matrix, which is the same for all joints of a file whose nodes stand in the bind pose, and most often the
-//! identity. glTF moves a vertex by the sum of `w_j G_j B_j`; with `G_j` at rest `A B_j^-1` that is [`Rig`]'s own rule about
-//! the heads `A B_j^-1 0`, so rest frames can be the world's.
+//! Rest is the bind pose. A skin's vertices and joints are brought to the scene by its
+//! root joint: global transform times inverse bind matrix, which is the same for all
+//! joints of a file whose nodes stand in the bind pose, and most often the identity. glTF
+//! moves a vertex by the sum of `w_j G_j B_j`; with `G_j` at rest `A B_j^-1` that is
+//! [`Rig`]'s own rule about the heads `A B_j^-1 0`, so rest frames can be the world's.
 
 use super::access::{Data, F32, U8, U16};
 use super::container::name_of;
@@ -14,7 +15,8 @@ use crate::geom::{FileFrame, GeomError};
 use glam::{DAffine3, DMat4, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How near to the identity a skin's placement is taken for it: what single precision leaves of the product.
+/// How near to the identity a skin's placement is taken for it: what single precision
+/// leaves of the product.
 const SAME: f64 = 1e-5;
 
 /// One skin that the scene uses.
@@ -41,13 +43,21 @@ pub(super) struct Skeleton {
 fn inverse(m: DAffine3, what: impl Fn() -> String) -> Result<DAffine3, GeomError> {
     let inverse = m.inverse();
     let det = m.matrix3.determinant();
-    if det != 0.0 && det.is_finite() && inverse.is_finite() { Ok(inverse) } else { Err(GeomError::invalid(what())) }
+    if det != 0.0 && det.is_finite() && inverse.is_finite() {
+        Ok(inverse)
+    } else {
+        Err(GeomError::invalid(what()))
+    }
 }
 
 impl Skeleton {
     pub fn of(data: &Data, nodes: &Nodes) -> Result<Skeleton, GeomError> {
         let all = &data.document.nodes;
-        let used = all.iter().zip(&nodes.drawn).filter(|(n, d)| **d && n.mesh.is_some()).filter_map(|(n, _)| n.skin);
+        let used = all
+            .iter()
+            .zip(&nodes.drawn)
+            .filter(|(n, d)| **d && n.mesh.is_some())
+            .filter_map(|(n, _)| n.skin);
         let used: BTreeSet<usize> = used.collect();
         let mut out = Skeleton { carrier: vec![None; all.len()], ..Skeleton::default() };
         let mut rank = vec![0; all.len()];
@@ -57,9 +67,13 @@ impl Skeleton {
             let missing = || GeomError::invalid(format!("the glTF file has no skin {s}"));
             let skin = data.document.skins.get(s).ok_or_else(missing)?;
             if let Some(j) = skin.joints.iter().find(|j| **j >= all.len()) {
-                return Err(GeomError::invalid(format!("skin {s} refers to the missing node {j} as a joint")));
+                return Err(GeomError::invalid(format!(
+                    "skin {s} refers to the missing node {j} as a joint"
+                )));
             }
-            let Some((first, root)) = skin.joints.iter().copied().enumerate().min_by_key(|(_, j)| rank[*j]) else {
+            let Some((first, root)) =
+                skin.joints.iter().copied().enumerate().min_by_key(|(_, j)| rank[*j])
+            else {
                 return Err(GeomError::invalid(format!("skin {s} of the glTF file has no joints")));
             };
             let binds = match skin.inverse_bind_matrices {
@@ -68,7 +82,8 @@ impl Skeleton {
                     let e = data.elements(a, "MAT4", &[F32])?;
                     let (has, needs) = (e.count, skin.joints.len());
                     if has < needs {
-                        let message = format!("skin {s} has {needs} joints, but {has} inverse bind matrices");
+                        let message =
+                            format!("skin {s} has {needs} joints, but {has} inverse bind matrices");
                         return Err(GeomError::invalid(message));
                     }
                     let one = |i| DMat4::from_cols_array(&std::array::from_fn(|k| e.get(i, k)));
@@ -81,7 +96,12 @@ impl Skeleton {
             }
             let mut joints = Vec::with_capacity(skin.joints.len());
             for (j, bind) in skin.joints.iter().zip(&binds) {
-                let name = || format!("the inverse bind matrix of joint `{}` is singular", name_of(&all[*j], *j));
+                let name = || {
+                    format!(
+                        "the inverse bind matrix of joint `{}` is singular",
+                        name_of(&all[*j], *j)
+                    )
+                };
                 let rest = to_scene * inverse(*bind, name)?;
                 joints.push(*number[*j].get_or_insert_with(|| {
                     out.nodes.push(*j);
@@ -97,17 +117,24 @@ impl Skeleton {
         Ok(out)
     }
 
-    /// Where a mesh without a skin is at rest: with the joint that carries it, or where its node is.
+    /// Where a mesh without a skin is at rest: with the joint that carries it, or where
+    /// its node is.
     pub fn place(&self, data: &Data, nodes: &Nodes, node: usize) -> Result<DAffine3, GeomError> {
         let global = nodes.global[node];
         let Some(j) = self.carrier[node] else { return Ok(global) };
         let joint = self.nodes[j];
-        let name = || format!("the node `{}` has no volume", name_of(&data.document.nodes[joint], joint));
+        let name =
+            || format!("the node `{}` has no volume", name_of(&data.document.nodes[joint], joint));
         Ok(self.rest[j] * (inverse(nodes.global[joint], name)? * global))
     }
 
     /// The rig, with a keypoint at each joint's head; none without joints.
-    pub fn rig(&self, data: &Data, nodes: &Nodes, frame: &FileFrame) -> Result<Option<Rig>, GeomError> {
+    pub fn rig(
+        &self,
+        data: &Data,
+        nodes: &Nodes,
+        frame: &FileFrame,
+    ) -> Result<Option<Rig>, GeomError> {
         if self.nodes.is_empty() {
             return Ok(None);
         }
@@ -163,7 +190,8 @@ impl Skeleton {
     }
 }
 
-/// What moves each vertex of a primitive: the four that weigh most of `JOINTS_0` and `JOINTS_1`, in the rig's numbers.
+/// What moves each vertex of a primitive: the four that weigh most of `JOINTS_0` and
+/// `JOINTS_1`, in the rig's numbers.
 pub(super) fn influences(
     data: &Data,
     primitive: &Primitive,
@@ -177,7 +205,10 @@ pub(super) fn influences(
         let find = |name: &str| primitive.attributes.get(&format!("{name}_{k}")).copied();
         match (find("JOINTS"), find("WEIGHTS")) {
             (Some(j), Some(w)) => {
-                let set = (data.elements(j, "VEC4", &[U8, U16])?, data.elements(w, "VEC4", &[F32, U8, U16])?);
+                let set = (
+                    data.elements(j, "VEC4", &[U8, U16])?,
+                    data.elements(w, "VEC4", &[F32, U8, U16])?,
+                );
                 let (joints, weights) = (set.0.count, set.1.count);
                 if joints != vertices || weights != vertices {
                     return Err(GeomError::invalid(format!(
@@ -187,7 +218,9 @@ pub(super) fn influences(
                 sets.push(set);
             }
             _ if k == 0 => {
-                return Err(GeomError::invalid(format!("{what} has a skin, but no weights (JOINTS_0 and WEIGHTS_0)")));
+                return Err(GeomError::invalid(format!(
+                    "{what} has a skin, but no weights (JOINTS_0 and WEIGHTS_0)"
+                )));
             }
             _ => break,
         }
@@ -195,17 +228,25 @@ pub(super) fn influences(
     let one = |v: usize| {
         let mut found = Vec::with_capacity(8);
         for (joints, weights) in &sets {
-            found.extend((0..4).map(|k| (joints.whole(v, k), weights.get(v, k))).filter(|(_, w)| *w != 0.0));
+            found.extend(
+                (0..4).map(|k| (joints.whole(v, k), weights.get(v, k))).filter(|(_, w)| *w != 0.0),
+            );
         }
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found.truncate(MOST_WEIGHTS);
         let sum: f64 = found.iter().map(|(_, w)| *w).sum();
         let mut out = Influence::default();
         for (k, (j, w)) in found.iter().enumerate() {
-            let placed = skin.joints.get(*j).and_then(|j| rig.placed(*j)).and_then(|j| u16::try_from(j).ok());
+            let placed = skin
+                .joints
+                .get(*j)
+                .and_then(|j| rig.placed(*j))
+                .and_then(|j| u16::try_from(j).ok());
             out.joints[k] = placed.ok_or_else(|| {
                 let n = skin.joints.len();
-                GeomError::invalid(format!("vertex {v} of {what} is moved by joint {j}, but its skin has {n} joints"))
+                GeomError::invalid(format!(
+                    "vertex {v} of {what} is moved by joint {j}, but its skin has {n} joints"
+                ))
             })?;
             out.weights[k] = (w / sum) as f32;
         }

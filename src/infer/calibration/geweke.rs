@@ -1,14 +1,18 @@
-//! Geweke's joint distribution test: "Getting it right: joint distribution tests of posterior simulators" (2004).
+//! Geweke's joint distribution test: "Getting it right: joint distribution tests of
+//! posterior simulators" (2004).
 //!
-//! The marginal-conditional simulator draws a state from the prior and data from it. The successive-conditional one lets the
-//! sampler move the state given the data, then draws the data anew given the state, by turns. Both have the same joint
-//! distribution if the sampler leaves the posterior invariant.
+//! The marginal-conditional simulator draws a state from the prior and data from it. The
+//! successive-conditional one lets the sampler move the state given the data, then draws
+//! the data anew given the state, by turns. Both have the same joint distribution if the
+//! sampler leaves the posterior invariant.
 //!
-//! Every successive chain starts in a draw of the joint distribution, so no burn-in is waited for and slow chains are as good
-//! as fast ones, only less telling; chains are independent, so their means have an honest standard error whatever their
-//! autocorrelation. Numbers are compared by their place among the marginal draws (0 to 1): the means and the mean squares
-//! of places exist for heavy tails too, and see what those of the numbers see. The log joint density is among the numbers, read
-//! before data are redrawn: kernels that ignore the data keep every other number as it was.
+//! Every successive chain starts in a draw of the joint distribution, so no burn-in is
+//! waited for and slow chains are as good as fast ones, only less telling; chains are
+//! independent, so their means have an honest standard error whatever their
+//! autocorrelation. Numbers are compared by their place among the marginal draws (0 to
+//! 1): the means and the mean squares of places exist for heavy tails too, and see what
+//! those of the numbers see. The log joint density is among the numbers, read before data
+//! are redrawn: kernels that ignore the data keep every other number as it was.
 
 use super::quantities::{OF_DATA, Quantities, read_data};
 use super::sampler::Sampler;
@@ -26,7 +30,8 @@ const MARGINAL: u32 = 20;
 /// How the two simulators compare.
 #[derive(Clone, Debug)]
 pub struct Geweke {
-    /// One row a quantity, by address; the log joint density and what is said of the data last.
+    /// One row a quantity, by address; the log joint density and what is said of the data
+    /// last.
     pub rows: Vec<GewekeRow>,
     /// Successive chains.
     pub chains: usize,
@@ -34,7 +39,8 @@ pub struct Geweke {
     pub marginal: usize,
     /// The fewest turns of a chain.
     pub turns: usize,
-    /// A z-score beyond this fails: [`FALSE_ALARMS`] over the number of scores, both sides.
+    /// A z-score beyond this fails: [`FALSE_ALARMS`] over the number of scores, both
+    /// sides.
     pub threshold: f64,
     /// Numbers of choices that were not looked at, because there are so many.
     pub left_out: usize,
@@ -68,7 +74,11 @@ impl Geweke {
 ///
 /// # Errors
 /// If data cannot be simulated, or a chain fails.
-pub fn geweke(code: &Arc<Code>, sampler: &dyn Sampler, settings: &Settings) -> Result<Geweke, CalibrationError> {
+pub fn geweke(
+    code: &Arc<Code>,
+    sampler: &dyn Sampler,
+    settings: &Settings,
+) -> Result<Geweke, CalibrationError> {
     if settings.replicates < FEWEST {
         return Err(CalibrationError::TooFew(format!("at least {FEWEST} replicates are needed")));
     }
@@ -89,16 +99,18 @@ pub fn geweke(code: &Arc<Code>, sampler: &dyn Sampler, settings: &Settings) -> R
             taken: Mutex::default(),
         });
         sampler.run(code, i, settings.steps, Arc::clone(&watch) as Arc<dyn Watch>)?;
-        let taken = std::mem::take(&mut *watch.taken.lock().unwrap_or_else(PoisonError::into_inner));
+        let taken =
+            std::mem::take(&mut *watch.taken.lock().unwrap_or_else(PoisonError::into_inner));
         match taken.failed {
             Some(e) => Err(e),
-            None if taken.readings.is_empty() => {
-                Err(CalibrationError::TooFew("a chain has fewer than two draws; increase --steps".into()))
-            }
+            None if taken.readings.is_empty() => Err(CalibrationError::TooFew(
+                "a chain has fewer than two draws; increase --steps".into(),
+            )),
             None => Ok(taken.readings),
         }
     })?;
-    let names: Vec<String> = quantities.names.iter().cloned().chain(OF_DATA.map(str::to_owned)).collect();
+    let names: Vec<String> =
+        quantities.names.iter().cloned().chain(OF_DATA.map(str::to_owned)).collect();
     Ok(judged(names, &marginal, &successive, quantities.left_out))
 }
 
@@ -140,17 +152,25 @@ impl Watch for Turns {
 }
 
 impl Turns {
-    /// The first turn leaves what warm-up came to for a draw of the joint distribution, with what kernels have learnt.
-    fn turn(&self, chain: u32, turn: u64, trace: &mut Trace) -> Result<Option<Vec<f64>>, CalibrationError> {
+    /// The first turn leaves what warm-up came to for a draw of the joint distribution,
+    /// with what kernels have learnt.
+    fn turn(
+        &self,
+        chain: u32,
+        turn: u64,
+        trace: &mut Trace,
+    ) -> Result<Option<Vec<f64>>, CalibrationError> {
         if turn == 0 {
             let start = simulate(&self.code, &self.settings, chain)?;
             trace.restore(&start.trace.constraints(), replicating(self.settings.seed, chain, 0))?;
-            let data: Vec<_> = start.trace.observed().into_iter().map(|o| (o.hash, o.value)).collect();
+            let data: Vec<_> =
+                start.trace.observed().into_iter().map(|o| (o.hash, o.value)).collect();
             trace.set_observed(&data)?;
             trace.commit();
             return Ok(None);
         }
-        // Before the data are drawn anew: afterwards they fit whatever the kernels came to, also if they never looked at the data.
+        // Before the data are drawn anew: afterwards they fit whatever the kernels came
+        // to, also if they never looked at the data.
         let reading = read(&self.quantities, trace);
         let drawn = trace.replicate(replicating(self.settings.seed, chain, turn))?;
         trace.set_observed(&drawn.values)?;
@@ -159,21 +179,30 @@ impl Turns {
     }
 }
 
-fn judged(names: Vec<String>, marginal: &[Vec<f64>], successive: &[Vec<Vec<f64>>], left_out: usize) -> Geweke {
+fn judged(
+    names: Vec<String>,
+    marginal: &[Vec<f64>],
+    successive: &[Vec<Vec<f64>>],
+    left_out: usize,
+) -> Geweke {
     let tests = 2.0 * names.len() as f64;
     let z = inv_normal_cdf(1.0 - 0.5 * FALSE_ALARMS / tests);
-    // Student's quantile from the normal one (Abramowitz & Stegun 26.7.5): the error is estimated from the chains.
+    // Student's quantile from the normal one (Abramowitz & Stegun 26.7.5): the error is
+    // estimated from the chains.
     let threshold = z + (z * z * z + z) / (4.0 * (successive.len() as f64 - 1.0));
     let row = |(q, name): (usize, String)| {
         let mut sorted: Vec<f64> = marginal.iter().filter_map(|r| r.get(q).copied()).collect();
         sorted.sort_by(f64::total_cmp);
-        let chains: Vec<Vec<f64>> =
-            successive.iter().map(|c| c.iter().filter_map(|r| r.get(q).copied()).collect()).collect();
+        let chains: Vec<Vec<f64>> = successive
+            .iter()
+            .map(|c| c.iter().filter_map(|r| r.get(q).copied()).collect())
+            .collect();
         let score = |power: i32| {
             let of = |x: f64| place(&sorted, x).powi(power);
             let expected: Vec<f64> = sorted.iter().map(|x| of(*x)).collect();
             let means: Vec<f64> = chains.iter().map(|c| mean(c.iter().map(|x| of(*x)))).collect();
-            let error = variance(&expected) / expected.len() as f64 + variance(&means) / means.len() as f64;
+            let error =
+                variance(&expected) / expected.len() as f64 + variance(&means) / means.len() as f64;
             let difference = mean(means.iter().copied()) - mean(expected.iter().copied());
             if difference.abs() < 1e-12 { 0.0 } else { difference / error.sqrt() }
         };
@@ -182,7 +211,14 @@ fn judged(names: Vec<String>, marginal: &[Vec<f64>], successive: &[Vec<Vec<f64>>
         let mut all = chains.concat();
         all.sort_by(f64::total_cmp);
         let middle = |xs: &[f64]| xs.get(xs.len() / 2).copied().unwrap_or(f64::NAN);
-        GewekeRow { name, marginal: middle(&sorted), successive: middle(&all), z_mean, z_square, passes }
+        GewekeRow {
+            name,
+            marginal: middle(&sorted),
+            successive: middle(&all),
+            z_mean,
+            z_square,
+            passes,
+        }
     };
     Geweke {
         rows: names.into_iter().enumerate().map(row).collect(),
@@ -226,7 +262,11 @@ mod tests {
             // The quantile is approximated from the normal one, to the first order.
             let normal = inv_normal_cdf(1.0 - 0.5 * FALSE_ALARMS / (2 * names) as f64);
             assert!(judged.threshold > normal && judged.threshold <= exact, "{}", judged.threshold);
-            assert!(exact - judged.threshold < 0.5 * (exact - normal), "{} {exact}", judged.threshold);
+            assert!(
+                exact - judged.threshold < 0.5 * (exact - normal),
+                "{} {exact}",
+                judged.threshold
+            );
         }
     }
 }

@@ -1,10 +1,13 @@
-//! Is what a sampler draws the posterior? Checks that need no posterior to compare with, only that data can be simulated.
+//! Is what a sampler draws the posterior? Checks that need no posterior to compare with,
+//! only that data can be simulated.
 //!
-//! [`sbc()`] ranks true values among draws given data simulated from them (Talts et al. 2018); [`geweke()`] lets kernels and
-//! fresh data take turns and compares with the prior (Geweke 2004). Both take any [`Sampler`]: a plan of a program, or one
-//! kernel in a loop. Not here: running chains, printing.
+//! [`sbc()`] ranks true values among draws given data simulated from them (Talts et al.
+//! 2018); [`geweke()`] lets kernels and fresh data take turns and compares with the prior
+//! (Geweke 2004). Both take any [`Sampler`]: a plan of a program, or one kernel in a
+//! loop. Not here: running chains, printing.
 //!
-//! Invariant: results are functions of program, sampler, seed and counts, not of the number of threads.
+//! Invariant: results are functions of program, sampler, seed and counts, not of the
+//! number of threads.
 
 mod geweke;
 mod quantities;
@@ -20,7 +23,8 @@ use super::parallel::in_parallel;
 use super::plan::ChainError;
 use crate::trace::Limits;
 
-/// The probability that a right sampler fails a check, over all quantities together (Bonferroni).
+/// The probability that a right sampler fails a check, over all quantities together
+/// (Bonferroni).
 pub const FALSE_ALARMS: f64 = 1e-3;
 
 /// The fewest replicates that say anything.
@@ -35,8 +39,9 @@ pub struct Settings {
     pub seed: u64,
     /// Threads that replicates are shared among.
     pub threads: usize,
-    /// Kernel applications of each chain after warm-up. Without it what the plan says; `sbc` then runs longer where a few first
-    /// chains come to fewer independent draws than it ranks.
+    /// Kernel applications of each chain after warm-up. Without it what the plan says;
+    /// `sbc` then runs longer where a few first chains come to fewer independent draws
+    /// than it ranks.
     pub steps: Option<u64>,
     /// Bounds on what the program may build.
     pub limits: Limits,
@@ -71,7 +76,8 @@ impl From<Box<crate::lang::error::RunError>> for CalibrationError {
     }
 }
 
-/// Does the same for each index, on some threads; results in order, the first error if there is one.
+/// Does the same for each index, on some threads; results in order, the first error if
+/// there is one.
 fn each<T: Send>(
     settings: &Settings,
     indices: std::ops::Range<u32>,

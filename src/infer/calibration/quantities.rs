@@ -1,7 +1,9 @@
-//! The numbers that are looked at in a state: its choices by address, and the log joint density.
+//! The numbers that are looked at in a state: its choices by address, and the log joint
+//! density.
 //!
-//! Invariant: a reading has one number for each name. A choice that a state does not have reads as -infinity: below every
-//! value, which makes it as good a function of the state as any, where choices come and go.
+//! Invariant: a reading has one number for each name. A choice that a state does not have
+//! reads as -infinity: below every value, which makes it as good a function of the state
+//! as any, where choices come and go.
 
 use crate::trace::{Selector, Trace};
 use indexmap::IndexMap;
@@ -27,7 +29,8 @@ impl Quantities {
             for t in trace.targets(all) {
                 let (hash, count) = (trace.address_hash(*t), trace.value(*t).numbers().len());
                 for i in 0..count {
-                    let entry = found.entry((hash, i)).or_insert_with(|| (trace.address(*t), count, 0));
+                    let entry =
+                        found.entry((hash, i)).or_insert_with(|| (trace.address(*t), count, 0));
                     entry.1 = count.max(entry.1);
                     entry.2 += 1;
                 }
@@ -38,10 +41,13 @@ impl Quantities {
         let left_out = found.len().saturating_sub(MOST);
         found.truncate(MOST);
         found.sort_by(|a, b| (&a.1.0, a.0.1).cmp(&(&b.1.0, b.0.1)));
-        let called = |(at, (address, count, _)): &((u64, usize), (crate::trace::Address, usize, u32))| match count {
-            1 => address.to_string(),
-            _ => format!("{address}[{}]", at.1),
-        };
+        let called =
+            |(at, (address, count, _)): &((u64, usize), (crate::trace::Address, usize, u32))| {
+                match count {
+                    1 => address.to_string(),
+                    _ => format!("{address}[{}]", at.1),
+                }
+            };
         let mut names: Vec<String> = found.iter().map(called).collect();
         names.push("log joint".into());
         let places = found.into_iter().enumerate().map(|(i, (at, _))| (at, i)).collect();
@@ -70,7 +76,8 @@ impl Quantities {
     }
 }
 
-/// What is said of data: the mean and the mean square of all observed numbers that are finite.
+/// What is said of data: the mean and the mean square of all observed numbers that are
+/// finite.
 pub(super) const OF_DATA: [&str; 2] = ["mean of the data", "mean square of the data"];
 
 /// These numbers of a state; -infinity where nothing observed is a number.

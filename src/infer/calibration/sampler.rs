@@ -12,12 +12,19 @@ use std::sync::Arc;
 
 /// Something that draws from the posterior of a program.
 pub trait Sampler: Sync {
-    /// Runs a chain and shows its states, one draw after the other, to `watch`, which may put the chain in another state.
-    /// `steps` bounds the kernel applications after warm-up, in place of the sampler's own number. Gives how many there were.
+    /// Runs a chain and shows its states, one draw after the other, to `watch`, which may
+    /// put the chain in another state. `steps` bounds the kernel applications after
+    /// warm-up, in place of the sampler's own number. Gives how many there were.
     ///
     /// # Errors
     /// If the chain cannot start or fails.
-    fn run(&self, code: &Arc<Code>, chain: u32, steps: Option<u64>, watch: Arc<dyn Watch>) -> Result<u64, ChainError>;
+    fn run(
+        &self,
+        code: &Arc<Code>,
+        chain: u32,
+        steps: Option<u64>,
+        watch: Arc<dyn Watch>,
+    ) -> Result<u64, ChainError>;
 }
 
 /// The plan of a program.
@@ -31,8 +38,18 @@ pub struct PlanSampler<'a> {
 }
 
 impl Sampler for PlanSampler<'_> {
-    fn run(&self, code: &Arc<Code>, chain: u32, steps: Option<u64>, watch: Arc<dyn Watch>) -> Result<u64, ChainError> {
-        let options = RunOptions { steps: steps.or(self.options.steps), watch: Some(watch), ..self.options.clone() };
+    fn run(
+        &self,
+        code: &Arc<Code>,
+        chain: u32,
+        steps: Option<u64>,
+        watch: Arc<dyn Watch>,
+    ) -> Result<u64, ChainError> {
+        let options = RunOptions {
+            steps: steps.or(self.options.steps),
+            watch: Some(watch),
+            ..self.options.clone()
+        };
         let done = run_chain(code, self.plan, &options, self.progress, &mut Discard, chain)?;
         Ok(done.steps)
     }
@@ -53,8 +70,15 @@ pub struct KernelSampler<F> {
 }
 
 impl<F: Fn() -> Box<dyn Kernel> + Sync> Sampler for KernelSampler<F> {
-    fn run(&self, code: &Arc<Code>, chain: u32, steps: Option<u64>, watch: Arc<dyn Watch>) -> Result<u64, ChainError> {
-        let begun = starts(code, self.seed, chain, Start::default(), Limits::default()).map_err(ChainError::Start)?;
+    fn run(
+        &self,
+        code: &Arc<Code>,
+        chain: u32,
+        steps: Option<u64>,
+        watch: Arc<dyn Watch>,
+    ) -> Result<u64, ChainError> {
+        let begun = starts(code, self.seed, chain, Start::default(), Limits::default())
+            .map_err(ChainError::Start)?;
         let Some(mut trace) = begun.into_iter().next() else { return Ok(0) };
         let mut kernel = (self.kernel)();
         let every = self.every.max(1);

@@ -1,9 +1,10 @@
-//! Simulation-based calibration: Talts, Betancourt, Simpson, Vehtari & Gelman, "Validating Bayesian inference algorithms with
-//! simulation-based calibration" (2018).
+//! Simulation-based calibration: Talts, Betancourt, Simpson, Vehtari & Gelman,
+//! "Validating Bayesian inference algorithms with simulation-based calibration" (2018).
 //!
-//! A true state is drawn from the prior, data from it, and the sampler run on the data. If it draws from the posterior, the rank
-//! of a true number among nearly independent draws is uniform, whatever the number. The log joint density is ranked too: it
-//! sees errors of the data's part that no single choice shows (Modrák et al. 2023).
+//! A true state is drawn from the prior, data from it, and the sampler run on the data.
+//! If it draws from the posterior, the rank of a true number among nearly independent
+//! draws is uniform, whatever the number. The log joint density is ranked too: it sees
+//! errors of the data's part that no single choice shows (Modrák et al. 2023).
 
 use super::quantities::Quantities;
 use super::sampler::Sampler;
@@ -34,7 +35,8 @@ pub struct Sbc {
     pub replicates: usize,
     /// Bins that the ranks are counted in.
     pub bins: usize,
-    /// A quantity fails below this probability: [`FALSE_ALARMS`] over the number of quantities.
+    /// A quantity fails below this probability: [`FALSE_ALARMS`] over the number of
+    /// quantities.
     pub threshold: f64,
     /// Kernel applications of the longest chain after warm-up.
     pub steps: u64,
@@ -55,8 +57,8 @@ pub struct SbcRow {
     pub p: f64,
     /// The fewest independent draws of a chain.
     pub least_ess: f64,
-    /// Whether more than a tenth of the chains had fewer independent draws than are ranked: then ranks pile up at both ends also
-    /// where the kernels are right.
+    /// Whether more than a tenth of the chains had fewer independent draws than are
+    /// ranked: then ranks pile up at both ends also where the kernels are right.
     pub is_short: bool,
     /// Whether the ranks may well be uniform.
     pub passes: bool,
@@ -72,8 +74,13 @@ impl Sbc {
 /// Checks a sampler on data simulated from the program.
 ///
 /// # Errors
-/// If data cannot be simulated, a chain fails, or a chain has fewer draws than are ranked.
-pub fn sbc(code: &Arc<Code>, sampler: &dyn Sampler, settings: &Settings) -> Result<Sbc, CalibrationError> {
+/// If data cannot be simulated, a chain fails, or a chain has fewer draws than are
+/// ranked.
+pub fn sbc(
+    code: &Arc<Code>,
+    sampler: &dyn Sampler,
+    settings: &Settings,
+) -> Result<Sbc, CalibrationError> {
     if settings.replicates < FEWEST {
         return Err(CalibrationError::TooFew(format!("at least {FEWEST} replicates are needed")));
     }
@@ -87,7 +94,8 @@ pub fn sbc(code: &Arc<Code>, sampler: &dyn Sampler, settings: &Settings) -> Resu
         .collect();
     let one = |i: u32, steps: Option<u64>| {
         let (truth, code) = &truths[i as usize];
-        let watch = Arc::new(Collect { quantities: Arc::clone(&quantities), rows: Mutex::default() });
+        let watch =
+            Arc::new(Collect { quantities: Arc::clone(&quantities), rows: Mutex::default() });
         let steps = sampler.run(code, i, steps, Arc::clone(&watch) as Arc<dyn Watch>)?;
         let rows = std::mem::take(&mut *watch.rows.lock().unwrap_or_else(PoisonError::into_inner));
         ranked(truth, &rows, settings, i).map(|ranks| (steps, ranks))
@@ -126,10 +134,18 @@ impl Watch for Collect {
 }
 
 /// Ranks true values among draws far apart; among equal ones the place is drawn.
-fn ranked(truth: &[f64], rows: &[Vec<f64>], settings: &Settings, index: u32) -> Result<Vec<Ranked>, CalibrationError> {
+fn ranked(
+    truth: &[f64],
+    rows: &[Vec<f64>],
+    settings: &Settings,
+    index: u32,
+) -> Result<Vec<Ranked>, CalibrationError> {
     let kept = RANKS - 1;
     if rows.len() < kept {
-        let message = format!("a chain has only {} draws, but {kept} are ranked; increase --steps", rows.len());
+        let message = format!(
+            "a chain has only {} draws, but {kept} are ranked; increase --steps",
+            rows.len()
+        );
         return Err(CalibrationError::TooFew(message));
     }
     let one = |(q, truth): (usize, &f64)| {
@@ -178,10 +194,19 @@ fn judged(quantities: &Quantities, done: &[(u64, Vec<Ranked>)]) -> Sbc {
             short += usize::from(r.ess < (RANKS - 1) as f64);
         }
         let expected = replicates as f64 / bins as f64;
-        let chi_square: f64 = counts.iter().map(|c| (f64::from(*c) - expected).powi(2) / expected).sum();
+        let chi_square: f64 =
+            counts.iter().map(|c| (f64::from(*c) - expected).powi(2) / expected).sum();
         let p = chi_square_tail(chi_square, bins as f64 - 1.0);
         let is_short = short as f64 > SHORT * replicates as f64;
-        SbcRow { name: name.clone(), counts, chi_square, p, least_ess: least, is_short, passes: p >= threshold }
+        SbcRow {
+            name: name.clone(),
+            counts,
+            chi_square,
+            p,
+            least_ess: least,
+            is_short,
+            passes: p >= threshold,
+        }
     };
     Sbc {
         rows: quantities.names.iter().enumerate().map(row).collect(),

@@ -1,8 +1,9 @@
-//! States and data drawn from the joint distribution of a program: choices from the prior, then every observation from its own
-//! distribution given them.
+//! States and data drawn from the joint distribution of a program: choices from the
+//! prior, then every observation from its own distribution given them.
 //!
-//! A program that is no such distribution is refused, with what stands in the way: a factor, a likelihood without a sampler,
-//! an improper prior, frozen choices, observations that are there or not by chance, observed values that depend on choices.
+//! A program that is no such distribution is refused, with what stands in the way: a
+//! factor, a likelihood without a sampler, an improper prior, frozen choices,
+//! observations that are there or not by chance, observed values that depend on choices.
 
 use super::{CalibrationError, Settings};
 use crate::infer::plan::ChainError;
@@ -13,7 +14,8 @@ use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Draws, Limits, Observation, Selector, Trace};
 use std::sync::Arc;
 
-/// How often a draw from the prior may lead where the program has no value before that is an error.
+/// How often a draw from the prior may lead where the program has no value before that is
+/// an error.
 const RETRIES: u64 = 1000;
 
 /// A state with data drawn from it.
@@ -32,23 +34,38 @@ pub(in crate::infer) fn replicating(seed: u64, index: u32, step: u64) -> Draws {
 }
 
 /// Draws a state and data.
-pub(super) fn simulate(code: &Arc<Code>, settings: &Settings, index: u32) -> Result<Simulated, CalibrationError> {
+pub(super) fn simulate(
+    code: &Arc<Code>,
+    settings: &Settings,
+    index: u32,
+) -> Result<Simulated, CalibrationError> {
     let trace = state(code, settings.limits.clone(), settings.seed, index)?;
     with_data(trace, settings, index)
 }
 
-/// Draws a state from the prior. Where the program has no value (a scale that is not positive) the prior has no mass: kernels
-/// reject such states, so they are drawn again here.
-pub(in crate::infer) fn state(code: &Arc<Code>, limits: Limits, seed: u64, index: u32) -> Result<Trace, ChainError> {
+/// Draws a state from the prior. Where the program has no value (a scale that is not
+/// positive) the prior has no mass: kernels reject such states, so they are drawn again
+/// here.
+pub(in crate::infer) fn state(
+    code: &Arc<Code>,
+    limits: Limits,
+    seed: u64,
+    index: u32,
+) -> Result<Trace, ChainError> {
     let key = StreamKey::new(seed, index, Purpose::TRUTH);
-    let draw = |step| Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits.clone());
+    let draw =
+        |step| Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits.clone());
     attempts(RETRIES, draw).map_err(|e| match e.is_recoverable() {
         true => ChainError::Start(StartError::Run(e)),
         false => ChainError::Run(e),
     })
 }
 
-fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simulated, CalibrationError> {
+fn with_data(
+    mut trace: Trace,
+    settings: &Settings,
+    index: u32,
+) -> Result<Simulated, CalibrationError> {
     let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
     if !trace.code().freezes.is_empty() {
         return refuse(
@@ -69,7 +86,9 @@ fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simula
     let targets = trace.targets(all).to_vec();
     if let Some(t) = targets.iter().find(|t| trace.dist(**t).is_some_and(|d| d.is_improper())) {
         let address = trace.address(*t);
-        return refuse(format!("the prior of {address} is improper, so true values cannot be drawn from it"));
+        return refuse(format!(
+            "the prior of {address} is improper, so true values cannot be drawn from it"
+        ));
     }
     let given = trace.observed();
     if given.is_empty() {
@@ -80,7 +99,8 @@ fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simula
     Ok(Simulated { trace, data: Arc::new(drawn.values.into_iter().collect()), given })
 }
 
-/// Refuses programs whose set of observations, or what they observe, is a matter of chance: `a` and `b` are two draws.
+/// Refuses programs whose set of observations, or what they observe, is a matter of
+/// chance: `a` and `b` are two draws.
 pub(super) fn same_data(a: &Simulated, b: &Simulated) -> Result<(), CalibrationError> {
     let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
     for (x, y) in [(a, b), (b, a)] {

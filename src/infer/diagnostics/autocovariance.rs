@@ -1,10 +1,11 @@
-//! The autocovariance of a chain at every lag, by the fast Fourier transform: O(n log n), for chains that mix badly need
-//! all lags.
+//! The autocovariance of a chain at every lag, by the fast Fourier transform: O(n log n),
+//! for chains that mix badly need all lags.
 
 use super::chains::mean;
 use std::f64::consts::PI;
 
-/// The biased autocovariances, lags 0 to n - 1: (1/n) Σ (x_t - m)(x_{t+lag} - m) with m the mean.
+/// The biased autocovariances, lags 0 to n - 1: (1/n) Σ (x_t - m)(x_{t+lag} - m) with m
+/// the mean.
 pub(super) fn autocovariance(x: &[f64]) -> Vec<f64> {
     let (n, m) = (x.len(), mean(x));
     // Padding to twice the length keeps the circular correlation from wrapping round.
@@ -16,14 +17,16 @@ pub(super) fn autocovariance(x: &[f64]) -> Vec<f64> {
     for (a, b) in re.iter_mut().zip(&mut im) {
         (*a, *b) = (*a * *a + *b * *b, 0.0);
     }
-    // The power spectrum is real and even, so that the forward transform inverts it up to the factor `size`.
+    // The power spectrum is real and even, so that the forward transform inverts it up to
+    // the factor `size`.
     fourier(&mut re, &mut im);
     re.truncate(n);
     re.iter_mut().for_each(|v| *v /= size as f64 * n as f64);
     re
 }
 
-/// The discrete Fourier transform in place, by decimation in time (Cooley & Tukey 1965); the length is a power of two.
+/// The discrete Fourier transform in place, by decimation in time (Cooley & Tukey 1965);
+/// the length is a power of two.
 fn fourier(re: &mut [f64], im: &mut [f64]) {
     let n = re.len();
     let mut j = 0;
@@ -68,12 +71,14 @@ mod tests {
     #[test]
     fn equals_the_sum_of_products() {
         for n in [2, 3, 5, 8, 100, 257] {
-            let x: Vec<f64> = (0..n).map(|i| ((i * i * 31 + 7 * i) % 101) as f64 / 7.0 + 1000.0).collect();
+            let x: Vec<f64> =
+                (0..n).map(|i| ((i * i * 31 + 7 * i) % 101) as f64 / 7.0 + 1000.0).collect();
             let m = mean(&x);
             let fast = autocovariance(&x);
             assert_eq!(fast.len(), n);
             for (lag, f) in fast.iter().enumerate() {
-                let slow = (0..n - lag).map(|t| (x[t] - m) * (x[t + lag] - m)).sum::<f64>() / n as f64;
+                let slow =
+                    (0..n - lag).map(|t| (x[t] - m) * (x[t + lag] - m)).sum::<f64>() / n as f64;
                 assert!((f - slow).abs() < 1e-11 * fast[0].max(1.0), "n {n} lag {lag}: {f} {slow}");
             }
         }

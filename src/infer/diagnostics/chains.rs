@@ -1,6 +1,7 @@
 //! A rectangle of draws, chain after chain, and the moments the diagnostics need.
 
-/// Draws of several chains of one length, in a unit that suits them: squares and fourth powers of draws of any size are then numbers.
+/// Draws of several chains of one length, in a unit that suits them: squares and fourth
+/// powers of draws of any size are then numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chains {
     values: Vec<f64>,
@@ -9,13 +10,19 @@ pub(super) struct Chains {
 }
 
 impl Chains {
-    /// Copies the draws; `None` if there are fewer than four in a chain, or one is not finite.
+    /// Copies the draws; `None` if there are fewer than four in a chain, or one is not
+    /// finite.
     pub fn new<C: AsRef<[f64]>>(chains: &[C]) -> Option<Chains> {
         let draws = chains.iter().map(|c| c.as_ref().len()).min()?;
-        let mut values: Vec<f64> = chains.iter().flat_map(|c| c.as_ref().iter().take(draws)).copied().collect();
+        let mut values: Vec<f64> =
+            chains.iter().flat_map(|c| c.as_ref().iter().take(draws)).copied().collect();
         let unit = unit(&values);
         values.iter_mut().for_each(|x| *x /= unit);
-        (draws >= 4 && values.iter().all(|x| x.is_finite())).then_some(Chains { values, draws, unit })
+        (draws >= 4 && values.iter().all(|x| x.is_finite())).then_some(Chains {
+            values,
+            draws,
+            unit,
+        })
     }
 
     /// What the draws are given in: a power of 2.
@@ -43,7 +50,8 @@ impl Chains {
         self.values.chunks_exact(self.draws)
     }
 
-    /// The first and the last half of each chain as chains of their own; the middle draw of an odd number is left out.
+    /// The first and the last half of each chain as chains of their own; the middle draw
+    /// of an odd number is left out.
     pub fn split(&self) -> Chains {
         let half = self.draws / 2;
         let mut values = Vec::with_capacity(2 * half * self.count());
@@ -64,7 +72,8 @@ impl Chains {
     }
 }
 
-/// The power of 2 at or below the largest of these numbers, so that dividing by it is exact; 1 if there is none.
+/// The power of 2 at or below the largest of these numbers, so that dividing by it is
+/// exact; 1 if there is none.
 pub(super) fn unit(x: &[f64]) -> f64 {
     let largest = x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     if largest > 0.0 && largest.is_finite() { libm::ldexp(1.0, libm::ilogb(largest)) } else { 1.0 }
@@ -89,7 +98,8 @@ mod tests {
     fn split_leaves_out_the_middle_draw() {
         let c = Chains::new(&[vec![1., 2., 3., 4., 5.], vec![6., 7., 8., 9., 10.]]).unwrap();
         let s = c.split();
-        let draws: Vec<Vec<f64>> = s.iter().map(|c| c.iter().map(|x| x * s.unit()).collect()).collect();
+        let draws: Vec<Vec<f64>> =
+            s.iter().map(|c| c.iter().map(|x| x * s.unit()).collect()).collect();
         assert_eq!(draws, [[1., 2.], [6., 7.], [4., 5.], [9., 10.]]);
         assert_eq!(s.unit(), 8.0);
     }

@@ -1,20 +1,22 @@
 //! Effective sample sizes: how many independent draws would tell as much.
 //!
-//! Geyer's initial monotone sequence over the autocorrelations of all chains together (Vehtari et al. 2021, section 3.2),
-//! on rank-normalised draws for the bulk and on indicators for quantiles.
+//! Geyer's initial monotone sequence over the autocorrelations of all chains together
+//! (Vehtari et al. 2021, section 3.2), on rank-normalised draws for the bulk and on
+//! indicators for quantiles.
 
 use super::autocovariance::autocovariance;
 use super::chains::{Chains, mean, unit, variance};
 use super::normal_scores::normal_scores;
 use super::quantile::quantile;
 
-/// Effective sample size for the bulk of the distribution: of the rank-normalised, split chains. NaN if it cannot be
-/// said (see the module).
+/// Effective sample size for the bulk of the distribution: of the rank-normalised, split
+/// chains. NaN if it cannot be said (see the module).
 pub fn ess_bulk<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| bulk(&c))
 }
 
-/// Effective sample size for the tails: the smaller one of those for the 5 % and the 95 % quantile.
+/// Effective sample size for the tails: the smaller one of those for the 5 % and the 95 %
+/// quantile.
 pub fn ess_tail<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| tail(&c))
 }
@@ -49,7 +51,8 @@ fn of_quantile(chains: &Chains, p: f64) -> f64 {
 pub(super) fn ess(chains: &Chains) -> f64 {
     let (count, n) = (chains.count() as f64, chains.draws());
     let total = count * n as f64;
-    let (low, high) = chains.values().iter().fold((f64::MAX, f64::MIN), |(l, h), &x| (l.min(x), h.max(x)));
+    let (low, high) =
+        chains.values().iter().fold((f64::MAX, f64::MIN), |(l, h), &x| (l.min(x), h.max(x)));
     if high - low < RESOLUTION * unit(chains.values()) {
         return total;
     }
@@ -62,7 +65,8 @@ pub(super) fn ess(chains: &Chains) -> f64 {
     }
     let rho = |lag: usize| 1.0 - (within - covariance(lag)) / pooled;
 
-    // Geyer's initial positive sequence: pairs of neighbouring lags as long as their sum is positive.
+    // Geyer's initial positive sequence: pairs of neighbouring lags as long as their sum
+    // is positive.
     let (mut even, mut odd) = (1.0, rho(1));
     let mut rhos = vec![even, odd];
     while rhos.len() + 2 < n && even + odd > 0.0 {
@@ -74,7 +78,8 @@ pub(super) fn ess(chains: &Chains) -> f64 {
             rhos.extend([0.0, 0.0]);
         }
     }
-    // The last pair is left out of the sum, but for its even member where that is positive.
+    // The last pair is left out of the sum, but for its even member where that is
+    // positive.
     let used = rhos.len() - 2;
     let last_even = if even > 0.0 { even } else { rhos[used] };
     rhos.truncate(used);
@@ -86,10 +91,12 @@ pub(super) fn ess(chains: &Chains) -> f64 {
             rhos[t] = before / 2.0;
         }
     }
-    // An antithetic chain may be worth more than independent draws, but not beyond this bound (section 3.2).
+    // An antithetic chain may be worth more than independent draws, but not beyond this
+    // bound (section 3.2).
     let tau = (-1.0 + 2.0 * rhos.iter().sum::<f64>() + last_even).max(1.0 / libm::log10(total));
     total / tau
 }
 
-/// The decimal resolution of a double, in the unit of the draws: a smaller spread counts as none.
+/// The decimal resolution of a double, in the unit of the draws: a smaller spread counts
+/// as none.
 const RESOLUTION: f64 = 1e-15;

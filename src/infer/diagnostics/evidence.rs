@@ -1,11 +1,13 @@
 //! The evidence of a mode, from the draws of chains that stay in it.
 //!
-//! log Z = E[log density] + entropy, both over the mode. The mean is that of the draws; the entropy is a Gaussian's of their
-//! covariance. Draws that stay near a mode are often fewer than the choices, so their correlations are shrunk towards none
-//! (Schäfer & Strimmer 2005, "A shrinkage approach to large-scale covariance matrix estimation", target D), counting
-//! autocorrelated draws for what they are worth. Exact for Gaussian modes and many draws. Chains that have not yet been everywhere in
-//! their mode are too narrow, by dozens of nats where there are dozens of choices: the error says so, and modes are better told apart
-//! by their densities then.
+//! log Z = E[log density] + entropy, both over the mode. The mean is that of the draws;
+//! the entropy is a Gaussian's of their covariance. Draws that stay near a mode are often
+//! fewer than the choices, so their correlations are shrunk towards none (Schäfer &
+//! Strimmer 2005, "A shrinkage approach to large-scale covariance matrix estimation",
+//! target D), counting autocorrelated draws for what they are worth. Exact for Gaussian
+//! modes and many draws. Chains that have not yet been everywhere in their mode are too
+//! narrow, by dozens of nats where there are dozens of choices: the error says so, and
+//! modes are better told apart by their densities then.
 
 use nalgebra::{Cholesky, DMatrix};
 use serde::{Deserialize, Serialize};
@@ -17,7 +19,8 @@ const WIDER: f64 = 3.0;
 /// Draws of all evidences from their errors, over which the shares are averaged.
 const AVERAGED: u64 = 1000;
 
-/// Draws of one chain: their log densities, means, covariance, and how far each is like the one before.
+/// Draws of one chain: their log densities, means, covariance, and how far each is like
+/// the one before.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Cloud {
     count: u64,
@@ -41,7 +44,8 @@ pub struct LogEvidence {
 }
 
 impl Cloud {
-    /// Takes the next draw (Welford 1962). All draws have as many coordinates; one that is not finite is left out.
+    /// Takes the next draw (Welford 1962). All draws have as many coordinates; one that
+    /// is not finite is left out.
     fn add(&mut self, y: &[f64], log_density: f64) {
         let fits = self.count == 0 || y.len() == self.mean.len();
         if !fits || !log_density.is_finite() || y.iter().any(|x| !x.is_finite()) {
@@ -61,7 +65,10 @@ impl Cloud {
             let after = y[..=i].iter().zip(&self.mean);
             after.zip(&mut products).for_each(|((y, m), p)| *p += d * (y - m));
         }
-        self.steps.iter_mut().zip(y.iter().zip(&self.last)).for_each(|(s, (y, last))| *s += (y - last) * (y - last));
+        self.steps
+            .iter_mut()
+            .zip(y.iter().zip(&self.last))
+            .for_each(|(s, (y, last))| *s += (y - last) * (y - last));
         self.last.copy_from_slice(y);
         let d = log_density - self.log[0];
         self.log[0] += d / n;
@@ -90,7 +97,8 @@ impl Cloud {
         joined
     }
 
-    /// What the draws are worth: the median over the coordinates, each taken for an autoregression of first order.
+    /// What the draws are worth: the median over the coordinates, each taken for an
+    /// autoregression of first order.
     fn effective(&self) -> f64 {
         let n = self.count as f64;
         let one = |i: usize| {
@@ -103,8 +111,9 @@ impl Cloud {
     }
 }
 
-/// The draws of one chain in the unconstrained space, in two to four blocks of the same length, of which the last may not be full:
-/// what they say alone tells whether the chain has seen its mode.
+/// The draws of one chain in the unconstrained space, in two to four blocks of the same
+/// length, of which the last may not be full: what they say alone tells whether the chain
+/// has seen its mode.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clouds {
     blocks: Vec<Cloud>,
@@ -113,7 +122,8 @@ pub struct Clouds {
 }
 
 impl Clouds {
-    /// Takes the next draw of the chain, in so many coordinates as the others; one that is not finite is left out.
+    /// Takes the next draw of the chain, in so many coordinates as the others; one that
+    /// is not finite is left out.
     pub fn add(&mut self, y: &[f64], log_density: f64) {
         self.length = self.length.max(FEWEST);
         if self.blocks.last().is_none_or(|b| b.count >= self.length) {
@@ -157,10 +167,12 @@ impl Gaussian {
         let log = clouds.iter().map(|c| share(c) * c.log[0]).sum::<f64>();
         let off = |c: &Cloud| share(c) * (c.log[0] - log) * (c.log[0] - log);
         let log_variance = clouds.iter().map(|c| c.log[1] / n + off(c)).sum::<f64>();
-        let mean: Vec<f64> = (0..d).map(|i| clouds.iter().map(|c| share(c) * c.mean[i]).sum()).collect();
+        let mean: Vec<f64> =
+            (0..d).map(|i| clouds.iter().map(|c| share(c) * c.mean[i]).sum()).collect();
         let covariance = |i: usize, j: usize| {
             let between = |c: &Cloud| share(c) * (c.mean[i] - mean[i]) * (c.mean[j] - mean[j]);
-            clouds.iter().map(|c| c.products[i * (i + 1) / 2 + j] / n + between(c)).sum::<f64>() * n / (n - 1.0)
+            clouds.iter().map(|c| c.products[i * (i + 1) / 2 + j] / n + between(c)).sum::<f64>() * n
+                / (n - 1.0)
         };
         let entropy = entropy(d, effective, covariance)?;
         let widths = (0..d).map(|i| 0.5 * libm::log(covariance(i, i))).collect();
@@ -168,7 +180,8 @@ impl Gaussian {
     }
 }
 
-/// The entropy of a Gaussian of a sample covariance, from so many independent draws. `None` where a coordinate never moved.
+/// The entropy of a Gaussian of a sample covariance, from so many independent draws.
+/// `None` where a coordinate never moved.
 fn entropy(d: usize, effective: f64, covariance: impl Fn(usize, usize) -> f64) -> Option<f64> {
     let sd: Vec<f64> = (0..d).map(|i| covariance(i, i).sqrt()).collect();
     if sd.iter().any(|s| !s.is_normal()) {
@@ -190,15 +203,17 @@ fn entropy(d: usize, effective: f64, covariance: impl Fn(usize, usize) -> f64) -
     }
     let factor = Cholesky::new(correlations)?;
     let freedom = effective - 1.0;
-    // The log of a sample variance is too small by this much on average: log(x) - digamma(x) at half the freedom.
+    // The log of a sample variance is too small by this much on average: log(x) -
+    // digamma(x) at half the freedom.
     let bias = 1.0 / freedom + 1.0 / (3.0 * freedom * freedom);
     let each = 0.5 * (libm::log(2.0 * std::f64::consts::PI) + 1.0 + bias);
     let log = |i: usize| each + libm::log(sd[i]) + libm::log(factor.l_dirty()[(i, i)]);
     Some((0..d).map(log).sum())
 }
 
-/// The evidence of a mode from chains that stay in it. Its error is that of so many draws, and of chains that are still on their
-/// way: blocks of their draws are narrower then than all of them. `None` from too few draws, or where a coordinate never moved.
+/// The evidence of a mode from chains that stay in it. Its error is that of so many
+/// draws, and of chains that are still on their way: blocks of their draws are narrower
+/// then than all of them. `None` from too few draws, or where a coordinate never moved.
 pub fn log_evidence(chains: &[&Clouds]) -> Option<LogEvidence> {
     let blocks: Vec<&Cloud> = chains.iter().flat_map(|c| &c.blocks).collect();
     let all = Gaussian::of(&blocks)?;
@@ -213,8 +228,9 @@ pub fn log_evidence(chains: &[&Clouds]) -> Option<LogEvidence> {
     (value.is_finite() && error.is_finite()).then_some(LogEvidence { value, error })
 }
 
-/// The mean log density of chains, with the error of taking modes for equally wide: their entropies in so many dimensions differ
-/// by about the square root of these. `None` without draws.
+/// The mean log density of chains, with the error of taking modes for equally wide: their
+/// entropies in so many dimensions differ by about the square root of these. `None`
+/// without draws.
 pub fn log_density(chains: &[&Clouds]) -> Option<LogEvidence> {
     let blocks: Vec<&Cloud> = chains.iter().flat_map(|c| &c.blocks).collect();
     let count: f64 = blocks.iter().map(|b| b.count as f64).sum();
@@ -223,12 +239,14 @@ pub fn log_density(chains: &[&Clouds]) -> Option<LogEvidence> {
     Some(LogEvidence { value, error: dimensions.sqrt() })
 }
 
-/// The share of each mode in all of them, averaged over what their evidences may be given their errors.
+/// The share of each mode in all of them, averaged over what their evidences may be given
+/// their errors.
 pub fn shares(all: &[LogEvidence]) -> Vec<f64> {
     let mut rng = crate::rng::StreamKey::new(0, 0, crate::rng::Purpose::KERNEL).stream(0, 0, 0);
     let mut shares = vec![0.0; all.len()];
     for _ in 0..AVERAGED {
-        let logs: Vec<f64> = all.iter().map(|e| e.value + e.error * rng.standard_normal()).collect();
+        let logs: Vec<f64> =
+            all.iter().map(|e| e.value + e.error * rng.standard_normal()).collect();
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = logs.iter().map(|l| libm::exp(l - most)).collect();
         let sum: f64 = weights.iter().sum();
@@ -242,15 +260,24 @@ mod tests {
     use super::*;
     use crate::rng::{Purpose, StreamKey};
 
-    /// Draws of a normal distribution in `d` dimensions about `at`, of mass `log_mass`: neighbours correlate by `r`, and
-    /// each draw is like the one before by `lag`.
-    fn cloud(seed: u64, (d, n): (usize, usize), (at, sd): (f64, f64), r: f64, lag: f64, log_mass: f64) -> Clouds {
+    /// Draws of a normal distribution in `d` dimensions about `at`, of mass `log_mass`:
+    /// neighbours correlate by `r`, and each draw is like the one before by `lag`.
+    fn cloud(
+        seed: u64,
+        (d, n): (usize, usize),
+        (at, sd): (f64, f64),
+        r: f64,
+        lag: f64,
+        log_mass: f64,
+    ) -> Clouds {
         let mut rng = StreamKey::new(seed, 0, Purpose(77)).stream(0, 0, 0);
         let mut cloud = Clouds::default();
         let mut state = vec![0.0; d];
         for t in 0..n {
             let keep = if t == 0 { 0.0 } else { lag };
-            state.iter_mut().for_each(|z| *z = keep * *z + (1.0 - keep * keep).sqrt() * rng.standard_normal());
+            state
+                .iter_mut()
+                .for_each(|z| *z = keep * *z + (1.0 - keep * keep).sqrt() * rng.standard_normal());
             let mut x = vec![0.0; d];
             for i in 0..d {
                 let before = if i == 0 { 0.0 } else { r };
@@ -271,7 +298,8 @@ mod tests {
         let wide = cloud(1, (3, 4000), (5.0, 2.0), 0.9, 0.0, -7.0);
         let e = log_evidence(&[&wide]).unwrap();
         assert!((e.value + 7.0).abs() < 0.05 && e.error < 0.05, "{e:?}");
-        // Two chains of the same mode, autocorrelated: what they are worth is about a fifth.
+        // Two chains of the same mode, autocorrelated: what they are worth is about a
+        // fifth.
         let two = [2, 3].map(|s| cloud(s, (3, 4000), (5.0, 2.0), 0.9, 0.7, -7.0));
         let worth: f64 = two[0].blocks.iter().map(Cloud::effective).sum();
         assert!((worth / 4000.0 - 0.3 / 1.7).abs() < 0.03, "{worth}");
@@ -288,9 +316,18 @@ mod tests {
             c
         };
         let (whole, joined) = (of(0, 50), Cloud::joined(&[of(0, 13), of(13, 50)]));
-        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8 * (1.0 + a.abs()));
-        assert!(near(&whole.mean, &joined.mean) && near(&whole.products, &joined.products), "{whole:?} {joined:?}");
-        assert!(near(&whole.steps, &joined.steps) && near(&whole.log, &joined.log) && whole.last == joined.last);
+        let near = |a: &[f64], b: &[f64]| {
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8 * (1.0 + a.abs()))
+        };
+        assert!(
+            near(&whole.mean, &joined.mean) && near(&whole.products, &joined.products),
+            "{whole:?} {joined:?}"
+        );
+        assert!(
+            near(&whole.steps, &joined.steps)
+                && near(&whole.log, &joined.log)
+                && whole.last == joined.last
+        );
         let mut blocks = Clouds::default();
         (0..1000).for_each(|t| blocks.add(&draw(t), 0.0));
         assert_eq!((blocks.count(), blocks.length), (1000, 256));
@@ -302,7 +339,10 @@ mod tests {
         // A random walk in 30 dimensions: twice as long is wider by log(2) / 2 in each.
         let walk = log_evidence(&[&cloud(9, (30, 400), (0.0, 1.0), 0.0, 0.9999, 0.0)]).unwrap();
         let there = log_evidence(&[&cloud(9, (30, 4000), (0.0, 1.0), 0.0, 0.0, 0.0)]).unwrap();
-        assert!(walk.error > 0.5 * walk.value.abs() && walk.error < 100.0 && there.error < 0.5, "{walk:?} {there:?}");
+        assert!(
+            walk.error > 0.5 * walk.value.abs() && walk.error < 100.0 && there.error < 0.5,
+            "{walk:?} {there:?}"
+        );
     }
 
     #[test]
@@ -310,7 +350,10 @@ mod tests {
         let walk = |seed, log| cloud(seed, (30, 200), (0.0, 1.0), 0.0, 0.9999, log);
         let (low, high) = (walk(9, 0.0), walk(10, 60.0));
         let each = [&low, &high].map(|c| log_density(&[c]).unwrap());
-        assert!((each[0].error - 30f64.sqrt()).abs() < 1e-12 && shares(&each)[1] > 0.999, "{each:?}");
+        assert!(
+            (each[0].error - 30f64.sqrt()).abs() < 1e-12 && shares(&each)[1] > 0.999,
+            "{each:?}"
+        );
         let near = [each[0], LogEvidence { value: each[0].value + 3.0, ..each[0] }];
         assert!((0.55..0.8).contains(&shares(&near)[1]), "{:?}", shares(&near));
         assert_eq!(log_density(&[]), None);
@@ -318,13 +361,15 @@ mod tests {
 
     #[test]
     fn few_draws_in_many_dimensions_are_unbiased_to_their_error() {
-        // Neighbours by 0.5: 39 of 780 correlations. 30 such modes of 60 autocorrelated draws each.
+        // Neighbours by 0.5: 39 of 780 correlations. 30 such modes of 60 autocorrelated
+        // draws each.
         let all: Vec<f64> = (0..30)
             .map(|s| log_evidence(&[&cloud(s, (40, 60), (0.0, 0.1), 0.5, 0.4, 3.0)]).unwrap())
             .map(|e| (e.value - 3.0) / e.error)
             .collect();
         let mean = all.iter().sum::<f64>() / 30.0;
-        // The bias is what shrinking leaves out of the correlations, at most 39 * 0.14 nats; an error is 1.3 nats.
+        // The bias is what shrinking leaves out of the correlations, at most 39 * 0.14
+        // nats; an error is 1.3 nats.
         assert!(mean > -1.0 && mean < 4.5, "{mean}");
     }
 
@@ -337,7 +382,8 @@ mod tests {
         let s = shares(&each);
         assert!((s[0] - 1.0 / 3.0).abs() < 0.02 && (s[0] + s[1] - 1.0).abs() < 1e-12, "{s:?}");
         // Errors make them more even, not less.
-        let sure = |error| shares(&[LogEvidence { value: 0.0, error }, LogEvidence { value: 3.0, error }]);
+        let sure =
+            |error| shares(&[LogEvidence { value: 0.0, error }, LogEvidence { value: 3.0, error }]);
         assert!((sure(0.0)[1] - 0.9526).abs() < 1e-3 && sure(4.0)[1] < 0.8 && sure(4.0)[1] > 0.6);
     }
 

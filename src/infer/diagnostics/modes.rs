@@ -1,16 +1,19 @@
 //! Chains that agree with each other, where not all do.
 //!
-//! Two chains agree if the split R-hat of the two of them is low for every quantity; groups are what agreement connects. A group
-//! is a place where chains stay (a mode, if they are long enough), not a share of probability: chains fall where they start.
+//! Two chains agree if the split R-hat of the two of them is low for every quantity;
+//! groups are what agreement connects. A group is a place where chains stay (a mode, if
+//! they are long enough), not a share of probability: chains fall where they start.
 
 use super::r_hat;
 
-/// Two chains with a split R-hat above this are at different places: their means are more than about one and a half standard
-/// deviations apart (or one is much wider), which slow mixing about one place seldom gives.
+/// Two chains with a split R-hat above this are at different places: their means are more
+/// than about one and a half standard deviations apart (or one is much wider), which slow
+/// mixing about one place seldom gives.
 const APART: f64 = 1.3;
 
-/// Groups of chains, by number: each in order, the largest group first, then by first chain. `quantities[quantity][chain]` are
-/// draws. One group where all agree; none without chains.
+/// Groups of chains, by number: each in order, the largest group first, then by first
+/// chain. `quantities[quantity][chain]` are draws. One group where all agree; none
+/// without chains.
 pub fn modes(quantities: &[&[Vec<f64>]]) -> Vec<Vec<usize>> {
     let chains = quantities.iter().map(|q| q.len()).max().unwrap_or(0);
     let mut group: Vec<usize> = (0..chains).collect();
@@ -38,7 +41,9 @@ fn agree(a: Option<&Vec<f64>>, b: Option<&Vec<f64>>) -> bool {
     let r = r_hat(&[a, b]);
     if r.is_nan() {
         // Too short to be told apart, or constant: then at one place or at two.
-        return a.len() < 4 || b.len() < 4 || a.first().map(|x| x.to_bits()) == b.first().map(|x| x.to_bits());
+        return a.len() < 4
+            || b.len() < 4
+            || a.first().map(|x| x.to_bits()) == b.first().map(|x| x.to_bits());
     }
     r <= APART
 }
@@ -62,7 +67,8 @@ mod tests {
 
     #[test]
     fn chains_of_two_modes_are_told_apart() {
-        let x: Vec<Vec<f64>> = [0.0, 5.0, 0.0, 0.0, 5.0].iter().zip(0..).map(|(c, s)| chain(s, *c, 300)).collect();
+        let x: Vec<Vec<f64>> =
+            [0.0, 5.0, 0.0, 0.0, 5.0].iter().zip(0..).map(|(c, s)| chain(s, *c, 300)).collect();
         let y: Vec<Vec<f64>> = (0..5).map(|s| chain(50 + s, 1.0, 300)).collect();
         assert_eq!(modes(&[&y, &x]), [vec![0, 2, 3], vec![1, 4]]);
         assert_eq!(modes(&[&y]), [vec![0, 1, 2, 3, 4]]);

@@ -1,9 +1,10 @@
-//! Rank normalisation: draws replaced by the normal quantiles of their ranks, which makes the diagnostics sound for heavy
-//! tails (Vehtari et al. 2021, equation 14).
+//! Rank normalisation: draws replaced by the normal quantiles of their ranks, which makes
+//! the diagnostics sound for heavy tails (Vehtari et al. 2021, equation 14).
 
 use super::chains::Chains;
 
-/// Each draw's normal score z = Φ⁻¹((r - 3/8) / (S + 1/4)), r its rank among all S draws; ties share their mean rank.
+/// Each draw's normal score z = Φ⁻¹((r - 3/8) / (S + 1/4)), r its rank among all S draws;
+/// ties share their mean rank.
 pub(super) fn normal_scores(chains: &Chains) -> Chains {
     let x = chains.values();
     let mut order: Vec<usize> = (0..x.len()).collect();
@@ -19,8 +20,9 @@ pub(super) fn normal_scores(chains: &Chains) -> Chains {
     chains.with_values(z)
 }
 
-/// The quantile of the standard normal distribution, 0 < p < 1, to a relative error of about 1e-16: Wichura, "Algorithm
-/// AS 241: the percentage points of the normal distribution" (Applied Statistics 37:3, 1988), routine PPND16.
+/// The quantile of the standard normal distribution, 0 < p < 1, to a relative error of
+/// about 1e-16: Wichura, "Algorithm AS 241: the percentage points of the normal
+/// distribution" (Applied Statistics 37:3, 1988), routine PPND16.
 fn normal_quantile(p: f64) -> f64 {
     let q = p - 0.5;
     if q.abs() <= 0.425 {
@@ -33,7 +35,8 @@ fn normal_quantile(p: f64) -> f64 {
     if q < 0.0 { -x } else { x }
 }
 
-/// A rational function: coefficients of numerator and denominator from the highest power down.
+/// A rational function: coefficients of numerator and denominator from the highest power
+/// down.
 fn ratio([num, den]: &[[f64; 8]; 2], r: f64) -> f64 {
     let horner = |c: &[f64; 8]| c.iter().fold(0.0, |acc, c| acc * r + c);
     horner(num) / horner(den)
@@ -118,7 +121,11 @@ mod tests {
             let p = libm::erfc(-x / std::f64::consts::SQRT_2) / 2.0;
             // Near p = 1 the spacing of doubles limits what can come back.
             let spacing = f64::EPSILON * p / (libm::exp(-x * x / 2.0) / 2.506_628_274_631_000_7);
-            assert!((normal_quantile(p) - x).abs() <= 1e-13 + 4.0 * spacing, "{x}: {}", normal_quantile(p));
+            assert!(
+                (normal_quantile(p) - x).abs() <= 1e-13 + 4.0 * spacing,
+                "{x}: {}",
+                normal_quantile(p)
+            );
         }
         assert_eq!(normal_quantile(0.5), 0.0);
     }

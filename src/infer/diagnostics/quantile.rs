@@ -1,7 +1,7 @@
 //! Sample quantiles.
 
-/// The quantile at `p` in [0, 1] by linear interpolation between order statistics (R's type 7, numpy's default); NaN of
-/// nothing, or if a draw is NaN.
+/// The quantile at `p` in [0, 1] by linear interpolation between order statistics (R's
+/// type 7, numpy's default); NaN of nothing, or if a draw is NaN.
 pub fn quantile(x: &[f64], p: f64) -> f64 {
     if x.iter().any(|v| v.is_nan()) {
         return f64::NAN;
@@ -18,7 +18,8 @@ pub fn quantile_sorted(sorted: &[f64], p: f64) -> f64 {
     let below = (at as usize).min(last);
     let (lo, hi) = (sorted[below], sorted[(below + 1).min(last)]);
     let share = at - below as f64;
-    // Between equal values there is nothing to interpolate, and rounding must not lead outside.
+    // Between equal values there is nothing to interpolate, and rounding must not lead
+    // outside.
     if lo == hi || share == 0.0 {
         lo
     } else if (hi - lo).is_finite() {

@@ -4,8 +4,9 @@ use super::chains::{Chains, mean, variance};
 use super::normal_scores::normal_scores;
 use super::quantile::quantile;
 
-/// Rank-normalised split R-hat: the larger one of bulk and folded R-hat (Vehtari et al. 2021, section 4.1). Near 1 when
-/// the chains agree; above 1.01 they do not yet. NaN for a single chain, or if it cannot be said (see the module).
+/// Rank-normalised split R-hat: the larger one of bulk and folded R-hat (Vehtari et al.
+/// 2021, section 4.1). Near 1 when the chains agree; above 1.01 they do not yet. NaN for
+/// a single chain, or if it cannot be said (see the module).
 pub fn r_hat<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| rank_normalised(&c))
 }
@@ -21,8 +22,8 @@ pub(super) fn rank_normalised(chains: &Chains) -> f64 {
     if folded > bulk { folded } else { bulk }
 }
 
-/// √(marginal variance / within-chain variance) (Gelman & Rubin 1992); NaN of chains that are all constant, whose variances are
-/// rounding errors.
+/// √(marginal variance / within-chain variance) (Gelman & Rubin 1992); NaN of chains that
+/// are all constant, whose variances are rounding errors.
 fn plain(chains: &Chains) -> f64 {
     if chains.iter().all(|c| c.windows(2).all(|w| w[0] == w[1])) {
         return f64::NAN;

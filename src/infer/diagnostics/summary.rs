@@ -5,7 +5,8 @@ use super::quantile::quantile_sorted;
 use super::{ess, mcse, rhat};
 use serde::{Deserialize, Serialize};
 
-/// What the chains say of one scalar quantity. What cannot be said is NaN; JSON has `null` for it.
+/// What the chains say of one scalar quantity. What cannot be said is NaN; JSON has
+/// `null` for it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// The mean of all draws.
@@ -40,8 +41,9 @@ pub struct Summary {
     pub r_hat: f64,
 }
 
-/// Summarises one scalar quantity, `chains[chain][draw]`. Moments and quantiles need no minimum of draws and take chains
-/// of different lengths in full; a NaN draw makes all of them NaN.
+/// Summarises one scalar quantity, `chains[chain][draw]`. Moments and quantiles need no
+/// minimum of draws and take chains of different lengths in full; a NaN draw makes all of
+/// them NaN.
 pub fn summary<C: AsRef<[f64]>>(chains: &[C]) -> Summary {
     let mut all: Vec<f64> = chains.iter().flat_map(|c| c.as_ref()).copied().collect();
     let nan = all.iter().any(|x| x.is_nan());

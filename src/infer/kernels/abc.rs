@@ -1,9 +1,12 @@
-//! `abc(move, eps)`: approximate Bayesian computation by Markov chain Monte Carlo (Marjoram et al. 2003).
+//! `abc(move, eps)`: approximate Bayesian computation by Markov chain Monte Carlo
+//! (Marjoram et al. 2003).
 //!
-//! The kernel inside proposes as if nothing were observed; then everything observed is drawn anew from its own distribution, and
-//! the proposal stays if what was drawn is near enough to what is observed. The densities of the
-//! observations play no part. The chain draws from the prior given that simulated data come within `eps`: the posterior, as `eps` goes to 0.
-//! The distance is the root mean square of the differences between the observed numbers and the drawn ones.
+//! The kernel inside proposes as if nothing were observed; then everything observed is
+//! drawn anew from its own distribution, and the proposal stays if what was drawn is near
+//! enough to what is observed. The densities of the observations play no part. The chain
+//! draws from the prior given that simulated data come within `eps`: the posterior, as
+//! `eps` goes to 0. The distance is the root mean square of the differences between the
+//! observed numbers and the drawn ones.
 
 use crate::infer::kernel::{At, Kernel, Outcome};
 use crate::infer::selection::fail;
@@ -14,15 +17,18 @@ use crate::syntax::span::Span;
 use crate::trace::{Draws, Trace, TraceResult};
 use std::sync::Arc;
 
-/// Likelihood-free Metropolis-Hastings around a kernel that leaves the prior invariant and is reversible.
+/// Likelihood-free Metropolis-Hastings around a kernel that leaves the prior invariant
+/// and is reversible.
 pub struct Abc {
     kernel: Box<dyn Kernel>,
     eps: f64,
-    /// The distance at which the present state was accepted: above `eps` until a state comes near enough.
+    /// The distance at which the present state was accepted: above `eps` until a state
+    /// comes near enough.
     distance: f64,
     /// What it is a distance from.
     observed: Option<Arc<Observed>>,
-    /// Whether the distance is a checkpoint's, and from what is observed in the next step.
+    /// Whether the distance is a checkpoint's, and from what is observed in the next
+    /// step.
     loaded: bool,
     span: Span,
 }
@@ -34,8 +40,8 @@ impl Abc {
     }
 }
 
-/// One step of the kernel inside under the prior, kept if data drawn in the new state are within `eps`; `distance` is that of
-/// the present state.
+/// One step of the kernel inside under the prior, kept if data drawn in the new state are
+/// within `eps`; `distance` is that of the present state.
 pub(super) fn step_within(
     kernel: &mut dyn Kernel,
     trace: &mut Trace,
@@ -67,16 +73,23 @@ pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f
     if let Some((address, what)) = replicate.silent.first() {
         return Err(fail(
             span,
-            format!("abc simulates all observations, but {address} is {what}, which has no sampler"),
+            format!(
+                "abc simulates all observations, but {address} is {what}, which has no sampler"
+            ),
         ));
     }
     let observed = trace.observed();
     let (mut squares, mut count) = (0.0, 0.0);
     for o in &observed {
-        let Some((_, drawn)) = replicate.values.iter().find(|(hash, _)| *hash == o.hash) else { continue };
+        let Some((_, drawn)) = replicate.values.iter().find(|(hash, _)| *hash == o.hash) else {
+            continue;
+        };
         let (mut a, mut b) = (Vec::new(), Vec::new());
         if !numbers(&o.value, &mut a) || !numbers(drawn, &mut b) || a.len() != b.len() {
-            return Err(fail(span, format!("abc compares numbers, but {} is {}", o.address, o.value.type_name())));
+            return Err(fail(
+                span,
+                format!("abc compares numbers, but {} is {}", o.address, o.value.type_name()),
+            ));
         }
         squares += a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
         count += a.len() as f64;

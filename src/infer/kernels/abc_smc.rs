@@ -1,11 +1,13 @@
-//! `abc(move, eps, particles)`: approximate Bayesian computation by sequential Monte Carlo with tolerances that fall (Del Moral,
-//! Doucet & Jasra 2012), as a proposal.
+//! `abc(move, eps, particles)`: approximate Bayesian computation by sequential Monte
+//! Carlo with tolerances that fall (Del Moral, Doucet & Jasra 2012), as a proposal.
 //!
-//! Particles drawn from the prior, each with data drawn from it, are kept while those data are within the tolerance;
-//! copies fill the places of the others, and all move by the kernel inside as `abc` does. The product of the shares that were
-//! kept estimates without bias how probable data within `eps` are, so accepting one of the last particles with the ratio
-//! of the estimates leaves the prior given such data invariant for any number of particles (see `particles.rs`). The tolerances
-//! are found in the first run, so that half of the particles are kept at each, and stay as they are.
+//! Particles drawn from the prior, each with data drawn from it, are kept while those
+//! data are within the tolerance; copies fill the places of the others, and all move by
+//! the kernel inside as `abc` does. The product of the shares that were kept estimates
+//! without bias how probable data within `eps` are, so accepting one of the last
+//! particles with the ratio of the estimates leaves the prior given such data invariant
+//! for any number of particles (see `particles.rs`). The tolerances are found in the
+//! first run, so that half of the particles are kept at each, and stay as they are.
 
 use super::abc::{simulate, step_within};
 use super::particles::{Independent, Prior, Way};
@@ -34,8 +36,8 @@ pub struct Closer {
 }
 
 impl AbcSmc {
-    /// A kernel, the largest distance, the numbers of particles and of their moves at each tolerance; frozen choices are not
-    /// drawn anew. `span` is where errors point.
+    /// A kernel, the largest distance, the numbers of particles and of their moves at
+    /// each tolerance; frozen choices are not drawn anew. `span` is where errors point.
     pub fn new(
         kernel: Box<dyn Kernel>,
         eps: f64,
@@ -68,7 +70,12 @@ impl Way for Closer {
         self.kernel.load(&inner)
     }
 
-    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
+    fn lead(
+        &mut self,
+        prior: &Prior,
+        trace: &mut Trace,
+        at: &At,
+    ) -> TraceResult<(Vec<Trace>, f64)> {
         let mut particles = prior.draw(trace, self.particles, at)?;
         let mut distances = Vec::with_capacity(particles.len());
         for (i, p) in particles.iter().enumerate() {
@@ -78,12 +85,14 @@ impl Way for Closer {
         let (mut tolerance, mut log_kept, mut rung) = (f64::INFINITY, 0.0, 0);
         while tolerance > self.eps {
             if find {
-                let next = if rung + 1 < MOST { next_tolerance(&distances, tolerance) } else { self.eps };
+                let next =
+                    if rung + 1 < MOST { next_tolerance(&distances, tolerance) } else { self.eps };
                 self.tolerances.push(next.max(self.eps));
             }
             tolerance = self.tolerances[rung];
             rung += 1;
-            let kept: Vec<f64> = distances.iter().map(|d| f64::from(u8::from(*d <= tolerance))).collect();
+            let kept: Vec<f64> =
+                distances.iter().map(|d| f64::from(u8::from(*d <= tolerance))).collect();
             let count: f64 = kept.iter().sum();
             if count == 0.0 {
                 if find {
@@ -107,7 +116,8 @@ impl Way for Closer {
     }
 }
 
-/// The tolerance that keeps half of the particles, or as many as there are below the present one.
+/// The tolerance that keeps half of the particles, or as many as there are below the
+/// present one.
 fn next_tolerance(distances: &[f64], present: f64) -> f64 {
     let mut sorted = distances.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -123,7 +133,8 @@ mod tests {
     fn tolerances_keep_half_and_fall() {
         assert_eq!(next_tolerance(&[3.0, 1.0, 4.0, 2.0], f64::INFINITY), 2.0);
         assert_eq!(next_tolerance(&[2.0, 1.0, 2.0, 2.0], 2.0), 1.0);
-        // Nothing is nearer, or nothing is comparable: what remains is the last tolerance.
+        // Nothing is nearer, or nothing is comparable: what remains is the last
+        // tolerance.
         assert_eq!(next_tolerance(&[2.0; 4], 2.0), 0.0);
         assert_eq!(next_tolerance(&[f64::INFINITY; 4], f64::INFINITY), 0.0);
     }

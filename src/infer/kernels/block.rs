@@ -3,8 +3,9 @@
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
 use crate::trace::{Trace, TraceResult};
 
-/// `block(sel)`: draws all selected choices anew from their priors, together. Choices that appear or vanish in consequence
-/// pay for themselves, so the selection may change with the state.
+/// `block(sel)`: draws all selected choices anew from their priors, together. Choices
+/// that appear or vanish in consequence pay for themselves, so the selection may change
+/// with the state.
 #[derive(Clone, Debug)]
 pub struct Block {
     scope: Registered,

@@ -1,10 +1,13 @@
-//! `delayed(move, at)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate transitions (Liu 2001, section 9.4.3).
+//! `delayed(move, at)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate
+//! transitions (Liu 2001, section 9.4.3).
 //!
-//! Beside the chain's trace there is a twin, in which the coarse surrogates of the observations at `at` stand in their place. The
-//! kernel inside moves the twin, its own test and proposal ratio included; only what it accepts goes to the chain's trace, where
-//! the ratio (fine change / coarse change) decides. Any kernel that is reversible under the surrogate leaves the
-//! posterior invariant in this way, whatever the surrogate says, as long as it is possible wherever the observation is. The observation
-//! itself is evaluated for what the first stage lets through, and for nothing else.
+//! Beside the chain's trace there is a twin, in which the coarse surrogates of the
+//! observations at `at` stand in their place. The kernel inside moves the twin, its own
+//! test and proposal ratio included; only what it accepts goes to the chain's trace,
+//! where the ratio (fine change / coarse change) decides. Any kernel that is reversible
+//! under the surrogate leaves the posterior invariant in this way, whatever the surrogate
+//! says, as long as it is possible wherever the observation is. The observation itself is
+//! evaluated for what the first stage lets through, and for nothing else.
 
 use crate::infer::kernel::{At, Kernel, Outcome, recoverable, settle};
 use crate::infer::selection::fail;
@@ -34,21 +37,29 @@ impl Delayed {
         trace.rollback();
         let mut twin = match self.twin.take() {
             Some(twin) => twin,
-            None => trace.under_surrogates(&self.observations)?.ok_or_else(|| self.nothing_coarse())?,
+            None => {
+                trace.under_surrogates(&self.observations)?.ok_or_else(|| self.nothing_coarse())?
+            }
         };
         twin.observe_as(trace)?;
         twin.propose_choices_of(trace)?;
         twin.commit();
         if let Some(extra) = trace.lacks(&twin) {
             let address = twin.address(extra);
-            return Err(fail(self.span, format!("delayed: only the surrogate depends on the choice {address}")));
+            return Err(fail(
+                self.span,
+                format!("delayed: only the surrogate depends on the choice {address}"),
+            ));
         }
         Ok(self.twin.insert(twin))
     }
 
     fn nothing_coarse(&self) -> Box<RunError> {
-        let mut e = fail(self.span, "delayed: no selected observation has a coarse surrogate".into());
-        e.hint = Some("observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into());
+        let mut e =
+            fail(self.span, "delayed: no selected observation has a coarse surrogate".into());
+        e.hint = Some(
+            "observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into(),
+        );
         e
     }
 }
@@ -92,11 +103,21 @@ impl Kernel for Delayed {
         let mut outcome = match recoverable(trace.propose_choices_of(twin))? {
             None => Outcome { accepted: 0, failed: 1, ..inner },
             Some(w) => {
-                let fine =
-                    if at.power == 1.0 { w.log_joint } else { w.log_joint - (1.0 - at.power) * w.log_likelihood };
-                // Choices that only the observation asks for stay as they are: nothing here would pay for others.
-                let same = trace.lacks(twin).is_none() && trace.beyond(twin) == beyond && !trace.takes_away(&beyond);
-                let decided = settle(trace, if same { fine - coarse } else { f64::NEG_INFINITY }, &mut at.stream());
+                let fine = if at.power == 1.0 {
+                    w.log_joint
+                } else {
+                    w.log_joint - (1.0 - at.power) * w.log_likelihood
+                };
+                // Choices that only the observation asks for stay as they are: nothing
+                // here would pay for others.
+                let same = trace.lacks(twin).is_none()
+                    && trace.beyond(twin) == beyond
+                    && !trace.takes_away(&beyond);
+                let decided = settle(
+                    trace,
+                    if same { fine - coarse } else { f64::NEG_INFINITY },
+                    &mut at.stream(),
+                );
                 Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
             }
         };

@@ -1,9 +1,10 @@
 //! Random walks in the unconstrained space, with scales learnt in warm-up.
 //!
-//! A continuous choice moves by a Gaussian step of its image under the transform of its support; the step is taken in the
-//! coordinates of the state, the new value is read in those of the proposed state, and the log Jacobians of both are in the
-//! ratio. That is right also for a support that depends on another choice of the block. A finite discrete choice moves to
-//! another of its values, an unbounded integer by a few units.
+//! A continuous choice moves by a Gaussian step of its image under the transform of its
+//! support; the step is taken in the coordinates of the state, the new value is read in
+//! those of the proposed state, and the log Jacobians of both are in the ratio. That is
+//! right also for a support that depends on another choice of the block. A finite
+//! discrete choice moves to another of its values, an unbounded integer by a few units.
 
 use super::shape::{MOST, Shape};
 use crate::dist::{Datum, Support};
@@ -76,8 +77,8 @@ impl Spread {
 struct Move {
     /// None for a choice that has only one value.
     change: Option<Change>,
-    /// The log density of the move by itself: less the log number of values it could have gone to, or the log Jacobian at
-    /// the old point.
+    /// The log density of the move by itself: less the log number of values it could have
+    /// gone to, or the log Jacobian at the old point.
     old_term: f64,
     /// For a choice of finitely many values: the one it had.
     finite: Option<Datum>,
@@ -85,7 +86,8 @@ struct Move {
 }
 
 impl Move {
-    /// The log density of the move back, without what [`crate::trace::Weight`] has; `None` if there is no way back.
+    /// The log density of the move back, without what [`crate::trace::Weight`] has;
+    /// `None` if there is no way back.
     fn back(&self, trace: &Trace, t: Target) -> Option<f64> {
         let values = trace.dist(t)?.stored_support().finite_values();
         match (&self.finite, values) {
@@ -112,7 +114,8 @@ impl Drift {
         }
     }
 
-    /// A move of a choice that is at `free` in the unconstrained space, along `step` where that is given.
+    /// A move of a choice that is at `free` in the unconstrained space, along `step`
+    /// where that is given.
     fn propose_one(
         trace: &Trace,
         t: Target,
@@ -127,10 +130,16 @@ impl Drift {
         let dimensions = y.len();
         if let Some(step) = step {
             y.iter_mut().zip(step).for_each(|(y, d)| *y += scale * d);
-            return Some(Move { change: Some(Change::Free(y)), old_term, finite: None, dimensions });
+            return Some(Move {
+                change: Some(Change::Free(y)),
+                old_term,
+                finite: None,
+                dimensions,
+            });
         }
-        // Now and then a much longer or shorter step: chains leave narrow places and settle in wide ones. The length does not
-        // depend on the state, so the proposal stays symmetric.
+        // Now and then a much longer or shorter step: chains leave narrow places and
+        // settle in wide ones. The length does not depend on the state, so the proposal
+        // stays symmetric.
         let scale = scale * libm::exp(rng.standard_normal());
         for v in &mut y {
             *v += scale * rng.standard_normal();
@@ -144,7 +153,10 @@ impl Drift {
 
     fn adapt(&mut self, key: u64, accepted: bool, dimensions: usize) {
         let aim = if dimensions <= 1 { ONE_D } else { MANY_D };
-        let s = self.scales.entry(key).or_insert_with(|| Scale { log: libm::log(self.initial), steps: 0.0 });
+        let s = self
+            .scales
+            .entry(key)
+            .or_insert_with(|| Scale { log: libm::log(self.initial), steps: 0.0 });
         s.steps += 1.0;
         // Not below a twentieth: an annealed warm-up moves the target all the time.
         let gain = libm::pow(s.steps, -0.6).max(0.05);
@@ -165,13 +177,23 @@ fn discrete_move(support: &Support, stored: &Datum, scale: f64, rng: &mut Stream
             i += 1;
         }
         let old_term = -libm::log(values.len() as f64 - 1.0);
-        return Some(Move { change: Some(Change::Set(values[i].clone())), old_term, finite, dimensions: 1 });
+        return Some(Move {
+            change: Some(Change::Set(values[i].clone())),
+            old_term,
+            finite,
+            dimensions: 1,
+        });
     }
     let Datum::Num(x) = stored else { return None };
     let reach = 1 + libm::floor(scale.clamp(0.0, 1e6)) as usize;
     let jump = 1.0 + rng.index(reach) as f64;
     let to = if rng.uniform() < 0.5 { x + jump } else { x - jump };
-    Some(Move { change: Some(Change::Set(Datum::Num(to))), old_term: 0.0, finite: None, dimensions: 1 })
+    Some(Move {
+        change: Some(Change::Set(Datum::Num(to))),
+        old_term: 0.0,
+        finite: None,
+        dimensions: 1,
+    })
 }
 
 impl Kernel for Drift {
@@ -223,7 +245,9 @@ impl Kernel for Drift {
             } else {
                 1.0
             };
-            let Some(m) = Self::propose_one(trace, *t, free, step, scale * spread, &mut rng) else { continue };
+            let Some(m) = Self::propose_one(trace, *t, free, step, scale * spread, &mut rng) else {
+                continue;
+            };
             dimensions += m.dimensions;
             changes.extend(m.change.clone().map(|c| (*t, c)));
             moves.push((*t, m));
@@ -235,8 +259,10 @@ impl Kernel for Drift {
         let mut outcome = match recoverable(proposed)? {
             None => Outcome::failed(),
             Some(w) => {
-                let mut ratio = at.tempered(&w) + w.log_jacobian + ways - self.scope.ways_back(trace);
-                // A choice that vanishes goes whatever its move was, and comes back from its prior.
+                let mut ratio =
+                    at.tempered(&w) + w.log_jacobian + ways - self.scope.ways_back(trace);
+                // A choice that vanishes goes whatever its move was, and comes back from
+                // its prior.
                 for (t, m) in moves.iter().filter(|(t, _)| !trace.was_removed(*t)) {
                     ratio += m.back(trace, *t).unwrap_or(f64::NEG_INFINITY) - m.old_term;
                 }
@@ -263,7 +289,8 @@ fn shape_key(trace: &Trace, targets: &[Target], frees: &[Option<(Vec<f64>, f64)>
 }
 
 impl Drift {
-    /// Learns the spreads and the shape of what moves together, from where the chain is now.
+    /// Learns the spreads and the shape of what moves together, from where the chain is
+    /// now.
     fn learn(&mut self, trace: &mut Trace, at: &At) {
         let selection = self.scope.selection(trace);
         let targets = trace.targets(selection);

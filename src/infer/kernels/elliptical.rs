@@ -1,8 +1,10 @@
-//! Elliptical slice sampling (Murray, Adams & MacKay 2010, figure 2) of choices with Gaussian priors.
+//! Elliptical slice sampling (Murray, Adams & MacKay 2010, figure 2) of choices with
+//! Gaussian priors.
 //!
-//! It works on the white noise behind the choices, so that any mean and covariance will do, also those that depend on
-//! choices of the same block. Points at which choices appear or vanish count as outside the slice: the kernel moves within
-//! the present structure, and leaves the posterior given that structure invariant.
+//! It works on the white noise behind the choices, so that any mean and covariance will
+//! do, also those that depend on choices of the same block. Points at which choices
+//! appear or vanish count as outside the slice: the kernel moves within the present
+//! structure, and leaves the posterior given that structure invariant.
 
 use crate::dist::Datum;
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable};
@@ -14,7 +16,8 @@ use std::f64::consts::TAU;
 /// After this many shrinkings the bracket is narrower than the numbers can tell.
 const MAX_SHRINKS: u32 = 200;
 
-/// `elliptical(sel)`: slice sampling along an ellipse through the state and a draw from the prior.
+/// `elliptical(sel)`: slice sampling along an ellipse through the state and a draw from
+/// the prior.
 #[derive(Clone, Debug)]
 pub struct Elliptical {
     scope: Registered,
@@ -52,7 +55,8 @@ impl Kernel for Elliptical {
         for t in &targets {
             here.push(noise(trace, *t).ok_or_else(|| not_gaussian(trace, *t))?);
         }
-        let there: Vec<Vec<f64>> = here.iter().map(|z| z.iter().map(|_| rng.standard_normal()).collect()).collect();
+        let there: Vec<Vec<f64>> =
+            here.iter().map(|z| z.iter().map(|_| rng.standard_normal()).collect()).collect();
         let threshold = libm::log(rng.open_uniform());
         let mut angle = rng.uniform() * TAU;
         let (mut low, mut high) = (angle - TAU, angle);
@@ -87,10 +91,20 @@ fn shrink(low: f64, high: f64, rng: &mut Stream) -> f64 {
     low + (high - low) * rng.uniform()
 }
 
-fn point(targets: &[Target], here: &[Vec<f64>], there: &[Vec<f64>], angle: f64) -> Vec<(Target, Change)> {
+fn point(
+    targets: &[Target],
+    here: &[Vec<f64>],
+    there: &[Vec<f64>],
+    angle: f64,
+) -> Vec<(Target, Change)> {
     let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-    let mix = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(a, b)| a * cos + b * sin).collect();
-    targets.iter().zip(here.iter().zip(there)).map(|(t, (a, b))| (*t, Change::White(mix(a, b)))).collect()
+    let mix =
+        |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(a, b)| a * cos + b * sin).collect();
+    targets
+        .iter()
+        .zip(here.iter().zip(there))
+        .map(|(t, (a, b))| (*t, Change::White(mix(a, b))))
+        .collect()
 }
 
 fn not_gaussian(trace: &Trace, t: Target) -> Box<RunError> {

@@ -1,9 +1,10 @@
 //! Gibbs updates of finite discrete choices by enumeration, in log space.
 //!
-//! While no value makes other choices appear or vanish, the new value comes from its exact conditional. Otherwise each
-//! value's weight is that of the one draw of what appears with it, and the move is a multiple-try Metropolis step (Liu,
-//! Liang & Wong 2000) with one try a value: the weights around the new state, with fresh draws for all values but the old
-//! one, make the ratio.
+//! While no value makes other choices appear or vanish, the new value comes from its
+//! exact conditional. Otherwise each value's weight is that of the one draw of what
+//! appears with it, and the move is a multiple-try Metropolis step (Liu, Liang & Wong 2000)
+//! with one try a value: the weights around the new state, with fresh draws for all
+//! values but the old one, make the ratio.
 
 use crate::dist::{Datum, Dist};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts, recoverable};
@@ -15,8 +16,8 @@ use crate::trace::{Change, Peek, Target, Trace, TraceResult};
 #[derive(Clone, Debug)]
 pub struct Gibbs {
     scope: Registered,
-    /// The values of the choice, their log weights, those relative to the largest: kept from step to step so that nothing is
-    /// allocated.
+    /// The values of the choice, their log weights, those relative to the largest: kept
+    /// from step to step so that nothing is allocated.
     values: Vec<Datum>,
     log: Vec<f64>,
     weights: Vec<f64>,
@@ -37,10 +38,17 @@ impl Gibbs {
     /// The kernel for one of these choices at a time.
     pub fn new(scope: Scope) -> Self {
         let scope = Registered::new(scope.single());
-        Gibbs { scope, values: Vec::new(), log: Vec::new(), weights: Vec::new(), peek: Peek::default() }
+        Gibbs {
+            scope,
+            values: Vec::new(),
+            log: Vec::new(),
+            weights: Vec::new(),
+            peek: Peek::default(),
+        }
     }
 
-    /// The log weights of all values relative to the state with value `old`, without updates; `None` if it takes those.
+    /// The log weights of all values relative to the state with value `old`, without
+    /// updates; `None` if it takes those.
     fn weigh_beside(
         &mut self,
         trace: &Trace,
@@ -52,14 +60,22 @@ impl Gibbs {
         let mut weighed = Weighed::default();
         let log = &mut self.log;
         log.clear();
-        let told = trace.weigh_values(target, dist, (&self.values, old), &mut self.peek, at.power, |w| {
-            weighed.failed += u32::from(w.is_none());
-            log.push(w.filter(|w| !w.is_nan()).unwrap_or(f64::NEG_INFINITY));
-        })?;
+        let told = trace.weigh_values(
+            target,
+            dist,
+            (&self.values, old),
+            &mut self.peek,
+            at.power,
+            |w| {
+                weighed.failed += u32::from(w.is_none());
+                log.push(w.filter(|w| !w.is_nan()).unwrap_or(f64::NEG_INFINITY));
+            },
+        )?;
         Ok(told.then_some(weighed))
     }
 
-    /// The same by updates. `ways` is what picking the choice in that state costs, and the lane of value `i` is `first_lane + i`.
+    /// The same by updates. `ways` is what picking the choice in that state costs, and
+    /// the lane of value `i` is `first_lane + i`.
     fn weigh(
         &mut self,
         trace: &mut Trace,
@@ -105,9 +121,12 @@ impl Kernel for Gibbs {
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else { return Ok(Outcome::default()) };
+        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else {
+            return Ok(Outcome::default());
+        };
         let stored = trace.stored(target);
-        let Some(dist) = trace.dist(target).filter(|d| d.support().list_values(&mut self.values)) else {
+        let Some(dist) = trace.dist(target).filter(|d| d.support().list_values(&mut self.values))
+        else {
             return Ok(Outcome::default());
         };
         let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
@@ -118,7 +137,8 @@ impl Kernel for Gibbs {
             None => self.weigh(trace, at, target, old, (libm::log(n as f64), 0))?,
         };
         let chosen = sample_log(&self.log, &mut self.weights, &mut rng);
-        let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
+        let mut outcome =
+            Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
         if chosen == old {
             trace.rollback();
             return Ok(outcome);
@@ -145,7 +165,8 @@ impl Kernel for Gibbs {
         let ways = self.scope.ways_back(trace);
         self.weigh(trace, at, target, chosen, (ways, self.values.len() as u64))?;
         trace.rollback();
-        // The old state itself stands for the old value: its weight back is minus its weight forth.
+        // The old state itself stands for the old value: its weight back is minus its
+        // weight forth.
         self.log[old] = -forth;
         if accepts(log_forward - forth - log_sum_exp(&self.log), &mut rng) {
             outcome.accepted = 1;
@@ -158,7 +179,8 @@ impl Kernel for Gibbs {
     }
 }
 
-/// An index with probability proportional to exp(log[i]), of which at least one is not zero.
+/// An index with probability proportional to exp(log[i]), of which at least one is not
+/// zero.
 fn sample_log(log: &[f64], weights: &mut Vec<f64>, rng: &mut Stream) -> usize {
     let max = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     weights.clear();
@@ -173,7 +195,8 @@ mod tests {
     use crate::model::Model;
     use crate::trace::{ChoiceKind, Selector};
 
-    /// Where all values lead to the same choices, and where one of them has a choice of its own.
+    /// Where all values lead to the same choices, and where one of them has a choice of
+    /// its own.
     #[test]
     fn a_step_is_one_proposal_accepted_where_the_value_changes() {
         let texts = [
@@ -192,7 +215,11 @@ mod tests {
                 let before = trace.stored(k);
                 let outcome = kernel.step(&mut trace, &At::new(1, 0, step)).unwrap();
                 let moved = u32::from(trace.stored(k) != before);
-                assert_eq!((outcome.proposals, outcome.accepted, outcome.failed), (1, moved, 0), "{text}, step {step}");
+                assert_eq!(
+                    (outcome.proposals, outcome.accepted, outcome.failed),
+                    (1, moved, 0),
+                    "{text}, step {step}"
+                );
                 moves += moved;
             }
             assert!((1..200).contains(&moves), "{text}: {moves}");

@@ -1,15 +1,20 @@
-//! Kernels of a program that map choices to others by a rule: involutive Metropolis-Hastings (Tierney 1998; Neklyudov et al.
-//! 2020; Cusumano-Towner, Lew & Mansinghka 2020).
+//! Kernels of a program that map choices to others by a rule: involutive
+//! Metropolis-Hastings (Tierney 1998; Neklyudov et al. 2020; Cusumano-Towner, Lew &
+//! Mansinghka 2020).
 //!
-//! The body of the kernel draws auxiliary variables (`propose u ~ d;`) and gives new values of choices and auxiliary variables
-//! (`propose @x = e; propose u = e;`; an auxiliary variable without one stays). The map must be its own inverse: at
-//! each move it is played again where it led, and has to lead back. The log ratio has the log absolute determinant of its
-//! Jacobian over the numbers among choices and auxiliary variables, found by differences of fourth order. So that these see
-//! everything, the body reads choices by `value(@x)` alone.
+//! The body of the kernel draws auxiliary variables (`propose u ~ d;`) and gives new
+//! values of choices and auxiliary variables (`propose @x = e; propose u = e;`; an
+//! auxiliary variable without one stays). The map must be its own inverse: at each move
+//! it is played again where it led, and has to lead back. The log ratio has the log
+//! absolute determinant of its Jacobian over the numbers among choices and auxiliary
+//! variables, found by differences of fourth order. So that these see everything, the
+//! body reads choices by `value(@x)` alone.
 //!
-//! Beside the map, choices may be proposed by distributions (`propose @y ~ d`), which read the state before: as if the new value
-//! were an auxiliary variable that changes places with the old one, which has a Jacobian of one. The density of the way back is
-//! that of the old value in the play on the new state. The map must not read what is proposed beside it, or does not return.
+//! Beside the map, choices may be proposed by distributions (`propose @y ~ d`), which
+//! read the state before: as if the new value were an auxiliary variable that changes
+//! places with the old one, which has a Jacobian of one. The density of the way back is
+//! that of the old value in the play on the new state. The map must not read what is
+//! proposed beside it, or does not return.
 
 use super::own::{Image, Own, Played, Source, log_density, log_volume, sampled, values};
 use crate::dist::Datum;
@@ -45,7 +50,8 @@ fn mapped(played: &Played, trace: &Trace) -> Vec<Mapped> {
         });
     }
     for (i, drawn) in played.drawn.iter().enumerate() {
-        let image = played.images.iter().find(|(image, _)| matches!(image, Image::Auxiliary(j) if *j == i));
+        let image =
+            played.images.iter().find(|(image, _)| matches!(image, Image::Auxiliary(j) if *j == i));
         let new = image.map_or(&drawn.value, |(_, v)| v).clone();
         let is_continuous = !drawn.dist.support().is_discrete();
         all.push(Mapped { choice: None, old: drawn.value.clone(), new, is_continuous });
@@ -66,7 +72,9 @@ fn numbers(v: &Value) -> Vec<f64> {
 fn with_numbers(v: &Value, numbers: &mut impl Iterator<Item = f64>) -> Value {
     match v {
         Value::Num(x) => Value::Num(numbers.next().unwrap_or(*x)),
-        Value::Array(xs) => Value::from_elements(xs.iter().map(|x| Value::Num(numbers.next().unwrap_or(*x))).collect()),
+        Value::Array(xs) => Value::from_elements(
+            xs.iter().map(|x| Value::Num(numbers.next().unwrap_or(*x))).collect(),
+        ),
         v => v.clone(),
     }
 }
@@ -76,7 +84,9 @@ fn near(a: &Value, b: &Value) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE * (1.0 + a.abs().max(b.abs()));
     match (a, b) {
         (Value::Num(a), Value::Num(b)) => close(*a, *b),
-        (Value::Array(a), Value::Array(b)) => a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| close(*a, *b)),
+        (Value::Array(a), Value::Array(b)) => {
+            a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| close(*a, *b))
+        }
         (a, b) => a.same(b),
     }
 }
@@ -102,20 +112,27 @@ impl Own {
             undo.push((*t, Change::Set(old)));
         }
         let (old, volume) = (values(trace, &forth.all), log_volume(trace, &forth.all));
-        undo.extend(forth.all.iter().filter_map(|p| Some((p.target, Change::Set(trace.stored(p.target)?)))));
+        undo.extend(
+            forth.all.iter().filter_map(|p| Some((p.target, Change::Set(trace.stored(p.target)?)))),
+        );
         let (new, proposed) = sampled(&forth.all, &mut rng);
         changes.extend(proposed);
-        let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else { return Ok(Outcome::failed()) };
+        let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else {
+            return Ok(Outcome::failed());
+        };
         if changes.iter().any(|(t, _)| trace.was_removed(*t)) || w.log_weight == f64::NEG_INFINITY {
             trace.rollback();
             return Ok(Outcome::one(false));
         }
         let removed = trace.removed();
         trace.commit();
-        let auxiliaries: Vec<Value> = forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
+        let auxiliaries: Vec<Value> =
+            forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
         let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), Some(&[])));
         let (log_back, wrong) = match &back {
-            Ok(Some(back)) if back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target)) => {
+            Ok(Some(back))
+                if back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target)) =>
+            {
                 let density = back.log_density_of(&auxiliaries) + log_density(&back.all, &old);
                 (density, self.does_not_return(&forth_map, &mapped(back, trace)))
             }
@@ -123,8 +140,10 @@ impl Own {
         };
         let drawn: Vec<Value> = forth.drawn.iter().map(|d| d.value.clone()).collect();
         let log_forth = forth.log_density_of(&drawn) + log_density(&forth.all, &new);
-        let ratio = at.tempered(&w) + log_back - log_forth + log_jacobian + volume - log_volume(trace, &forth.all);
-        // A place that the auxiliary variables cannot lead back from is refused, whatever the map does there.
+        let ratio = at.tempered(&w) + log_back - log_forth + log_jacobian + volume
+            - log_volume(trace, &forth.all);
+        // A place that the auxiliary variables cannot lead back from is refused, whatever
+        // the map does there.
         let wrong = wrong.filter(|_| log_back > f64::NEG_INFINITY);
         if wrong.is_none() && back.is_ok() && accepts(ratio, &mut rng) {
             return Ok(Outcome::one(true));
@@ -139,13 +158,18 @@ impl Own {
 
     /// What is wrong if the map does not lead back to where it began.
     fn does_not_return(&self, forth: &[Mapped], back: &[Mapped]) -> Option<Box<RunError>> {
-        let same = |(f, b): (&Mapped, &Mapped)| f.choice.as_ref().map(|c| c.1) == b.choice.as_ref().map(|c| c.1);
+        let same = |(f, b): (&Mapped, &Mapped)| {
+            f.choice.as_ref().map(|c| c.1) == b.choice.as_ref().map(|c| c.1)
+        };
         let hint = "an involution is its own inverse: applied twice, it must return to the original values";
         let wrong = if forth.len() != back.len() || !forth.iter().zip(back).all(same) {
             self.fault("at the new state it maps different choices".into())
         } else {
             let (f, b) = forth.iter().zip(back).find(|(f, b)| !near(&f.old, &b.new))?;
-            let name = f.choice.as_ref().map_or("an auxiliary variable".to_owned(), |(a, _)| a.to_string());
+            let name = f
+                .choice
+                .as_ref()
+                .map_or("an auxiliary variable".to_owned(), |(a, _)| a.to_string());
             self.fault(format!("applied twice, it takes {name} from {} to {}", f.old, b.new))
         };
         Some(Box::new(RunError { hint: Some(hint.into()), ..*wrong }))
@@ -153,11 +177,20 @@ impl Own {
 
     fn fault(&self, what: String) -> Box<RunError> {
         let name = &self.declared.name;
-        fail(name.span, format!("the map of the kernel `{}` is not an involution: {what}", name.node))
+        fail(
+            name.span,
+            format!("the map of the kernel `{}` is not an involution: {what}", name.node),
+        )
     }
 
     /// The log of the absolute determinant of the map's Jacobian.
-    fn log_jacobian(&self, trace: &mut Trace, at: &At, played: &Played, map: &[Mapped]) -> TraceResult<f64> {
+    fn log_jacobian(
+        &self,
+        trace: &mut Trace,
+        at: &At,
+        played: &Played,
+        map: &[Mapped],
+    ) -> TraceResult<f64> {
         let at_new = |map: &[Mapped], f: fn(&Mapped) -> &Value| -> Vec<f64> {
             map.iter().filter(|m| m.is_continuous).flat_map(|m| numbers(f(m))).collect()
         };
@@ -174,7 +207,9 @@ impl Own {
                 let mut moved = from.clone();
                 moved[j] += steps * h;
                 let mut moved = moved.into_iter();
-                let place = |m: &Mapped| if m.is_continuous { with_numbers(&m.old, &mut moved) } else { m.old.clone() };
+                let place = |m: &Mapped| {
+                    if m.is_continuous { with_numbers(&m.old, &mut moved) } else { m.old.clone() }
+                };
                 let values: Vec<Value> = map.iter().map(place).collect();
                 let choices: Vec<(Address, Value)> = map
                     .iter()
@@ -185,7 +220,9 @@ impl Own {
                 let there = self.play(trace, at, Source::Moved(auxiliaries), Some(&choices))?;
                 let image = at_new(&mapped(&there, trace), |m| &m.new);
                 if image.len() != n || there.drawn.len() != played.drawn.len() {
-                    return Err(self.fault("the choices it maps depend on values that it changes".into()));
+                    return Err(
+                        self.fault("the choices it maps depend on values that it changes".into())
+                    );
                 }
                 for i in 0..n {
                     matrix[(i, j)] += weight * image[i] / (12.0 * h);
@@ -193,7 +230,11 @@ impl Own {
             }
         }
         let log = libm::log(matrix.determinant().abs());
-        if log.is_finite() { Ok(log) } else { Err(self.fault("its Jacobian is singular or not finite".into())) }
+        if log.is_finite() {
+            Ok(log)
+        } else {
+            Err(self.fault("its Jacobian is singular or not finite".into()))
+        }
     }
 }
 

@@ -1,18 +1,24 @@
-//! Data-driven proposals: q_data of Kulkarni et al. 2014, section 3. Independence Metropolis-Hastings from a kernel density
-//! estimate over the latents of K scenes whose pictures look like the observed one.
+//! Data-driven proposals: q_data of Kulkarni et al. 2014, section 3. Independence
+//! Metropolis-Hastings from a kernel density estimate over the latents of K scenes whose
+//! pictures look like the observed one.
 //!
-//! The proposal is a mixture, drawn for all selected choices at once: with a tenth the prior, else one of the K scenes and one
-//! of two widths. A continuous choice is then normal about the scene's value in the unconstrained space, a discrete one is the
-//! scene's or (one time in ten) drawn from its prior; one that the scene has not, or has in another form, is drawn from its
-//! prior. The density of the whole mixture, at the proposed and at the present state, is in the ratio, so the posterior is
-//! right whatever the scenes are.
+//! The proposal is a mixture, drawn for all selected choices at once: with a tenth the
+//! prior, else one of the K scenes and one of two widths. A continuous choice is then
+//! normal about the scene's value in the unconstrained space, a discrete one is the
+//! scene's or (one time in ten) drawn from its prior; one that the scene has not, or has
+//! in another form, is drawn from its prior. The density of the whole mixture, at the
+//! proposed and at the present state, is in the ratio, so the posterior is right whatever
+//! the scenes are.
 //!
-//! Structure: choices that appear are drawn from the prior and pay for themselves, as do those that vanish, whatever was
-//! proposed for them. Choices that stay are selected before and after alike, since that is decided when they appear; so the mixture is
-//! over the same choices in both directions. If one of them changes its form (its number of coordinates, or from discrete to
-//! continuous), the proposal is rejected, in both directions alike.
+//! Structure: choices that appear are drawn from the prior and pay for themselves, as do
+//! those that vanish, whatever was proposed for them. Choices that stay are selected
+//! before and after alike, since that is decided when they appear; so the mixture is over
+//! the same choices in both directions. If one of them changes its form (its number of
+//! coordinates, or from discrete to continuous), the proposal is rejected, in both
+//! directions alike.
 //!
-//! Densities are kept relative to the prior's, which cancels what [`Weight::log_weight`](crate::trace::Weight) has of it.
+//! Densities are kept relative to the prior's, which cancels what
+//! [`Weight::log_weight`](crate::trace::Weight) has of it.
 
 use crate::dist::{Datum, Support};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
@@ -24,16 +30,19 @@ use rustc_hash::FxHashMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// The share of the prior in the mixture: with it the proposal reaches all the posterior does.
+/// The share of the prior in the mixture: with it the proposal reaches all the posterior
+/// does.
 const PRIOR: f64 = 0.1;
 /// How often a discrete choice is drawn from its prior although the scene has a value.
 const REDRAWN: f64 = 0.1;
-/// Widths of the components, in units of the rule's: about the neighbours, and close to one.
+/// Widths of the components, in units of the rule's: about the neighbours, and close to
+/// one.
 const WIDTHS: [f64; 2] = [1.0, 0.25];
 /// The least bandwidth, in units of the coordinate's spread over scenes of all kinds.
 const FLOOR: f64 = 0.05;
 
-/// `knn(sel, bank, k)`: an independence proposal from the latents of the nearest neighbours.
+/// `knn(sel, bank, k)`: an independence proposal from the latents of the nearest
+/// neighbours.
 #[derive(Clone, Debug)]
 pub struct Knn {
     scope: Registered,
@@ -66,7 +75,8 @@ impl Knn {
             return prior;
         }
         let share = libm::log((1.0 - PRIOR) / count as f64);
-        let scenes = self.components().map(|c| share + places.iter().map(|p| c.log_density(p)).sum::<f64>());
+        let scenes =
+            self.components().map(|c| share + places.iter().map(|p| c.log_density(p)).sum::<f64>());
         let terms: Vec<f64> = std::iter::once(libm::log(PRIOR) + prior).chain(scenes).collect();
         log_sum_exp(&terms)
     }
@@ -82,8 +92,8 @@ impl Knn {
     }
 }
 
-/// The bandwidth of each coordinate: Silverman's rule (1986, equation 3.28) over the neighbours, and at least a share of its
-/// spread over scenes of all kinds.
+/// The bandwidth of each coordinate: Silverman's rule (1986, equation 3.28) over the
+/// neighbours, and at least a share of its spread over scenes of all kinds.
 fn bandwidths(n: &Neighbours) -> FxHashMap<u64, Vec<f64>> {
     let rule = 1.06 * libm::pow(n.entries.len().max(1) as f64, -0.2);
     let local = n.local();
@@ -108,7 +118,8 @@ enum Form {
         value: Datum,
         support: Support,
     },
-    /// Coordinates, the log Jacobian of the transform there, and which coordinates are angles.
+    /// Coordinates, the log Jacobian of the transform there, and which coordinates are
+    /// angles.
     Free {
         y: Vec<f64>,
         jacobian: f64,
@@ -125,12 +136,19 @@ impl Place {
         let mut angles = Vec::new();
         let form = match trace.free(t) {
             None => Form::Discrete { value: trace.stored(t)?, support },
-            Some((y, jacobian)) if is_continuous(&support, &mut angles) && angles.len() == y.len() => {
+            Some((y, jacobian))
+                if is_continuous(&support, &mut angles) && angles.len() == y.len() =>
+            {
                 Form::Free { y, jacobian, angles }
             }
             Some(_) => Form::Mixed,
         };
-        Some(Place { hash: trace.address_hash(t), form, score: trace.score_of(t), improper: dist.is_improper() })
+        Some(Place {
+            hash: trace.address_hash(t),
+            form,
+            score: trace.score_of(t),
+            improper: dist.is_improper(),
+        })
     }
 
     /// Whether the mixture means the same by it in another state.
@@ -143,7 +161,8 @@ impl Place {
     }
 }
 
-/// Whether every part of a support is continuous; notes which of its coordinates are angles.
+/// Whether every part of a support is continuous; notes which of its coordinates are
+/// angles.
 fn is_continuous(support: &Support, angles: &mut Vec<bool>) -> bool {
     match support {
         Support::Circle => angles.push(true),
@@ -175,7 +194,8 @@ impl Component<'_> {
         let fits = match (latent, &place.form) {
             (Latent::Discrete(x), Form::Discrete { support, .. }) => support.fits(x),
             (Latent::Free(m), Form::Free { y, .. }) => {
-                m.len() == y.len() && self.kernel.bandwidths.get(&place.hash).is_some_and(|b| b.len() == y.len())
+                m.len() == y.len()
+                    && self.kernel.bandwidths.get(&place.hash).is_some_and(|b| b.len() == y.len())
             }
             _ => false,
         };
@@ -190,18 +210,26 @@ impl Component<'_> {
     fn draw(&self, place: &Place, rng: &mut Stream) -> Change {
         match self.latent(place) {
             Some(Latent::Discrete(x)) if rng.uniform() >= REDRAWN => Change::Set(x.clone()),
-            Some(Latent::Free(m)) => {
-                Change::Free(m.iter().zip(self.bandwidths(place)).map(|(m, b)| m + b * rng.standard_normal()).collect())
-            }
+            Some(Latent::Free(m)) => Change::Free(
+                m.iter()
+                    .zip(self.bandwidths(place))
+                    .map(|(m, b)| m + b * rng.standard_normal())
+                    .collect(),
+            ),
             _ => Change::Resample,
         }
     }
 
-    /// The log density of what [`Component::draw`] draws, at the choice's value, less that of the prior.
+    /// The log density of what [`Component::draw`] draws, at the choice's value, less
+    /// that of the prior.
     fn log_density(&self, place: &Place) -> f64 {
         match (self.latent(place), &place.form) {
             (Some(Latent::Discrete(x)), Form::Discrete { value, .. }) => {
-                let copied = if x == value { libm::log(1.0 - REDRAWN) - place.score } else { f64::NEG_INFINITY };
+                let copied = if x == value {
+                    libm::log(1.0 - REDRAWN) - place.score
+                } else {
+                    f64::NEG_INFINITY
+                };
                 let redrawn = if place.improper { f64::NEG_INFINITY } else { libm::log(REDRAWN) };
                 log_sum_exp(&[copied, redrawn])
             }
@@ -232,7 +260,8 @@ fn log_wrapped(x: f64, sd: f64) -> f64 {
     let nearest = x - TAU * libm::round(x / TAU);
     // Beyond nine standard deviations there is nothing left to add.
     let turns = libm::ceil((9.0 * sd + PI) / TAU) as i32;
-    let terms: Vec<f64> = (-turns..=turns).map(|k| log_normal(nearest + TAU * f64::from(k), sd)).collect();
+    let terms: Vec<f64> =
+        (-turns..=turns).map(|k| log_normal(nearest + TAU * f64::from(k), sd)).collect();
     log_sum_exp(&terms)
 }
 
@@ -248,10 +277,14 @@ impl Kernel for Knn {
         if targets.is_empty() || here.len() != targets.len() {
             return Ok(Outcome::default());
         }
-        let changes: Vec<(Target, Change)> = targets.iter().copied().zip(self.draw(&here, &mut rng)).collect();
-        let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else { return Ok(Outcome::failed()) };
+        let changes: Vec<(Target, Change)> =
+            targets.iter().copied().zip(self.draw(&here, &mut rng)).collect();
+        let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else {
+            return Ok(Outcome::failed());
+        };
         let mut ratio = at.tempered(&w) + ways - self.scope.ways_back(trace);
-        let (mut before, mut after) = (Vec::with_capacity(here.len()), Vec::with_capacity(here.len()));
+        let (mut before, mut after) =
+            (Vec::with_capacity(here.len()), Vec::with_capacity(here.len()));
         for ((t, change), old) in changes.iter().zip(here) {
             if trace.was_removed(*t) {
                 continue;
@@ -267,7 +300,8 @@ impl Kernel for Knn {
             after.push(new);
         }
         ratio += self.log_density(&before) - self.log_density(&after);
-        // An impossible state is none to go to; infinite terms of both signs would make it NaN, which is a rejection too.
+        // An impossible state is none to go to; infinite terms of both signs would make
+        // it NaN, which is a rejection too.
         if w.log_joint == f64::NEG_INFINITY {
             ratio = f64::NEG_INFINITY;
         }

@@ -1,4 +1,5 @@
-//! The proposal against slow references: its density integrates to 1, and is that of what it draws.
+//! The proposal against slow references: its density integrates to 1, and is that of what
+//! it draws.
 
 use super::*;
 use crate::infer::Pick;
@@ -52,7 +53,8 @@ fn densities_of_numbers_integrate_to_one() {
         let k = kernel(free(&t, &[-0.3, 0.4, 1.9]), &[]);
         let n = 20_000;
         let h = (hi - lo) / f64::from(n);
-        let total: f64 = (0..n).map(|i| density(&k, &t, Datum::Num(lo + (f64::from(i) + 0.5) * h)) * h).sum();
+        let total: f64 =
+            (0..n).map(|i| density(&k, &t, Datum::Num(lo + (f64::from(i) + 0.5) * h)) * h).sum();
         assert!((total - 1.0).abs() < 2e-3, "{text}: {total}");
     }
 }
@@ -61,7 +63,8 @@ fn densities_of_numbers_integrate_to_one() {
 fn masses_of_discrete_choices_sum_to_one() {
     let t = trace("assume x ~ categorical([0.5, 0.3, 0.2]); observe normal(x, 1) = 0;");
     let hash = t.address_hash(t.all_targets()[0]);
-    let scene = |x: f64| -> Latents { [(hash, Latent::Discrete(Datum::Num(x)))].into_iter().collect() };
+    let scene =
+        |x: f64| -> Latents { [(hash, Latent::Discrete(Datum::Num(x)))].into_iter().collect() };
     let k = kernel(vec![scene(2.0), scene(2.0), scene(0.0)], &[]);
     let q: Vec<f64> = (0..3).map(|x| density(&k, &t, Datum::Num(f64::from(x)))).collect();
     let by_hand = |x: usize, copies: f64| {
@@ -74,10 +77,12 @@ fn masses_of_discrete_choices_sum_to_one() {
     assert!((q.iter().sum::<f64>() - 1.0).abs() < 1e-14);
 }
 
-/// The mixture is over all choices together, not one by one: two scenes, two numbers, compared with the sum written out.
+/// The mixture is over all choices together, not one by one: two scenes, two numbers,
+/// compared with the sum written out.
 #[test]
 fn the_mixture_is_joint() {
-    let t = trace("assume x ~ normal(0, 1); assume y ~ normal(0, 3); observe normal(x + y, 1) = 0;");
+    let t =
+        trace("assume x ~ normal(0, 1); assume y ~ normal(0, 3); observe normal(x + y, 1) = 0;");
     let hash: Vec<u64> = t.all_targets().iter().map(|c| t.address_hash(*c)).collect();
     let scene = |a: f64, b: f64| -> Latents {
         [(hash[0], Latent::Free(vec![a])), (hash[1], Latent::Free(vec![b]))].into_iter().collect()
@@ -100,14 +105,16 @@ fn the_mixture_is_joint() {
     let mut mixture = PRIOR * (p[0].score + p[1].score).exp();
     for (a, b) in [(-1.0, 2.0), (0.5, -4.0)] {
         for w in WIDTHS {
-            mixture += (1.0 - PRIOR) / 4.0 * normal(at(0), a, sd(0) * w) * normal(at(1), b, sd(1) * w);
+            mixture +=
+                (1.0 - PRIOR) / 4.0 * normal(at(0), a, sd(0) * w) * normal(at(1), b, sd(1) * w);
         }
     }
     let q = k.log_density(&p) + p[0].score + p[1].score;
     assert!((q - mixture.ln()).abs() < 1e-12, "{q}, {}", mixture.ln());
 }
 
-/// What is drawn has the density that is claimed: shares of draws in bins against the integral over them.
+/// What is drawn has the density that is claimed: shares of draws in bins against the
+/// integral over them.
 #[test]
 fn draws_follow_the_density() {
     let text = "assume x ~ uniform(0, 1); observe normal(x, 1) = 0;";
@@ -127,9 +134,13 @@ fn draws_follow_the_density() {
     let fine = 200;
     for (b, count) in counts.iter().enumerate() {
         let middle = |i: usize| (b as f64 + (i as f64 + 0.5) / fine as f64) / bins as f64;
-        let mass: f64 = (0..fine).map(|i| density(&k, &t, Datum::Num(middle(i)))).sum::<f64>() / (fine * bins) as f64;
+        let mass: f64 = (0..fine).map(|i| density(&k, &t, Datum::Num(middle(i)))).sum::<f64>()
+            / (fine * bins) as f64;
         let expected = mass * f64::from(n);
-        assert!((count - expected).abs() < 5.0 * expected.sqrt() + 5.0, "bin {b}: {count}, expected {expected}");
+        assert!(
+            (count - expected).abs() < 5.0 * expected.sqrt() + 5.0,
+            "bin {b}: {count}, expected {expected}"
+        );
     }
 }
 
@@ -145,16 +156,19 @@ fn without_neighbours_or_with_none_that_fit_it_is_the_prior() {
 
 #[test]
 fn wide_normals_round_the_circle_are_uniform() {
-    for (x, sd, expected) in
-        [(0.4, 20.0, -TAU.ln()), (-3.0, 1e6, -TAU.ln()), (TAU + 0.01, 0.01, -0.5 - 0.01f64.ln() - 0.5 * TAU.ln())]
-    {
+    for (x, sd, expected) in [
+        (0.4, 20.0, -TAU.ln()),
+        (-3.0, 1e6, -TAU.ln()),
+        (TAU + 0.01, 0.01, -0.5 - 0.01f64.ln() - 0.5 * TAU.ln()),
+    ] {
         let got = log_wrapped(x, sd);
         assert!((got - expected).abs() < 1e-3, "{x} {sd}: {got}, {expected}");
     }
     // The density of a circle's numbers sums to one for any spread.
     for sd in [0.3, 1.0, 2.0, 5.0] {
         let n = 2000;
-        let total: f64 = (0..n).map(|i| log_wrapped(TAU * f64::from(i) / f64::from(n), sd).exp()).sum();
+        let total: f64 =
+            (0..n).map(|i| log_wrapped(TAU * f64::from(i) / f64::from(n), sd).exp()).sum();
         assert!((total * TAU / f64::from(n) - 1.0).abs() < 1e-9, "{sd}: {total}");
     }
 }

@@ -1,4 +1,5 @@
-//! Single-site Metropolis-Hastings from the prior: q_single of Kulkarni et al. 2014, section 3.
+//! Single-site Metropolis-Hastings from the prior: q_single of Kulkarni et al. 2014,
+//! section 3.
 
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
 use crate::trace::{Change, Trace, TraceResult};
@@ -27,7 +28,9 @@ impl Kernel for Mh {
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else { return Ok(Outcome::default()) };
+        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else {
+            return Ok(Outcome::default());
+        };
         let proposed = trace.propose(&[(target, Change::Resample)], at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed().at(target)) };
         let ratio = at.tempered(&weight) + libm::log(n as f64) - self.scope.ways_back(trace);

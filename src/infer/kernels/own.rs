@@ -1,9 +1,13 @@
 //! Kernels that programs declare: Metropolis-Hastings with proposals of their own.
 //!
-//! The body is played on the present state and draws from each `propose @x ~ d` as it comes; then all choices change at
-//! once. The density of the way back is found by replay: the body is played again on the new state, with the old values as
-//! what it would have to draw, and with the same auxiliary variables (`propose u ~ d`), so that each value of these is a
-//! proposal of its own. A choice that is stored as white noise is proposed by its value, which the noise follows. Bodies with maps are moves of their own: see `involution.rs`. Every expression reads the state the play began in, never a value proposed in it.
+//! The body is played on the present state and draws from each `propose @x ~ d` as it
+//! comes; then all choices change at once. The density of the way back is found by
+//! replay: the body is played again on the new state, with the old values as what it
+//! would have to draw, and with the same auxiliary variables (`propose u ~ d`), so that
+//! each value of these is a proposal of its own. A choice that is stored as white noise
+//! is proposed by its value, which the noise follows. Bodies with maps are moves of their
+//! own: see `involution.rs`. Every expression reads the state the play began in, never a
+//! value proposed in it.
 
 use crate::dist::{Datum, Dist};
 use crate::infer::expr::{Scope, evaluate};
@@ -76,12 +80,19 @@ pub(super) enum Source<'a> {
 }
 
 impl Own {
-    /// A declared kernel with the values of its parameters, in a chain that began at `started`.
-    pub fn new(code: Arc<Code>, declared: KernelDecl, arguments: Vec<(Arc<str>, Value)>, started: Instant) -> Self {
+    /// A declared kernel with the values of its parameters, in a chain that began at
+    /// `started`.
+    pub fn new(
+        code: Arc<Code>,
+        declared: KernelDecl,
+        arguments: Vec<(Arc<str>, Value)>,
+        started: Instant,
+    ) -> Self {
         Own { code, declared, arguments, started }
     }
 
-    /// What the body proposes in a state; in a map, with values in place of those that choices have there.
+    /// What the body proposes in a state; in a map, with values in place of those that
+    /// choices have there.
     pub(super) fn play(
         &self,
         trace: &mut Trace,
@@ -91,14 +102,15 @@ impl Own {
     ) -> TraceResult<Played> {
         let key = StreamKey::new(at.seed, at.chain, Purpose::PREDICT);
         let draws = Draws { key, step: at.step, lane: at.part };
-        let mut play = Play { own: self, draws, steps: at.step, source, moved, played: Played::default() };
+        let mut play =
+            Play { own: self, draws, steps: at.step, source, moved, played: Played::default() };
         let mut variables = self.arguments.clone();
         play.body(&self.declared.body, trace, &mut variables)?;
         Ok(play.played)
     }
 
-    /// What the body proposes in the state that is pending, if it reads nothing of it but choices: then the state need not be taken
-    /// up to be asked, nor left again.
+    /// What the body proposes in the state that is pending, if it reads nothing of it but
+    /// choices: then the state need not be taken up to be asked, nor left again.
     fn way_back(
         &self,
         trace: &mut Trace,
@@ -107,18 +119,24 @@ impl Own {
         new: &[Option<Datum>],
         auxiliaries: &[Value],
     ) -> Option<Played> {
-        let moved = all.iter().zip(new).map(|(p, x)| Some((p.address.clone(), Value::from_datum(x.as_ref()?))));
+        let moved = all
+            .iter()
+            .zip(new)
+            .map(|(p, x)| Some((p.address.clone(), Value::from_datum(x.as_ref()?))));
         let moved: Vec<(Address, Value)> = moved.collect::<Option<_>>()?;
         self.play(trace, at, Source::Given(auxiliaries), Some(&moved)).ok()
     }
 
-    /// A jump to what the body proposes, whatever the densities say: a start. `None` where the program has no value there.
+    /// A jump to what the body proposes, whatever the densities say: a start. `None`
+    /// where the program has no value there.
     ///
     /// # Errors
-    /// As [`Kernel::step`], and if the body has a map, which only leads from one state to another.
+    /// As [`Kernel::step`], and if the body has a map, which only leads from one state to
+    /// another.
     pub fn leap(&self, trace: &mut Trace, at: &At) -> TraceResult<Option<()>> {
         if maps(&self.declared.body) {
-            let message = "the kernel of a start must propose choices from distributions, not by a map";
+            let message =
+                "the kernel of a start must propose choices from distributions, not by a map";
             return Err(fail(self.declared.name.span, message.into()));
         }
         let mut rng = at.stream();
@@ -145,10 +163,23 @@ impl Play<'_> {
     /// What expressions can see.
     fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> Scope<'b> {
         let (code, started) = (&self.own.code, self.own.started);
-        Scope { code, trace, variables, draws: self.draws, started, steps: self.steps, moved: self.moved }
+        Scope {
+            code,
+            trace,
+            variables,
+            draws: self.draws,
+            started,
+            steps: self.steps,
+            moved: self.moved,
+        }
     }
 
-    fn body(&mut self, body: &[KStmt], trace: &mut Trace, variables: &mut Vec<(Arc<str>, Value)>) -> TraceResult<()> {
+    fn body(
+        &mut self,
+        body: &[KStmt],
+        trace: &mut Trace,
+        variables: &mut Vec<(Arc<str>, Value)>,
+    ) -> TraceResult<()> {
         let depth = variables.len();
         for s in body {
             match &s.kind {
@@ -167,9 +198,15 @@ impl Play<'_> {
                 }
                 KStmtKind::Map { target, value } => {
                     let image = self.image(target, trace, variables)?;
-                    let proposed = |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
-                    if self.played.images.iter().any(|(i, _)| *i == image) || self.played.all.iter().any(proposed) {
-                        return Err(fail(s.span, "this gets a new value twice in one kernel".into()));
+                    let proposed =
+                        |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
+                    if self.played.images.iter().any(|(i, _)| *i == image)
+                        || self.played.all.iter().any(proposed)
+                    {
+                        return Err(fail(
+                            s.span,
+                            "this gets a new value twice in one kernel".into(),
+                        ));
                     }
                     let value = evaluate(value, &mut self.env(trace, variables))?;
                     self.played.images.push((image, value));
@@ -187,14 +224,20 @@ impl Play<'_> {
                     let mapped = |i: &(Image, Value)| matches!(i.0, Image::Choice(_, t) if t == proposed.target);
                     let twice = self.played.all.iter().any(|p| p.target == proposed.target);
                     if twice || self.played.images.iter().any(mapped) {
-                        return Err(fail(s.span, "this choice is proposed twice in one kernel".into()));
+                        return Err(fail(
+                            s.span,
+                            "this choice is proposed twice in one kernel".into(),
+                        ));
                     }
                     self.played.all.push(proposed);
                 }
                 _ => {
-                    let message = "a kernel with `propose` may contain only `let`, `for` and `propose`";
+                    let message =
+                        "a kernel with `propose` may contain only `let`, `for` and `propose`";
                     let mut e = fail(s.span, message.into());
-                    e.hint = Some("kernels that apply other kernels are written without `propose`".into());
+                    e.hint = Some(
+                        "kernels that apply other kernels are written without `propose`".into(),
+                    );
                     return Err(e);
                 }
             }
@@ -236,24 +279,44 @@ impl Play<'_> {
         Ok(Proposed { address, target: found, dist: self.distribution(dist, trace, variables)? })
     }
 
-    fn distribution(&self, dist: &Expr, trace: &mut Trace, variables: &[(Arc<str>, Value)]) -> TraceResult<Dist> {
+    fn distribution(
+        &self,
+        dist: &Expr,
+        trace: &mut Trace,
+        variables: &[(Arc<str>, Value)],
+    ) -> TraceResult<Dist> {
         match evaluate(dist, &mut self.env(trace, variables))? {
             Value::Dist(d) => Ok(Dist::clone(&d)),
-            v => Err(fail(dist.span, format!("`propose` needs a distribution, got {}", v.type_name()))),
+            v => Err(fail(
+                dist.span,
+                format!("`propose` needs a distribution, got {}", v.type_name()),
+            )),
         }
     }
 
     /// What a map gives a new value to.
-    fn image(&self, target: &Expr, trace: &mut Trace, variables: &[(Arc<str>, Value)]) -> TraceResult<Image> {
+    fn image(
+        &self,
+        target: &Expr,
+        trace: &mut Trace,
+        variables: &[(Arc<str>, Value)],
+    ) -> TraceResult<Image> {
         let ExprKind::Var(name) = &target.kind else {
             let (address, found) = self.choice(target, trace, variables)?;
-            if trace.elements(found).is_some() || trace.dist(found).is_some_and(|d| d.is_stored_whitened()) {
+            if trace.elements(found).is_some()
+                || trace.dist(found).is_some_and(|d| d.is_stored_whitened())
+            {
                 return Err(fail(target.span, format!("{address} cannot be mapped as a whole")));
             }
             return Ok(Image::Choice(address, found));
         };
         let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
-        let not = || fail(target.span, format!("`{name}` is not an auxiliary variable; propose {name} ~ …; makes one"));
+        let not = || {
+            fail(
+                target.span,
+                format!("`{name}` is not an auxiliary variable; propose {name} ~ …; makes one"),
+            )
+        };
         drawn.map(Image::Auxiliary).ok_or_else(not)
     }
 
@@ -281,7 +344,9 @@ impl Play<'_> {
 pub(crate) fn proposes(body: &[KStmt]) -> bool {
     body.iter().any(|s| match &s.kind {
         KStmtKind::Propose { .. } | KStmtKind::Map { .. } => true,
-        KStmtKind::For { body, .. } | KStmtKind::Repeat { body, .. } | KStmtKind::Every { body, .. } => proposes(body),
+        KStmtKind::For { body, .. }
+        | KStmtKind::Repeat { body, .. }
+        | KStmtKind::Every { body, .. } => proposes(body),
         _ => false,
     })
 }
@@ -301,7 +366,10 @@ pub(super) fn values(trace: &Trace, all: &[Proposed]) -> Vec<Option<Datum>> {
 }
 
 /// Values drawn for all choices that are proposed, and the changes to them.
-pub(super) fn sampled(all: &[Proposed], rng: &mut Stream) -> (Vec<Option<Datum>>, Vec<(Target, Change)>) {
+pub(super) fn sampled(
+    all: &[Proposed],
+    rng: &mut Stream,
+) -> (Vec<Option<Datum>>, Vec<(Target, Change)>) {
     let draw = |p: &Proposed| {
         let x = p.dist.sample(rng);
         (Some(x.clone()), (p.target, Change::Value(x)))
@@ -309,7 +377,8 @@ pub(super) fn sampled(all: &[Proposed], rng: &mut Stream) -> (Vec<Option<Datum>>
     all.iter().map(draw).unzip()
 }
 
-/// The log of how much larger a volume of values is than that of the white noise they are stored as, over all of these choices.
+/// The log of how much larger a volume of values is than that of the white noise they are
+/// stored as, over all of these choices.
 pub(super) fn log_volume(trace: &Trace, all: &[Proposed]) -> f64 {
     let one = |p: &Proposed| {
         let dist = trace.dist(p.target).filter(Dist::is_stored_whitened)?;
@@ -343,11 +412,18 @@ impl Kernel for Own {
             return Ok(Outcome::default());
         }
         let (old, volume) = (values(trace, &forth.all), log_volume(trace, &forth.all));
-        let undo: Vec<_> =
-            forth.all.iter().filter_map(|p| Some((p.target, Change::Set(trace.stored(p.target)?)))).collect();
+        let undo: Vec<_> = forth
+            .all
+            .iter()
+            .filter_map(|p| Some((p.target, Change::Set(trace.stored(p.target)?))))
+            .collect();
         let (new, changes) = sampled(&forth.all, &mut rng);
-        let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else { return Ok(Outcome::failed()) };
-        if forth.all.iter().any(|p| trace.was_removed(p.target)) || w.log_weight == f64::NEG_INFINITY {
+        let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else {
+            return Ok(Outcome::failed());
+        };
+        if forth.all.iter().any(|p| trace.was_removed(p.target))
+            || w.log_weight == f64::NEG_INFINITY
+        {
             trace.rollback();
             return Ok(Outcome::one(false));
         }
@@ -358,8 +434,9 @@ impl Kernel for Own {
                 back.drawn.len() == forth.drawn.len()
                     && back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target))
             });
-            let log_back =
-                back.map_or(f64::NEG_INFINITY, |back| log_density(&back.all, &old) + back.log_density_of(&auxiliaries));
+            let log_back = back.map_or(f64::NEG_INFINITY, |back| {
+                log_density(&back.all, &old) + back.log_density_of(&auxiliaries)
+            });
             at.tempered(&w) + log_back - log_forth + volume - log_volume(trace, &forth.all)
         };
         if w.appeared + w.vanished == 0

@@ -1,6 +1,7 @@
-//! What kernels of particles share: states drawn from the prior, and the acceptance of a whole state by estimates of the
-//! evidence (particle independent Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2). Not here: how
-//! particles go from the prior to the posterior.
+//! What kernels of particles share: states drawn from the prior, and the acceptance of a
+//! whole state by estimates of the evidence (particle independent Metropolis-Hastings:
+//! Andrieu, Doucet & Holenstein 2010, section 2.4.2). Not here: how particles go from the
+//! prior to the posterior.
 
 use crate::infer::kernel::{At, Kernel, Outcome, accepts};
 use crate::infer::selection::fail;
@@ -25,8 +26,10 @@ pub(super) trait Way {
     /// See [`Kernel::load`].
     fn load(&mut self, state: &[u8]) -> Result<(), StateError>;
 
-    /// Draws particles and leads them there; gives them and the log of the evidence's estimate.
-    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)>;
+    /// Draws particles and leads them there; gives them and the log of the evidence's
+    /// estimate.
+    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At)
+    -> TraceResult<(Vec<Trace>, f64)>;
 }
 
 /// Nothing was estimated yet.
@@ -38,12 +41,14 @@ pub(super) struct Prior {
     frozen: Selector,
 }
 
-/// Whole states, accepted with the ratio of the estimates of the evidence that they come with.
+/// Whole states, accepted with the ratio of the estimates of the evidence that they come
+/// with.
 pub struct Independent<W> {
     way: W,
     prior: Prior,
     span: Span,
-    /// The state that was accepted last: its log joint density and the log of the evidence's estimate.
+    /// The state that was accepted last: its log joint density and the log of the
+    /// evidence's estimate.
     accepted: Option<(f64, f64)>,
     /// What was observed then.
     observed: Option<Arc<Observed>>,
@@ -72,13 +77,15 @@ impl Prior {
 
 #[allow(private_bounds)]
 impl<W: Way> Independent<W> {
-    /// For particles that go this way; frozen choices are not drawn anew. `span` is where errors point.
+    /// For particles that go this way; frozen choices are not drawn anew. `span` is where
+    /// errors point.
     pub(super) fn by(way: W, frozen: Selector, span: Span) -> Self {
         let (prior, estimates) = (Prior { frozen }, NO_ESTIMATES);
         Independent { way, prior, span, accepted: None, observed: None, loaded: false, estimates }
     }
 
-    /// Begins a step; true if it is the first of all or the first under other data, whose estimates start anew.
+    /// Begins a step; true if it is the first of all or the first under other data, whose
+    /// estimates start anew.
     ///
     /// # Errors
     /// If the state is not the one that was accepted last.
@@ -98,7 +105,10 @@ impl<W: Way> Independent<W> {
             && !at.adapting
         {
             let name = self.way.name();
-            let mut e = fail(self.span, format!("another kernel changed the state between two steps of {name}"));
+            let mut e = fail(
+                self.span,
+                format!("another kernel changed the state between two steps of {name}"),
+            );
             e.hint = Some(format!(
                 "{name} draws complete states; its evidence estimate is valid only for the state it drew"
             ));
@@ -108,7 +118,13 @@ impl<W: Way> Independent<W> {
     }
 
     /// Takes one of the particles as the new state, or stays.
-    fn decide(&mut self, trace: &mut Trace, mut particles: Vec<Trace>, log_evidence: f64, rng: &mut Stream) -> Outcome {
+    fn decide(
+        &mut self,
+        trace: &mut Trace,
+        mut particles: Vec<Trace>,
+        log_evidence: f64,
+        rng: &mut Stream,
+    ) -> Outcome {
         let one = rng.index(particles.len());
         let (count, log_sum) = self.estimates;
         self.estimates = (count.saturating_add(1), log_sum_exp(&[log_sum, log_evidence]));

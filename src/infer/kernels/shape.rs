@@ -1,5 +1,6 @@
-//! The shape of a posterior as a random walk learns it in warm-up: a covariance in the unconstrained space (Haario, Saksman &
-//! Tamminen 2001), from windows of states that double in length, so that the way to the posterior is forgotten.
+//! The shape of a posterior as a random walk learns it in warm-up: a covariance in the
+//! unconstrained space (Haario, Saksman & Tamminen 2001), from windows of states that
+//! double in length, so that the way to the posterior is forgotten.
 
 use crate::rng::Stream;
 use nalgebra::DMatrix;
@@ -51,7 +52,8 @@ impl Shape {
         }
     }
 
-    /// Ends a window: its covariance, drawn a little towards its diagonal, is the shape from now on.
+    /// Ends a window: its covariance, drawn a little towards its diagonal, is the shape
+    /// from now on.
     fn close(&mut self) {
         let (d, n) = (self.mean.len(), f64::from(self.count));
         let covariance = DMatrix::from_fn(d, d, |i, j| {
@@ -66,7 +68,8 @@ impl Shape {
         *self = Shape { window: longer, factor: self.factor.take(), ..Shape::new(d) };
     }
 
-    /// A step drawn in this shape, of unit scale; `None` before the first window has ended.
+    /// A step drawn in this shape, of unit scale; `None` before the first window has
+    /// ended.
     pub fn step(&self, rng: &mut Stream) -> Option<Vec<f64>> {
         let factor = self.factor.as_ref()?;
         let z: Vec<f64> = (0..factor.nrows()).map(|_| rng.standard_normal()).collect();
@@ -84,13 +87,16 @@ mod tests {
         let mut rng = StreamKey::new(1, 0, Purpose::KERNEL).stream(0, 0, 0);
         let mut shape = Shape::new(2);
         assert!(shape.step(&mut rng).is_none());
-        // Correlation 0.95, standard deviations 1 and 3, far from the origin; windows of 100, 200, … 12,800 states.
+        // Correlation 0.95, standard deviations 1 and 3, far from the origin; windows of
+        // 100, 200, … 12,800 states.
         for _ in 0..25_500 {
             let (a, b) = (rng.standard_normal(), rng.standard_normal());
             shape.add(&[50.0 + a, 3.0 * (0.95 * a + (1.0 - 0.95f64 * 0.95).sqrt() * b)]);
         }
         let steps: Vec<Vec<f64>> = (0..40_000).filter_map(|_| shape.step(&mut rng)).collect();
-        let moment = |i: usize, j: usize| steps.iter().map(|s| s[i] * s[j]).sum::<f64>() / steps.len() as f64;
+        let moment = |i: usize, j: usize| {
+            steps.iter().map(|s| s[i] * s[j]).sum::<f64>() / steps.len() as f64
+        };
         assert!((moment(0, 0) - 1.0).abs() < 0.05, "{}", moment(0, 0));
         assert!((moment(1, 1) - 9.0).abs() < 0.45, "{}", moment(1, 1));
         assert!((moment(0, 1) - 2.85).abs() < 0.15, "{}", moment(0, 1));

@@ -1,8 +1,10 @@
-//! `slice(sel, width, doubling)`: slice sampling of one number at a time (Neal 2003, section 4): an interval around the present
-//! point by stepping out (figure 3) or doubling (figures 4 and 6), then shrinkage (figure 5).
+//! `slice(sel, width, doubling)`: slice sampling of one number at a time (Neal 2003,
+//! section 4): an interval around the present point by stepping out (figure 3) or
+//! doubling (figures 4 and 6), then shrinkage (figure 5).
 //!
-//! Each coordinate of the unconstrained space is moved in turn. A place where the program has no value, or where choices appear or
-//! vanish, counts as outside the slice, so the kernel moves within the present structure.
+//! Each coordinate of the unconstrained space is moved in turn. A place where the program
+//! has no value, or where choices appear or vanish, counts as outside the slice, so the
+//! kernel moves within the present structure.
 
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable};
 use crate::infer::state::{StateError, in_order, pack, unpack};
@@ -10,7 +12,8 @@ use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
 
-/// At most so many widths are stepped out, shared at random between both sides, which keeps the kernel reversible.
+/// At most so many widths are stepped out, shared at random between both sides, which
+/// keeps the kernel reversible.
 const STEPS_OUT: u32 = 32;
 
 /// An interval doubles at most so often.
@@ -25,13 +28,14 @@ pub struct Slice {
     scope: Registered,
     width: Option<f64>,
     doubling: bool,
-    /// By address and coordinate: widths learnt in warm-up, with the number of moves they are from.
+    /// By address and coordinate: widths learnt in warm-up, with the number of moves they
+    /// are from.
     learnt: FxHashMap<(u64, usize), (f64, f64)>,
 }
 
 impl Slice {
-    /// The kernel for these choices, with a width in the unconstrained space, or else widths that are learnt; the interval
-    /// doubles or steps out.
+    /// The kernel for these choices, with a width in the unconstrained space, or else
+    /// widths that are learnt; the interval doubles or steps out.
     pub fn new(scope: Scope, width: Option<f64>, doubling: bool) -> Self {
         Slice { scope: Registered::new(scope), width, doubling, learnt: FxHashMap::default() }
     }
@@ -40,7 +44,8 @@ impl Slice {
         self.width.unwrap_or_else(|| self.learnt.get(&key).map_or(1.0, |(w, _)| *w))
     }
 
-    /// Towards three times the mean distance moved: two points drawn from an interval are a third of its length apart.
+    /// Towards three times the mean distance moved: two points drawn from an interval are
+    /// a third of its length apart.
     fn learn(&mut self, key: (u64, usize), moved: f64) {
         let (width, count) = self.learnt.entry(key).or_insert((1.0, 0.0));
         *count += 1.0;
@@ -60,13 +65,16 @@ struct Line<'a> {
 }
 
 impl Line<'_> {
-    /// The log density at a place, less that of the present point; the place is then pending.
+    /// The log density at a place, less that of the present point; the place is then
+    /// pending.
     fn log_density(&mut self, x: f64) -> TraceResult<f64> {
         let mut y = self.y.clone();
         y[self.coordinate] = x;
         let proposed = self.trace.propose(&[(self.target, Change::Free(y))], self.at.draws(0));
         Ok(match recoverable(proposed)? {
-            Some(w) if w.appeared + w.vanished == 0 => self.at.tempered(&w) + w.log_jacobian - self.jacobian,
+            Some(w) if w.appeared + w.vanished == 0 => {
+                self.at.tempered(&w) + w.log_jacobian - self.jacobian
+            }
             _ => f64::NEG_INFINITY,
         })
     }
@@ -81,12 +89,17 @@ impl Line<'_> {
         let level = libm::log(rng.open_uniform());
         let left = here - width * rng.uniform();
         let first = (left, left + width);
-        let interval =
-            if doubling { self.double(first, level, rng)? } else { self.step_out(first, level, width, rng)? };
+        let interval = if doubling {
+            self.double(first, level, rng)?
+        } else {
+            self.step_out(first, level, width, rng)?
+        };
         let (mut left, mut right) = interval;
         for _ in 0..SHRINKS {
             let x = left + (right - left) * rng.uniform();
-            if self.log_density(x)? > level && (!doubling || self.leads_back(x, interval, width, level)?) {
+            if self.log_density(x)? > level
+                && (!doubling || self.leads_back(x, interval, width, level)?)
+            {
                 self.trace.commit();
                 return Ok((x - here).abs());
             }
@@ -117,9 +130,16 @@ impl Line<'_> {
         Ok((left, right))
     }
 
-    /// Doubles an interval to either side at random until both ends are outside the slice (figure 4).
-    fn double(&mut self, (mut left, mut right): (f64, f64), level: f64, rng: &mut Stream) -> TraceResult<(f64, f64)> {
-        let (mut out_left, mut out_right) = (self.log_density(left)? <= level, self.log_density(right)? <= level);
+    /// Doubles an interval to either side at random until both ends are outside the slice
+    /// (figure 4).
+    fn double(
+        &mut self,
+        (mut left, mut right): (f64, f64),
+        level: f64,
+        rng: &mut Stream,
+    ) -> TraceResult<(f64, f64)> {
+        let (mut out_left, mut out_right) =
+            (self.log_density(left)? <= level, self.log_density(right)? <= level);
         for _ in 0..DOUBLINGS {
             if out_left && out_right {
                 break;
@@ -135,9 +155,16 @@ impl Line<'_> {
         Ok((left, right))
     }
 
-    /// Whether doubling from `x` could have come to this interval: it would not have stopped at one of those that halving
-    /// towards `x` goes through (figure 6). If so, `x` is pending.
-    fn leads_back(&mut self, x: f64, (mut left, mut right): (f64, f64), width: f64, level: f64) -> TraceResult<bool> {
+    /// Whether doubling from `x` could have come to this interval: it would not have
+    /// stopped at one of those that halving towards `x` goes through (figure 6). If so,
+    /// `x` is pending.
+    fn leads_back(
+        &mut self,
+        x: f64,
+        (mut left, mut right): (f64, f64),
+        width: f64,
+        level: f64,
+    ) -> TraceResult<bool> {
         let here = self.here();
         let mut differs = false;
         while right - left > 1.1 * width {
@@ -182,7 +209,9 @@ impl Kernel for Slice {
         for target in targets {
             let mut coordinate = 0;
             // Read anew for each coordinate: the one before has moved.
-            while let Some((y, jacobian)) = trace.free_to_move(target).filter(|(y, _)| coordinate < y.len()) {
+            while let Some((y, jacobian)) =
+                trace.free_to_move(target).filter(|(y, _)| coordinate < y.len())
+            {
                 let key = (trace.address_hash(target), coordinate);
                 let width = self.width(key);
                 let mut line = Line { trace, at, target, y, coordinate, jacobian };

@@ -1,10 +1,13 @@
-//! `smc(move, particles)`: annealed sequential Monte Carlo (Del Moral, Doucet & Jasra 2006) as a proposal.
+//! `smc(move, particles)`: annealed sequential Monte Carlo (Del Moral, Doucet & Jasra 2006)
+//! as a proposal.
 //!
-//! Particles drawn from the prior are weighed and resampled as the power of the likelihood rises from 0 to 1, and move by the
-//! kernel inside in between. The product of the mean weights estimates the evidence without bias; accepting one of the last
-//! particles with the ratio of the new estimate to the old (particle independent Metropolis-Hastings: Andrieu, Doucet &
-//! Holenstein 2010, section 2.4.2) leaves the posterior exactly invariant for any number of particles. The powers are
-//! found in the first run, so that half of the weights count at each, and stay as they are.
+//! Particles drawn from the prior are weighed and resampled as the power of the
+//! likelihood rises from 0 to 1, and move by the kernel inside in between. The product of
+//! the mean weights estimates the evidence without bias; accepting one of the last
+//! particles with the ratio of the new estimate to the old (particle independent
+//! Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2) leaves the
+//! posterior exactly invariant for any number of particles. The powers are found in the
+//! first run, so that half of the weights count at each, and stay as they are.
 
 use super::particles::{Independent, Prior, Way};
 use crate::infer::kernel::{At, Kernel, inner_step};
@@ -32,7 +35,8 @@ pub struct Annealed {
 }
 
 impl Smc {
-    /// So many particles, moved by a kernel; frozen choices are not drawn anew. `span` is where errors point.
+    /// So many particles, moved by a kernel; frozen choices are not drawn anew. `span` is
+    /// where errors point.
     pub fn new(kernel: Box<dyn Kernel>, particles: usize, frozen: Selector, span: Span) -> Self {
         Independent::by(Annealed { kernel, particles, powers: Vec::new() }, frozen, span)
     }
@@ -53,26 +57,37 @@ impl Way for Annealed {
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
         let (inner, powers): (Vec<u8>, Vec<f64>) = unpack(state)?;
-        holds(powers.iter().all(|p| *p > 0.0) && powers.last().is_none_or(|p| *p == 1.0), self.name())?;
+        holds(
+            powers.iter().all(|p| *p > 0.0) && powers.last().is_none_or(|p| *p == 1.0),
+            self.name(),
+        )?;
         self.powers = powers;
         self.kernel.load(&inner)
     }
 
-    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
+    fn lead(
+        &mut self,
+        prior: &Prior,
+        trace: &mut Trace,
+        at: &At,
+    ) -> TraceResult<(Vec<Trace>, f64)> {
         let mut particles = prior.draw(trace, self.particles, at)?;
         let find = self.powers.is_empty();
         let (mut power, mut log_evidence, mut rung) = (0.0, 0.0, 0);
         while power < 1.0 {
             let likelihoods: Vec<f64> = particles.iter().map(Trace::log_likelihood).collect();
             if find {
-                let next = if rung + 1 < MOST_POWERS { next_power(&likelihoods, power) } else { 1.0 };
+                let next =
+                    if rung + 1 < MOST_POWERS { next_power(&likelihoods, power) } else { 1.0 };
                 self.powers.push(next);
             }
             let step = self.powers[rung] - power;
             power = self.powers[rung];
             rung += 1;
             // What is impossible has no weight at any power.
-            let gain = |l: &f64| if *l == f64::NEG_INFINITY || l.is_nan() { f64::NEG_INFINITY } else { step * l };
+            let gain = |l: &f64| {
+                if *l == f64::NEG_INFINITY || l.is_nan() { f64::NEG_INFINITY } else { step * l }
+            };
             let weights: Vec<f64> = likelihoods.iter().map(gain).collect();
             let total = log_sum_exp(&weights);
             log_evidence += total - libm::log(self.particles as f64);
@@ -86,23 +101,32 @@ impl Way for Annealed {
             let chosen = systematic(&shares, self.particles, &mut within.stream());
             particles = chosen.into_iter().map(|i| particles[i].clone()).collect();
             for (i, p) in particles.iter_mut().enumerate() {
-                inner_step(&mut *self.kernel, p, &At { power: at.power * power, ..within.within(i as u64) })?;
+                inner_step(
+                    &mut *self.kernel,
+                    p,
+                    &At { power: at.power * power, ..within.within(i as u64) },
+                )?;
             }
         }
         Ok((particles, log_evidence))
     }
 }
 
-/// The power at which half of the particles would count (by the effective number of equal weights), by bisection.
+/// The power at which half of the particles would count (by the effective number of equal
+/// weights), by bisection.
 fn next_power(likelihoods: &[f64], power: f64) -> f64 {
-    // Beside those that are large the logarithm of their number would be lost: they are taken below the largest.
-    let most = likelihoods.iter().copied().filter(|l| l.is_finite()).fold(f64::NEG_INFINITY, f64::max);
+    // Beside those that are large the logarithm of their number would be lost: they are
+    // taken below the largest.
+    let most =
+        likelihoods.iter().copied().filter(|l| l.is_finite()).fold(f64::NEG_INFINITY, f64::max);
     let from = if most.abs() > LARGE { most } else { 0.0 };
     let enough = |to: f64| {
         let relative = |l: &f64| (to - power) * (l - from);
-        let weights: Vec<f64> = likelihoods.iter().filter(|l| l.is_finite()).map(relative).collect();
+        let weights: Vec<f64> =
+            likelihoods.iter().filter(|l| l.is_finite()).map(relative).collect();
         let twice: Vec<f64> = weights.iter().map(|w| 2.0 * w).collect();
-        2.0 * log_sum_exp(&weights) - log_sum_exp(&twice) >= libm::log(0.5 * weights.len().max(1) as f64)
+        2.0 * log_sum_exp(&weights) - log_sum_exp(&twice)
+            >= libm::log(0.5 * weights.len().max(1) as f64)
     };
     if enough(1.0) {
         return 1.0;
@@ -119,7 +143,8 @@ fn next_power(likelihoods: &[f64], power: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Likelihoods so far apart that no power tells them by half of the particles: the next one is above all the same.
+    /// Likelihoods so far apart that no power tells them by half of the particles: the
+    /// next one is above all the same.
     #[test]
     fn powers_rise_whatever_the_likelihoods_are() {
         for power in [0.0, 1e-3, 0.5, 1.0 - 1e-10] {

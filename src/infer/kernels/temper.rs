@@ -1,9 +1,11 @@
-//! `temper(move)`: replica exchange over powers of the likelihood (Geyer 1991; Hukushima & Nemoto 1996).
+//! `temper(move)`: replica exchange over powers of the likelihood (Geyer 1991; Hukushima
+//! & Nemoto 1996).
 //!
-//! Beside the chain's own state there are replicas that see the likelihood raised to lower powers, so that they cross between
-//! modes. Each step moves every replica by the kernel inside, then neighbours swap states with the Metropolis ratio, the even
-//! pairs and the odd ones in turn (Okabe et al. 2001). In warm-up the ladder is spaced so that neighbours swap about as often
-//! everywhere (Miasojedow, Moulines & Vihola 2013).
+//! Beside the chain's own state there are replicas that see the likelihood raised to
+//! lower powers, so that they cross between modes. Each step moves every replica by the
+//! kernel inside, then neighbours swap states with the Metropolis ratio, the even pairs
+//! and the odd ones in turn (Okabe et al. 2001). In warm-up the ladder is spaced so that
+//! neighbours swap about as often everywhere (Miasojedow, Moulines & Vihola 2013).
 
 use crate::infer::kernel::{At, Kernel, Outcome, accepts, inner_step};
 use crate::infer::state::{StateError, holds, pack, unpack};
@@ -26,11 +28,18 @@ pub struct Temper {
 }
 
 impl Temper {
-    /// One level a kernel; the powers fall geometrically from 1 to `hottest` until warm-up finds better ones.
+    /// One level a kernel; the powers fall geometrically from 1 to `hottest` until
+    /// warm-up finds better ones.
     pub fn new(kernels: Vec<Box<dyn Kernel>>, hottest: f64) -> Self {
         let pairs = kernels.len().saturating_sub(1);
         let gap = (-libm::log(hottest) / pairs.max(1) as f64).max(1e-6);
-        Temper { kernels, replicas: Vec::new(), saved: Vec::new(), gaps: vec![libm::log(gap); pairs], rounds: 0 }
+        Temper {
+            kernels,
+            replicas: Vec::new(),
+            saved: Vec::new(),
+            gaps: vec![libm::log(gap); pairs],
+            rounds: 0,
+        }
     }
 
     /// The powers of the levels, the chain's own first.
@@ -60,13 +69,17 @@ impl Kernel for Temper {
             [] => self.saved.clone(),
             all => all.iter().map(Trace::constraints).collect(),
         };
-        let state = |level: usize| if level == 0 { trace } else { self.replicas.get(level - 1).unwrap_or(trace) };
-        let kernels: Vec<Vec<u8>> = self.kernels.iter().enumerate().map(|(level, k)| k.save(state(level))).collect();
+        let state = |level: usize| {
+            if level == 0 { trace } else { self.replicas.get(level - 1).unwrap_or(trace) }
+        };
+        let kernels: Vec<Vec<u8>> =
+            self.kernels.iter().enumerate().map(|(level, k)| k.save(state(level))).collect();
         pack(&(kernels, replicas, &self.gaps, self.rounds))
     }
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
-        let (kernels, replicas, gaps, rounds): (Vec<Vec<u8>>, Vec<_>, Vec<f64>, u64) = unpack(state)?;
+        let (kernels, replicas, gaps, rounds): (Vec<Vec<u8>>, Vec<_>, Vec<f64>, u64) =
+            unpack(state)?;
         let fits = kernels.len() == self.kernels.len() && gaps.len() == self.gaps.len();
         holds(fits && (replicas.is_empty() || replicas.len() == gaps.len()), "temper")?;
         (self.saved, self.gaps, self.rounds) = (replicas, gaps, rounds);
@@ -88,7 +101,11 @@ impl Kernel for Temper {
         let powers = self.powers();
         for (level, kernel) in self.kernels.iter_mut().enumerate() {
             let state = if level == 0 { &mut *trace } else { &mut self.replicas[level - 1] };
-            inner_step(&mut **kernel, state, &At { power: at.power * powers[level], ..at.within(level as u64) })?;
+            inner_step(
+                &mut **kernel,
+                state,
+                &At { power: at.power * powers[level], ..at.within(level as u64) },
+            )?;
         }
         let mut rng = at.stream();
         let mut outcome = Outcome::default();

@@ -18,7 +18,8 @@ use std::sync::atomic::Ordering;
 /// The most kernels of a chain: arguments that change without end would fill the memory.
 const MOST: usize = 10_000;
 
-/// How deep statements and declared kernels may be within each other: a kernel may call itself.
+/// How deep statements and declared kernels may be within each other: a kernel may call
+/// itself.
 const MOST_NESTED: usize = 200;
 
 impl Runner<'_> {
@@ -34,7 +35,13 @@ impl Runner<'_> {
             };
             match weight {
                 Value::Num(w) if w >= 0.0 && w.is_finite() => weights.push(w),
-                v => return Err(fail(a.weight.span, format!("a weight must be at least 0, got {v}")).into()),
+                v => {
+                    return Err(fail(
+                        a.weight.span,
+                        format!("a weight must be at least 0, got {v}"),
+                    )
+                    .into());
+                }
             }
         }
         let total: f64 = weights.iter().sum();
@@ -43,8 +50,14 @@ impl Runner<'_> {
         arms.get(arm).map_or(Ok(Flow::Next), |a| self.apply(&a.kernel, Some(arm), doing))
     }
 
-    /// Applies a kernel, or another statement that looks like a call; in a `mix` it is one of the arms.
-    pub(super) fn apply(&mut self, e: &Expr, arm: Option<usize>, doing: Doing) -> Result<Flow, ChainError> {
+    /// Applies a kernel, or another statement that looks like a call; in a `mix` it is
+    /// one of the arms.
+    pub(super) fn apply(
+        &mut self,
+        e: &Expr,
+        arm: Option<usize>,
+        doing: Doing,
+    ) -> Result<Flow, ChainError> {
         let Some((name, args)) = call(e) else {
             return Err(fail(e.span, "expected a kernel, such as mh(one(@**))".into()).into());
         };
@@ -56,10 +69,13 @@ impl Runner<'_> {
         let place = e as *const Expr as usize;
         let i = match self.calls.get(&place) {
             Some(i) => *i,
-            None => match self.code.kernels.iter().find(|k| &*k.name.node == name && !proposes(&k.body)) {
-                Some(k) => return self.apply_declared(e, k, args, arm),
-                None => self.instance(e, place)?,
-            },
+            None => {
+                match self.code.kernels.iter().find(|k| &*k.name.node == name && !proposes(&k.body))
+                {
+                    Some(k) => return self.apply_declared(e, k, args, arm),
+                    None => self.instance(e, place)?,
+                }
+            }
         };
         let begun = Instant::now();
         let (mut steps, mut done) = match doing {
@@ -67,7 +83,8 @@ impl Runner<'_> {
             _ => (0, Outcome::default()),
         };
         // A kernel that does not go through its choices in turn makes one step.
-        let members = self.instances[i].kernel.as_mut().and_then(|k| k.sweep(&mut self.trace)).unwrap_or(1);
+        let members =
+            self.instances[i].kernel.as_mut().and_then(|k| k.sweep(&mut self.trace)).unwrap_or(1);
         let mut over = steps > 0 && self.is_over();
         while steps < members && !over {
             done.add(self.step(i, steps)?);
@@ -94,7 +111,9 @@ impl Runner<'_> {
         arm: Option<usize>,
     ) -> Result<Flow, ChainError> {
         if self.path.len() >= MOST_NESTED {
-            let message = format!("statements and kernels of the plan are nested more than {MOST_NESTED} deep");
+            let message = format!(
+                "statements and kernels of the plan are nested more than {MOST_NESTED} deep"
+            );
             return Err(fail(e.span, message).into());
         }
         self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });
@@ -143,7 +162,8 @@ impl Runner<'_> {
                 return Err(fail(e.span, message).into());
             }
             None => {
-                let stats = KernelStats { name: crate::syntax::print_expr(e), ..Default::default() };
+                let stats =
+                    KernelStats { name: crate::syntax::print_expr(e), ..Default::default() };
                 let (signature, kernel) = (built.signature, Some(built.kernel));
                 self.instances.push(Instance { signature, kernel, saved: Vec::new(), stats });
                 self.instances.len() - 1

@@ -14,8 +14,8 @@ const K: usize = 10;
 /// More neighbours than this tell nothing that the prior does not.
 const MOST: f64 = 10_000.0;
 
-/// Finds what a plan's kernels will ask for, so that a bank that cannot be used is an error before the chain begins. Banks whose
-/// names are computed wait for their turn.
+/// Finds what a plan's kernels will ask for, so that a bank that cannot be used is an
+/// error before the chain begins. Banks whose names are computed wait for their turn.
 ///
 /// # Errors
 /// As [`neighbours`].
@@ -48,7 +48,12 @@ fn whole(x: f64) -> Option<usize> {
     ((1.0..=MOST).contains(&x) && x == libm::trunc(x)).then_some(x as usize)
 }
 
-fn find(options: &RunOptions, e: &Expr, bank: &str, k: usize) -> Result<Arc<Neighbours>, Box<RunError>> {
+fn find(
+    options: &RunOptions,
+    e: &Expr,
+    bank: &str,
+    k: usize,
+) -> Result<Arc<Neighbours>, Box<RunError>> {
     match &options.banks {
         Some(banks) => banks.neighbours(bank, k).map_err(|message| fail(e.span, message)),
         None => Err(fail(e.span, format!("knn: the bank {bank:?} is not known to this run"))),
@@ -77,7 +82,10 @@ pub(in crate::infer) fn neighbours(
         Some(k) => match evaluate(k, env)? {
             Value::Num(x) if whole(x).is_some() => x as usize,
             v => {
-                return Err(fail(k.span, format!("knn: `k` must be a whole number from 1 to {MOST}, got {v}")));
+                return Err(fail(
+                    k.span,
+                    format!("knn: `k` must be a whole number from 1 to {MOST}, got {v}"),
+                ));
             }
         },
     };

@@ -1,7 +1,9 @@
-//! Checkpoints: all that a chain goes on from, so that its draws are those it would have made without a break.
+//! Checkpoints: all that a chain goes on from, so that its draws are those it would have
+//! made without a break.
 //!
-//! What is not here is a function of what is and of the program: a trace runs again from its choices, with scores that are
-//! equal bit for bit and lists of choices in the same order; random streams are told by step and address; caches fill again.
+//! What is not here is a function of what is and of the program: a trace runs again from
+//! its choices, with scores that are equal bit for bit and lists of choices in the same
+//! order; random streams are told by step and address; caches fill again.
 
 use super::place::{Doing, Place};
 use super::runner::{Instance, Runner};
@@ -25,8 +27,8 @@ const MOST: u64 = 1 << 60;
 /// The most numbers that are recorded with a draw.
 const MOST_NUMBERS: usize = 10_000_000;
 
-/// The state of a chain at a step, and all it needs to go on. Of use with the same program, plan, data and seed only; what keeps it
-/// sees to that.
+/// The state of a chain at a step, and all it needs to go on. Of use with the same
+/// program, plan, data and seed only; what keeps it sees to that.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
     seed: u64,
@@ -61,8 +63,8 @@ struct SavedKernel {
 }
 
 impl Checkpoint {
-    /// That of a chain now, in the middle of a statement that is as far as `doing` says; `None` if there is more than plain data
-    /// among its variables.
+    /// That of a chain now, in the middle of a statement that is as far as `doing` says;
+    /// `None` if there is more than plain data among its variables.
     pub(super) fn of(r: &Runner, doing: Option<Doing>) -> Option<Checkpoint> {
         let plain = |(name, v): &(Arc<str>, _)| Some((Arc::clone(name), Plain::of(v)?));
         let variables = r.variables.iter().map(plain).collect::<Option<_>>()?;
@@ -116,9 +118,12 @@ impl Checkpoint {
     /// If they are others.
     pub fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, StateError> {
         let c: Checkpoint = unpack(bytes)?;
-        let sizes = c.columns.iter().try_fold(0usize, |sum, column| sum.checked_add(column.shape.len()));
+        let sizes =
+            c.columns.iter().try_fold(0usize, |sum, column| sum.checked_add(column.shape.len()));
         let counts = [c.step, c.draws].into_iter().chain(c.path.iter().map(Place::most));
-        let fits = c.warmup_steps <= c.step && c.population.fits() && sizes.is_some_and(|n| n <= MOST_NUMBERS);
+        let fits = c.warmup_steps <= c.step
+            && c.population.fits()
+            && sizes.is_some_and(|n| n <= MOST_NUMBERS);
         holds(fits && counts.into_iter().all(|n| n < MOST), "a chain")?;
         Ok(c)
     }
@@ -164,13 +169,20 @@ impl<'a> Runner<'a> {
         c: Checkpoint,
     ) -> Result<Self, ChainError> {
         if (c.seed, c.chain) != (options.seed, chain) {
-            let message = format!("the checkpoint belongs to chain {} with seed {}", u64::from(c.chain) + 1, c.seed);
+            let message = format!(
+                "the checkpoint belongs to chain {} with seed {}",
+                u64::from(c.chain) + 1,
+                c.seed
+            );
             return Err(StateError::new(message).into());
         }
         let count = c.state.len();
-        let (trace, _) = Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits.clone())?;
+        let (trace, _) =
+            Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits.clone())?;
         if trace.choice_count() != count {
-            return Err(StateError::new("the checkpoint's choices are not those of the program").into());
+            return Err(
+                StateError::new("the checkpoint's choices are not those of the program").into()
+            );
         }
         if let Some(watch) = &options.watch {
             watch.load(chain, &c.watch)?;
@@ -178,10 +190,23 @@ impl<'a> Runner<'a> {
         let past = Duration::try_from_secs_f64(c.seconds).unwrap_or_default();
         let now = Instant::now();
         let started = now.checked_sub(past).unwrap_or(now);
-        let mut runner = Runner::new(code, plan, options, progress, sink, (chain, started), (trace, c.population));
+        let mut runner = Runner::new(
+            code,
+            plan,
+            options,
+            progress,
+            sink,
+            (chain, started),
+            (trace, c.population),
+        );
         runner.variables = c.variables.into_iter().map(|(name, v)| (name, v.value())).collect();
         runner.way = c.path.into();
-        let saved = |k: SavedKernel| Instance { signature: k.signature, kernel: None, saved: k.state, stats: k.stats };
+        let saved = |k: SavedKernel| Instance {
+            signature: k.signature,
+            kernel: None,
+            saved: k.state,
+            stats: k.stats,
+        };
         runner.instances = c.kernels.into_iter().map(saved).collect();
         runner.sites.load(c.sites);
         runner.recorder.set_columns(c.columns);

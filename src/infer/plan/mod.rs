@@ -30,7 +30,8 @@ use std::time::Duration;
 pub struct RunOptions {
     /// The seed: same seed, same draws.
     pub seed: u64,
-    /// Kernel applications per chain after warm-up, in place of the outermost `repeat`'s count.
+    /// Kernel applications per chain after warm-up, in place of the outermost `repeat`'s
+    /// count.
     pub steps: Option<u64>,
     /// Kernel applications per chain in warm-up, in place of what the program says.
     pub warmup: Option<u64>,
@@ -44,9 +45,11 @@ pub struct RunOptions {
     pub watch: Option<Arc<dyn Watch>>,
     /// Who finds the neighbours that `knn` proposes from.
     pub banks: Option<Arc<dyn Banks>>,
-    /// Whether to count what single-site kernels do by address; it costs a few percent of a fast step.
+    /// Whether to count what single-site kernels do by address; it costs a few percent of
+    /// a fast step.
     pub sites: bool,
-    /// Whether to record the log density of each observed value with every draw, as the column `log_lik`, where there are at most 1000.
+    /// Whether to record the log density of each observed value with every draw, as the
+    /// column `log_lik`, where there are at most 1000.
     pub pointwise: bool,
 }
 
@@ -67,11 +70,13 @@ impl Default for RunOptions {
     }
 }
 
-/// Looks at the state of a chain whenever a draw is recorded, and at steps. [`Observer`](super::Observer) is one made of closures.
+/// Looks at the state of a chain whenever a draw is recorded, and at steps.
+/// [`Observer`](super::Observer) is one made of closures.
 pub trait Watch: fmt::Debug + Send + Sync {
-    /// A draw of a chain has been recorded, and this is its state. What it asks for and no observation does is drawn from
-    /// `draws`. It leaves the state as it is, unless it is there to change it ([`super::calibration::geweke()`]): the chain goes on
-    /// from what it leaves. Draws of one chain come in order, chains in any.
+    /// A draw of a chain has been recorded, and this is its state. What it asks for and
+    /// no observation does is drawn from `draws`. It leaves the state as it is, unless it
+    /// is there to change it ([`super::calibration::geweke()`]): the chain goes on from
+    /// what it leaves. Draws of one chain come in order, chains in any.
     fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws);
 
     /// What it has gathered of a chain, for a checkpoint.
@@ -105,8 +110,8 @@ pub trait Watch: fmt::Debug + Send + Sync {
 pub struct Progress {
     /// Set to end the run at the next step, or after a while in the middle of one.
     pub cancelled: Arc<AtomicBool>,
-    /// Counted up to have every chain hand a [`Checkpoint`] to its sink at the next step. One that ends before its plan does hands
-    /// one over in any case.
+    /// Counted up to have every chain hand a [`Checkpoint`] to its sink at the next step.
+    /// One that ends before its plan does hands one over in any case.
     pub checkpoints: AtomicU64,
     /// Steps of all chains.
     pub steps: AtomicU64,
@@ -173,7 +178,8 @@ impl From<Box<RunError>> for ChainError {
 /// Runs one chain of a plan, or goes on with it from the checkpoint that its sink has.
 ///
 /// # Errors
-/// If it cannot start, the program fails, the sink does, or the checkpoint is of another plan.
+/// If it cannot start, the program fails, the sink does, or the checkpoint is of another
+/// plan.
 pub(crate) fn run_chain(
     code: &Arc<Code>,
     plan: &[KStmt],
@@ -190,16 +196,18 @@ pub(crate) fn run_chain(
     }
     let (how, from) = start_of(code, plan, options)?;
     banks::check(plan, options)?;
-    let mut begun = starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())
-        .map_err(ChainError::Start)?;
+    let mut begun =
+        starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())
+            .map_err(ChainError::Start)?;
     for trace in &mut begun {
         super::force::apply(code, trace, options, chain)?;
     }
     run_among(code, plan, options, progress, sink, (chain, started), begun)
 }
 
-/// Runs a plan from a state there is, in place of a start of its own; what the program forces is not forced again. Streams of
-/// random numbers belong to seed, chain and step: two runs from one state need different chains.
+/// Runs a plan from a state there is, in place of a start of its own; what the program
+/// forces is not forced again. Streams of random numbers belong to seed, chain and step:
+/// two runs from one state need different chains.
 ///
 /// # Errors
 /// If the program fails, or the sink does.
@@ -220,9 +228,11 @@ pub fn run_from(
     run_among(code, plan, options, progress, sink, (chain, started), vec![trace])
 }
 
-/// The options of a chain that hears in the middle of an evaluation, too, that it should end.
+/// The options of a chain that hears in the middle of an evaluation, too, that it should
+/// end.
 fn stoppable(options: &RunOptions, progress: &Progress) -> RunOptions {
-    let stop = options.limits.stop.clone().or(Arc::clone(&progress.cancelled)).or_within(options.time);
+    let stop =
+        options.limits.stop.clone().or(Arc::clone(&progress.cancelled)).or_within(options.time);
     RunOptions { limits: Limits { stop, ..options.limits.clone() }, ..options.clone() }
 }
 
@@ -238,7 +248,8 @@ fn run_among(
 ) -> Result<ChainResult, ChainError> {
     let population = Population::new(&begun);
     let trace = begun.swap_remove(0);
-    let mut runner = Runner::new(code, plan, options, progress, sink, (chain, started), (trace, population));
+    let mut runner =
+        Runner::new(code, plan, options, progress, sink, (chain, started), (trace, population));
     progress.started.fetch_add(1, Ordering::Relaxed);
     let done = runner.freeze().and_then(|()| runner.run(plan));
     progress.ended.fetch_add(1, Ordering::Relaxed);
@@ -257,7 +268,11 @@ pub(super) fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
 }
 
 /// An argument by its name or place.
-pub(super) fn argument<'a>(args: &'a [crate::syntax::ast::Arg], place: usize, name: &str) -> Option<&'a Expr> {
+pub(super) fn argument<'a>(
+    args: &'a [crate::syntax::ast::Arg],
+    place: usize,
+    name: &str,
+) -> Option<&'a Expr> {
     let named = args.iter().find(|a| a.name.as_ref().is_some_and(|n| &*n.node == name));
     named.or_else(|| args.get(place).filter(|a| a.name.is_none())).map(|a| &a.value)
 }

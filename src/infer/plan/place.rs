@@ -1,4 +1,5 @@
-//! Where in a plan a chain is, statement within statement: what it takes to leave and to come back.
+//! Where in a plan a chain is, statement within statement: what it takes to leave and to
+//! come back.
 
 use super::super::kernel::Outcome;
 use super::super::plain::Plain;

@@ -47,9 +47,11 @@ pub(super) struct Instance {
 impl Instance {
     fn into_stats(self) -> KernelStats {
         match self.kernel {
-            Some(kernel) => {
-                KernelStats { log_evidence: kernel.log_evidence(), step_size: kernel.step_size(), ..self.stats }
-            }
+            Some(kernel) => KernelStats {
+                log_evidence: kernel.log_evidence(),
+                step_size: kernel.step_size(),
+                ..self.stats
+            },
             None => self.stats,
         }
     }
@@ -82,7 +84,8 @@ pub(super) struct Runner<'a> {
     pub counted: [u64; 3],
     /// The statements being run, the outermost first.
     pub path: Vec<Place>,
-    /// Where a checkpoint says to go on, the outermost first; empty once the chain is there.
+    /// Where a checkpoint says to go on, the outermost first; empty once the chain is
+    /// there.
     pub way: VecDeque<Place>,
     /// Whether the plan is done.
     pub finished: bool,
@@ -139,7 +142,8 @@ impl<'a> Runner<'a> {
     pub fn run(mut self, plan: &[KStmt]) -> Result<ChainResult, ChainError> {
         if !self.finished {
             let flow = match self.body(plan) {
-                // A step that took too long is given up: draws and checkpoints from before it stay.
+                // A step that took too long is given up: draws and checkpoints from
+                // before it stay.
                 Err(ChainError::Run(e)) if e.kind == FaultKind::Stopped && self.draws > 0 => {
                     self.way.clear();
                     Flow::End
@@ -203,7 +207,9 @@ impl<'a> Runner<'a> {
         let v = evaluate(e, &mut self.env())?;
         match v.extent() {
             Extent::Fits => Ok(v),
-            _ => Err(fail(e.span, "this value has too many elements, or is nested too deep".into())),
+            _ => {
+                Err(fail(e.span, "this value has too many elements, or is nested too deep".into()))
+            }
         }
     }
 
@@ -226,13 +232,18 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Runs statements one after the other, from the one where a checkpoint says to go on.
+    /// Runs statements one after the other, from the one where a checkpoint says to go
+    /// on.
     pub fn body(&mut self, stmts: &[KStmt]) -> Result<Flow, ChainError> {
         let level = self.path.len();
         let mut back = self.way.pop_front();
         let first = back.as_ref().map_or(0, |p| p.statement);
         for (statement, s) in stmts.iter().enumerate().skip(first) {
-            let place = back.take().unwrap_or(Place { statement, depth: self.variables.len(), doing: Doing::Begins });
+            let place = back.take().unwrap_or(Place {
+                statement,
+                depth: self.variables.len(),
+                doing: Doing::Begins,
+            });
             let doing = place.doing.clone();
             self.path.truncate(level);
             self.path.push(place);
@@ -273,14 +284,18 @@ impl<'a> Runner<'a> {
                 let n = self.count(count)?.max(1);
                 let pass = self.variables.iter().rev().find(|(name, _)| &**name == PASS);
                 match pass {
-                    Some((_, Value::Num(i))) if (*i as u64 + 1).is_multiple_of(n) => self.body(body),
+                    Some((_, Value::Num(i))) if (*i as u64 + 1).is_multiple_of(n) => {
+                        self.body(body)
+                    }
                     _ => Ok(Flow::Next),
                 }
             }
             KStmtKind::Mix(arms) => self.mix(arms, doing),
             KStmtKind::For { var, iter, body } => {
                 let (begin, items) = match doing {
-                    Doing::Items { item, all: Some(all) } => (item, all.iter().map(Plain::value).collect()),
+                    Doing::Items { item, all: Some(all) } => {
+                        (item, all.iter().map(Plain::value).collect())
+                    }
                     _ => (0, self.value(iter)?.passes()),
                 };
                 let all: Option<Vec<Plain>> = items.iter().map(Plain::of).collect();
@@ -303,7 +318,10 @@ impl<'a> Runner<'a> {
             KStmtKind::StopWhen(cond) => match self.value(cond)? {
                 Value::Bool(true) => Ok(Flow::Stop),
                 Value::Bool(false) => Ok(Flow::Next),
-                v => Err(fail(cond.span, format!("`stop when` needs a bool, got {}", v.type_name())).into()),
+                v => {
+                    Err(fail(cond.span, format!("`stop when` needs a bool, got {}", v.type_name()))
+                        .into())
+                }
             },
             KStmtKind::Collect(exprs) => {
                 if !self.in_warmup {
@@ -351,7 +369,11 @@ impl<'a> Runner<'a> {
     }
 
     /// One pass of a loop.
-    pub fn pass(&mut self, (i, of, first): (u64, u64, u64), body: &[KStmt]) -> Result<Flow, ChainError> {
+    pub fn pass(
+        &mut self,
+        (i, of, first): (u64, u64, u64),
+        body: &[KStmt],
+    ) -> Result<Flow, ChainError> {
         self.note(Doing::Loop { pass: i, of, first });
         if self.loops == 0 {
             self.progress.pass.store(i, Ordering::Relaxed);
@@ -372,9 +394,11 @@ impl<'a> Runner<'a> {
         flow
     }
 
-    /// Whether somebody ended the run: its progress, whose flag is among those of the limits, or who watches it.
+    /// Whether somebody ended the run: its progress, whose flag is among those of the
+    /// limits, or who watches it.
     pub fn is_cancelled(&self) -> bool {
-        self.options.limits.stop.is_set() || self.options.watch.as_ref().is_some_and(|w| w.is_over())
+        self.options.limits.stop.is_set()
+            || self.options.watch.as_ref().is_some_and(|w| w.is_over())
     }
 
     /// Whether the run, or the warm-up, has used up what it was given.
@@ -393,8 +417,9 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Hands over a checkpoint, if the sink wants any: of the present statement begun, or as far as `doing` says. A chain whose
-    /// plan holds more than plain data in its variables has none.
+    /// Hands over a checkpoint, if the sink wants any: of the present statement begun, or
+    /// as far as `doing` says. A chain whose plan holds more than plain data in its
+    /// variables has none.
     pub fn keep(&mut self, doing: Option<Doing>) -> Result<(), ChainError> {
         if !self.sink.takes_checkpoints() {
             return Ok(());
@@ -417,7 +442,8 @@ impl<'a> Runner<'a> {
             self.sink.columns(self.recorder.columns()).map_err(ChainError::Sink)?;
         }
         let log_joint = self.trace.log_joint();
-        let sum = |f: fn(&KernelStats) -> u64| self.instances.iter().map(|i| f(&i.stats)).sum::<u64>();
+        let sum =
+            |f: fn(&KernelStats) -> u64| self.instances.iter().map(|i| f(&i.stats)).sum::<u64>();
         let now = [sum(|s| s.proposals), sum(|s| s.accepted), sum(|s| s.divergent)];
         let since = |i: usize| now[i].saturating_sub(self.counted[i]);
         let [proposals, accepted, divergent] = [since(0), since(1), since(2)];

@@ -1,4 +1,5 @@
-//! Warm-up: loops whose draws are thrown away, in which kernels learn and the likelihood may be annealed.
+//! Warm-up: loops whose draws are thrown away, in which kernels learn and the likelihood
+//! may be annealed.
 
 use super::ChainError;
 use super::place::Doing;
@@ -10,12 +11,18 @@ use crate::syntax::ast::{Arg, Expr, KStmt};
 use std::sync::atomic::Ordering;
 
 impl Runner<'_> {
-    pub(super) fn warmup(&mut self, count: &Expr, body: &[KStmt], doing: Doing) -> Result<Flow, ChainError> {
+    pub(super) fn warmup(
+        &mut self,
+        count: &Expr,
+        body: &[KStmt],
+        doing: Doing,
+    ) -> Result<Flow, ChainError> {
         let (mut i, passes, first) = self.passes(count, doing)?;
         self.in_warmup = true;
         self.progress.warming.fetch_add(1, Ordering::Relaxed);
         let mut flow = Flow::Next;
-        // More passes than the program says only if they get somewhere: a loop without kernels would never end.
+        // More passes than the program says only if they get somewhere: a loop without
+        // kernels would never end.
         let unbounded = self.options.warmup.is_some();
         while i < passes || unbounded && (i == 0 || self.step > first) {
             flow = self.pass((i, passes, first), body)?;
@@ -33,25 +40,41 @@ impl Runner<'_> {
         Ok(if flow == Flow::End && self.is_cancelled() { Flow::End } else { Flow::Next })
     }
 
-    /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
+    /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a
+    /// warm-up.
     pub(super) fn anneal(&mut self, e: &Expr, args: &[Arg]) -> Result<Flow, ChainError> {
         if !self.in_warmup {
-            return Err(fail(e.span, "`anneal` is allowed only in `warmup`, whose draws are discarded".into()).into());
+            return Err(fail(
+                e.span,
+                "`anneal` is allowed only in `warmup`, whose draws are discarded".into(),
+            )
+            .into());
         }
         let from = match args {
             [a] => match self.value(&a.value)? {
                 Value::Num(t) if t >= 1.0 => t,
                 v => {
-                    return Err(fail(a.value.span, format!("expected a temperature of at least 1, got {v}")).into());
+                    return Err(fail(
+                        a.value.span,
+                        format!("expected a temperature of at least 1, got {v}"),
+                    )
+                    .into());
                 }
             },
-            _ => return Err(fail(e.span, "anneal takes one argument, the initial temperature".into()).into()),
+            _ => {
+                return Err(fail(
+                    e.span,
+                    "anneal takes one argument, the initial temperature".into(),
+                )
+                .into());
+            }
         };
         let number = |name: &str| match self.variables.iter().rev().find(|(n, _)| &**n == name) {
             Some((_, Value::Num(x))) => *x,
             _ => 0.0,
         };
-        // With a time limit, by the clock: the steps are recorded, and a replay by steps counts passes instead.
+        // With a time limit, by the clock: the steps are recorded, and a replay by steps
+        // counts passes instead.
         let share = match (self.options.warmup, self.options.time) {
             (Some(n), _) => self.step as f64 / (n.max(1) as f64),
             (None, Some(t)) => {

@@ -39,13 +39,21 @@ impl<'a> Args<'a> {
     /// The error that argument `i` is not what was wanted.
     pub fn wrong(&self, i: usize, wanted: &str) -> Fault {
         let got = described(self.get(i));
-        Fault::type_error(format!("{}: `{}` must be {wanted}, got {got}", self.builtin.full_name(), self.name(i)))
+        Fault::type_error(format!(
+            "{}: `{}` must be {wanted}, got {got}",
+            self.builtin.full_name(),
+            self.name(i)
+        ))
     }
 
-    /// The error that argument `i` is an array with something in it that does not belong there.
+    /// The error that argument `i` is an array with something in it that does not belong
+    /// there.
     pub fn element_wrong(&self, i: usize, wanted: &str, found: &Value) -> Fault {
         let (name, got) = (self.builtin.full_name(), described(found));
-        Fault::type_error(format!("{name}: `{}` must be {wanted}, got an array with {got} in it", self.name(i)))
+        Fault::type_error(format!(
+            "{name}: `{}` must be {wanted}, got an array with {got} in it",
+            self.name(i)
+        ))
     }
 
     /// The error that argument `i` has the wrong length.
@@ -137,7 +145,9 @@ impl<'a> Args<'a> {
         match self.get(i) {
             Value::Array(xs) => Ok(Cow::Borrowed(xs)),
             Value::List(xs) => {
-                let number = |x| truth(x).ok_or_else(|| self.element_wrong(i, "an array of numbers or bools", x));
+                let number = |x| {
+                    truth(x).ok_or_else(|| self.element_wrong(i, "an array of numbers or bools", x))
+                };
                 xs.iter().map(number).collect::<Result<Vec<_>, _>>().map(Cow::Owned)
             }
             _ => Err(self.wrong(i, "an array of numbers")),
@@ -177,14 +187,18 @@ impl<'a> Args<'a> {
     /// The error that a distribution has too much in it.
     #[doc(hidden)]
     pub fn too_large(&self, what: &str, most: usize) -> Fault {
-        Fault::new(FaultKind::Limit, format!("{}: more than {most} {what}", self.builtin.full_name()))
+        Fault::new(
+            FaultKind::Limit,
+            format!("{}: more than {most} {what}", self.builtin.full_name()),
+        )
     }
 
     /// The error that an array would be too long.
     #[doc(hidden)]
     pub fn too_many(&self, n: f64) -> Fault {
         let message = format!("{}: an array of {n} elements is too long", self.builtin.full_name());
-        Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MOST_ELEMENTS} can be made in one call"))
+        Fault::new(FaultKind::Limit, message)
+            .with_hint(format!("at most {MOST_ELEMENTS} can be made in one call"))
     }
 
     /// A vector of exactly three numbers, or one number for all three, or a default.

@@ -23,7 +23,8 @@ pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
         Value::Dist(d) if a.given(1) => dist::Ordered::new(Dist::clone(d), a.count(1)?),
         Value::Dist(_) => {
             let hint = "ordered(normal(0, 1), 3) is three numbers; list different priors: ordered([d1, d2])";
-            return Err(Fault::type_error("ordered: with a single distribution, `n` is required").with_hint(hint));
+            return Err(Fault::type_error("ordered: with a single distribution, `n` is required")
+                .with_hint(hint));
         }
         _ if a.given(1) => {
             let hint = "omit `n`: an array gives one number per distribution";
@@ -52,7 +53,8 @@ pub(super) fn truncated(a: &Args) -> Result<Dist, Fault> {
         return dist::truncated(d, bounds[0], bounds[1]).map_err(fault);
     };
     let expected = d.elements().unwrap_or(n);
-    if let Some(i) = columns.iter().position(|c| c.as_ref().is_some_and(|xs| xs.len() != expected)) {
+    if let Some(i) = columns.iter().position(|c| c.as_ref().is_some_and(|xs| xs.len() != expected))
+    {
         return Err(a.wrong_length(i + 1, &format!("as many elements as the rest, {expected}")));
     }
     let mut elements = Vec::with_capacity(n);

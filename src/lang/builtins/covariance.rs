@@ -50,7 +50,11 @@ impl CovarianceValue {
         Some(Self::joined(&x.0, &y.0, |x, y| x + y))
     }
 
-    fn joined(x: &Covariance, y: &Covariance, join: fn(Covariance, Covariance) -> Covariance) -> Result<Value, String> {
+    fn joined(
+        x: &Covariance,
+        y: &Covariance,
+        join: fn(Covariance, Covariance) -> Covariance,
+    ) -> Result<Value, String> {
         if x.param_count() + y.param_count() > MOST_PARAMS {
             return Err(format!("a covariance of more than {MOST_PARAMS} parameters"));
         }
@@ -77,12 +81,18 @@ pub(super) const TABLE: &[Row] = &[
         "Squared exponential, `sd^2 exp(-(x - y)^2 / (2 length^2))`: very smooth functions.",
         |a| value(Covariance::sq_exp(a.num(0)?, a.num_or(1, 1.0)?)),
     ),
-    covariance("matern32", &[LENGTH, SD], "Matérn with nu = 3/2: once-differentiable functions.", |a| {
-        value(Covariance::matern32(a.num(0)?, a.num_or(1, 1.0)?))
-    }),
-    covariance("matern52", &[LENGTH, SD], "Matérn with nu = 5/2: twice-differentiable functions.", |a| {
-        value(Covariance::matern52(a.num(0)?, a.num_or(1, 1.0)?))
-    }),
+    covariance(
+        "matern32",
+        &[LENGTH, SD],
+        "Matérn with nu = 3/2: once-differentiable functions.",
+        |a| value(Covariance::matern32(a.num(0)?, a.num_or(1, 1.0)?)),
+    ),
+    covariance(
+        "matern52",
+        &[LENGTH, SD],
+        "Matérn with nu = 5/2: twice-differentiable functions.",
+        |a| value(Covariance::matern52(a.num(0)?, a.num_or(1, 1.0)?)),
+    ),
     covariance(
         "periodic",
         &[
@@ -93,12 +103,16 @@ pub(super) const TABLE: &[Row] = &[
         "Periodic, `sd^2 exp(-2 sin^2(pi (x - y) / period) / length^2)`.",
         |a| value(Covariance::periodic(a.num(0)?, a.num(1)?, a.num_or(2, 1.0)?)),
     ),
-    covariance("white", &[SD], "Independent noise at every point; add it to another: `sq_exp(2) + white(0.1)`.", |a| {
-        value(Covariance::white(a.num_or(0, 1.0)?))
-    }),
+    covariance(
+        "white",
+        &[SD],
+        "Independent noise at every point; add it to another: `sq_exp(2) + white(0.1)`.",
+        |a| value(Covariance::white(a.num_or(0, 1.0)?)),
+    ),
 ];
 
-/// The adjoint of a covariance has a number for each parameter, in the order of the arguments.
+/// The adjoint of a covariance has a number for each parameter, in the order of the
+/// arguments.
 fn pull_params(a: &Args, y: &Value, by: &Adjoint) -> Option<Pulled> {
     let n = y.downcast::<CovarianceValue>()?.0.param_count();
     Some(by.numbers(n).into_iter().take(a.values.len()).map(Adjoint::Num).collect())

@@ -1,7 +1,8 @@
-//! Symmetric positive definite matrices: Cholesky factors, linear systems, determinants, and their derivatives.
+//! Symmetric positive definite matrices: Cholesky factors, linear systems, determinants,
+//! and their derivatives.
 //!
-//! Only the lower triangle is computed with. Derivatives by a matrix are symmetric: an entry off the diagonal shares them with its mirror
-//! image.
+//! Only the lower triangle is computed with. Derivatives by a matrix are symmetric: an
+//! entry off the diagonal shares them with its mirror image.
 
 use super::elementwise::array;
 use super::matrix::Matrix;
@@ -116,7 +117,8 @@ fn read(a: &Args) -> Result<Factor, Fault> {
     let (name, n) = (a.builtin.full_name(), m.rows.len());
     if m.width != n {
         let message = format!("{name}: `m` must be square, got {n} x {}", m.width);
-        return Err(Fault::type_error(message).with_hint("a covariance matrix has one row and one column per variable"));
+        return Err(Fault::type_error(message)
+            .with_hint("a covariance matrix has one row and one column per variable"));
     }
     let entries = m.rows.iter().flat_map(|r| r.iter());
     let largest = entries.clone().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -127,15 +129,20 @@ fn read(a: &Args) -> Result<Factor, Fault> {
         for j in 0..i {
             let (one, other) = (m.rows[i][j], m.rows[j][i]);
             if (one - other).abs() > ASYMMETRY * largest {
-                let message =
-                    format!("{name}: `m` must be symmetric, got {one} at [{i}][{j}] and {other} at [{j}][{i}]");
-                return Err(Fault::type_error(message).with_hint("(m + transpose(m)) / 2 is symmetric"));
+                let message = format!(
+                    "{name}: `m` must be symmetric, got {one} at [{i}][{j}] and {other} at [{j}][{i}]"
+                );
+                return Err(
+                    Fault::type_error(message).with_hint("(m + transpose(m)) / 2 is symmetric")
+                );
             }
         }
     }
     let lower = m.rows.iter().enumerate().flat_map(|(i, r)| r[..=i].iter().copied()).collect();
     Factor::new(n, lower).map_err(|rows| {
-        let message = format!("{name}: `m` must be positive definite, but its leading block of {rows} rows is not");
+        let message = format!(
+            "{name}: `m` must be positive definite, but its leading block of {rows} rows is not"
+        );
         Fault::domain(message).with_hint(
             "a covariance matrix has positive variances and correlations between -1 and 1; adding \
              a small number to the diagonal helps against rounding errors",
@@ -145,7 +152,8 @@ fn read(a: &Args) -> Result<Factor, Fault> {
 
 /// The mean of a matrix and its mirror image, as an adjoint.
 fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> Adjoint {
-    let row = |i: usize| Adjoint::Array((0..n).map(|j| 0.5 * (entry(i, j) + entry(j, i))).collect());
+    let row =
+        |i: usize| Adjoint::Array((0..n).map(|j| 0.5 * (entry(i, j) + entry(j, i))).collect());
     Adjoint::List((0..n).map(row).collect())
 }
 

@@ -1,4 +1,5 @@
-//! How built-ins pass derivatives back: vector-Jacobian products of functions of numbers, element by element and otherwise.
+//! How built-ins pass derivatives back: vector-Jacobian products of functions of numbers,
+//! element by element and otherwise.
 
 use super::Args;
 use super::elementwise::{array_len, part};
@@ -10,7 +11,8 @@ use smallvec::{SmallVec, smallvec};
 /// The adjoints of a call's arguments, in order; those left out at the end are zero.
 pub type Pulled = SmallVec<[Adjoint; 4]>;
 
-/// From the arguments, the result and its adjoint to the adjoints of the arguments; `None` where nobody knows them.
+/// From the arguments, the result and its adjoint to the adjoints of the arguments;
+/// `None` where nobody knows them.
 pub type Pull = fn(&Args, &Value, &Adjoint) -> Option<Pulled>;
 
 /// The derivative of a function.
@@ -18,7 +20,8 @@ pub type Pull = fn(&Args, &Value, &Adjoint) -> Option<Pulled>;
 pub enum Derivative {
     /// Not known.
     Unknown,
-    /// Zero wherever there is one: comparing, counting, rounding, and what has no numbers in it.
+    /// Zero wherever there is one: comparing, counting, rounding, and what has no numbers
+    /// in it.
     Zero,
     /// Its vector-Jacobian product.
     Product(Pull),
@@ -35,9 +38,11 @@ pub enum Derivative {
 pub struct Binary {
     /// dz/dx and dz/dy, of x, y and z.
     pub slopes: fn(f64, f64, f64) -> [f64; 2],
-    /// Of a buffer, both arguments, where the results begin and how many there are: fills in the results.
+    /// Of a buffer, both arguments, where the results begin and how many there are: fills
+    /// in the results.
     pub forward: fn(&mut [f64], Column, Column, usize, usize),
-    /// Of a buffer, adjoints in the same places, and the rest as above: adds to the adjoints of the arguments.
+    /// Of a buffer, adjoints in the same places, and the rest as above: adds to the
+    /// adjoints of the arguments.
     pub reverse: fn(&[f64], &mut [f64], Column, Column, usize, usize),
     /// The product where the result is an object.
     pub objects: Option<Pull>,
@@ -60,15 +65,17 @@ impl Derivative {
             (Derivative::Zero, _) => Some(Pulled::new()),
             (Derivative::Product(f), _) => f(a, value, by),
             (Derivative::Unary(f), _) => unary(a, value, by, *f),
-            (Derivative::Binary(f), Value::Object(_)) => f.objects.and_then(|pull| pull(a, value, by)),
+            (Derivative::Binary(f), Value::Object(_)) => {
+                f.objects.and_then(|pull| pull(a, value, by))
+            }
             (Derivative::Binary(f), _) => of_two(a, value, by, f.slopes),
             (Derivative::Reduction(f), _) => reduction(a, value, by, f.slopes),
         }
     }
 }
 
-/// A row of a function of two numbers with its slopes, of x, y and z: loops made for them, so that arithmetic runs over
-/// buffers without calls.
+/// A row of a function of two numbers with its slopes, of x, y and z: loops made for
+/// them, so that arithmetic runs over buffers without calls.
 macro_rules! of_pairs {
     ($row:expr, $f:expr, $slopes:expr) => {
         of_pairs!($row, $f, $slopes, None)
@@ -90,7 +97,14 @@ pub(super) use of_pairs;
 
 /// Fills in the results of a function of two columns that lie before them in a buffer.
 #[inline(always)]
-pub(super) fn each_pair(v: &mut [f64], x: Column, y: Column, out: usize, n: usize, f: impl Fn(f64, f64) -> f64) {
+pub(super) fn each_pair(
+    v: &mut [f64],
+    x: Column,
+    y: Column,
+    out: usize,
+    n: usize,
+    f: impl Fn(f64, f64) -> f64,
+) {
     let (before, z) = v.split_at_mut(out);
     let z = &mut z[..n];
     match (x.step, y.step) {
@@ -124,7 +138,8 @@ pub(super) fn pull_pairs(
     let (before, by) = g.split_at_mut(out);
     let (z, by) = (&v[out..out + n], &by[..n]);
     for (side, c) in [x, y].into_iter().enumerate().filter(|(_, c)| c.live) {
-        let one = |i: usize| times(by[i], slopes(v[x.at + i * x.step], v[y.at + i * y.step], z[i])[side]);
+        let one =
+            |i: usize| times(by[i], slopes(v[x.at + i * x.step], v[y.at + i * y.step], z[i])[side]);
         match c.step {
             0 => before[c.at] += (0..n).fold(0.0, |sum, i| sum + one(i)),
             _ => before[c.at..c.at + n].iter_mut().enumerate().for_each(|(i, g)| *g += one(i)),
@@ -132,7 +147,8 @@ pub(super) fn pull_pairs(
     }
 }
 
-/// A product in which nothing stays nothing: an infinite slope of something that does not matter is 0.
+/// A product in which nothing stays nothing: an infinite slope of something that does not
+/// matter is 0.
 pub(crate) fn times(by: f64, slope: f64) -> f64 {
     if by == 0.0 { 0.0 } else { by * slope }
 }
@@ -167,8 +183,8 @@ fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Optio
     Some(smallvec![go(a.get(0), y, by, slope)?])
 }
 
-/// A function of two numbers, element by element as [`super::elementwise::broadcast`] pairs them: `slopes(x, y, z)` are dz/dx
-/// and dz/dy.
+/// A function of two numbers, element by element as [`super::elementwise::broadcast`]
+/// pairs them: `slopes(x, y, z)` are dz/dx and dz/dy.
 pub(super) fn binary(
     x: &Value,
     y: &Value,
@@ -182,7 +198,12 @@ pub(super) fn binary(
         (Value::Num(x), Value::Num(y), Value::Num(z), by) => {
             Some(slopes(*x, *y, *z).map(|s| Adjoint::Num(times(by.number(), s))))
         }
-        (Value::Num(_) | Value::Array(_), Value::Num(_) | Value::Array(_), Value::Array(zs), by) => {
+        (
+            Value::Num(_) | Value::Array(_),
+            Value::Num(_) | Value::Array(_),
+            Value::Array(zs),
+            by,
+        ) => {
             let at = |v: &Value, i: usize| number(v, i).unwrap_or(f64::NAN);
             let by = by.numbers(zs.len());
             let (mut gx, mut gy) = (Vec::with_capacity(zs.len()), Vec::with_capacity(zs.len()));
@@ -201,7 +222,8 @@ pub(super) fn binary(
             let n = array_len(z)?;
             let mut both = zero();
             for i in 0..n {
-                let parts = binary(&part(x, i), &part(y, i), &z.element(i)?, &by.element(i), slopes)?;
+                let parts =
+                    binary(&part(x, i), &part(y, i), &z.element(i)?, &by.element(i), slopes)?;
                 for ((sum, v), one) in both.iter_mut().zip([x, y]).zip(parts) {
                     if array_len(v).is_some() { sum.add_element(n, i, one) } else { sum.add(one) }
                 }
@@ -212,12 +234,22 @@ pub(super) fn binary(
 }
 
 /// The same for a call with two arguments.
-fn of_two(a: &Args, z: &Value, by: &Adjoint, slopes: fn(f64, f64, f64) -> [f64; 2]) -> Option<Pulled> {
+fn of_two(
+    a: &Args,
+    z: &Value,
+    by: &Adjoint,
+    slopes: fn(f64, f64, f64) -> [f64; 2],
+) -> Option<Pulled> {
     binary(a.get(0), a.get(1), z, by, slopes).map(|both| both.into_iter().collect())
 }
 
 /// A function of an array that gives one number.
-fn reduction(a: &Args, y: &Value, by: &Adjoint, slopes: fn(&[f64], f64, &mut [f64])) -> Option<Pulled> {
+fn reduction(
+    a: &Args,
+    y: &Value,
+    by: &Adjoint,
+    slopes: fn(&[f64], f64, &mut [f64]),
+) -> Option<Pulled> {
     let xs = a.numbers(0).ok()?;
     let Value::Num(y) = y else { return None };
     let g = by.number();
@@ -227,9 +259,15 @@ fn reduction(a: &Args, y: &Value, by: &Adjoint, slopes: fn(&[f64], f64, &mut [f6
     Some(smallvec![Adjoint::Array(all)])
 }
 
-/// A function of several numbers that gives one of them, element by element (`min`, `max`, `clamp`, `select`): the derivative
-/// goes to the first of `order` that is equal to it.
-pub(super) fn one_of(values: &[&Value], order: &[usize], z: &Value, by: &Adjoint) -> Option<Pulled> {
+/// A function of several numbers that gives one of them, element by element (`min`,
+/// `max`, `clamp`, `select`): the derivative goes to the first of `order` that is equal
+/// to it.
+pub(super) fn one_of(
+    values: &[&Value],
+    order: &[usize],
+    z: &Value,
+    by: &Adjoint,
+) -> Option<Pulled> {
     let mut all: Pulled = smallvec![Adjoint::Zero; values.len()];
     match (z, by) {
         (_, Adjoint::Zero) => {}
@@ -237,7 +275,9 @@ pub(super) fn one_of(values: &[&Value], order: &[usize], z: &Value, by: &Adjoint
             let i = *order.iter().find(|i| matches!(values[**i], Value::Num(x) if x == z))?;
             all[i] = by.clone();
         }
-        (Value::Array(zs), by) if values.iter().all(|v| matches!(v, Value::Num(_) | Value::Array(_))) => {
+        (Value::Array(zs), by)
+            if values.iter().all(|v| matches!(v, Value::Num(_) | Value::Array(_))) =>
+        {
             let by = by.numbers(zs.len());
             for (i, (z, g)) in zs.iter().zip(by).enumerate().filter(|(_, (_, g))| *g != 0.0) {
                 let k = *order.iter().find(|k| number(values[**k], i) == Some(*z))?;

@@ -1,7 +1,9 @@
-//! The distributions: one built-in per family of [`crate::dist`], which computes and documents them.
+//! The distributions: one built-in per family of [`crate::dist`], which computes and
+//! documents them.
 //!
-//! Here parameters are read from values. A parameter that is an array makes a product of independent elements, with an
-//! address each. A parameter outside its domain is a recoverable fault: a proposal that leads there is rejected.
+//! Here parameters are read from values. A parameter that is an array makes a product of
+//! independent elements, with an address each. A parameter outside its domain is a
+//! recoverable fault: a proposal that leads there is rejected.
 
 use super::compounds::{mixture, ordered, truncated};
 use super::covariance::CovarianceValue;
@@ -39,7 +41,11 @@ macro_rules! scalar {
 }
 
 /// The row of any other family.
-const fn other(name: &'static str, args: &'static [Arg], make: fn(&Args) -> Result<Dist, Fault>) -> Row {
+const fn other(
+    name: &'static str,
+    args: &'static [Arg],
+    make: fn(&Args) -> Result<Dist, Fault>,
+) -> Row {
     Row::new(Kind::Distribution(make), name, SECTION, args, Type::Dist, family(name).doc)
 }
 
@@ -51,8 +57,16 @@ pub(super) const TABLE: &[Row] = &[
     scalar!("gamma", [shape, rate], dist::Gamma::new(shape, rate).map(Dist::Gamma)),
     scalar!("exponential", [rate], dist::Exponential::new(rate).map(Dist::Exponential)),
     scalar!("half_normal", [sd], dist::HalfNormal::new(sd).map(Dist::HalfNormal)),
-    scalar!("half_cauchy", [location, scale], dist::HalfCauchy::new(location, scale).map(Dist::HalfCauchy)),
-    scalar!("student_t", [df, location, scale], dist::StudentT::new(df, location, scale).map(Dist::StudentT)),
+    scalar!(
+        "half_cauchy",
+        [location, scale],
+        dist::HalfCauchy::new(location, scale).map(Dist::HalfCauchy)
+    ),
+    scalar!(
+        "student_t",
+        [df, location, scale],
+        dist::StudentT::new(df, location, scale).map(Dist::StudentT)
+    ),
     other(
         "truncated_normal",
         &[
@@ -63,7 +77,8 @@ pub(super) const TABLE: &[Row] = &[
         ],
         |a| {
             elementwise(a, &[0.0, 1.0, f64::NEG_INFINITY, f64::INFINITY], |[mean, sd, lo, hi]| {
-                dist::TruncatedNormal::new(mean, sd, lo, hi).map(|d| Dist::TruncatedNormal(Arc::new(d)))
+                dist::TruncatedNormal::new(mean, sd, lo, hi)
+                    .map(|d| Dist::TruncatedNormal(Arc::new(d)))
             })
         },
     ),
@@ -72,7 +87,12 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("d", Type::Dist, "A distribution of numbers."),
             opt("lo", Type::Nums, "-inf", "The lower bound."),
-            opt("hi", Type::Nums, "inf", "The upper bound, above `lo`; of integers it may be `lo`."),
+            opt(
+                "hi",
+                Type::Nums,
+                "inf",
+                "The upper bound, above `lo`; of integers it may be `lo`.",
+            ),
         ],
         truncated,
     ),
@@ -99,7 +119,11 @@ pub(super) const TABLE: &[Row] = &[
         |a| elementwise(a, &UNBOUNDED, |[lo, hi]| dist::Flat::new(lo, hi).map(Dist::Flat)),
     ),
     scalar!("flip", [p], dist::Flip::new(p).map(Dist::Flip)),
-    scalar!("uniform_discrete", [lo, hi], dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)),
+    scalar!(
+        "uniform_discrete",
+        [lo, hi],
+        dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)
+    ),
     scalar!("binomial", [n, p], dist::Binomial::new(n, p).map(Dist::Binomial)),
     scalar!("poisson", [rate], dist::Poisson::new(rate).map(Dist::Poisson)),
     other(
@@ -111,16 +135,22 @@ pub(super) const TABLE: &[Row] = &[
         make: |weights| dist::Categorical::new(Arc::clone(weights)).map(Dist::Categorical).ok(),
         log_probability: |weights, x| dist::Categorical::log_probability(weights, x).ok(),
     }),
-    other("dirichlet", &[arg("alpha", Type::Array, "One positive concentration per component.")], |a| {
-        dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault)
-    }),
+    other(
+        "dirichlet",
+        &[arg("alpha", Type::Array, "One positive concentration per component.")],
+        |a| dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault),
+    ),
     other(
         "multinomial",
         &[
             arg("n", Type::Int, "The number of draws."),
             arg("weights", Type::Array, "One weight per category; they need not sum to 1."),
         ],
-        |a| dist::Multinomial::new(a.num(0)?, &a.array(1)?).map(|d| Dist::Multinomial(Arc::new(d))).map_err(fault),
+        |a| {
+            dist::Multinomial::new(a.num(0)?, &a.array(1)?)
+                .map(|d| Dist::Multinomial(Arc::new(d)))
+                .map_err(fault)
+        },
     ),
     other(
         "lkj",
@@ -150,8 +180,18 @@ pub(super) const TABLE: &[Row] = &[
         "mv_normal",
         &[
             arg("mean", Type::Array, "The mean vector."),
-            opt("cov", Type::Array, "none", "The covariance matrix, an array of rows; give either `cov` or `chol`."),
-            opt("chol", Type::Array, "none", "The lower triangular Cholesky factor of the covariance."),
+            opt(
+                "cov",
+                Type::Array,
+                "none",
+                "The covariance matrix, an array of rows; give either `cov` or `chol`.",
+            ),
+            opt(
+                "chol",
+                Type::Array,
+                "none",
+                "The lower triangular Cholesky factor of the covariance.",
+            ),
             opt(
                 "whitened",
                 Type::Bool,
@@ -168,21 +208,37 @@ pub(super) const TABLE: &[Row] = &[
             arg("mean", Type::Nums, "The mean: one number, or one per point."),
             arg("cov", Type::Covariance, "The covariance function, such as `sq_exp(length)`."),
             arg("at", Type::Array, "The points."),
-            opt("centred", Type::Bool, "false", "Centred: stores the values instead of the underlying white noise."),
+            opt(
+                "centred",
+                Type::Bool,
+                "false",
+                "Centred: stores the values instead of the underlying white noise.",
+            ),
             opt("jitter", Type::Num, "1e-6", "Added to the diagonal of the covariance matrix.")
                 .unit("fraction of the variance"),
         ],
         gp,
     ),
-    other("iid", &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "The number of values.")], |a| {
-        let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
-        dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
-    }),
+    other(
+        "iid",
+        &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "The number of values.")],
+        |a| {
+            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+            dist::Iid::new(Dist::clone(d), a.count(1)?)
+                .map(|d| Dist::Iid(Arc::new(d)))
+                .map_err(fault)
+        },
+    ),
     other(
         "ordered",
         &[
             arg("d", Type::Any, "A distribution of continuous numbers, or an array of them."),
-            opt("n", Type::Int, "none", "The number of values from a single distribution; an array gives one of each."),
+            opt(
+                "n",
+                Type::Int,
+                "none",
+                "The number of values from a single distribution; an array gives one of each.",
+            ),
         ],
         ordered,
     ),
@@ -202,7 +258,9 @@ pub(super) const UNBOUNDED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 /// What the reference says of a family besides its arguments.
 pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
     let found = FAMILIES.iter().find(|f| f.name == name);
-    found.map_or(Vec::new(), |f| vec![("Support", f.support.to_owned()), ("Density", f.formula.to_owned())])
+    found.map_or(Vec::new(), |f| {
+        vec![("Support", f.support.to_owned()), ("Density", f.formula.to_owned())]
+    })
 }
 
 /// A parameter outside its domain, with a hint where there is one.
@@ -217,7 +275,8 @@ pub(super) fn fault(e: ParamError) -> Fault {
     }
 }
 
-/// A distribution of a number, or a product of such when a parameter is an array. Parameters left out have the defaults.
+/// A distribution of a number, or a product of such when a parameter is an array.
+/// Parameters left out have the defaults.
 fn elementwise<const N: usize>(
     a: &Args,
     defaults: &[f64],
@@ -251,7 +310,10 @@ fn product<const N: usize>(
                 let xs = a.array(i)?;
                 let (k, n) = *first.get_or_insert((i, xs.len()));
                 if xs.len() != n {
-                    return Err(a.wrong_length(i, &format!("as many elements as `{}`, {n}", a.builtin.args[k].name)));
+                    return Err(a.wrong_length(
+                        i,
+                        &format!("as many elements as `{}`, {n}", a.builtin.args[k].name),
+                    ));
                 }
                 columns[i] = Some(xs);
             }
@@ -280,7 +342,8 @@ fn product<const N: usize>(
 const REMEMBERED: usize = 64;
 
 thread_local! {
-    /// By mean and matrix, the very same arrays: factors take long, and a trace asks for the same ones again and again.
+    /// By mean and matrix, the very same arrays: factors take long, and a trace asks for
+    /// the same ones again and again.
     static NORMALS: RefCell<VecDeque<([Value; 3], bool, Dist)>> = const { RefCell::new(VecDeque::new()) };
 }
 
@@ -350,11 +413,15 @@ fn gp(a: &Args) -> Result<Dist, Fault> {
         _ => a.array(0)?.to_vec(),
     };
     if mean.len() != at.len() {
-        return Err(a.wrong_length(0, &format!("as many elements as there are points, {}", at.len())));
+        return Err(
+            a.wrong_length(0, &format!("as many elements as there are points, {}", at.len()))
+        );
     }
     let centred = a.bool_or(3, false)?;
     let jitter = a.num_or(4, dist::JITTER)?;
-    dist::Gp::with_jitter(mean, cov, &at, centred, jitter).map(|d| Dist::Gp(Arc::new(d))).map_err(fault)
+    dist::Gp::with_jitter(mean, cov, &at, centred, jitter)
+        .map(|d| Dist::Gp(Arc::new(d)))
+        .map_err(fault)
 }
 
 /// The family of a name, found while compiling.

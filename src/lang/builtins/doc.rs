@@ -1,11 +1,13 @@
-//! The language reference, made from the table of built-ins: one entry for `pcadlang doc`, and the whole as Markdown.
+//! The language reference, made from the table of built-ins: one entry for
+//! `pcadlang doc`, and the whole as Markdown.
 
 use super::examples::INCLUDE;
 use super::{Argument, Builtin, Kind, Table, Type};
 use crate::syntax::{Place, STATEMENTS, Statement};
 use std::fmt::Write;
 
-/// The entry of a built-in, constant or statement as plain text: `normal`, `scene.lathe`, or `lathe` where that is clear, `observe`.
+/// The entry of a built-in, constant or statement as plain text: `normal`, `scene.lathe`,
+/// or `lathe` where that is clear, `observe`.
 pub fn doc(table: &Table, name: &str) -> Option<String> {
     if let Some(c) = table.constants().iter().find(|c| c.name == name) {
         return Some(format!("{} = {}\n\n{}\n", c.name, c.value, c.doc));
@@ -50,8 +52,11 @@ fn entry(b: &Builtin) -> String {
     }
     if let Some(example) = b.example() {
         // An expression is no program yet.
-        let include =
-            if example.contains("scene.") && example.contains(';') { format!("  {INCLUDE}\n") } else { String::new() };
+        let include = if example.contains("scene.") && example.contains(';') {
+            format!("  {INCLUDE}\n")
+        } else {
+            String::new()
+        };
         let _ = write!(s, "\nExample:\n\n{include}{}", indented(example, "  "));
     }
     s
@@ -127,7 +132,10 @@ fn traits(a: &Argument) -> String {
 fn notes(b: &Builtin) -> Vec<(&'static str, String)> {
     let mut notes = Vec::new();
     if b.is_planned() {
-        notes.push(("Not available yet", "checked, but a run that reaches it ends with an error.".to_owned()));
+        notes.push((
+            "Not available yet",
+            "checked, but a run that reaches it ends with an error.".to_owned(),
+        ));
     }
     if matches!(b.kind, Kind::Distribution(_)) {
         notes.extend(super::distributions::notes(&b.name));

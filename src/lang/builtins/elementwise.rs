@@ -1,7 +1,8 @@
-//! Functions of single numbers applied to arrays element by element, and arrays of arrays through and through.
+//! Functions of single numbers applied to arrays element by element, and arrays of arrays
+//! through and through.
 //!
-//! The rule: two arrays need equal lengths; anything else is paired with every element. Plain numbers come first because
-//! nearly every call in a model has them.
+//! The rule: two arrays need equal lengths; anything else is paired with every element.
+//! Plain numbers come first because nearly every call in a model has them.
 
 use super::{Args, Scalar};
 use crate::lang::error::Fault;
@@ -30,7 +31,11 @@ pub(super) fn unary(a: &Args, f: fn(f64) -> f64) -> Result<Value, Fault> {
         match v {
             Value::Num(x) => Ok(Value::Num(f(*x))),
             Value::Array(xs) => Ok(Value::Array(xs.iter().map(|x| f(*x)).collect())),
-            Value::List(xs) => xs.iter().map(|x| go(a, x, f)).collect::<Result<Vec<_>, _>>().map(Value::from_elements),
+            Value::List(xs) => xs
+                .iter()
+                .map(|x| go(a, x, f))
+                .collect::<Result<Vec<_>, _>>()
+                .map(Value::from_elements),
             _ => Err(not_a_number(a, 0, v)),
         }
     }
@@ -45,7 +50,8 @@ pub(super) fn binary(a: &Args, f: fn(f64, f64) -> f64) -> Result<Value, Fault> {
     })
 }
 
-/// A function of two numbers or arrays of them; `other` takes pairs of which one is neither.
+/// A function of two numbers or arrays of them; `other` takes pairs of which one is
+/// neither.
 pub(super) fn numeric(
     a: &Args,
     x: &Value,
@@ -55,8 +61,12 @@ pub(super) fn numeric(
 ) -> Result<Value, Fault> {
     match (x, y) {
         (Value::Num(x), Value::Num(y)) => Ok(Value::Num(f(*x, *y))),
-        (Value::Array(xs), Value::Num(y)) => Ok(Value::Array(xs.iter().map(|x| f(*x, *y)).collect())),
-        (Value::Num(x), Value::Array(ys)) => Ok(Value::Array(ys.iter().map(|y| f(*x, *y)).collect())),
+        (Value::Array(xs), Value::Num(y)) => {
+            Ok(Value::Array(xs.iter().map(|x| f(*x, *y)).collect()))
+        }
+        (Value::Num(x), Value::Array(ys)) => {
+            Ok(Value::Array(ys.iter().map(|y| f(*x, *y)).collect()))
+        }
         (Value::Array(xs), Value::Array(ys)) if xs.len() == ys.len() => {
             Ok(Value::Array(xs.iter().zip(ys.iter()).map(|(x, y)| f(*x, *y)).collect()))
         }

@@ -1,7 +1,8 @@
 //! What a host stands behind a built-in: closures, with what they have captured.
 //!
-//! The entry of the table has plain functions as any other ([`Foreign::entry`]); they find the closures at the built-in that their
-//! arguments name. So nothing that calls built-ins needs to know of hosts.
+//! The entry of the table has plain functions as any other ([`Foreign::entry`]); they
+//! find the closures at the built-in that their arguments name. So nothing that calls
+//! built-ins needs to know of hosts.
 
 use super::{Args, Builtin, Derivative, Kind, Pulled};
 use crate::dist::Dist;
@@ -20,8 +21,9 @@ type Incremental = dyn Fn(&Args, Option<&Before>) -> Result<(Value, State), Faul
 type Make = dyn Fn(&Args) -> Result<Dist, Fault> + Send + Sync;
 type Product = dyn Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync;
 
-/// An evaluation that a later one may start from. It is kept with what it is the value of (a node of a trace, an operation of a
-/// tape) and never changed: whatever goes back to an earlier state has that state's.
+/// An evaluation that a later one may start from. It is kept with what it is the value of
+/// (a node of a trace, an operation of a tape) and never changed: whatever goes back to
+/// an earlier state has that state's.
 pub struct Before {
     /// The arguments.
     pub args: Vec<Value>,
@@ -33,7 +35,10 @@ pub struct Before {
 
 impl fmt::Debug for Before {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Before").field("args", &self.args).field("value", &self.value).finish_non_exhaustive()
+        f.debug_struct("Before")
+            .field("args", &self.args)
+            .field("value", &self.value)
+            .finish_non_exhaustive()
     }
 }
 
@@ -73,27 +78,44 @@ impl Foreign {
             Foreign::Function { pull, .. } => (Kind::Function(call_foreign), product(pull)),
             Foreign::Incremental { pull, .. } => (Kind::Function(call_foreign), product(pull)),
             Foreign::Family(_) => (Kind::Distribution(make_foreign), Derivative::Unknown),
-            Foreign::Likelihood(_) => (Kind::Function(call_foreign), Derivative::Product(pull_foreign)),
+            Foreign::Likelihood(_) => {
+                (Kind::Function(call_foreign), Derivative::Product(pull_foreign))
+            }
             Foreign::Kernel(_) => (Kind::Inference, Derivative::Unknown),
         }
     }
 }
 
 impl Builtin {
-    /// Calls an incremental function of a host, from an earlier evaluation if there is one; `None` for any other built-in.
+    /// Calls an incremental function of a host, from an earlier evaluation if there is
+    /// one; `None` for any other built-in.
     #[inline]
-    pub(crate) fn resume(&self, values: &[&Value], before: Option<&Before>) -> Option<Result<Before, Fault>> {
+    pub(crate) fn resume(
+        &self,
+        values: &[&Value],
+        before: Option<&Before>,
+    ) -> Option<Result<Before, Fault>> {
         match &self.foreign {
-            Some(Foreign::Incremental { call, .. }) => Some(self.resume_with(&**call, values, before)),
+            Some(Foreign::Incremental { call, .. }) => {
+                Some(self.resume_with(&**call, values, before))
+            }
             _ => None,
         }
     }
 
-    fn resume_with(&self, call: &Incremental, values: &[&Value], before: Option<&Before>) -> Result<Before, Fault> {
+    fn resume_with(
+        &self,
+        call: &Incremental,
+        values: &[&Value],
+        before: Option<&Before>,
+    ) -> Result<Before, Fault> {
         let a = Args { builtin: self, values };
         let args: Vec<Value> = (0..values.len()).map(|i| a.get(i).clone()).collect();
         match before {
-            Some(b) if b.args.len() == args.len() && b.args.iter().zip(&args).all(|(x, y)| x.same(y)) => {
+            Some(b)
+                if b.args.len() == args.len()
+                    && b.args.iter().zip(&args).all(|(x, y)| x.same(y)) =>
+            {
                 Ok(Before { args, value: b.value.clone(), state: Arc::clone(&b.state) })
             }
             _ => call(&a, before).map(|(value, state)| Before { args, value, state }),

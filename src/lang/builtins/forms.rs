@@ -1,10 +1,17 @@
-//! Forms: built-ins that are lowered to operations of their own, because they call functions or look at the whole trace.
+//! Forms: built-ins that are lowered to operations of their own, because they call
+//! functions or look at the whole trace.
 
 use super::{Arg, Form, Kind, Row, Type, arg};
 
 const SECTION: &str = "Forms";
 
-const fn form(name: &'static str, args: &'static [Arg], returns: Type, doc: &'static str, form: Form) -> Row {
+const fn form(
+    name: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    form: Form,
+) -> Row {
     Row::new(Kind::Form(form), name, SECTION, args, returns, doc)
 }
 
@@ -23,7 +30,11 @@ pub(super) const TABLE: &[Row] = &[
     form(
         "fold",
         &[
-            arg("f", Type::Function, "A function of the running value and an element; it may draw."),
+            arg(
+                "f",
+                Type::Function,
+                "A function of the running value and an element; it may draw.",
+            ),
             arg("init", Type::Any, "The initial value."),
             arg("xs", Type::Any, "An array or record."),
         ],
@@ -33,14 +44,30 @@ pub(super) const TABLE: &[Row] = &[
     ),
     form(
         "mem",
-        &[arg("f", Type::Function, "A function; its arguments must be numbers, strings, bools or arrays of them.")],
+        &[arg(
+            "f",
+            Type::Function,
+            "A function; its arguments must be numbers, strings, bools or arrays of them.",
+        )],
         Type::Function,
         "A function that calls `f` once per distinct argument and remembers its result \
          (stochastic memoisation).",
         Form::Mem,
     ),
-    form("log_joint", &[], Type::Num, "The log joint density of all choices and observations.", Form::LogJoint),
-    form("log_prior", &[], Type::Num, "The log prior density of the unobserved choices.", Form::LogPrior),
+    form(
+        "log_joint",
+        &[],
+        Type::Num,
+        "The log joint density of all choices and observations.",
+        Form::LogJoint,
+    ),
+    form(
+        "log_prior",
+        &[],
+        Type::Num,
+        "The log prior density of the unobserved choices.",
+        Form::LogPrior,
+    ),
     form(
         "log_likelihood",
         &[],

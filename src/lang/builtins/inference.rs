@@ -1,7 +1,8 @@
-//! Names known to inference blocks, user kernels and reports only: kernels, starts, monitors.
+//! Names known to inference blocks, user kernels and reports only: kernels, starts,
+//! monitors.
 //!
-//! This is their documentation and their arguments; what they do is the business of the engine. They are not values of
-//! the model.
+//! This is their documentation and their arguments; what they do is the business of the
+//! engine. They are not values of the model.
 
 use super::{Arg, Kind, Row, Type, arg, opt};
 
@@ -102,7 +103,11 @@ pub(super) const TABLE: &[Row] = &[
     name(
         "hmc",
         KERNELS,
-        &[SEL, opt("steps", Type::Int, "10", "The number of leapfrog steps per proposal."), MARGINAL],
+        &[
+            SEL,
+            opt("steps", Type::Int, "10", "The number of leapfrog steps per proposal."),
+            MARGINAL,
+        ],
         Type::Kernel,
         "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     ),
@@ -111,7 +116,12 @@ pub(super) const TABLE: &[Row] = &[
         KERNELS,
         &[
             SEL,
-            opt("max_depth", Type::Int, "10", "The maximum tree depth: at most 2^max_depth leapfrog steps."),
+            opt(
+                "max_depth",
+                Type::Int,
+                "10",
+                "The maximum tree depth: at most 2^max_depth leapfrog steps.",
+            ),
             MARGINAL,
         ],
         Type::Kernel,
@@ -202,7 +212,12 @@ pub(super) const TABLE: &[Row] = &[
                 "200",
                 "The number of draws from the prior, from which starting points are chosen.",
             ),
-            opt("keep", Type::Int, "16", "The number of these, the most probable, that climb to a mode."),
+            opt(
+                "keep",
+                Type::Int,
+                "16",
+                "The number of these, the most probable, that climb to a mode.",
+            ),
             opt("steps", Type::Int, "60", "The maximum number of optimisation steps per climb."),
             opt(
                 "first",
@@ -296,8 +311,20 @@ pub(super) const TABLE: &[Row] = &[
         "The current value of a choice, in user kernels and conditions.",
     ),
     name("elapsed", MONITORS, &[], Type::Num, "The time since the chain started, in seconds."),
-    name("steps", MONITORS, &[], Type::Int, "The number of kernel applications in this chain so far."),
-    name("acceptance", MONITORS, &[], Type::Num, "The acceptance rate of this chain after warm-up."),
+    name(
+        "steps",
+        MONITORS,
+        &[],
+        Type::Int,
+        "The number of kernel applications in this chain so far.",
+    ),
+    name(
+        "acceptance",
+        MONITORS,
+        &[],
+        Type::Num,
+        "The acceptance rate of this chain after warm-up.",
+    ),
     name(
         "rhat",
         MONITORS,
@@ -305,7 +332,13 @@ pub(super) const TABLE: &[Row] = &[
         Type::Num,
         "Rank-normalised split R-hat over all chains, evaluated at step barriers (Vehtari et al. 2021).",
     ),
-    name("ess", MONITORS, &[X], Type::Num, "The bulk effective sample size over all chains (Vehtari et al. 2021)."),
+    name(
+        "ess",
+        MONITORS,
+        &[X],
+        Type::Num,
+        "The bulk effective sample size over all chains (Vehtari et al. 2021).",
+    ),
     name(
         "snapshot",
         MONITORS,

@@ -48,7 +48,8 @@ fn interp(a: &Args) -> Result<Value, Fault> {
     }
 }
 
-/// By the places read, and by the values of the table; by its places where lines are straight between them.
+/// By the places read, and by the values of the table; by its places where lines are
+/// straight between them.
 fn pull(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
     let (xs, ys) = (a.numbers(1).ok()?, a.numbers(2).ok()?);
     let (mut by_xs, mut by_ys) = (vec![0.0; xs.len()], vec![0.0; ys.len()]);

@@ -1,6 +1,8 @@
-//! What built-ins are called elsewhere: words that the search of the reference knows, from Stan, PyMC, BUGS and numpy.
+//! What built-ins are called elsewhere: words that the search of the reference knows,
+//! from Stan, PyMC, BUGS and numpy.
 
-/// Names, and other words for them. Underscores and dots divide words, as in what is searched for.
+/// Names, and other words for them. Underscores and dots divide words, as in what is
+/// searched for.
 pub(super) const KNOWN_AS: &[(&str, &str)] = &[
     (
         "log_density",

@@ -15,7 +15,8 @@ const SECTION: &str = "Arrays and records";
 const XS: &[Arg] = &[arg("xs", Type::Array, "An array.")];
 const N: &[Arg] = &[arg("n", Type::Int, "The number of elements.")];
 const BOOLS: &[Arg] = &[arg("xs", Type::Array, "Bools.")];
-const FIELDS: &[Arg] = &[arg("r", Type::Any, "A record, or an array whose keys are its positions.")];
+const FIELDS: &[Arg] =
+    &[arg("r", Type::Any, "A record, or an array whose keys are its positions.")];
 
 pub(super) const TABLE: &[Row] = &[
     function(
@@ -267,7 +268,9 @@ fn range(a: &Args) -> Result<Value, Fault> {
     let (start, end, step) = (a.num(0)?, a.num(1)?, a.num_or(2, 1.0)?);
     let n = libm::ceil((end - start) / step);
     if n.is_nan() || step == 0.0 {
-        return Err(Fault::domain(format!("range: steps of {step} do not lead from {start} to {end}")));
+        return Err(Fault::domain(format!(
+            "range: steps of {step} do not lead from {start} to {end}"
+        )));
     }
     if n > MOST_ELEMENTS as f64 {
         return Err(a.too_many(n));
@@ -313,21 +316,30 @@ fn pull_concat(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
         let (n, start) = (array_len(v).unwrap_or(0), from);
         from += n;
         match by {
-            Adjoint::Array(gs) => gs.get(start..start + n).map_or(Adjoint::Zero, |g| Adjoint::Array(g.to_vec())),
+            Adjoint::Array(gs) => {
+                gs.get(start..start + n).map_or(Adjoint::Zero, |g| Adjoint::Array(g.to_vec()))
+            }
             by => moved(v, by, |i| start + i),
         }
     };
     Some(a.values.iter().map(part).collect())
 }
 
-fn pull_select(cond: &Value, x: &Value, y: &Value, z: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+fn pull_select(
+    cond: &Value,
+    x: &Value,
+    y: &Value,
+    z: &Value,
+    by: &Adjoint,
+) -> Option<[Adjoint; 2]> {
     if let Value::Bool(b) = cond {
         return Some(if *b { [by.clone(), Adjoint::Zero] } else { [Adjoint::Zero, by.clone()] });
     }
     let n = array_len(cond)?;
     let mut both = [Adjoint::Zero, Adjoint::Zero];
     for i in 0..n {
-        let parts = pull_select(&part(cond, i), &part(x, i), &part(y, i), &z.element(i)?, &by.element(i))?;
+        let parts =
+            pull_select(&part(cond, i), &part(x, i), &part(y, i), &z.element(i)?, &by.element(i))?;
         for ((sum, v), one) in both.iter_mut().zip([x, y]).zip(parts) {
             if array_len(v).is_some() { sum.add_element(n, i, one) } else { sum.add(one) }
         }
@@ -338,7 +350,9 @@ fn pull_select(cond: &Value, x: &Value, y: &Value, z: &Value, by: &Adjoint) -> O
 /// The positions in ascending order, equals in the order they had.
 fn sorted(a: &Args, xs: &[Value]) -> Result<Vec<usize>, Fault> {
     let mut order: Vec<usize> = (0..xs.len()).collect();
-    if xs.iter().all(|x| matches!(x, Value::Num(_))) || xs.iter().all(|x| matches!(x, Value::Str(_))) {
+    if xs.iter().all(|x| matches!(x, Value::Num(_)))
+        || xs.iter().all(|x| matches!(x, Value::Str(_)))
+    {
         order.sort_by(|i, j| ascending(&xs[*i], &xs[*j]));
         return Ok(order);
     }
@@ -348,7 +362,9 @@ fn sorted(a: &Args, xs: &[Value]) -> Result<Vec<usize>, Fault> {
 fn ascending(x: &Value, y: &Value) -> Ordering {
     match (x, y) {
         // Total, so that NaN of either sign comes last; -0 and 0 are equal.
-        (Value::Num(x), Value::Num(y)) => x.is_nan().cmp(&y.is_nan()).then_with(|| (x + 0.0).total_cmp(&(y + 0.0))),
+        (Value::Num(x), Value::Num(y)) => {
+            x.is_nan().cmp(&y.is_nan()).then_with(|| (x + 0.0).total_cmp(&(y + 0.0)))
+        }
         (Value::Str(x), Value::Str(y)) => x.cmp(y),
         _ => Ordering::Equal,
     }

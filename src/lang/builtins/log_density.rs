@@ -1,4 +1,5 @@
-//! The log density of a value under a distribution, as a number: for mixtures written out, pointwise scores, factors.
+//! The log density of a value under a distribution, as a number: for mixtures written
+//! out, pointwise scores, factors.
 
 use super::{Args, Pulled, Row, Type, arg, function};
 use crate::dist::Dist;
@@ -11,7 +12,10 @@ use smallvec::smallvec;
 pub(super) const TABLE: &[Row] = &[function(
     "log_density",
     "Distributions",
-    &[arg("d", Type::Dist, "A distribution."), arg("x", Type::Any, "A value of `d`, or an array of values.")],
+    &[
+        arg("d", Type::Dist, "A distribution."),
+        arg("x", Type::Any, "A value of `d`, or an array of values."),
+    ],
     Type::Num,
     "The log density (of a discrete distribution, the log probability) of `x` under `d`, in nats: \
      -inf outside the support. Several values of a scalar distribution are treated as \
@@ -37,7 +41,9 @@ fn dist<'a>(a: &Args<'a>) -> Result<&'a Dist, Fault> {
         Value::Likelihood(_) => Err(a
             .wrong(0, "a distribution")
             .with_hint("a likelihood is scored by `observe`, and its sum is log_likelihood()")),
-        _ => Err(a.wrong(0, "a distribution").with_hint("the distribution comes first: log_density(normal(0, 1), x)")),
+        _ => Err(a
+            .wrong(0, "a distribution")
+            .with_hint("the distribution comes first: log_density(normal(0, 1), x)")),
     }
 }
 
@@ -45,7 +51,10 @@ fn dist<'a>(a: &Args<'a>) -> Result<&'a Dist, Fault> {
 fn fits(d: &Dist, x: &Value) -> bool {
     let one = |d: &Dist, x: &Value| x.to_datum().is_some_and(|x| d.support().fits(&x));
     match (d.elements(), x) {
-        (Some(n), x) => x.len() == Some(n) && (0..n).all(|i| x.element(i).is_some_and(|x| one(&d.element(i), &x))),
+        (Some(n), x) => {
+            x.len() == Some(n)
+                && (0..n).all(|i| x.element(i).is_some_and(|x| one(&d.element(i), &x)))
+        }
         (None, Value::Array(_)) if d.is_scalar() => true,
         (None, Value::List(xs)) => one(d, x) || xs.iter().all(|x| one(d, x)),
         (None, x) => one(d, x),
@@ -57,7 +66,9 @@ fn drawn(d: &Dist) -> String {
     let name = d.name();
     match d.elements() {
         Some(n) => format!("`{name}` has {n} elements here, so `x` is an array of {n} values"),
-        None if d.is_scalar() => format!("`{name}` draws numbers: `x` is a number or an array of them"),
+        None if d.is_scalar() => {
+            format!("`{name}` draws numbers: `x` is a number or an array of them")
+        }
         None if matches!(d.support(), crate::dist::Support::Boolean) => {
             format!("`{name}` draws true or false: compare a number, as in `n == 1`")
         }
@@ -65,7 +76,8 @@ fn drawn(d: &Dist) -> String {
     }
 }
 
-/// By the distribution: by its parameters, and behind them by the factor of its covariance. Where the density is 0 it stays so.
+/// By the distribution: by its parameters, and behind them by the factor of its
+/// covariance. Where the density is 0 it stays so.
 fn pull(a: &Args, value: &Value, by: &Adjoint) -> Option<Pulled> {
     let (Value::Dist(d), Value::Num(score)) = (a.get(0), value) else { return None };
     let weight = by.number();

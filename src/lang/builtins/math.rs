@@ -1,4 +1,5 @@
-//! Functions of numbers, element by element on arrays, through libm so that they are the same on every platform.
+//! Functions of numbers, element by element on arrays, through libm so that they are the
+//! same on every platform.
 
 use super::derivative::{of_pairs, one_of};
 use super::elementwise::{mapped, numeric};
@@ -86,7 +87,8 @@ pub(super) const TABLE: &[Row] = &[
         "`x` moved into the interval from `lo` to `hi`.",
         clamp,
     )
-    // The bounds first, of which the upper one wins: at a bound the argument moves nothing.
+    // The bounds first, of which the upper one wins: at a bound the argument moves
+    // nothing.
     .pull(|a, z, by| one_of(a.values, &[2, 1, 0], z, by)),
     smooth!("sin", ANGLE, "The sine.", libm::sin, |x, _| libm::cos(x)),
     smooth!("cos", ANGLE, "The cosine.", libm::cos, |x, _| -libm::sin(x)),
@@ -124,7 +126,10 @@ pub(super) const TABLE: &[Row] = &[
 /// The derivatives of x^y.
 pub(super) fn pow_slopes(x: f64, y: f64, z: f64) -> [f64; 2] {
     // A base of 0 has no logarithm, and x^y does not move with y there.
-    [if y == 0.0 { 0.0 } else { y * libm::pow(x, y - 1.0) }, if z == 0.0 { 0.0 } else { z * libm::log(x) }]
+    [
+        if y == 0.0 { 0.0 } else { y * libm::pow(x, y - 1.0) },
+        if z == 0.0 { 0.0 } else { z * libm::log(x) },
+    ]
 }
 
 fn pull_extreme(a: &Args, z: &Value, by: &Adjoint) -> Option<Pulled> {
@@ -164,7 +169,11 @@ pub(super) fn larger(x: f64, y: f64) -> f64 {
     if x > y || x.is_nan() { x } else { y }
 }
 
-fn extreme(a: &Args, of_two: fn(f64, f64) -> f64, of_all: fn(&[f64]) -> f64) -> Result<Value, Fault> {
+fn extreme(
+    a: &Args,
+    of_two: fn(f64, f64) -> f64,
+    of_all: fn(&[f64]) -> f64,
+) -> Result<Value, Fault> {
     if a.values.len() < 2 {
         return match a.get(0) {
             Value::Num(x) => Ok(Value::Num(*x)),
@@ -180,7 +189,8 @@ fn extreme(a: &Args, of_two: fn(f64, f64) -> f64, of_all: fn(&[f64]) -> f64) -> 
 }
 
 fn clamp(a: &Args) -> Result<Value, Fault> {
-    let wrong = |i: usize| move |_: &Value, _: &Value| Err(a.wrong(i, "a number or an array of numbers"));
+    let wrong =
+        |i: usize| move |_: &Value, _: &Value| Err(a.wrong(i, "a number or an array of numbers"));
     let raised = numeric(a, a.get(0), a.get(1), larger, &wrong(1))?;
     numeric(a, &raised, a.get(2), smaller, &wrong(2))
 }

@@ -1,6 +1,7 @@
 //! Matrices: arrays of rows, every row an array of as many numbers.
 //!
-//! Plain triple loops in a fixed order: the matrices of a model are small, and results must not depend on a machine.
+//! Plain triple loops in a fixed order: the matrices of a model are small, and results
+//! must not depend on a machine.
 
 use super::elementwise::array;
 use super::reduce::dot;
@@ -125,7 +126,10 @@ impl<'a> Matrix<'a> {
         let width = rows.first().map_or(0, |r| r.len());
         match rows.iter().position(|r| r.len() != width) {
             Some(k) => {
-                let what = format!("rows of one length; row 0 has {width} numbers, row {k} has {}", rows[k].len());
+                let what = format!(
+                    "rows of one length; row 0 has {width} numbers, row {k} has {}",
+                    rows[k].len()
+                );
                 Err(Fault::type_error(format!("{}: a matrix has {what}", a.builtin.full_name())))
             }
             None => Ok(Matrix { rows, width }),
@@ -144,7 +148,10 @@ impl<'a> Matrix<'a> {
 
     /// The derivatives by a matrix of this size.
     fn of(by: &Adjoint, rows: usize, width: usize) -> Matrix<'static> {
-        Matrix { rows: (0..rows).map(|i| Cow::Owned(by.element(i).numbers(width))).collect(), width }
+        Matrix {
+            rows: (0..rows).map(|i| Cow::Owned(by.element(i).numbers(width))).collect(),
+            width,
+        }
     }
 
     fn into_adjoint(self) -> Adjoint {
@@ -183,7 +190,8 @@ fn pull_matmul(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
     let is_vector = |i: usize| matches!(a.get(i), Value::Array(_));
     let left = if is_vector(0) { single_row(a, 0).ok()? } else { Matrix::read(a, 0).ok()? };
     // Its columns.
-    let right = if is_vector(1) { single_row(a, 1).ok()? } else { Matrix::read(a, 1).ok()?.transposed() };
+    let right =
+        if is_vector(1) { single_row(a, 1).ok()? } else { Matrix::read(a, 1).ok()?.transposed() };
     let (n, m, inner) = (left.rows.len(), right.rows.len(), left.width);
     let g = match (is_vector(0), is_vector(1)) {
         (true, true) => Matrix::from_fn(1, 1, |_, _| by.number()),
@@ -194,10 +202,14 @@ fn pull_matmul(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
         }
         (false, false) => Matrix::of(by, n, m),
     };
-    let by_left = Matrix::from_fn(n, inner, |i, k| (0..m).map(|j| g.rows[i][j] * right.rows[j][k]).sum());
+    let by_left =
+        Matrix::from_fn(n, inner, |i, k| (0..m).map(|j| g.rows[i][j] * right.rows[j][k]).sum());
     // As columns, too.
-    let by_right = Matrix::from_fn(m, inner, |j, k| (0..n).map(|i| g.rows[i][j] * left.rows[i][k]).sum());
-    let row = |m: Matrix| Adjoint::Array(m.rows.into_iter().next().map(Cow::into_owned).unwrap_or_default());
+    let by_right =
+        Matrix::from_fn(m, inner, |j, k| (0..n).map(|i| g.rows[i][j] * left.rows[i][k]).sum());
+    let row = |m: Matrix| {
+        Adjoint::Array(m.rows.into_iter().next().map(Cow::into_owned).unwrap_or_default())
+    };
     Some(smallvec![
         if is_vector(0) { row(by_left) } else { by_left.into_adjoint() },
         if is_vector(1) { row(by_right) } else { by_right.transposed().into_adjoint() },

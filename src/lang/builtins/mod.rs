@@ -1,7 +1,9 @@
-//! The table of built-ins: every function, distribution, form and kernel with its arguments, units and doc line.
+//! The table of built-ins: every function, distribution, form and kernel with its
+//! arguments, units and doc line.
 //!
-//! Evaluation, static checks, `pcadlang doc` and the language reference all read this one table. Functions here are pure:
-//! the same arguments give the same value to the last bit, on every platform.
+//! Evaluation, static checks, `pcadlang doc` and the language reference all read this one
+//! table. Functions here are pure: the same arguments give the same value to the last
+//! bit, on every platform.
 
 mod args;
 mod compounds;
@@ -148,8 +150,8 @@ pub enum Kind {
     Inference,
 }
 
-/// What a built-in is on single numbers, where that is all there is to it: what formulas of scores run, and what functions
-/// of arrays do with each element.
+/// What a built-in is on single numbers, where that is all there is to it: what formulas
+/// of scores run, and what functions of arrays do with each element.
 #[derive(Clone, Copy)]
 pub enum Scalar {
     /// A number of a number.
@@ -181,7 +183,8 @@ pub enum Scalar {
 pub struct Builtin {
     /// Its name.
     pub name: Text,
-    /// The namespace it belongs to: nothing for the language itself, `scene` for `std/scene.pcad`.
+    /// The namespace it belongs to: nothing for the language itself, `scene` for
+    /// `std/scene.pcad`.
     pub module: Text,
     /// The heading it stands under in the reference.
     pub section: Text,
@@ -218,10 +221,13 @@ impl Builtin {
         let args = Args { builtin: self, values };
         match self.kind {
             Kind::Function(f) => f(&args),
-            Kind::Distribution(_) => self.distribution(values).map(|d| Value::Dist(std::sync::Arc::new(d))),
-            Kind::Form(_) | Kind::Inference => {
-                Err(Fault::type_error(format!("`{}` cannot be used as a function value", self.name)))
+            Kind::Distribution(_) => {
+                self.distribution(values).map(|d| Value::Dist(std::sync::Arc::new(d)))
             }
+            Kind::Form(_) | Kind::Inference => Err(Fault::type_error(format!(
+                "`{}` cannot be used as a function value",
+                self.name
+            ))),
         }
     }
 
@@ -244,12 +250,18 @@ impl Builtin {
 
     /// Whether this version only checks and documents it, and cannot run it yet.
     pub fn is_planned(&self) -> bool {
-        matches!(self.kind, Kind::Inference) && self.foreign.is_none() && inference::PLANNED.contains(&&*self.name)
+        matches!(self.kind, Kind::Inference)
+            && self.foreign.is_none()
+            && inference::PLANNED.contains(&&*self.name)
     }
 
     /// Its name as a program writes it: `normal`, `scene.lathe`.
     pub fn full_name(&self) -> String {
-        if self.module.is_empty() { self.name.clone().into_owned() } else { format!("{}.{}", self.module, self.name) }
+        if self.module.is_empty() {
+            self.name.clone().into_owned()
+        } else {
+            format!("{}.{}", self.module, self.name)
+        }
     }
 
     /// `name(a, b = default)`, as the reference shows it.
@@ -273,11 +285,13 @@ impl Builtin {
         s
     }
 
-    /// For each parameter, the index of the written argument that feeds it; `None` for a default. With a variadic last
-    /// parameter the result is as long as what was written. `args` tells the keyword of each argument, if it has one.
+    /// For each parameter, the index of the written argument that feeds it; `None` for a
+    /// default. With a variadic last parameter the result is as long as what was written.
+    /// `args` tells the keyword of each argument, if it has one.
     ///
     /// # Errors
-    /// Too many arguments, too few, one given twice, an unknown keyword: a message for the user.
+    /// Too many arguments, too few, one given twice, an unknown keyword: a message for
+    /// the user.
     pub fn match_names<'a>(
         &self,
         args: impl Iterator<Item = Option<&'a str>>,
@@ -292,11 +306,19 @@ impl Builtin {
                     continue;
                 }
                 None => i,
-                Some(k) => self.args.iter().position(|a| a.name == k).ok_or_else(|| self.no_such_argument(k))?,
+                Some(k) => self
+                    .args
+                    .iter()
+                    .position(|a| a.name == k)
+                    .ok_or_else(|| self.no_such_argument(k))?,
             };
             // Too many are counted first, so that the message can say how many.
             if p < order.len() && order[p].replace(i).is_some() {
-                return Err(format!("`{}` got its argument `{}` twice", self.full_name(), self.args[p].name));
+                return Err(format!(
+                    "`{}` got its argument `{}` twice",
+                    self.full_name(),
+                    self.args[p].name
+                ));
             }
         }
         if written > order.len() {
@@ -305,12 +327,19 @@ impl Builtin {
                 1 => "1 argument".to_owned(),
                 n => format!("{n} arguments"),
             };
-            return Err(format!("`{}` takes {takes}, got {written}: {}", self.full_name(), self.signature()));
+            return Err(format!(
+                "`{}` takes {takes}, got {written}: {}",
+                self.full_name(),
+                self.signature()
+            ));
         }
         match self.args.iter().zip(&order).find(|(a, o)| a.default.is_none() && o.is_none()) {
-            Some((missing, _)) => {
-                Err(format!("`{}` needs its argument `{}`: {}", self.full_name(), missing.name, self.signature()))
-            }
+            Some((missing, _)) => Err(format!(
+                "`{}` needs its argument `{}`: {}",
+                self.full_name(),
+                missing.name,
+                self.signature()
+            )),
             None => Ok(order),
         }
     }
@@ -319,7 +348,10 @@ impl Builtin {
         let hint = match crate::diag::nearest(keyword, self.args.iter().map(|a| &*a.name)) {
             Some(near) => format!("; did you mean `{near}`?"),
             None if self.args.is_empty() => "; it takes none".to_owned(),
-            None => format!("; it takes {}", self.args.iter().map(|a| &*a.name).collect::<Vec<_>>().join(", ")),
+            None => format!(
+                "; it takes {}",
+                self.args.iter().map(|a| &*a.name).collect::<Vec<_>>().join(", ")
+            ),
         };
         format!("`{}` has no argument `{keyword}`{hint}", self.full_name())
     }

@@ -1,6 +1,8 @@
-//! The operators, under the names they are written with; `neg` and `not` are the prefix ones.
+//! The operators, under the names they are written with; `neg` and `not` are the prefix
+//! ones.
 //!
-//! Numbers follow IEEE 754: division by zero gives an infinity or NaN, which is caught where it is scored.
+//! Numbers follow IEEE 754: division by zero gives an infinity or NaN, which is caught
+//! where it is scored.
 
 use super::covariance::CovarianceValue;
 use super::derivative::of_pairs;
@@ -13,9 +15,15 @@ use std::cmp::Ordering;
 
 const SECTION: &str = "Operators";
 
-const SIDES: &[Arg] = &[arg("a", Type::Any, "The left side."), arg("b", Type::Any, "The right side.")];
+const SIDES: &[Arg] =
+    &[arg("a", Type::Any, "The left side."), arg("b", Type::Any, "The right side.")];
 
-const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>) -> Row {
+const fn infix(
+    name: &'static str,
+    returns: Type,
+    doc: &'static str,
+    f: fn(&Args) -> Result<Value, Fault>,
+) -> Row {
     function(name, SECTION, SIDES, returns, doc, f)
 }
 
@@ -134,7 +142,9 @@ fn multiply(a: &Args) -> Result<Value, Fault> {
 }
 
 fn arithmetic(a: &Args) -> Result<Value, Fault> {
-    numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| Err(unsuited(a, "numbers", x, y)))
+    numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| {
+        Err(unsuited(a, "numbers", x, y))
+    })
 }
 
 /// `x - y floor(x / y)`, exact where IEEE's remainder is.
@@ -147,7 +157,9 @@ fn not(a: &Args) -> Result<Value, Fault> {
     fn go(v: &Value) -> Result<Value, Fault> {
         match v {
             Value::Bool(b) => Ok(Value::Bool(!b)),
-            Value::List(xs) => xs.iter().map(go).collect::<Result<Vec<_>, _>>().map(Value::from_elements),
+            Value::List(xs) => {
+                xs.iter().map(go).collect::<Result<Vec<_>, _>>().map(Value::from_elements)
+            }
             Value::Array(xs) if xs.is_empty() => Ok(v.clone()),
             _ => Err(Fault::type_error(format!("`not` needs a bool, got {}", v.type_name()))),
         }
@@ -162,7 +174,8 @@ fn equality(a: &Args, wanted: bool) -> Result<Value, Fault> {
     }
 }
 
-/// Equality of whole values: numbers as IEEE compares them, functions and objects by identity.
+/// Equality of whole values: numbers as IEEE compares them, functions and objects by
+/// identity.
 pub(super) fn equal(x: &Value, y: &Value) -> bool {
     match (x, y) {
         (Value::Num(x), Value::Num(y)) => x == y,
@@ -213,7 +226,11 @@ const EXACT: f64 = 9_007_199_254_740_992.0;
 /// The error that an operator is not defined for what stands at its sides.
 fn unsuited(a: &Args, wanted: &str, x: &Value, y: &Value) -> Fault {
     let name = &a.builtin.name;
-    let fault = Fault::type_error(format!("`{name}` needs {wanted}, got {} and {}", x.type_name(), y.type_name()));
+    let fault = Fault::type_error(format!(
+        "`{name}` needs {wanted}, got {} and {}",
+        x.type_name(),
+        y.type_name()
+    ));
     match (x, y) {
         (Value::Str(_), Value::Num(_)) | (Value::Num(_), Value::Str(_)) if name == "+" => {
             fault.with_hint("`str(x)` makes a string of a number")

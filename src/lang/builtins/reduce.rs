@@ -1,4 +1,5 @@
-//! Functions that make one number, or one running array, of an array of numbers. Sums run from left to right.
+//! Functions that make one number, or one running array, of an array of numbers. Sums run
+//! from left to right.
 
 use super::derivative::{Reduction, times};
 use super::math::{larger, smaller};
@@ -10,7 +11,8 @@ use smallvec::smallvec;
 const SECTION: &str = "Sums and statistics";
 
 const XS: &[Arg] = &[arg("xs", Type::Array, "Numbers; bools count 0 and 1.")];
-const PAIR: &[Arg] = &[arg("xs", Type::Array, "Numbers."), arg("ys", Type::Array, "The same number of numbers.")];
+const PAIR: &[Arg] =
+    &[arg("xs", Type::Array, "Numbers."), arg("ys", Type::Array, "The same number of numbers.")];
 
 /// The row of a function of at least so many numbers.
 macro_rules! of_all {
@@ -26,13 +28,19 @@ macro_rules! of_all {
 pub(super) const TABLE: &[Row] = &[
     of_all!("sum", 0, "The sum; 0 if empty.", sum, |_, _, by| by.fill(1.0)),
     of_all!("prod", 0, "The product; 1 if empty.", |xs| xs.iter().product(), |xs, _, by| {
-        let others = |i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();
+        let others =
+            |i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();
         by.iter_mut().enumerate().for_each(|(i, by)| *by = others(i));
     }),
-    of_all!("mean", 1, "The arithmetic mean of at least one number.", mean, |xs, _, by| by.fill(1.0 / xs.len() as f64)),
-    of_all!("var", 2, "The sample variance (divisor n - 1) of at least two numbers.", variance, |xs, _, by| {
-        spread_slopes(xs, 2.0, by)
-    }),
+    of_all!("mean", 1, "The arithmetic mean of at least one number.", mean, |xs, _, by| by
+        .fill(1.0 / xs.len() as f64)),
+    of_all!(
+        "var",
+        2,
+        "The sample variance (divisor n - 1) of at least two numbers.",
+        variance,
+        |xs, _, by| { spread_slopes(xs, 2.0, by) }
+    ),
     of_all!(
         "sd",
         2,
@@ -43,10 +51,13 @@ pub(super) const TABLE: &[Row] = &[
     of_all!("norm", 0, "The Euclidean norm.", norm, |xs, y, by| {
         by.iter_mut().zip(xs).for_each(|(by, x)| *by = x / y)
     }),
-    of_all!("log_sum_exp", 0, "`log(sum(exp(xs)))` without overflow; -inf if empty.", log_sum_exp, |xs, y, by| by
-        .iter_mut()
-        .zip(xs)
-        .for_each(|(by, x)| *by = libm::exp(x - y))),
+    of_all!(
+        "log_sum_exp",
+        0,
+        "`log(sum(exp(xs)))` without overflow; -inf if empty.",
+        log_sum_exp,
+        |xs, y, by| by.iter_mut().zip(xs).for_each(|(by, x)| *by = libm::exp(x - y))
+    ),
     function("cumsum", SECTION, XS, Type::Array, "The cumulative sums.", |a| {
         let mut total = 0.0;
         let running = |x: &f64| {

@@ -1,4 +1,5 @@
-//! The rows that the language's own built-ins are written in: constants, from which the table's entries are made.
+//! The rows that the language's own built-ins are written in: constants, from which the
+//! table's entries are made.
 
 use super::{Args, Argument, Builtin, Derivative, Kind, Pull, Scalar, Type};
 use crate::lang::error::Fault;
@@ -69,7 +70,18 @@ impl Row {
         doc: &'static str,
     ) -> Row {
         let derivative = Derivative::Unknown;
-        Row { name, module: "", section, args, variadic: false, returns, doc, kind, scalar: None, derivative }
+        Row {
+            name,
+            module: "",
+            section,
+            args,
+            variadic: false,
+            returns,
+            doc,
+            kind,
+            scalar: None,
+            derivative,
+        }
     }
 
     /// The same, known to be this on single numbers.

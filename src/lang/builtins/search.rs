@@ -9,13 +9,15 @@ use crate::diag::nearest;
 pub struct Found<'t> {
     /// The best first.
     pub entries: Vec<&'t Builtin>,
-    /// Words that nothing has, and the nearest ones, which were looked for in their place.
+    /// Words that nothing has, and the nearest ones, which were looked for in their
+    /// place.
     pub instead: Vec<(String, String)>,
     /// Words that nothing has and nothing is near to; they were left out.
     pub unknown: Vec<String>,
 }
 
-/// The built-ins that have all the words, those that have them in their names first, then by section, arguments, text.
+/// The built-ins that have all the words, those that have them in their names first, then
+/// by section, arguments, text.
 pub fn search<'t>(table: &'t Table, words: &str) -> Found<'t> {
     let texts: Vec<Text<'t>> = table.iter().map(Text::new).collect();
     let mut found = Found { entries: Vec::new(), instead: Vec::new(), unknown: Vec::new() };
@@ -41,7 +43,8 @@ pub fn search<'t>(table: &'t Table, words: &str) -> Found<'t> {
         let each: Vec<u32> = wanted.iter().map(|word| text.worth(word)).collect();
         each.iter().all(|worth| *worth > 0).then(|| each.iter().sum::<u32>())
     };
-    let mut ranked: Vec<(u32, &'t Builtin)> = texts.iter().filter_map(|text| Some((worth(text)?, text.of))).collect();
+    let mut ranked: Vec<(u32, &'t Builtin)> =
+        texts.iter().filter_map(|text| Some((worth(text)?, text.of))).collect();
     ranked.sort_by_key(|(worth, _)| std::cmp::Reverse(*worth));
     found.entries = ranked.into_iter().map(|(_, b)| b).collect();
     found
@@ -63,8 +66,9 @@ impl<'t> Text<'t> {
     fn new(of: &'t Builtin) -> Self {
         let args = of.args.iter().flat_map(|arg| words_of(&arg.name).chain(words_of(&arg.doc)));
         let known = KNOWN_AS.iter().find(|(name, _)| of.module.is_empty() && *name == of.name);
-        let elsewhere =
-            known.into_iter().flat_map(|(_, words)| words_of(words).chain(words.split(' ').map(str::to_owned)));
+        let elsewhere = known
+            .into_iter()
+            .flat_map(|(_, words)| words_of(words).chain(words.split(' ').map(str::to_owned)));
         Text {
             of,
             name: of.name.to_lowercase(),
@@ -77,7 +81,9 @@ impl<'t> Text<'t> {
     }
 
     fn words(&self) -> impl Iterator<Item = &str> {
-        let all = [&self.parts, &self.section, &self.doc, &self.args, &self.elsewhere].into_iter().flatten();
+        let all = [&self.parts, &self.section, &self.doc, &self.args, &self.elsewhere]
+            .into_iter()
+            .flatten();
         all.map(String::as_str).chain(std::iter::once(self.name.as_str()))
     }
 
@@ -133,7 +139,11 @@ mod tests {
         let table = Table::default();
         for b in table.iter() {
             let found = search(&table, &b.full_name()).entries;
-            assert!(found.iter().take(2).any(|f| f.full_name() == b.full_name()), "{}", b.full_name());
+            assert!(
+                found.iter().take(2).any(|f| f.full_name() == b.full_name()),
+                "{}",
+                b.full_name()
+            );
         }
     }
 

@@ -3,8 +3,8 @@
 //! Not a scope: shadowing by a program's own names is the business of lowering.
 
 use super::{
-    Builtin, Row, Text, covariance, data, definite, distributions, forms, inference, interp, list, log_density, math,
-    matrix, operators, reduce, scene,
+    Builtin, Row, Text, covariance, data, definite, distributions, forms, inference, interp, list,
+    log_density, math, matrix, operators, reduce, scene,
 };
 use indexmap::{Equivalent, IndexMap};
 use rustc_hash::FxBuildHasher;
@@ -21,8 +21,16 @@ pub struct Constant {
 }
 
 const CONSTANTS: &[Constant] = &[
-    Constant { name: "pi", value: std::f64::consts::PI, doc: "The ratio of a circle's circumference to its diameter." },
-    Constant { name: "inf", value: f64::INFINITY, doc: "Positive infinity; `-inf` is the log of zero." },
+    Constant {
+        name: "pi",
+        value: std::f64::consts::PI,
+        doc: "The ratio of a circle's circumference to its diameter.",
+    },
+    Constant {
+        name: "inf",
+        value: f64::INFINITY,
+        doc: "Positive infinity; `-inf` is the log of zero.",
+    },
 ];
 
 /// Those of the language, in the order of the reference.
@@ -72,7 +80,8 @@ impl Default for Table {
 }
 
 impl Table {
-    /// The built-ins of the language and these; one of the same module and name replaces the language's own.
+    /// The built-ins of the language and these; one of the same module and name replaces
+    /// the language's own.
     pub fn new(more: impl IntoIterator<Item = Builtin>) -> Self {
         let all = all().chain(more);
         Table { entries: all.map(|b| (FullName(b.module.clone(), b.name.clone()), b)).collect() }
@@ -83,7 +92,8 @@ impl Table {
         &self.entries[i as usize]
     }
 
-    /// The index of a built-in; operators are named as they are written, with `neg` and `not` for the prefix ones.
+    /// The index of a built-in; operators are named as they are written, with `neg` and
+    /// `not` for the prefix ones.
     pub fn find(&self, module: &str, name: &str) -> Option<u32> {
         self.entries.get_index_of(&Sought(module, name)).map(|i| i as u32)
     }

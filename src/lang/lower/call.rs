@@ -1,4 +1,5 @@
-//! Calls: of built-ins, forms, named functions and function values, with their arguments matched and checked.
+//! Calls: of built-ins, forms, named functions and function values, with their arguments
+//! matched and checked.
 
 use super::scope::Meaning;
 use super::types::{accepts, shown};
@@ -19,17 +20,27 @@ enum Target {
 }
 
 impl Lowerer<'_> {
-    pub fn call(&mut self, e: &Expr, callee: &Expr, args: &[Arg], name: Option<&Arc<str>>) -> Typed {
+    pub fn call(
+        &mut self,
+        e: &Expr,
+        callee: &Expr,
+        args: &[Arg],
+        name: Option<&Arc<str>>,
+    ) -> Typed {
         match self.target(callee) {
             Target::Builtin(i) => {
                 let table = Arc::clone(&self.code.builtins);
                 let b = table.get(i);
                 match b.kind {
                     Kind::Form(form) => self.form(form, i, args, e.span, name),
-                    Kind::Function(_) | Kind::Distribution(_) => match self.builtin_args(i, args, e.span) {
-                        Some(operands) => self.op(Op::Prim { builtin: i, args: operands }, b.returns, e.span),
-                        None => self.nothing(),
-                    },
+                    Kind::Function(_) | Kind::Distribution(_) => {
+                        match self.builtin_args(i, args, e.span) {
+                            Some(operands) => {
+                                self.op(Op::Prim { builtin: i, args: operands }, b.returns, e.span)
+                            }
+                            None => self.nothing(),
+                        }
+                    }
                     Kind::Inference => {
                         self.only_in_plans(&b.name, callee.span);
                         self.nothing()
@@ -42,7 +53,11 @@ impl Lowerer<'_> {
                 let label = self.callee_name(callee);
                 let site = self.site(&label, Vec::new(), 0);
                 let ops = args.into_iter().map(|(k, v, _)| (k, v.at)).collect();
-                self.op(Op::Call { callee: Callee::Static(block), args: ops, site }, Type::Any, e.span)
+                self.op(
+                    Op::Call { callee: Callee::Static(block), args: ops, site },
+                    Type::Any,
+                    e.span,
+                )
             }
             Target::Value => {
                 let f = self.expr(callee);
@@ -66,7 +81,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// A call of a built-in family of distributions, for `x ~ family(…)` and `observe family(…) = v`.
+    /// A call of a built-in family of distributions, for `x ~ family(…)` and
+    /// `observe family(…) = v`.
     pub fn family_call(&mut self, e: &Expr) -> Option<(u32, Box<[Operand]>)> {
         let ExprKind::Call { callee, args } = &e.kind else { return None };
         let name_is_free = match &callee.kind {
@@ -169,9 +185,18 @@ impl Lowerer<'_> {
                 Some(j) => {
                     let v = values[*j];
                     if !accepts(arg.ty, v.ty) {
-                        let message =
-                            format!("{}: `{}` must be {}, got {}", b.full_name(), arg.name, shown(arg.ty), shown(v.ty));
-                        let e = self.error(message, args[*j].value.span, format!("this is {}", shown(v.ty)));
+                        let message = format!(
+                            "{}: `{}` must be {}, got {}",
+                            b.full_name(),
+                            arg.name,
+                            shown(arg.ty),
+                            shown(v.ty)
+                        );
+                        let e = self.error(
+                            message,
+                            args[*j].value.span,
+                            format!("this is {}", shown(v.ty)),
+                        );
                         if v.ty == Type::Dist {
                             e.hint_also("draw a value first: x ~ …; then use x");
                         } else {
@@ -182,7 +207,11 @@ impl Lowerer<'_> {
                 }
                 None => {
                     let full: &str = &b.full_name();
-                    let given = self.inputs.defaults.iter().find(|((f, a), _)| f == full && *a == *arg.name);
+                    let given = self
+                        .inputs
+                        .defaults
+                        .iter()
+                        .find(|((f, a), _)| f == full && *a == *arg.name);
                     let value = given.map_or(Value::Unit, |(_, v)| v.clone());
                     operands.push(self.constant(value).at);
                 }
@@ -198,7 +227,14 @@ impl Lowerer<'_> {
         }
     }
 
-    fn form(&mut self, form: Form, i: u32, args: &[Arg], span: Span, name: Option<&Arc<str>>) -> Typed {
+    fn form(
+        &mut self,
+        form: Form,
+        i: u32,
+        args: &[Arg],
+        span: Span,
+        name: Option<&Arc<str>>,
+    ) -> Typed {
         let table = Arc::clone(&self.code.builtins);
         let b = table.get(i);
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
@@ -209,7 +245,8 @@ impl Lowerer<'_> {
                 return self.nothing();
             }
         };
-        let arg = |p: usize| order.get(p).copied().flatten().and_then(|j| args.get(j)).map(|a| &a.value);
+        let arg =
+            |p: usize| order.get(p).copied().flatten().and_then(|j| args.get(j)).map(|a| &a.value);
         let function = |l: &mut Self, e: Option<&Expr>| -> (Typed, Arc<str>) {
             let Some(e) = e else { return (l.nothing(), Arc::from("fn")) };
             let label = match &e.kind {
@@ -218,8 +255,13 @@ impl Lowerer<'_> {
             };
             let value = l.expr(e);
             if !accepts(Type::Function, value.ty) {
-                let message = format!("the first argument of `{}` must be a function, got {}", b.name, shown(value.ty));
-                l.error(message, e.span, format!("this is {}", shown(value.ty))).hint_also(b.signature());
+                let message = format!(
+                    "the first argument of `{}` must be a function, got {}",
+                    b.name,
+                    shown(value.ty)
+                );
+                l.error(message, e.span, format!("this is {}", shown(value.ty)))
+                    .hint_also(b.signature());
             }
             (value, label)
         };
@@ -254,7 +296,10 @@ impl Lowerer<'_> {
 
     /// Checks the number and keywords of a named function's arguments.
     fn check_arity(&mut self, block: u32, args: &[(Option<Arc<str>>, Typed, Span)], span: Span) {
-        let BlockKind::Function { name, params, required } = &self.code.blocks[block as usize].kind else { return };
+        let BlockKind::Function { name, params, required } = &self.code.blocks[block as usize].kind
+        else {
+            return;
+        };
         let (name, params, required) = (Arc::clone(name), Arc::clone(params), *required);
         let signature = format!("{name}({})", params.join(", "));
         let mut given = vec![false; params.len()];
@@ -266,12 +311,21 @@ impl Lowerer<'_> {
             match (p, keyword) {
                 (Some(p), _) if !given[p] => given[p] = true,
                 (Some(p), _) => {
-                    self.error(format!("`{name}` got its argument `{}` twice", params[p]), *at, "given again here");
+                    self.error(
+                        format!("`{name}` got its argument `{}` twice", params[p]),
+                        *at,
+                        "given again here",
+                    );
                     return;
                 }
                 (None, Some(k)) => {
-                    let near = crate::diag::nearest(k, params.iter().map(|p| &**p)).map(str::to_owned);
-                    let e = self.error(format!("`{name}` has no argument `{k}`"), *at, "unknown keyword");
+                    let near =
+                        crate::diag::nearest(k, params.iter().map(|p| &**p)).map(str::to_owned);
+                    let e = self.error(
+                        format!("`{name}` has no argument `{k}`"),
+                        *at,
+                        "unknown keyword",
+                    );
                     e.hint_also(near.map_or(signature, |n| format!("did you mean `{n}`?")));
                     return;
                 }
@@ -281,15 +335,23 @@ impl Lowerer<'_> {
                         1 => "1 argument".to_owned(),
                         n => format!("{n} arguments"),
                     };
-                    self.error(format!("`{name}` takes {takes}, got {}", args.len()), *at, "one too many")
-                        .hint_also(signature);
+                    self.error(
+                        format!("`{name}` takes {takes}, got {}", args.len()),
+                        *at,
+                        "one too many",
+                    )
+                    .hint_also(signature);
                     return;
                 }
             }
         }
         if let Some(p) = (0..required).find(|p| !given[*p]) {
-            self.error(format!("`{name}` needs its argument `{}`", params[p]), span, "in this call")
-                .hint_also(signature);
+            self.error(
+                format!("`{name}` needs its argument `{}`", params[p]),
+                span,
+                "in this call",
+            )
+            .hint_also(signature);
         }
     }
 }

@@ -25,10 +25,15 @@ impl Lowerer<'_> {
     fn drawn_type(&self, d: &DistSpec) -> Type {
         match d {
             // What a host's family draws only the host knows.
-            DistSpec::Family { builtin, .. } if self.code.builtins.get(*builtin).foreign.is_some() => Type::Any,
+            DistSpec::Family { builtin, .. }
+                if self.code.builtins.get(*builtin).foreign.is_some() =>
+            {
+                Type::Any
+            }
             DistSpec::Family { builtin, args } => match &*self.code.builtins.get(*builtin).name {
                 "flip" => Type::Any,
-                "dirichlet" | "mv_normal" | "gp" | "multinomial" | "lkj" | "wishart" | "ordered" => Type::Array,
+                "dirichlet" | "mv_normal" | "gp" | "multinomial" | "lkj" | "wishart"
+                | "ordered" => Type::Array,
                 "iid" | "mixture" => Type::Any,
                 _ if args.iter().all(|a| self.is_number(*a)) => Type::Num,
                 // A parameter that is an array makes the choice one.
@@ -45,7 +50,11 @@ impl Lowerer<'_> {
     /// `t[k] ~ d`.
     pub fn keyed_draw(&mut self, target: &Expr, dist: &Expr, tags: &[Tag]) {
         let Some((name, keys)) = keyed_target(target) else {
-            self.error("a choice is drawn into a name or an element", target.span, "expected `x` or `t[k]`");
+            self.error(
+                "a choice is drawn into a name or an element",
+                target.span,
+                "expected `x` or `t[k]`",
+            );
             return;
         };
         if !self.in_loop() {
@@ -73,7 +82,8 @@ impl Lowerer<'_> {
             ExprKind::Var(v) => variables.iter().rposition(|x| x == v),
             _ => None,
         };
-        let plain = keys.len() == loops.len() && keys.iter().enumerate().all(|(i, k)| loop_of(k) == Some(i));
+        let plain = keys.len() == loops.len()
+            && keys.iter().enumerate().all(|(i, k)| loop_of(k) == Some(i));
         let carried = if plain {
             0
         } else {
@@ -109,7 +119,9 @@ impl Lowerer<'_> {
             .collect();
         let source = Source { loops: through, draw: slot, keys: source_keys };
         let home = self.scopes[outside].block;
-        if let Op::Container { sources, .. } = &mut self.code.blocks[home as usize].ops[container as usize] {
+        if let Op::Container { sources, .. } =
+            &mut self.code.blocks[home as usize].ops[container as usize]
+        {
             let mut all = std::mem::take(sources).into_vec();
             all.push(source);
             *sources = all.into();
@@ -117,14 +129,19 @@ impl Lowerer<'_> {
         let last = self.scopes.len() - 1;
         let scope = &mut self.scopes[last];
         if scope.drawn.iter().any(|(n, w, _)| *n == name.node && *w == written) {
-            self.error(format!("`{}{written}` is drawn twice", name.node), target.span, "a second draw at one address")
-                .hint_also("every choice needs its own address: use another key, or another name");
+            self.error(
+                format!("`{}{written}` is drawn twice", name.node),
+                target.span,
+                "a second draw at one address",
+            )
+            .hint_also("every choice needs its own address: use another key, or another name");
             return;
         }
         scope.drawn.push((name.node, written, slot));
     }
 
-    /// Which occurrence of its name a container is. `z[0] ~ d; for t in 1 .. n { z[t] ~ e; }` draws `@z[0]`, `@z[1]`, …: that two of
+    /// Which occurrence of its name a container is.
+    /// `z[0] ~ d; for t in 1 .. n { z[t] ~ e; }` draws `@z[0]`, `@z[1]`, …: that two of
     /// its elements have one address is found when they are drawn.
     fn occurrence_of(&mut self, container: (u32, Slot), name: &Arc<str>) -> u32 {
         if let Some(n) = self.bodies.last().and_then(|b| b.containers.get(&container)) {
@@ -137,7 +154,8 @@ impl Lowerer<'_> {
         n
     }
 
-    /// Declares the containers that statements of this block, and loops in them, draw into.
+    /// Declares the containers that statements of this block, and loops in them, draw
+    /// into.
     pub fn declare_containers(&mut self, stmts: &[Stmt]) {
         if self.in_loop() {
             return;
@@ -149,7 +167,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Whether the innermost block is a loop's: its containers belong to a block further out.
+    /// Whether the innermost block is a loop's: its containers belong to a block further
+    /// out.
     fn in_loop(&self) -> bool {
         self.scopes.last().is_some_and(|s| matches!(s.kind, ScopeKind::Loop { .. }))
     }
@@ -178,16 +197,20 @@ impl Lowerer<'_> {
     }
 
     fn not_a_container(&mut self, name: &Name, bound: Span) {
-        let message = format!("`{}` is already bound and cannot also hold keyed choices", name.node);
+        let message =
+            format!("`{}` is already bound and cannot also hold keyed choices", name.node);
         let e = self.error(message, name.span, "used as a container here");
         e.point_at(bound, "bound here");
         e.hint_also("give the container another name");
     }
 
-    /// The slot that an element was drawn into, if `base[keys]` is written exactly as where it was drawn, in this pass.
+    /// The slot that an element was drawn into, if `base[keys]` is written exactly as
+    /// where it was drawn, in this pass.
     pub fn drawn_here(&self, name: &str, written: &str) -> Option<Operand> {
         for (up, scope) in self.scopes.iter().rev().enumerate() {
-            if let Some((_, _, slot)) = scope.drawn.iter().find(|(n, w, _)| &**n == name && w == written) {
+            if let Some((_, _, slot)) =
+                scope.drawn.iter().find(|(n, w, _)| &**n == name && w == written)
+            {
                 return Some(Self::reach(Operand::Local(*slot), up as u16));
             }
             let bound = match scope.kind {

@@ -21,8 +21,12 @@ impl Lowerer<'_> {
             ExprKind::Bool(b) => self.constant(Value::Bool(*b)),
             ExprKind::Var(name) => self.variable(name, e.span),
             ExprKind::Address(_) | ExprKind::TagSel { .. } => {
-                self.error("a selection of choices is not a value of the model", e.span, "a selection")
-                    .hint_also("selections belong in inference blocks, `freeze` and `force`");
+                self.error(
+                    "a selection of choices is not a value of the model",
+                    e.span,
+                    "a selection",
+                )
+                .hint_also("selections belong in inference blocks, `freeze` and `force`");
                 self.nothing()
             }
             ExprKind::Array(xs) => {
@@ -87,8 +91,12 @@ impl Lowerer<'_> {
         if let Some((b, up)) = self.lookup(name) {
             return match b.meaning {
                 Meaning::Value(o) => Typed { at: Self::reach(o, up), ty: b.ty },
-                Meaning::Container(slot) => Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any },
-                Meaning::Function(block) => self.constant(Value::Closure(Closure { block, frame: 0 })),
+                Meaning::Container(slot) => {
+                    Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any }
+                }
+                Meaning::Function(block) => {
+                    self.constant(Value::Closure(Closure { block, frame: 0 }))
+                }
             };
         }
         if let Some(x) = self.code.builtins.constant(name) {
@@ -96,7 +104,9 @@ impl Lowerer<'_> {
         }
         if let Some(i) = self.find_builtin(name) {
             match self.code.builtins.get(i).kind {
-                Kind::Function(_) | Kind::Distribution(_) => return self.constant(Value::Builtin(i)),
+                Kind::Function(_) | Kind::Distribution(_) => {
+                    return self.constant(Value::Builtin(i));
+                }
                 Kind::Form(_) => {
                     self.error(format!("`{name}` can only be called"), span, "not a value")
                         .hint_also(format!("wrap it in a function: fn(x) {{ {name}(…) }}"));
@@ -125,7 +135,11 @@ impl Lowerer<'_> {
         let mut values = Vec::with_capacity(fields.len());
         for (name, e) in fields {
             if names.contains(&name.node) {
-                self.error(format!("the field `{}` occurs twice", name.node), name.span, "again here");
+                self.error(
+                    format!("the field `{}` occurs twice", name.node),
+                    name.span,
+                    "again here",
+                );
             }
             names.push(Arc::clone(&name.node));
             values.push(self.expr(e).at);
@@ -159,16 +173,26 @@ impl Lowerer<'_> {
             let key = self.expr(k);
             if matches!(
                 value.ty,
-                Type::Num | Type::Int | Type::Bool | Type::Str | Type::Dist | Type::Function | Type::Likelihood
+                Type::Num
+                    | Type::Int
+                    | Type::Bool
+                    | Type::Str
+                    | Type::Dist
+                    | Type::Function
+                    | Type::Likelihood
             ) {
                 let message = format!("{} has no elements", shown(value.ty));
                 self.error(message, base.span, format!("this is {}", shown(value.ty)));
                 return self.nothing();
             }
             if matches!(value.ty, Type::Array | Type::Nums)
-                && matches!(key.ty, Type::Bool | Type::Str | Type::Record | Type::Dist | Type::Function)
+                && matches!(
+                    key.ty,
+                    Type::Bool | Type::Str | Type::Record | Type::Dist | Type::Function
+                )
             {
-                let message = format!("an array index must be a whole number, got {}", shown(key.ty));
+                let message =
+                    format!("an array index must be a whole number, got {}", shown(key.ty));
                 self.error(message, k.span, format!("this is {}", shown(key.ty)));
                 return self.nothing();
             }
@@ -177,7 +201,8 @@ impl Lowerer<'_> {
         value
     }
 
-    /// A field of what is known before a run, such as a column of a file: where it is read in any case, it must be there.
+    /// A field of what is known before a run, such as a column of a file: where it is
+    /// read in any case, it must be there.
     fn check_field(&mut self, base: Operand, field: &Name) {
         let always = |s: &Scope| matches!(s.kind, ScopeKind::Root | ScopeKind::Loop { .. });
         let Operand::Const(i) = base else { return };
@@ -207,12 +232,21 @@ impl Lowerer<'_> {
         let value = self.expr(base);
         if matches!(
             value.ty,
-            Type::Num | Type::Int | Type::Bool | Type::Str | Type::Array | Type::Nums | Type::Dist | Type::Function
+            Type::Num
+                | Type::Int
+                | Type::Bool
+                | Type::Str
+                | Type::Array
+                | Type::Nums
+                | Type::Dist
+                | Type::Function
         ) {
             let message = format!("{} has no field `{}`", shown(value.ty), field.node);
             let e = self.error(message, base.span, format!("this is {}", shown(value.ty)));
             match value.ty {
-                Type::Array => e.hint_also("elements of an array are indexed by number: a[0], a[1], …"),
+                Type::Array => {
+                    e.hint_also("elements of an array are indexed by number: a[0], a[1], …")
+                }
                 Type::Function => e.hint_also(format!("call it first: f(…).{}", field.node)),
                 _ => {}
             }
@@ -229,8 +263,12 @@ impl Lowerer<'_> {
             let up = (self.scopes.len() - 1) as u16;
             return match b.meaning {
                 Meaning::Value(o) => Typed { at: Self::reach(o, up), ty: b.ty },
-                Meaning::Container(slot) => Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any },
-                Meaning::Function(block) => self.constant(Value::Closure(Closure { block, frame: 0 })),
+                Meaning::Container(slot) => {
+                    Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any }
+                }
+                Meaning::Function(block) => {
+                    self.constant(Value::Closure(Closure { block, frame: 0 }))
+                }
             };
         }
         if let Some(native) = &self.modules[module].native
@@ -243,10 +281,13 @@ impl Lowerer<'_> {
         self.nothing()
     }
 
-    /// The index of a built-in of the language, or of the native module whose file this is.
+    /// The index of a built-in of the language, or of the native module whose file this
+    /// is.
     pub fn find_builtin(&self, name: &str) -> Option<u32> {
         let native = self.modules[self.module].native.as_deref();
-        native.and_then(|m| self.code.builtins.find(m, name)).or_else(|| self.code.builtins.find("", name))
+        native
+            .and_then(|m| self.code.builtins.find(m, name))
+            .or_else(|| self.code.builtins.find("", name))
     }
 
     fn binary(&mut self, op: BinaryOp, left: &Expr, right: &Expr, span: Span) -> Typed {
@@ -261,7 +302,8 @@ impl Lowerer<'_> {
                     Some(v)
                 });
                 let fixed = self.branch(|_| Some(Typed { at: settled, ty: Type::Bool }));
-                let (then, otherwise) = if op == BinaryOp::And { (other.0, fixed.0) } else { (fixed.0, other.0) };
+                let (then, otherwise) =
+                    if op == BinaryOp::And { (other.0, fixed.0) } else { (fixed.0, other.0) };
                 self.op(Op::If { cond: cond.at, then, otherwise }, Type::Bool, left.span)
             }
             BinaryOp::Intersect => {
@@ -314,7 +356,11 @@ impl Lowerer<'_> {
 
     pub fn check_bool(&mut self, v: Typed, span: Span, what: &str) {
         if !matches!(v.ty, Type::Any | Type::Bool) {
-            let e = self.error(format!("{what}, got {}", shown(v.ty)), span, format!("this is {}", shown(v.ty)));
+            let e = self.error(
+                format!("{what}, got {}", shown(v.ty)),
+                span,
+                format!("this is {}", shown(v.ty)),
+            );
             if matches!(v.ty, Type::Num | Type::Int | Type::Nums) {
                 e.hint_also("compare it, e.g. x != 0");
             }
@@ -336,7 +382,8 @@ impl Lowerer<'_> {
         self.scopes.push(Scope::new(block, ScopeKind::Branch));
         let result = f(self);
         self.scopes.pop();
-        // A constant or a slot further out is seen one level deeper from inside; `f` gave it as seen there.
+        // A constant or a slot further out is seen one level deeper from inside; `f` gave
+        // it as seen there.
         self.code.blocks[block as usize].result = result.map(|t| t.at);
         (block, result.map_or(Type::Any, |t| t.ty))
     }

@@ -1,4 +1,5 @@
-//! What to say of a name nobody knows: where it is bound after all, what is near, what it is called here.
+//! What to say of a name nobody knows: where it is bound after all, what is near, what it
+//! is called here.
 //!
 //! Only messages are made here: nothing in it decides whether a program is correct.
 
@@ -58,10 +59,13 @@ impl Lowerer<'_> {
         });
         let elsewhere = self.bound_elsewhere(name, span);
         let lives = builtins.iter().find(|b| b.name == name && !b.module.is_empty());
-        let lives = lives.map(|b| format!("include \"std/{0}.pcad\" as {0}; then write {0}.{name}", b.module));
+        let lives = lives
+            .map(|b| format!("include \"std/{0}.pcad\" as {0}; then write {0}.{name}", b.module));
         let module = builtins.iter().find(|b| b.module == name);
-        let module = module.map(|_| format!("add at the top: include \"std/{name}.pcad\" as {name};"));
-        let called = ELSEWHERE.iter().find(|(n, _)| *n == name).map(|(_, here)| format!("write `{here}`"));
+        let module =
+            module.map(|_| format!("add at the top: include \"std/{name}.pcad\" as {name};"));
+        let called =
+            ELSEWHERE.iter().find(|(n, _)| *n == name).map(|(_, here)| format!("write `{here}`"));
         let e = self.error(format!("unknown name `{name}`"), span, "not bound here");
         match elsewhere {
             Some(Elsewhere::Later(at)) => {
@@ -98,16 +102,24 @@ impl Lowerer<'_> {
                     return Some(Elsewhere::Later(d.name.span));
                 }
                 ItemKind::Fn(f) => {
-                    let parameter = f.lambda.params.iter().map(|p| &p.name).find(|n| &*n.node == name);
-                    let found = parameter.map(|n| n.span).or_else(|| bound_in(&f.lambda.body.stmts, name));
+                    let parameter =
+                        f.lambda.params.iter().map(|p| &p.name).find(|n| &*n.node == name);
+                    let found =
+                        parameter.map(|n| n.span).or_else(|| bound_in(&f.lambda.body.stmts, name));
                     inner = inner.or(found.map(|at| Elsewhere::Inside(at, "function")));
                 }
                 ItemKind::Stmt(s) => {
                     if let Some(n) = binds(s, name) {
-                        return Some(if within { Elsewhere::Itself(n) } else { Elsewhere::Later(n) });
+                        return Some(if within {
+                            Elsewhere::Itself(n)
+                        } else {
+                            Elsewhere::Later(n)
+                        });
                     }
                     if let StmtKind::For { var, body, .. } = &s.kind {
-                        let found = Some(var.span).filter(|_| &*var.node == name).or_else(|| bound_in(body, name));
+                        let found = Some(var.span)
+                            .filter(|_| &*var.node == name)
+                            .or_else(|| bound_in(body, name));
                         inner = inner.or(found.map(|at| Elsewhere::Inside(at, "loop")));
                     }
                 }
@@ -123,29 +135,41 @@ impl Lowerer<'_> {
         let m = &self.modules[module];
         let native = m.native.clone();
         let own = m.names.keys().cloned().collect::<Vec<_>>();
-        let natives = table.iter().filter(|b| native.as_deref() == Some(&*b.module)).map(|b| &*b.name);
+        let natives =
+            table.iter().filter(|b| native.as_deref() == Some(&*b.module)).map(|b| &*b.name);
         let known: Vec<&str> = own.iter().map(|n| &**n).chain(natives).collect();
         let hint = match nearest(&field.node, known.iter().copied()) {
             Some(n) => format!("did you mean `{ns}.{n}`?"),
             None if known.is_empty() => "it has no names".into(),
             None => format!("it has {}", known.join(", ")),
         };
-        self.error(format!("`{ns}` has no `{}`", field.node), field.span, "unknown name").hint_also(hint);
+        self.error(format!("`{ns}` has no `{}`", field.node), field.span, "unknown name")
+            .hint_also(hint);
     }
 
     /// The arguments of a built-in that do not match what it takes; `message` says how.
-    pub fn mismatch(&mut self, b: &Builtin, message: String, args: &[Arg], span: Span) -> &mut Diagnostic {
+    pub fn mismatch(
+        &mut self,
+        b: &Builtin,
+        message: String,
+        args: &[Arg],
+        span: Span,
+    ) -> &mut Diagnostic {
         // The table's messages end with what it takes, or with a guess.
         let cut = [": ", "; "].iter().filter_map(|s| message.find(s)).min();
         let (message, rest) = match cut {
             Some(i) => (message[..i].to_owned(), message[i + 2..].to_owned()),
             None => (message, b.signature()),
         };
-        let unknown = args.iter().filter_map(|a| a.name.as_ref()).find(|n| !b.args.iter().any(|p| p.name == *n.node));
+        let unknown = args
+            .iter()
+            .filter_map(|a| a.name.as_ref())
+            .find(|n| !b.args.iter().any(|p| p.name == *n.node));
         let again = args.iter().enumerate().find_map(|(i, a)| {
             let n = a.name.as_ref()?;
             let place = b.args.iter().position(|p| p.name == *n.node)?;
-            let earlier = args[..i].iter().any(|o| o.name.as_ref().is_some_and(|o| o.node == n.node));
+            let earlier =
+                args[..i].iter().any(|o| o.name.as_ref().is_some_and(|o| o.node == n.node));
             let positional = args[..i].get(place).is_some_and(|o| o.name.is_none());
             (earlier || positional).then_some(n.span)
         });
@@ -164,7 +188,9 @@ impl Lowerer<'_> {
 /// Where a statement by itself binds a name.
 fn binds(s: &Stmt, name: &str) -> Option<Span> {
     let bound = match &s.kind {
-        StmtKind::Assume { name, .. } | StmtKind::Predict { name, .. } | StmtKind::Let { name, .. } => name,
+        StmtKind::Assume { name, .. }
+        | StmtKind::Predict { name, .. }
+        | StmtKind::Let { name, .. } => name,
         _ => return None,
     };
     (&*bound.node == name).then_some(bound.span)

@@ -27,7 +27,8 @@ pub struct DataItem {
     pub ty: Option<String>,
     /// Whether it has a default.
     pub has_default: bool,
-    /// How its default says that files are to be read; another file in its place is read alike.
+    /// How its default says that files are to be read; another file in its place is read
+    /// alike.
     pub options: Options,
     /// The help text.
     pub help: Option<String>,
@@ -64,13 +65,16 @@ fn unit(loaded: &Loaded, index: usize, prefix: &str, found: &mut Interface) {
             ItemKind::Data(d) => {
                 let read = d.default.as_ref().and_then(|e| match &e.kind {
                     ExprKind::Call { callee, args } => match &callee.kind {
-                        ExprKind::Var(kind) => Some((kind.to_string(), args.get(1..).unwrap_or_default())),
+                        ExprKind::Var(kind) => {
+                            Some((kind.to_string(), args.get(1..).unwrap_or_default()))
+                        }
                         _ => None,
                     },
                     _ => None,
                 });
                 // What is wrong with options is said when the program is lowered.
-                let options = read.as_ref().and_then(|(kind, args)| Options::parse(kind, args).ok());
+                let options =
+                    read.as_ref().and_then(|(kind, args)| Options::parse(kind, args).ok());
                 found.data.push(DataItem {
                     name: format!("{prefix}{}", d.name.node),
                     ty: d.ty.as_ref().map(|t| t.node.to_string()).or(read.map(|(kind, _)| kind)),

@@ -7,7 +7,9 @@ use crate::diag::{IntoDiagnostic, nearest};
 use crate::lang::builtins::{Type, data};
 use crate::lang::code::{BlockKind, Op};
 use crate::lang::value::{Closure, Value};
-use crate::syntax::ast::{Declaration, Expr, ExprKind, FnDecl, Item, ItemKind, Lambda, Stmt, StmtKind};
+use crate::syntax::ast::{
+    Declaration, Expr, ExprKind, FnDecl, Item, ItemKind, Lambda, Stmt, StmtKind,
+};
 use crate::syntax::parse_expr;
 use std::sync::Arc;
 
@@ -43,19 +45,28 @@ impl Lowerer<'_> {
             match &item.kind {
                 ItemKind::Include { alias, path } => {
                     let Some(included) = unit.includes.get(i).copied().flatten() else { continue };
-                    let native = path.node.strip_prefix("std/").and_then(|p| p.strip_suffix(".pcad")).map(Arc::from);
+                    let native = path
+                        .node
+                        .strip_prefix("std/")
+                        .and_then(|p| p.strip_suffix(".pcad"))
+                        .map(Arc::from);
                     match alias {
                         Some(alias) => {
                             let prefix = Some(Arc::clone(&alias.node));
                             self.modules.push(Module { prefix, native, ..Module::default() });
                             let module = self.modules.len() - 1;
                             let space = Namespace { module, span: alias.span };
-                            let old = self.modules[self.module].namespaces.insert(Arc::clone(&alias.node), space);
+                            let old = self.modules[self.module]
+                                .namespaces
+                                .insert(Arc::clone(&alias.node), space);
                             if let Some(old) = old {
-                                let message = format!("the namespace `{}` is declared twice", alias.node);
+                                let message =
+                                    format!("the namespace `{}` is declared twice", alias.node);
                                 let e = self.error(message, alias.span, "declared again here");
                                 e.point_at(old.span, "first declared here");
-                                e.hint_also("rename one of them after `as`, or include the file once");
+                                e.hint_also(
+                                    "rename one of them after `as`, or include the file once",
+                                );
                             }
                             let outer = std::mem::replace(&mut self.module, module);
                             self.unit(included);
@@ -86,7 +97,10 @@ impl Lowerer<'_> {
                     self.plans.push(Plan { name, body: body.clone().into() });
                 }
                 ItemKind::Report { exprs, file } if index == 0 => {
-                    self.reports.push(Report { exprs: exprs.clone(), file: file.as_ref().map(super::text) });
+                    self.reports.push(Report {
+                        exprs: exprs.clone(),
+                        file: file.as_ref().map(super::text),
+                    });
                 }
                 ItemKind::Export { expr, file } if index == 0 => {
                     self.exports.push(Export { expr: expr.clone(), file: super::text(file) });
@@ -101,14 +115,20 @@ impl Lowerer<'_> {
     fn forgotten(&mut self, items: &[Item]) -> Vec<usize> {
         let mut gone = Vec::new();
         for (i, item) in items.iter().enumerate() {
-            let ItemKind::Stmt(Stmt { kind: StmtKind::Forget(e), .. }) = &item.kind else { continue };
+            let ItemKind::Stmt(Stmt { kind: StmtKind::Forget(e), .. }) = &item.kind else {
+                continue;
+            };
             gone.push(i);
             let name = match &e.kind {
                 ExprKind::Var(name) => Some(Arc::clone(name)),
                 _ => None,
             };
             let Some(name) = name else {
-                self.error("`forget` takes the name of an observation or assume", e.span, "not a name");
+                self.error(
+                    "`forget` takes the name of an observation or assume",
+                    e.span,
+                    "not a name",
+                );
                 continue;
             };
             let is_it = |item: &Item| forgettable(item).is_some_and(|n| n.node == name);
@@ -121,7 +141,9 @@ impl Lowerer<'_> {
                     let e = self.error(message, e.span, "nothing to forget");
                     match near {
                         Some(n) => e.hint_also(format!("did you mean `{n}`?")),
-                        None => e.hint_also("name an observation with `as` to be able to forget it"),
+                        None => {
+                            e.hint_also("name an observation with `as` to be able to forget it")
+                        }
                     }
                 }
             }
@@ -142,8 +164,10 @@ impl Lowerer<'_> {
 
     /// An empty function block.
     pub fn function_block(&mut self, name: Arc<str>, lambda: &Lambda) -> u32 {
-        let params: Arc<[Arc<str>]> = lambda.params.iter().map(|p| Arc::clone(&p.name.node)).collect();
-        let required = lambda.params.iter().position(|p| p.default.is_some()).unwrap_or(lambda.params.len());
+        let params: Arc<[Arc<str>]> =
+            lambda.params.iter().map(|p| Arc::clone(&p.name.node)).collect();
+        let required =
+            lambda.params.iter().position(|p| p.default.is_some()).unwrap_or(lambda.params.len());
         if let Some(p) = lambda.params[required..].iter().find(|p| p.default.is_none()) {
             let message = format!("the parameter `{}` needs a default", p.name.node);
             self.error(message, p.name.span, "comes after one that has a default")
@@ -168,7 +192,8 @@ impl Lowerer<'_> {
         for (i, p) in lambda.params.iter().enumerate() {
             if let Some(e) = &p.default {
                 let value = self.expr(e).at;
-                self.code.blocks[block as usize].ops[i] = Op::Param { index: i as u16, default: Some(value) };
+                self.code.blocks[block as usize].ops[i] =
+                    Op::Param { index: i as u16, default: Some(value) };
             }
         }
         let result = self.body_of(&lambda.body);
@@ -191,7 +216,11 @@ impl Lowerer<'_> {
         let ty = match &d.ty {
             Some(t) => declared(&t.node).unwrap_or_else(|| {
                 let near = nearest(&t.node, TYPES).map(str::to_owned);
-                let e = self.error(format!("there is no parameter type `{}`", t.node), t.span, "unknown type");
+                let e = self.error(
+                    format!("there is no parameter type `{}`", t.node),
+                    t.span,
+                    "unknown type",
+                );
                 match near {
                     Some(n) => e.hint_also(format!("did you mean `{n}`?")),
                     None => e.hint_also(format!("types are {}", TYPES.join(", "))),
@@ -215,13 +244,20 @@ impl Lowerer<'_> {
             }
             (None, None) => {
                 if self.inputs.needs_data {
-                    let e = self.error(format!("the parameter `{name}` has no value"), d.name.span, "no default");
+                    let e = self.error(
+                        format!("the parameter `{name}` has no value"),
+                        d.name.span,
+                        "no default",
+                    );
                     e.hint_also(format!("set it on the command line: --set {name}=…"));
                 }
                 self.nothing()
             }
         };
-        self.bind_value(&d.name, Typed { at: value.at, ty: if ty == Type::Any { value.ty } else { ty } });
+        self.bind_value(
+            &d.name,
+            Typed { at: value.at, ty: if ty == Type::Any { value.ty } else { ty } },
+        );
     }
 
     /// The value of `--set name=text`.
@@ -245,7 +281,13 @@ impl Lowerer<'_> {
     }
 
     /// A number that is known must be whole where that is asked for.
-    fn check_whole(&mut self, value: Typed, wanted: Type, span: crate::syntax::span::Span, what: &str) {
+    fn check_whole(
+        &mut self,
+        value: Typed,
+        wanted: Type,
+        span: crate::syntax::span::Span,
+        what: &str,
+    ) {
         if wanted == Type::Int
             && let crate::lang::code::Operand::Const(i) = value.at
             && let Value::Num(x) = self.code.const_value(i)
@@ -255,7 +297,13 @@ impl Lowerer<'_> {
         }
     }
 
-    pub fn check_type(&mut self, value: Typed, wanted: Type, span: crate::syntax::span::Span, what: &str) {
+    pub fn check_type(
+        &mut self,
+        value: Typed,
+        wanted: Type,
+        span: crate::syntax::span::Span,
+        what: &str,
+    ) {
         if !accepts(wanted, value.ty) {
             let message = format!("{what} must be {}, got {}", shown(wanted), shown(value.ty));
             self.error(message, span, format!("this is {}", shown(value.ty)));
@@ -268,10 +316,17 @@ impl Lowerer<'_> {
             && !data::kinds().any(|k| k == &*t.node)
         {
             let near = nearest(&t.node, data::kinds()).map(str::to_owned);
-            let e = self.error(format!("there is no data of type `{}`", t.node), t.span, "unknown type");
+            let e = self.error(
+                format!("there is no data of type `{}`", t.node),
+                t.span,
+                "unknown type",
+            );
             match near {
                 Some(n) => e.hint_also(format!("did you mean `{n}`?")),
-                None => e.hint_also(format!("types are {}", data::kinds().collect::<Vec<_>>().join(", "))),
+                None => e.hint_also(format!(
+                    "types are {}",
+                    data::kinds().collect::<Vec<_>>().join(", ")
+                )),
             }
         }
         let value = match (self.inputs.data.get(&*name).cloned(), &d.default) {
@@ -289,7 +344,8 @@ impl Lowerer<'_> {
             (None, Some(e)) => self.data_default(e, folder),
             (None, None) => {
                 if self.inputs.needs_data {
-                    let e = self.error(format!("`{name}` is not given"), d.name.span, "needs a file");
+                    let e =
+                        self.error(format!("`{name}` is not given"), d.name.span, "needs a file");
                     e.hint_also(format!("set it on the command line: --observe {name}=FILE"));
                 }
                 self.nothing()
@@ -312,8 +368,12 @@ impl Lowerer<'_> {
                 return self.nothing();
             };
             let ExprKind::Str(path) = &arg.value.kind else {
-                self.error(format!("{kind} takes a path, a string in quotes"), arg.value.span, "not a string")
-                    .hint_also("the files of a run must be known before it starts");
+                self.error(
+                    format!("{kind} takes a path, a string in quotes"),
+                    arg.value.span,
+                    "not a string",
+                )
+                .hint_also("the files of a run must be known before it starts");
                 return self.nothing();
             };
             let Some(options) = self.options(kind, rest) else { return self.nothing() };
@@ -336,9 +396,13 @@ impl Lowerer<'_> {
             Err(e) => e,
         };
         let span = args.get(i)?.value.span;
-        self.error(fault.message, span, if data::has_options(kind) { "not an option" } else { "not expected" })
-            .hints
-            .extend(fault.hint);
+        self.error(
+            fault.message,
+            span,
+            if data::has_options(kind) { "not an option" } else { "not expected" },
+        )
+        .hints
+        .extend(fault.hint);
         None
     }
 

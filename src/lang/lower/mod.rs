@@ -1,12 +1,15 @@
-//! Lowering: from syntax trees to [`Code`], with every name, argument, tag and address checked.
+//! Lowering: from syntax trees to [`Code`], with every name, argument, tag and address
+//! checked.
 //!
-//! Blocks nest as the text does; a name becomes a slot of its block. The top level comes first, then the bodies of named
-//! functions, which see every top-level name, then the inference blocks, which see all that came before. Nothing is
-//! evaluated here but the defaults of `param` and `data` given by the host.
+//! Blocks nest as the text does; a name becomes a slot of its block. The top level comes
+//! first, then the bodies of named functions, which see every top-level name, then the
+//! inference blocks, which see all that came before. Nothing is evaluated here but the
+//! defaults of `param` and `data` given by the host.
 //!
-//! One file a concern: `scope` names and sites, `items` the top level, `stmt` statements, `draw` random choices and
-//! containers, `expr` expressions, `call` calls, `plan` inference blocks, `select` selections, `types` what can be
-//! told of types, `hints` what to say of unknown names.
+//! One file a concern: `scope` names and sites, `items` the top level, `stmt` statements,
+//! `draw` random choices and containers, `expr` expressions, `call` calls, `plan`
+//! inference blocks, `select` selections, `types` what can be told of types, `hints` what
+//! to say of unknown names.
 
 mod call;
 mod draw;
@@ -36,7 +39,8 @@ use rustc_hash::FxHashMap;
 use scope::{Body, Module, Scope};
 use std::sync::Arc;
 
-/// Reads a file of data: its kind (`image`, `csv`, …), its path as written, the folder of the program, how it is to be read.
+/// Reads a file of data: its kind (`image`, `csv`, …), its path as written, the folder of
+/// the program, how it is to be read.
 pub type ReadData<'a> = &'a dyn Fn(&str, &str, &str, &Options) -> Result<Value, Fault>;
 
 /// What a program is given from outside.
@@ -49,7 +53,8 @@ pub struct Inputs<'a> {
     pub data: IndexMap<String, Value>,
     /// How `data d = csv("file")` reads.
     pub read: ReadData<'a>,
-    /// Whether a `data` item without a value is an error; not when a program is only checked.
+    /// Whether a `data` item without a value is an error; not when a program is only
+    /// checked.
     pub needs_data: bool,
     /// Values for arguments left out: of a built-in by full name, an argument by name.
     pub defaults: FxHashMap<(String, String), Value>,
@@ -101,9 +106,17 @@ pub struct Compiled {
 ///
 /// # Errors
 /// Everything that is wrong with it, in the order of the text; settings first.
-pub fn compile(loaded: &Loaded, inputs: Inputs, map: &mut SourceMap) -> Result<Compiled, Vec<Diagnostic>> {
+pub fn compile(
+    loaded: &Loaded,
+    inputs: Inputs,
+    map: &mut SourceMap,
+) -> Result<Compiled, Vec<Diagnostic>> {
     let mut l = Lowerer {
-        code: Code { builtins: Arc::clone(&inputs.builtins), eager: inputs.eager, ..Code::default() },
+        code: Code {
+            builtins: Arc::clone(&inputs.builtins),
+            eager: inputs.eager,
+            ..Code::default()
+        },
         inputs,
         loaded,
         map,
@@ -177,7 +190,12 @@ struct Typed {
 }
 
 impl Lowerer<'_> {
-    fn error(&mut self, message: impl Into<String>, span: Span, label: impl Into<String>) -> &mut Diagnostic {
+    fn error(
+        &mut self,
+        message: impl Into<String>,
+        span: Span,
+        label: impl Into<String>,
+    ) -> &mut Diagnostic {
         self.errors.push(Diagnostic::error(message, span, label));
         let last = self.errors.len() - 1;
         &mut self.errors[last]

@@ -1,4 +1,5 @@
-//! Inference blocks, user kernels, reports and exports: checked in full, and the model's expressions in them lowered.
+//! Inference blocks, user kernels, reports and exports: checked in full, and the model's
+//! expressions in them lowered.
 
 use super::types::shown;
 use super::{AddHint, Lowerer};
@@ -90,8 +91,12 @@ impl Lowerer<'_> {
             }
             KStmtKind::StopWhen(e) => {
                 if !around.in_loop {
-                    self.error("`stop when` is allowed only in a loop, which it ends", s.span, "not in a loop")
-                        .hint_also("repeat 1000 { … stop when …; }");
+                    self.error(
+                        "`stop when` is allowed only in a loop, which it ends",
+                        s.span,
+                        "not in a loop",
+                    )
+                    .hint_also("repeat 1000 { … stop when …; }");
                 }
                 self.plan_expr(e, around);
             }
@@ -104,7 +109,11 @@ impl Lowerer<'_> {
                     if let ExprKind::Var(v) = &e.kind
                         && around.names.contains(v)
                     {
-                        self.error(format!("`{v}` is not a quantity of the model"), e.span, "a variable of this block");
+                        self.error(
+                            format!("`{v}` is not a quantity of the model"),
+                            e.span,
+                            "a variable of this block",
+                        );
                         continue;
                     }
                     self.query(e);
@@ -204,8 +213,12 @@ impl Lowerer<'_> {
                     .hint_also("infer { init(best_of(100)); repeat 1000 { … } }");
                 }
                 if &**name == "anneal" && !around.in_warmup {
-                    self.error("`anneal` is allowed only in `warmup`", e.span, "draws are kept here")
-                        .hint_also("draws must be collected under the unmodified likelihood");
+                    self.error(
+                        "`anneal` is allowed only in `warmup`",
+                        e.span,
+                        "draws are kept here",
+                    )
+                    .hint_also("draws must be collected under the unmodified likelihood");
                 }
                 self.inference_args(b, args, e.span, around);
             }
@@ -213,14 +226,21 @@ impl Lowerer<'_> {
                 let other = match found.map(|b| b.kind) {
                     Some(Kind::Distribution(_)) => Some("a distribution"),
                     Some(_) => Some("a function"),
-                    None => self.modules[0].names.contains_key(name).then_some("a name of the model"),
+                    None => {
+                        self.modules[0].names.contains_key(name).then_some("a name of the model")
+                    }
                 };
                 let known = table
                     .iter()
-                    .filter(|b| matches!(b.kind, Kind::Inference) && b.returns == Type::Kernel && b.name != "prior")
+                    .filter(|b| {
+                        matches!(b.kind, Kind::Inference)
+                            && b.returns == Type::Kernel
+                            && b.name != "prior"
+                    })
                     .map(|b| &*b.name);
                 let own: Vec<Arc<str>> = self.kernels.keys().cloned().collect();
-                let near = crate::diag::nearest(name, known.chain(own.iter().map(|n| &**n))).map(str::to_owned);
+                let near = crate::diag::nearest(name, known.chain(own.iter().map(|n| &**n)))
+                    .map(str::to_owned);
                 let message = match other {
                     Some(what) => format!("expected a kernel, but `{name}` is {what}"),
                     None => format!("unknown kernel `{name}`"),
@@ -228,14 +248,22 @@ impl Lowerer<'_> {
                 let e = self.error(message, callee.span, "not a kernel");
                 match near {
                     Some(n) => e.hint_also(format!("did you mean `{n}`?")),
-                    None => e.hint_also("kernels are mh, block, drift, gibbs, elliptical; see `pcadlang doc`"),
+                    None => e.hint_also(
+                        "kernels are mh, block, drift, gibbs, elliptical; see `pcadlang doc`",
+                    ),
                 }
             }
         }
     }
 
     /// The arguments of a name of inference blocks, by their types.
-    fn inference_args(&mut self, b: &crate::lang::builtins::Builtin, args: &[Arg], span: Span, around: &Around) {
+    fn inference_args(
+        &mut self,
+        b: &crate::lang::builtins::Builtin,
+        args: &[Arg],
+        span: Span,
+        around: &Around,
+    ) {
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
             Ok(order) => order,
             Err(message) => {
@@ -254,10 +282,17 @@ impl Lowerer<'_> {
                 Type::Selection => self.selection(value, &around.names.clone()),
                 Type::Kernel => self.kernel_or_start(&b.name, value, around),
                 Type::Num | Type::Int | Type::Nums
-                    if matches!(value.kind, ExprKind::Address(_) | ExprKind::TagSel { .. } | ExprKind::Str(_)) =>
+                    if matches!(
+                        value.kind,
+                        ExprKind::Address(_) | ExprKind::TagSel { .. } | ExprKind::Str(_)
+                    ) =>
                 {
                     let message = format!("{}: `{}` must be {}", b.name, arg.name, shown(arg.ty));
-                    let label = if matches!(value.kind, ExprKind::Str(_)) { "this is a string" } else { "a selection" };
+                    let label = if matches!(value.kind, ExprKind::Str(_)) {
+                        "this is a string"
+                    } else {
+                        "a selection"
+                    };
                     self.error(message, value.span, label).hint_also(b.signature());
                 }
                 _ => self.plan_expr(value, around),
@@ -271,8 +306,12 @@ impl Lowerer<'_> {
             && let ExprKind::Var(inner) = &callee.kind
             && ["temper", "smc", "abc", "optimize"].contains(&&**inner)
         {
-            self.error(format!("`delayed` does not take `{inner}`"), e.span, "not a reversible move of one state")
-                .hint_also("for example delayed(drift(@x), @obs)");
+            self.error(
+                format!("`delayed` does not take `{inner}`"),
+                e.span,
+                "not a reversible move of one state",
+            )
+            .hint_also("for example delayed(drift(@x), @obs)");
         }
         if outer != "init" {
             return self.kernel(e, around);
@@ -288,8 +327,9 @@ impl Lowerer<'_> {
                 }
             }
             _ => {
-                self.error("`init` takes prior() or best_of(n)", e.span, "not a start")
-                    .hint_also("init(best_of(100)); starts at the best of 100 draws from the prior");
+                self.error("`init` takes prior() or best_of(n)", e.span, "not a start").hint_also(
+                    "init(best_of(100)); starts at the best of 100 draws from the prior",
+                );
             }
         }
     }
@@ -305,7 +345,9 @@ impl Lowerer<'_> {
                     self.unbound(name, e.span);
                 }
             }
-            ExprKind::Address(_) | ExprKind::TagSel { .. } => self.selection(e, &around.names.clone()),
+            ExprKind::Address(_) | ExprKind::TagSel { .. } => {
+                self.selection(e, &around.names.clone())
+            }
             ExprKind::Array(xs) => xs.iter().for_each(|x| self.plan_expr(x, around)),
             ExprKind::Record(fields) => fields.iter().for_each(|(_, x)| self.plan_expr(x, around)),
             ExprKind::Call { callee, args } => {
@@ -317,7 +359,8 @@ impl Lowerer<'_> {
                             return self.inference_args(b, args, e.span, around);
                         }
                         Some(b) => {
-                            if let Err(message) = b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)))
+                            if let Err(message) = b
+                                .match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)))
                             {
                                 self.mismatch(b, message, args, e.span);
                             }
@@ -353,8 +396,12 @@ impl Lowerer<'_> {
     }
 
     fn not_in_a_plan(&mut self, span: Span) {
-        self.error("this expression cannot be used in an inference block", span, "a function, or statements")
-            .hint_also("bind it in the model, let name = …;, and use the name here");
+        self.error(
+            "this expression cannot be used in an inference block",
+            span,
+            "a function, or statements",
+        )
+        .hint_also("bind it in the model, let name = …;, and use the name here");
     }
 
     /// An expression of the model that draws are made of: a slot of the top level.
@@ -365,8 +412,12 @@ impl Lowerer<'_> {
             && matches!(self.code.builtins.get(i).kind, Kind::Inference)
         {
             let _ = args;
-            self.error(format!("`{name}` is no quantity of the model"), e.span, "cannot be collected")
-                .hint_also("collect names of the model and expressions of them, log_joint() included");
+            self.error(
+                format!("`{name}` is no quantity of the model"),
+                e.span,
+                "cannot be collected",
+            )
+            .hint_also("collect names of the model and expressions of them, log_joint() included");
             return;
         }
         let label: Arc<str> = Arc::from("query");

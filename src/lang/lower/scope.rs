@@ -1,4 +1,5 @@
-//! Names, lexical blocks and sites: which slot a name means, and what a place adds to addresses.
+//! Names, lexical blocks and sites: which slot a name means, and what a place adds to
+//! addresses.
 
 use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::Type;
@@ -66,7 +67,8 @@ pub(super) struct Body {
     counts: FxHashMap<(Vec<Arc<str>>, Arc<str>), u32>,
     /// Tags of the `assume` around, by index of their name.
     pub tags: Vec<SiteTag>,
-    /// Which occurrence of its name a container is, by block and slot: its elements share it, wherever they are drawn.
+    /// Which occurrence of its name a container is, by block and slot: its elements share
+    /// it, wherever they are drawn.
     pub containers: FxHashMap<(u32, Slot), u32>,
 }
 
@@ -92,7 +94,11 @@ impl Lowerer<'_> {
     /// A name's meaning, and how many blocks out it is bound.
     pub fn lookup(&self, name: &str) -> Option<(Binding, u16)> {
         for (up, scope) in self.scopes.iter().rev().enumerate() {
-            let names = if scope.kind == ScopeKind::Root { &self.modules[self.module].names } else { &scope.names };
+            let names = if scope.kind == ScopeKind::Root {
+                &self.modules[self.module].names
+            } else {
+                &scope.names
+            };
             if let Some(b) = names.get(name) {
                 return Some((*b, up as u16));
             }
@@ -112,7 +118,8 @@ impl Lowerer<'_> {
 
     /// Every name visible here, for hints.
     pub fn visible(&self) -> Vec<Arc<str>> {
-        let mut names: Vec<Arc<str>> = self.scopes.iter().flat_map(|s| s.names.keys().cloned()).collect();
+        let mut names: Vec<Arc<str>> =
+            self.scopes.iter().flat_map(|s| s.names.keys().cloned()).collect();
         let module = &self.modules[self.module];
         names.extend(module.names.keys().cloned());
         names.extend(module.namespaces.keys().cloned());
@@ -132,13 +139,18 @@ impl Lowerer<'_> {
             }
         };
         if let Some(old) = names.insert(Arc::clone(&name.node), binding) {
-            let e = self.error(format!("`{}` is bound twice", name.node), name.span, "bound again here");
+            let e = self.error(
+                format!("`{}` is bound twice", name.node),
+                name.span,
+                "bound again here",
+            );
             e.point_at(old.span, "first bound here");
             e.hint_also("rename one of them");
         }
     }
 
-    /// Binds a value at the innermost block; at the top level the inference blocks see it too.
+    /// Binds a value at the innermost block; at the top level the inference blocks see it
+    /// too.
     pub fn bind_value(&mut self, name: &Name, value: Typed) {
         self.bind(name, Meaning::Value(value.at), value.ty);
         if self.scopes.len() == 1 {
@@ -186,7 +198,13 @@ impl Lowerer<'_> {
     }
 
     /// A site below the present bindings, as an occurrence of its name.
-    pub fn site_of(&mut self, name: &Arc<str>, occurrence: u32, own_tags: Vec<SiteTag>, carried: u32) -> u32 {
+    pub fn site_of(
+        &mut self,
+        name: &Arc<str>,
+        occurrence: u32,
+        own_tags: Vec<SiteTag>,
+        carried: u32,
+    ) -> u32 {
         let module = self.modules[self.module].prefix.clone();
         if self.bodies.len() == 1
             && let Some(m) = &module
@@ -224,7 +242,8 @@ impl Lowerer<'_> {
         result
     }
 
-    /// The loops of the present function around the innermost block, outermost first: index into scopes.
+    /// The loops of the present function around the innermost block, outermost first:
+    /// index into scopes.
     pub fn loops_here(&self) -> Vec<usize> {
         let mut loops = Vec::new();
         for (i, s) in self.scopes.iter().enumerate().rev() {

@@ -17,17 +17,34 @@ impl Lowerer<'_> {
             ExprKind::TagSel { name, .. } => {
                 let known = BUILT_IN.contains(&&**name) || self.code.tags.contains(name);
                 if !known {
-                    let near = nearest(name, self.code.tags.iter().map(|t| &**t).chain(BUILT_IN)).map(str::to_owned);
-                    let tags = self.code.tags.iter().map(|t| format!("${t}")).collect::<Vec<_>>().join(", ");
-                    let e = self.error(format!("no choice has the tag `${name}`"), e.span, "unknown tag");
+                    let near = nearest(name, self.code.tags.iter().map(|t| &**t).chain(BUILT_IN))
+                        .map(str::to_owned);
+                    let tags = self
+                        .code
+                        .tags
+                        .iter()
+                        .map(|t| format!("${t}"))
+                        .collect::<Vec<_>>()
+                        .join(", ");
+                    let e = self.error(
+                        format!("no choice has the tag `${name}`"),
+                        e.span,
+                        "unknown tag",
+                    );
                     match near {
                         Some(n) => e.hint_also(format!("did you mean `${n}`?")),
-                        None if tags.is_empty() => e.hint_also("a tag is put on a choice: x ~ normal(0, 1) #name;"),
+                        None if tags.is_empty() => {
+                            e.hint_also("a tag is put on a choice: x ~ normal(0, 1) #name;")
+                        }
                         None => e.hint_also(format!("tags of this program are {tags}")),
                     }
                 }
             }
-            ExprKind::Binary { op: BinaryOp::Add | BinaryOp::Sub | BinaryOp::Intersect, left, right } => {
+            ExprKind::Binary {
+                op: BinaryOp::Add | BinaryOp::Sub | BinaryOp::Intersect,
+                left,
+                right,
+            } => {
                 self.selection(left, names);
                 self.selection(right, names);
             }
@@ -48,12 +65,17 @@ impl Lowerer<'_> {
             ExprKind::Var(v) => {
                 let bound = self.roots.contains(v);
                 let e = self.error("expected a selection of choices", e.span, "not a selection");
-                e.hint_also(if bound { format!("write @{v}") } else { "addresses begin with @, tags with $".into() });
+                e.hint_also(if bound {
+                    format!("write @{v}")
+                } else {
+                    "addresses begin with @, tags with $".into()
+                });
             }
             ExprKind::Error => {}
             _ => {
-                self.error("expected a selection of choices", e.span, "not a selection")
-                    .hint_also("an address such as @**, a tag such as $affine, or both joined by +, - or &");
+                self.error("expected a selection of choices", e.span, "not a selection").hint_also(
+                    "an address such as @**, a tag such as $affine, or both joined by +, - or &",
+                );
             }
         }
     }
@@ -77,12 +99,24 @@ impl Lowerer<'_> {
             // Segments further in must occur somewhere below.
             for s in &a.segments[1..] {
                 if let SegmentName::Name(n) = &s.name
-                    && !self.code.sites.iter().any(|site| site.segments.iter().any(|x| x.name == *n))
+                    && !self
+                        .code
+                        .sites
+                        .iter()
+                        .any(|site| site.segments.iter().any(|x| x.name == *n))
                 {
-                    let known: Vec<Arc<str>> =
-                        self.code.sites.iter().flat_map(|s| s.segments.iter().map(|x| Arc::clone(&x.name))).collect();
+                    let known: Vec<Arc<str>> = self
+                        .code
+                        .sites
+                        .iter()
+                        .flat_map(|s| s.segments.iter().map(|x| Arc::clone(&x.name)))
+                        .collect();
                     let near = nearest(n, known.iter().map(|n| &**n)).map(str::to_owned);
-                    let e = self.error(format!("no address has a segment `{n}`"), span, "nothing is there");
+                    let e = self.error(
+                        format!("no address has a segment `{n}`"),
+                        span,
+                        "nothing is there",
+                    );
                     if let Some(n) = near {
                         e.hint_also(format!("did you mean `{n}`?"));
                     }
@@ -93,7 +127,11 @@ impl Lowerer<'_> {
         }
         let near = nearest(name, self.roots.iter().map(|n| &**n)).map(str::to_owned);
         let all = self.roots.iter().map(|n| format!("@{n}")).collect::<Vec<_>>().join(", ");
-        let e = self.error(format!("no choice has an address that begins with @{name}"), span, "nothing is there");
+        let e = self.error(
+            format!("no choice has an address that begins with @{name}"),
+            span,
+            "nothing is there",
+        );
         match near {
             Some(n) => e.hint_also(format!("did you mean @{n}?")),
             None if all.is_empty() => e.hint_also("this program makes no choices"),

@@ -44,8 +44,12 @@ impl Lowerer<'_> {
                     let global = self.global_name(name);
                     self.code.predictions.push((global, value.at));
                 } else {
-                    self.error("`predict` is allowed only at the top level", s.span, "inside a function or loop")
-                        .hint_also("return the value and predict the result of the call");
+                    self.error(
+                        "`predict` is allowed only at the top level",
+                        s.span,
+                        "inside a function or loop",
+                    )
+                    .hint_also("return the value and predict the result of the call");
                 }
             }
             StmtKind::Draw { target, dist, tags } => match &target.kind {
@@ -78,7 +82,8 @@ impl Lowerer<'_> {
             StmtKind::Factor { expr, name } => {
                 let weight = self.expr(expr);
                 self.check_type(weight, Type::Num, expr.span, "the log weight of a factor");
-                let label = name.as_ref().map_or_else(|| Arc::from("factor"), |n| Arc::clone(&n.node));
+                let label =
+                    name.as_ref().map_or_else(|| Arc::from("factor"), |n| Arc::clone(&n.node));
                 let site = self.site(&label, Vec::new(), 0);
                 self.push(Op::Factor { weight: weight.at, site }, expr.span);
             }
@@ -86,10 +91,18 @@ impl Lowerer<'_> {
                 let value = self.expr(value);
                 match &target.kind {
                     _ if !at_root => {
-                        self.error("`force` is allowed only at the top level", s.span, "inside a function or loop");
+                        self.error(
+                            "`force` is allowed only at the top level",
+                            s.span,
+                            "inside a function or loop",
+                        );
                     }
                     ExprKind::Address(a) => {
-                        self.code.forces.push(Force { target: a.clone(), value: value.at, span: target.span });
+                        self.code.forces.push(Force {
+                            target: a.clone(),
+                            value: value.at,
+                            span: target.span,
+                        });
                     }
                     _ => {
                         self.error("`force` takes an address", target.span, "not an address")
@@ -101,11 +114,19 @@ impl Lowerer<'_> {
                 if at_root {
                     self.code.freezes.push(sel.clone());
                 } else {
-                    self.error("`freeze` is allowed only at the top level", s.span, "inside a function or loop");
+                    self.error(
+                        "`freeze` is allowed only at the top level",
+                        s.span,
+                        "inside a function or loop",
+                    );
                 }
             }
             StmtKind::Forget(_) => {
-                self.error("`forget` is allowed only at the top level", s.span, "inside a function or loop");
+                self.error(
+                    "`forget` is allowed only at the top level",
+                    s.span,
+                    "inside a function or loop",
+                );
             }
             StmtKind::Sample(e) => {
                 let label: Arc<str> = Arc::from("sample");
@@ -113,7 +134,11 @@ impl Lowerer<'_> {
                 if at_root {
                     self.code.samples.push(value.at);
                 } else {
-                    self.error("`sample` is allowed only at the top level", s.span, "inside a function or loop");
+                    self.error(
+                        "`sample` is allowed only at the top level",
+                        s.span,
+                        "inside a function or loop",
+                    );
                 }
             }
             StmtKind::For { var, iter, body } => self.for_loop(var, iter, body, s),
@@ -123,7 +148,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Records a name of the main program with every draw, unless its plan says what to collect.
+    /// Records a name of the main program with every draw, unless its plan says what to
+    /// collect.
     pub fn recorded(&mut self, name: &Arc<str>, value: Operand) {
         if self.modules[self.module].prefix.is_none() {
             self.code.assumed.push((Arc::clone(name), value));
@@ -133,7 +159,10 @@ impl Lowerer<'_> {
     fn for_loop(&mut self, var: &Name, iter: &Expr, body: &[Stmt], s: &Stmt) {
         let over = self.expr(iter);
         if !matches!(over.ty, Type::Any | Type::Array | Type::Nums | Type::Record) {
-            let message = format!("`for` iterates over an array, a range or a record, not over {}", shown(over.ty));
+            let message = format!(
+                "`for` iterates over an array, a range or a record, not over {}",
+                shown(over.ty)
+            );
             let e = self.error(message, iter.span, format!("this is {}", shown(over.ty)));
             if matches!(over.ty, Type::Num | Type::Int) {
                 e.hint_also("a range of whole numbers is written 0 .. n");
@@ -167,7 +196,8 @@ impl Lowerer<'_> {
 
     fn check_observable(&mut self, v: Typed, e: &Expr) {
         if !matches!(v.ty, Type::Any | Type::Dist | Type::Likelihood) {
-            let message = format!("only a distribution or likelihood can be observed, not {}", shown(v.ty));
+            let message =
+                format!("only a distribution or likelihood can be observed, not {}", shown(v.ty));
             self.error(message, e.span, format!("this is {}", shown(v.ty)))
                 .hint_also("write `observe d = v;`: the distribution on the left, the observed value on the right");
         }
@@ -178,7 +208,9 @@ impl Lowerer<'_> {
             Type::Any | Type::Dist => {}
             Type::Likelihood => {
                 self.error("a likelihood cannot be drawn from", e.span, "this is a likelihood")
-                    .hint_also("it scores an observed value and has no sampler: use it in `observe`");
+                    .hint_also(
+                        "it scores an observed value and has no sampler: use it in `observe`",
+                    );
             }
             ty => {
                 let message = format!("`~` needs a distribution, got {}", shown(ty));
@@ -199,23 +231,31 @@ impl Lowerer<'_> {
             .collect()
     }
 
-    /// A tag's value: a name that is bound is that variable, any other word stands for itself.
+    /// A tag's value: a name that is bound is that variable, any other word stands for
+    /// itself.
     fn tag_value(&mut self, e: &Expr) -> Operand {
         match &e.kind {
-            ExprKind::Var(word) if self.lookup(word).is_none() => self.code.constant(Value::Str(Arc::clone(word))),
+            ExprKind::Var(word) if self.lookup(word).is_none() => {
+                self.code.constant(Value::Str(Arc::clone(word)))
+            }
             _ => self.expr(e).at,
         }
     }
 
-    /// The tags of an `assume`: its choices may lie anywhere below, so that values must be literal.
+    /// The tags of an `assume`: its choices may lie anywhere below, so that values must
+    /// be literal.
     fn constant_tags(&mut self, tags: &[Tag]) -> Vec<SiteTag> {
         let made = self.tags(tags);
         for (t, tag) in made.iter().zip(tags) {
             if let Some(o) = t.value
                 && !matches!(o, Operand::Const(_))
             {
-                self.error("the tag of an `assume x = …` needs a literal value", tag.span, "this is computed")
-                    .hint_also("put the tag on the draw itself");
+                self.error(
+                    "the tag of an `assume x = …` needs a literal value",
+                    tag.span,
+                    "this is computed",
+                )
+                .hint_also("put the tag on the draw itself");
             }
         }
         made.into_iter().filter(|t| matches!(t.value, None | Some(Operand::Const(_)))).collect()

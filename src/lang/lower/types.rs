@@ -1,4 +1,5 @@
-//! What can be told of types before a run: enough to catch a wrong argument where it is written, never a wrong alarm.
+//! What can be told of types before a run: enough to catch a wrong argument where it is
+//! written, never a wrong alarm.
 
 use crate::lang::builtins::Type;
 use crate::lang::value::Value;

@@ -1,12 +1,16 @@
-//! Recording a tape: each step is told in the order of evaluation, and becomes one operation or a few.
+//! Recording a tape: each step is told in the order of evaluation, and becomes one
+//! operation or a few.
 //!
-//! `None` from a method means that a tape cannot do this step; whoever records then leaves the program to be run as it is.
+//! `None` from a method means that a tape cannot do this step; whoever records then
+//! leaves the program to be run as it is.
 
 use super::form::{Form, Made};
 use super::op::Op;
 use super::{Input, Sums, Tape};
 use crate::dist::{Dist, Support, batch, batch_of_mixture};
-use crate::lang::builtins::{Before, Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Scalar};
+use crate::lang::builtins::{
+    Before, Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Scalar,
+};
 use crate::lang::value::Value;
 use crate::num::Column;
 use smallvec::SmallVec;
@@ -41,7 +45,8 @@ impl Builder {
         at
     }
 
-    /// A value that lies in the buffer, now with these numbers; `None` if it has anything but numbers in it.
+    /// A value that lies in the buffer, now with these numbers; `None` if it has anything
+    /// but numbers in it.
     pub fn place(&mut self, now: &Value) -> Option<Form> {
         Some(match now {
             Value::Num(x) => {
@@ -62,7 +67,8 @@ impl Builder {
         })
     }
 
-    /// Makes a placed value, or a part of it, the image of the next coordinates under a support.
+    /// Makes a placed value, or a part of it, the image of the next coordinates under a
+    /// support.
     pub fn input(&mut self, support: Support, form: Form) {
         let dimension = support.free_dim();
         self.inputs.push(Input { support, form, dimension });
@@ -109,7 +115,9 @@ impl Builder {
         if special.is_some() {
             return special;
         }
-        if matches!(builtin.derivative, Derivative::Unknown) && !matches!(builtin.kind, Kind::Distribution(_)) {
+        if matches!(builtin.derivative, Derivative::Unknown)
+            && !matches!(builtin.kind, Kind::Distribution(_))
+        {
             return None;
         }
         if numeric(now) {
@@ -143,7 +151,9 @@ impl Builder {
     fn unary(&mut self, f: fn(f64) -> f64, slope: fn(f64, f64) -> f64, x: &Form) -> Option<Form> {
         match x {
             Form::Fixed(Value::Num(x)) => Some(Form::Fixed(Value::Num(f(*x)))),
-            Form::List(all) => Some(Form::List(all.iter().map(|x| self.unary(f, slope, x)).collect::<Option<_>>()?)),
+            Form::List(all) => Some(Form::List(
+                all.iter().map(|x| self.unary(f, slope, x)).collect::<Option<_>>()?,
+            )),
             Form::Num(x) => {
                 let out = self.reserve(1);
                 self.ops.push(Op::Unary { f, slope, x: *x, out, n: 1 });
@@ -158,10 +168,15 @@ impl Builder {
         }
     }
 
-    /// Pairs as the built-ins do: two arrays need equal lengths, anything else goes with every element.
+    /// Pairs as the built-ins do: two arrays need equal lengths, anything else goes with
+    /// every element.
     fn binary(&mut self, f: &'static Binary, x: &Form, y: &Form, now: &Value) -> Option<Form> {
-        let flat =
-            |form: &Form| matches!(form, Form::Num(_) | Form::Array(..) | Form::Fixed(Value::Num(_) | Value::Array(_)));
+        let flat = |form: &Form| {
+            matches!(
+                form,
+                Form::Num(_) | Form::Array(..) | Form::Fixed(Value::Num(_) | Value::Array(_))
+            )
+        };
         if x.is_fixed() && y.is_fixed() {
             return Some(Form::Fixed(now.clone()));
         }
@@ -173,7 +188,9 @@ impl Builder {
             return Some(n.map_or(Form::Num(out), |n| Form::Array(out, n)));
         }
         let n = x.len().or(y.len())?;
-        let part = |form: &Form, i: usize| if form.len().is_some() { form.element(i) } else { Some(form.clone()) };
+        let part = |form: &Form, i: usize| {
+            if form.len().is_some() { form.element(i) } else { Some(form.clone()) }
+        };
         let one = |i: usize| self.binary(f, &part(x, i)?, &part(y, i)?, &now.element(i)?);
         let all = (0..n).map(one).collect::<Option<Vec<_>>>()?;
         self.array(all)
@@ -205,7 +222,9 @@ impl Builder {
     /// An array of these elements.
     pub fn array(&mut self, all: Vec<Form>) -> Option<Form> {
         if all.iter().all(Form::is_fixed) {
-            return Some(Form::Fixed(Value::from_elements(all.iter().map(Form::fixed).collect::<Option<_>>()?)));
+            return Some(Form::Fixed(Value::from_elements(
+                all.iter().map(Form::fixed).collect::<Option<_>>()?,
+            )));
         }
         if !all.iter().all(|f| matches!(f, Form::Num(_) | Form::Fixed(Value::Num(_)))) {
             return Some(Form::List(all.into()));
@@ -263,18 +282,30 @@ impl Builder {
         Some(())
     }
 
-    /// The log density of a value under the distribution that a family gives for these arguments, which now is `dist`.
-    pub fn family(&mut self, builtin: &Builtin, args: Vec<Form>, dist: &Dist, x: &Form, observed: bool) -> Option<()> {
+    /// The log density of a value under the distribution that a family gives for these
+    /// arguments, which now is `dist`.
+    pub fn family(
+        &mut self,
+        builtin: &Builtin,
+        args: Vec<Form>,
+        dist: &Dist,
+        x: &Form,
+        observed: bool,
+    ) -> Option<()> {
         if x.is_fixed() && args.iter().all(Form::is_fixed) {
             return Some(());
         }
         // Of `iid(d, n)`, d is what moves.
         let inner = match (dist, args.first()) {
-            (Dist::Iid(_), Some(Form::Made(m))) if args[1..].iter().all(Form::is_fixed) => Some(Arc::clone(m)),
+            (Dist::Iid(_), Some(Form::Made(m))) if args[1..].iter().all(Form::is_fixed) => {
+                Some(Arc::clone(m))
+            }
             _ => None,
         };
         let params = inner.as_ref().map_or(&args[..], |m| &m.args);
-        if self.mixture(dist, params, x, observed).is_some() || self.density(dist, params, x, observed).is_some() {
+        if self.mixture(dist, params, x, observed).is_some()
+            || self.density(dist, params, x, observed).is_some()
+        {
             return Some(());
         }
         let dist = match args.iter().all(Form::is_fixed) {
@@ -285,7 +316,13 @@ impl Builder {
     }
 
     /// The log density of a value under a distribution or likelihood, which now is `now`.
-    pub fn distribution(&mut self, dist: &Form, now: &Value, x: &Form, observed: bool) -> Option<()> {
+    pub fn distribution(
+        &mut self,
+        dist: &Form,
+        now: &Value,
+        x: &Form,
+        observed: bool,
+    ) -> Option<()> {
         if x.is_fixed() && dist.is_fixed() {
             return Some(());
         }
@@ -294,7 +331,9 @@ impl Builder {
                 let m = Arc::clone(m);
                 self.family(&m.builtin, m.args.to_vec(), d, x, observed)
             }
-            (Form::Fixed(_), Value::Dist(d)) if self.density(d, &[], x, observed).is_some() => Some(()),
+            (Form::Fixed(_), Value::Dist(d)) if self.density(d, &[], x, observed).is_some() => {
+                Some(())
+            }
             _ => self.score(dist.clone(), x.clone(), observed),
         }
     }
@@ -337,8 +376,11 @@ impl Builder {
             (None, len) => observed || len.is_none(),
         };
         let fixed = params.iter().all(Form::is_fixed);
-        let own_columns = params.iter().all(|p| p.len().is_none_or(|len| len == n && matches!(dist, Dist::Product(_))));
-        // A truth value is no number to any other family, nor a number a truth value, but for 1 and 0.
+        let own_columns = params
+            .iter()
+            .all(|p| p.len().is_none_or(|len| len == n && matches!(dist, Dist::Product(_))));
+        // A truth value is no number to any other family, nor a number a truth value, but
+        // for 1 and 0.
         let kind = match one_of(dist) {
             Dist::Flip(_) => matches!(x, Form::Fixed(v) if is_bools(v) || is_zeros_and_ones(v)),
             _ => !matches!(x, Form::Fixed(v) if is_bools(v)),

@@ -21,7 +21,8 @@ pub enum Form {
     List(Arc<[Form]>),
     /// A record.
     Record(Arc<[(Arc<str>, Form)]>),
-    /// The result of a call that has no place in the buffer (a truth value, a distribution, a covariance): made when it is needed.
+    /// The result of a call that has no place in the buffer (a truth value, a
+    /// distribution, a covariance): made when it is needed.
     Made(Arc<Made>),
 }
 
@@ -92,7 +93,9 @@ impl Form {
             Form::Fixed(v) => v.clone(),
             Form::Num(at) => Value::Num(buffer[*at]),
             Form::Array(at, n) => Value::Array(buffer[*at..at + n].into()),
-            Form::List(all) => Value::from_elements(all.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?),
+            Form::List(all) => {
+                Value::from_elements(all.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?)
+            }
             Form::Record(all) => {
                 let fields = all.iter().map(|(name, f)| Some((Arc::clone(name), f.value(buffer)?)));
                 Value::Record(Arc::new(fields.collect::<Option<_>>()?))
@@ -115,9 +118,10 @@ impl Form {
             (Form::List(all), Value::List(xs)) if xs.len() == all.len() => {
                 all.iter().zip(xs.iter()).all(|(f, x)| f.write(buffer, x))
             }
-            (Form::Record(all), Value::Record(r)) if r.len() == all.len() => {
-                all.iter().zip(r.iter()).all(|((name, f), (other, x))| name == other && f.write(buffer, x))
-            }
+            (Form::Record(all), Value::Record(r)) if r.len() == all.len() => all
+                .iter()
+                .zip(r.iter())
+                .all(|((name, f), (other, x))| name == other && f.write(buffer, x)),
             (Form::Fixed(v), x) => v.same(x),
             _ => false,
         }
@@ -140,14 +144,15 @@ impl Form {
             Form::Num(at) => Adjoint::Num(adjoints[*at]),
             Form::Array(at, n) => Adjoint::Array(adjoints[*at..at + n].to_vec()),
             Form::List(all) => Adjoint::List(all.iter().map(|f| f.adjoint(adjoints)).collect()),
-            Form::Record(all) => {
-                Adjoint::Record(all.iter().map(|(n, f)| (Arc::clone(n), f.adjoint(adjoints))).collect())
-            }
+            Form::Record(all) => Adjoint::Record(
+                all.iter().map(|(n, f)| (Arc::clone(n), f.adjoint(adjoints))).collect(),
+            ),
             _ => Adjoint::Zero,
         }
     }
 
-    /// Adds an adjoint to those of the numbers this is made of; false if a derivative is not known.
+    /// Adds an adjoint to those of the numbers this is made of; false if a derivative is
+    /// not known.
     pub(super) fn pull(&self, by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
         if by.is_zero() || self.is_fixed() {
             return true;
@@ -170,8 +175,12 @@ impl Form {
                 }
                 true
             }
-            Form::List(all) => all.iter().enumerate().all(|(i, f)| f.pull(&by.element(i), buffer, adjoints)),
-            Form::Record(all) => all.iter().all(|(name, f)| f.pull(&by.field(name), buffer, adjoints)),
+            Form::List(all) => {
+                all.iter().enumerate().all(|(i, f)| f.pull(&by.element(i), buffer, adjoints))
+            }
+            Form::Record(all) => {
+                all.iter().all(|(name, f)| f.pull(&by.field(name), buffer, adjoints))
+            }
             Form::Made(m) => match call(&m.builtin, &m.args, buffer) {
                 Some((_, value)) => pull_call(&m.builtin, &m.args, value, by, buffer, adjoints),
                 None => false,
@@ -179,7 +188,8 @@ impl Form {
         }
     }
 
-    /// Passes the derivatives by the parameters of a distribution, and by a covariance among them, on to what it was made of.
+    /// Passes the derivatives by the parameters of a distribution, and by a covariance
+    /// among them, on to what it was made of.
     pub(super) fn pull_dist(
         &self,
         dist: &Dist,
@@ -188,7 +198,9 @@ impl Form {
         buffer: &[f64],
         adjoints: &mut [f64],
     ) -> bool {
-        let Form::Made(m) = self else { return self.pull(&Adjoint::Array(params), buffer, adjoints) };
+        let Form::Made(m) = self else {
+            return self.pull(&Adjoint::Array(params), buffer, adjoints);
+        };
         let Some((values, _)) = call(&m.builtin, &m.args, buffer) else { return false };
         let values: SmallVec<[&Value; 4]> = values.iter().collect();
         let a = Args { builtin: &m.builtin, values: &values };
@@ -209,13 +221,19 @@ impl Form {
 }
 
 /// The arguments of a call and its result.
-pub(super) fn call(builtin: &Builtin, args: &[Form], buffer: &[f64]) -> Option<(SmallVec<[Value; 4]>, Value)> {
-    let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
+pub(super) fn call(
+    builtin: &Builtin,
+    args: &[Form],
+    buffer: &[f64],
+) -> Option<(SmallVec<[Value; 4]>, Value)> {
+    let values: SmallVec<[Value; 4]> =
+        args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
     let value = builtin.apply(&values.iter().collect::<SmallVec<[&Value; 4]>>()).ok()?;
     Some((values, value))
 }
 
-/// The result of a call, of an incremental function from where it was in the last run if the tape keeps that.
+/// The result of a call, of an incremental function from where it was in the last run if
+/// the tape keeps that.
 pub(super) fn call_from(
     builtin: &Builtin,
     args: &[Form],
@@ -223,7 +241,8 @@ pub(super) fn call_from(
     before: &mut Option<Arc<Before>>,
     keeps: bool,
 ) -> Option<Value> {
-    let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
+    let values: SmallVec<[Value; 4]> =
+        args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
     let values: SmallVec<[&Value; 4]> = values.iter().collect();
     match builtin.resume(&values, before.as_deref().filter(|_| keeps)) {
         None => builtin.apply(&values).ok(),

@@ -1,12 +1,16 @@
-//! Tapes: the straight line of arithmetic that leads from some numbers to a log density, recorded once and run many times.
+//! Tapes: the straight line of arithmetic that leads from some numbers to a log density,
+//! recorded once and run many times.
 //!
-//! A tape keeps every number in one buffer and every derivative in another of the same layout; running it forwards or backwards
-//! allocates nothing where all operations are arithmetic on numbers and arrays, and densities of numbers. Other operations call the
-//! built-in itself, and its vector-Jacobian product. It knows nothing of traces: [`Builder`] is told what to compute, in order.
+//! A tape keeps every number in one buffer and every derivative in another of the same
+//! layout; running it forwards or backwards allocates nothing where all operations are
+//! arithmetic on numbers and arrays, and densities of numbers. Other operations call the
+//! built-in itself, and its vector-Jacobian product. It knows nothing of traces:
+//! [`Builder`] is told what to compute, in order.
 //!
-//! Invariant: the same functions on the same numbers as the program, and scores summed exactly, so that a density is that of the
-//! program to the last bit. What a tape cannot tell (a parameter outside its domain, a condition that turned out otherwise) it
-//! says, and the program itself has to be run.
+//! Invariant: the same functions on the same numbers as the program, and scores summed
+//! exactly, so that a density is that of the program to the last bit. What a tape cannot
+//! tell (a parameter outside its domain, a condition that turned out otherwise) it says,
+//! and the program itself has to be run.
 
 mod build;
 mod form;
@@ -31,7 +35,8 @@ pub struct Sums {
     pub jacobian: ExactSum,
 }
 
-/// Numbers that a tape starts from: a value that is the image of unconstrained coordinates under its support.
+/// Numbers that a tape starts from: a value that is the image of unconstrained
+/// coordinates under its support.
 #[derive(Debug)]
 struct Input {
     support: Support,
@@ -56,8 +61,8 @@ impl Tape {
         &self.sums
     }
 
-    /// Runs it where its inputs have these values, by their number, and gives the coordinates. False where it cannot tell what
-    /// the program does there.
+    /// Runs it where its inputs have these values, by their number, and gives the
+    /// coordinates. False where it cannot tell what the program does there.
     pub fn stand(&mut self, mut value: impl FnMut(usize) -> Value, y: &mut Vec<f64>) -> bool {
         self.sums = Sums::default();
         y.clear();
@@ -77,7 +82,8 @@ impl Tape {
         self.forward()
     }
 
-    /// Runs it at a point of unconstrained space. False where it cannot tell what the program does there.
+    /// Runs it at a point of unconstrained space. False where it cannot tell what the
+    /// program does there.
     pub fn run(&mut self, y: &[f64]) -> bool {
         self.sums = Sums::default();
         let mut rest = y;
@@ -118,8 +124,9 @@ impl Tape {
         self.ops.iter_mut().all(|op| op.forward(values, sums))
     }
 
-    /// The derivatives, by the coordinates at which it was last run, of the log prior plus `power` times the log likelihood plus
-    /// the log Jacobians. False where one is not known.
+    /// The derivatives, by the coordinates at which it was last run, of the log prior
+    /// plus `power` times the log likelihood plus the log Jacobians. False where one is
+    /// not known.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         out.clear();
         self.adjoints.clear();

@@ -24,11 +24,23 @@ pub(super) enum Op {
     /// Numbers from anywhere side by side.
     Gather { from: Box<[usize]>, out: usize },
     /// A call of any built-in whose result is of a form that lies in the buffer.
-    Call { builtin: Builtin, args: Box<[Form]>, out: Form, before: Option<Arc<Before>>, keeps: bool },
+    Call {
+        builtin: Builtin,
+        args: Box<[Form]>,
+        out: Form,
+        before: Option<Arc<Before>>,
+        keeps: bool,
+    },
     /// What must be as it was when the tape was recorded.
     Guard { form: Form, value: Value },
     /// The log densities of numbers.
-    Density { batch: Box<dyn Batch>, x: Column, params: SmallVec<[Column; 3]>, n: usize, observed: bool },
+    Density {
+        batch: Box<dyn Batch>,
+        x: Column,
+        params: SmallVec<[Column; 3]>,
+        n: usize,
+        observed: bool,
+    },
     /// The log density of any value under any distribution or likelihood.
     Score { dist: Form, x: Form, observed: bool },
     /// A log weight.
@@ -56,19 +68,26 @@ impl Op {
                 let (before, y) = v.split_at_mut(*out);
                 let x = &before[*x..*x + *width];
                 let rows = before[*rows..].chunks_exact((*width).max(1));
-                y[..*n].iter_mut().zip(rows).for_each(|(y, row)| *y = crate::lang::builtins::dot(row, x));
+                y[..*n]
+                    .iter_mut()
+                    .zip(rows)
+                    .for_each(|(y, row)| *y = crate::lang::builtins::dot(row, x));
                 true
             }
             Op::Gather { from, out } => {
                 from.iter().enumerate().for_each(|(i, at)| v[*out + i] = v[*at]);
                 true
             }
-            Op::Call { builtin, args, out, before, keeps } => match call_from(builtin, args, v, before, *keeps) {
-                Some(value) => out.write(v, &value),
-                None => false,
-            },
+            Op::Call { builtin, args, out, before, keeps } => {
+                match call_from(builtin, args, v, before, *keeps) {
+                    Some(value) => out.write(v, &value),
+                    None => false,
+                }
+            }
             Op::Guard { form, value } => form.value(v).is_some_and(|now| now.same(value)),
-            Op::Density { batch, x, params, n, observed } => batch.score(v, *x, params, *n, sums.of(*observed)),
+            Op::Density { batch, x, params, n, observed } => {
+                batch.score(v, *x, params, *n, sums.of(*observed))
+            }
             Op::Score { dist, x, observed } => {
                 let (Some(dist), Some(x)) = (dist.value(v), x.value(v)) else { return false };
                 score(&dist, &x, *observed, sums.of(*observed))
@@ -106,7 +125,10 @@ impl Op {
                 let (before, by) = g.split_at_mut(*out);
                 let rows = v[*rows..].chunks_exact((*width).max(1));
                 for (by, row) in by[..*n].iter().zip(rows) {
-                    before[*x..x + width].iter_mut().zip(row).for_each(|(g, a)| *g += times(*by, *a));
+                    before[*x..x + width]
+                        .iter_mut()
+                        .zip(row)
+                        .for_each(|(g, a)| *g += times(*by, *a));
                 }
                 true
             }
@@ -123,7 +145,9 @@ impl Op {
                 batch.pull(v, g, *x, params, *n, weight(*observed));
                 true
             }
-            Op::Score { dist, x, observed } => pull_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false),
+            Op::Score { dist, x, observed } => {
+                pull_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false)
+            }
             Op::Factor { x } => {
                 g[*x] += power;
                 true
@@ -157,7 +181,14 @@ fn score(dist: &Value, x: &Value, observed: bool, sum: &mut ExactSum) -> bool {
     true
 }
 
-fn pull_score(dist: &Form, x: &Form, observed: bool, v: &[f64], g: &mut [f64], weight: f64) -> Option<bool> {
+fn pull_score(
+    dist: &Form,
+    x: &Form,
+    observed: bool,
+    v: &[f64],
+    g: &mut [f64],
+    weight: f64,
+) -> Option<bool> {
     let (made, value) = (dist.value(v)?, x.value(v)?);
     if let Value::Likelihood(l) = &made {
         let mut by = l.gradient(&value)?;

@@ -13,15 +13,22 @@ fn normal(mean: f64, sd: f64) -> Dist {
     Dist::Normal(crate::dist::Normal::new(mean, sd).unwrap())
 }
 
-/// `s ~ gamma-like positive number; observe normal([1, 2] * s, s) = [0.5, 0.7]`, told with the values for s = 2.
+/// `s ~ gamma-like positive number; observe normal([1, 2] * s, s) = [0.5, 0.7]`, told
+/// with the values for s = 2.
 fn told(guarded: bool) -> Tape {
     let (table, mut b) = (Table::default(), Builder::default());
     let s = b.place(&Value::Num(2.0)).unwrap();
     b.input(Support::Positive, s.clone());
     let weights = Form::Fixed(Value::array(vec![1.0, 2.0]));
-    let mean = b.call(&builtin(&table, "*"), vec![weights, s.clone()], &Value::array(vec![2.0, 4.0])).unwrap();
+    let mean = b
+        .call(&builtin(&table, "*"), vec![weights, s.clone()], &Value::array(vec![2.0, 4.0]))
+        .unwrap();
     if guarded {
-        let above = b.call(&builtin(&table, ">"), vec![s.clone(), Form::Fixed(Value::Num(1.0))], &Value::Bool(true));
+        let above = b.call(
+            &builtin(&table, ">"),
+            vec![s.clone(), Form::Fixed(Value::Num(1.0))],
+            &Value::Bool(true),
+        );
         b.guard(&above.unwrap(), &Value::Bool(true)).unwrap();
     }
     let product = crate::dist::Product::new(vec![normal(2.0, 2.0), normal(4.0, 2.0)]).unwrap();
@@ -33,7 +40,9 @@ fn told(guarded: bool) -> Tape {
 
 fn density(y: f64) -> f64 {
     let s = y.exp();
-    let one = |w: f64, x: f64| -0.5 * ((x - w * s) / s).powi(2) - s.ln() - 0.5 * std::f64::consts::TAU.ln();
+    let one = |w: f64, x: f64| {
+        -0.5 * ((x - w * s) / s).powi(2) - s.ln() - 0.5 * std::f64::consts::TAU.ln()
+    };
     one(1.0, 0.5) + one(2.0, 0.7) + y
 }
 

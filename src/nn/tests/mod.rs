@@ -1,4 +1,5 @@
-//! Operators against their definitions, files that are written here, and files that are broken.
+//! Operators against their definitions, files that are written here, and files that are
+//! broken.
 
 mod operators;
 mod writer;
@@ -57,7 +58,8 @@ fn operators_that_do_not_fit_are_named() {
         }
     };
     assert!(
-        with(&tensors(0, &[1, 1, 4, 1])).contains("operator 1 of the network, builtin 3: the shapes of its tensors")
+        with(&tensors(0, &[1, 1, 4, 1]))
+            .contains("operator 1 of the network, builtin 3: the shapes of its tensors")
     );
     assert!(with(&tensors(5, &[1, 1, 3, 1])).contains("operator 2 of the network, builtin 19"));
     assert!(with(&tensors(3, &[2])).contains("the number of values of a constant"));
@@ -66,7 +68,8 @@ fn operators_that_do_not_fit_are_named() {
     assert!(with(&|g| g[1] = Field::I32s(vec![9])).contains("a tensor is missing"));
 }
 
-/// The dense form of a tensor of these values, with dimensions of a table `DimensionMetadata` each.
+/// The dense form of a tensor of these values, with dimensions of a table
+/// `DimensionMetadata` each.
 fn dense(
     shape: &[usize],
     order: &[i32],
@@ -74,7 +77,8 @@ fn dense(
     dimensions: Vec<Vec<Field>>,
     values: &[f32],
 ) -> Result<Vec<f32>, NetworkError> {
-    let fields = [Field::I32s(order.to_vec()), Field::I32s(blocks.to_vec()), Field::Tables(dimensions)];
+    let fields =
+        [Field::I32s(order.to_vec()), Field::I32s(blocks.to_vec()), Field::Tables(dimensions)];
     let bytes = file(b"TEST", &fields);
     sparse::dense(shape, &Table::root(&bytes, *b"TEST")?, values)
 }
@@ -92,12 +96,25 @@ fn rows(segments: &[u16], indices: &[u8]) -> Vec<Field> {
 #[test]
 fn sparse_tensors_are_laid_out() {
     // Compressed rows: 1 0 2 / 0 0 0 / 0 3 0.
-    let by_rows = dense(&[3, 3], &[0, 1], &[], vec![all_of(3), rows(&[0, 2, 2, 3], &[0, 2, 1])], &[1.0, 2.0, 3.0]);
+    let by_rows = dense(
+        &[3, 3],
+        &[0, 1],
+        &[],
+        vec![all_of(3), rows(&[0, 2, 2, 3], &[0, 2, 1])],
+        &[1.0, 2.0, 3.0],
+    );
     assert_eq!(by_rows.unwrap(), [1.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0]);
     // The same by columns.
-    let by_columns = dense(&[3, 3], &[1, 0], &[], vec![all_of(3), rows(&[0, 1, 2, 3], &[0, 2, 0])], &[1.0, 3.0, 2.0]);
+    let by_columns = dense(
+        &[3, 3],
+        &[1, 0],
+        &[],
+        vec![all_of(3), rows(&[0, 1, 2, 3], &[0, 2, 0])],
+        &[1.0, 3.0, 2.0],
+    );
     assert_eq!(by_columns.unwrap(), [1.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0]);
-    // Blocks of two columns: of the two in each row, the second of the first row and the first of the second.
+    // Blocks of two columns: of the two in each row, the second of the first row and the
+    // first of the second.
     let blocks = vec![all_of(2), rows(&[0, 1, 2], &[1, 0]), all_of(2)];
     let by_blocks = dense(&[2, 4], &[0, 1, 2], &[1], blocks, &[1.0, 2.0, 3.0, 4.0]);
     assert_eq!(by_blocks.unwrap(), [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 0.0, 0.0]);
@@ -105,13 +122,18 @@ fn sparse_tensors_are_laid_out() {
 
 #[test]
 fn sparse_tensors_that_lead_nowhere_are_errors() {
-    let of = |order: &[i32], dimensions: Vec<Vec<Field>>| dense(&[2, 2], order, &[], dimensions, &[1.0]).is_err();
+    let of = |order: &[i32], dimensions: Vec<Vec<Field>>| {
+        dense(&[2, 2], order, &[], dimensions, &[1.0]).is_err()
+    };
     assert!(of(&[0, 1], vec![all_of(2), all_of(2)]), "too few values");
     assert!(of(&[0, 0], vec![all_of(2), all_of(2)]));
     assert!(of(&[0, 1], vec![all_of(2), all_of(3)]));
     assert!(of(&[0, 1], vec![all_of(2)]));
     assert!(of(&[0, 1], vec![all_of(2), rows(&[0, 1], &[0])]), "too few rows");
     assert!(of(&[0, 1], vec![all_of(2), rows(&[0, 1, 1], &[2])]), "an index outside");
-    assert!(of(&[0, 1], vec![all_of(2), rows(&[0, 2, 1], &[0, 0])]), "rows that end before they begin");
+    assert!(
+        of(&[0, 1], vec![all_of(2), rows(&[0, 2, 1], &[0, 0])]),
+        "rows that end before they begin"
+    );
     assert!(!of(&[0, 1], vec![all_of(2), rows(&[0, 1, 1], &[1])]));
 }

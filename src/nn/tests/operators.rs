@@ -33,7 +33,9 @@ fn near(got: &[f32], expected: &[f64]) {
 /// Windows of all kinds, over pictures of sizes that are no multiples of anything.
 fn cases() -> Vec<(Window, Size)> {
     let mut all = Vec::new();
-    for (size, stride) in [([1, 1], [1, 1]), ([3, 3], [1, 1]), ([3, 3], [2, 2]), ([5, 2], [1, 3]), ([1, 1], [2, 2])] {
+    for (size, stride) in
+        [([1, 1], [1, 1]), ([3, 3], [1, 1]), ([3, 3], [2, 2]), ([5, 2], [1, 3]), ([1, 1], [2, 2])]
+    {
         for same in [true, false] {
             for (height, width, channels) in [(5, 7, 3), (8, 6, 19), (6, 9, 1)] {
                 all.push((Window { size, stride, same }, Size { height, width, channels }));
@@ -58,7 +60,8 @@ fn convolutions() {
         for channels in [1, 16, 21] {
             let to = w.output(from, channels).unwrap();
             let depth = w.size[0] * w.size[1] * from.channels;
-            let (x, weights) = (numbers(from.len(), k as u32), numbers(channels * depth, 99 + k as u32));
+            let (x, weights) =
+                (numbers(from.len(), k as u32), numbers(channels * depth, 99 + k as u32));
             let biases = numbers(channels, 7);
             let clip = if channels == 21 { Clip { lo: 0.0, hi: 0.5 } } else { FREE };
             let c = Convolution::new(w, &weights, &biases, clip);
@@ -74,7 +77,10 @@ fn convolutions() {
                     for (i, weight) in weights[o * depth..][..depth].iter().enumerate() {
                         let (tap, channel) = (i / from.channels, i % from.channels);
                         let (ky, kx) = (tap / w.size[1], tap % w.size[1]);
-                        let at = [(row * w.stride[0] + ky) as isize - top, (column * w.stride[1] + kx) as isize - left];
+                        let at = [
+                            (row * w.stride[0] + ky) as isize - top,
+                            (column * w.stride[1] + kx) as isize - left,
+                        ];
                         sum += f64::from(*weight) * value(&x, from, at, channel);
                     }
                     expected.push(sum.max(f64::from(clip.lo)).min(f64::from(clip.hi)));
@@ -90,9 +96,11 @@ fn depthwise_convolutions() {
     for (k, (w, from)) in cases().into_iter().enumerate() {
         let to = w.output(from, from.channels).unwrap();
         let taps = w.size[0] * w.size[1];
-        let (x, weights) = (numbers(from.len(), k as u32), numbers(taps * from.channels, 5 + k as u32));
+        let (x, weights) =
+            (numbers(from.len(), k as u32), numbers(taps * from.channels, 5 + k as u32));
         let biases = numbers(from.channels, 3);
-        let d = Depthwise { window: w, weights: weights.clone(), biases: biases.clone(), clip: FREE };
+        let d =
+            Depthwise { window: w, weights: weights.clone(), biases: biases.clone(), clip: FREE };
         let (mut out, mut plain) = (vec![9.0; to.len()], vec![9.0; to.len()]);
         d.run(&x, from, to, &mut out);
         portable(|| d.run(&x, from, to, &mut plain));
@@ -103,7 +111,10 @@ fn depthwise_convolutions() {
             for c in 0..from.channels {
                 let each = (0..taps).map(|tap| {
                     let (ky, kx) = (tap / w.size[1], tap % w.size[1]);
-                    let at = [(row * w.stride[0] + ky) as isize - top, (column * w.stride[1] + kx) as isize - left];
+                    let at = [
+                        (row * w.stride[0] + ky) as isize - top,
+                        (column * w.stride[1] + kx) as isize - left,
+                    ];
                     f64::from(weights[tap * from.channels + c]) * value(&x, from, at, c)
                 });
                 expected.push(f64::from(biases[c]) + each.sum::<f64>());
@@ -113,7 +124,8 @@ fn depthwise_convolutions() {
     }
 }
 
-/// A transposed convolution is the transpose of the convolution with the same window: <C x, y> = <x, C' y>.
+/// A transposed convolution is the transpose of the convolution with the same window: <C
+/// x, y> = <x, C' y>.
 #[test]
 fn transposed_convolutions() {
     for (size, stride) in [([2, 2], [2, 2]), ([3, 3], [2, 2]), ([4, 3], [2, 1])] {
@@ -123,9 +135,12 @@ fn transposed_convolutions() {
         let weights = numbers(channels * taps * from.channels, 11);
         let t = Transposed { window, weights: weights.clone(), biases: vec![0.0; channels] };
         let to = t.output(from);
-        // Of the convolution, inputs and outputs exchange places: weights by its output channel, tap, input channel.
+        // Of the convolution, inputs and outputs exchange places: weights by its output
+        // channel, tap, input channel.
         let mut back = vec![0.0; weights.len()];
-        for (o, tap, i) in (0..channels).flat_map(|o| (0..taps).flat_map(move |t| (0..3).map(move |i| (o, t, i)))) {
+        for (o, tap, i) in
+            (0..channels).flat_map(|o| (0..taps).flat_map(move |t| (0..3).map(move |i| (o, t, i))))
+        {
             back[(i * taps + tap) * channels + o] = weights[(o * taps + tap) * 3 + i];
         }
         let c = Convolution::new(window, &back, &[0.0; 3], FREE);
@@ -133,12 +148,20 @@ fn transposed_convolutions() {
         let (mut up, mut down) = (vec![0.0; to.len()], vec![0.0; from.len()]);
         t.run(&x, from, to, &mut up);
         c.run(&y, to, from, &mut down);
-        let product = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>();
+        let product = |a: &[f32], b: &[f32]| {
+            a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>()
+        };
         assert!((product(&up, &y) - product(&x, &down)).abs() < 1e-5, "{size:?}");
         let biased = Transposed { biases: vec![0.25, -1.0], ..t };
         let mut more = vec![0.0; to.len()];
         biased.run(&x, from, to, &mut more);
-        near(&more, &up.iter().enumerate().map(|(i, u)| f64::from(*u) + [0.25, -1.0][i % 2]).collect::<Vec<_>>());
+        near(
+            &more,
+            &up.iter()
+                .enumerate()
+                .map(|(i, u)| f64::from(*u) + [0.25, -1.0][i % 2])
+                .collect::<Vec<_>>(),
+        );
     }
 }
 
@@ -154,14 +177,22 @@ fn pictures_of_other_sizes() {
     assert_eq!(resized(Alignment::First), [0.0, 4.0, 8.0, 8.0]);
     near(&resized(Alignment::Corners), &[0.0, 8.0 / 3.0, 16.0 / 3.0, 8.0]);
 
-    let (from, to) = (Size { height: 2, width: 2, channels: 1 }, Size { height: 3, width: 4, channels: 2 });
+    let (from, to) =
+        (Size { height: 2, width: 2, channels: 1 }, Size { height: 3, width: 4, channels: 2 });
     let mut out = vec![9.0; to.len()];
     pad(&[1.0, 2.0, 3.0, 4.0], from, to, [1, 2, 1], &mut out);
-    let places: Vec<(usize, f32)> = out.iter().copied().enumerate().filter(|(_, v)| *v != 0.0).collect();
+    let places: Vec<(usize, f32)> =
+        out.iter().copied().enumerate().filter(|(_, v)| *v != 0.0).collect();
     assert_eq!(places, [(13, 1.0), (15, 2.0), (21, 3.0), (23, 4.0)]);
 
     let mut out = [0.0; 4];
-    depth_to_space(&[1.0, 2.0, 3.0, 4.0], Size { height: 1, width: 1, channels: 4 }, from, 2, &mut out);
+    depth_to_space(
+        &[1.0, 2.0, 3.0, 4.0],
+        Size { height: 1, width: 1, channels: 4 },
+        from,
+        2,
+        &mut out,
+    );
     assert_eq!(out, [1.0, 2.0, 3.0, 4.0]);
 
     // The last window hangs over the border: its mean is over what is inside.

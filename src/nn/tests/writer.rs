@@ -48,8 +48,12 @@ fn table(out: &mut Vec<u8>, fields: &[Field]) -> usize {
                 continue;
             }
             Field::Bytes(b) => vector(out, b.len(), b),
-            Field::U16s(v) => vector(out, v.len(), &v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>()),
-            Field::I32s(v) => vector(out, v.len(), &v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>()),
+            Field::U16s(v) => {
+                vector(out, v.len(), &v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>())
+            }
+            Field::I32s(v) => {
+                vector(out, v.len(), &v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>())
+            }
             Field::Table(fields) => table(out, fields),
             Field::Tables(all) => {
                 let start = vector(out, all.len(), &vec![0; 4 * all.len()]);
@@ -88,10 +92,12 @@ fn operator(code: i32, inputs: &[i32], output: i32, options: Vec<Field>) -> Vec<
     vec![Field::I32(code), i, o, Field::U8(0), Field::Table(options)]
 }
 
-/// A convolution of one row of three pixels with the 16 bit weights 1 and -2, then its positive part.
+/// A convolution of one row of three pixels with the 16 bit weights 1 and -2, then its
+/// positive part.
 pub fn small() -> Vec<Field> {
     let bytes = |v: &[f32]| v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-    let halves: Vec<u8> = [1.0f32, -2.0].iter().flat_map(|x| half::f16::from_f32(*x).to_le_bytes()).collect();
+    let halves: Vec<u8> =
+        [1.0f32, -2.0].iter().flat_map(|x| half::f16::from_f32(*x).to_le_bytes()).collect();
     let buffer = |b: Vec<u8>| vec![Field::Bytes(b)];
     let code = |n: u8| vec![Field::U8(n), Field::Absent, Field::Absent, Field::I32(i32::from(n))];
     let graph = vec![
@@ -107,7 +113,12 @@ pub fn small() -> Vec<Field> {
         Field::I32s(vec![5]),
         Field::Tables(vec![
             operator(0, &[1], 2, vec![]),
-            operator(1, &[0, 2, 3], 4, vec![Field::U8(1), Field::I32(1), Field::I32(1), Field::U8(0)]),
+            operator(
+                1,
+                &[0, 2, 3],
+                4,
+                vec![Field::U8(1), Field::I32(1), Field::I32(1), Field::U8(0)],
+            ),
             operator(2, &[4], 5, vec![]),
         ]),
     ];

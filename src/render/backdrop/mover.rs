@@ -26,7 +26,8 @@ pub struct Own {
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     pub layer: Layer,
-    /// What it was drawn before, if that left out some of it: what hides all of it, or does not mind how near it is.
+    /// What it was drawn before, if that left out some of it: what hides all of it, or
+    /// does not mind how near it is.
     settled: Option<Arc<()>>,
 }
 
@@ -52,8 +53,9 @@ impl Mover {
         Mover { leaf, ..Mover::default() }
     }
 
-    /// Its layer is that of the instance from here on. Nothing is drawn of one that this backdrop hides; if it is the only mover, its depth
-    /// need only be known where it matters.
+    /// Its layer is that of the instance from here on. Nothing is drawn of one that this
+    /// backdrop hides; if it is the only mover, its depth need only be known where it
+    /// matters.
     pub fn move_to(
         &mut self,
         instance: &Instance,
@@ -64,10 +66,14 @@ impl Mover {
     ) {
         let affine = affine_bits(&instance.affine);
         let holds = |own: &Own| {
-            own.settled.as_ref().is_none_or(|known| only && behind.is_some_and(|b| Arc::ptr_eq(known, &b.settled)))
+            own.settled
+                .as_ref()
+                .is_none_or(|known| only && behind.is_some_and(|b| Arc::ptr_eq(known, &b.settled)))
         };
         let is_it = |own: &Own| {
-            holds(own) && own.affine == affine && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
+            holds(own)
+                && own.affine == affine
+                && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
         };
         if is_it(&self.now) {
             return;
@@ -96,6 +102,10 @@ impl Mover {
     pub fn look(&mut self, depths: &Depths<'_>) {
         self.seen.clear();
         let Mover { now, seen, .. } = self;
-        now.layer.pieces.iter().filter(|piece| depths.visible(piece)).for_each(|piece| seen.push(piece));
+        now.layer
+            .pieces
+            .iter()
+            .filter(|piece| depths.visible(piece))
+            .for_each(|piece| seen.push(piece));
     }
 }

@@ -1,4 +1,5 @@
-//! What stands still: its depth, and its pieces of contour by the pixels that they look at.
+//! What stands still: its depth, and its pieces of contour by the pixels that they look
+//! at.
 
 use crate::render::Camera;
 use crate::render::project::DepthRange;
@@ -6,7 +7,8 @@ use crate::render::raster::Area;
 use crate::render::visibility::{Depths, Glance, Piece};
 use std::sync::Arc;
 
-/// Half the width of the depth ranges that a backdrop is first made ready for, relatively.
+/// Half the width of the depth ranges that a backdrop is first made ready for,
+/// relatively.
 const FIRST_WIDTH: f64 = 0.005;
 
 /// A bit for each side by which a piece is free.
@@ -27,14 +29,16 @@ pub struct Still {
     extents: [f64; 2],
     /// Half the width of those, relatively.
     width: f64,
-    /// Pieces that the backdrop does not hide at the greatest of these depth ranges, with the number of their mesh.
+    /// Pieces that the backdrop does not hide at the greatest of these depth ranges, with
+    /// the number of their mesh.
     live: Vec<(Piece, usize)>,
     /// Of each of those, which of its looks are free, and whether it is shown.
     state: Vec<u8>,
-    /// Looks that the backdrop ends at the least of these depth ranges only, with the least one at which it does not, in that order,
-    /// and their pixels.
+    /// Looks that the backdrop ends at the least of these depth ranges only, with the
+    /// least one at which it does not, in that order, and their pixels.
     unsure: Vec<(f64, u32, u32)>,
-    /// By pixel: the least depth that leaves any look there free, whatever the depth range.
+    /// By pixel: the least depth that leaves any look there free, whatever the depth
+    /// range.
     pub nearest: Vec<f32>,
     /// Where in `looks` those at each pixel begin.
     start: Vec<u32>,
@@ -46,16 +50,22 @@ pub struct Still {
 impl Still {
     /// Nothing in a picture.
     pub fn new(camera: &Camera) -> Still {
-        Still { depth: vec![f32::INFINITY; camera.pixels()], width: FIRST_WIDTH, ..Still::default() }
+        Still {
+            depth: vec![f32::INFINITY; camera.pixels()],
+            width: FIRST_WIDTH,
+            ..Still::default()
+        }
     }
 
-    /// Whether it hides all of a mesh with this depth range that covers pixels of an area only, contours included.
+    /// Whether it hides all of a mesh with this depth range that covers pixels of an area
+    /// only, contours included.
     pub fn hides(&self, range: &DepthRange, area: &Area, camera: &Camera) -> bool {
         let (limit, width) = (Depths::hiding(self.extents[1], range), camera.width as usize);
         // Pieces may lie, and look, a little beside the area.
         const REACH: usize = 4;
         let (left, right) = (area.left.saturating_sub(REACH), (area.right + REACH).min(width));
-        let rows = area.top.saturating_sub(REACH)..(area.bottom + REACH).min(camera.height as usize);
+        let rows =
+            area.top.saturating_sub(REACH)..(area.bottom + REACH).min(camera.height as usize);
         let near = |d: &f32| f64::from(*d) < limit;
         area.pixels() > 0
             && rows
@@ -69,7 +79,8 @@ impl Still {
         least <= extent && extent <= most
     }
 
-    /// Sorts the pieces for depth ranges about this one; for more of them if it has been done before.
+    /// Sorts the pieces for depth ranges about this one; for more of them if it has been
+    /// done before.
     pub fn settle(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
         self.settled = Arc::default();
         self.width = if again { (2.0 * self.width).min(0.5) } else { self.width };
@@ -83,7 +94,9 @@ impl Still {
         // A counting sort by pixel.
         self.start.clear();
         self.start.resize(self.depth.len() + 2, 0);
-        let glances = |i: usize, piece: &Piece| [0, 1].map(|side| piece.glance(side, i as u32)).into_iter().flatten();
+        let glances = |i: usize, piece: &Piece| {
+            [0, 1].map(|side| piece.glance(side, i as u32)).into_iter().flatten()
+        };
         for (i, (piece, _)) in self.live.iter().enumerate() {
             glances(i, piece).for_each(|(pixel, _)| self.start[pixel as usize + 2] += 1);
         }
@@ -109,7 +122,8 @@ impl Still {
                 let glance = &self.looks[at as usize];
                 nearest = nearest.min(rounded_up(most.least(glance)));
                 if most.frees(glance, *depth) && !least.frees(glance, *depth) {
-                    let free = |extent: f64| depths(extent).is_some_and(|d| d.frees(glance, *depth));
+                    let free =
+                        |extent: f64| depths(extent).is_some_and(|d| d.frees(glance, *depth));
                     self.unsure.push((first_true(self.extents, free), at, pixel as u32));
                 }
             }
@@ -123,7 +137,8 @@ impl Still {
     pub fn look_at_all(&mut self, depths: &Depths<'_>) -> usize {
         let mut shown = 0;
         for ((piece, _), state) in self.live.iter().zip(&mut self.state) {
-            let [first, second] = [0, 1].map(|side| u8::from(depths.visible_by(piece, side)) << side);
+            let [first, second] =
+                [0, 1].map(|side| u8::from(depths.visible_by(piece, side)) << side);
             let free = first | second;
             *state = if free == 0 { 0 } else { free | SHOWN };
             shown += usize::from(free != 0);
@@ -131,8 +146,9 @@ impl Still {
         shown
     }
 
-    /// Looks again at some pixels, and at whatever the depth range decides that was one and is another; `changed` is told pieces
-    /// that are shown no longer (false) or now (true), each once.
+    /// Looks again at some pixels, and at whatever the depth range decides that was one
+    /// and is another; `changed` is told pieces that are shown no longer (false) or now
+    /// (true), each once.
     pub fn look_again(
         &mut self,
         depths: &Depths<'_>,
@@ -153,15 +169,22 @@ impl Still {
         };
         for pixel in pixels.iter().map(|p| *p as usize) {
             let ends = [pixel, pixel + 1].map(|i| start.get(i).map_or(0, |s| *s as usize));
-            looks.get(ends[0]..ends[1]).unwrap_or_default().iter().for_each(|glance| look(glance, pixel));
+            looks
+                .get(ends[0]..ends[1])
+                .unwrap_or_default()
+                .iter()
+                .for_each(|glance| look(glance, pixel));
         }
         let [low, high] = [extents[0].min(extents[1]), extents[0].max(extents[1])];
-        let between = [low, high].map(|extent| unsure.partition_point(|(flip, ..)| *flip <= extent));
+        let between =
+            [low, high].map(|extent| unsure.partition_point(|(flip, ..)| *flip <= extent));
         for (_, at, pixel) in unsure.get(between[0]..between[1]).unwrap_or_default() {
             looks.get(*at as usize).into_iter().for_each(|glance| look(glance, *pixel as usize));
         }
         for piece in &*touched {
-            let (Some(state), Some((piece, _))) = (state.get_mut(*piece as usize), live.get(*piece as usize)) else {
+            let (Some(state), Some((piece, _))) =
+                (state.get_mut(*piece as usize), live.get(*piece as usize))
+            else {
                 continue;
             };
             let shown = *state & FREE != 0;
@@ -174,17 +197,23 @@ impl Still {
 
     /// The pieces that are shown, with the number of their mesh.
     pub fn shown(&self) -> impl Iterator<Item = &(Piece, usize)> {
-        self.live.iter().zip(&self.state).filter(|(_, state)| **state & SHOWN != 0).map(|(live, _)| live)
+        self.live
+            .iter()
+            .zip(&self.state)
+            .filter(|(_, state)| **state & SHOWN != 0)
+            .map(|(live, _)| live)
     }
 }
 
-/// The least number in single precision that is not less: `f64::from(x) < v` exactly if `x < rounded_up(v)`.
+/// The least number in single precision that is not less: `f64::from(x) < v` exactly if
+/// `x < rounded_up(v)`.
 fn rounded_up(v: f64) -> f32 {
     let rounded = v as f32;
     if f64::from(rounded) < v { rounded.next_up() } else { rounded }
 }
 
-/// The least number above the first of two positive ones at which a monotone condition holds, which holds at the second one and not at the first.
+/// The least number above the first of two positive ones at which a monotone condition
+/// holds, which holds at the second one and not at the first.
 fn first_true([low, high]: [f64; 2], holds: impl Fn(f64) -> bool) -> f64 {
     // Positive numbers are in the order of their bits.
     let (mut low, mut high) = (low.to_bits(), high.to_bits());

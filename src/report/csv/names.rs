@@ -5,9 +5,10 @@ use std::collections::HashSet;
 
 /// The name of every column of the file, elements of vectors one by one.
 ///
-/// In ArviZ a `.` starts an index and a trailing `__` marks a statistic of the sampler, and neither it nor CmdStan knows
-/// quotes, so `.` becomes `/`, a comma `;`, white space and quotes `_`, and a name that ends in `__` gets a `/`. Names
-/// that fall together are told apart by `/2`, `/3`, ….
+/// In ArviZ a `.` starts an index and a trailing `__` marks a statistic of the sampler,
+/// and neither it nor CmdStan knows quotes, so `.` becomes `/`, a comma `;`, white space
+/// and quotes `_`, and a name that ends in `__` gets a `/`. Names that fall together are
+/// told apart by `/2`, `/3`, ….
 pub fn column_names(columns: &[Column]) -> Vec<String> {
     let mut taken = HashSet::new();
     let mut names = Vec::new();
@@ -46,13 +47,19 @@ fn bearable(name: &str) -> String {
     out
 }
 
-/// The columns a line of names stands for: the inverse of [`column_names`] on names that needed no change.
+/// The columns a line of names stands for: the inverse of [`column_names`] on names that
+/// needed no change.
 pub(super) fn columns(names: &[&str]) -> Vec<Column> {
     let mut columns: Vec<Column> = Vec::new();
     for name in names {
-        let element = name.rsplit_once('.').and_then(|(base, i)| Some((base, i.parse::<usize>().ok()?)));
+        let element =
+            name.rsplit_once('.').and_then(|(base, i)| Some((base, i.parse::<usize>().ok()?)));
         match (element, columns.last_mut()) {
-            (Some((base, i)), Some(Column { name, shape: Shape::Vector(n) })) if name == base && i == *n + 1 => *n = i,
+            (Some((base, i)), Some(Column { name, shape: Shape::Vector(n) }))
+                if name == base && i == *n + 1 =>
+            {
+                *n = i
+            }
             (Some((base, 1)), _) => columns.push(Column::vector(base, 1)),
             _ => columns.push(Column::scalar(*name)),
         }
@@ -66,7 +73,12 @@ mod tests {
 
     #[test]
     fn names_survive_the_way_there_and_back() {
-        let wanted = [Column::scalar("a/b"), Column::vector("v", 3), Column::vector("w", 1), Column::scalar("f(x;y)")];
+        let wanted = [
+            Column::scalar("a/b"),
+            Column::vector("v", 3),
+            Column::vector("w", 1),
+            Column::scalar("f(x;y)"),
+        ];
         let names = column_names(&wanted);
         assert_eq!(names, ["a/b", "v.1", "v.2", "v.3", "w.1", "f(x;y)"]);
         assert_eq!(columns(&names.iter().map(String::as_str).collect::<Vec<_>>()), wanted);

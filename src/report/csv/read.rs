@@ -10,7 +10,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CsvError {
     /// The line of names does not start with the columns about the draw.
-    #[error("line {line}: not a file of draws by pcadlang: its columns do not start with lp__, accept_stat__, …")]
+    #[error(
+        "line {line}: not a file of draws by pcadlang: its columns do not start with lp__, accept_stat__, …"
+    )]
     Columns {
         /// Where.
         line: usize,
@@ -35,8 +37,8 @@ pub enum CsvError {
     },
 }
 
-/// Reads what [`super::CsvSink`] writes, also while it is still being written: a last line that is not finished is left
-/// out.
+/// Reads what [`super::CsvSink`] writes, also while it is still being written: a last
+/// line that is not finished is left out.
 ///
 /// # Errors
 /// If a finished line is not what it should be.
@@ -56,7 +58,8 @@ pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
             }
         } else if let Some(now) = named(text) {
             // Columns that come later are in no draw before them.
-            let all = if chain.columns.is_empty() { now.clone() } else { merged(&chain.columns, &now) };
+            let all =
+                if chain.columns.is_empty() { now.clone() } else { merged(&chain.columns, &now) };
             chain.widen(all);
             layout = Some((width(&now), now));
         } else {
@@ -80,7 +83,9 @@ pub(crate) fn named(text: &str) -> Option<Vec<Column>> {
 
 /// A draw of so many recorded numbers; its chain and number are left 0.
 pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRow, CsvError> {
-    let parse = |s: &str| s.parse::<f64>().map_err(|_| CsvError::Number { line, text: s.chars().take(40).collect() });
+    let parse = |s: &str| {
+        s.parse::<f64>().map_err(|_| CsvError::Number { line, text: s.chars().take(40).collect() })
+    };
     let all = text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
     match &all[..] {
         [log_joint, acceptance, divergent, log_prior, log_likelihood, step, values @ ..]
@@ -98,7 +103,9 @@ pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRo
                 values: values.to_vec(),
             })
         }
-        _ => Err(CsvError::Width { line, found: all.len(), expected: expected + DRAW_COLUMNS.len() }),
+        _ => {
+            Err(CsvError::Width { line, found: all.len(), expected: expected + DRAW_COLUMNS.len() })
+        }
     }
 }
 
@@ -106,7 +113,8 @@ pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRo
 mod tests {
     use super::*;
 
-    const HEAD: &str = "# id = 3\nlp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n";
+    const HEAD: &str =
+        "# id = 3\nlp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n";
 
     #[test]
     fn an_unfinished_line_is_left_out() {
@@ -116,7 +124,10 @@ mod tests {
             assert!(chain.rows.is_empty());
         }
         let chain = read(&whole).unwrap();
-        assert_eq!((chain.rows[0].chain, chain.rows[0].step, chain.rows[0].values.len()), (2, 5, 3));
+        assert_eq!(
+            (chain.rows[0].chain, chain.rows[0].step, chain.rows[0].values.len()),
+            (2, 5, 3)
+        );
     }
 
     #[test]

@@ -25,13 +25,14 @@ pub struct DrawReader<R> {
     end: u64,
     line: usize,
     text: String,
-    /// What the lines after the last line of names have: so many numbers, and where they belong.
+    /// What the lines after the last line of names have: so many numbers, and where they
+    /// belong.
     layout: Option<(usize, Layout)>,
 }
 
 impl<R: BufRead> DrawReader<R> {
-    /// A reader of what [`super::CsvSink`] wrote with these columns, or with fewer before more came; nothing at or after byte `end`
-    /// is looked at.
+    /// A reader of what [`super::CsvSink`] wrote with these columns, or with fewer before
+    /// more came; nothing at or after byte `end` is looked at.
     pub fn new(from: R, columns: &[Column], end: u64) -> Self {
         let names = column_names(columns);
         let columns = super::names::columns(&names.iter().map(String::as_str).collect::<Vec<_>>());
@@ -50,7 +51,8 @@ impl<R: BufRead> DrawReader<R> {
     pub fn next_row(&mut self) -> Result<Option<DrawRow>, StreamError> {
         loop {
             self.text.clear();
-            let length = self.from.by_ref().take(self.end - self.position).read_line(&mut self.text)?;
+            let length =
+                self.from.by_ref().take(self.end - self.position).read_line(&mut self.text)?;
             if !self.text.ends_with('\n') {
                 return Ok(None);
             }
@@ -88,7 +90,11 @@ mod tests {
     const TEXT: &str = "# id = 1\nlp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n-1,1,0,-2,1,5,0.5,1,2\n-3,1,0,-2,1,9,inf,1,2\n";
 
     fn rows(text: &str, end: usize) -> Result<(usize, u64), StreamError> {
-        let mut reader = DrawReader::new(text.as_bytes(), &[Column::scalar("x"), Column::vector("v", 2)], end as u64);
+        let mut reader = DrawReader::new(
+            text.as_bytes(),
+            &[Column::scalar("x"), Column::vector("v", 2)],
+            end as u64,
+        );
         let mut n = 0;
         while let Some(row) = reader.next_row()? {
             assert_eq!((row.step, row.values.len()), ([5, 9][n], 3));
@@ -109,9 +115,13 @@ mod tests {
     #[test]
     fn columns_that_come_later_are_nan_before() {
         let names = "lp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__";
-        let text = format!("{names},v.1\n-1,1,0,-2,1,5,1\n{names},v.1,v.2,x\n-3,1,0,-2,1,9,3,4,7\n");
-        let mut reader =
-            DrawReader::new(text.as_bytes(), &[Column::vector("v", 2), Column::scalar("x")], text.len() as u64);
+        let text =
+            format!("{names},v.1\n-1,1,0,-2,1,5,1\n{names},v.1,v.2,x\n-3,1,0,-2,1,9,3,4,7\n");
+        let mut reader = DrawReader::new(
+            text.as_bytes(),
+            &[Column::vector("v", 2), Column::scalar("x")],
+            text.len() as u64,
+        );
         let mut next = || reader.next_row().unwrap().unwrap().values;
         let first = next();
         assert!(first[0] == 1.0 && first[1..].iter().all(|x| x.is_nan()) && first.len() == 3);
@@ -126,7 +136,10 @@ mod tests {
         let error = |text: &str| rows(text, text.len()).unwrap_err().to_string();
         assert!(error("a,b\n").contains("line 1"));
         assert!(error(&TEXT.replace(",v.2", "")).contains("9 numbers, but 8 columns"));
-        assert!(error(&TEXT.replace("step__,x", "step__,y")).contains("line 2"), "a column that is not known");
+        assert!(
+            error(&TEXT.replace("step__,x", "step__,y")).contains("line 2"),
+            "a column that is not known"
+        );
         assert!(error(&TEXT.replace("inf", "x")).contains("line 4"));
     }
 }

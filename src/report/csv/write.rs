@@ -21,8 +21,8 @@ pub struct CsvSink<W = File> {
 }
 
 impl CsvSink {
-    /// Creates (or empties) the file of a chain, counted from 0, and writes its comments: first what ArviZ looks for,
-    /// then the given pairs.
+    /// Creates (or empties) the file of a chain, counted from 0, and writes its comments:
+    /// first what ArviZ looks for, then the given pairs.
     ///
     /// # Errors
     /// If the file cannot be created or written.
@@ -30,10 +30,16 @@ impl CsvSink {
         CsvSink::new(File::create(path)?, chain, comments)
     }
 
-    /// Goes on with a file whose first `written` bytes are a chain's, and that ends there. The columns are those announced, if
-    /// they were.
+    /// Goes on with a file whose first `written` bytes are a chain's, and that ends
+    /// there. The columns are those announced, if they were.
     pub(crate) fn resume(file: File, written: u64, columns: Option<&[Column]>) -> Self {
-        CsvSink { out: file, comments: String::new(), width: columns.map(width), line: String::new(), written }
+        CsvSink {
+            out: file,
+            comments: String::new(),
+            width: columns.map(width),
+            line: String::new(),
+            written,
+        }
     }
 
     /// Brings all draws so far to the disk.
@@ -51,7 +57,8 @@ impl<W: Write> CsvSink<W> {
     /// # Errors
     /// If it cannot be written to.
     pub fn new(mut out: W, chain: u32, comments: &[(&str, String)]) -> io::Result<Self> {
-        let mut text = format!("# model = pcadlang\n# id = {}\n# save_warmup = 0\n", u64::from(chain) + 1);
+        let mut text =
+            format!("# model = pcadlang\n# id = {}\n# save_warmup = 0\n", u64::from(chain) + 1);
         for (key, value) in comments {
             let value = value.replace(|c: char| c.is_control(), " ");
             let _ = writeln!(text, "# {key} = {value}");
@@ -97,12 +104,14 @@ impl<W: Write + Send> Sink for CsvSink<W> {
 
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
         if self.width != Some(row.values.len()) {
-            let said = self.width.map_or("no columns declared".into(), |w| format!("{w} announced"));
+            let said =
+                self.width.map_or("no columns declared".into(), |w| format!("{w} announced"));
             let message = format!("a draw of {} numbers with {said}", row.values.len());
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         }
         self.line.clear();
-        // Writing to a string does not fail. `{:?}` is the shortest text that reads back to the same bits.
+        // Writing to a string does not fail. `{:?}` is the shortest text that reads back
+        // to the same bits.
         let r = row;
         let _ = write!(self.line, "{:?},{:?},{}", r.log_joint, r.acceptance, r.divergent);
         let _ = write!(self.line, ",{:?},{:?},{}", r.log_prior, r.log_likelihood, r.step);
@@ -115,8 +124,9 @@ impl<W: Write + Send> Sink for CsvSink<W> {
     }
 
     fn chain_done(&mut self, _chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()> {
-        let text =
-            format!("# steps = {steps}\n# warmup_steps = {warmup}\n# Elapsed Time: {seconds:.3} seconds (Total)\n");
+        let text = format!(
+            "# steps = {steps}\n# warmup_steps = {warmup}\n# Elapsed Time: {seconds:.3} seconds (Total)\n"
+        );
         self.out.write_all(text.as_bytes())?;
         self.out.flush()
     }
@@ -150,16 +160,36 @@ mod tests {
         let x = draw as f64 / 3.0;
         let (log_joint, log_prior, log_likelihood) = (-x, 0.5 - x, -0.5);
         let (acceptance, divergent) = (0.25, draw % 2);
-        DrawRow { chain: 2, draw, step: 10 * draw, log_joint, log_prior, log_likelihood, acceptance, divergent, values }
+        DrawRow {
+            chain: 2,
+            draw,
+            step: 10 * draw,
+            log_joint,
+            log_prior,
+            log_likelihood,
+            acceptance,
+            divergent,
+            values,
+        }
     }
 
-    const ODD: [f64; 8] =
-        [0.1, -0.0, 5e-324, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1.000_000_000_000_000_2];
+    const ODD: [f64; 8] = [
+        0.1,
+        -0.0,
+        5e-324,
+        f64::MAX,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NAN,
+        1.000_000_000_000_000_2,
+    ];
 
     #[test]
     fn readable_after_every_call_and_bit_for_bit() {
         let shared = Shared::default();
-        let mut sink = CsvSink::new(shared.clone(), 2, &[("seed", "7".into()), ("program", "a\nb".into())]).unwrap();
+        let mut sink =
+            CsvSink::new(shared.clone(), 2, &[("seed", "7".into()), ("program", "a\nb".into())])
+                .unwrap();
         let columns = [Column::vector("v", 7), Column::scalar("a/b")];
         sink.columns(&columns).unwrap();
         for draw in 0..5 {
@@ -182,8 +212,12 @@ mod tests {
             assert_eq!((back.chain, back.draw, back.step), (2, wrote.draw, wrote.step));
             assert_eq!((back.acceptance, back.divergent), (wrote.acceptance, wrote.divergent));
         }
-        let said = |key: &str| chain.comments.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
-        assert_eq!((said("seed"), said("program"), said("steps")), (Some("7"), Some("a b"), Some("40")));
+        let said =
+            |key: &str| chain.comments.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
+        assert_eq!(
+            (said("seed"), said("program"), said("steps")),
+            (Some("7"), Some("a b"), Some("40"))
+        );
     }
 
     #[test]

@@ -32,7 +32,8 @@ pub(super) fn escaped(text: &str) -> String {
     out
 }
 
-/// A name of a quantity or a kernel as text that may go on in another line where one of its parts ends, and nowhere else.
+/// A name of a quantity or a kernel as text that may go on in another line where one of
+/// its parts ends, and nowhere else.
 pub(super) fn breakable(name: &str) -> String {
     let mut out = String::with_capacity(2 * name.len());
     let mut parts = name.split_inclusive(['.', '_', '/', '[', '(', ',', ';', ':', '-']).peekable();
@@ -45,13 +46,15 @@ pub(super) fn breakable(name: &str) -> String {
     out
 }
 
-/// Coordinates in a row, separated by commas, to a ten-thousandth of the largest: the page stays small, and every number
-/// is one in JSON.
+/// Coordinates in a row, separated by commas, to a ten-thousandth of the largest: the
+/// page stays small, and every number is one in JSON.
 pub(super) fn coordinates(positions: &[[f32; 3]]) -> String {
-    let all = || positions.iter().flatten().map(|x| if x.is_finite() { f64::from(*x) } else { 0.0 });
+    let all =
+        || positions.iter().flatten().map(|x| if x.is_finite() { f64::from(*x) } else { 0.0 });
     let largest = all().fold(0.0, |m: f64, x| m.max(x.abs()));
     // Four digits after the first of the largest number.
-    let digits = if largest > 0.0 { (4 - largest.log10().floor() as i32).clamp(0, 40) as usize } else { 0 };
+    let digits =
+        if largest > 0.0 { (4 - largest.log10().floor() as i32).clamp(0, 40) as usize } else { 0 };
     let numbers = all().map(|x| {
         let s = format!("{x:.digits$}");
         let s = if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.') } else { &s };
@@ -66,7 +69,9 @@ mod tests {
 
     #[test]
     fn vectors_of_the_standard() {
-        for (text, code) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+        for (text, code) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
             assert_eq!(base64(text.as_bytes()), code);
         }
         assert_eq!(base64(&[0xfb, 0xff, 0xfe]), "+//+");
@@ -90,6 +95,9 @@ mod tests {
 
     #[test]
     fn quotes_are_escaped() {
-        assert_eq!(escaped("<a b=\"c\" d='e'> & é"), "&lt;a b=&quot;c&quot; d=&#39;e&#39;&gt; &amp; é");
+        assert_eq!(
+            escaped("<a b=\"c\" d='e'> & é"),
+            "&lt;a b=&quot;c&quot; d=&#39;e&#39;&gt; &amp; é"
+        );
     }
 }

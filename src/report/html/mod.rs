@@ -1,5 +1,5 @@
-//! `report.html`: one file that holds everything: pictures, plots, tables, the mesh to turn round,
-//! the program.
+//! `report.html`: one file that holds everything: pictures, plots, tables, the mesh to
+//! turn round, the program.
 //!
 //! Invariant: the page asks nothing of the network, and whatever it quotes is escaped.
 
@@ -70,7 +70,8 @@ const PLOTTED: usize = 40;
 const STYLE: &str = include_str!("style.css");
 const COPY: &str = include_str!("copy.js");
 
-/// The page. Writing to a text does not fail, so results of `write!` are not looked at here.
+/// The page. Writing to a text does not fail, so results of `write!` are not looked at
+/// here.
 pub fn page(p: &Page) -> String {
     let mut s = String::new();
     let title = escaped(p.title);
@@ -86,7 +87,11 @@ pub fn page(p: &Page) -> String {
         let _ = writeln!(s, "<p class=\"facts\">{}</p>", facts.join(" · "));
     }
     if !p.command.is_empty() {
-        let _ = writeln!(s, "<div class=\"command\"><pre id=\"command\">{}</pre></div>", escaped(p.command));
+        let _ = writeln!(
+            s,
+            "<div class=\"command\"><pre id=\"command\">{}</pre></div>",
+            escaped(p.command)
+        );
         let _ = writeln!(s, "<script>\n{COPY}</script>");
     }
     for w in p.warnings {

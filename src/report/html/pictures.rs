@@ -46,7 +46,8 @@ fn figure(s: &mut String, picture: &Picture) {
 
 fn turning(s: &mut String, m: &MeshData) {
     let known = |t: &&[u32; 3]| t.iter().all(|i| (*i as usize) < m.positions.len());
-    let triangles: Vec<String> = m.triangles.iter().filter(known).flatten().map(u32::to_string).collect();
+    let triangles: Vec<String> =
+        m.triangles.iter().filter(known).flatten().map(u32::to_string).collect();
     let _ = writeln!(
         s,
         "<figure><canvas id=\"mesh\" width=\"384\" height=\"384\" tabindex=\"0\"></canvas>\
@@ -65,7 +66,10 @@ mod tests {
     #[test]
     fn pictures_that_belong_together_are_side_by_side() {
         let of = |lines| Picture { caption: "a picture", file: b"\xff\xd8\xff".to_vec(), lines };
-        let text = pictures(&Page { pictures: vec![vec![of(false)], vec![of(true), of(true)]], ..Page::default() });
+        let text = pictures(&Page {
+            pictures: vec![vec![of(false)], vec![of(true), of(true)]],
+            ..Page::default()
+        });
         assert_eq!(text.matches("data:image/jpeg;base64,/9j/").count(), 3);
         assert_eq!(text.matches("<div class=\"pair\"><figure>").count(), 1);
         assert_eq!(text.matches("<img class=\"lines\"").count(), 2);

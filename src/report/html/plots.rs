@@ -1,6 +1,7 @@
 //! Small plots of draws as SVG: traces, distributions, ranks.
 //!
-//! Invariant: only finite numbers are written, whatever the draws are. Draws that are not finite are not shown.
+//! Invariant: only finite numbers are written, whatever the draws are. Draws that are not
+//! finite are not shown.
 
 use crate::report::{Quantity, number};
 use std::fmt::Write;
@@ -9,7 +10,8 @@ const WIDTH: f64 = 260.0;
 /// The height of the plot, and with the line of labels below it.
 const HEIGHT: f64 = 90.0;
 const WHOLE: f64 = 103.0;
-/// One colour for each chain, told apart also by the colour blind (Okabe and Ito 2008): classes of the style.
+/// One colour for each chain, told apart also by the colour blind (Okabe and Ito 2008):
+/// classes of the style.
 const COLORS: [&str; 6] = ["c0", "c1", "c2", "c3", "c4", "c5"];
 /// At most this many points of a chain are drawn.
 const POINTS: usize = 400;
@@ -28,7 +30,8 @@ fn open(title: &str) -> String {
 /// A label below the plot, at its left or its right end.
 fn label(s: &mut String, right: bool, text: &str) {
     let (x, anchor) = if right { (WIDTH, "end") } else { (0.0, "start") };
-    let _ = write!(s, "<text x=\"{x}\" y=\"{}\" text-anchor=\"{anchor}\">{text}</text>", WHOLE - 3.0);
+    let _ =
+        write!(s, "<text x=\"{x}\" y=\"{}\" text-anchor=\"{anchor}\">{text}</text>", WHOLE - 3.0);
 }
 
 /// The smallest and the largest finite draw.
@@ -38,8 +41,8 @@ fn range(q: &Quantity) -> Option<(f64, f64)> {
     (lo <= hi).then_some((lo, hi))
 }
 
-/// Where between the ends a draw is, from 0 to 1; in the middle if the ends are the same. Halves, so that the largest
-/// doubles do not overflow.
+/// Where between the ends a draw is, from 0 to 1; in the middle if the ends are the same.
+/// Halves, so that the largest doubles do not overflow.
 fn place(x: f64, (lo, hi): (f64, f64)) -> f64 {
     let share = (0.5 * x - 0.5 * lo) / (0.5 * hi - 0.5 * lo);
     if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 }
@@ -67,10 +70,18 @@ pub(super) fn traces(q: &Quantity) -> String {
         for (c, xs) in q.chains.iter().enumerate() {
             let across = WIDTH / (xs.len().max(2) - 1) as f64;
             let mut points = String::new();
-            for (i, x) in xs.iter().enumerate().step_by(xs.len().div_ceil(POINTS).max(1)).filter(|(_, x)| x.is_finite())
+            for (i, x) in xs
+                .iter()
+                .enumerate()
+                .step_by(xs.len().div_ceil(POINTS).max(1))
+                .filter(|(_, x)| x.is_finite())
             {
-                let _ =
-                    write!(points, "{:.1},{:.1} ", across * i as f64, HEIGHT - 2.0 - (HEIGHT - 4.0) * place(*x, ends));
+                let _ = write!(
+                    points,
+                    "{:.1},{:.1} ",
+                    across * i as f64,
+                    HEIGHT - 2.0 - (HEIGHT - 4.0) * place(*x, ends)
+                );
             }
             let color = color(c);
             let _ = write!(
@@ -91,7 +102,8 @@ pub(super) fn marginal(q: &Quantity) -> String {
         let count = |xs: &Vec<f64>| {
             let mut bins = [0.0f64; BINS];
             for x in xs.iter().filter(|x| x.is_finite()) {
-                bins[((place(*x, ends) * BINS as f64) as usize).min(BINS - 1)] += 1.0 / xs.len() as f64;
+                bins[((place(*x, ends) * BINS as f64) as usize).min(BINS - 1)] +=
+                    1.0 / xs.len() as f64;
             }
             bins
         };
@@ -111,11 +123,15 @@ pub(super) fn marginal(q: &Quantity) -> String {
     s + "</svg>"
 }
 
-/// How many of each chain's draws have ranks in each bin, relative to level; `[chain][bin]`. Equal draws share their
-/// ranks, so that chains that agree look alike for discrete quantities too.
+/// How many of each chain's draws have ranks in each bin, relative to level;
+/// `[chain][bin]`. Equal draws share their ranks, so that chains that agree look alike
+/// for discrete quantities too.
 fn rank_shares(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
-    let mut order: Vec<(f64, usize)> =
-        chains.iter().enumerate().flat_map(|(c, xs)| xs.iter().map(move |x| (*x + 0.0, c))).collect();
+    let mut order: Vec<(f64, usize)> = chains
+        .iter()
+        .enumerate()
+        .flat_map(|(c, xs)| xs.iter().map(move |x| (*x + 0.0, c)))
+        .collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let scale = RANK_BINS as f64 / order.len().max(1) as f64;
     let mut shares = vec![[0.0f64; RANK_BINS]; chains.len()];
@@ -136,16 +152,24 @@ fn rank_shares(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
     shares
 }
 
-/// Histograms of the ranks of each chain's draws among all: level if the chains agree (Vehtari et al. 2021, section 4.3).
+/// Histograms of the ranks of each chain's draws among all: level if the chains agree
+/// (Vehtari et al. 2021, section 4.3).
 pub(super) fn ranks(q: &Quantity) -> String {
-    let mut s = open("ranks of each chain's draws among all; level lines mean that the chains agree");
+    let mut s =
+        open("ranks of each chain's draws among all; level lines mean that the chains agree");
     // Agreement is at a third of the height; what is beyond the top is cut.
     let height = |share: f64| (HEIGHT - HEIGHT / 3.0 * share).max(2.0);
     let level = height(1.0);
-    let _ = write!(s, "<path d=\"M0,{level:.1}H{WIDTH}\" class=\"level\" stroke-dasharray=\"3 3\"/>");
-    for (c, shares) in rank_shares(&q.chains).iter().enumerate().filter(|(c, _)| !q.chains[*c].is_empty()) {
+    let _ =
+        write!(s, "<path d=\"M0,{level:.1}H{WIDTH}\" class=\"level\" stroke-dasharray=\"3 3\"/>");
+    for (c, shares) in
+        rank_shares(&q.chains).iter().enumerate().filter(|(c, _)| !q.chains[*c].is_empty())
+    {
         let (path, color) = (steps(&shares.map(height)), color(c));
-        let _ = write!(s, "<path class=\"{color}\" d=\"{path}\" fill=\"none\" stroke=\"currentColor\"/>");
+        let _ = write!(
+            s,
+            "<path class=\"{color}\" d=\"{path}\" fill=\"none\" stroke=\"currentColor\"/>"
+        );
     }
     label(&mut s, false, "lowest rank");
     label(&mut s, true, "highest");
@@ -188,8 +212,12 @@ mod tests {
     fn every_chain_is_drawn_within_the_plot() {
         let q = quantity(vec![(0..1000).map(f64::from).collect(), vec![500.0; 10]]);
         let svg = traces(&q);
-        let lines: Vec<&str> = svg.split("points=\"").skip(1).map(|l| l.split('"').next().unwrap()).collect();
-        assert_eq!(lines.iter().map(|l| l.split_whitespace().count()).collect::<Vec<_>>(), [334, 10]);
+        let lines: Vec<&str> =
+            svg.split("points=\"").skip(1).map(|l| l.split('"').next().unwrap()).collect();
+        assert_eq!(
+            lines.iter().map(|l| l.split_whitespace().count()).collect::<Vec<_>>(),
+            [334, 10]
+        );
         assert!(lines[0].starts_with("0.0,88.0 ") && lines[1].ends_with("260.0,45.0 "), "{svg}");
         assert!(svg.contains(">0 to 999<") && svg.contains(">1000 draws<"));
         assert_eq!(marginal(&q).matches("fill=\"none\"").count(), 2);
@@ -197,11 +225,15 @@ mod tests {
 
     #[test]
     fn ranks_are_level_where_chains_agree() {
-        let level = |shares: &[[f64; RANK_BINS]]| shares.iter().flatten().all(|s| (s - 1.0).abs() < 1e-9);
+        let level =
+            |shares: &[[f64; RANK_BINS]]| shares.iter().flatten().all(|s| (s - 1.0).abs() < 1e-9);
         let half = |odd: usize| (0..200).map(|i| (2 * i + odd) as f64).collect::<Vec<_>>();
         assert!(level(&rank_shares(&[half(0), half(1)])));
         let coins = |n: usize| (0..n).map(|i| f64::from(i as u32 % 2)).collect::<Vec<_>>();
-        assert!(level(&rank_shares(&[coins(50), coins(50), coins(90)])), "equal draws share their ranks");
+        assert!(
+            level(&rank_shares(&[coins(50), coins(50), coins(90)])),
+            "equal draws share their ranks"
+        );
         assert!(level(&rank_shares(&[vec![0.0, -0.0, 0.0], vec![-0.0; 3]])), "zeros are equal");
         let apart = rank_shares(&[vec![1.0; 30], vec![2.0; 30]]);
         assert_eq!((apart[0][0], apart[0][19], apart[1][0]), (2.0, 0.0, 0.0));

@@ -1,5 +1,5 @@
-//! The tables of a page. What matters most stands in their first columns; those that are too wide
-//! scroll by themselves.
+//! The tables of a page. What matters most stands in their first columns; those that are
+//! too wide scroll by themselves.
 
 use super::encode::{breakable, escaped};
 use super::pictures::source;
@@ -47,7 +47,11 @@ pub(super) fn modes(p: &Page) -> String {
         head.push_str("<th>");
         // The first two columns are names, and all chains together.
         if let Some(file) = i.checked_sub(2).and_then(|i| p.mode_pictures.get(i)?.as_deref()) {
-            let _ = write!(head, "<img class=\"thumb\" alt=\"the best state of {name}\" src=\"{}\"><br>", source(file));
+            let _ = write!(
+                head,
+                "<img class=\"thumb\" alt=\"the best state of {name}\" src=\"{}\"><br>",
+                source(file)
+            );
         }
         head.push_str(&name);
     }
@@ -71,10 +75,16 @@ pub(super) fn kernels(kernels: &[KernelStats]) -> String {
     for k in kernels {
         let rate = k.acceptance().map_or("-".to_owned(), |r| format!("{:.0}%", 100.0 * r));
         let (name, time) = (breakable(&k.name), seconds(k.seconds));
-        let _ = writeln!(s, "<tr><th>{name}<td>{}<td>{rate}<td>{}<td>{time}</tr>", k.proposals, k.failed);
+        let _ = writeln!(
+            s,
+            "<tr><th>{name}<td>{}<td>{rate}<td>{}<td>{time}</tr>",
+            k.proposals, k.failed
+        );
     }
     let text = wide("<th>kernel<th>proposals<th>accepted<th>failed<th>time", &s);
-    format!("{text}<p class=\"note\">After warm-up. Failed: the log density of the proposal is undefined.</p>\n")
+    format!(
+        "{text}<p class=\"note\">After warm-up. Failed: the log density of the proposal is undefined.</p>\n"
+    )
 }
 
 pub(super) fn list(items: &[String]) -> String {

@@ -20,7 +20,10 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
         command: text,
         program: text,
         pictures: vec![vec![picture]],
-        mesh: Some(MeshData { positions: &[[0.0, f32::NAN, 2.0]; 3], triangles: &[[0, 1, 2], [0, 1, 3]] }),
+        mesh: Some(MeshData {
+            positions: &[[0.0, f32::NAN, 2.0]; 3],
+            triangles: &[[0, 1, 2], [0, 1, 3]],
+        }),
         settings: vec![("seed", text.into())],
         modes: &super::super::modes(std::slice::from_ref(&q), None),
         mode_pictures: vec![Some(vec![1, 2, 3])],
@@ -31,14 +34,28 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
     });
     // Where names may break is no part of them.
     let page = page.replace("<wbr>", "");
-    assert!(!page.contains("alert(1)</") && !page.contains("& ") && !page.contains("alert(1)<"), "escaped");
-    assert_eq!(page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(), 14);
-    assert_eq!(page.matches("data:image/png;base64,AQID").count(), 2, "the picture, and that of a mode");
+    assert!(
+        !page.contains("alert(1)</") && !page.contains("& ") && !page.contains("alert(1)<"),
+        "escaped"
+    );
+    assert_eq!(
+        page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(),
+        14
+    );
+    assert_eq!(
+        page.matches("data:image/png;base64,AQID").count(),
+        2,
+        "the picture, and that of a mode"
+    );
     assert!(page.contains("{\"positions\":[0,0,2,0,0,2,0,0,2],\"triangles\":[0,1,2]}"));
     assert!(page.contains("<td class=\"bad\">") && page.contains("<td>0<td>-<td>0<td>0.00 s"));
     assert!(page.ends_with("</html>") && !page.contains("http"), "nothing comes from the network");
-    for tag in ["table", "div", "figure", "script", "svg", "canvas", "pre", "h2", "section", "nav", "ul", "p"] {
-        let opened = page.matches(&format!("<{tag}>")).count() + page.matches(&format!("<{tag} ")).count();
+    for tag in [
+        "table", "div", "figure", "script", "svg", "canvas", "pre", "h2", "section", "nav", "ul",
+        "p",
+    ] {
+        let opened =
+            page.matches(&format!("<{tag}>")).count() + page.matches(&format!("<{tag} ")).count();
         assert_eq!(opened, page.matches(&format!("</{tag}>")).count(), "{tag}");
     }
 }
@@ -46,8 +63,13 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
 /// Every part can be gone to, and every link leads somewhere.
 #[test]
 fn links_lead_to_parts() {
-    let text = page(&Page { quantities: &[quantity("a"), quantity("b")], program: "1", ..Page::default() });
-    let links: Vec<&str> = text.split("href=\"#").skip(1).filter_map(|l| l.split('"').next()).collect();
+    let text = page(&Page {
+        quantities: &[quantity("a"), quantity("b")],
+        program: "1",
+        ..Page::default()
+    });
+    let links: Vec<&str> =
+        text.split("href=\"#").skip(1).filter_map(|l| l.split('"').next()).collect();
     assert_eq!(links, ["quantities", "draws", "program", "q0", "q1"]);
     for link in links {
         assert_eq!(text.matches(&format!(" id=\"{link}\"")).count(), 1, "{link}");
@@ -57,7 +79,11 @@ fn links_lead_to_parts() {
 #[test]
 fn a_page_of_nothing() {
     let page = page(&Page::default());
-    assert!(page.ends_with("</html>") && !page.contains("<canvas") && !page.contains("more, in the files"));
+    assert!(
+        page.ends_with("</html>")
+            && !page.contains("<canvas")
+            && !page.contains("more, in the files")
+    );
     assert!(!page.contains("<section") && !page.contains("<script") && !page.contains("<h2"));
 }
 
@@ -69,29 +95,42 @@ fn many_quantities_are_listed_but_not_all_plotted() {
     assert!(page.contains("and 3 more") && page.contains("<th>q42<"));
 }
 
-/// What says whether chains agree stands next to the mean, where a narrow screen shows it, and
-/// tables that are wider scroll by themselves with their names in view.
+/// What says whether chains agree stands next to the mean, where a narrow screen shows
+/// it, and tables that are wider scroll by themselves with their names in view.
 #[test]
 fn the_table_fits_narrow_screens() {
     let text = page(&Page { quantities: &[quantity("pose.left_arm[2]")], ..Page::default() });
-    let heads: Vec<&str> = text.split("<th>").skip(1).map(|h| h.split('<').next().unwrap_or("")).collect();
+    let heads: Vec<&str> =
+        text.split("<th>").skip(1).map(|h| h.split('<').next().unwrap_or("")).collect();
     assert_eq!(heads[..4], ["quantity", "mean", "sd", "R-hat"]);
     assert!(text.contains("<div class=\"wide\"><table>"));
     assert!(text.contains("pose.<wbr>left_<wbr>arm[<wbr>2]"), "names break where their parts end");
     assert!(STYLE.contains("position: sticky") && STYLE.contains("overflow-x: auto"));
     let anywhere = STYLE.lines().filter(|l| l.contains("overflow-wrap: anywhere"));
-    assert!(anywhere.clone().all(|l| l.contains(".settings td") || l.contains("#command")), "letters stay together");
+    assert!(
+        anywhere.clone().all(|l| l.contains(".settings td") || l.contains("#command")),
+        "letters stay together"
+    );
 }
 
-/// Three pictures stand in a row of a window that is 1200 pixels wide, its scroll bar and margins
-/// taken off; heads of tables are one line, and labels of plots that are made smaller stay legible.
+/// Three pictures stand in a row of a window that is 1200 pixels wide, its scroll bar and
+/// margins taken off; heads of tables are one line, and labels of plots that are made
+/// smaller stay legible.
 #[test]
 fn the_style_uses_the_width() {
-    let after = |key: &str| STYLE.split(key).nth(1).and_then(|s| s.split("px").next()?.parse::<u32>().ok());
-    let (one, two) = (after("figure { margin: 0; flex: 0 1 ").unwrap(), after("gap: 16px; flex: 0 1 ").unwrap());
+    let after =
+        |key: &str| STYLE.split(key).nth(1).and_then(|s| s.split("px").next()?.parse::<u32>().ok());
+    let (one, two) =
+        (after("figure { margin: 0; flex: 0 1 ").unwrap(), after("gap: 16px; flex: 0 1 ").unwrap());
     let page = after("max-width: ").unwrap();
-    assert!(two == 2 * one + 16 && one + 16 + two <= page.min(1200 - 15 - 2 * 15), "{one} {two} {page}");
-    assert!(STYLE.contains(".wide tr:first-child th { white-space: nowrap }"), "R-hat breaks at its hyphen");
+    assert!(
+        two == 2 * one + 16 && one + 16 + two <= page.min(1200 - 15 - 2 * 15),
+        "{one} {two} {page}"
+    );
+    assert!(
+        STYLE.contains(".wide tr:first-child th { white-space: nowrap }"),
+        "R-hat breaks at its hyphen"
+    );
     // Of a plot of 260 pixels that is 180 wide.
     let label = after("  .plots svg text { font-size: ").unwrap();
     assert!(label * 180 / 260 >= 9, "{label}");
@@ -103,7 +142,10 @@ fn the_page_has_a_dark_side() {
     let text = page(&Page { quantities: &[quantity("a")], ..Page::default() });
     assert!(text.contains("prefers-color-scheme: dark") && text.contains("content=\"light dark\""));
     let svgs = text.split("<svg").skip(1).map(|s| s.split("</svg>").next().unwrap_or(""));
-    assert!(svgs.clone().count() == 3 && svgs.clone().all(|s| !s.contains("=\"#")), "plots are coloured by the style");
+    assert!(
+        svgs.clone().count() == 3 && svgs.clone().all(|s| !s.contains("=\"#")),
+        "plots are coloured by the style"
+    );
     for part in svgs.flat_map(|s| s.split("class=\"").skip(1)).filter_map(|s| s.split('"').next()) {
         assert!(STYLE.contains(&format!(".{part} {{")), ".{part} has no colour");
     }

@@ -10,8 +10,9 @@ pub const DETECTED: [f32; 3] = [90.0, 220.0, 255.0];
 /// The colour of the ring around a dot that sets it off from what is below.
 const RING: [f32; 3] = [20.0, 20.0, 20.0];
 
-/// Draws dots, about 9 pixels wide in a picture of [`LONGER_SIDE`]. Positions are in pixels of a picture of `width` x
-/// `height` and scaled to this one; what is not finite is left out.
+/// Draws dots, about 9 pixels wide in a picture of [`LONGER_SIDE`]. Positions are in
+/// pixels of a picture of `width` x `height` and scaled to this one; what is not finite
+/// is left out.
 pub fn dots(out: &mut RgbImage, (width, height): (u32, u32), at: &[[f64; 2]], color: [f32; 3]) {
     let (w, h) = (out.width() as f32, out.height() as f32);
     let (sx, sy) = (w / width.max(1) as f32, h / height.max(1) as f32);
@@ -42,11 +43,19 @@ mod tests {
     #[test]
     fn a_dot_is_where_it_should_be_and_nowhere_else() {
         let mut p = RgbImage::new(200, 100);
-        dots(&mut p, (20, 10), &[[10.0, 5.0], [f64::NAN, 1.0], [1e300, 1.0], [-50.0, 5.0]], OF_SCENE);
+        dots(
+            &mut p,
+            (20, 10),
+            &[[10.0, 5.0], [f64::NAN, 1.0], [1e300, 1.0], [-50.0, 5.0]],
+            OF_SCENE,
+        );
         assert_eq!(p.get_pixel(100, 50).0, [255, 220, 0]);
         let lit: Vec<(u32, u32)> =
             p.enumerate_pixels().filter(|(.., c)| c.0 != [0; 3]).map(|(x, y, _)| (x, y)).collect();
-        assert!(lit.len() > 8 && lit.iter().all(|(x, y)| x.abs_diff(100) < 5 && y.abs_diff(50) < 5), "{lit:?}");
+        assert!(
+            lit.len() > 8 && lit.iter().all(|(x, y)| x.abs_diff(100) < 5 && y.abs_diff(50) < 5),
+            "{lit:?}"
+        );
         dots(&mut RgbImage::new(0, 0), (0, 0), &[[0.0, 0.0]], OF_SCENE);
     }
 }

@@ -1,6 +1,8 @@
-//! Letters for captions: five pixels high, drawn here pixel by pixel, so that no font has to be shipped.
+//! Letters for captions: five pixels high, drawn here pixel by pixel, so that no font has
+//! to be shipped.
 //!
-//! Small letters look as capitals do; what has no picture is a small box. Not a typesetter: one line, no kerning.
+//! Small letters look as capitals do; what has no picture is a small box. Not a
+//! typesetter: one line, no kerning.
 
 use image::{Rgb, RgbImage};
 
@@ -57,8 +59,8 @@ pub(super) fn fitting(text: &str, room: u32) -> &str {
     text
 }
 
-/// Writes a text with its upper left corner at (x, y), every pixel of a sign `scale` pixels large. What lies outside the
-/// picture is left out.
+/// Writes a text with its upper left corner at (x, y), every pixel of a sign `scale`
+/// pixels large. What lies outside the picture is left out.
 pub(super) fn write(out: &mut RgbImage, x: u32, y: u32, scale: u32, color: Rgb<u8>, text: &str) {
     let mut left = x;
     for c in text.chars() {
@@ -86,7 +88,12 @@ mod tests {
         for (i, (c, rows)) in GLYPHS.iter().enumerate() {
             let lines: Vec<&str> = rows.split('/').collect();
             assert_eq!(lines.len() as u32, HEIGHT, "{c}");
-            assert!(lines.iter().all(|l| l.len() == lines[0].len() && l.bytes().all(|b| b".#".contains(&b))), "{c}");
+            assert!(
+                lines
+                    .iter()
+                    .all(|l| l.len() == lines[0].len() && l.bytes().all(|b| b".#".contains(&b))),
+                "{c}"
+            );
             assert!(GLYPHS[..i].iter().all(|(d, r)| d != c && r != rows), "{c}");
         }
         for c in ('a'..='z').chain('0'..='9') {
@@ -100,10 +107,16 @@ mod tests {
         write(&mut p, 1, 1, 2, Rgb([255; 3]), "H1é");
         assert_eq!(width("H1é"), 11);
         let on = |p: &RgbImage| {
-            p.enumerate_pixels().filter(|(.., p)| p.0[0] > 0).map(|(x, y, _)| (x, y)).collect::<Vec<_>>()
+            p.enumerate_pixels()
+                .filter(|(.., p)| p.0[0] > 0)
+                .map(|(x, y, _)| (x, y))
+                .collect::<Vec<_>>()
         };
         let all = on(&p);
-        assert_eq!((all.iter().map(|a| a.0).min(), all.iter().map(|a| a.0).max()), (Some(1), Some(22)));
+        assert_eq!(
+            (all.iter().map(|a| a.0).min(), all.iter().map(|a| a.0).max()),
+            (Some(1), Some(22))
+        );
         assert_eq!(all.iter().map(|a| a.1).max(), Some(9), "what lies outside is left out");
         assert_eq!(
             (fitting("H1é", 11), fitting("H1é", 10), fitting("H1é", 7), fitting("H1é", 2)),

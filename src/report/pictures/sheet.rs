@@ -1,4 +1,5 @@
-//! Contact sheets: many pictures in rows, as Figure 1 of Kulkarni et al. (2014) shows draws from a prior.
+//! Contact sheets: many pictures in rows, as Figure 1 of Kulkarni et al. (2014) shows
+//! draws from a prior.
 
 use super::font;
 use image::imageops::replace;
@@ -13,13 +14,15 @@ const INK: Rgb<u8> = Rgb([30; 3]);
 /// Behind captions.
 const PAPER: Rgb<u8> = Rgb([250; 3]);
 
-/// Pictures in rows, with thin lines between them. Cells have the size of the largest picture; smaller ones lie in the
-/// upper left corner of theirs. Without a picture, a sheet of one pixel.
+/// Pictures in rows, with thin lines between them. Cells have the size of the largest
+/// picture; smaller ones lie in the upper left corner of theirs. Without a picture, a
+/// sheet of one pixel.
 pub fn contact_sheet(pictures: &[RgbImage], columns: u32) -> RgbImage {
     captioned_sheet(pictures, columns, &[])
 }
 
-/// As [`contact_sheet`], with a line of text below each picture that has one; what is too wide for the picture is cut.
+/// As [`contact_sheet`], with a line of text below each picture that has one; what is too
+/// wide for the picture is cut.
 pub fn captioned_sheet(pictures: &[RgbImage], columns: u32, captions: &[String]) -> RgbImage {
     let Some(w) = pictures.iter().map(|p| p.width()).max() else { return RgbImage::new(1, 1) };
     let h = pictures.iter().map(|p| p.height()).max().unwrap_or(0);
@@ -28,13 +31,20 @@ pub fn captioned_sheet(pictures: &[RgbImage], columns: u32, captions: &[String])
     let scale = (w / 96).clamp(1, 4);
     let line = if captions.iter().all(String::is_empty) { 0 } else { (font::HEIGHT + 4) * scale };
     let (step_x, step_y) = (w + GAP, h + line + GAP);
-    let mut sheet = RgbImage::from_pixel(columns * step_x + GAP, count.div_ceil(columns) * step_y + GAP, LINE);
+    let mut sheet =
+        RgbImage::from_pixel(columns * step_x + GAP, count.div_ceil(columns) * step_y + GAP, LINE);
     for (i, p) in pictures.iter().enumerate() {
         let (x, y) = (GAP + i as u32 % columns * step_x, GAP + i as u32 / columns * step_y);
         replace(&mut sheet, p, i64::from(x), i64::from(y));
         if line > 0 {
-            replace(&mut sheet, &RgbImage::from_pixel(w, line, PAPER), i64::from(x), i64::from(y + h));
-            let text = captions.get(i).map_or("", |t| font::fitting(t, (w / scale).saturating_sub(4)));
+            replace(
+                &mut sheet,
+                &RgbImage::from_pixel(w, line, PAPER),
+                i64::from(x),
+                i64::from(y + h),
+            );
+            let text =
+                captions.get(i).map_or("", |t| font::fitting(t, (w / scale).saturating_sub(4)));
             let left = x + (w.saturating_sub(font::width(text) * scale)) / 2;
             font::write(&mut sheet, left, y + h + 2 * scale, scale, INK, text);
         }
@@ -68,7 +78,10 @@ mod tests {
         assert_eq!(sheet.dimensions(), (2 * 42 + 2, 20 + 9 + 4));
         let ink: Vec<(u32, u32)> =
             sheet.enumerate_pixels().filter(|(.., p)| **p == INK).map(|(x, y, _)| (x, y)).collect();
-        assert!(!ink.is_empty() && ink.iter().all(|(x, y)| (2..42).contains(x) && (24..29).contains(y)), "{ink:?}");
+        assert!(
+            !ink.is_empty() && ink.iter().all(|(x, y)| (2..42).contains(x) && (24..29).contains(y)),
+            "{ink:?}"
+        );
         assert_eq!(sheet.get_pixel(2, 2).0, [9; 3]);
         assert_eq!(sheet.get_pixel(50, 25), &PAPER);
     }

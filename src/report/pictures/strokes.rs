@@ -29,8 +29,9 @@ pub fn contours(width: u32, height: u32, strokes: &Strokes) -> RgbImage {
     out
 }
 
-/// Draws strokes, scaled to the picture, about 2 pixels wide in one of [`LONGER_SIDE`]. A pixel is covered by as much as
-/// its middle is inside the stroke, up to one pixel; where strokes meet the larger cover counts, so joints do not show.
+/// Draws strokes, scaled to the picture, about 2 pixels wide in one of [`LONGER_SIDE`]. A
+/// pixel is covered by as much as its middle is inside the stroke, up to one pixel; where
+/// strokes meet the larger cover counts, so joints do not show.
 pub(super) fn draw_strokes(out: &mut RgbImage, s: &Strokes, color: [f32; 3]) {
     let (width, height) = (out.width() as usize, out.height() as usize);
     let (w, h) = (width as f32, height as f32);
@@ -44,13 +45,19 @@ pub(super) fn draw_strokes(out: &mut RgbImage, s: &Strokes, color: [f32; 3]) {
             continue;
         }
         let (reach_x, reach_y) = (dx.abs() + half_width + 1.0, dy.abs() + half_width + 1.0);
-        let (u0, u1) = ((x - reach_x).max(0.0) as usize, (x + reach_x + 1.0).clamp(0.0, w) as usize);
-        let (v0, v1) = ((y - reach_y).max(0.0) as usize, (y + reach_y + 1.0).clamp(0.0, h) as usize);
+        let (u0, u1) =
+            ((x - reach_x).max(0.0) as usize, (x + reach_x + 1.0).clamp(0.0, w) as usize);
+        let (v0, v1) =
+            ((y - reach_y).max(0.0) as usize, (y + reach_y + 1.0).clamp(0.0, h) as usize);
         let square = dx * dx + dy * dy;
         for v in v0..v1 {
             for u in u0..u1 {
                 let (px, py) = (u as f32 + 0.5 - x, v as f32 + 0.5 - y);
-                let t = if square > 0.0 { ((px * dx + py * dy) / square).clamp(-1.0, 1.0) } else { 0.0 };
+                let t = if square > 0.0 {
+                    ((px * dx + py * dy) / square).clamp(-1.0, 1.0)
+                } else {
+                    0.0
+                };
                 let (ex, ey) = (px - t * dx, py - t * dy);
                 let c = (half_width + 0.5 - (ex * ex + ey * ey).sqrt()).clamp(0.0, 1.0);
                 if let Some(at) = cover.get_mut(v * width + u) {
@@ -77,7 +84,11 @@ mod tests {
     #[test]
     fn a_stroke_is_where_it_should_be() {
         let c = contours(20, 20, &one(&[10.0], &[10.0], &[[1.0], [0.0]], &[8.0]));
-        assert!(c.get_pixel(8, 10).0[0] > 100 && c.get_pixel(8, 14).0[0] == 0 && c.get_pixel(17, 10).0[0] == 0);
+        assert!(
+            c.get_pixel(8, 10).0[0] > 100
+                && c.get_pixel(8, 14).0[0] == 0
+                && c.get_pixel(17, 10).0[0] == 0
+        );
         // The light it leaves is its area: width 1.4 by length 8, and round ends.
         let sum: f32 = c.pixels().map(|p| f32::from(p.0[0]) / 255.0).sum();
         let area = 1.4 * 8.0 + std::f32::consts::PI * 0.7 * 0.7;
@@ -101,6 +112,9 @@ mod tests {
             let c = contours(20, 20, &one(&[odd], &[10.0], &[[1.0], [0.0]], &[8.0]));
             assert!(c.pixels().all(|p| p.0 == [0; 3]), "{odd}");
         }
-        assert_eq!(contours(0, 3, &one(&[1.0], &[1.0], &[[1.0], [0.0]], &[1.0])).dimensions(), (0, 3));
+        assert_eq!(
+            contours(0, 3, &one(&[1.0], &[1.0], &[[1.0], [0.0]], &[1.0])).dimensions(),
+            (0, 3)
+        );
     }
 }

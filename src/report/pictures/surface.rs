@@ -1,4 +1,5 @@
-//! The surface of a draw: shaded, over a photograph, as a mask, and how often draws cover a pixel.
+//! The surface of a draw: shaded, over a photograph, as a mask, and how often draws cover
+//! a pixel.
 
 use super::strokes::{Strokes, draw_strokes};
 use super::{LONGER_SIDE, mix};
@@ -16,7 +17,8 @@ pub struct Drawn<'a> {
     pub depth: &'a [f32],
     /// Unit normals in the camera's frame: x right, y up, z towards the camera.
     pub normal: &'a [[f32; 3]],
-    /// The part of the scene that is seen, counted from 0; may be empty, then all is one part.
+    /// The part of the scene that is seen, counted from 0; may be empty, then all is one
+    /// part.
     pub part: &'a [u16],
 }
 
@@ -24,8 +26,8 @@ pub struct Drawn<'a> {
 const OVER: f32 = 0.55;
 /// The colour of contours: far from the surface's blues and from most photographs.
 const STROKE: [f32; 3] = [255.0, 60.0, 20.0];
-/// The colours of a part in the dark and in full light. Parts take turns; they differ a little in hue only, for a cap and
-/// the side below it are parts too.
+/// The colours of a part in the dark and in full light. Parts take turns; they differ a
+/// little in hue only, for a cap and the side below it are parts too.
 const PALETTE: [[[f32; 3]; 2]; 4] = [
     [[30.0, 42.0, 66.0], [206.0, 232.0, 255.0]],
     [[24.0, 52.0, 62.0], [200.0, 244.0, 246.0]],
@@ -33,8 +35,8 @@ const PALETTE: [[[f32; 3]; 2]; 4] = [
     [[38.0, 46.0, 54.0], [224.0, 232.0, 238.0]],
 ];
 
-/// How light a pixel is, from 0 to 1: a light at the camera's upper left, a weaker one at the camera, and some from
-/// everywhere (Lambert's law).
+/// How light a pixel is, from 0 to 1: a light at the camera's upper left, a weaker one at
+/// the camera, and some from everywhere (Lambert's law).
 fn light([x, y, z]: [f32; 3]) -> f32 {
     let key = (0.7 * z - 0.45 * x + 0.55 * y).max(0.0);
     let light = 0.72 * key + 0.22 * z.max(0.0) + 0.06;
@@ -52,14 +54,16 @@ fn shade(d: &Drawn, i: usize) -> Option<[f32; 3]> {
     Some([0, 1, 2].map(|c| dark[c] + (bright[c] - dark[c]) * light))
 }
 
-/// The same brightness with twice the colour, so that a surface is told from what is seen through it.
+/// The same brightness with twice the colour, so that a surface is told from what is seen
+/// through it.
 fn vivid(c: [f32; 3]) -> [f32; 3] {
     let mean = (c[0] + c[1] + c[2]) / 3.0;
     c.map(|x| (mean + 2.0 * (x - mean)).clamp(0.0, 255.0))
 }
 
-/// The surface drawn over the photograph, half transparent, with its contours on top. The drawing's size decides, but a
-/// small picture is enlarged to [`LONGER_SIDE`] so that it can be judged.
+/// The surface drawn over the photograph, half transparent, with its contours on top. The
+/// drawing's size decides, but a small picture is enlarged to [`LONGER_SIDE`] so that it
+/// can be judged.
 pub fn overlay(photo: Option<&RgbImage>, drawn: &Drawn, strokes: &Strokes) -> RgbImage {
     let mut out = match photo.filter(|p| p.width() > 0 && p.height() > 0) {
         Some(p) if p.dimensions() == (drawn.width, drawn.height) => p.clone(),
@@ -104,7 +108,9 @@ pub fn frequency(width: u32, height: u32, counts: &[u32], of: u32) -> GrayImage 
 
 /// A picture from a function of the place in row-major order.
 fn from_fn(width: u32, height: u32, value: impl Fn(usize) -> u8) -> GrayImage {
-    GrayImage::from_fn(width, height, |x, y| Luma([value(y as usize * width as usize + x as usize)]))
+    GrayImage::from_fn(width, height, |x, y| {
+        Luma([value(y as usize * width as usize + x as usize)])
+    })
 }
 
 #[cfg(test)]
@@ -135,7 +141,8 @@ mod tests {
     #[test]
     fn small_pictures_are_enlarged() {
         let (depth, normal) = ([1.0; 4], [[0.0, 0.0, 1.0]; 4]);
-        let drawn = Drawn { width: 2, height: 2, depth: &depth, normal: &normal, part: &[0, 1, 2, 3] };
+        let drawn =
+            Drawn { width: 2, height: 2, depth: &depth, normal: &normal, part: &[0, 1, 2, 3] };
         assert_eq!(overlay(None, &drawn, &none()).dimensions(), (768, 768));
         let empty = Drawn { width: 0, height: 0, depth: &[], normal: &[], part: &[] };
         assert_eq!(overlay(None, &empty, &none()).dimensions(), (0, 0));
@@ -144,7 +151,9 @@ mod tests {
     #[test]
     fn light_comes_from_the_upper_left_and_is_always_a_number() {
         let s = std::f32::consts::FRAC_1_SQRT_2;
-        assert!(light([0.0, s, s]) > light([0.0, -s, s]) && light([-s, 0.0, s]) > light([s, 0.0, s]));
+        assert!(
+            light([0.0, s, s]) > light([0.0, -s, s]) && light([-s, 0.0, s]) > light([s, 0.0, s])
+        );
         for n in [[f32::NAN; 3], [f32::INFINITY; 3], [0.0; 3], [0.0, 0.0, -1.0], [-9.0, 9.0, 9.0]] {
             assert!((0.0..=1.0).contains(&light(n)), "{n:?}");
         }
@@ -152,7 +161,13 @@ mod tests {
 
     #[test]
     fn parts_differ_and_short_buffers_are_background() {
-        let drawn = Drawn { width: 3, height: 1, depth: &[1.0; 2], normal: &[[0.0, 0.0, 1.0]; 2], part: &[0, 1] };
+        let drawn = Drawn {
+            width: 3,
+            height: 1,
+            depth: &[1.0; 2],
+            normal: &[[0.0, 0.0, 1.0]; 2],
+            part: &[0, 1],
+        };
         let s = shaded(&drawn);
         assert_ne!(s.get_pixel(0, 0), s.get_pixel(1, 0));
         assert_eq!(s.get_pixel(2, 0).0, [250; 3]);

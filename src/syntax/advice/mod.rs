@@ -1,7 +1,8 @@
-//! What was probably meant by a text that does not fit the grammar: habits from other languages, and common slips.
+//! What was probably meant by a text that does not fit the grammar: habits from other
+//! languages, and common slips.
 //!
-//! This only chooses words; a rule that misses costs a hint, not a message. [`words`] looks at names and keywords,
-//! [`symbols`] at the rest.
+//! This only chooses words; a rule that misses costs a hint, not a message. [`words`]
+//! looks at names and keywords, [`symbols`] at the rest.
 
 mod symbols;
 mod words;
@@ -45,7 +46,10 @@ pub(crate) fn explain(context: &Context<'_, '_>) -> SyntaxError {
     let at_end = at >= tokens.lexemes.len();
     let advice = if context.semicolon { rules.foreign_statement() } else { rules.apply() };
     if context.semicolon && advice.is_none() {
-        return SyntaxError::new(SyntaxErrorKind::MissingSemicolon { at_end }, tokens.span_after(at));
+        return SyntaxError::new(
+            SyntaxErrorKind::MissingSemicolon { at_end },
+            tokens.span_after(at),
+        );
     }
     let text = rules.text(at);
     let found = match tokens.lexemes.get(at).map(|l| &l.token) {
@@ -67,8 +71,17 @@ fn hint(hint: impl Into<String>) -> Option<Advice> {
 }
 
 /// Another message and label, and a hint.
-fn say(message: impl Into<String>, label: impl Into<String>, hint: impl Into<String>) -> Option<Advice> {
-    Some(Advice { message: Some(message.into()), label: Some(label.into()), hint: Some(hint.into()), place: None })
+fn say(
+    message: impl Into<String>,
+    label: impl Into<String>,
+    hint: impl Into<String>,
+) -> Option<Advice> {
+    Some(Advice {
+        message: Some(message.into()),
+        label: Some(label.into()),
+        hint: Some(hint.into()),
+        place: None,
+    })
 }
 
 /// What the rules look at.

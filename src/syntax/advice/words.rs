@@ -1,4 +1,5 @@
-//! Rules about words: statements of other languages, and keywords where they do not belong.
+//! Rules about words: statements of other languages, and keywords where they do not
+//! belong.
 
 use super::{Advice, Rules, say};
 use crate::syntax::token::Token;
@@ -22,16 +23,24 @@ impl Rules<'_, '_> {
             "var" | "const" | "val" | "auto" | "mut" | "set" if named => {
                 "a value is bound by `let x = e;`, a random choice made by `x ~ d;`"
             }
-            "int" | "real" | "float" | "double" | "bool" | "string" | "vector" | "matrix" | "array" if named => {
+            "int" | "real" | "float" | "double" | "bool" | "string" | "vector" | "matrix"
+            | "array"
+                if named =>
+            {
                 "names are not declared: `let x = e;` binds a value, `x ~ d;` makes a random choice"
             }
             "import" | "from" | "using" | "use" | "require" | "load" => {
                 "another file is read by `include \"file.pcad\" as name;`"
             }
-            "model" | "parameters" | "transformed" | "generated" | "program" | "module" | "begin" if block => {
+            "model" | "parameters" | "transformed" | "generated" | "program" | "module"
+            | "begin"
+                if block =>
+            {
                 "the statements of a model are written at the top level, one after another"
             }
-            "while" | "loop" | "do" | "until" => "write `for i in a .. b { … }`, or a function that calls itself",
+            "while" | "loop" | "do" | "until" => {
+                "write `for i in a .. b { … }`, or a function that calls itself"
+            }
             "elif" | "elseif" | "elsif" => "write `else if`",
             "switch" | "match" | "case" | "cond" => "write `if … { } else if … { } else { }`",
             "class" | "struct" | "type" | "enum" if named => "a record is written `{ x: 1, y: 2 }`",
@@ -54,8 +63,8 @@ impl Rules<'_, '_> {
         let found = self.found()?;
         let word = self.text(self.context.at);
         if *found == Token::Else && !self.expects("in") {
-            let semicolon =
-                matches!(self.back(1), Some(Token::Semi | Token::Bad)) && self.back(2) == Some(&Token::RBrace);
+            let semicolon = matches!(self.back(1), Some(Token::Semi | Token::Bad))
+                && self.back(2) == Some(&Token::RBrace);
             let hint = if semicolon {
                 "there is no `;` between `}` and `else`"
             } else {
@@ -66,11 +75,19 @@ impl Rules<'_, '_> {
         if self.expects_statement() {
             if found.starts_inference_statement() {
                 let message = format!("`{word}` is allowed only in an inference plan");
-                return say(message, "not a statement of the model", format!("write `infer {{ {word} … }}`"));
+                return say(
+                    message,
+                    "not a statement of the model",
+                    format!("write `infer {{ {word} … }}`"),
+                );
             }
             if found.starts_model_statement() {
                 let message = format!("`{word}` is allowed only in the model");
-                return say(message, "not a statement of an inference plan", "move it outside `infer` or `kernel`");
+                return say(
+                    message,
+                    "not a statement of an inference plan",
+                    "move it outside `infer` or `kernel`",
+                );
             }
             if found.starts_item() && *found != Token::Fn {
                 return say(
@@ -84,11 +101,22 @@ impl Rules<'_, '_> {
             let hint = "declare it at the top level, or bind it: `let f = fn(x) { … };`";
             return say("a named function cannot be declared here", "expected `(`", hint);
         }
-        if (found.starts_statement() || found.starts_item()) && self.expects_expression() && !self.expects(word) {
-            let advice = say("this statement is incomplete", "expected an expression after this", "");
-            return advice.map(|advice| Advice { hint: None, place: self.context.at.checked_sub(1), ..advice });
+        if (found.starts_statement() || found.starts_item())
+            && self.expects_expression()
+            && !self.expects(word)
+        {
+            let advice =
+                say("this statement is incomplete", "expected an expression after this", "");
+            return advice.map(|advice| Advice {
+                hint: None,
+                place: self.context.at.checked_sub(1),
+                ..advice
+            });
         }
-        if matches!(found, Token::If | Token::Fn | Token::Not) && self.expects_expression() && !self.expects(word) {
+        if matches!(found, Token::If | Token::Fn | Token::Not)
+            && self.expects_expression()
+            && !self.expects(word)
+        {
             let message = format!("`{word}` as an operand needs parentheses");
             return say(message, "", format!("write `({word} …)`"));
         }
@@ -102,7 +130,9 @@ impl Rules<'_, '_> {
     pub(super) fn keyword_as_name(&self) -> Option<Advice> {
         let found = self.found()?;
         let word = self.text(self.context.at);
-        let ends = |t: &Token<'_>| t.is_infix() || matches!(t, Token::Comma | Token::RParen | Token::Semi | Token::Dot);
+        let ends = |t: &Token<'_>| {
+            t.is_infix() || matches!(t, Token::Comma | Token::RParen | Token::Semi | Token::Dot)
+        };
         let value = self.expects_expression() && self.next().is_some_and(ends);
         if !found.is_keyword() || *found == Token::Else || !(value || self.expects_name_only()) {
             return None;

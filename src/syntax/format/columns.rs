@@ -1,5 +1,5 @@
-//! What a writer lined up stays lined up: `~`, `=`, `=>`, tags and comments that stood in one column on lines below each
-//! other, with more than one space before one of them.
+//! What a writer lined up stays lined up: `~`, `=`, `=>`, tags and comments that stood in
+//! one column on lines below each other, with more than one space before one of them.
 
 /// Where something stood in the source.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,17 +55,23 @@ pub(super) fn line_up(rows: &mut [Row], width: usize) {
     for k in 0..most {
         for run in runs(rows, |row| row.stops.get(k).copied()) {
             let rows = &mut rows[run];
-            let column = rows.iter().filter_map(|row| Some(row.stops.get(k)?.at)).max().unwrap_or(0);
-            let widest = rows.iter().filter_map(|row| Some(row.code() + column - row.stops.get(k)?.at)).max();
+            let column =
+                rows.iter().filter_map(|row| Some(row.stops.get(k)?.at)).max().unwrap_or(0);
+            let widest = rows
+                .iter()
+                .filter_map(|row| Some(row.code() + column - row.stops.get(k)?.at))
+                .max();
             if widest.is_some_and(|widest| widest <= width) {
                 rows.iter_mut().for_each(|row| row.shift(row.stops[k].at, column));
             }
         }
     }
-    // Comments keep their column, so that those further away stay in line too, if the code before them leaves room.
+    // Comments keep their column, so that those further away stay in line too, if the
+    // code before them leaves room.
     for run in runs(rows, |row| row.comment) {
         let rows = &mut rows[run];
-        let column = rows.iter().filter_map(|row| Some(row.comment?.at.max(row.comment?.seen.column))).max();
+        let column =
+            rows.iter().filter_map(|row| Some(row.comment?.at.max(row.comment?.seen.column))).max();
         for row in rows.iter_mut() {
             if let (Some(stop), Some(column)) = (row.comment, column) {
                 row.shift(stop.at, column);
@@ -74,7 +80,8 @@ pub(super) fn line_up(rows: &mut [Row], width: usize) {
     }
 }
 
-/// The longest runs of rows whose stops were in one column of lines below each other, if spaces were put there for it.
+/// The longest runs of rows whose stops were in one column of lines below each other, if
+/// spaces were put there for it.
 fn runs(rows: &[Row], stop: impl Fn(&Row) -> Option<Stop>) -> Vec<std::ops::Range<usize>> {
     let seen: Vec<Option<Seen>> = rows.iter().map(|row| stop(row).map(|stop| stop.seen)).collect();
     let mut runs = Vec::new();

@@ -5,7 +5,8 @@ use crate::syntax::ast::*;
 use crate::syntax::string::quote;
 use crate::syntax::token::is_name;
 
-/// How tightly an expression binds, as in the grammar; an operand looser than its place needs parentheses.
+/// How tightly an expression binds, as in the grammar; an operand looser than its place
+/// needs parentheses.
 pub(super) type Binding = u8;
 const WHOLE: Binding = 0;
 const OR: Binding = 1;
@@ -52,8 +53,8 @@ fn binding(expr: &Expr) -> Binding {
     }
 }
 
-/// Whether an `if` must be, or may be, written without its last `else`: no branch has a value, and nothing is done
-/// otherwise.
+/// Whether an `if` must be, or may be, written without its last `else`: no branch has a
+/// value, and nothing is done otherwise.
 pub(super) fn lacks_else(expr: &Expr) -> bool {
     match &expr.kind {
         ExprKind::If { then, otherwise, .. } if then.result.is_none() => match &otherwise.result {
@@ -67,7 +68,10 @@ pub(super) fn lacks_else(expr: &Expr) -> bool {
 
 /// Whether an expression ends with a bracket that it opens.
 pub(super) fn in_brackets(expr: &Expr) -> bool {
-    matches!(expr.kind, ExprKind::Array(_) | ExprKind::Record(_) | ExprKind::Lambda(_) | ExprKind::If { .. })
+    matches!(
+        expr.kind,
+        ExprKind::Array(_) | ExprKind::Record(_) | ExprKind::Lambda(_) | ExprKind::If { .. }
+    )
 }
 
 /// Whether an expression is short: numbers, names.
@@ -86,7 +90,8 @@ fn number(x: f64) -> String {
 }
 
 impl Printer<'_> {
-    /// An expression that stands where one binds at least so tightly. The source has the parentheses that it needs.
+    /// An expression that stands where one binds at least so tightly. The source has the
+    /// parentheses that it needs.
     pub fn operand(&mut self, expr: &Expr, least: Binding) {
         if self.source.is_none() && binding(expr) < least {
             self.text("(");
@@ -99,7 +104,8 @@ impl Printer<'_> {
 
     /// An expression, in the parentheses that the source has round it.
     pub fn expr(&mut self, expr: &Expr) {
-        let parentheses = self.source.as_ref().map_or(0, |source| source.parentheses(expr.span.start));
+        let parentheses =
+            self.source.as_ref().map_or(0, |source| source.parentheses(expr.span.start));
         (0..parentheses).for_each(|_| self.text("("));
         self.bare(expr);
         (0..parentheses).for_each(|_| self.text(")"));
@@ -113,19 +119,25 @@ impl Printer<'_> {
             ExprKind::Var(name) => self.token(name),
             ExprKind::Address(address) => self.address(address),
             ExprKind::TagSel { name, value } => {
-                let bare = |v: &str| !v.is_empty() && v.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
-                let value = value.as_ref().map(|v| if bare(v) { format!(":{v}") } else { format!(":{}", quote(v)) });
+                let bare = |v: &str| {
+                    !v.is_empty() && v.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+                };
+                let value = value
+                    .as_ref()
+                    .map(|v| if bare(v) { format!(":{v}") } else { format!(":{}", quote(v)) });
                 self.token(&format!("${name}{}", value.unwrap_or_default()));
             }
             ExprKind::Array(items) => {
                 let share = if items.iter().all(is_short) { Share::Lines } else { Share::Nothing };
                 self.brackets(("[", "", "]"), items, share, Self::expr);
             }
-            ExprKind::Record(fields) => self.brackets(("{", " ", "}"), fields, Share::Nothing, |p, (name, value)| {
-                p.token(&name.node);
-                p.text(": ");
-                p.expr(value);
-            }),
+            ExprKind::Record(fields) => {
+                self.brackets(("{", " ", "}"), fields, Share::Nothing, |p, (name, value)| {
+                    p.token(&name.node);
+                    p.text(": ");
+                    p.expr(value);
+                })
+            }
             ExprKind::Call { callee, args } => {
                 self.operand(callee, POSTFIX);
                 self.args(args);
@@ -149,7 +161,9 @@ impl Printer<'_> {
                 self.text("not ");
                 self.operand(expr, NOT);
             }
-            ExprKind::Binary { op, .. } if matches!(operator(*op).1, RANGE | POWER) => self.chain(expr),
+            ExprKind::Binary { op, .. } if matches!(operator(*op).1, RANGE | POWER) => {
+                self.chain(expr)
+            }
             ExprKind::Binary { .. } => self.group(|p| p.chain(expr)),
             ExprKind::If { .. } => self.if_else(expr, false),
             ExprKind::Lambda(lambda) => {
@@ -172,12 +186,16 @@ impl Printer<'_> {
         });
     }
 
-    /// Operands of operators that bind equally; a line may be broken before each operator.
+    /// Operands of operators that bind equally; a line may be broken before each
+    /// operator.
     fn chain(&mut self, expr: &Expr) {
         let ExprKind::Binary { op, left, right } = &expr.kind else { return self.bare(expr) };
         let (text, own, left_least, right_least) = operator(*op);
-        let same = matches!(left.kind, ExprKind::Binary { .. }) && binding(left) == own && left_least == own;
-        let bare = self.source.as_ref().is_none_or(|source| source.parentheses(left.span.start) == 0);
+        let same = matches!(left.kind, ExprKind::Binary { .. })
+            && binding(left) == own
+            && left_least == own;
+        let bare =
+            self.source.as_ref().is_none_or(|source| source.parentheses(left.span.start) == 0);
         if same && bare {
             self.chain(left);
         } else {
@@ -209,8 +227,12 @@ impl Printer<'_> {
     /// Whether a block of an `if` is written on several lines.
     fn breaks(&self, expr: &Expr) -> bool {
         let ExprKind::If { then, otherwise, .. } = &expr.kind else { return false };
-        let broken = |body: &Body| self.source.as_ref().is_some_and(|source| source.opened_at(body.span.start));
-        broken(then) || broken(otherwise) || otherwise.result.as_ref().is_some_and(|nested| self.breaks(nested))
+        let broken = |body: &Body| {
+            self.source.as_ref().is_some_and(|source| source.opened_at(body.span.start))
+        };
+        broken(then)
+            || broken(otherwise)
+            || otherwise.result.as_ref().is_some_and(|nested| self.breaks(nested))
     }
 
     fn if_chain(&mut self, expr: &Expr, open: bool) {
@@ -219,14 +241,13 @@ impl Printer<'_> {
         self.operand(cond, OR);
         self.text(" ");
         self.branch(then);
-        let nested = otherwise
-            .result
-            .as_ref()
-            .filter(|nested| otherwise.stmts.is_empty() && matches!(nested.kind, ExprKind::If { .. }));
+        let nested = otherwise.result.as_ref().filter(|nested| {
+            otherwise.stmts.is_empty() && matches!(nested.kind, ExprKind::If { .. })
+        });
         let has_else = self.next_is("else");
-        if !has_else
-            .unwrap_or_else(|| !open || nested.is_some() || otherwise.result.is_some() || !otherwise.stmts.is_empty())
-        {
+        if !has_else.unwrap_or_else(|| {
+            !open || nested.is_some() || otherwise.result.is_some() || !otherwise.stmts.is_empty()
+        }) {
             return;
         }
         self.text(" else ");

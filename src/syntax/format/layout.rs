@@ -1,7 +1,9 @@
-//! Where lines end: pieces of text and the places where a line may be broken, set within a width.
+//! Where lines end: pieces of text and the places where a line may be broken, set within
+//! a width.
 //!
-//! After Oppen (1980) and Wadler (2003): a group is set on one line if it fits, else its lines are broken. A group that holds
-//! a broken one is not itself broken by that: `map(fn(x) {`, the body, `}, xs)`.
+//! After Oppen (1980) and Wadler (2003): a group is set on one line if it fits, else its
+//! lines are broken. A group that holds a broken one is not itself broken by that:
+//! `map(fn(x) {`, the body, `}, xs)`.
 
 use super::columns::{self, Row, Seen, Stop};
 use super::source::{Comment, Place};
@@ -23,9 +25,11 @@ pub(super) enum Rule {
 pub(super) enum Kind {
     /// A list in brackets: broken if the source has a line end behind the bracket.
     Brackets,
-    /// A block of statements: likewise, or if all of it, on one line, would be too long; those around it are broken with it.
+    /// A block of statements: likewise, or if all of it, on one line, would be too long;
+    /// those around it are broken with it.
     Block,
-    /// Parts that may go on in new lines: broken if all of it, on one line, would be too long.
+    /// Parts that may go on in new lines: broken if all of it, on one line, would be too
+    /// long.
     Parts,
 }
 
@@ -106,7 +110,8 @@ impl<'s> Layout<'s> {
         self.ops.push(Op::Close);
     }
 
-    /// A comment; what must go on behind it in a new line breaks the groups it is in, up to a block of statements.
+    /// A comment; what must go on behind it in a new line breaks the groups it is in, up
+    /// to a block of statements.
     pub fn comment(&mut self, comment: Comment<'s>) {
         if comment.place != Place::Inline {
             for &i in self.open.iter().rev() {
@@ -157,7 +162,8 @@ struct Setter<'a, 's> {
     width: usize,
     rows: Vec<Row>,
     column: usize,
-    /// By open indent: whether the group it is in is broken; on one line nothing is further in.
+    /// By open indent: whether the group it is in is broken; on one line nothing is
+    /// further in.
     indents: Vec<bool>,
     /// By open group, outermost first: whether it is broken.
     groups: Vec<bool>,
@@ -165,7 +171,8 @@ struct Setter<'a, 's> {
     breaks: usize,
     /// A space to be written before the next text, if it stays on the line.
     space: bool,
-    /// Whether the last thing written was a comment that a line end must follow, and one that runs to the line's end.
+    /// Whether the last thing written was a comment that a line end must follow, and one
+    /// that runs to the line's end.
     comment: Option<bool>,
 }
 
@@ -175,7 +182,8 @@ impl Setter<'_, '_> {
             Op::Text(text) => self.write(text),
             Op::Space => self.space = true,
             Op::Line(flat, rule) => {
-                if self.is_broken() && (*rule != Rule::Fill || !self.fits(i + 1, flat.len(), true)) {
+                if self.is_broken() && (*rule != Rule::Fill || !self.fits(i + 1, flat.len(), true))
+                {
                     self.breaks = self.breaks.max(1);
                 } else {
                     self.space |= !flat.is_empty();
@@ -183,7 +191,9 @@ impl Setter<'_, '_> {
             }
             Op::Blank if self.breaks == 1 || self.comment.is_some() => self.breaks = 2,
             Op::Blank => {}
-            Op::Open { broken, kind } => self.groups.push(*broken || !self.fits(i, 0, *kind != Kind::Brackets)),
+            Op::Open { broken, kind } => {
+                self.groups.push(*broken || !self.fits(i, 0, *kind != Kind::Brackets))
+            }
             Op::Close => drop(self.groups.pop()),
             Op::Indent => self.indents.push(self.is_broken()),
             Op::Dedent => drop(self.indents.pop()),
@@ -222,7 +232,8 @@ impl Setter<'_, '_> {
         &mut self.rows[last]
     }
 
-    /// Ends lines, if that is due; nothing is above the first line, and no empty line follows what opens.
+    /// Ends lines, if that is due; nothing is above the first line, and no empty line
+    /// follows what opens.
     fn end_lines(&mut self, indent: usize) {
         if self.comment.take().is_some() {
             self.breaks = self.breaks.max(1);
@@ -290,14 +301,17 @@ impl Setter<'_, '_> {
         self.comment = Some(to_the_end);
     }
 
-    /// Whether what starts at an operation fits on the line, up to the next place where the line may be broken. Groups in
-    /// it are measured as they are on one line, those that are broken in any case too if `all`;
-    /// the line may be broken in those behind it.
+    /// Whether what starts at an operation fits on the line, up to the next place where
+    /// the line may be broken. Groups in it are measured as they are on one line, those
+    /// that are broken in any case too if `all`; the line may be broken in those behind
+    /// it.
     fn fits(&self, start: usize, before: usize, all: bool) -> bool {
         if self.width == usize::MAX {
             return true;
         }
-        let used = if self.ends_line() { self.indent() } else { self.column + usize::from(self.space) } + before;
+        let used =
+            if self.ends_line() { self.indent() } else { self.column + usize::from(self.space) }
+                + before;
         let Some(mut room) = self.width.checked_sub(used) else { return false };
         let mut inside: Vec<bool> = Vec::new();
         let mut outside = self.groups.as_slice();
@@ -309,7 +323,9 @@ impl Setter<'_, '_> {
                     None => text.chars().count(),
                 },
                 Op::Space => 1,
-                Op::Line(..) if inside.last().or(outside.last()).is_none_or(|broken| *broken) => return true,
+                Op::Line(..) if inside.last().or(outside.last()).is_none_or(|broken| *broken) => {
+                    return true;
+                }
                 Op::Line(flat, _) => flat.len(),
                 Op::Open { broken, .. } => {
                     inside.push(behind || (*broken && !all));
@@ -323,9 +339,15 @@ impl Setter<'_, '_> {
                     }
                     0
                 }
-                Op::Comment(comment) if comment.place == Place::Inline => comment.text.chars().count() + 2,
+                Op::Comment(comment) if comment.place == Place::Inline => {
+                    comment.text.chars().count() + 2
+                }
                 Op::Comment(_) => return true,
-                Op::IfBroken(text) if inside.last().or(outside.last()).is_none_or(|broken| *broken) => text.len(),
+                Op::IfBroken(text)
+                    if inside.last().or(outside.last()).is_none_or(|broken| *broken) =>
+                {
+                    text.len()
+                }
                 Op::Blank | Op::Indent | Op::Dedent | Op::IfBroken(_) | Op::Stop(_) => 0,
             };
             match room.checked_sub(width) {

@@ -1,11 +1,14 @@
 //! The tree back to text, in two ways that share one printer.
 //!
-//! [`print`] gives one canonical form of a tree: a line for each statement, however long, and no more parentheses than
-//! needed. [`format`] sets a text anew, with its comments: tokens stay as they are written, numbers and parentheses too,
-//! and only spaces and line ends change, and commas before closing brackets. The printer walks the tree; when it formats, it
-//! takes each token from the text, which keeps its spelling and the comments beside it.
+//! [`print`] gives one canonical form of a tree: a line for each statement, however long,
+//! and no more parentheses than needed. [`format`] sets a text anew, with its comments:
+//! tokens stay as they are written, numbers and parentheses too, and only spaces and line
+//! ends change, and commas before closing brackets. The printer walks the tree; when it
+//! formats, it takes each token from the text, which keeps its spelling and the comments
+//! beside it.
 //!
-//! Parsing what either gives yields the same tree up to spans, for every tree that the parser makes without errors.
+//! Parsing what either gives yields the same tree up to spans, for every tree that the
+//! parser makes without errors.
 
 mod columns;
 mod expressions;
@@ -20,7 +23,8 @@ use super::parse::parse;
 use super::span::FileId;
 use printer::Printer;
 
-/// The columns of a line of formatted code; what cannot be broken, and comments, may be longer.
+/// The columns of a line of formatted code; what cannot be broken, and comments, may be
+/// longer.
 pub const WIDTH: usize = 100;
 
 /// A program as text.
@@ -37,9 +41,11 @@ pub fn print_expr(expr: &Expr) -> String {
     printer.set(usize::MAX)
 }
 
-/// A program's text, formatted. Comments and single empty lines are kept, and so is what was lined up.
+/// A program's text, formatted. Comments and single empty lines are kept, and so is what
+/// was lined up.
 ///
-/// A block or bracket that fits on a line is on one line, unless the text has a line end right behind what opens it.
+/// A block or bracket that fits on a line is on one line, unless the text has a line end
+/// right behind what opens it.
 ///
 /// # Errors
 /// The syntax errors of the text.

@@ -1,4 +1,5 @@
-//! What the printer is made of: tokens, lists, blocks, and the comments that come with them.
+//! What the printer is made of: tokens, lists, blocks, and the comments that come with
+//! them.
 
 use super::layout::{Kind, Layout, Rule};
 use super::source::{Comment, Place, Source};
@@ -58,8 +59,10 @@ impl<'s> Printer<'s> {
         source.advance();
         let after = source.take(|place| matches!(place, Place::Trailing | Place::Below));
         if matches!(token, "," | ";") {
-            // What is written before these goes behind them, but for a remark on what they end.
-            let (inline, lines): (Vec<_>, Vec<_>) = before.into_iter().partition(|c| c.place == Place::Inline);
+            // What is written before these goes behind them, but for a remark on what
+            // they end.
+            let (inline, lines): (Vec<_>, Vec<_>) =
+                before.into_iter().partition(|c| c.place == Place::Inline);
             if !inline.is_empty() {
                 self.flush();
             }
@@ -81,7 +84,8 @@ impl<'s> Printer<'s> {
         }
     }
 
-    /// Writes the comments on lines of their own that are before the next token, and the empty line before it.
+    /// Writes the comments on lines of their own that are before the next token, and the
+    /// empty line before it.
     pub fn leading(&mut self) {
         let Some(source) = &mut self.source else { return };
         let comments = source.take(|place| place != Place::Inline);
@@ -177,7 +181,8 @@ impl<'s> Printer<'s> {
         mut print: impl FnMut(&mut Self, &T),
     ) {
         self.text(open);
-        let remarks = !self.behind.is_empty() || self.source.as_ref().is_some_and(Source::has_comments);
+        let remarks =
+            !self.behind.is_empty() || self.source.as_ref().is_some_and(Source::has_comments);
         match items {
             [] if !remarks => return self.text(close),
             [only] if share == Share::Brackets && !remarks => {
@@ -217,7 +222,8 @@ impl<'s> Printer<'s> {
         self.layout.close();
     }
 
-    /// Goes past a comma before a closing bracket, which is there or not as lines are broken.
+    /// Goes past a comma before a closing bracket, which is there or not as lines are
+    /// broken.
     fn skip_comma(&mut self) {
         if let Some(source) = &mut self.source
             && source.peek() == ","
@@ -250,7 +256,8 @@ impl<'s> Printer<'s> {
     /// Statements in braces, on lines of their own or not as what they are in has it.
     pub fn braces(&mut self, lines: usize, mut print: impl FnMut(&mut Self, usize)) {
         self.text("{");
-        let remarks = !self.behind.is_empty() || self.source.as_ref().is_some_and(Source::has_comments);
+        let remarks =
+            !self.behind.is_empty() || self.source.as_ref().is_some_and(Source::has_comments);
         if lines == 0 && !remarks {
             return self.text("}");
         }
@@ -272,7 +279,8 @@ impl<'s> Printer<'s> {
         self.blocks(broken, |p| p.braces(lines, print));
     }
 
-    /// Whether the block that comes next is written on several lines; without a source, `canonical`.
+    /// Whether the block that comes next is written on several lines; without a source,
+    /// `canonical`.
     pub fn opens_lines(&self, canonical: bool) -> bool {
         self.source.as_ref().map_or(canonical, Source::opens_lines)
     }

@@ -47,8 +47,10 @@ impl<'s> Source<'s> {
     pub fn new(text: &'s str) -> Self {
         let (lexemes, _) = lex(text, 0..text.len(), FileId(0), 0);
         let tokens = lexemes.into_iter().map(|lexeme| lexeme.start..lexeme.end).collect();
-        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
-        let mut source = Source { text, tokens, lines, next: 0, comments: Vec::new(), blank: false };
+        let lines =
+            std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
+        let mut source =
+            Source { text, tokens, lines, next: 0, comments: Vec::new(), blank: false };
         source.read_gap();
         source
     }
@@ -60,7 +62,9 @@ impl<'s> Source<'s> {
 
     /// How many tokens from the next one on are parentheses that open before a byte.
     pub fn parentheses(&self, before: u32) -> usize {
-        let open = |token: &&Range<usize>| token.start < before as usize && &self.text[(*token).clone()] == "(";
+        let open = |token: &&Range<usize>| {
+            token.start < before as usize && &self.text[(*token).clone()] == "("
+        };
         self.tokens[self.next.min(self.tokens.len())..].iter().take_while(open).count()
     }
 
@@ -70,7 +74,8 @@ impl<'s> Source<'s> {
         self.read_gap();
     }
 
-    /// Takes the comments before the next token that satisfy a condition, up to the first that does not.
+    /// Takes the comments before the next token that satisfy a condition, up to the first
+    /// that does not.
     pub fn take(&mut self, wanted: impl Fn(Place) -> bool) -> Vec<Comment<'s>> {
         let n = self.comments.iter().take_while(|comment| wanted(comment.place)).count();
         self.comments.drain(..n).collect()
@@ -116,7 +121,8 @@ impl<'s> Source<'s> {
 
     /// What is between the token before and a token.
     fn gap(&self, token: usize) -> &'s str {
-        let start = token.checked_sub(1).and_then(|last| self.tokens.get(last)).map_or(0, |last| last.end);
+        let start =
+            token.checked_sub(1).and_then(|last| self.tokens.get(last)).map_or(0, |last| last.end);
         let end = self.tokens.get(token).map_or(self.text.len(), |next| next.start);
         self.text.get(start..end).unwrap_or("")
     }
@@ -131,9 +137,11 @@ impl<'s> Source<'s> {
         // How many lines end before the next comment.
         let mut ends = usize::from(first);
         let mut own_line = Vec::new();
-        // Behind less than a whole statement or item, a comment may stand where those on lines of their own do.
+        // Behind less than a whole statement or item, a comment may stand where those on
+        // lines of their own do.
         let last_token = self.next.checked_sub(1).and_then(|last| self.tokens.get(last));
-        let ends_part = last_token.is_some_and(|token| matches!(&self.text[token.clone()], "," | ";"));
+        let ends_part =
+            last_token.is_some_and(|token| matches!(&self.text[token.clone()], "," | ";"));
         while let Some(rest) = gap.get(at..).filter(|rest| !rest.is_empty()) {
             let length = if rest.starts_with("//") {
                 rest.find('\n').unwrap_or(rest.len())
@@ -158,7 +166,12 @@ impl<'s> Source<'s> {
                 _ if continues => Place::Below,
                 _ => Place::OwnLine,
             };
-            comments.push(Comment { text: rest[..length].trim_end(), place, blank: ends > 1, seen });
+            comments.push(Comment {
+                text: rest[..length].trim_end(),
+                place,
+                blank: ends > 1,
+                seen,
+            });
             ends = 0;
             at += length;
         }

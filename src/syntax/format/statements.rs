@@ -10,7 +10,9 @@ use std::sync::Arc;
 impl Printer<'_> {
     /// A whole file.
     pub fn program(&mut self, program: &Program) {
-        self.lines(program.items.len(), |p, i| program.items.get(i).map_or((), |item| p.item(item)));
+        self.lines(program.items.len(), |p, i| {
+            program.items.get(i).map_or((), |item| p.item(item))
+        });
     }
 
     fn name(&mut self, name: &Name) {
@@ -66,7 +68,11 @@ impl Printer<'_> {
         self.text(";");
     }
 
-    fn declaration(&mut self, keyword: &str, Declaration { name, ty, default, help }: &Declaration) {
+    fn declaration(
+        &mut self,
+        keyword: &str,
+        Declaration { name, ty, default, help }: &Declaration,
+    ) {
         self.text(keyword);
         self.name(name);
         self.maybe(": ", ty.as_ref(), Self::name);
@@ -108,14 +114,17 @@ impl Printer<'_> {
 
     /// A body whose lines are broken as what it is in has it.
     pub fn body_lines(&mut self, Body { stmts, result, .. }: &Body) {
-        self.braces(stmts.len() + usize::from(result.is_some()), |p, i| match (stmts.get(i), result) {
-            (Some(stmt), _) => p.stmt(stmt, result.is_none() && i + 1 == stmts.len()),
-            (None, Some(result)) => p.expr(result),
-            (None, None) => {}
+        self.braces(stmts.len() + usize::from(result.is_some()), |p, i| {
+            match (stmts.get(i), result) {
+                (Some(stmt), _) => p.stmt(stmt, result.is_none() && i + 1 == stmts.len()),
+                (None, Some(result)) => p.expr(result),
+                (None, None) => {}
+            }
         });
     }
 
-    /// A statement; `last` if it ends a body without a value, so that a last `if` must not become the value.
+    /// A statement; `last` if it ends a body without a value, so that a last `if` must
+    /// not become the value.
     fn stmt(&mut self, stmt: &Stmt, last: bool) {
         match &stmt.kind {
             StmtKind::Assume { name, bind, expr, tags } => {
@@ -152,7 +161,8 @@ impl Printer<'_> {
             StmtKind::Sample(expr) => self.verb("sample ", expr),
             StmtKind::For { var, iter, body } => {
                 self.for_each(var, iter);
-                return self.block(body.len(), |p, i| body.get(i).map_or((), |stmt| p.stmt(stmt, false)));
+                return self
+                    .block(body.len(), |p, i| body.get(i).map_or((), |stmt| p.stmt(stmt, false)));
             }
             StmtKind::Expr(expr) => return self.expr_stmt(expr, last),
         }
@@ -167,7 +177,8 @@ impl Printer<'_> {
         self.text(" ");
     }
 
-    /// What is observed: the value on a line of its own if there is no room, but for one in brackets.
+    /// What is observed: the value on a line of its own if there is no room, but for one
+    /// in brackets.
     fn observed(&mut self, dist: &Expr, value: &Expr, coarse: Option<&Expr>) {
         self.expr(dist);
         if in_brackets(value) {

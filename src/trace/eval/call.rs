@@ -153,7 +153,8 @@ impl Graph {
                         return self.call_builtin(code, n, i, args);
                     }
                     v => {
-                        let message = format!("only functions can be called; this is {}", v.type_name());
+                        let message =
+                            format!("only functions can be called; this is {}", v.type_name());
                         return Err(self.type_error(code, n, message));
                     }
                 }
@@ -200,7 +201,8 @@ impl Graph {
             return Ok(self.finish(code, n, Value::Unit));
         };
         let child = *child;
-        let Some(result) = code.blocks[self.frames[child.frame as usize].block as usize].result else {
+        let Some(result) = code.blocks[self.frames[child.frame as usize].block as usize].result
+        else {
             return Ok(self.finish(code, n, Value::Unit));
         };
         if let Some(m) = self.unready(child.frame, result) {
@@ -219,8 +221,15 @@ impl Graph {
     }
 
     /// Matches arguments to parameters by position and name.
-    fn match_arguments(&self, code: &Code, n: NodeId, block: u32, args: &WrittenArgs) -> Result<Arguments, Failure> {
-        let BlockKind::Function { name, params, required } = &code.blocks[block as usize].kind else {
+    fn match_arguments(
+        &self,
+        code: &Code,
+        n: NodeId,
+        block: u32,
+        args: &WrittenArgs,
+    ) -> Result<Arguments, Failure> {
+        let BlockKind::Function { name, params, required } = &code.blocks[block as usize].kind
+        else {
             return Ok(Arguments::None);
         };
         match match_names(name, params, *required, args.iter().map(|(k, _)| k.as_deref())) {
@@ -230,8 +239,17 @@ impl Graph {
         }
     }
 
-    fn call_builtin(&mut self, code: &Code, n: NodeId, builtin: u32, args: &WrittenArgs) -> Result<Step, Failure> {
-        if !matches!(self.nodes[n as usize].side.as_deref(), None | Some(Side::Deps(_) | Side::Kept(_))) {
+    fn call_builtin(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        builtin: u32,
+        args: &WrittenArgs,
+    ) -> Result<Step, Failure> {
+        if !matches!(
+            self.nodes[n as usize].side.as_deref(),
+            None | Some(Side::Deps(_) | Side::Kept(_))
+        ) {
             self.let_side_go(code, n);
         }
         let frame = self.nodes[n as usize].frame;
@@ -259,7 +277,12 @@ impl Graph {
         self.finish_call(code, n, deps, made)
     }
 
-    pub(super) fn evaluate_mem(&mut self, code: &Code, n: NodeId, f: Operand) -> Result<Step, Failure> {
+    pub(super) fn evaluate_mem(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        f: Operand,
+    ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(m) = self.unready(frame, f) {
             return self.need(code, m);
@@ -267,7 +290,8 @@ impl Graph {
         let closure = match self.value(code, frame, f) {
             Value::Closure(c) => *c,
             v => {
-                let message = format!("mem: needs a function defined in the program, got {}", v.type_name());
+                let message =
+                    format!("mem: needs a function defined in the program, got {}", v.type_name());
                 return Err(self.type_error(code, n, message));
             }
         };
@@ -278,7 +302,8 @@ impl Graph {
             return Ok(self.settle_node(code, n));
         }
         self.drop_structure(code, n);
-        let memo = Memo { block: closure.block, parent: closure.frame, entries: Default::default() };
+        let memo =
+            Memo { block: closure.block, parent: closure.frame, entries: Default::default() };
         self.set_side(n, Some(Side::Memo(memo)));
         self.version += 1;
         let version = self.version;
@@ -286,7 +311,13 @@ impl Graph {
     }
 
     /// A call through `mem`: finds or makes the entry of its arguments.
-    fn call_memo(&mut self, code: &Code, n: NodeId, memo: NodeId, args: &WrittenArgs) -> Result<Step, Failure> {
+    fn call_memo(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        memo: NodeId,
+        args: &WrittenArgs,
+    ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
         let operands: SmallVec<[Operand; 4]> = args.iter().map(|(_, o)| *o).collect();
         if let Some(step) = self.await_plain(code, n, frame, &operands)? {
@@ -375,9 +406,12 @@ impl Graph {
                     return Err(self.type_error(code, n, "not a `mem` function".into()));
                 };
                 let home = self.nodes[memo as usize].frame;
-                // What the key stands for: calls with 0 and -0 are one entry, and which of them came first must not show.
+                // What the key stands for: calls with 0 and -0 are one entry, and which
+                // of them came first must not show.
                 let values: Arc<[Value]> = match key {
-                    Key::List(keys) if values.len() != 1 => keys.iter().map(Key::to_value).collect(),
+                    Key::List(keys) if values.len() != 1 => {
+                        keys.iter().map(Key::to_value).collect()
+                    }
                     key => [key.to_value()].into(),
                 };
                 let frame = Frame {
@@ -402,7 +436,8 @@ impl Graph {
         Ok(new.0)
     }
 
-    /// Counts one call of an entry less; an entry without calls goes at the end of the update.
+    /// Counts one call of an entry less; an entry without calls goes at the end of the
+    /// update.
     pub(crate) fn leave_memo(&mut self, memo: NodeId, key: &Key) {
         let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
         let Some(entry) = m.entries.get_mut(key) else { return };
@@ -424,10 +459,12 @@ impl Graph {
     }
 }
 
-/// Which argument each parameter takes: `None` when that is the order written, without gaps.
+/// Which argument each parameter takes: `None` when that is the order written, without
+/// gaps.
 ///
 /// # Errors
-/// Too many arguments, too few, one given twice, an unknown keyword: a message for the user.
+/// Too many arguments, too few, one given twice, an unknown keyword: a message for the
+/// user.
 pub(crate) fn match_names<'a>(
     name: &str,
     params: &[Arc<str>],
@@ -439,7 +476,12 @@ pub(crate) fn match_names<'a>(
     for (i, keyword) in args.enumerate() {
         let p = match keyword {
             None if i < params.len() => i,
-            None => return Err(format!("`{name}` takes {}, got more", count(params.len(), "argument"))),
+            None => {
+                return Err(format!(
+                    "`{name}` takes {}, got more",
+                    count(params.len(), "argument")
+                ));
+            }
             Some(k) => params.iter().position(|p| **p == *k).ok_or_else(|| {
                 let near = crate::diag::nearest(k, params.iter().map(|p| &**p));
                 let hint = near.map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();

@@ -42,8 +42,10 @@ impl Graph {
                 self.set_deps(n, deps);
                 return Ok(self.settle_node(code, n));
             }
-            // Marking stops at numbers: what reads this one was not told that it may become something else.
-            let was_told = self.nodes[n as usize].flags & TARGET != 0 || self.may_be_redrawn(code, n);
+            // Marking stops at numbers: what reads this one was not told that it may
+            // become something else.
+            let was_told =
+                self.nodes[n as usize].flags & TARGET != 0 || self.may_be_redrawn(code, n);
             if !moved && !was_told {
                 return Err(self.reformed(code, n));
             }
@@ -74,8 +76,9 @@ impl Graph {
 
     /// Whether one of these operands changed in this update.
     fn any_changed(&self, frame: FrameId, operands: &[Operand]) -> bool {
-        let changed =
-            |o: &Operand| self.resolve(frame, *o).is_some_and(|d| self.nodes[d as usize].changed == self.epoch);
+        let changed = |o: &Operand| {
+            self.resolve(frame, *o).is_some_and(|d| self.nodes[d as usize].changed == self.epoch)
+        };
         operands.iter().any(changed)
     }
 
@@ -128,17 +131,28 @@ impl Graph {
             DistSpec::Value(_) => match values[0] {
                 Value::Dist(d) => Ok(Dist::clone(d)),
                 Value::Likelihood(l) => {
-                    let message = format!("`{}` is a likelihood: it can be observed, not drawn", l.name());
+                    let message =
+                        format!("`{}` is a likelihood: it can be observed, not drawn", l.name());
                     Err(Fault::type_error(message))
                 }
-                v => Err(Fault::type_error(format!("`~` needs a distribution, got {}", v.type_name()))
-                    .with_hint("write `=` to bind a value")),
+                v => Err(Fault::type_error(format!(
+                    "`~` needs a distribution, got {}",
+                    v.type_name()
+                ))
+                .with_hint("write `=` to bind a value")),
             },
         };
         made.map_err(|f| self.fault(code, n, f))
     }
 
-    fn own_keyed(&self, code: &Code, n: NodeId, frame: FrameId, site: u32, keys: &[Operand]) -> Result<u64, Failure> {
+    fn own_keyed(
+        &self,
+        code: &Code,
+        n: NodeId,
+        frame: FrameId,
+        site: u32,
+        keys: &[Operand],
+    ) -> Result<u64, Failure> {
         let own = self.own_keys(code, frame, keys);
         if own.len() < keys.len() {
             keys.iter()
@@ -190,7 +204,13 @@ impl Graph {
                 scores.push(score);
                 stored.push(Value::from_datum(&x));
             }
-            let side = ChoiceSide { stored: None, scores, elements: count as u32, hash: own, deps: Deps::new() };
+            let side = ChoiceSide {
+                stored: None,
+                scores,
+                elements: count as u32,
+                hash: own,
+                deps: Deps::new(),
+            };
             self.set_side(n, Some(Side::Choice(side)));
             self.register_choice(code, n, hash, Some(count), dist)?;
             return Ok(Value::from_elements(stored));
@@ -204,7 +224,8 @@ impl Graph {
         self.add_prior(score, given.is_none());
         self.nodes[n as usize].score = score;
         let whitened = dist.is_stored_whitened();
-        let value = Value::from_datum(&if whitened { dist.realise(&stored) } else { stored.clone() });
+        let value =
+            Value::from_datum(&if whitened { dist.realise(&stored) } else { stored.clone() });
         if whitened || own.is_some() {
             let side = ChoiceSide {
                 stored: whitened.then_some(stored),
@@ -234,7 +255,8 @@ impl Graph {
 
     fn improper(&self, code: &Code, n: NodeId, dist: &Dist) -> Failure {
         let message = format!("`{}` is improper, so it cannot be sampled", dist.name());
-        let hint = "use `drift` on it, observe something that depends on it, or give it a proper prior";
+        let hint =
+            "use `drift` on it, observe something that depends on it, or give it a proper prior";
         self.fail(code, n, FaultKind::Domain, message, Some(hint.into()))
     }
 
@@ -245,8 +267,9 @@ impl Graph {
         }
     }
 
-    /// Re-scores a choice under its distribution and applies the pending changes. False when its form no longer fits (as
-    /// many elements, as many dimensions): then it is drawn anew.
+    /// Re-scores a choice under its distribution and applies the pending changes. False
+    /// when its form no longer fits (as many elements, as many dimensions): then it is
+    /// drawn anew.
     fn update_choice(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<bool, Failure> {
         if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref()
             && c.elements != NONE
@@ -280,7 +303,13 @@ impl Graph {
             Some(Change::Set(d)) => (Some(d), false),
             Some(Change::Value(d)) => match dist.unrealise(&d) {
                 Some(x) => (Some(x), false),
-                None => return Err(self.type_error(code, n, "the value does not fit the choice".into())),
+                None => {
+                    return Err(self.type_error(
+                        code,
+                        n,
+                        "the value does not fit the choice".into(),
+                    ));
+                }
             },
             Some(Change::Resample) => {
                 let hash = self.choice_hash(code, n);
@@ -316,7 +345,8 @@ impl Graph {
         self.nodes[n as usize].score = score;
         self.nodes[n as usize].flags &= !TARGET;
         if new.is_some() || whitened {
-            let value = Value::from_datum(&if whitened { dist.realise(stored) } else { stored.clone() });
+            let value =
+                Value::from_datum(&if whitened { dist.realise(stored) } else { stored.clone() });
             let epoch = self.epoch;
             let node = &mut self.nodes[n as usize];
             if !value.same(&node.value) {
@@ -336,11 +366,14 @@ impl Graph {
     /// The same for a choice of many elements.
     fn update_elements(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<(), Failure> {
         let hash = self.choice_hash(code, n);
-        let Some(Side::Choice(side)) = self.nodes[n as usize].side.as_deref() else { return Ok(()) };
+        let Some(Side::Choice(side)) = self.nodes[n as usize].side.as_deref() else {
+            return Ok(());
+        };
         let side = side.clone();
         let count = side.elements as usize;
         let old = self.nodes[n as usize].value.clone();
-        let mut xs: Vec<Datum> = (0..count).filter_map(|i| old.element(i).as_ref().and_then(Value::to_datum)).collect();
+        let mut xs: Vec<Datum> =
+            (0..count).filter_map(|i| old.element(i).as_ref().and_then(Value::to_datum)).collect();
         let changes: SmallVec<[(u32, Change); 4]> = if self.nodes[n as usize].flags & TARGET != 0 {
             self.pending_of(n).map(|p| (p.element, p.change.clone())).collect()
         } else {
@@ -348,7 +381,8 @@ impl Graph {
         };
         let mut changed = false;
         for (element, change) in &changes {
-            let range = if *element == NONE { 0..count } else { *element as usize..*element as usize + 1 };
+            let range =
+                if *element == NONE { 0..count } else { *element as usize..*element as usize + 1 };
             for i in range {
                 let one = dist.element(i);
                 let new = match change {
@@ -360,8 +394,12 @@ impl Graph {
                         self.jacobian.add(jacobian);
                         Some(x)
                     }
-                    Change::Resample => Some(self.drawn_now(code, n, &one, element_hash(hash, i))?),
-                    Change::White(z) if *element == NONE => z.get(i).and_then(|z| one.colour(&[*z])),
+                    Change::Resample => {
+                        Some(self.drawn_now(code, n, &one, element_hash(hash, i))?)
+                    }
+                    Change::White(z) if *element == NONE => {
+                        z.get(i).and_then(|z| one.colour(&[*z]))
+                    }
                     Change::White(z) => one.colour(z),
                 };
                 if let (Some(new), Some(x)) = (new, xs.get_mut(i)) {
@@ -375,7 +413,8 @@ impl Graph {
                 }
             }
         }
-        let scores: Vec<f64> = xs.iter().enumerate().map(|(i, x)| dist.element_log_density(i, x)).collect();
+        let scores: Vec<f64> =
+            xs.iter().enumerate().map(|(i, x)| dist.element_log_density(i, x)).collect();
         side.scores.iter().for_each(|s| self.prior.sub(*s));
         scores.iter().for_each(|s| self.prior.add(*s));
         self.note(Entry::Choice(n, Box::new(side)));
@@ -404,7 +443,10 @@ impl Graph {
     }
 
     pub(crate) fn is_whitened(&self, n: NodeId) -> bool {
-        matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Choice(ChoiceSide { stored: Some(_), .. })))
+        matches!(
+            self.nodes[n as usize].side.as_deref(),
+            Some(Side::Choice(ChoiceSide { stored: Some(_), .. }))
+        )
     }
 
     /// Takes a choice that nothing asks for out of the score and the register.
@@ -425,10 +467,15 @@ impl Graph {
                     Entry::Choice(m, side) if *m == n => Some(side.scores.clone()),
                     _ => None,
                 });
-                let before = before.filter(|b| b.len() == scores.len()).unwrap_or_else(|| scores.clone());
+                let before =
+                    before.filter(|b| b.len() == scores.len()).unwrap_or_else(|| scores.clone());
                 for (i, (s, before)) in scores.into_iter().zip(before).enumerate() {
                     self.prior.sub(s);
-                    self.undrawn.add(if self.redrawn.contains(&(n, i as u32)) { s } else { before });
+                    self.undrawn.add(if self.redrawn.contains(&(n, i as u32)) {
+                        s
+                    } else {
+                        before
+                    });
                 }
             }
             _ => {
@@ -442,7 +489,13 @@ impl Graph {
 
     fn not_gaussian(&self, code: &Code, n: NodeId) -> Failure {
         let message = "this choice has no Gaussian prior".to_owned();
-        self.fail(code, n, FaultKind::Type, message, Some("elliptical moves need normal, mv_normal or gp".into()))
+        self.fail(
+            code,
+            n,
+            FaultKind::Type,
+            message,
+            Some("elliptical moves need normal, mv_normal or gp".into()),
+        )
     }
 }
 

@@ -26,7 +26,12 @@ enum Found {
 
 impl Graph {
     /// Finds out which keys a container has and where their draws are.
-    pub(super) fn evaluate_container(&mut self, code: &Code, n: NodeId, sources: &[Source]) -> Result<Step, Failure> {
+    pub(super) fn evaluate_container(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        sources: &[Source],
+    ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
         let mut deps = Deps::new();
         let entries = if let [Source { loops, keys, .. }] = sources
@@ -42,7 +47,16 @@ impl Graph {
             let mut entries = IndexMap::new();
             for (i, source) in sources.iter().enumerate() {
                 let mut passes = SmallVec::new();
-                if let Some(step) = self.walk(code, n, frame, source, i as u32, &mut passes, &mut deps, &mut entries)? {
+                if let Some(step) = self.walk(
+                    code,
+                    n,
+                    frame,
+                    source,
+                    i as u32,
+                    &mut passes,
+                    &mut deps,
+                    &mut entries,
+                )? {
                     return Ok(step);
                 }
             }
@@ -107,7 +121,9 @@ impl Graph {
                         f = self.nodes[self.frames[f as usize].owner as usize].frame;
                     }
                     let key = self.frames[f as usize].key.clone();
-                    key.ok_or_else(|| self.type_error(code, n, "this iteration of the loop has no key".into()))?
+                    key.ok_or_else(|| {
+                        self.type_error(code, n, "this iteration of the loop has no key".into())
+                    })?
                 }
                 SourceKey::Operand(o) => {
                     if let Some(m) = self.unready(frame, *o) {
@@ -136,14 +152,18 @@ impl Graph {
             Some(Side::Loop(l)) => {
                 let [key] = keys else { return Ok(Found::Missing) };
                 // Results of a map over names answer to names and to positions.
-                let pass = l.keys.find(key).or_else(|| key.as_index().filter(|i| *i < l.keys.len()));
+                let pass =
+                    l.keys.find(key).or_else(|| key.as_index().filter(|i| *i < l.keys.len()));
                 let Some(pass) = pass else { return Ok(Found::Missing) };
                 self.map_result(code, container, pass).map(Found::Place)
             }
             Some(Side::Table(Table { entries: None, .. })) => {
-                let Op::Container { sources, .. } = self.op(code, container) else { return Ok(Found::Missing) };
+                let Op::Container { sources, .. } = self.op(code, container) else {
+                    return Ok(Found::Missing);
+                };
                 let ([key], source) = (keys, &sources[0]) else { return Ok(Found::Missing) };
-                let outer = self.frames[self.nodes[container as usize].frame as usize].base + source.loops[0];
+                let outer = self.frames[self.nodes[container as usize].frame as usize].base
+                    + source.loops[0];
                 let pass = match self.nodes[outer as usize].side.as_deref() {
                     Some(Side::Loop(l)) => l.keys.find(key),
                     _ => None,
@@ -161,7 +181,12 @@ impl Graph {
     }
 
     /// The draw of an element.
-    fn element_node(&mut self, code: &Code, container: NodeId, element: &Element) -> Result<NodeId, Failure> {
+    fn element_node(
+        &mut self,
+        code: &Code,
+        container: NodeId,
+        element: &Element,
+    ) -> Result<NodeId, Failure> {
         let Op::Container { sources, .. } = self.op(code, container) else { return Ok(container) };
         let source = &sources[element.source as usize];
         let mut frame = self.nodes[container as usize].frame;
@@ -270,12 +295,21 @@ impl Graph {
     }
 
     /// The entries of a container whose keys are those of its one loop.
-    fn single_loop_entries(&self, code: &Code, container: NodeId) -> IndexMap<SmallVec<[Key; 1]>, Element> {
-        let Op::Container { sources, .. } = self.op(code, container) else { return IndexMap::new() };
-        let outer = self.frames[self.nodes[container as usize].frame as usize].base + sources[0].loops[0];
+    fn single_loop_entries(
+        &self,
+        code: &Code,
+        container: NodeId,
+    ) -> IndexMap<SmallVec<[Key; 1]>, Element> {
+        let Op::Container { sources, .. } = self.op(code, container) else {
+            return IndexMap::new();
+        };
+        let outer =
+            self.frames[self.nodes[container as usize].frame as usize].base + sources[0].loops[0];
         match self.nodes[outer as usize].side.as_deref() {
             Some(Side::Loop(l)) => (0..l.keys.len())
-                .map(|i| (smallvec![l.keys.get(i)], Element { source: 0, passes: smallvec![i as u32] }))
+                .map(|i| {
+                    (smallvec![l.keys.get(i)], Element { source: 0, passes: smallvec![i as u32] })
+                })
                 .collect(),
             _ => IndexMap::new(),
         }
@@ -322,7 +356,8 @@ impl Graph {
                     continue;
                 }
                 let width = self.key_width(code, container).min(rest.len());
-                let found: Option<SmallVec<[Key; 2]>> = rest[..width].iter().map(Key::from_value).collect();
+                let found: Option<SmallVec<[Key; 2]>> =
+                    rest[..width].iter().map(Key::from_value).collect();
                 let Some(found) = found else {
                     let message = format!("{} cannot be a key", rest[0].type_name());
                     return Err(self.type_error(code, n, message));
@@ -356,8 +391,15 @@ impl Graph {
         Ok(self.finish(code, n, value))
     }
 
-    /// The element of a container that a node read before, if container and keys are what they were.
-    fn element_read_before(&self, code: &Code, n: NodeId, base: Operand, keys: &[Operand]) -> Option<NodeId> {
+    /// The element of a container that a node read before, if container and keys are what
+    /// they were.
+    fn element_read_before(
+        &self,
+        code: &Code,
+        n: NodeId,
+        base: Operand,
+        keys: &[Operand],
+    ) -> Option<NodeId> {
         let node = &self.nodes[n as usize];
         let Value::Container(r) = self.value(code, node.frame, base) else { return None };
         let Some(Side::Deps(deps)) = node.side.as_deref() else { return None };
@@ -366,7 +408,8 @@ impl Graph {
             d.state == State::Clean && d.changed != self.epoch
         };
         let all = keys.iter().chain([&base]).filter_map(|o| self.resolve(node.frame, *o));
-        let same = node.flags & WAS_STALE != 0 && as_it_was(r.node) && all.into_iter().all(as_it_was);
+        let same =
+            node.flags & WAS_STALE != 0 && as_it_was(r.node) && all.into_iter().all(as_it_was);
         (same && deps.len() == 1 && deps[0] != r.node + 1).then(|| deps[0])
     }
 
@@ -381,20 +424,30 @@ impl Graph {
     fn missing(&self, code: &Code, n: NodeId, container: NodeId, keys: &[Key]) -> Failure {
         let shown = keys.iter().map(|k| format!("[{k}]")).collect::<String>();
         let known: Vec<String> = match self.nodes[container as usize].side.as_deref() {
-            Some(Side::Loop(l)) => (0..l.keys.len().min(100)).map(|i| l.keys.get(i).to_string()).collect(),
-            Some(Side::Table(Table { entries: Some(e), .. })) => {
-                e.keys().take(100).map(|k| k.iter().map(Key::to_string).collect::<Vec<_>>().join("][")).collect()
+            Some(Side::Loop(l)) => {
+                (0..l.keys.len().min(100)).map(|i| l.keys.get(i).to_string()).collect()
             }
+            Some(Side::Table(Table { entries: Some(e), .. })) => e
+                .keys()
+                .take(100)
+                .map(|k| k.iter().map(Key::to_string).collect::<Vec<_>>().join("]["))
+                .collect(),
             _ => {
                 let entries = self.single_loop_entries(code, container);
-                entries.keys().take(100).map(|k| k.iter().map(Key::to_string).collect::<String>()).collect()
+                entries
+                    .keys()
+                    .take(100)
+                    .map(|k| k.iter().map(Key::to_string).collect::<String>())
+                    .collect()
             }
         };
         let wanted = keys.iter().map(Key::to_string).collect::<Vec<_>>().join("][");
         let hint = match crate::diag::nearest(&wanted, known.iter().map(String::as_str)) {
             Some(near) => Some(format!("did you mean [{near}]?")),
             None => match (known.first(), known.last()) {
-                (Some(a), Some(b)) if known.len() > 1 => Some(format!("its keys run from [{a}] to [{b}]")),
+                (Some(a), Some(b)) if known.len() > 1 => {
+                    Some(format!("its keys run from [{a}] to [{b}]"))
+                }
                 (Some(a), _) => Some(format!("its only key is [{a}]")),
                 _ => Some("it has no elements".into()),
             },

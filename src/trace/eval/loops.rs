@@ -33,7 +33,9 @@ impl Graph {
         let (owner, pass) = (frame.owner, frame.pass as usize);
         let home = self.nodes[owner as usize].frame;
         let (from, operand) = if pass == 0 {
-            let Op::Fold { init, .. } = self.op(code, owner) else { return Ok(self.finish(code, n, Value::Unit)) };
+            let Op::Fold { init, .. } = self.op(code, owner) else {
+                return Ok(self.finish(code, n, Value::Unit));
+            };
             (home, *init)
         } else {
             let previous = self.pass_frame(code, owner, pass - 1)?;
@@ -50,7 +52,13 @@ impl Graph {
         Ok(self.finish(code, n, value))
     }
 
-    pub(super) fn evaluate_for(&mut self, code: &Code, n: NodeId, iter: Operand, body: u32) -> Result<Step, Failure> {
+    pub(super) fn evaluate_for(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        iter: Operand,
+        body: u32,
+    ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(step) = self.await_plain(code, n, frame, &[iter])? {
             return Ok(step);
@@ -66,7 +74,10 @@ impl Graph {
             }
             v @ (Value::Array(_) | Value::List(_)) => (v.clone(), for_keys(v)),
             v => {
-                let message = format!("`for` iterates over an array, a range or a record, not over {}", v.type_name());
+                let message = format!(
+                    "`for` iterates over an array, a range or a record, not over {}",
+                    v.type_name()
+                );
                 return Err(self.type_error(code, n, message));
             }
         };
@@ -103,8 +114,9 @@ impl Graph {
             Value::Closure(c) => (c.block, c.frame),
             Value::Builtin(i) => {
                 let builtin = code.builtins.get(*i);
-                let results: Result<Vec<Value>, Fault> =
-                    (0..keys.len()).map(|i| builtin.apply(&[&items.element(i).unwrap_or_default()])).collect();
+                let results: Result<Vec<Value>, Fault> = (0..keys.len())
+                    .map(|i| builtin.apply(&[&items.element(i).unwrap_or_default()]))
+                    .collect();
                 let results = results.map_err(|e| self.fault(code, n, e))?;
                 let value = match keys {
                     Keys::Listed { ref keys, .. } if matches!(xs, Value::Record(_)) => {
@@ -121,7 +133,8 @@ impl Graph {
             }
             v => {
                 let message = format!("map: needs a function, got {}", v.type_name());
-                let hint = matches!(v, Value::Memo(_)).then(|| "wrap it: fn(x) { f(x) }".to_owned());
+                let hint =
+                    matches!(v, Value::Memo(_)).then(|| "wrap it: fn(x) { f(x) }".to_owned());
                 return Err(self.fail(code, n, FaultKind::Type, message, hint));
             }
         };
@@ -157,7 +170,8 @@ impl Graph {
         let (block, parent) = match self.value(code, frame, f) {
             Value::Closure(c) => (c.block, c.frame),
             v => {
-                let message = format!("fold: needs a function defined in the program, got {}", v.type_name());
+                let message =
+                    format!("fold: needs a function defined in the program, got {}", v.type_name());
                 return Err(self.type_error(code, n, message));
             }
         };
@@ -200,7 +214,14 @@ impl Graph {
         Ok(self.finish(code, n, value))
     }
 
-    fn check_callback(&self, code: &Code, n: NodeId, what: &str, block: u32, takes: usize) -> Result<(), Failure> {
+    fn check_callback(
+        &self,
+        code: &Code,
+        n: NodeId,
+        what: &str,
+        block: u32,
+        takes: usize,
+    ) -> Result<(), Failure> {
         match code.blocks[block as usize].signature() {
             Some((_, params, required)) if params.len() >= takes && required <= takes => Ok(()),
             Some((name, params, _)) => {
@@ -259,7 +280,8 @@ impl Graph {
                 match keys.find(&old.keys.get(i)).filter(|_| same) {
                     Some(j) => {
                         frames[j] = *f;
-                        let before = std::mem::replace(&mut self.frames[*f as usize].pass, j as u32);
+                        let before =
+                            std::mem::replace(&mut self.frames[*f as usize].pass, j as u32);
                         self.note(Entry::PassMoved(*f, before));
                     }
                     None => self.detach(code, *f),
@@ -270,13 +292,17 @@ impl Graph {
             }
             result = old.result;
         }
-        self.set_side(n, Some(Side::Loop(Loop { keys, items, frames, block, parent, result, deps })));
+        self.set_side(
+            n,
+            Some(Side::Loop(Loop { keys, items, frames, block, parent, result, deps })),
+        );
         self.version += 1;
         let version = self.version;
         if let Some(Side::Loop(_)) = self.nodes[n as usize].side.as_deref()
             && !matches!(self.op(code, n), Op::Fold { .. })
         {
-            // The reference with the new version is the value; consumers see that the structure changed.
+            // The reference with the new version is the value; consumers see that the
+            // structure changed.
             let node = &mut self.nodes[n as usize];
             node.value = Value::Container(NodeRef { node: n, version });
             node.changed = self.epoch;
@@ -301,9 +327,20 @@ impl Graph {
     }
 
     /// The frame of a pass, made if nothing has asked for it before.
-    pub(crate) fn pass_frame(&mut self, code: &Code, owner: NodeId, pass: usize) -> Result<FrameId, Failure> {
+    pub(crate) fn pass_frame(
+        &mut self,
+        code: &Code,
+        owner: NodeId,
+        pass: usize,
+    ) -> Result<FrameId, Failure> {
         let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else {
-            return Err(self.fail(code, owner, FaultKind::Index, "this loop has no iterations".into(), None));
+            return Err(self.fail(
+                code,
+                owner,
+                FaultKind::Index,
+                "this loop has no iterations".into(),
+                None,
+            ));
         };
         if l.frames[pass] != NONE {
             return Ok(l.frames[pass]);
@@ -312,8 +349,12 @@ impl Graph {
         let home = self.nodes[owner as usize].frame;
         let here = &self.frames[home as usize];
         let (path, depth, args) = match self.op(code, owner) {
-            Op::Map { site, .. } => (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Item),
-            Op::Fold { site, .. } => (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Fold),
+            Op::Map { site, .. } => {
+                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Item)
+            }
+            Op::Fold { site, .. } => {
+                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Fold)
+            }
             _ => (here.path, here.depth, Arguments::None),
         };
         debug_assert!(!matches!(code.blocks[block as usize].kind, BlockKind::Root));
@@ -338,7 +379,8 @@ impl Graph {
     }
 }
 
-/// Keys for `for`: the elements themselves where they are numbers, strings or bools; else the index.
+/// Keys for `for`: the elements themselves where they are numbers, strings or bools; else
+/// the index.
 fn for_keys(items: &Value) -> Result<Keys, Fault> {
     match items {
         Value::Array(xs) => {
@@ -351,14 +393,17 @@ fn for_keys(items: &Value) -> Result<Keys, Fault> {
             }
             listed(xs.iter().map(|x| Key::num(*x)))
         }
-        Value::List(xs) if xs.iter().all(|x| matches!(x, Value::Str(_) | Value::Bool(_) | Value::Num(_))) => {
+        Value::List(xs)
+            if xs.iter().all(|x| matches!(x, Value::Str(_) | Value::Bool(_) | Value::Num(_))) =>
+        {
             listed(xs.iter().map(Key::from_value))
         }
         v => Ok(Keys::Range { start: 0, len: v.len().unwrap_or(0) }),
     }
 }
 
-/// Keys for `map` and `fold`: the elements where they are distinct strings, a record's names, else the index.
+/// Keys for `map` and `fold`: the elements where they are distinct strings, a record's
+/// names, else the index.
 fn map_keys(xs: &Value) -> Result<(Value, Keys), Fault> {
     match xs {
         Value::Array(v) => Ok((xs.clone(), Keys::Range { start: 0, len: v.len() })),
@@ -371,7 +416,10 @@ fn map_keys(xs: &Value) -> Result<(Value, Keys), Fault> {
             let keys = listed(r.keys().map(|k| Some(Key::Str(Arc::clone(k)))))?;
             Ok((Value::List(r.values().cloned().collect()), keys))
         }
-        v => Err(Fault::type_error(format!("needs an array or record to run over, got {}", v.type_name()))),
+        v => Err(Fault::type_error(format!(
+            "needs an array or record to run over, got {}",
+            v.type_name()
+        ))),
     }
 }
 

@@ -28,11 +28,13 @@ impl Graph {
             Op::Prim { builtin, args } => {
                 let builtin = code.builtins.get(*builtin);
                 let mut deps = Deps::new();
-                let made =
-                    match self.inputs(code, frame, args, &mut deps).map(|values| self.apply_at(n, builtin, &values)) {
-                        Ok(made) => made,
-                        Err(m) => return self.need(code, m),
-                    };
+                let made = match self
+                    .inputs(code, frame, args, &mut deps)
+                    .map(|values| self.apply_at(n, builtin, &values))
+                {
+                    Ok(made) => made,
+                    Err(m) => return self.need(code, m),
+                };
                 let made = made.map_err(|e| self.fault(code, n, e))?;
                 self.finish_call(code, n, deps, made)
             }
@@ -41,7 +43,8 @@ impl Graph {
                     return Ok(step);
                 }
                 let mut deps = Deps::new();
-                let values = items.iter().map(|o| self.plain(code, frame, *o, &mut deps).clone()).collect();
+                let values =
+                    items.iter().map(|o| self.plain(code, frame, *o, &mut deps).clone()).collect();
                 self.set_deps(n, deps);
                 self.finish_made(code, n, Value::from_elements(values))
             }
@@ -51,18 +54,26 @@ impl Graph {
                 }
                 let mut deps = Deps::new();
                 let fields = names.iter().zip(values.iter());
-                let fields = fields.map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone())).collect();
+                let fields = fields
+                    .map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone()))
+                    .collect();
                 self.set_deps(n, deps);
                 self.finish_made(code, n, Value::Record(std::sync::Arc::new(fields)))
             }
-            Op::Closure(block) => Ok(self.finish(code, n, Value::Closure(Closure { block: *block, frame }))),
+            Op::Closure(block) => {
+                Ok(self.finish(code, n, Value::Closure(Closure { block: *block, frame })))
+            }
             Op::Index { base, keys } => self.evaluate_index(code, n, *base, keys),
             Op::Call { callee, args, site } => self.evaluate_call(code, n, *callee, args, *site),
             Op::If { cond, then, otherwise } => self.evaluate_if(code, n, *cond, *then, *otherwise),
-            Op::Select { cond, then, otherwise } => self.evaluate_select(code, n, *cond, *then, *otherwise),
+            Op::Select { cond, then, otherwise } => {
+                self.evaluate_select(code, n, *cond, *then, *otherwise)
+            }
             Op::For { iter, body } => self.evaluate_for(code, n, *iter, *body),
             Op::Map { f, over, site } => self.evaluate_map(code, n, *f, *over, *site),
-            Op::Fold { f, init, over, site } => self.evaluate_fold(code, n, *f, *init, *over, *site),
+            Op::Fold { f, init, over, site } => {
+                self.evaluate_fold(code, n, *f, *init, *over, *site)
+            }
             Op::Container { sources, .. } => self.evaluate_container(code, n, sources),
             Op::Gather => self.evaluate_gather(code, n),
             Op::Mem { f, .. } => self.evaluate_mem(code, n, *f),
@@ -118,7 +129,8 @@ impl Graph {
         Ok(None)
     }
 
-    /// The values of operands, containers read as arrays or records, or the node to wait for before they can be read.
+    /// The values of operands, containers read as arrays or records, or the node to wait
+    /// for before they can be read.
     pub(crate) fn inputs<'a>(
         &'a self,
         code: &'a Code,
@@ -153,8 +165,15 @@ impl Graph {
         Ok(values)
     }
 
-    /// The value of an operand with a container read as an array or record; what was read for that goes to `deps`.
-    pub(super) fn plain<'a>(&'a self, code: &'a Code, frame: FrameId, o: Operand, deps: &mut Deps) -> &'a Value {
+    /// The value of an operand with a container read as an array or record; what was read
+    /// for that goes to `deps`.
+    pub(super) fn plain<'a>(
+        &'a self,
+        code: &'a Code,
+        frame: FrameId,
+        o: Operand,
+        deps: &mut Deps,
+    ) -> &'a Value {
         match self.value(code, frame, o) {
             Value::Container(r) => {
                 deps.push(r.node + 1);
@@ -165,7 +184,12 @@ impl Graph {
     }
 
     /// Calls a built-in at a node: an incremental function from where it was.
-    pub(super) fn apply_at(&self, n: NodeId, builtin: &Builtin, values: &[&Value]) -> Result<Made, Fault> {
+    pub(super) fn apply_at(
+        &self,
+        n: NodeId,
+        builtin: &Builtin,
+        values: &[&Value],
+    ) -> Result<Made, Fault> {
         match builtin.resume(values, self.kept(n).map(|b| &**b)) {
             None => builtin.apply(values).map(Made::Value),
             Some(made) => made.map(Made::Kept),
@@ -173,7 +197,13 @@ impl Graph {
     }
 
     /// Ends the evaluation of a call.
-    fn finish_call(&mut self, code: &Code, n: NodeId, deps: Deps, made: Made) -> Result<Step, Failure> {
+    fn finish_call(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        deps: Deps,
+        made: Made,
+    ) -> Result<Step, Failure> {
         match made {
             Made::Value(value) => {
                 self.set_deps(n, deps);

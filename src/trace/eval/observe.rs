@@ -37,7 +37,9 @@ impl Graph {
             Score::One(score) => {
                 self.likelihood.add(score);
                 self.nodes[n as usize].score = score;
-                if matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Total(_))) || !deps.is_empty() {
+                if matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Total(_)))
+                    || !deps.is_empty()
+                {
                     self.set_total(n, ExactSum::default());
                 }
             }
@@ -94,10 +96,15 @@ impl Graph {
             match values[0] {
                 Value::Dist(_) => {}
                 v @ Value::Likelihood(_) => {
-                    return likelihood_score(v, observed).map(Score::One).map_err(|f| self.fault(code, n, f));
+                    return likelihood_score(v, observed)
+                        .map(Score::One)
+                        .map_err(|f| self.fault(code, n, f));
                 }
                 v => {
-                    let message = format!("`observe` needs a distribution or likelihood, got {}", v.type_name());
+                    let message = format!(
+                        "`observe` needs a distribution or likelihood, got {}",
+                        v.type_name()
+                    );
                     return Err(self.type_error(code, n, message));
                 }
             }
@@ -107,9 +114,15 @@ impl Graph {
     }
 
     /// The log density of an observation's coarse surrogate: never part of the joint.
-    pub(crate) fn surrogate_score(&mut self, code: &Code, n: NodeId) -> Result<Option<f64>, Failure> {
+    pub(crate) fn surrogate_score(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+    ) -> Result<Option<f64>, Failure> {
         let frame = self.nodes[n as usize].frame;
-        let Op::Observe { value, coarse: Some(coarse), .. } = self.op(code, n) else { return Ok(None) };
+        let Op::Observe { value, coarse: Some(coarse), .. } = self.op(code, n) else {
+            return Ok(None);
+        };
         for o in [*value, *coarse] {
             if let Some(m) = self.unready(frame, o) {
                 self.demand(code, m)?;
@@ -133,19 +146,32 @@ impl Graph {
         score.map(Some).map_err(|f| self.fault(code, n, f))
     }
 
-    pub(super) fn evaluate_factor(&mut self, code: &Code, n: NodeId, weight: Operand) -> Result<Step, Failure> {
+    pub(super) fn evaluate_factor(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        weight: Operand,
+    ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(m) = self.unready(frame, weight) {
             return self.need(code, m);
         }
         let score = match self.value(code, frame, weight) {
             Value::Num(w) if w.is_nan() => {
-                let hint = "0 / 0, inf - inf and the logarithm of a negative number are NaN".to_owned();
-                return Err(self.fail(code, n, FaultKind::Domain, "the log weight is not a number".into(), Some(hint)));
+                let hint =
+                    "0 / 0, inf - inf and the logarithm of a negative number are NaN".to_owned();
+                return Err(self.fail(
+                    code,
+                    n,
+                    FaultKind::Domain,
+                    "the log weight is not a number".into(),
+                    Some(hint),
+                ));
             }
             Value::Num(w) => *w,
             v => {
-                let message = format!("`factor` needs a log weight, a number; got {}", v.type_name());
+                let message =
+                    format!("`factor` needs a log weight, a number; got {}", v.type_name());
                 return Err(self.type_error(code, n, message));
             }
         };

@@ -1,4 +1,5 @@
-//! How derivatives pass through calls of built-ins: written as such, called as values, mapped over elements.
+//! How derivatives pass through calls of built-ins: written as such, called as values,
+//! mapped over elements.
 
 use super::Reverse;
 use crate::lang::adjoint::Adjoint;
@@ -29,18 +30,30 @@ impl Reverse<'_> {
     pub(super) fn pull_called(&mut self, n: NodeId, by: &Adjoint) -> Result<bool, Failure> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
-        let Op::Call { callee: Callee::Value(f), args, .. } = g.op(self.code, n) else { return Ok(false) };
+        let Op::Call { callee: Callee::Value(f), args, .. } = g.op(self.code, n) else {
+            return Ok(false);
+        };
         let Value::Builtin(i) = g.value(self.code, frame, *f) else { return Ok(false) };
         let builtin = self.code.builtins.get(*i);
         // It was matched when it was called.
-        let Ok(order) = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())) else { return Ok(false) };
+        let Ok(order) = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())) else {
+            return Ok(false);
+        };
         let operands: SmallVec<[Option<Operand>; 8]> =
             order.iter().map(|i| i.and_then(|i| args.get(i)).map(|a| a.1)).collect();
         let mut deps = Deps::new();
-        let value = |o: &Option<Operand>| o.map_or(&Value::Unit, |o| g.plain(self.code, frame, o, &mut deps));
+        let value = |o: &Option<Operand>| {
+            o.map_or(&Value::Unit, |o| g.plain(self.code, frame, o, &mut deps))
+        };
         let values: SmallVec<[&Value; 8]> = operands.iter().map(value).collect();
         let operand = |i: usize| operands.get(i).copied().flatten();
-        let pulled = self.by_call(n, &Args { builtin, values: &values }, &g.nodes[n as usize].value, by, operand)?;
+        let pulled = self.by_call(
+            n,
+            &Args { builtin, values: &values },
+            &g.nodes[n as usize].value,
+            by,
+            operand,
+        )?;
         self.give_arguments(n, builtin, operands, pulled)?;
         Ok(true)
     }
@@ -54,7 +67,8 @@ impl Reverse<'_> {
             return Err(self.no_derivative(n, "the result of this map"));
         };
         let builtin = self.code.builtins.get(*i);
-        let (xs, ys) = (g.plain(self.code, frame, *over, &mut Deps::new()), &g.nodes[n as usize].value);
+        let (xs, ys) =
+            (g.plain(self.code, frame, *over, &mut Deps::new()), &g.nodes[n as usize].value);
         let mut whole = Adjoint::Zero;
         for i in 0..xs.len().unwrap_or(0) {
             let (x, y, by) = match (xs, ys) {
@@ -62,7 +76,11 @@ impl Reverse<'_> {
                     (Some((_, x)), Some((name, y))) => (x.clone(), y.clone(), by.field(name)),
                     _ => continue,
                 },
-                _ => (xs.element(i).unwrap_or_default(), ys.element(i).unwrap_or_default(), by.element(i)),
+                _ => (
+                    xs.element(i).unwrap_or_default(),
+                    ys.element(i).unwrap_or_default(),
+                    by.element(i),
+                ),
             };
             if by.is_zero() {
                 continue;
@@ -110,8 +128,10 @@ impl Reverse<'_> {
             }
             if part.is_unknown() {
                 let name = builtin.args.get(i).or(builtin.args.last()).map_or("", |a| &*a.name);
-                return Err(self
-                    .no_derivative(n, &format!("`{}`, as a function of its argument `{name}`,", builtin.full_name())));
+                return Err(self.no_derivative(
+                    n,
+                    &format!("`{}`, as a function of its argument `{name}`,", builtin.full_name()),
+                ));
             }
             self.give_node(source, part);
         }

@@ -1,9 +1,11 @@
 //! Gradients of the log joint density by chosen choices: reverse mode over the trace.
 //!
-//! The nodes between the choices and what they are scored by are put in an order in which operands come first; derivatives
-//! then flow from the scores back through that order. Structure is taken as it is: which branch is taken, how many choices
-//! there are, what a discrete choice is. Built-ins bring their own vector-Jacobian products ([`crate::lang::builtins`]),
-//! distributions and likelihoods their gradients, supports those of their transforms.
+//! The nodes between the choices and what they are scored by are put in an order in which
+//! operands come first; derivatives then flow from the scores back through that order.
+//! Structure is taken as it is: which branch is taken, how many choices there are, what a
+//! discrete choice is. Built-ins bring their own vector-Jacobian products
+//! ([`crate::lang::builtins`]), distributions and likelihoods their gradients, supports
+//! those of their transforms.
 
 mod calls;
 mod pull;
@@ -46,14 +48,16 @@ pub(super) struct Reverse<'a> {
     /// The active nodes, operands first.
     order: Vec<NodeId>,
     adjoints: FxHashMap<NodeId, Adjoint>,
-    /// The weight of the log density that is being differentiated, and that times the power of the likelihood.
+    /// The weight of the log density that is being differentiated, and that times the
+    /// power of the likelihood.
     weight: f64,
     power: f64,
 }
 
 impl Graph {
-    /// The gradient, by the unconstrained coordinates of the targets one after the other, of the log prior plus `power` times
-    /// the log likelihood plus the log Jacobians of the transforms, with a weight for each score. Discrete targets have no
+    /// The gradient, by the unconstrained coordinates of the targets one after the other,
+    /// of the log prior plus `power` times the log likelihood plus the log Jacobians of
+    /// the transforms, with a weight for each score. Discrete targets have no
     /// coordinates.
     ///
     /// # Errors
@@ -70,8 +74,15 @@ impl Graph {
         for t in targets {
             marks[t.node as usize] = Mark::Target;
         }
-        let mut pass =
-            Reverse { graph: self, code, marks, order: Vec::new(), adjoints: FxHashMap::default(), weight: 1.0, power };
+        let mut pass = Reverse {
+            graph: self,
+            code,
+            marks,
+            order: Vec::new(),
+            adjoints: FxHashMap::default(),
+            weight: 1.0,
+            power,
+        };
         for t in targets {
             pass.visit(t.node);
         }
@@ -90,11 +101,16 @@ impl Graph {
             pass.power = pass.weight * power;
             pass.pull_score(n)?;
         }
-        let mut own: FxHashMap<NodeId, Option<Own>> = targets.iter().map(|t| (t.node, None)).collect();
+        let mut own: FxHashMap<NodeId, Option<Own>> =
+            targets.iter().map(|t| (t.node, None)).collect();
         while let Some(n) = pass.order.pop() {
             let by = pass.adjoints.remove(&n).unwrap_or_default();
-            // A likelihood may leave out some of its arguments: that matters if these depend on a target.
-            let in_parts = matches!((&self.nodes[n as usize].value, &by), (Value::Likelihood(_), Adjoint::List(_)));
+            // A likelihood may leave out some of its arguments: that matters if these
+            // depend on a target.
+            let in_parts = matches!(
+                (&self.nodes[n as usize].value, &by),
+                (Value::Likelihood(_), Adjoint::List(_))
+            );
             if by.is_unknown() && !in_parts {
                 return Err(pass.no_derivative(n, "a value computed from this"));
             }

@@ -1,4 +1,5 @@
-//! How derivatives pass from a node to what it is computed from, by the kind of its operation.
+//! How derivatives pass from a node to what it is computed from, by the kind of its
+//! operation.
 
 use super::{Inputs, Reverse};
 use crate::dist::Dist;
@@ -12,7 +13,8 @@ use crate::trace::node::*;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
-    /// The nodes whose values a node's value is computed from. Of a target: those that move its support.
+    /// The nodes whose values a node's value is computed from. Of a target: those that
+    /// move its support.
     pub(super) fn inputs(&self, n: NodeId, target: bool) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
         let frame = g.nodes[n as usize].frame;
@@ -21,12 +23,17 @@ impl Reverse<'_> {
             Op::Prim { args, .. } | Op::Array(args) => {
                 all.extend(args.iter().filter_map(|o| self.source(frame, *o)));
             }
-            Op::Record { values, .. } => all.extend(values.iter().filter_map(|o| self.source(frame, *o))),
+            Op::Record { values, .. } => {
+                all.extend(values.iter().filter_map(|o| self.source(frame, *o)))
+            }
             Op::Index { .. } => all.extend(self.indexed(n).map(|(source, _)| source)),
             Op::Param { default, .. } => {
                 all.extend(match g.argument(self.code, n) {
                     Some((from, o)) => self.source(from, o),
-                    None => self.passed(n).map(|(source, _)| source).or(default.and_then(|o| self.source(frame, o))),
+                    None => self
+                        .passed(n)
+                        .map(|(source, _)| source)
+                        .or(default.and_then(|o| self.source(frame, o))),
                 });
             }
             Op::Item => all.extend(self.passed(n).map(|(source, _)| source)),
@@ -47,7 +54,9 @@ impl Reverse<'_> {
             },
             Op::Select { .. } => all.extend(self.taken(n).and_then(|o| self.source(frame, o))),
             // The results of a map of a built-in.
-            Op::Map { over, .. } if !matches!(side, Some(Side::Loop(_))) => all.extend(self.source(frame, *over)),
+            Op::Map { over, .. } if !matches!(side, Some(Side::Loop(_))) => {
+                all.extend(self.source(frame, *over))
+            }
             Op::Draw { dist, .. } => {
                 let moves = |d: Dist| d.is_stored_whitened() || target && d.has_moving_support();
                 if g.dist_of(self.code, n).is_some_and(moves) {
@@ -109,10 +118,12 @@ impl Reverse<'_> {
             }
             Op::Gather => self.pull_gather(n, by)?,
             Op::Call { .. } if self.pull_called(n, by)? => {}
-            Op::Accumulator | Op::Call { .. } | Op::If { .. } | Op::Fold { .. } => match &self.inputs(n, false)[..] {
-                [one] => self.give_node(*one, by.clone()),
-                _ => return Err(self.no_derivative(n, "the result of this call")),
-            },
+            Op::Accumulator | Op::Call { .. } | Op::If { .. } | Op::Fold { .. } => {
+                match &self.inputs(n, false)[..] {
+                    [one] => self.give_node(*one, by.clone()),
+                    _ => return Err(self.no_derivative(n, "the result of this call")),
+                }
+            }
             Op::Select { .. } => {
                 if let Some(o) = self.taken(n) {
                     self.give(frame, o, by.clone());
@@ -137,13 +148,16 @@ impl Reverse<'_> {
         self.give_node(source, whole);
     }
 
-    /// What a parameter of a pass gets: the node, and which of its elements unless all of it.
+    /// What a parameter of a pass gets: the node, and which of its elements unless all of
+    /// it.
     pub(super) fn passed(&self, n: NodeId) -> Option<(NodeId, Option<usize>)> {
         let g = self.graph;
         let f = &g.frames[g.nodes[n as usize].frame as usize];
         let slot = n - f.base;
         let element = match (&f.args, g.op(self.code, n)) {
-            (_, Op::Item) | (Arguments::Item, _) => slot == 0 || matches!(g.op(self.code, n), Op::Item),
+            (_, Op::Item) | (Arguments::Item, _) => {
+                slot == 0 || matches!(g.op(self.code, n), Op::Item)
+            }
             (Arguments::Fold, _) if slot == 1 => true,
             (Arguments::Fold, _) if slot == 0 => {
                 return match g.nodes[n as usize].side.as_deref() {
@@ -165,7 +179,8 @@ impl Reverse<'_> {
         Some((self.source(home, over)?, Some(f.pass as usize)))
     }
 
-    /// Where an index ends up: the node whose plain value the last keys pick from, and those keys.
+    /// Where an index ends up: the node whose plain value the last keys pick from, and
+    /// those keys.
     pub(super) fn indexed(&self, n: NodeId) -> Option<(NodeId, SmallVec<[Value; 2]>)> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
@@ -200,7 +215,9 @@ impl Reverse<'_> {
         };
         for (i, d) in elements.into_iter().enumerate() {
             let part = match &self.graph.nodes[n as usize].value {
-                Value::Record(r) => r.get_index(i).map_or(Adjoint::Zero, |(name, _)| by.field(name)),
+                Value::Record(r) => {
+                    r.get_index(i).map_or(Adjoint::Zero, |(name, _)| by.field(name))
+                }
                 _ => by.element(i),
             };
             self.give_node(d, part);
@@ -208,11 +225,15 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// The nodes with the elements of a container read as a whole; `None` if some are constants.
+    /// The nodes with the elements of a container read as a whole; `None` if some are
+    /// constants.
     pub(super) fn gathered(&self, n: NodeId) -> Option<Inputs> {
         let g = self.graph;
         let Some(Side::Deps(deps)) = g.nodes[n as usize].side.as_deref() else { return None };
-        let nested = deps.iter().filter(|d| matches!(g.nodes[**d as usize].value, Value::Container(_))).count();
+        let nested = deps
+            .iter()
+            .filter(|d| matches!(g.nodes[**d as usize].value, Value::Container(_)))
+            .count();
         let elements = &deps[..deps.len() - nested];
         let count = match &g.nodes[n as usize].value {
             Value::Record(r) => r.len(),
@@ -233,8 +254,14 @@ impl Reverse<'_> {
         self.give_params(n, dist, &d, by)
     }
 
-    /// The part of a target's adjoint that goes to what moves its support or its realisation; changes nothing in its own.
-    pub(super) fn pull_support(&mut self, n: NodeId, targets: &[Target], by: &Adjoint) -> Result<(), Failure> {
+    /// The part of a target's adjoint that goes to what moves its support or its
+    /// realisation; changes nothing in its own.
+    pub(super) fn pull_support(
+        &mut self,
+        n: NodeId,
+        targets: &[Target],
+        by: &Adjoint,
+    ) -> Result<(), Failure> {
         let Op::Draw { dist: spec, .. } = self.graph.op(self.code, n) else { return Ok(()) };
         let Some(dist) = self.graph.dist_of(self.code, n) else { return Ok(()) };
         if dist.is_stored_whitened() {
@@ -254,15 +281,24 @@ impl Reverse<'_> {
         }
     }
 
-    /// x(y) moves with the bounds while y stays: the derivative by the distribution's parameters.
-    fn by_bounds(&self, n: NodeId, dist: &Dist, targets: &[Target], by: &Adjoint) -> Option<Vec<f64>> {
+    /// x(y) moves with the bounds while y stays: the derivative by the distribution's
+    /// parameters.
+    fn by_bounds(
+        &self,
+        n: NodeId,
+        dist: &Dist,
+        targets: &[Target],
+        by: &Adjoint,
+    ) -> Option<Vec<f64>> {
         let stored = self.graph.stored(n)?;
         let Some(count) = dist.elements() else {
             return dist.by_bounds(&stored, by.number());
         };
         let mut all = Vec::new();
         for i in 0..count {
-            let moved = targets.iter().any(|t| t.node == n && (t.element == NONE || t.element as usize == i));
+            let moved = targets
+                .iter()
+                .any(|t| t.node == n && (t.element == NONE || t.element as usize == i));
             let one = dist.element(i);
             let x = stored.element(i)?;
             let part = one.by_bounds(&x, by.element(i).number())?;

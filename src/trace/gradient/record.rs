@@ -1,7 +1,9 @@
-//! Recording the log density as a function of some choices on a tape ([`crate::lang::tape`]).
+//! Recording the log density as a function of some choices on a tape
+//! ([`crate::lang::tape`]).
 //!
-//! What an update of the choices may reach is marked as an update would mark it; those nodes, operands first, are told to the
-//! tape. Structure is taken as it is: where it hangs on something that moves, the tape holds a guard that tells when it is no longer
+//! What an update of the choices may reach is marked as an update would mark it; those
+//! nodes, operands first, are told to the tape. Structure is taken as it is: where it
+//! hangs on something that moves, the tape holds a guard that tells when it is no longer
 //! so, or there is no tape at all. It is not an evaluation: nothing in the trace changes.
 
 use super::{Inputs, Reverse};
@@ -25,15 +27,18 @@ impl Graph {
                 self.mark_target(code, t.node);
             }
         }
-        let mut all: Vec<NodeId> =
-            self.journal.iter().filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None }).collect();
+        let mut all: Vec<NodeId> = self
+            .journal
+            .iter()
+            .filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
+            .collect();
         self.rollback(code, before);
         self.sort_by_place(&mut all);
         all
     }
 
-    /// The log density by the unconstrained coordinates of the targets, one after the other; `None` where it cannot be told in
-    /// a straight line.
+    /// The log density by the unconstrained coordinates of the targets, one after the
+    /// other; `None` where it cannot be told in a straight line.
     pub fn record(&mut self, code: &Code, targets: &[Target]) -> Option<Tape> {
         let reached = self.reached(code, targets);
         let view = Reverse {
@@ -112,7 +117,8 @@ impl Recorder<'_> {
                 continue;
             }
             let n = *n;
-            let fixed = !self.placed.contains_key(&n) && reads.iter().all(|r| self.form(*r).is_fixed());
+            let fixed =
+                !self.placed.contains_key(&n) && reads.iter().all(|r| self.form(*r).is_fixed());
             stack.pop();
             let form = match fixed {
                 true => Form::Fixed(self.value(n).clone()),
@@ -212,7 +218,9 @@ impl Recorder<'_> {
                 if !self.operand(frame, *f).is_fixed() {
                     return None;
                 }
-                let Value::Builtin(i) = graph.value(code, frame, *f) else { return self.tell_call(n) };
+                let Value::Builtin(i) = graph.value(code, frame, *f) else {
+                    return self.tell_call(n);
+                };
                 let builtin = code.builtins.get(*i);
                 let order = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())).ok()?;
                 let argument = |i: &Option<usize>| match i.and_then(|i| args.get(i)) {
@@ -241,14 +249,22 @@ impl Recorder<'_> {
             Op::Map { f, over, .. } => {
                 let Value::Builtin(i) = graph.value(code, frame, *f) else { return None };
                 let (over, builtin) = (self.operand(frame, *over), code.builtins.get(*i));
-                let one = |(i, now): (usize, Value)| self.tape.call(builtin, vec![over.position(i)?], &now);
+                let one = |(i, now): (usize, Value)| {
+                    self.tape.call(builtin, vec![over.position(i)?], &now)
+                };
                 match &now {
                     Value::Record(r) => {
-                        let all = r.values().cloned().enumerate().map(one).collect::<Option<Vec<_>>>()?;
+                        let all =
+                            r.values().cloned().enumerate().map(one).collect::<Option<Vec<_>>>()?;
                         Some(Form::Record(r.keys().cloned().zip(all).collect()))
                     }
                     v => {
-                        let all = v.passes().into_iter().enumerate().map(one).collect::<Option<Vec<_>>>()?;
+                        let all = v
+                            .passes()
+                            .into_iter()
+                            .enumerate()
+                            .map(one)
+                            .collect::<Option<Vec<_>>>()?;
                         self.tape.array(all)
                     }
                 }
@@ -267,7 +283,8 @@ impl Recorder<'_> {
                 self.tape.factor(&weight)?;
                 Some(Form::Fixed(now))
             }
-            // Loops over what moves, functions and containers whose structure hangs on it.
+            // Loops over what moves, functions and containers whose structure hangs on
+            // it.
             _ => None,
         }
     }

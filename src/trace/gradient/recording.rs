@@ -1,14 +1,16 @@
 //! A recorded density and the state of the trace it belongs to.
 //!
-//! It holds as long as nothing else changes the trace: every commit counts up the trace's revision, and who moves only the choices
-//! that the density is a function of says so ([`Recording::moved`]). A clone of a trace has an identity of its own.
+//! It holds as long as nothing else changes the trace: every commit counts up the trace's
+//! revision, and who moves only the choices that the density is a function of says so
+//! ([`Recording::moved`]). A clone of a trace has an identity of its own.
 
 use crate::lang::tape::{Sums, Tape};
 use crate::num::ExactSum;
 use crate::trace::{Change, NONE, Target, Trace, Weight};
 use std::sync::Arc;
 
-/// The log density of a trace as a function of the unconstrained coordinates of some of its choices.
+/// The log density of a trace as a function of the unconstrained coordinates of some of
+/// its choices.
 #[derive(Debug)]
 pub struct Recording {
     tape: Tape,
@@ -20,14 +22,21 @@ pub struct Recording {
 }
 
 impl Trace {
-    /// Records the log density as a function of the unconstrained coordinates of some continuous choices, to be worked out many times
-    /// without proposals; `None` where that cannot be told in a straight line. [`Recording::begin`] comes first.
+    /// Records the log density as a function of the unconstrained coordinates of some
+    /// continuous choices, to be worked out many times without proposals; `None` where
+    /// that cannot be told in a straight line. [`Recording::begin`] comes first.
     pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
         let tape = self.graph.record(&self.code, targets)?;
         let identity = Arc::clone(&self.identity);
         let revision = self.graph.revision;
-        Some(Recording { tape, targets: targets.to_vec(), identity, revision, start: Sums::default() })
+        Some(Recording {
+            tape,
+            targets: targets.to_vec(),
+            identity,
+            revision,
+            start: Sums::default(),
+        })
     }
 }
 
@@ -42,8 +51,9 @@ impl Recording {
         self.revision = trace.graph.revision;
     }
 
-    /// Takes the state the trace is in as what densities are relative to, and gives its coordinates. False if it cannot be told
-    /// what the program does there: then a condition has changed since.
+    /// Takes the state the trace is in as what densities are relative to, and gives its
+    /// coordinates. False if it cannot be told what the program does there: then a
+    /// condition has changed since.
     pub fn begin(&mut self, trace: &Trace, y: &mut Vec<f64>) -> bool {
         let targets = &self.targets;
         let now = |i: usize| {
@@ -58,13 +68,17 @@ impl Recording {
         told
     }
 
-    /// What a proposal of these coordinates would weigh; `None` if only a proposal can tell.
+    /// What a proposal of these coordinates would weigh; `None` if only a proposal can
+    /// tell.
     pub fn weigh(&mut self, y: &[f64]) -> Option<Weight> {
         if !self.tape.run(y) {
             return None;
         }
         let (new, old, none) = (self.tape.sums(), &self.start, &ExactSum::default());
-        let log_weight = ExactSum::balance([&new.prior, &new.likelihood, none], [&old.prior, &old.likelihood, none]);
+        let log_weight = ExactSum::balance(
+            [&new.prior, &new.likelihood, none],
+            [&old.prior, &old.likelihood, none],
+        );
         Some(Weight {
             log_weight,
             log_joint: log_weight,

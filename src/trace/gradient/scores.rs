@@ -1,4 +1,5 @@
-//! Derivatives of what a trace is scored by: choices under their priors, observations, factors.
+//! Derivatives of what a trace is scored by: choices under their priors, observations,
+//! factors.
 
 use super::{Inputs, Reverse};
 use crate::dist::{Datum, Dist};
@@ -12,7 +13,8 @@ use crate::trace::node::*;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
-    /// The nodes that the score of a choice, observation or factor is computed from, but for the choice itself.
+    /// The nodes that the score of a choice, observation or factor is computed from, but
+    /// for the choice itself.
     pub(super) fn score_inputs(&self, n: NodeId) -> Inputs {
         let mut all = Inputs::new();
         let frame = self.graph.nodes[n as usize].frame;
@@ -46,7 +48,9 @@ impl Reverse<'_> {
                     // Added where the noise's own derivative is made.
                     return Ok(());
                 }
-                let Some((mut by_x, mut params)) = density::gradient(&dist, &Value::from_datum(&stored)) else {
+                let Some((mut by_x, mut params)) =
+                    density::gradient(&dist, &Value::from_datum(&stored))
+                else {
                     return Err(self.no_derivative(n, &format!("the density of `{}`", dist.name())));
                 };
                 by_x.scale(self.weight);
@@ -64,7 +68,9 @@ impl Reverse<'_> {
                     && let Value::Likelihood(l) = g.value(code, frame, *o)
                 {
                     let Some(mut by) = l.gradient(observed) else {
-                        return Err(self.no_derivative(n, &format!("the likelihood `{}`", l.name())));
+                        return Err(
+                            self.no_derivative(n, &format!("the likelihood `{}`", l.name()))
+                        );
                     };
                     by.scale(self.power);
                     self.give(frame, *o, by);
@@ -90,7 +96,8 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// Hands the derivatives by a distribution's parameters to what they were computed from.
+    /// Hands the derivatives by a distribution's parameters to what they were computed
+    /// from.
     pub(super) fn give_params(
         &mut self,
         n: NodeId,
@@ -104,7 +111,8 @@ impl Reverse<'_> {
             DistSpec::Family { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
                 let values = self.values(frame, args);
-                let mut pulled = density::by_arguments(&Args { builtin, values: &values }, dist, &params);
+                let mut pulled =
+                    density::by_arguments(&Args { builtin, values: &values }, dist, &params);
                 if let Some(p) = density::matrix(dist, &values).and_then(|i| pulled.get_mut(i)) {
                     *p = Adjoint::Zero;
                 }
@@ -114,8 +122,8 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// Hands the derivatives by a covariance or a factor of one, `weight` times, to what it was computed from; [`density::by_arguments`]
-    /// leaves it out.
+    /// Hands the derivatives by a covariance or a factor of one, `weight` times, to what
+    /// it was computed from; [`density::by_arguments`] leaves it out.
     pub(super) fn give_matrix(
         &mut self,
         n: NodeId,
@@ -144,17 +152,20 @@ impl Reverse<'_> {
                 all.append(&mut by);
                 Some(Adjoint::Array(all))
             }
-            DistSpec::Family { builtin, .. } => {
-                density::by_matrix(&Args { builtin: self.code.builtins.get(*builtin), values: &values }, dist, &by)
-            }
+            DistSpec::Family { builtin, .. } => density::by_matrix(
+                &Args { builtin: self.code.builtins.get(*builtin), values: &values },
+                dist,
+                &by,
+            ),
         };
         let Some(by) = by else { return Err(self.no_matrix(n, dist)) };
         self.give_node(source, by);
         Ok(())
     }
 
-    /// The adjoints of the arguments of a distribution that is a value: its parameters, and behind them the factor of its
-    /// covariance. `wanted` says whether an argument leads anywhere.
+    /// The adjoints of the arguments of a distribution that is a value: its parameters,
+    /// and behind them the factor of its covariance. `wanted` says whether an argument
+    /// leads anywhere.
     pub(super) fn by_distribution(
         &self,
         n: NodeId,
@@ -164,13 +175,16 @@ impl Reverse<'_> {
         wanted: impl Fn(usize) -> bool,
     ) -> Result<SmallVec<[Adjoint; 4]>, Failure> {
         let all = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
-        let Some(i) = density::matrix(dist, a.values) else { return Ok(density::by_arguments(a, dist, &all)) };
+        let Some(i) = density::matrix(dist, a.values) else {
+            return Ok(density::by_arguments(a, dist, &all));
+        };
         let (params, factor) = all.split_at(dist.param_count().min(all.len()));
         let mut pulled = density::by_arguments(a, dist, params);
         if let Some(p) = pulled.get_mut(i) {
             *p = match factor {
                 _ if !wanted(i) => Adjoint::Zero,
-                // Within a distribution of several, such as `iid`, which hands out parameters only.
+                // Within a distribution of several, such as `iid`, which hands out
+                // parameters only.
                 [] => Adjoint::Unknown,
                 _ => density::by_matrix(a, dist, factor).ok_or_else(|| self.no_matrix(n, dist))?,
             };

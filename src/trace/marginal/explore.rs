@@ -1,9 +1,11 @@
-//! Finding what choices reach: which of them share a score and which scores those are, at one place of the rest.
+//! Finding what choices reach: which of them share a score and which scores those are, at
+//! one place of the rest.
 //!
-//! A partition of the choices is right if no score reads choices of two groups, in any joint state. To know that, it is
-//! enough to look at every joint value of each group once, whatever the other groups are at: a score that reads only its
-//! group there takes the same course under all values of the others ([`super::reads`]). A look at which a score reads two
-//! groups makes them one, and all is looked at again.
+//! A partition of the choices is right if no score reads choices of two groups, in any
+//! joint state. To know that, it is enough to look at every joint value of each group
+//! once, whatever the other groups are at: a score that reads only its group there takes
+//! the same course under all values of the others ([`super::reads`]). A look at which a
+//! score reads two groups makes them one, and all is looked at again.
 
 use super::partition::Partition;
 use super::reads::{Found, Label, Reader};
@@ -23,7 +25,8 @@ pub(crate) enum Explored {
     Sums(Sums),
     /// These changes make choices appear or vanish.
     Structure(Vec<(Target, Change)>),
-    /// The program has no value here whatever the choices are, there are choices that it never asks for, or they have other values.
+    /// The program has no value here whatever the choices are, there are choices that it
+    /// never asks for, or they have other values.
     Nowhere,
 }
 
@@ -43,7 +46,8 @@ impl Asked {
         }
     }
 
-    /// Whether all of these are asked for by scores, or by choices that are, in some look each.
+    /// Whether all of these are asked for by scores, or by choices that are, in some look
+    /// each.
     fn has_all(&self, choices: &[Target]) -> bool {
         let mut all = self.by_scores.clone();
         let mut open: Vec<NodeId> = all.iter().copied().collect();
@@ -68,7 +72,8 @@ struct Table {
 
 impl Table {
     fn new(m: &Marginal, partition: &Partition) -> Result<Table, usize> {
-        let mut t = Table { groups: vec![], group_of: vec![], next: vec![], fine: vec![], looks: vec![] };
+        let mut t =
+            Table { groups: vec![], group_of: vec![], next: vec![], fine: vec![], looks: vec![] };
         let mut places = FxHashMap::default();
         for (i, values) in m.values.iter().enumerate() {
             let place = *places.entry(partition.root(i as u32)).or_insert_with(|| {
@@ -88,7 +93,8 @@ impl Table {
         Ok(t)
     }
 
-    /// A value for each group, of which at least one has not been looked at; `None` if all have.
+    /// A value for each group, of which at least one has not been looked at; `None` if
+    /// all have.
     fn next(&self) -> Option<Vec<usize>> {
         let open = |i: &usize| self.next[*i] < self.groups[*i].values;
         let value = |i: usize| if open(&i) { self.next[i] } else { self.fine[i].unwrap_or(0) };
@@ -110,7 +116,8 @@ impl Table {
 
     /// A group cannot have its value of a look; false if it can have none.
     fn leave_out(&mut self, group: usize, look: &[usize]) -> bool {
-        // One that the program had a value for under others is an evaluation that the partition does not cover.
+        // One that the program had a value for under others is an evaluation that the
+        // partition does not cover.
         let open = self.next[group] == look[group];
         self.next[group] += usize::from(open);
         open && (self.next[group] < self.groups[group].values || self.fine[group].is_some())
@@ -118,12 +125,14 @@ impl Table {
 }
 
 impl Trace {
-    /// Looks at the joint values of choices at a place, which these changes lead to; `strict` if there may be choices that nothing asks
-    /// for. A proposal may be pending afterwards.
+    /// Looks at the joint values of choices at a place, which these changes lead to;
+    /// `strict` if there may be choices that nothing asks for. A proposal may be pending
+    /// afterwards.
     ///
     /// # Errors
-    /// If one of them is not finite there, if the choices that there are depend on one in a way that cannot be undone, or if too many
-    /// depend on each other; those of the program.
+    /// If one of them is not finite there, if the choices that there are depend on one in
+    /// a way that cannot be undone, or if too many depend on each other; those of the
+    /// program.
     pub(crate) fn explore(
         &mut self,
         at: &[(Target, Change)],
@@ -156,7 +165,8 @@ impl Trace {
                     Err(label) if label.site == NONE => return Ok(Explored::Nowhere),
                     Err(label) => {
                         found.structure_moves = true;
-                        if m.partition.joins() == joins && !table.leave_out(table.group_of[label.site as usize], &look)
+                        if m.partition.joins() == joins
+                            && !table.leave_out(table.group_of[label.site as usize], &look)
                         {
                             return Ok(Explored::Nowhere);
                         }
@@ -170,7 +180,9 @@ impl Trace {
                 match self.moved_support(m) {
                     Some(_) if !at.is_empty() => return Ok(Explored::Nowhere),
                     Some(t) => {
-                        return Err(self.cannot_sum(t, "its possible values depend on other choices"));
+                        return Err(
+                            self.cannot_sum(t, "its possible values depend on other choices")
+                        );
                     }
                     None => {}
                 }
@@ -195,12 +207,17 @@ impl Trace {
             }
             if m.partition.joins() == joins {
                 let all = !strict || asked.has_all(self.all_targets());
-                return Ok(if all { Explored::Sums(table.into_sums(found)) } else { Explored::Nowhere });
+                return Ok(if all {
+                    Explored::Sums(table.into_sums(found))
+                } else {
+                    Explored::Nowhere
+                });
             }
         }
     }
 
-    /// Proposes changes; where the program has no value, what the evaluation that failed depends on.
+    /// Proposes changes; where the program has no value, what the evaluation that failed
+    /// depends on.
     fn attempt(
         &mut self,
         changes: &[(Target, Change)],
@@ -216,7 +233,8 @@ impl Trace {
             Err(e) if e.is_recoverable() => {
                 let failed = std::mem::take(&mut self.graph.failed);
                 let new = failed.last().filter(|n| self.is_improper_draw(**n)).copied();
-                let label = Reader::new(&self.graph, &self.code, own, &mut m.partition).read_failed(&failed);
+                let label = Reader::new(&self.graph, &self.code, own, &mut m.partition)
+                    .read_failed(&failed);
                 self.graph.rollback(&self.code, before);
                 match new {
                     Some(node) => Err(self.cannot_sum(
@@ -226,7 +244,8 @@ impl Trace {
                     None => Ok(Err(label)),
                 }
             }
-            // A choice that stays, in a frame that goes, and the same choice in the frame that comes instead.
+            // A choice that stays, in a frame that goes, and the same choice in the frame
+            // that comes instead.
             Err(e) if e.kind == FaultKind::Duplicate => {
                 let refused = self.check_held(m.sites[0]).err();
                 self.graph.rollback(&self.code, before);
@@ -246,7 +265,8 @@ impl Trace {
         let g = &self.graph;
         let stays = |f: &FrameId| {
             let frame = &g.frames[*f as usize];
-            let mut nodes = frame.base..frame.base + self.code.blocks[frame.block as usize].len() as u32;
+            let mut nodes =
+                frame.base..frame.base + self.code.blocks[frame.block as usize].len() as u32;
             nodes.any(|n| g.nodes[n as usize].refs > 0)
         };
         match g.detached.iter().any(stays) {
@@ -259,7 +279,13 @@ impl Trace {
 impl Table {
     fn into_sums(self, found: Found) -> Sums {
         let Found { structure_moves, values_move, .. } = found;
-        let mut sums = Sums { groups: self.groups, looks: self.looks, structure_moves, values_move, ..Sums::default() };
+        let mut sums = Sums {
+            groups: self.groups,
+            looks: self.looks,
+            structure_moves,
+            values_move,
+            ..Sums::default()
+        };
         for (n, site) in found.scores {
             let group = self.group_of[site as usize];
             if sums.reached.insert(n, group).is_none() {

@@ -1,4 +1,5 @@
-//! Choices that stay although nothing may ask for them: the components of a mixture that no label points at now.
+//! Choices that stay although nothing may ask for them: the components of a mixture that
+//! no label points at now.
 
 use super::Marginal;
 use super::explore::Explored;
@@ -25,8 +26,9 @@ pub(crate) struct Held {
 }
 
 impl Trace {
-    /// Finds what the choices of a selection reach, for a kernel that moves those of another. Choices that only other values
-    /// of the first ones ask for are drawn from their prior given the rest and stay, as do those that there are, until
+    /// Finds what the choices of a selection reach, for a kernel that moves those of
+    /// another. Choices that only other values of the first ones ask for are drawn from
+    /// their prior given the rest and stay, as do those that there are, until
     /// [`Trace::let_go`]; they may be in the selections too.
     ///
     /// # Errors
@@ -85,7 +87,10 @@ impl Trace {
                 }
                 Explored::Structure(changes) => {
                     if drawn || self.propose(&changes, draws)?.appeared == 0 {
-                        return Err(self.cannot_sum(m.sites[0], "other choices are created or removed with it"));
+                        return Err(self.cannot_sum(
+                            m.sites[0],
+                            "other choices are created or removed with it",
+                        ));
                     }
                     self.commit();
                     self.hold_all(held)?;
@@ -96,7 +101,8 @@ impl Trace {
         Ok(m)
     }
 
-    /// Goes back to the choices as they were, and draws from their prior there those that came up elsewhere.
+    /// Goes back to the choices as they were, and draws from their prior there those that
+    /// came up elsewhere.
     fn draw_others(
         &mut self,
         site: Target,
@@ -107,7 +113,8 @@ impl Trace {
         let others = self.all_targets().iter().filter(|t| !there.contains(&t.node));
         let mut changes = original.to_vec();
         changes.extend(others.map(|t| (*t, Change::Resample)));
-        // The same stream: where the priors are the same, so is what is drawn, and what is asked for because of it.
+        // The same stream: where the priors are the same, so is what is drawn, and what
+        // is asked for because of it.
         let w = self.propose(&changes, draws)?;
         if w.appeared + w.vanished > 0 {
             return Err(self.cannot_sum(site, BY_CHANCE));
@@ -118,11 +125,18 @@ impl Trace {
 
     /// Enters the choices that there are now.
     fn take_up(&self, m: &mut Marginal, sites: Selection, moving: Selection) -> TraceResult<()> {
-        let not = |t: &Target| self.cannot_sum(*t, "it is not a discrete choice with finitely many values");
+        let not = |t: &Target| {
+            self.cannot_sum(*t, "it is not a discrete choice with finitely many values")
+        };
         let known: FxHashSet<Target> = m.sites.iter().copied().collect();
         for t in self.targets(sites).iter().filter(|t| !known.contains(t)) {
-            let support = self.dist(*t).map(|d| d.stored_support()).filter(Support::is_finite).ok_or_else(|| not(t))?;
-            let values: Vec<Datum> = support.finite_values().filter(|v| !v.is_empty()).ok_or_else(|| not(t))?;
+            let support = self
+                .dist(*t)
+                .map(|d| d.stored_support())
+                .filter(Support::is_finite)
+                .ok_or_else(|| not(t))?;
+            let values: Vec<Datum> =
+                support.finite_values().filter(|v| !v.is_empty()).ok_or_else(|| not(t))?;
             m.sites.push(*t);
             m.values.push(values);
             m.supports.push(support);
@@ -164,11 +178,13 @@ impl Trace {
         }
     }
 
-    /// Holds the loops and the entries of functions with `mem` that a choice is in, as who reads it or calls them does.
+    /// Holds the loops and the entries of functions with `mem` that a choice is in, as
+    /// who reads it or calls them does.
     fn hold_frames(&mut self, n: NodeId, held: &mut Held) {
         let mut f = self.graph.nodes[n as usize].frame;
         while self.graph.frames[f as usize].owner != NONE {
-            let (owner, key) = (self.graph.frames[f as usize].owner, self.graph.frames[f as usize].key.clone());
+            let (owner, key) =
+                (self.graph.frames[f as usize].owner, self.graph.frames[f as usize].key.clone());
             if let Some(Side::Memo(m)) = self.graph.nodes[owner as usize].side.as_deref_mut()
                 && let Some(key) = key
                 && let Some(entry) = m.entries.get_mut(&key)

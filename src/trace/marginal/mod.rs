@@ -1,9 +1,11 @@
-//! Finite choices that are summed out: which scores each of them reaches, and the parts of the log joint that follow.
+//! Finite choices that are summed out: which scores each of them reaches, and the parts
+//! of the log joint that follow.
 //!
-//! Choices that no score has in common are summed one by one; those that share one are a group, whose joint values are
-//! enumerated. The log joint is then a base plus one term for each group, so that the log of its sum over all joint values
-//! of all choices is the base plus, for each group, a log-sum-exp over the values of that group alone. Not here: what the
-//! sums are for.
+//! Choices that no score has in common are summed one by one; those that share one are a
+//! group, whose joint values are enumerated. The log joint is then a base plus one term
+//! for each group, so that the log of its sum over all joint values of all choices is the
+//! base plus, for each group, a log-sum-exp over the values of that group alone. Not
+//! here: what the sums are for.
 
 mod explore;
 mod hold;
@@ -46,7 +48,8 @@ pub(crate) struct Sums {
     /// By score, or by the node that observations and factors are below: its group.
     reached: FxHashMap<NodeId, usize>,
     owners: FxHashMap<NodeId, usize>,
-    /// Whether this holds for the place alone, since what is read depends on choices that the kernel moves.
+    /// Whether this holds for the place alone, since what is read depends on choices that
+    /// the kernel moves.
     pub structure_moves: bool,
     /// Whether the distributions of the choices depend on choices that the kernel moves.
     values_move: bool,
@@ -60,12 +63,14 @@ struct Group {
     owners: Vec<NodeId>,
     /// How many joint values they have.
     values: usize,
-    /// By joint value: the look in which it is seen first; `None` if the program has no value there.
+    /// By joint value: the look in which it is seen first; `None` if the program has no
+    /// value there.
     seen: Vec<Option<usize>>,
 }
 
 impl Marginal {
-    /// The changes that put each group at a joint value, given by its number, appended to a list.
+    /// The changes that put each group at a joint value, given by its number, appended to
+    /// a list.
     fn put(&self, groups: &[Group], values: &[usize], out: &mut Vec<(Target, Change)>) {
         for (g, value) in groups.iter().zip(values) {
             let mut rest = *value;
@@ -91,10 +96,12 @@ impl Sums {
 }
 
 impl Trace {
-    /// Whether what is read, and so which choices there are, depends on choices of a kind, as far as this state shows.
+    /// Whether what is read, and so which choices there are, depends on choices of a
+    /// kind, as far as this state shows.
     pub(crate) fn structure_depends_on(&self, kind: ChoiceKind) -> bool {
         let selector = Selector::Kind(kind);
-        let moving = self.all_targets().iter().filter(|t| self.graph.selects(&self.code, &selector, t));
+        let moving =
+            self.all_targets().iter().filter(|t| self.graph.selects(&self.code, &selector, t));
         let own = moving.map(|t| (t.node, Label { site: NONE, moves: true })).collect();
         let mut partition = Partition::default();
         partition.grow(1);
@@ -120,19 +127,22 @@ impl Trace {
         found
     }
 
-    /// Whether the choices have the values in the present state that they have elsewhere, also in that of a pending proposal.
+    /// Whether the choices have the values in the present state that they have elsewhere,
+    /// also in that of a pending proposal.
     pub(crate) fn has_same_values(&self, m: &Marginal) -> bool {
         !m.sums.values_move || self.moved_support(m).is_none()
     }
 
     /// The first choice whose values are others in the present state.
     fn moved_support(&self, m: &Marginal) -> Option<Target> {
-        let moved = |(t, s): &(&Target, &Support)| self.dist(**t).is_none_or(|d| d.stored_support() != **s);
+        let moved =
+            |(t, s): &(&Target, &Support)| self.dist(**t).is_none_or(|d| d.stored_support() != **s);
         m.sites.iter().zip(&m.supports).find(moved).map(|(t, _)| *t)
     }
 
-    /// The parts of the log prior plus `power` times the log likelihood in the present state, also that of a pending proposal:
-    /// the base, and in `terms` what each group reaches.
+    /// The parts of the log prior plus `power` times the log likelihood in the present
+    /// state, also that of a pending proposal: the base, and in `terms` what each group
+    /// reaches.
     pub(crate) fn parts(&self, sums: &Sums, power: f64, terms: &mut Vec<f64>) -> f64 {
         let tempered = |prior: &ExactSum, likelihood: &ExactSum| {
             prior.value() + if power == 0.0 { 0.0 } else { power * likelihood.value() }
@@ -179,7 +189,9 @@ impl Trace {
             };
             match self.graph.nodes[n as usize].side.as_deref() {
                 Some(Side::Child(c)) => frame(c.frame),
-                Some(Side::Loop(l)) => l.frames.iter().filter(|f| **f != NONE).for_each(|f| frame(*f)),
+                Some(Side::Loop(l)) => {
+                    l.frames.iter().filter(|f| **f != NONE).for_each(|f| frame(*f))
+                }
                 Some(Side::Memo(m)) => m.entries.values().for_each(|(f, _)| frame(*f)),
                 _ => {}
             }

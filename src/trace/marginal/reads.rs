@@ -1,9 +1,11 @@
 //! What scores read of some choices, in one state, also in that of a pending proposal.
 //!
-//! An evaluation takes its course by what it reads: where that stays, so do its course and its value, whatever the rest of
-//! the trace is. So two choices are independent given the rest if no score reads both of them, in any state that they may
-//! be in. What a score reads is found by following operands from it, never by looking for changes: a value that comes out
-//! the same for two values of a choice says nothing about a third one.
+//! An evaluation takes its course by what it reads: where that stays, so do its course
+//! and its value, whatever the rest of the trace is. So two choices are independent given
+//! the rest if no score reads both of them, in any state that they may be in. What a
+//! score reads is found by following operands from it, never by looking for changes: a
+//! value that comes out the same for two values of a choice says nothing about a third
+//! one.
 
 use super::partition::Partition;
 use crate::lang::code::{Callee, Code, Op, Operand};
@@ -17,7 +19,8 @@ type Inputs = SmallVec<[NodeId; 8]>;
 /// What a value depends on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Label {
-    /// One of the choices that are summed out, which stands for its group; [`NONE`] if there is none.
+    /// One of the choices that are summed out, which stands for its group; [`NONE`] if
+    /// there is none.
     pub site: u32,
     /// Whether it depends on a choice that the kernel moves.
     pub moves: bool,
@@ -38,16 +41,18 @@ enum Seen {
 pub(super) struct Found {
     /// Scores that depend on a choice: the node, and one choice of the group.
     pub scores: Vec<(NodeId, u32)>,
-    /// Nodes whose observations and factors come and go with a choice, or have other places in each state and depend on one: the
-    /// choice.
+    /// Nodes whose observations and factors come and go with a choice, or have other
+    /// places in each state and depend on one: the choice.
     pub owners: FxHashMap<NodeId, u32>,
     /// The choices that observations and factors ask for.
     pub asked: Vec<NodeId>,
     /// Whether what is read depends on choices that the kernel moves.
     pub structure_moves: bool,
-    /// Whether the distributions of choices that are summed out depend on choices that the kernel moves.
+    /// Whether the distributions of choices that are summed out depend on choices that
+    /// the kernel moves.
     pub values_move: bool,
-    /// Whether observations are made in a function with `mem`: any choice may decide about those.
+    /// Whether observations are made in a function with `mem`: any choice may decide
+    /// about those.
     pub anywhere: bool,
     /// Whether observations come and go in a way that is not followed.
     pub unclear: bool,
@@ -84,10 +89,13 @@ impl<'a> Reader<'a> {
         Reader { graph, code, own, partition, seen, labels, found: Found::default() }
     }
 
-    /// Follows every score; choices that are read by one of them are in one group from then on. `choices` are those of the trace.
+    /// Follows every score; choices that are read by one of them are in one group from
+    /// then on. `choices` are those of the trace.
     pub fn read_all(&mut self, choices: impl Iterator<Item = NodeId>) {
         for n in 0..self.graph.nodes.len() as NodeId {
-            if self.graph.nodes[n as usize].state == State::Clean && self.graph.slot_facts(self.code, n).is_effect {
+            if self.graph.nodes[n as usize].state == State::Clean
+                && self.graph.slot_facts(self.code, n).is_effect
+            {
                 self.read_effect(n);
             }
         }
@@ -129,11 +137,13 @@ impl<'a> Reader<'a> {
         label
     }
 
-    /// Follows what runs although nothing asks for it: an observation, a factor, or what they are in.
+    /// Follows what runs although nothing asks for it: an observation, a factor, or what
+    /// they are in.
     fn read_effect(&mut self, n: NodeId) {
         let read = self.visit(n);
         let (placed, owner) = self.placed(n);
-        let is_score = matches!(self.graph.op(self.code, n), Op::Observe { .. } | Op::Factor { .. });
+        let is_score =
+            matches!(self.graph.op(self.code, n), Op::Observe { .. } | Op::Factor { .. });
         let own = if is_score { read } else { self.decided(n) };
         let label = self.join(own, placed);
         match owner {
@@ -156,7 +166,8 @@ impl<'a> Reader<'a> {
         if self.seen[root as usize] != Seen::Not {
             return self.labels[root as usize];
         }
-        let mut stack: Vec<(NodeId, Inputs, usize, Label)> = vec![(root, self.inputs(root), 0, NOTHING)];
+        let mut stack: Vec<(NodeId, Inputs, usize, Label)> =
+            vec![(root, self.inputs(root), 0, NOTHING)];
         self.seen[root as usize] = Seen::Open;
         while let Some((n, inputs, next, label)) = stack.last_mut() {
             if let Some(input) = inputs.get(*next).copied() {
@@ -198,7 +209,8 @@ impl<'a> Reader<'a> {
         if score.site != NONE {
             self.found.scores.push((n, score.site));
         }
-        // A choice keeps its value whatever its distribution becomes, but for white noise, which is seen through it.
+        // A choice keeps its value whatever its distribution becomes, but for white
+        // noise, which is seen through it.
         if self.graph.is_whitened(n) { score } else { own }
     }
 
@@ -234,15 +246,17 @@ impl<'a> Reader<'a> {
         label
     }
 
-    /// What decides that a node is there, and the outermost node around it that a choice decides about, also one that moves:
-    /// frames that are made for a proposal have other nodes in each.
+    /// What decides that a node is there, and the outermost node around it that a choice
+    /// decides about, also one that moves: frames that are made for a proposal have other
+    /// nodes in each.
     fn placed(&mut self, n: NodeId) -> (Label, Option<NodeId>) {
         let (mut label, mut outermost, mut in_memo) = (NOTHING, None, false);
         let mut owner = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
         while owner != NONE {
             let mut decided = self.decided(owner);
             if matches!(self.graph.op(self.code, owner), Op::Mem { .. }) {
-                // Its entries are there for calls that may be anywhere: every choice may decide.
+                // Its entries are there for calls that may be anywhere: every choice may
+                // decide.
                 self.found.anywhere = true;
                 decided.site = 0;
             }
@@ -260,7 +274,8 @@ impl<'a> Reader<'a> {
 }
 
 impl Graph {
-    /// The nodes whose values decide which other nodes a node reads, and which frames it has.
+    /// The nodes whose values decide which other nodes a node reads, and which frames it
+    /// has.
     pub(in crate::trace) fn deciders(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId)) {
         let node = &self.nodes[n as usize];
         let mut operand = |o: &Operand| {
@@ -271,7 +286,9 @@ impl Graph {
         match self.op(code, n) {
             Op::If { cond, .. } | Op::Select { cond, .. } => operand(cond),
             Op::For { iter, .. } => operand(iter),
-            Op::Map { f, over, .. } | Op::Fold { f, over, .. } => [f, over].into_iter().for_each(operand),
+            Op::Map { f, over, .. } | Op::Fold { f, over, .. } => {
+                [f, over].into_iter().for_each(operand)
+            }
             Op::Mem { f, .. } => operand(f),
             Op::Draw { keys, .. } => keys.iter().for_each(operand),
             // The elements of arrays are not nodes, those of containers are.

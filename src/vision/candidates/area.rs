@@ -18,7 +18,8 @@ pub struct Area {
 impl Area {
     /// Of pixels row by row; none if all are off.
     pub fn new(width: usize, height: usize, on: Vec<bool>) -> Option<Area> {
-        let word = |bits: &[bool]| bits.iter().rev().fold(0u64, |word, on| word << 1 | u64::from(*on));
+        let word =
+            |bits: &[bool]| bits.iter().rev().fold(0u64, |word, on| word << 1 | u64::from(*on));
         let words: Vec<u64> = on.chunks(64).map(word).collect();
         let count = words.iter().map(|w| w.count_ones() as usize).sum();
         let mut bounds = [width, height, 0, 0];
@@ -30,7 +31,8 @@ impl Area {
         (count > 0).then_some(Area { width, height, on, count, bounds, words })
     }
 
-    /// Whether intersection over union with another set of the same picture is above a threshold.
+    /// Whether intersection over union with another set of the same picture is above a
+    /// threshold.
     pub fn overlaps(&self, other: &Area, threshold: f64) -> bool {
         // It cannot be above the ratio of the sizes.
         let (less, more) = (self.count.min(other.count), self.count.max(other.count));
@@ -50,7 +52,11 @@ impl Area {
 
     /// The pixels of both together.
     pub fn union(&self, other: &Area) -> Option<Area> {
-        Area::new(self.width, self.height, self.on.iter().zip(&other.on).map(|(a, b)| a | b).collect())
+        Area::new(
+            self.width,
+            self.height,
+            self.on.iter().zip(&other.on).map(|(a, b)| a | b).collect(),
+        )
     }
 
     /// Columns and rows of the pixels that are on, in raster order.
@@ -66,8 +72,8 @@ impl Area {
         inside && self.on[y as usize * self.width + x as usize]
     }
 
-    /// The pixels with one of the four neighbours off or beyond the picture, and how many are at
-    /// the picture's frame.
+    /// The pixels with one of the four neighbours off or beyond the picture, and how many
+    /// are at the picture's frame.
     pub fn outline(&self) -> (Vec<usize>, usize) {
         let (w, h) = (self.width, self.height);
         let (mut outline, mut framed) = (Vec::new(), 0);
@@ -83,7 +89,8 @@ impl Area {
         (outline, framed)
     }
 
-    /// With holes filled: what is off and does not hang together (4 neighbours) with the outside.
+    /// With holes filled: what is off and does not hang together (4 neighbours) with the
+    /// outside.
     pub fn filled(self) -> Area {
         let [x0, y0, x1, y1] = self.bounds;
         let (w, h) = (x1 - x0, y1 - y0);
@@ -91,7 +98,9 @@ impl Area {
         let off: Vec<bool> = (0..w * h).map(|p| !self.on[whole(p)]).collect();
         let mut outside = vec![false; off.len()];
         let mut stack: Vec<usize> = (0..off.len())
-            .filter(|p| off[*p] && (p.is_multiple_of(w) || p % w + 1 == w || *p < w || p / w + 1 == h))
+            .filter(|p| {
+                off[*p] && (p.is_multiple_of(w) || p % w + 1 == w || *p < w || p / w + 1 == h)
+            })
             .collect();
         stack.iter().for_each(|p| outside[*p] = true);
         while let Some(p) = stack.pop() {
@@ -142,11 +151,16 @@ fn spread(line: impl ExactSizeIterator<Item = bool>, by: usize, mut mark: impl F
 /// The four neighbours of a pixel of a picture of some width and height.
 pub fn neighbours(w: usize, h: usize, p: usize) -> [Option<usize>; 4] {
     let (i, j) = (p % w, p / w);
-    [(i > 0).then(|| p - 1), (i + 1 < w).then(|| p + 1), (j > 0).then(|| p - w), (j + 1 < h).then(|| p + w)]
+    [
+        (i > 0).then(|| p - 1),
+        (i + 1 < w).then(|| p + 1),
+        (j > 0).then(|| p - w),
+        (j + 1 < h).then(|| p + w),
+    ]
 }
 
-/// The number of its component for every pixel, and the components' sizes: pixels of the same label
-/// that hang together.
+/// The number of its component for every pixel, and the components' sizes: pixels of the
+/// same label that hang together.
 pub fn components(w: usize, h: usize, label: impl Fn(usize) -> u32) -> (Vec<u32>, Vec<usize>) {
     let mut of = vec![u32::MAX; w * h];
     let mut sizes = Vec::new();

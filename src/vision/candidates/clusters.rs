@@ -1,5 +1,5 @@
-//! Clusters of pixels by k-means, from a deterministic start: the clusters' components are regions,
-//! and a codebook gives every pixel a letter for histograms.
+//! Clusters of pixels by k-means, from a deterministic start: the clusters' components
+//! are regions, and a codebook gives every pixel a letter for histograms.
 
 use super::area::{Area, components};
 use super::picture::Picture;
@@ -11,8 +11,8 @@ type Point = [f32; COORDINATES];
 
 /// The most clusters that regions are made from.
 const MOST: usize = 12;
-/// Weights of position (along the longer side of the picture, in units of L*) and of the local
-/// deviation.
+/// Weights of position (along the longer side of the picture, in units of L*) and of the
+/// local deviation.
 const WEIGHTS: [[f32; 2]; 4] = [[0.0, 0.0], [0.0, 1.0], [40.0, 0.5], [80.0, 1.0]];
 /// How many letters a codebook has at most.
 pub const LETTERS: usize = 48;
@@ -71,7 +71,8 @@ impl Points {
     }
 }
 
-/// The pixels' coordinates with some weights: all, and some on a grid that clusters are found on.
+/// The pixels' coordinates with some weights: all, and some on a grid that clusters are
+/// found on.
 fn points(picture: &Picture, [place, texture]: [f32; 2]) -> (Points, Points) {
     let (w, h) = (picture.width, picture.height);
     let unit = place / w.max(h) as f32;
@@ -104,8 +105,8 @@ impl Moments {
     }
 }
 
-/// Clusters that grow in number: the one with the greatest spread is cut in two along its widest
-/// coordinate.
+/// Clusters that grow in number: the one with the greatest spread is cut in two along its
+/// widest coordinate.
 struct Means {
     points: Points,
     labels: Vec<u32>,
@@ -133,8 +134,8 @@ impl Means {
         all
     }
 
-    /// Moves centres to the means of their points, and points to their nearest centres. A centre
-    /// without points stays.
+    /// Moves centres to the means of their points, and points to their nearest centres. A
+    /// centre without points stays.
     fn round(&mut self) {
         let all = self.moments();
         let pairs = self.centres.iter_mut().zip(&all).filter(|(_, m)| m.count > 0.0);
@@ -146,7 +147,8 @@ impl Means {
     fn split(&mut self) -> bool {
         let all = self.moments();
         let spread = |k: usize| (0..COORDINATES).map(|c| all[k].spread(c)).sum::<f64>();
-        let widest = (0..all.len()).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
+        let widest =
+            (0..all.len()).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
         let cluster = all[widest];
         let wider = |best, c| if cluster.spread(c) > cluster.spread(best) { c } else { best };
         let axis = (0..COORDINATES).fold(0, wider);
@@ -160,7 +162,10 @@ impl Means {
         low[axis] -= step;
         high[axis] += step;
         let new = self.centres.len() as u32;
-        for i in (0..self.points.count).filter(|i| self.labels[*i] as usize == widest).collect::<Vec<_>>() {
+        for i in (0..self.points.count)
+            .filter(|i| self.labels[*i] as usize == widest)
+            .collect::<Vec<_>>()
+        {
             if self.points.lists[axis][i] > middle[axis] {
                 self.labels[i] = new;
             }

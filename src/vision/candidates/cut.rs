@@ -1,8 +1,8 @@
-//! Cutting an object out around a seed, as GrabCut does (Rother et al. 2004, ACM Trans. Graphics
-//! 23, 309-314): colours of the object and of what is around it are learned from the last mask, and
-//! a field of pixels, alike where their colours are, decides the next one. The field is not cut
-//! exactly but by mean field (Kraehenbuehl & Koltun 2011, NIPS), here with four neighbours: a fifth
-//! of the time.
+//! Cutting an object out around a seed, as GrabCut does (Rother et al. 2004, ACM Trans.
+//! Graphics 23, 309-314): colours of the object and of what is around it are learned from
+//! the last mask, and a field of pixels, alike where their colours are, decides the next
+//! one. The field is not cut exactly but by mean field (Kraehenbuehl & Koltun 2011,
+//! NIPS), here with four neighbours: a fifth of the time.
 
 use super::area::{Area, largest};
 use super::clusters::LETTERS;
@@ -18,7 +18,8 @@ const LAMBDA: f32 = 0.8;
 /// The most that a pixel's colour may say either way, in logarithms.
 const CLIP: f32 = 3.0;
 
-/// What the cuts of a picture share: the letters of its pixels, and how alike neighbours are.
+/// What the cuts of a picture share: the letters of its pixels, and how alike neighbours
+/// are.
 pub struct Field {
     width: usize,
     height: usize,
@@ -35,11 +36,15 @@ impl Field {
         let (w, h) = (picture.width, picture.height);
         let squared = |p: usize, q: usize| {
             let (a, b) = (picture.lab[p], picture.lab[q]);
-            (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2])
+            (a[0] - b[0]) * (a[0] - b[0])
+                + (a[1] - b[1]) * (a[1] - b[1])
+                + (a[2] - b[2]) * (a[2] - b[2])
         };
         // A pixel is unlike anything beyond the frame.
         let n = w * h;
-        let side = |p: usize| if !p.is_multiple_of(w) && p < n { squared(p, p - 1) } else { f32::INFINITY };
+        let side = |p: usize| {
+            if !p.is_multiple_of(w) && p < n { squared(p, p - 1) } else { f32::INFINITY }
+        };
         let over = |p: usize| if p >= w && p < n { squared(p, p - w) } else { f32::INFINITY };
         let mut left: Vec<f32> = (0..w * h + 1).map(side).collect();
         let mut above: Vec<f32> = (0..w * h + w).map(over).collect();
@@ -64,8 +69,8 @@ impl Field {
         Some(largest(self.width, self.height, &mask)?.filled())
     }
 
-    /// How much more often a letter is on the object than beside it, in logarithms; none if one of
-    /// the two is empty.
+    /// How much more often a letter is on the object than beside it, in logarithms; none
+    /// if one of the two is empty.
     fn gains(&self, window: &[bool], mask: &[bool]) -> Option<[f32; LETTERS]> {
         let mut counts = [[0u32; LETTERS]; 2];
         for (p, _) in window.iter().enumerate().filter(|(_, inside)| **inside) {
@@ -83,14 +88,22 @@ impl Field {
         Some(std::array::from_fn(|l| libm::logf(part(1, l) / part(0, l)).clamp(-CLIP, CLIP)))
     }
 
-    /// How much each pixel of the window is believed to be the object, from the last mask. Pixels
-    /// with an even and with an odd sum of column and row take turns: no two neighbours change at
-    /// once, so it settles.
-    fn mean_field(&self, window: &[bool], gain: &[f32; LETTERS], mask: &[bool], belief: &mut [f32]) {
+    /// How much each pixel of the window is believed to be the object, from the last
+    /// mask. Pixels with an even and with an odd sum of column and row take turns: no two
+    /// neighbours change at once, so it settles.
+    fn mean_field(
+        &self,
+        window: &[bool],
+        gain: &[f32; LETTERS],
+        mask: &[bool],
+        belief: &mut [f32],
+    ) {
         let (w, h) = (self.width, self.height);
         belief.iter_mut().zip(mask).for_each(|(b, m)| *b = f32::from(u8::from(*m)));
         let odd = |p: usize| (p % w + p / w) % 2;
-        let side = |s: usize| -> Vec<usize> { (0..w * h).filter(|p| window[*p] && odd(*p) == s).collect() };
+        let side = |s: usize| -> Vec<usize> {
+            (0..w * h).filter(|p| window[*p] && odd(*p) == s).collect()
+        };
         let sides = [side(0), side(1)];
         for _ in 0..SWEEPS {
             let mut most = 0.0f32;

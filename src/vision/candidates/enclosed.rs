@@ -10,13 +10,15 @@ use crate::vision::gradient::Gradient;
 
 /// How far points reach along their contour, so that gaps between them close, pixels.
 const REACH: f32 = 0.75;
-/// Gaps of up to twice so many pixels are closed: where a contour is hidden by a hair, some of it is missing.
+/// Gaps of up to twice so many pixels are closed: where a contour is hidden by a hair,
+/// some of it is missing.
 const GAPS: [usize; 5] = [0, 1, 3, 6, 12];
 /// What is mostly lines encloses nothing.
 const LINES: f64 = 0.8;
 
-/// The regions that contours enclose, the largest and most symmetric first. Contours that do not
-/// close, such as those of an object that is cut off by the frame, enclose nothing.
+/// The regions that contours enclose, the largest and most symmetric first. Contours that
+/// do not close, such as those of an object that is cut off by the frame, enclose
+/// nothing.
 pub fn enclosed(map: &ContourMap, options: &CandidateOptions) -> Vec<Candidate> {
     let longer = map.width.max(map.height);
     if map.is_empty() || longer == 0 {
@@ -39,7 +41,8 @@ pub fn enclosed(map: &ContourMap, options: &CandidateOptions) -> Vec<Candidate> 
     suppressed(regions, OVERLAP, options.most).into_iter().filter_map(candidate).collect()
 }
 
-/// What lines enclose that are made wider by some pixels, less what they were made wider by: regions of at least so many pixels.
+/// What lines enclose that are made wider by some pixels, less what they were made wider
+/// by: regions of at least so many pixels.
 fn closed(w: usize, h: usize, lines: &[bool], by: usize, least: usize) -> Vec<Area> {
     let Some(wide) = Area::new(w, h, lines.to_vec()) else { return Vec::new() };
     let Some(wide) = Area::new(w, h, wide.dilated(by)).map(Area::filled) else { return Vec::new() };

@@ -1,9 +1,10 @@
-//! Segments by minimum spanning forests (Felzenszwalb & Huttenlocher 2004, "Efficient graph-based
-//! image segmentation", IJCV 59, 167-181).
+//! Segments by minimum spanning forests (Felzenszwalb & Huttenlocher 2004, "Efficient
+//! graph-based image segmentation", IJCV 59, 167-181).
 
 use super::picture::Picture;
 
-/// Pairs of neighbouring pixels (8 neighbours) and how far apart their colours are, nearest first.
+/// Pairs of neighbouring pixels (8 neighbours) and how far apart their colours are,
+/// nearest first.
 pub struct Edges {
     pixels: usize,
     edges: Vec<(f32, u32, u32)>,
@@ -62,12 +63,13 @@ impl Forest {
     }
 }
 
-/// The number of its segment for every pixel, and how many there are. `k`: how much longer than
-/// within a segment an edge to the next one has to be, for a segment of one pixel; segments of
-/// fewer than `least` pixels are joined to their nearest neighbour.
+/// The number of its segment for every pixel, and how many there are. `k`: how much
+/// longer than within a segment an edge to the next one has to be, for a segment of one
+/// pixel; segments of fewer than `least` pixels are joined to their nearest neighbour.
 pub fn felzenszwalb(edges: &Edges, k: f32, least: u32) -> (Vec<u32>, usize) {
     let n = edges.pixels;
-    let mut forest = Forest { parent: (0..n as u32).collect(), size: vec![1; n], inner: vec![0.0; n] };
+    let mut forest =
+        Forest { parent: (0..n as u32).collect(), size: vec![1; n], inner: vec![0.0; n] };
     for &(length, p, q) in &edges.edges {
         let (a, b) = (forest.root(p), forest.root(q));
         let allowed = |r: u32| forest.inner[r as usize] + k / forest.size[r as usize] as f32;

@@ -1,6 +1,6 @@
-//! Hierarchies of regions: the two most alike neighbours are joined until one is left, and every
-//! region on the way is a proposal (Uijlings et al. 2013, "Selective search for object
-//! recognition", IJCV 104, 154-171, section 3).
+//! Hierarchies of regions: the two most alike neighbours are joined until one is left,
+//! and every region on the way is a proposal (Uijlings et al. 2013, "Selective search for
+//! object recognition", IJCV 104, 154-171, section 3).
 
 use super::area::Area;
 use super::picture::Picture;
@@ -33,8 +33,8 @@ struct Region {
     segments: Vec<usize>,
 }
 
-/// Two neighbours, with the sum of the gradient along their border, its length, and how alike they
-/// are.
+/// Two neighbours, with the sum of the gradient along their border, its length, and how
+/// alike they are.
 #[derive(Clone, Copy)]
 struct Pair {
     a: usize,
@@ -83,7 +83,8 @@ fn regions(picture: &Picture, labels: &[u32], count: usize) -> Vec<Region> {
         r.bounds = [b[0].min(i), b[1].min(j), b[2].max(i + 1), b[3].max(j + 1)];
         r.size += 1.0;
         let [l, u, v] = picture.lab[p];
-        for (c, part) in [l / 100.0, (u + 60.0) / 120.0, (v + 60.0) / 120.0].into_iter().enumerate() {
+        for (c, part) in [l / 100.0, (u + 60.0) / 120.0, (v + 60.0) / 120.0].into_iter().enumerate()
+        {
             r.colour[c * BINS + ((part * BINS as f32) as usize).min(BINS - 1)] += 1.0 / 3.0;
         }
         r.texture[texture(picture.slope.0[p], picture.slope.1[p])] += 1.0;
@@ -111,7 +112,11 @@ fn pairs(picture: &Picture, labels: &[u32]) -> Vec<Pair> {
         let next = [(p % w + 1 < w, p + 1), (p / w + 1 < h, p + w)];
         for (_, q) in next.into_iter().filter(|(there, q)| *there && labels[*q] != labels[p]) {
             let edge = picture.gradient.magnitude[p].max(picture.gradient.magnitude[q]);
-            borders.push((labels[p].min(labels[q]) as usize, labels[p].max(labels[q]) as usize, edge));
+            borders.push((
+                labels[p].min(labels[q]) as usize,
+                labels[p].max(labels[q]) as usize,
+                edge,
+            ));
         }
     }
     borders.sort_by_key(|b| (b.0, b.1));
@@ -140,7 +145,10 @@ fn alike(picture: &Picture, rule: Rule, all: &[Region], pair: &Pair) -> f32 {
             let high = |c: usize| both[0][c].max(both[1][c]);
             let around = ((high(2) - low(0)) * (high(3) - low(1))) as f32;
             let size = (a.size + b.size) / pixels;
-            colour + common(&a.texture, &b.texture) + (1.0 - size) + (1.0 - (around / pixels - size))
+            colour
+                + common(&a.texture, &b.texture)
+                + (1.0 - size)
+                + (1.0 - (around / pixels - size))
         }
     }
 }
@@ -171,15 +179,21 @@ pub fn merge(
     let area = |r: &Region| {
         let mut member = vec![false; *count];
         r.segments.iter().for_each(|s| member[*s] = true);
-        Area::new(picture.width, picture.height, labels.iter().map(|l| member[*l as usize]).collect())
+        Area::new(
+            picture.width,
+            picture.height,
+            labels.iter().map(|l| member[*l as usize]).collect(),
+        )
     };
     all.iter().filter(fits).filter_map(area).collect()
 }
 
-/// The pairs after `joined` has become region `new`, which has each of its neighbours once.
+/// The pairs after `joined` has become region `new`, which has each of its neighbours
+/// once.
 fn renamed(pairs: &[Pair], joined: Pair, new: usize) -> Vec<Pair> {
     let gone = |r: usize| r == joined.a || r == joined.b;
-    let (touched, mut out): (Vec<Pair>, Vec<Pair>) = pairs.iter().partition(|p| gone(p.a) || gone(p.b));
+    let (touched, mut out): (Vec<Pair>, Vec<Pair>) =
+        pairs.iter().partition(|p| gone(p.a) || gone(p.b));
     let mut renamed: Vec<Pair> = touched
         .into_iter()
         .filter(|p| !(gone(p.a) && gone(p.b)))

@@ -1,6 +1,6 @@
-//! Mirror symmetry of a region: the axes in which it is most its own mirror image, and its widths
-//! along them. The silhouette of a lathe is symmetric in the projection of its axis, seen from
-//! anywhere far enough away.
+//! Mirror symmetry of a region: the axes in which it is most its own mirror image, and
+//! its widths along them. The silhouette of a lathe is symmetric in the projection of its
+//! axis, seen from anywhere far enough away.
 
 use super::area::Area;
 use std::f64::consts::PI;
@@ -12,7 +12,8 @@ const SAMPLE: usize = 200;
 /// Second axes are at least this far from the first, radians.
 const APART: f64 = PI / 6.0;
 
-/// A line to mirror in: the points whose product with the unit `normal` is `offset`, pixels.
+/// A line to mirror in: the points whose product with the unit `normal` is `offset`,
+/// pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Mirror {
     /// Intersection over union of the region with its mirror image.
@@ -41,7 +42,8 @@ impl Shape<'_> {
         }
         let centre = centre.map(|c| c / area.count as f64);
         let step = area.count.div_ceil(most).max(1);
-        let about = |(i, j): (usize, usize)| [i as f64 + 0.5 - centre[0], j as f64 + 0.5 - centre[1]];
+        let about =
+            |(i, j): (usize, usize)| [i as f64 + 0.5 - centre[0], j as f64 + 0.5 - centre[1]];
         Shape { area, centre, points: area.points().step_by(step).map(about).collect() }
     }
 
@@ -57,8 +59,8 @@ impl Shape<'_> {
         Mirror { symmetry, angle, offset, centre: self.centre }
     }
 
-    /// The best mirror near another: steps of the given size in angle and offset, halved `halvings`
-    /// times.
+    /// The best mirror near another: steps of the given size in angle and offset, halved
+    /// `halvings` times.
     fn refined(&self, from: Mirror, angle: f64, offset: f64, halvings: i32) -> Mirror {
         let mut best = self.mirror(from.angle, from.offset);
         for h in 0..=halvings {
@@ -86,7 +88,8 @@ fn between(a: f64, b: f64) -> f64 {
     d.min(PI - d)
 }
 
-/// The symmetry of a region in its best mirror, roughly: what many regions are compared by.
+/// The symmetry of a region in its best mirror, roughly: what many regions are compared
+/// by.
 pub fn symmetry(area: &Area) -> f64 {
     let shape = Shape::of(area, SAMPLE);
     let scan = (0..ANGLES / 2).map(|i| shape.mirror(PI * i as f64 / (ANGLES / 2) as f64, 0.0));

@@ -1,12 +1,13 @@
-//! Regions of a photograph that may be an object of revolution (vases, bottles, cups, lamps),
-//! without learned weights.
+//! Regions of a photograph that may be an object of revolution (vases, bottles, cups,
+//! lamps), without learned weights.
 //!
-//! Of clean contours without a photograph they are what the contours enclose. Of a photograph:
+//! Of clean contours without a photograph they are what the contours enclose. Of a
+//! photograph:
 //!
-//! Segments and clusters of colour are joined into regions, the most promising are cut out along
-//! edges, and what is symmetric, stands out from what is around it and lies within the picture
-//! comes first. A function of the picture alone, with the same bits on any machine. Not here: what
-//! is made of the candidates, and three dimensions.
+//! Segments and clusters of colour are joined into regions, the most promising are cut
+//! out along edges, and what is symmetric, stands out from what is around it and lies
+//! within the picture comes first. A function of the picture alone, with the same bits on
+//! any machine. Not here: what is made of the candidates, and three dimensions.
 
 mod area;
 mod clusters;
@@ -35,7 +36,8 @@ use score::{Judge, suppressed};
 /// Regions are at least and at most this part of the picture.
 const LEAST: f64 = 0.004;
 const MOST: f64 = 0.65;
-/// Of two regions that overlap more than this (intersection over union) the better one is kept.
+/// Of two regions that overlap more than this (intersection over union) the better one is
+/// kept.
 const OVERLAP: f64 = 0.85;
 /// How many of the regions are cut out.
 const SEEDS: usize = 30;
@@ -64,16 +66,16 @@ impl Default for CandidateOptions {
 pub struct Axis {
     /// How nearly: intersection over union of the mask and its mirror image, 0 to 1.
     pub symmetry: f64,
-    /// Where the mask ends along the axis, in pixels of the photograph: the lower end in the
-    /// picture.
+    /// Where the mask ends along the axis, in pixels of the photograph: the lower end in
+    /// the picture.
     pub foot: [f64; 2],
     /// The other end.
     pub top: [f64; 2],
-    /// Half-widths across the axis in the middles of 24 equal parts from foot to top, in pixels of
-    /// the photograph; smoothed lightly, above 0.
+    /// Half-widths across the axis in the middles of 24 equal parts from foot to top, in
+    /// pixels of the photograph; smoothed lightly, above 0.
     pub widths: Vec<f64>,
-    /// How much speaks for each of the [`tilts`], 0 to 1: whether a flat end, a rim or a foot, is
-    /// seen as an ellipse so high.
+    /// How much speaks for each of the [`tilts`], 0 to 1: whether a flat end, a rim or a
+    /// foot, is seen as an ellipse so high.
     pub rims: Vec<f64>,
 }
 
@@ -99,9 +101,11 @@ pub fn candidates(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
 }
 
 impl Candidate {
-    /// Of a region of a picture with these edges, where a pixel is `scale` pixels of the photograph.
+    /// Of a region of a picture with these edges, where a pixel is `scale` pixels of the
+    /// photograph.
     fn new(score: f64, area: Area, edges: &rim::Edges, scale: [f64; 2]) -> Option<Candidate> {
-        let axes = mirror::mirrors(&area).iter().map(|m| profile::axis(edges, &area, m, scale)).collect();
+        let axes =
+            mirror::mirrors(&area).iter().map(|m| profile::axis(edges, &area, m, scale)).collect();
         let mask = Mask::new(area.width as u32, area.height as u32, area.on).ok()?;
         Some(Candidate { score, mask, axes })
     }
@@ -112,7 +116,8 @@ fn found(picture: &Picture, most: usize) -> Vec<(f64, Area)> {
     let field = Field::new(picture, clusters::codebook(picture));
     let judge = Judge::new(picture, &field.letters);
     let scored = |area: Area| (judge.score(&area), area);
-    let regions = suppressed(regions(picture).into_iter().map(scored).collect(), OVERLAP, SEEDS.max(most));
+    let regions =
+        suppressed(regions(picture).into_iter().map(scored).collect(), OVERLAP, SEEDS.max(most));
     let cuts = regions.iter().take(SEEDS).filter_map(|(_, seed)| field.cut(seed));
     let cuts: Vec<_> = cuts.map(scored).collect();
     let parts = suppressed(cuts.into_iter().chain(regions).collect(), OVERLAP, most.max(PARTS));
@@ -120,11 +125,12 @@ fn found(picture: &Picture, most: usize) -> Vec<(f64, Area)> {
     suppressed(wholes.into_iter().chain(parts).collect(), OVERLAP, most)
 }
 
-/// Neighbours among the best regions put together: objects of two colours, such as a lamp's foot
-/// and its shade.
+/// Neighbours among the best regions put together: objects of two colours, such as a
+/// lamp's foot and its shade.
 fn wholes(parts: &[(f64, Area)]) -> Vec<Area> {
     let parts: Vec<&Area> = parts.iter().take(PARTS).map(|(_, area)| area).collect();
-    let near: Vec<Area> = parts.iter().filter_map(|a| Area::new(a.width, a.height, a.dilated(1))).collect();
+    let near: Vec<Area> =
+        parts.iter().filter_map(|a| Area::new(a.width, a.height, a.dilated(1))).collect();
     let mut out = Vec::new();
     for (i, a) in parts.iter().enumerate() {
         for (b, near) in parts.iter().zip(&near).take(i) {

@@ -1,17 +1,17 @@
-//! A small picture as the search for candidates sees it: colours in CIE L*a*b*, how much lightness
-//! varies around a pixel, and gradients.
+//! A small picture as the search for candidates sees it: colours in CIE L*a*b*, how much
+//! lightness varies around a pixel, and gradients.
 
 use crate::vision::Photo;
 use crate::vision::color::linear_to_labs;
 use crate::vision::gradient::{Gradient, colour_gradient, derivatives, smoothed};
 
-/// Standard deviation, pixels, of the smoothing before colours are compared (Felzenszwalb &
-/// Huttenlocher 2004, section 4).
+/// Standard deviation, pixels, of the smoothing before colours are compared (Felzenszwalb
+/// & Huttenlocher 2004, section 4).
 const SMOOTHING: f32 = 0.8;
 /// That of the Gaussian in which lightness varies.
 const AROUND: f32 = 2.0;
-/// Gradients as strong as this part of a picture's pixels have, and stronger, are edges beyond
-/// doubt.
+/// Gradients as strong as this part of a picture's pixels have, and stronger, are edges
+/// beyond doubt.
 const STRONG: f64 = 0.97;
 
 /// A picture at the working resolution; lists run row by row.
@@ -44,7 +44,8 @@ impl Picture {
         let gradient = colour_gradient(width, height, &lab, 1.0);
         let mut sorted = gradient.magnitude.clone();
         sorted.sort_by(f32::total_cmp);
-        let strong = sorted.get((STRONG * sorted.len() as f64) as usize).map_or(1.0, |g| g.max(1.0));
+        let strong =
+            sorted.get((STRONG * sorted.len() as f64) as usize).map_or(1.0, |g| g.max(1.0));
         Picture {
             width: width as usize,
             height: height as usize,

@@ -12,8 +12,8 @@ const LINES: usize = 4;
 /// Steps across, pixels.
 const STEP: f64 = 0.25;
 
-/// The axis of a mirror of a region of a picture with these edges, where a pixel is `scale` pixels of
-/// the photograph wide and high.
+/// The axis of a mirror of a region of a picture with these edges, where a pixel is
+/// `scale` pixels of the photograph wide and high.
 pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
     let normal = [libm::cos(mirror.angle), libm::sin(mirror.angle)];
     // Upwards in the picture; to the right where it is level.
@@ -26,7 +26,8 @@ pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axi
         (low, high) = (low.min(along - 0.5), high.max(along + 0.5));
         reach = reach.max((d[0] * normal[0] + d[1] * normal[1]).abs() + 1.0);
     }
-    let at = |along: f64, across: f64| [0, 1].map(|c| on_axis[c] + along * up[c] + across * normal[c]);
+    let at =
+        |along: f64, across: f64| [0, 1].map(|c| on_axis[c] + along * up[c] + across * normal[c]);
     let steps = (reach / STEP).ceil() as i32;
     let width = |along: f64| {
         let places = (-steps..steps).map(|s| at(along, (f64::from(s) + 0.5) * STEP));
@@ -34,7 +35,8 @@ pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axi
     };
     let line = |l: usize| width(low + (high - low) * (l as f64 + 0.5) / (PLACES * LINES) as f64);
     let lines: Vec<f64> = (0..PLACES * LINES).map(line).collect();
-    let means: Vec<f64> = lines.chunks(LINES).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
+    let means: Vec<f64> =
+        lines.chunks(LINES).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
     let means = smoothed(&means);
     let length = high - low;
     // By distance from the foot, linear between the middles of the parts.
@@ -62,5 +64,7 @@ pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axi
 /// Means with the neighbours, which count half.
 fn smoothed(values: &[f64]) -> Vec<f64> {
     let at = |i: usize| values[i.min(values.len() - 1)];
-    (0..values.len()).map(|i| 0.25 * at(i.saturating_sub(1)) + 0.5 * at(i) + 0.25 * at(i + 1)).collect()
+    (0..values.len())
+        .map(|i| 0.25 * at(i.saturating_sub(1)) + 0.5 * at(i) + 0.25 * at(i + 1))
+        .collect()
 }

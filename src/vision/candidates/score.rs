@@ -22,15 +22,16 @@ impl Judge<'_> {
         let most = |p: usize| {
             let (i, j) = (p % w, p / w);
             let rows = j.saturating_sub(1)..(j + 2).min(h);
-            let near = rows.flat_map(|j| (i.saturating_sub(1)..(i + 2).min(w)).map(move |i| j * w + i));
+            let near =
+                rows.flat_map(|j| (i.saturating_sub(1)..(i + 2).min(w)).map(move |i| j * w + i));
             near.map(|q| picture.gradient.magnitude[q]).fold(0.0, f32::max)
         };
         Judge { letters, edges: (0..w * h).map(|p| (most(p) / picture.strong).min(1.0)).collect() }
     }
 
-    /// The score of a region, at least 0. Symmetry is what tells lathes from other things. The
-    /// rest: edges along the outline, colours unlike those around, little of the outline at the
-    /// picture's frame, and a size worth looking at.
+    /// The score of a region, at least 0. Symmetry is what tells lathes from other
+    /// things. The rest: edges along the outline, colours unlike those around, little of
+    /// the outline at the picture's frame, and a size worth looking at.
     pub fn score(&self, area: &Area) -> f64 {
         let part = area.count as f64 / area.on.len() as f64;
         let fade = ((0.65 - part) / 0.15).clamp(0.0, 1.0);
@@ -40,7 +41,8 @@ impl Judge<'_> {
         if fade * inside == 0.0 {
             return 0.0;
         }
-        let support = outline.iter().map(|p| f64::from(self.edges[*p])).sum::<f64>() / outline.len() as f64;
+        let support =
+            outline.iter().map(|p| f64::from(self.edges[*p])).sum::<f64>() / outline.len() as f64;
         let size = part.min(0.15).sqrt();
         let symmetry = symmetry(area);
         if symmetry < SYMMETRIC {
@@ -51,8 +53,8 @@ impl Judge<'_> {
         symmetry * symmetry * support * chi * chi * inside * size * fade
     }
 
-    /// One less the Bhattacharyya coefficient of the letters of a region and of a ring around it; 0
-    /// without a ring.
+    /// One less the Bhattacharyya coefficient of the letters of a region and of a ring
+    /// around it; 0 without a ring.
     fn contrast(&self, area: &Area) -> f64 {
         let ring = area.dilated((0.15 * (area.count as f64).sqrt()).max(3.0) as usize);
         let mut counts = [[0u32; LETTERS]; 2];
@@ -69,8 +71,8 @@ impl Judge<'_> {
     }
 }
 
-/// The best regions by score, at most `most`, none of which overlaps a better one by more than
-/// `overlap` (intersection over union).
+/// The best regions by score, at most `most`, none of which overlaps a better one by more
+/// than `overlap` (intersection over union).
 pub fn suppressed(mut scored: Vec<(f64, Area)>, overlap: f64, most: usize) -> Vec<(f64, Area)> {
     // Stable: equals stay in the order they were found in.
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -22,8 +22,8 @@ fn profile(t: f64) -> f64 {
     22.0 + 14.0 * libm::sin(5.0 * t)
 }
 
-/// Where a pixel is along the vase, 0 at the foot and 1 at the top, and across its axis, which
-/// leans by an angle to the right.
+/// Where a pixel is along the vase, 0 at the foot and 1 at the top, and across its axis,
+/// which leans by an angle to the right.
 fn place(i: u32, j: u32, lean: f64) -> (f64, f64) {
     let (x, y) = (f64::from(i) + 0.5 - MIDDLE[0], f64::from(j) + 0.5 - MIDDLE[1]);
     let (s, c) = (libm::sin(lean), libm::cos(lean));
@@ -39,16 +39,21 @@ fn vase(lean: f64) -> (Photo, Mask) {
     let picture = RgbImage::from_fn(WIDTH, HEIGHT, |i, j| {
         let speckle = 30.0 * noise(j / 3 * 1000 + i / 3);
         let light = place(i, j, lean).1;
-        let [r, g, b] = if inside(i, j) { [200.0 + light, 150.0 + light, 90.0] } else { [60.0, 75.0, 80.0] };
+        let [r, g, b] =
+            if inside(i, j) { [200.0 + light, 150.0 + light, 90.0] } else { [60.0, 75.0, 80.0] };
         Rgb([r, g, b].map(|v| (v + speckle) as u8))
     });
-    let mask = (0..HEIGHT).flat_map(|j| (0..WIDTH).map(move |i| (i, j))).map(|(i, j)| inside(i, j)).collect();
+    let mask = (0..HEIGHT)
+        .flat_map(|j| (0..WIDTH).map(move |i| (i, j)))
+        .map(|(i, j)| inside(i, j))
+        .collect();
     (Photo::from_rgb(picture).unwrap(), Mask::new(WIDTH, HEIGHT, mask).unwrap())
 }
 
 fn iou(a: &Mask, b: &Mask) -> f64 {
     let pairs = || a.data().iter().zip(b.data());
-    pairs().filter(|(a, b)| **a && **b).count() as f64 / pairs().filter(|(a, b)| **a || **b).count() as f64
+    pairs().filter(|(a, b)| **a && **b).count() as f64
+        / pairs().filter(|(a, b)| **a || **b).count() as f64
 }
 
 fn check_vase(lean: f64) {
@@ -66,11 +71,18 @@ fn check_first(found: &[Candidate], truth: &Mask, lean: f64) {
     assert!(axis.symmetry > 0.9, "{}", axis.symmetry);
     let [x, y] = [0, 1].map(|c| axis.top[c] - axis.foot[c]);
     let (s, c) = (libm::sin(lean), libm::cos(lean));
-    assert!((libm::atan2(x, -y) - lean).abs() < 3.0_f64.to_radians(), "leans by {}", libm::atan2(x, -y));
+    assert!(
+        (libm::atan2(x, -y) - lean).abs() < 3.0_f64.to_radians(),
+        "leans by {}",
+        libm::atan2(x, -y)
+    );
     for (end, sign) in [(axis.foot, -0.5), (axis.top, 0.5)] {
         let expected = [MIDDLE[0] + sign * LENGTH * s, MIDDLE[1] - sign * LENGTH * c];
         let off = [end[0] - expected[0], end[1] - expected[1]];
-        assert!((off[0] * c + off[1] * s).abs() < 2.0, "{end:?} is beside the axis at {expected:?}");
+        assert!(
+            (off[0] * c + off[1] * s).abs() < 2.0,
+            "{end:?} is beside the axis at {expected:?}"
+        );
         assert!((off[0] * s - off[1] * c).abs() < 4.0, "{end:?} is not the end {expected:?}");
     }
     assert_eq!(axis.widths.len(), 24);
@@ -156,7 +168,9 @@ fn areas() {
     assert_eq!((ring.count, ring.bounds), (10, [1, 1, 5, 4]));
     assert_eq!(ring.clone().filled(), area(&["......", ".####.", ".####.", ".####.", "......"]));
     assert_eq!(ring.iou(&ring.clone().filled()), 10.0 / 12.0);
-    assert!(ring.overlaps(&ring.clone().filled(), 0.8) && !ring.overlaps(&ring.clone().filled(), 0.84));
+    assert!(
+        ring.overlaps(&ring.clone().filled(), 0.8) && !ring.overlaps(&ring.clone().filled(), 0.84)
+    );
     let open = area(&["......", ".####.", ".#..#.", ".##.#.", "......"]);
     assert_eq!(open.clone().filled(), open);
     assert_eq!(open.union(&ring), Some(ring.clone()));
@@ -229,7 +243,8 @@ fn a_cut_moves_to_the_object() {
     let truth = Area::new(picture.width, picture.height, truth.data().to_vec()).unwrap();
     // Its shape, a little beside it.
     let seed = |p: usize| p % picture.width >= 2 && truth.on[p - 2];
-    let seed = Area::new(picture.width, picture.height, (0..picture.pixels()).map(seed).collect()).unwrap();
+    let seed = Area::new(picture.width, picture.height, (0..picture.pixels()).map(seed).collect())
+        .unwrap();
     let field = Field::new(&picture, clusters::codebook(&picture));
     let cut = field.cut(&seed).unwrap();
     let (before, after) = (seed.iou(&truth), cut.iou(&truth));
@@ -241,13 +256,16 @@ fn a_cut_moves_to_the_object() {
     assert_eq!(suppressed(vec![(0.2, truth.clone()), (0.3, truth)], OVERLAP, 9).len(), 1);
 }
 
-/// A bright vessel before a darker ground, seen from above by a tilt: a cylinder with a dark inside.
+/// A bright vessel before a darker ground, seen from above by a tilt: a cylinder with a
+/// dark inside.
 fn vessel(tilt: f64, below: bool) -> Photo {
     const RADIUS: f64 = 40.0;
     let (flat, rim, foot) = (RADIUS * libm::sin(tilt), 75.0, 75.0 + 80.0 * libm::cos(tilt));
-    let ellipse = |x: f64, y: f64, middle: f64| (x / RADIUS).powi(2) + ((y - middle) / flat).powi(2) <= 1.0;
+    let ellipse =
+        |x: f64, y: f64, middle: f64| (x / RADIUS).powi(2) + ((y - middle) / flat).powi(2) <= 1.0;
     let picture = RgbImage::from_fn(WIDTH, HEIGHT, |i, j| {
-        let (x, y) = (f64::from(i) + 0.5 - 120.0, f64::from(if below { HEIGHT - 1 - j } else { j }) + 0.5);
+        let (x, y) =
+            (f64::from(i) + 0.5 - 120.0, f64::from(if below { HEIGHT - 1 - j } else { j }) + 0.5);
         let body = x.abs() <= RADIUS && (rim..=foot).contains(&y) || ellipse(x, y, foot);
         let colour = match (ellipse(x, y, rim), body) {
             (true, _) => [150.0, 100.0, 60.0],
@@ -269,7 +287,11 @@ fn rims_tell_tilts() {
         let axis = &found.first().expect("nothing was found").axes[0];
         let best = (0..80).fold(0, |best, i| if axis.rims[i] > axis.rims[best] { i } else { best });
         let (at, wanted) = (tilts[best], if below { -tilt } else { tilt });
-        assert!((at - wanted).abs() < 0.06 && axis.rims[best] > 0.4, "{wanted}: {at} {}", axis.rims[best]);
+        assert!(
+            (at - wanted).abs() < 0.06 && axis.rims[best] > 0.4,
+            "{wanted}: {at} {}",
+            axis.rims[best]
+        );
     }
     // Nothing speaks for a tilt of what has no flat end.
     let (photo, _) = vase(0.0);
@@ -294,7 +316,8 @@ fn lines(places: &[[f64; 2]], map: &mut ContourMap) {
     }
 }
 
-/// The outline of the vase from its foot up, over the top and down again, and at last along the foot.
+/// The outline of the vase from its foot up, over the top and down again, and at last
+/// along the foot.
 fn outline(lean: f64) -> Vec<[f64; 2]> {
     let (s, c) = (libm::sin(lean), libm::cos(lean));
     let at = |t: f64, across: f64| {
@@ -316,7 +339,9 @@ fn clean_contours_enclose_a_vase() {
         let found = enclosed(&map, &options);
         let (_, truth) = vase(lean);
         check_first(&found, &truth, lean);
-        let whole = |all: &[Candidate]| iou(&all[0].mask, &truth.resized(all[0].mask.width(), all[0].mask.height()));
+        let whole = |all: &[Candidate]| {
+            iou(&all[0].mask, &truth.resized(all[0].mask.width(), all[0].mask.height()))
+        };
         assert!(found.len() == 1 && whole(&found) > 0.95, "{}", whole(&found));
         // With gaps of six pixels, and smaller, as a program may ask.
         let mut gaps = ContourMap::new(WIDTH, HEIGHT);
@@ -349,12 +374,16 @@ fn rims_of_clean_contours_tell_tilts() {
         };
         let mut map = ContourMap::new(WIDTH, HEIGHT);
         lines(&arc(rim, 0.0, 2.0).collect::<Vec<_>>(), &mut map);
-        let below = [[120.0 + RADIUS, rim]].into_iter().chain(arc(foot, 0.0, 1.0)).chain([[120.0 - RADIUS, rim]]);
+        let below = [[120.0 + RADIUS, rim]]
+            .into_iter()
+            .chain(arc(foot, 0.0, 1.0))
+            .chain([[120.0 - RADIUS, rim]]);
         lines(&below.collect::<Vec<_>>(), &mut map);
         let found = enclosed(&map, &CandidateOptions { size: 256, most: 20 });
         // The axis that stands upright, which need not be the more symmetric one.
         let upright = |a: &&Axis| (a.top[0] - a.foot[0]).abs() < 4.0;
-        let axis = found.first().and_then(|c| c.axes.iter().find(upright)).expect("no upright axis");
+        let axis =
+            found.first().and_then(|c| c.axes.iter().find(upright)).expect("no upright axis");
         let best = (0..80).fold(0, |best, i| if axis.rims[i] > axis.rims[best] { i } else { best });
         assert!(
             (tilts[best] - tilt).abs() < 0.06 && axis.rims[best] > 0.5,

@@ -1,5 +1,6 @@
-//! The derivatives of the chamfer score by the rendered elements. The score is piecewise smooth: at the lines of the grid, and
-//! where another piece becomes the nearest, they are those of one side.
+//! The derivatives of the chamfer score by the rendered elements. The score is piecewise
+//! smooth: at the lines of the grid, and where another piece becomes the nearest, they
+//! are those of one side.
 
 use super::super::elements::{Element, Elements};
 use super::super::field::{PER_RADIAN, channel};
@@ -7,9 +8,14 @@ use super::reverse::Piece;
 use super::{Chamfer, Mode, NOTHING, Scratch};
 
 impl Chamfer {
-    /// The derivatives of [`Chamfer::log_likelihood`] by each element's x, y, length (pixels) and angle (radians, from right to
-    /// down) into `out`, and the one by sigma.
-    pub fn gradient(&self, elements: &Elements<'_>, scratch: &mut Scratch, out: &mut Vec<[f64; 4]>) -> f64 {
+    /// The derivatives of [`Chamfer::log_likelihood`] by each element's x, y, length
+    /// (pixels) and angle (radians, from right to down) into `out`, and the one by sigma.
+    pub fn gradient(
+        &self,
+        elements: &Elements<'_>,
+        scratch: &mut Scratch,
+        out: &mut Vec<[f64; 4]>,
+    ) -> f64 {
         out.clear();
         out.resize(elements.len(), [0.0; 4]);
         let sigma = self.options.sigma;
@@ -50,11 +56,15 @@ impl Chamfer {
             let mean = back.mean();
             reverse.each(elements, turn, &mut Scratch::default(), |length, distance, pair| {
                 let d = f64::from(distance) * self.percent;
-                let Some([point, piece]) = pair.filter(|_| !self.is_cut(d) && d < NOTHING) else { return };
+                let Some([point, piece]) = pair.filter(|_| !self.is_cut(d) && d < NOTHING) else {
+                    return;
+                };
                 let (_, by_distance) = slopes(back.length, mean, d);
                 let by = by_distance * f64::from(length) * self.percent * self.percent;
                 let index = piece.index as usize;
-                let (Some(place), Some(Some(e))) = (out.get_mut(index), seen.get(index)) else { return };
+                let (Some(place), Some(Some(e))) = (out.get_mut(index), seen.get(index)) else {
+                    return;
+                };
                 let slope = distance_slope(point, piece, turn);
                 place.iter_mut().zip(slope).for_each(|(p, s)| *p += by * s);
                 let border = elements.view_slope(e);
@@ -84,7 +94,8 @@ fn by_index(elements: &Elements<'_>) -> Vec<Option<Element>> {
     all
 }
 
-/// The derivatives of the distance from an observed point to a rendered piece, in pixels, by the piece's x, y, length and angle.
+/// The derivatives of the distance from an observed point to a rendered piece, in pixels,
+/// by the piece's x, y, length and angle.
 fn distance_slope(point: &Piece, piece: &Piece, turn: f32) -> [f64; 4] {
     let (p, e) = (&point.edge, &piece.edge);
     let (dx, dy) = (p.x - e.x, p.y - e.y);
@@ -94,7 +105,8 @@ fn distance_slope(point: &Piece, piece: &Piece, turn: f32) -> [f64; 4] {
     let distance = (ux * ux + uy * uy).sqrt();
     // On the piece itself the distance has no slope.
     let (ux, uy) = if distance > 0.0 { (ux / distance, uy / distance) } else { (0.0, 0.0) };
-    let by_length = if along.abs() > e.half { -0.5 * along.signum() * (ux * e.tx + uy * e.ty) } else { 0.0 };
+    let by_length =
+        if along.abs() > e.half { -0.5 * along.signum() * (ux * e.tx + uy * e.ty) } else { 0.0 };
     let mut by_angle = -held * (uy * e.tx - ux * e.ty);
     if turn > 0.0 {
         // Shorter one way round or the other.

@@ -1,6 +1,7 @@
-//! Distances from the observed contours to the rendered ones, exact and continuous, by buckets of elements. Per evaluation
-//! it fills a scratch and walks the observed points; it renders nothing. Invariant: the result does not depend on the order
-//! of the elements, and every candidate that could be nearest is looked at.
+//! Distances from the observed contours to the rendered ones, exact and continuous, by
+//! buckets of elements. Per evaluation it fills a scratch and walks the observed points;
+//! it renders nothing. Invariant: the result does not depend on the order of the
+//! elements, and every candidate that could be nearest is looked at.
 
 use super::super::elements::Elements;
 use super::super::field::{Edge, Edges, channel, turn_between};
@@ -8,7 +9,8 @@ use super::super::field::{Edge, Edges, channel, turn_between};
 /// Buckets along the longer side.
 const BUCKETS: f32 = 12.0;
 
-/// Observed points that are measured; of more, every so many-th in the order of the buckets stands for its neighbours.
+/// Observed points that are measured; of more, every so many-th in the order of the
+/// buckets stands for its neighbours.
 pub const MOST_OBSERVED: usize = 512;
 
 /// Memory that evaluations reuse.
@@ -52,7 +54,8 @@ pub(super) struct Reverse {
     down: usize,
     /// Side of a bucket in pixels.
     side: f32,
-    /// Least and greatest distance in pixels between points of two buckets, by how many lie between them down and across.
+    /// Least and greatest distance in pixels between points of two buckets, by how many
+    /// lie between them down and across.
     gaps: Vec<(f32, f32)>,
 }
 
@@ -63,9 +66,19 @@ impl Reverse {
         let across = ((width as f32 / side).ceil() as usize).max(1);
         let down = ((height as f32 / side).ceil() as usize).max(1);
         let norm = |u: usize, v: usize| ((u * u + v * v) as f32).sqrt() * side;
-        let gap = |v: usize, u: usize| (norm(u.saturating_sub(1), v.saturating_sub(1)), norm(u + 1, v + 1));
+        let gap = |v: usize, u: usize| {
+            (norm(u.saturating_sub(1), v.saturating_sub(1)), norm(u + 1, v + 1))
+        };
         let gaps = (0..down).flat_map(|v| (0..across).map(move |u| gap(v, u))).collect();
-        let mut r = Reverse { points: Vec::new(), stands_for: 1.0, start: Vec::new(), across, down, side, gaps };
+        let mut r = Reverse {
+            points: Vec::new(),
+            stands_for: 1.0,
+            start: Vec::new(),
+            across,
+            down,
+            side,
+            gaps,
+        };
         let (mut start, mut sorted) = (Vec::new(), Vec::new());
         let points: Vec<Piece> = grid
             .edges
@@ -74,14 +87,16 @@ impl Reverse {
                 let (tx, ty) = (e.tx / grid.sx, e.ty / grid.sy);
                 let norm = (tx * tx + ty * ty).sqrt();
                 let (x, y) = (e.x / grid.sx, e.y / grid.sy);
-                let edge = Edge { x, y, tx: tx / norm, ty: ty / norm, half: e.half * norm, turn: e.turn };
+                let edge =
+                    Edge { x, y, tx: tx / norm, ty: ty / norm, half: e.half * norm, turn: e.turn };
                 Piece { edge, cost: 0.0, index: 0 }
             })
             .collect();
         r.sort(&points, &mut start, &mut sorted);
         if sorted.len() > MOST_OBSERVED {
             r.stands_for = sorted.len() as f32 / MOST_OBSERVED as f32;
-            let few: Vec<Piece> = (0..MOST_OBSERVED).map(|i| sorted[i * sorted.len() / MOST_OBSERVED]).collect();
+            let few: Vec<Piece> =
+                (0..MOST_OBSERVED).map(|i| sorted[i * sorted.len() / MOST_OBSERVED]).collect();
             r.sort(&few, &mut start, &mut sorted);
         }
         r.start = start;
@@ -116,9 +131,10 @@ impl Reverse {
         v * self.across + u
     }
 
-    /// Calls `f(length, distance, pair)` for every observed point, in a fixed order, both in pixels, with the point and the
-    /// piece it is measured to. `turn` is the cost in pixels of one channel's turn. An element partly in view costs up to a diagonal more, so that none appears suddenly. With nothing
-    /// in view distances are infinite.
+    /// Calls `f(length, distance, pair)` for every observed point, in a fixed order, both
+    /// in pixels, with the point and the piece it is measured to. `turn` is the cost in
+    /// pixels of one channel's turn. An element partly in view costs up to a diagonal
+    /// more, so that none appears suddenly. With nothing in view distances are infinite.
     pub fn each(
         &self,
         elements: &Elements<'_>,
@@ -134,7 +150,8 @@ impl Reverse {
             let edge = Edge { x: e.x, y: e.y, tx: e.tx, ty: e.ty, half: 0.5 * e.length, turn };
             Piece { edge, cost: (1.0 - e.weight) * diagonal, index: e.index as u32 }
         }));
-        // Pieces reach out of their bucket by half their length, and half a pixel at the border.
+        // Pieces reach out of their bucket by half their length, and half a pixel at the
+        // border.
         let slack = pieces.iter().map(|p| p.edge.half).fold(0.0, f32::max) + 1.0;
         self.sort(pieces, start, sorted);
         filled.clear();
@@ -170,7 +187,11 @@ impl Reverse {
                         break;
                     }
                     for e in &sorted[start[c as usize] as usize..start[c as usize + 1] as usize] {
-                        let turned = if turn > 0.0 { turn * turn_between(e.edge.turn, p.edge.turn) } else { 0.0 };
+                        let turned = if turn > 0.0 {
+                            turn * turn_between(e.edge.turn, p.edge.turn)
+                        } else {
+                            0.0
+                        };
                         let distance = e.edge.distance(p.edge.x, p.edge.y) + turned + e.cost;
                         if distance < best {
                             (best, nearest) = (distance, Some([p, e]));

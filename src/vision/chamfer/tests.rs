@@ -37,7 +37,9 @@ fn slow(a: &Pieces, b: &Pieces, half: impl Fn(usize) -> f32, per_radian: f64) ->
     let (mut sum, mut length) = (0.0, 0.0);
     for i in 0..a.x.len() {
         let near = (0..b.x.len())
-            .map(|j| to_piece(a.x[i], a.y[i], b, j, half(j)) * percent + per_radian * turn(a, i, b, j))
+            .map(|j| {
+                to_piece(a.x[i], a.y[i], b, j, half(j)) * percent + per_radian * turn(a, i, b, j)
+            })
             .fold(f64::INFINITY, f64::min);
         sum += f64::from(a.length[i]) * near;
         length += f64::from(a.length[i]);
@@ -55,7 +57,9 @@ fn one_sided_distance_is_the_plain_one() {
     for size in [128, 256] {
         let seen = clutter(size, size, 12, 3);
         let drawn = Pieces::new(size, size).circle(0.5, 0.45, 0.3);
-        let fast = Chamfer::prepare(&seen.map(), size, size, &options()).unwrap().distance(&drawn.elements());
+        let fast = Chamfer::prepare(&seen.map(), size, size, &options())
+            .unwrap()
+            .distance(&drawn.elements());
         let plain = slow(&drawn, &seen, chord(&seen), 0.0);
         assert!((fast - plain).abs() < 0.02 * plain, "{size}: {fast} {plain}");
     }
@@ -66,7 +70,8 @@ fn orientation_costs_as_the_plain_one() {
     let seen = Pieces::new(128, 128).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.12);
     let drawn = Pieces::new(128, 128).circle(0.55, 0.5, 0.25);
     let turned = ChamferOptions { oriented: Some(3.0), ..options() };
-    let fast = Chamfer::prepare(&seen.map(), 128, 128, &turned).unwrap().distance(&drawn.elements());
+    let fast =
+        Chamfer::prepare(&seen.map(), 128, 128, &turned).unwrap().distance(&drawn.elements());
     let plain = slow(&drawn, &seen, chord(&seen), 3.0);
     // Orientations are held in eight channels.
     assert!((fast - plain).abs() < 0.12 * plain, "{fast} {plain}");
@@ -81,7 +86,9 @@ fn symmetric_distance_is_the_plain_one() {
         seen.length[j] = length;
     }
     let keep: Vec<usize> = (0..seen.x.len())
-        .filter(|&i| seen.x[i] >= 0.0 && seen.y[i] >= 0.0 && seen.x[i] <= 128.0 && seen.y[i] <= 96.0)
+        .filter(|&i| {
+            seen.x[i] >= 0.0 && seen.y[i] >= 0.0 && seen.x[i] <= 128.0 && seen.y[i] <= 96.0
+        })
         .collect();
     let pick = |v: &[f32]| keep.iter().map(|&i| v[i]).collect();
     let seen = Pieces {
@@ -95,11 +102,16 @@ fn symmetric_distance_is_the_plain_one() {
     for radius in [0.02, 0.1, 0.3] {
         for per_radian in [0.0, 2.0] {
             let drawn = Pieces::new(128, 96).circle(0.5, 0.35, radius);
-            let both =
-                ChamferOptions { symmetric: true, oriented: (per_radian > 0.0).then_some(per_radian), ..options() };
+            let both = ChamferOptions {
+                symmetric: true,
+                oriented: (per_radian > 0.0).then_some(per_radian),
+                ..options()
+            };
             let one = ChamferOptions { symmetric: false, ..both.clone() };
-            let both = Chamfer::prepare(&seen.map(), 128, 96, &both).unwrap().distance(&drawn.elements());
-            let one = Chamfer::prepare(&seen.map(), 128, 96, &one).unwrap().distance(&drawn.elements());
+            let both =
+                Chamfer::prepare(&seen.map(), 128, 96, &both).unwrap().distance(&drawn.elements());
+            let one =
+                Chamfer::prepare(&seen.map(), 128, 96, &one).unwrap().distance(&drawn.elements());
             let back = slow(&seen, &drawn, |j| 0.5 * drawn.length[j], per_radian);
             assert!((2.0 * both - one - back).abs() < 1e-3 * back, "{radius}: {both} {one} {back}");
         }
@@ -110,15 +122,18 @@ fn symmetric_distance_is_the_plain_one() {
 fn log_normal_of_the_distance() {
     let seen = Pieces::new(64, 64).circle(0.5, 0.5, 0.3);
     let drawn = Pieces::new(64, 64).circle(0.5, 0.5, 0.32);
-    let c = Chamfer::prepare(&seen.map(), 64, 64, &ChamferOptions { sigma: 0.7, ..options() }).unwrap();
+    let c =
+        Chamfer::prepare(&seen.map(), 64, 64, &ChamferOptions { sigma: 0.7, ..options() }).unwrap();
     let rho = c.distance(&drawn.elements());
     let exact = -0.5 * (rho / 0.7).powi(2) - 0.7f64.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln();
     assert!((c.log_likelihood(&drawn.elements()) - exact).abs() < 1e-12);
     // Radius off by 0.02 of the width: 2 / sqrt 2 percent of the diagonal.
     assert!((rho - std::f64::consts::SQRT_2).abs() < 0.05, "{rho}");
-    // A sum over pieces that are all equally far is the length in percent times one density.
+    // A sum over pieces that are all equally far is the length in percent times one
+    // density.
     let sum = ChamferOptions { sigma: 0.7, mode: Mode::Sum, ..options() };
-    let sum = Chamfer::prepare(&seen.map(), 64, 64, &sum).unwrap().log_likelihood(&drawn.elements());
+    let sum =
+        Chamfer::prepare(&seen.map(), 64, 64, &sum).unwrap().log_likelihood(&drawn.elements());
     let length = 100.0 * 2.0 * std::f64::consts::PI * 0.32 / std::f64::consts::SQRT_2;
     assert!((sum / (length * exact) - 1.0).abs() < 0.03, "{sum} {}", length * exact);
 }
@@ -142,7 +157,8 @@ fn order_does_not_matter() {
     let drawn = Pieces::new(128, 128).circle(0.5, 0.5, 0.35);
     for o in variants() {
         let c = Chamfer::prepare(&seen.map(), 128, 128, &o).unwrap();
-        let (a, b) = (c.log_likelihood(&drawn.elements()), c.log_likelihood(&drawn.reversed().elements()));
+        let (a, b) =
+            (c.log_likelihood(&drawn.elements()), c.log_likelihood(&drawn.reversed().elements()));
         assert!((a - b).abs() <= 1e-10 * a.abs(), "{o:?} {a} {b}");
     }
 }
@@ -156,8 +172,12 @@ fn small_moves_change_little() {
         let mut scratch = Scratch::default();
         let mut last = c.distance_with(&drawn.elements(), &mut scratch);
         for i in 1..2000 {
-            let now = c.distance_with(&drawn.moved(0.001 * i as f32, 0.0007 * i as f32).elements(), &mut scratch);
-            // 0.0012 pixels are 0.0007 percent; a piece that enters or leaves at the border shifts the mean by a little more.
+            let now = c.distance_with(
+                &drawn.moved(0.001 * i as f32, 0.0007 * i as f32).elements(),
+                &mut scratch,
+            );
+            // 0.0012 pixels are 0.0007 percent; a piece that enters or leaves at the
+            // border shifts the mean by a little more.
             assert!((now - last).abs() < 0.002, "{o:?} step {i}: {last} {now}");
             last = now;
         }
@@ -180,9 +200,17 @@ fn gradient_is_that_of_differences() {
         ChamferOptions { oriented: Some(1.0), ..options() },
         ChamferOptions { mode: Mode::Sum, truncate: Some(8.0), ..options() },
         ChamferOptions { symmetric: true, ..options() },
-        ChamferOptions { symmetric: true, oriented: Some(2.0), truncate: Some(7.0), mode: Mode::Sum, ..options() },
+        ChamferOptions {
+            symmetric: true,
+            oriented: Some(2.0),
+            truncate: Some(7.0),
+            mode: Mode::Sum,
+            ..options()
+        },
     ] {
-        let prepared = |sigma| Chamfer::prepare(&seen, 128, 128, &ChamferOptions { sigma, ..o.clone() }).unwrap();
+        let prepared = |sigma| {
+            Chamfer::prepare(&seen, 128, 128, &ChamferOptions { sigma, ..o.clone() }).unwrap()
+        };
         let c = prepared(5.0);
         let mut out = Vec::new();
         let by_sigma = c.gradient(&drawn.elements(), &mut Scratch::default(), &mut out);
@@ -190,7 +218,8 @@ fn gradient_is_that_of_differences() {
         let numeric = (scored(5.001) - scored(4.999)) / 0.002;
         assert!((numeric - by_sigma).abs() < 1e-5 * numeric.abs(), "{o:?}: {numeric} {by_sigma}");
         let bad = drawn.differing(&out, |e| c.log_likelihood(e));
-        // A difference that straddles a line of the grid, or two nearest pieces, need not agree.
+        // A difference that straddles a line of the grid, or two nearest pieces, need not
+        // agree.
         assert!(bad <= 16, "{o:?}: {bad} of 248 differ");
     }
 }
@@ -203,7 +232,8 @@ fn nothing_in_view_is_a_diagonal_away() {
     for o in variants() {
         let c = Chamfer::prepare(&seen, 64, 48, &o).unwrap();
         for nothing in [&out, &Pieces::new(64, 48)] {
-            let expected = if o.symmetric { 0.5 * (100.0 + o.truncate.unwrap_or(100.0)) } else { 100.0 };
+            let expected =
+                if o.symmetric { 0.5 * (100.0 + o.truncate.unwrap_or(100.0)) } else { 100.0 };
             assert!((c.distance(&nothing.elements()) - expected).abs() < 1e-4, "{o:?}");
             assert!(c.log_likelihood(&nothing.elements()) < c.log_likelihood(&drawn.elements()));
         }
@@ -217,8 +247,13 @@ fn nothing_in_view_is_a_diagonal_away() {
 fn extremes_give_numbers_or_errors() {
     let seen = clutter(64, 64, 8, 2).map();
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(Chamfer::prepare(&seen, 64, 64, &ChamferOptions { sigma: bad, ..options() }).is_err());
-        assert!(Chamfer::prepare(&seen, 64, 64, &ChamferOptions { truncate: Some(bad), ..options() }).is_err());
+        assert!(
+            Chamfer::prepare(&seen, 64, 64, &ChamferOptions { sigma: bad, ..options() }).is_err()
+        );
+        assert!(
+            Chamfer::prepare(&seen, 64, 64, &ChamferOptions { truncate: Some(bad), ..options() })
+                .is_err()
+        );
     }
     assert!(Chamfer::prepare(&seen, 0, 64, &options()).is_err());
     let mut torn = seen.clone();
@@ -239,14 +274,16 @@ fn extremes_give_numbers_or_errors() {
         }
     }
     // One pixel.
-    let c = Chamfer::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options()).unwrap();
+    let c =
+        Chamfer::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options()).unwrap();
     assert!(c.distance(&Pieces::new(1, 1).circle(0.5, 0.5, 0.4).elements()).is_finite());
 }
 
 #[test]
 fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
     let seen = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
-    let all = Pieces::new(96, 96).circle(0.52, 0.5, 0.3).circle(0.4, 0.4, 0.35).circle(0.99, 0.5, 0.1);
+    let all =
+        Pieces::new(96, 96).circle(0.52, 0.5, 0.3).circle(0.4, 0.4, 0.35).circle(0.99, 0.5, 0.1);
     for options in variants() {
         let chamfer = Chamfer::prepare(&seen.map(), 96, 96, &options).unwrap();
         let (mut tally, mut asked) = (Tally::default(), 0);
@@ -256,7 +293,8 @@ fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
                 count.set(count.get() + 1);
                 whole.elements()
             };
-            let score = chamfer.log_likelihood_after(step, elements, &mut tally, &mut Scratch::default());
+            let score =
+                chamfer.log_likelihood_after(step, elements, &mut tally, &mut Scratch::default());
             assert_eq!(score.to_bits(), chamfer.log_likelihood(&whole.elements()).to_bits());
             asked += usize::from(count.get() > 0);
         });

@@ -1,9 +1,11 @@
-//! The log ratio at every place of the grid: how the distance to the nearest edge is distributed round that place, and how
-//! much likelier an edge of one's own makes the distance found. For one orientation channel at a time. Invariant: every
-//! density is positive and integrates to 1 with the mass at the truncation, so every score is finite.
+//! The log ratio at every place of the grid: how the distance to the nearest edge is
+//! distributed round that place, and how much likelier an edge of one's own makes the
+//! distance found. For one orientation channel at a time. Invariant: every density is
+//! positive and integrates to 1 with the mass at the truncation, so every score is
+//! finite.
 //!
-//! Counts are taken over tiles, tiles are added up to windows centred on tiles, and densities between window centres and
-//! between bin centres are interpolated linearly.
+//! Counts are taken over tiles, tiles are added up to windows centred on tiles, and
+//! densities between window centres and between bin centres are interpolated linearly.
 
 use super::super::field::Edges;
 use super::ContourRatioOptions;
@@ -16,10 +18,12 @@ const BINS: usize = 24;
 /// Tiles along the longer side of the picture.
 const TILES: usize = 32;
 
-/// What the whole picture's distribution counts for in a window's, as a share of the window.
+/// What the whole picture's distribution counts for in a window's, as a share of the
+/// window.
 const PRIOR: f64 = 0.05;
 
-/// A distribution of distances: the bins' masses. What is missing to 1 lies beyond the truncation.
+/// A distribution of distances: the bins' masses. What is missing to 1 lies beyond the
+/// truncation.
 type Masses = [f32; BINS];
 
 /// The score at every place, from the distances in percent of the diagonal.
@@ -30,7 +34,8 @@ pub(super) fn scores(grid: &Edges, distance: &[f32], options: &ContourRatioOptio
     let ratio = Ratio::new(options);
     let mut out = vec![libm::log(1.0 - options.foreground) as f32; distance.len()];
     // The places of a row that are near an edge, side by side.
-    let (mut places, mut near, mut density) = (Vec::with_capacity(w), Vec::with_capacity(w), Vec::with_capacity(w));
+    let (mut places, mut near, mut density) =
+        (Vec::with_capacity(w), Vec::with_capacity(w), Vec::with_capacity(w));
     let mut scores = Vec::with_capacity(w);
     for (y, (distance, out)) in distance.chunks_exact(w).zip(out.chunks_exact_mut(w)).enumerate() {
         places.clear();
@@ -53,7 +58,8 @@ pub(super) fn scores(grid: &Edges, distance: &[f32], options: &ContourRatioOptio
     out
 }
 
-/// A bin's mass in the windows about a place, and how much more there is in the next bin: up left, up right, down left, down right.
+/// A bin's mass in the windows about a place, and how much more there is in the next bin:
+/// up left, up right, down left, down right.
 type Quad = [[f32; 4]; 2];
 
 /// The windows' distributions.
@@ -80,7 +86,8 @@ impl Windows {
         for (y, row) in distance.chunks_exact(w).enumerate() {
             let tiles = &mut counts[y / side * across..][..across];
             for (tile, row) in tiles.iter_mut().zip(row.chunks(side)) {
-                row.iter().for_each(|&d| tile[((f64::from(d) * per_bin) as u32 as usize).min(BINS)] += 1);
+                row.iter()
+                    .for_each(|&d| tile[((f64::from(d) * per_bin) as u32 as usize).min(BINS)] += 1);
             }
         }
         let mut all = [0u64; BINS + 1];
@@ -91,7 +98,8 @@ impl Windows {
         let total = all.iter().sum::<u64>() as f64 + (BINS + 1) as f64;
         let reach_x = (0.5 * options.window * w as f64 / side as f64).max(0.5);
         let reach_y = (0.5 * options.window * h as f64 / side as f64).max(0.5);
-        let counts: Vec<[f64; BINS + 1]> = counts.into_iter().map(|tile| tile.map(f64::from)).collect();
+        let counts: Vec<[f64; BINS + 1]> =
+            counts.into_iter().map(|tile| tile.map(f64::from)).collect();
         let mut masses = Vec::with_capacity(across * down);
         for ty in 0..down {
             for tx in 0..across {
@@ -102,7 +110,9 @@ impl Windows {
                         for (v, wy) in overlap(ty, reach_y, down) {
                             for (u, wx) in overlap(tx, reach_x, across) {
                                 let weight = wx * wy;
-                                sum.iter_mut().zip(&counts[v * across + u]).for_each(|(s, &n)| *s += weight * n);
+                                sum.iter_mut()
+                                    .zip(&counts[v * across + u])
+                                    .for_each(|(s, &n)| *s += weight * n);
                             }
                         }
                     },
@@ -120,7 +130,15 @@ impl Windows {
             (left as u32, fraction)
         };
         let quads = vec![[[[0.0; 4]; 2]; BINS]; across];
-        Windows { down, side, masses, columns: (0..w).map(column).collect(), below: 0.0, above: usize::MAX, quads }
+        Windows {
+            down,
+            side,
+            masses,
+            columns: (0..w).map(column).collect(),
+            below: 0.0,
+            above: usize::MAX,
+            quads,
+        }
     }
 
     /// Turns to a row of the grid.
@@ -155,7 +173,8 @@ impl Windows {
     }
 }
 
-/// The tiles within `reach` tiles of the middle of tile `at`, each with the part of it that is covered.
+/// The tiles within `reach` tiles of the middle of tile `at`, each with the part of it
+/// that is covered.
 fn overlap(at: usize, reach: f64, n: usize) -> impl Iterator<Item = (usize, f64)> {
     let (low, high) = (at as f64 + 0.5 - reach, at as f64 + 0.5 + reach);
     let first = low.max(0.0) as usize;

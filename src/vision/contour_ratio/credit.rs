@@ -1,9 +1,11 @@
-//! How often observed edges pay: edges in one small cell of the picture and of like orientation form a group, whose positive
-//! scores are scaled down once the contour that claims them is longer than `credit` times the edges themselves. It scores
-//! nothing. Invariant: exact integer sums per group, so the order of the claims has no influence, and every share is a
-//! continuous function of the claims.
+//! How often observed edges pay: edges in one small cell of the picture and of like
+//! orientation form a group, whose positive scores are scaled down once the contour that
+//! claims them is longer than `credit` times the edges themselves. It scores nothing.
+//! Invariant: exact integer sums per group, so the order of the claims has no influence,
+//! and every share is a continuous function of the claims.
 //!
-//! Groups, and not single edge pixels, because a piece of contour at a coarse resolution is longer than an edge pixel.
+//! Groups, and not single edge pixels, because a piece of contour at a coarse resolution
+//! is longer than an edge pixel.
 
 use super::super::field::{CHANNELS, Edges};
 use rustc_hash::FxHashMap;
@@ -28,7 +30,8 @@ pub(super) struct Capacity {
 }
 
 impl Capacity {
-    /// Groups edges; a cell is no smaller than a pixel of the frame (`pixel`, in grid units).
+    /// Groups edges; a cell is no smaller than a pixel of the frame (`pixel`, in grid
+    /// units).
     pub fn new(grid: &Edges, pixel: f32, credit: f64) -> Self {
         let side = (grid.width.max(grid.height) as f32 / CELLS).max(pixel);
         let mut numbers: FxHashMap<(u32, u32, u32), u32> = FxHashMap::default();
@@ -81,7 +84,8 @@ pub(super) struct Mark {
     length: i64,
 }
 
-/// The claims of some contour, of which pieces may come and go. Reused from evaluation to evaluation.
+/// The claims of some contour, of which pieces may come and go. Reused from evaluation to
+/// evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
     claims: Vec<Claim>,
@@ -115,7 +119,8 @@ impl Scratch {
         (self.paid, self.total, self.length, self.of) = (0, 0, 0, None);
     }
 
-    /// Adds a claim (`sign` 1) or takes it back (-1): a length of contour in percent and the score (length times log ratio) it would bring.
+    /// Adds a claim (`sign` 1) or takes it back (-1): a length of contour in percent and
+    /// the score (length times log ratio) it would bring.
     #[inline]
     pub(super) fn claim(&mut self, group: u32, length: f64, score: f64, sign: i64) {
         if let Some(claim) = self.claims.get_mut(group as usize) {
@@ -155,17 +160,24 @@ impl Scratch {
 
     /// What a group pays for one more unit of length that would bring `score` for each.
     pub(super) fn slope(&self, capacity: &Capacity, group: u32, score: f64) -> f64 {
-        let (Some(claim), Some(&limit)) = (self.claims.get(group as usize), capacity.limit.get(group as usize)) else {
+        let (Some(claim), Some(&limit)) =
+            (self.claims.get(group as usize), capacity.limit.get(group as usize))
+        else {
             return 0.0;
         };
         let length = claim.length as f64 / FIXED;
-        if length > limit { limit / length * (score - claim.score as f64 / FIXED / length) } else { score }
+        if length > limit {
+            limit / length * (score - claim.score as f64 / FIXED / length)
+        } else {
+            score
+        }
     }
 
     /// The scores paid. Each group's is rounded to the fixed point before they are added.
     pub(super) fn settle(&mut self, capacity: &Capacity) -> f64 {
         for id in self.open.drain(..) {
-            let (Some(claim), Some(&limit)) = (self.claims.get_mut(id as usize), capacity.limit.get(id as usize))
+            let (Some(claim), Some(&limit)) =
+                (self.claims.get_mut(id as usize), capacity.limit.get(id as usize))
             else {
                 continue;
             };

@@ -1,5 +1,6 @@
-//! The derivatives of the contour ratio by the rendered elements: those of the table, read between its places, and of what groups of
-//! edges pay. At the lines of the grid they are those of one side.
+//! The derivatives of the contour ratio by the rendered elements: those of the table,
+//! read between its places, and of what groups of edges pay. At the lines of the grid
+//! they are those of one side.
 
 use super::super::elements::Elements;
 use super::super::field::{PER_RADIAN, channels_of};
@@ -7,16 +8,24 @@ use super::credit::NO_GROUP;
 use super::{ContourRatio, Scratch};
 
 impl ContourRatio {
-    /// The derivatives of [`ContourRatio::log_likelihood`] by each element's x, y, length (pixels) and angle (radians, from right
-    /// to down) into `out`.
-    pub fn gradient(&self, elements: &Elements<'_>, scratch: &mut Scratch, out: &mut Vec<[f64; 4]>) {
+    /// The derivatives of [`ContourRatio::log_likelihood`] by each element's x, y, length
+    /// (pixels) and angle (radians, from right to down) into `out`.
+    pub fn gradient(
+        &self,
+        elements: &Elements<'_>,
+        scratch: &mut Scratch,
+        out: &mut Vec<[f64; 4]>,
+    ) {
         out.clear();
         out.resize(elements.len(), [0.0; 4]);
         // Fills in what every group is asked for.
         self.log_likelihood_with(elements, scratch);
         let samples = self.grid.width as usize * self.grid.height as usize;
         let factor = self.options.weight / self.options.unit;
-        let length: f64 = elements.in_view().map(|e| (f64::from(e.length * e.weight) * self.percent).min(1e4)).sum();
+        let length: f64 = elements
+            .in_view()
+            .map(|e| (f64::from(e.length * e.weight) * self.percent).min(1e4))
+            .sum();
         // With too little in view, each unit of length takes away some of the penalty.
         let missing = if length < self.options.least {
             -self.options.nothing * libm::log(1.0 - self.options.foreground) / self.options.least
@@ -27,7 +36,8 @@ impl ContourRatio {
             let Some(place) = out.get_mut(e.index) else { continue };
             let (low, high, f) = channels_of(e.tx, e.ty);
             let corners = self.grid.corners(e.x, e.y);
-            // What a unit of length brings in each channel, with its slopes over the grid.
+            // What a unit of length brings in each channel, with its slopes over the
+            // grid.
             let read = |k: usize| {
                 let [a, b, c, d] = corners.at.map(|at| match self.cells.get(k * samples + at) {
                     Some(cell) if cell.group == NO_GROUP => f64::from(cell.score),
@@ -42,7 +52,8 @@ impl ContourRatio {
             let [value, dx, dy] = [0, 1, 2].map(|i| a[i] + f * (b[i] - a[i]));
             let (by_length, weight) = (factor * (value + missing), f64::from(e.weight));
             let by = factor * f64::from(e.length) * weight * self.percent;
-            let border = elements.view_slope(&e).map(|s| s * by_length * f64::from(e.length) * self.percent);
+            let border =
+                elements.view_slope(&e).map(|s| s * by_length * f64::from(e.length) * self.percent);
             *place = [
                 by * dx * f64::from(self.grid.sx) + border[0],
                 by * dy * f64::from(self.grid.sy) + border[1],

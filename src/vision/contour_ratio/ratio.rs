@@ -1,17 +1,22 @@
-//! The log ratio of a piece at a distance from the nearest edge, `ln(foreground f(d) / b + 1 - foreground)`, for many distances `d`
-//! and densities `b`, several at a time. Invariant: every score is the one that [`Ratio::plain`] gives one by one, to the last bit.
+//! The log ratio of a piece at a distance from the nearest edge,
+//! `ln(foreground f(d) / b + 1 - foreground)`, for many distances `d` and densities `b`,
+//! several at a time. Invariant: every score is the one that [`Ratio::plain`] gives one
+//! by one, to the last bit.
 //!
-//! Exponentials and logarithms are worked out to 13 digits; where that leaves open which of two single precision numbers is the
-//! nearest, which is once in many thousand times, the plain way decides.
+//! Exponentials and logarithms are worked out to 13 digits; where that leaves open which
+//! of two single precision numbers is the nearest, which is once in many thousand times,
+//! the plain way decides.
 
 use super::ContourRatioOptions;
 use crate::num::simd::vectorised;
 use std::f64::consts::{LN_2, LOG2_E, PI};
 
-/// What the quick way may be wrong by, as a share of one more than the score's magnitude; many times what it is wrong by.
+/// What the quick way may be wrong by, as a share of one more than the score's magnitude;
+/// many times what it is wrong by.
 const DOUBT: f64 = 1e-12;
 
-/// Adding and taking this away rounds to a whole number, which is in the lowest bits meanwhile.
+/// Adding and taking this away rounds to a whole number, which is in the lowest bits
+/// meanwhile.
 const ROUND: f64 = 6755399441055744.0;
 
 /// What the score depends on besides distance and density.
@@ -58,7 +63,8 @@ impl Ratio {
     }
 }
 
-/// The exponential of a number that is not above 0, as a multiple of 1 + 1e-14 at most; below e^-700 as there.
+/// The exponential of a number that is not above 0, as a multiple of 1 + 1e-14 at most;
+/// below e^-700 as there.
 #[inline(always)]
 fn quick_exp(x: f64) -> f64 {
     let x = if x < -700.0 { -700.0 } else { x };
@@ -66,15 +72,28 @@ fn quick_exp(x: f64) -> f64 {
     let r = x - (shifted - ROUND) * LN_2;
     // Taylor's series for at most half of ln 2, from its end.
     let mut sum = 1.0 / 6227020800.0;
-    for factorial in [479001600.0, 39916800.0, 3628800.0, 362880.0, 40320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0]
-    {
+    for factorial in [
+        479001600.0,
+        39916800.0,
+        3628800.0,
+        362880.0,
+        40320.0,
+        5040.0,
+        720.0,
+        120.0,
+        24.0,
+        6.0,
+        2.0,
+        1.0,
+    ] {
         sum = sum * r + 1.0 / factorial;
     }
     let power = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
     (sum * r + 1.0) * power
 }
 
-/// The natural logarithm of a number above 1e-300, to 1e-14 of one more than its magnitude.
+/// The natural logarithm of a number above 1e-300, to 1e-14 of one more than its
+/// magnitude.
 #[inline(always)]
 fn quick_ln(x: f64) -> f64 {
     const HALF: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
@@ -111,8 +130,13 @@ mod tests {
     #[test]
     fn scores_are_those_of_the_plain_way() {
         for (foreground, sd) in [(0.75, 0.4), (1e-6, 1e-3), (1.0 - 1e-9, 50.0)] {
-            let ratio = Ratio::new(&ContourRatioOptions { foreground, sd, ..ContourRatioOptions::default() });
-            let distance: Vec<f64> = (0..40_000).map(|i| f64::from(i * 7919 % 40_000) * 1e-4).collect();
+            let ratio = Ratio::new(&ContourRatioOptions {
+                foreground,
+                sd,
+                ..ContourRatioOptions::default()
+            });
+            let distance: Vec<f64> =
+                (0..40_000).map(|i| f64::from(i * 7919 % 40_000) * 1e-4).collect();
             let density: Vec<f64> = (0..40_000).map(|i| 1e-4 + f64::from(i % 997) * 2e-3).collect();
             let mut scores = Vec::new();
             ratio.scores(&distance, &density, &mut scores);

@@ -11,7 +11,8 @@ fn prepare(seen: &Pieces, size: u32) -> ContourRatio {
     ContourRatio::prepare(&seen.map(), size, size, &options()).unwrap()
 }
 
-/// A single vertical edge line: the scores are known in closed form but for the window's counts, which are plain sums.
+/// A single vertical edge line: the scores are known in closed form but for the window's
+/// counts, which are plain sums.
 #[test]
 fn scores_follow_the_formula() {
     let mut seen = Pieces::new(256, 256);
@@ -25,13 +26,15 @@ fn scores_follow_the_formula() {
         let mut one = Pieces::new(256, 256);
         one.push(128.0 + offset, 128.0, std::f32::consts::FRAC_PI_2, 1.0);
         let got = c.log_likelihood(&one.elements()) / (o.weight / o.unit) / percent;
-        // Window of 64 pixels in the middle, of which distances cover 2 pixels per pixel; 5 % comes from the whole picture.
+        // Window of 64 pixels in the middle, of which distances cover 2 pixels per pixel;
+        // 5 % comes from the whole picture.
         let d = f64::from(offset) * percent;
         let expected = if d >= 3.3 {
             0.25f64.ln()
         } else {
             let density = (0.95 * 2.0 / 64.0 + 0.05 * 2.0 / 256.0) / percent;
-            let own = 2.0 / (2.0 * std::f64::consts::PI).sqrt() / 0.4 * (-0.5 * (d / 0.4).powi(2)).exp();
+            let own =
+                2.0 / (2.0 * std::f64::consts::PI).sqrt() / 0.4 * (-0.5 * (d / 0.4).powi(2)).exp();
             (0.75 * own / density + 0.25).ln()
         };
         assert!((got - expected).abs() < 0.2, "{offset}: {got} {expected}");
@@ -61,7 +64,9 @@ fn the_true_circle_wins() {
     let score = |x, y, r| c.log_likelihood(&Pieces::new(128, 128).circle(x, y, r).elements());
     let truth = score(0.5, 0.5, 0.3);
     assert!(truth > 0.0);
-    for (x, y, r) in [(0.53, 0.5, 0.3), (0.5, 0.5, 0.33), (0.5, 0.5, 0.15), (0.3, 0.4, 0.1), (0.7, 0.6, 0.02)] {
+    for (x, y, r) in
+        [(0.53, 0.5, 0.3), (0.5, 0.5, 0.33), (0.5, 0.5, 0.15), (0.3, 0.4, 0.1), (0.7, 0.6, 0.02)]
+    {
         assert!(score(x, y, r) < truth, "{x} {y} {r}");
     }
 }
@@ -70,8 +75,10 @@ fn the_true_circle_wins() {
 fn resolution_does_not_matter() {
     let seen = clutter(256, 256, 30, 8).circle(0.5, 0.5, 0.3);
     for (x, r) in [(0.5, 0.3), (0.51, 0.3), (0.55, 0.2)] {
-        let scores = [64u32, 128, 256]
-            .map(|size| prepare(&seen, size).log_likelihood(&Pieces::new(size, size).circle(x, 0.5, r).elements()));
+        let scores = [64u32, 128, 256].map(|size| {
+            prepare(&seen, size)
+                .log_likelihood(&Pieces::new(size, size).circle(x, 0.5, r).elements())
+        });
         let spread = scores.iter().fold(0.0f64, |m, s| m.max((s - scores[2]).abs()));
         assert!(spread < 0.04 * scores[2].abs() + 1.0, "{scores:?}");
     }
@@ -81,7 +88,10 @@ fn resolution_does_not_matter() {
 fn order_does_not_matter_to_the_last_bit() {
     let seen = clutter(128, 128, 40, 9);
     let c = prepare(&seen, 128);
-    let drawn = Pieces::new(128, 128).circle(0.5, 0.5, 0.35).circle(0.5, 0.5, 0.352).circle(0.51, 0.5, 0.35);
+    let drawn = Pieces::new(128, 128)
+        .circle(0.5, 0.5, 0.35)
+        .circle(0.5, 0.5, 0.352)
+        .circle(0.51, 0.5, 0.35);
     let mut scratch = Scratch::default();
     let a = c.log_likelihood_with(&drawn.elements(), &mut scratch);
     let b = c.log_likelihood_with(&drawn.reversed().elements(), &mut scratch);
@@ -93,12 +103,17 @@ fn order_does_not_matter_to_the_last_bit() {
 fn small_moves_change_little() {
     let seen = clutter(128, 128, 40, 11).circle(0.5, 0.5, 0.35);
     let c = prepare(&seen, 128);
-    let drawn = Pieces::new(128, 128).circle(0.5, 0.5, 0.35).circle(0.5, 0.5, 0.353).circle(1.0, 0.4, 0.2);
+    let drawn =
+        Pieces::new(128, 128).circle(0.5, 0.5, 0.35).circle(0.5, 0.5, 0.353).circle(1.0, 0.4, 0.2);
     let mut scratch = Scratch::default();
     let mut last = c.log_likelihood_with(&drawn.elements(), &mut scratch);
     for i in 1..3000 {
-        let now = c.log_likelihood_with(&drawn.moved(0.001 * i as f32, 0.0007 * i as f32).elements(), &mut scratch);
-        // Some 700 pieces, each of which can change by a few hundredths per hundredth of a pixel.
+        let now = c.log_likelihood_with(
+            &drawn.moved(0.001 * i as f32, 0.0007 * i as f32).elements(),
+            &mut scratch,
+        );
+        // Some 700 pieces, each of which can change by a few hundredths per hundredth of
+        // a pixel.
         assert!((now - last).abs() < 0.5, "step {i}: {last} {now}");
         last = now;
     }
@@ -189,7 +204,9 @@ fn extremes_give_numbers_or_errors() {
         let c = ContourRatio::prepare(&seen, 64, 64, &o).unwrap();
         assert!(c.log_likelihood(&drawn.elements()).is_finite(), "{o:?}");
     }
-    let one = ContourRatio::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options()).unwrap();
+    let one =
+        ContourRatio::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options())
+            .unwrap();
     assert!(one.log_likelihood(&Pieces::new(1, 1).circle(0.5, 0.5, 0.4).elements()).is_finite());
 }
 
@@ -199,8 +216,10 @@ fn gradient_is_that_of_differences() {
     let mut drawn = Pieces::new(128, 128).circle(0.52, 0.49, 0.29);
     drawn.push(-0.2, 50.3, 1.0, 1.0);
     drawn.push(70.3, 128.3, 1.0, 1.0);
-    // Smooth scores, so that differences are about slopes; then too little contour, and edges that pay no more.
-    let smooth = ContourRatioOptions { sd: 3.0, truncate: 12.0, weight: 0.05, credit: 1e9, ..options() };
+    // Smooth scores, so that differences are about slopes; then too little contour, and
+    // edges that pay no more.
+    let smooth =
+        ContourRatioOptions { sd: 3.0, truncate: 12.0, weight: 0.05, credit: 1e9, ..options() };
     for o in [
         smooth.clone(),
         ContourRatioOptions { least: 1e3, ..smooth.clone() },
@@ -217,9 +236,16 @@ fn gradient_is_that_of_differences() {
 #[test]
 fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
     let seen = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
-    let all = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.5, 0.5, 0.305).circle(0.4, 0.4, 0.35);
+    let all =
+        Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.5, 0.5, 0.305).circle(0.4, 0.4, 0.35);
     // Little credit, so that groups are asked for more than they pay.
-    let ratio = ContourRatio::prepare(&seen.map(), 96, 96, &ContourRatioOptions { credit: 0.8, ..options() }).unwrap();
+    let ratio = ContourRatio::prepare(
+        &seen.map(),
+        96,
+        96,
+        &ContourRatioOptions { credit: 0.8, ..options() },
+    )
+    .unwrap();
     let (mut scratch, mut asked) = (Scratch::default(), 0);
     comings_and_goings(&all, |step, whole| {
         let mut count = 0;

@@ -1,5 +1,6 @@
-//! What the trees of a structured forest look at: colours, and gradients at two scales, each as strong as the gradients around are
-//! weak, by direction. All smaller than the picture, and smoothed a little or more.
+//! What the trees of a structured forest look at: colours, and gradients at two scales,
+//! each as strong as the gradients around are weak, by direction. All smaller than the
+//! picture, and smoothed a little or more.
 
 use super::ForestOptions;
 use crate::vision::gradient::mirrored;
@@ -12,7 +13,8 @@ pub(super) struct Plane {
     pub data: Vec<f32>,
 }
 
-/// The features of a picture with a border around it; those of one pixel lie side by side.
+/// The features of a picture with a border around it; those of one pixel lie side by
+/// side.
 pub(super) struct Features {
     pub width: usize,
     pub height: usize,
@@ -29,12 +31,17 @@ impl Features {
         let luv = bordered(rgb, width, height, o);
         let mut all: Vec<Plane> = luv.iter().map(|p| averaged(p, o.shrink)).collect();
         for halving in [1, 2] {
-            let scaled = luv.each_ref().map(|p| smoothed(&averaged(p, halving), o.gradient_smoothing));
+            let scaled =
+                luv.each_ref().map(|p| smoothed(&averaged(p, halving), o.gradient_smoothing));
             let (magnitude, bins) = gradient(&scaled, o);
             all.push(averaged(&magnitude, o.shrink / halving));
             for bin in 0..o.orientations {
-                let data = magnitude.data.iter().zip(&bins).map(|(m, b)| if *b == bin { *m } else { 0.0 });
-                all.push(averaged(&Plane { data: data.collect(), ..magnitude }, o.shrink / halving));
+                let data =
+                    magnitude.data.iter().zip(&bins).map(|(m, b)| if *b == bin { *m } else { 0.0 });
+                all.push(averaged(
+                    &Plane { data: data.collect(), ..magnitude },
+                    o.shrink / halving,
+                ));
             }
         }
         let (width, height) = (all[0].width, all[0].height);
@@ -56,8 +63,8 @@ pub(super) fn rounded(a: usize, b: usize) -> usize {
     (a as f64 / b as f64).round_ties_even() as usize
 }
 
-/// The colours of a picture that is mirrored beyond its border: as far as patches reach, and so that its sides can be halved and
-/// shrunk.
+/// The colours of a picture that is mirrored beyond its border: as far as patches reach,
+/// and so that its sides can be halved and shrunk.
 fn bordered(rgb: &[[f32; 3]], width: usize, height: usize, o: &ForestOptions) -> [Plane; 3] {
     let border = (o.patch - o.inner) / 2;
     let side = |n: usize| (n + 2 * border).next_multiple_of(2 * o.shrink);
@@ -91,7 +98,8 @@ fn lightness() -> Vec<f32> {
     (0..STEPS + 40).map(of).collect()
 }
 
-/// L*, u* and v* of sRGB values, which are taken for linear light: so were those that forests were trained on.
+/// L*, u* and v* of sRGB values, which are taken for linear light: so were those that
+/// forests were trained on.
 fn luv([r, g, b]: [f32; 3], table: &[f32]) -> [f32; 3] {
     let x = 0.430_574 * r + 0.341_550 * g + 0.178_325 * b;
     let y = 0.222_015 * r + 0.706_655 * g + 0.071_330 * b;
@@ -100,7 +108,11 @@ fn luv([r, g, b]: [f32; 3], table: &[f32]) -> [f32; 3] {
     let n = 1.0 / (x + 15.0 * y + 3.0 * z + 1e-35);
     // The white point, and what makes the least u* and v* zero.
     let (white_u, white_v) = (0.197_833, 0.468_331);
-    [l, l * 13.0 * (4.0 * x * n - white_u) + 88.0 * UNIT, l * 13.0 * (9.0 * y * n - white_v) + 134.0 * UNIT]
+    [
+        l,
+        l * 13.0 * (4.0 * x * n - white_u) + 88.0 * UNIT,
+        l * 13.0 * (9.0 * y * n - white_v) + 134.0 * UNIT,
+    ]
 }
 
 /// Means of squares of `by` pixels a side; sides are multiples of it.
@@ -119,7 +131,8 @@ fn averaged(plane: &Plane, by: usize) -> Plane {
     Plane { width, height, data }
 }
 
-/// Smoothed by a triangle of a radius, along rows and columns; mirrored beyond the border, whose pixels count once.
+/// Smoothed by a triangle of a radius, along rows and columns; mirrored beyond the
+/// border, whose pixels count once.
 pub(super) fn smoothed(plane: &Plane, radius: usize) -> Plane {
     if radius == 0 {
         return plane.clone();
@@ -133,7 +146,10 @@ pub(super) fn smoothed(plane: &Plane, radius: usize) -> Plane {
     let mut line = vec![0.0; places.len()];
     for row in plane.data.chunks_exact(w) {
         line.iter_mut().zip(&places).for_each(|(l, i)| *l = row[*i]);
-        across.extend(line.windows(kernel.len()).map(|l| l.iter().zip(&kernel).map(|(v, k)| v * k).sum::<f32>()));
+        across.extend(
+            line.windows(kernel.len())
+                .map(|l| l.iter().zip(&kernel).map(|(v, k)| v * k).sum::<f32>()),
+        );
     }
     let mut data = vec![0.0; across.len()];
     for (j, out) in data.chunks_exact_mut(w).enumerate() {
@@ -154,7 +170,8 @@ fn once(i: i64, n: i64) -> usize {
 /// Less change than this has no direction.
 const FLAT: f32 = 1e-5;
 
-/// The gradient of the channel that changes most, in proportion to the gradients around, and the number of its direction.
+/// The gradient of the channel that changes most, in proportion to the gradients around,
+/// and the number of its direction.
 fn gradient(planes: &[Plane; 3], o: &ForestOptions) -> (Plane, Vec<usize>) {
     let (w, h) = (planes[0].width, planes[0].height);
     let directions: Vec<[f32; 2]> = (0..o.orientations)

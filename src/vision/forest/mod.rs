@@ -1,9 +1,12 @@
-//! Structured forests (Dollár & Zitnick 2013, "Structured forests for fast edge detection", ICCV, 1841-1848): decision trees that
-//! look at patches of 32 x 32 pixels and say where edges run in their middle 16 x 16; what the trees say of overlapping patches is
-//! averaged. Read from the files of OpenCV (`model.yml.gz`); there is no training here.
+//! Structured forests (Dollár & Zitnick 2013, "Structured forests for fast edge
+//! detection", ICCV, 1841-1848): decision trees that look at patches of 32 x 32 pixels
+//! and say where edges run in their middle 16 x 16; what the trees say of overlapping
+//! patches is averaged. Read from the files of OpenCV (`model.yml.gz`); there is no
+//! training here.
 //!
-//! The same numbers as from OpenCV's code for pictures whose sides are multiples of 4; others are padded to that, as the authors'
-//! own code does, where OpenCV resamples by odd factors.
+//! The same numbers as from OpenCV's code for pictures whose sides are multiples of 4;
+//! others are padded to that, as the authors' own code does, where OpenCV resamples by
+//! odd factors.
 
 mod features;
 mod read;
@@ -39,7 +42,8 @@ pub struct ForestOptions {
     pub gradient_smoothing: usize,
     /// The radius of the smoothing of features, in pixels of the picture.
     pub smoothing: usize,
-    /// The radius of the smoothing of features that are compared with each other, in pixels of the picture.
+    /// The radius of the smoothing of features that are compared with each other, in
+    /// pixels of the picture.
     pub similarity_smoothing: usize,
     /// The radius within which gradients are normalised.
     pub normalization: usize,
@@ -52,7 +56,8 @@ pub struct ForestOptions {
 }
 
 impl ForestOptions {
-    /// Features of a pixel: three of colour, and at two scales the gradient's magnitude and its parts by direction.
+    /// Features of a pixel: three of colour, and at two scales the gradient's magnitude
+    /// and its parts by direction.
     fn channels(&self) -> usize {
         2 * (self.orientations + 1) + 3
     }
@@ -74,7 +79,8 @@ impl ForestOptions {
     }
 }
 
-/// One node of a tree; the first child has a larger number than its parent, so every way down ends.
+/// One node of a tree; the first child has a larger number than its parent, so every way
+/// down ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node {
     /// The feature that is looked at.
@@ -107,10 +113,12 @@ impl fmt::Debug for Forest {
 }
 
 impl Forest {
-    /// Reads OpenCV's text (`model.yml`), or the same compressed by gzip (`model.yml.gz`).
+    /// Reads OpenCV's text (`model.yml`), or the same compressed by gzip
+    /// (`model.yml.gz`).
     ///
     /// # Errors
-    /// If it is no such text, or a forest that cannot be used: children before their parents, features that there are none of.
+    /// If it is no such text, or a forest that cannot be used: children before their
+    /// parents, features that there are none of.
     pub fn read(bytes: &[u8]) -> Result<Forest, VisionError> {
         read::forest(bytes).map_err(VisionError::Detector)
     }
@@ -125,7 +133,8 @@ impl Forest {
         &self.options
     }
 
-    /// How likely each pixel of a photograph is to be on an edge, worked out at a longer side of at most `size` pixels.
+    /// How likely each pixel of a photograph is to be on an edge, worked out at a longer
+    /// side of at most `size` pixels.
     pub fn map(&self, photo: &Photo, size: u32) -> SoftMap {
         let (width, height) = fitted(photo.width(), photo.height(), size);
         let small = photo.srgb(width, height);

@@ -1,5 +1,5 @@
-//! From the bytes of a file to a forest. All numbers are checked here, so that whatever a file says, looking at a picture ends and
-//! stays within its arrays.
+//! From the bytes of a file to a forest. All numbers are checked here, so that whatever a
+//! file says, looking at a picture ends and stays within its arrays.
 
 use super::yaml::{Token, Tokens};
 use super::{Forest, ForestOptions, Node};
@@ -89,16 +89,20 @@ fn parse(text: impl BufRead) -> Result<Forest, String> {
             Token::Number(x) => {
                 let whole = |most: u32| match x >= 0.0 && x <= f64::from(most) && x.fract() == 0.0 {
                     true => Ok(x as u32),
-                    false => Err(tokens.wrong(format!("{x} is not a whole number from 0 to {most}"))),
+                    false => {
+                        Err(tokens.wrong(format!("{x} is not a whole number from 0 to {most}")))
+                    }
                 };
                 let room = |n: usize, most: usize| match n < most {
                     true => Ok(()),
-                    false => Err(tokens
-                        .wrong(format!("the forest is too large; at most {most} numbers of one kind are supported"))),
+                    false => Err(tokens.wrong(format!(
+                        "the forest is too large; at most {most} numbers of one kind are supported"
+                    ))),
                 };
                 match at {
                     Some(Part::Options) => {
-                        let name = option.take().ok_or_else(|| tokens.wrong("an option has no name"))?;
+                        let name =
+                            option.take().ok_or_else(|| tokens.wrong("an option has no name"))?;
                         room(raw.options.len(), 64)?;
                         raw.options.push((name, whole(1 << 20)? as usize));
                     }
@@ -124,7 +128,9 @@ fn parse(text: impl BufRead) -> Result<Forest, String> {
                     }
                     Some(Part::Other) => {}
                     None => {
-                        return Err(tokens.wrong("a number without a name; is this the model of a structured forest?"));
+                        return Err(tokens.wrong(
+                            "a number without a name; is this the model of a structured forest?",
+                        ));
                     }
                 }
             }
@@ -143,7 +149,9 @@ fn options(given: &[(String, usize)]) -> Result<ForestOptions, String> {
         }
         match (least..=most).contains(&value) {
             true => Ok(value),
-            false => Err(format!("the option `{name}` must be from {least} to {most}, not {value}")),
+            false => {
+                Err(format!("the option `{name}` must be from {least} to {most}, not {value}"))
+            }
         }
     };
     let options = ForestOptions {
@@ -170,7 +178,10 @@ fn options(given: &[(String, usize)]) -> Result<ForestOptions, String> {
             "`patchSize` minus `patchInnerSize` must be even",
         ),
         (o.evaluated > o.trees, "`numberOfTreesToEvaluate` must be at most `numberOfTrees`"),
-        (o.cells() < 2 * o.grid, "`selfsimilarityGridSize` must be at most half of `patchSize` by `shrinkNumber`"),
+        (
+            o.cells() < 2 * o.grid,
+            "`selfsimilarityGridSize` must be at most half of `patchSize` by `shrinkNumber`",
+        ),
     ] {
         if wrong {
             return Err(why.into());
@@ -192,7 +203,10 @@ fn checked(raw: Raw) -> Result<Forest, String> {
         }
     }
     if count == 0 || !count.is_multiple_of(options.trees) {
-        return Err(format!("{count} nodes cannot be those of {} trees of one size", options.trees));
+        return Err(format!(
+            "{count} nodes cannot be those of {} trees of one size",
+            options.trees
+        ));
     }
     let each = count / options.trees;
     let known = options.plain() + options.pairs();
@@ -202,22 +216,39 @@ fn checked(raw: Raw) -> Result<Forest, String> {
         if child != 0 {
             // Both children come behind: every way down ends.
             if right <= at + 1 || right >= each {
-                return Err(format!("node {at} of tree {} has the child {child} of {each} nodes", i / each));
+                return Err(format!(
+                    "node {at} of tree {} has the child {child} of {each} nodes",
+                    i / each
+                ));
             }
             if raw.features[i] as usize >= known {
-                return Err(format!("node {at} of tree {} asks for feature {} of {known}", i / each, raw.features[i]));
+                return Err(format!(
+                    "node {at} of tree {} asks for feature {} of {known}",
+                    i / each,
+                    raw.features[i]
+                ));
             }
         }
-        nodes.push(Node { feature: raw.features[i], threshold: raw.thresholds[i], left: child.saturating_sub(1) });
+        nodes.push(Node {
+            feature: raw.features[i],
+            threshold: raw.thresholds[i],
+            left: child.saturating_sub(1),
+        });
     }
     let mut begins = raw.boundaries;
     if begins.len() == count {
         begins.push(raw.pixels.len() as u32);
     }
     if begins.len() != count + 1 {
-        return Err(format!("{count} nodes need {} numbers of `edgeBoundaries`, not {}", count + 1, begins.len()));
+        return Err(format!(
+            "{count} nodes need {} numbers of `edgeBoundaries`, not {}",
+            count + 1,
+            begins.len()
+        ));
     }
-    if begins.windows(2).any(|w| w[0] > w[1]) || begins.last().is_some_and(|e| *e as usize > raw.pixels.len()) {
+    if begins.windows(2).any(|w| w[0] > w[1])
+        || begins.last().is_some_and(|e| *e as usize > raw.pixels.len())
+    {
         return Err(format!(
             "`edgeBoundaries` must be ascending, up to at most {}, the length of `edgeBins`",
             raw.pixels.len()

@@ -1,4 +1,5 @@
-//! Features against their definition, leaves against the rules, and files that cannot be used.
+//! Features against their definition, leaves against the rules, and files that cannot be
+//! used.
 
 use super::features::{Features, Plane, smoothed};
 use super::writer::{Text, difference, gzip, options, small};
@@ -17,20 +18,25 @@ fn picture(width: usize, height: usize) -> Vec<[f32; 3]> {
         .map(|k| {
             let (x, y) = ((k % width) as f32, (k / width) as f32);
             let blob = if (x - 20.0).hypot(y - 15.0) < 9.0 { 0.7 } else { 0.2 };
-            [blob, (x / width as f32) * 0.8 + 0.1 * noise(k), 0.5 + 0.4 * libm::sinf(y / 3.0) * noise(3 * k + 1)]
+            [
+                blob,
+                (x / width as f32) * 0.8 + 0.1 * noise(k),
+                0.5 + 0.4 * libm::sinf(y / 3.0) * noise(3 * k + 1),
+            ]
         })
         .collect()
 }
 
-/// The features by their definition, one value at a time in double precision: slow, and nothing in common with the fast way but
-/// the constants.
+/// The features by their definition, one value at a time in double precision: slow, and
+/// nothing in common with the fast way but the constants.
 mod plainly {
     pub struct Picture {
         pub size: [i64; 2],
         pub luv: Vec<[f64; 3]>,
     }
 
-    /// The place `i`, reflected at the ends until it is within; `twice`: the end pixel comes twice.
+    /// The place `i`, reflected at the ends until it is within; `twice`: the end pixel
+    /// comes twice.
     fn reflected(mut i: i64, n: i64, twice: bool) -> i64 {
         let shift = i64::from(twice);
         loop {
@@ -49,17 +55,24 @@ mod plainly {
         let y = 0.222015 * r + 0.706655 * g + 0.071330 * b;
         let z = 0.020183 * r + 0.129553 * g + 0.939180 * b;
         let step = (1024.0 * y).floor() / 1024.0;
-        let l = if step > 0.008856451679 { 116.0 * step.powf(1.0 / 3.0) - 16.0 } else { 903.2962962963 * step };
+        let l = if step > 0.008856451679 {
+            116.0 * step.powf(1.0 / 3.0) - 16.0
+        } else {
+            903.2962962963 * step
+        };
         let all = x + 15.0 * y + 3.0 * z;
         let (u, v) = (13.0 * l * (4.0 * x / all - 0.197833), 13.0 * l * (9.0 * y / all - 0.468331));
         [l / 270.0, (u + 88.0) / 270.0, (v + 134.0) / 270.0]
     }
 
-    /// With 8 pixels around it, reflected, and more on the right and below up to a multiple of 4.
+    /// With 8 pixels around it, reflected, and more on the right and below up to a
+    /// multiple of 4.
     pub fn bordered(rgb: &[[f32; 3]], w: i64, h: i64) -> Picture {
         let up = |n: i64| (n + 16 + 3) / 4 * 4;
         let (bw, bh) = (up(w), up(h));
-        let at = |i: i64, j: i64| luv(rgb[(reflected(j - 8, h, true) * w + reflected(i - 8, w, true)) as usize]);
+        let at = |i: i64, j: i64| {
+            luv(rgb[(reflected(j - 8, h, true) * w + reflected(i - 8, w, true)) as usize])
+        };
         Picture { size: [bw, bh], luv: (0..bw * bh).map(|k| at(k % bw, k / bw)).collect() }
     }
 
@@ -77,10 +90,15 @@ mod plainly {
         /// The length of the steepest channel's change and its direction in degrees, 0 to 180.
         fn change(&self, i: i64, j: i64) -> (f64, f64) {
             let [w, h] = self.size;
-            let at =
-                |i: i64, j: i64, c: usize| self.luv[(reflected(j, h, true) * w + reflected(i, w, true)) as usize][c];
-            let all = [0, 1, 2].map(|c| [at(i + 1, j, c) - at(i - 1, j, c), at(i, j + 1, c) - at(i, j - 1, c)]);
-            let [x, y] = all.into_iter().max_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1]))).unwrap();
+            let at = |i: i64, j: i64, c: usize| {
+                self.luv[(reflected(j, h, true) * w + reflected(i, w, true)) as usize][c]
+            };
+            let all = [0, 1, 2]
+                .map(|c| [at(i + 1, j, c) - at(i - 1, j, c), at(i, j + 1, c) - at(i, j - 1, c)]);
+            let [x, y] = all
+                .into_iter()
+                .max_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])))
+                .unwrap();
             (x.hypot(y), y.atan2(x).to_degrees().rem_euclid(180.0))
         }
 
@@ -91,7 +109,8 @@ mod plainly {
             for dj in -4..=4i64 {
                 for di in -4..=4i64 {
                     let weight = ((5 - di.abs()) * (5 - dj.abs())) as f64 / 625.0;
-                    around += weight * self.change(reflected(i + di, w, false), reflected(j + dj, h, false)).0;
+                    around += weight
+                        * self.change(reflected(i + di, w, false), reflected(j + dj, h, false)).0;
                 }
             }
             self.change(i, j).0 / (around + 0.01)
@@ -109,9 +128,14 @@ mod plainly {
         let half = full.halved();
         let [w, h] = half.size;
         let places = || (0..w * h).map(|k| (k % w, k / w));
-        let mut all: Vec<Vec<f64>> = (0..3).map(|c| half.luv.iter().map(|p| p[c]).collect()).collect();
-        let four = |i: i64, j: i64| [(2 * i, 2 * j), (2 * i + 1, 2 * j), (2 * i, 2 * j + 1), (2 * i + 1, 2 * j + 1)];
-        let mean = |f: &dyn Fn(i64, i64) -> f64, i, j| four(i, j).iter().map(|(i, j)| f(*i, *j)).sum::<f64>() / 4.0;
+        let mut all: Vec<Vec<f64>> =
+            (0..3).map(|c| half.luv.iter().map(|p| p[c]).collect()).collect();
+        let four = |i: i64, j: i64| {
+            [(2 * i, 2 * j), (2 * i + 1, 2 * j), (2 * i, 2 * j + 1), (2 * i + 1, 2 * j + 1)]
+        };
+        let mean = |f: &dyn Fn(i64, i64) -> f64, i, j| {
+            four(i, j).iter().map(|(i, j)| f(*i, *j)).sum::<f64>() / 4.0
+        };
         all.push(places().map(|(i, j)| mean(&|i, j| full.magnitude(i, j), i, j)).collect());
         for b in 0..4 {
             let part = |i, j| if full.bin(i, j) == b { full.magnitude(i, j) } else { 0.0 };
@@ -119,7 +143,11 @@ mod plainly {
         }
         all.push(places().map(|(i, j)| half.magnitude(i, j)).collect());
         for b in 0..4 {
-            all.push(places().map(|(i, j)| if half.bin(i, j) == b { half.magnitude(i, j) } else { 0.0 }).collect());
+            all.push(
+                places()
+                    .map(|(i, j)| if half.bin(i, j) == b { half.magnitude(i, j) } else { 0.0 })
+                    .collect(),
+            );
         }
         all
     }
@@ -129,8 +157,11 @@ mod plainly {
         let mut sum = 0.0;
         for dj in -r..=r {
             for di in -r..=r {
-                let weight = ((r + 1 - di.abs()) * (r + 1 - dj.abs())) as f64 / ((r + 1) * (r + 1)).pow(2) as f64;
-                sum += weight * channel[(reflected(j + dj, h, false) * w + reflected(i + di, w, false)) as usize];
+                let weight = ((r + 1 - di.abs()) * (r + 1 - dj.abs())) as f64
+                    / ((r + 1) * (r + 1)).pow(2) as f64;
+                sum += weight
+                    * channel
+                        [(reflected(j + dj, h, false) * w + reflected(i + di, w, false)) as usize];
             }
         }
         sum
@@ -147,7 +178,8 @@ fn features_are_what_the_definition_says() {
         let slow = plainly::channels(&full);
         let [fw, fh] = full.size.map(|n| n / 2);
         assert_eq!((fast.width as i64, fast.height as i64, fast.channels), (fw, fh, 13));
-        // A direction halfway between two may fall to either in single precision: such pixels are few.
+        // A direction halfway between two may fall to either in single precision: such
+        // pixels are few.
         let (mut off, mut all) = (0, 0);
         for (c, channel) in slow.iter().enumerate() {
             for k in 0..fw * fh {
@@ -178,7 +210,11 @@ fn triangles() {
 #[test]
 fn a_small_forest_finds_the_sides_of_a_square() {
     let photo = Photo::from_rgb(RgbImage::from_fn(160, 120, |x, y| {
-        Rgb(if (50..110).contains(&x) && (30..90).contains(&y) { [230, 228, 225] } else { [40, 42, 45] })
+        Rgb(if (50..110).contains(&x) && (30..90).contains(&y) {
+            [230, 228, 225]
+        } else {
+            [40, 42, 45]
+        })
     }))
     .unwrap();
     let forest = forest(&small()).unwrap();
@@ -192,11 +228,13 @@ fn a_small_forest_finds_the_sides_of_a_square() {
         // In the middle of a side, far from the corners.
         if found.strength[k] > 0.08 && (55.0..105.0).contains(&x) && (y - 60.0).abs() > 20.0 {
             assert!(found.tx[k].abs() > 0.9, "{x} {y}");
-            sides[usize::from(y > 60.0)] += i32::from((y - 30.0).abs() < 2.0 || (y - 90.0).abs() < 2.0);
+            sides[usize::from(y > 60.0)] +=
+                i32::from((y - 30.0).abs() < 2.0 || (y - 90.0).abs() < 2.0);
         }
         if found.strength[k] > 0.08 && (35.0..85.0).contains(&y) && (x - 80.0).abs() > 20.0 {
             assert!(found.ty[k].abs() > 0.9, "{x} {y}");
-            sides[2 + usize::from(x > 80.0)] += i32::from((x - 50.0).abs() < 2.0 || (x - 110.0).abs() < 2.0);
+            sides[2 + usize::from(x > 80.0)] +=
+                i32::from((x - 50.0).abs() < 2.0 || (x - 110.0).abs() < 2.0);
         }
     }
     assert!(sides.iter().all(|n| *n >= 40), "{sides:?}");
@@ -204,10 +242,12 @@ fn a_small_forest_finds_the_sides_of_a_square() {
     assert_eq!(Forest::read(&gzip(small().yaml().as_bytes())).unwrap(), forest);
 }
 
-/// What OpenCV's rules say of one patch, worked out by hand: the tree is chosen by place, its leaf by one feature.
+/// What OpenCV's rules say of one patch, worked out by hand: the tree is chosen by place,
+/// its leaf by one feature.
 #[test]
 fn leaves_fall_where_the_rules_say() {
-    // One tree of one leaf that has one pixel, in row 3 and column 5 of the middle of a patch.
+    // One tree of one leaf that has one pixel, in row 3 and column 5 of the middle of a
+    // patch.
     let one = Text {
         options: options(1, 1),
         children: vec![0],
@@ -219,7 +259,8 @@ fn leaves_fall_where_the_rules_say() {
     let forest = forest(&one).unwrap();
     let photo = Photo::from_rgb(RgbImage::from_pixel(24, 20, Rgb([90, 90, 90]))).unwrap();
     let map = forest.map(&photo, 512);
-    // With a border of 8 there are (40 - 32) / 2 = 4 patches side by side, and 2 one below the other; each says 2 * 4 / 256.
+    // With a border of 8 there are (40 - 32) / 2 = 4 patches side by side, and 2 one
+    // below the other; each says 2 * 4 / 256.
     let mut said = vec![0.0f32; 24 * 20];
     for (i, j) in (0..2).flat_map(|i| (0..4).map(move |j| (i, j))) {
         said[(2 * i + 3) * 24 + 2 * j + 5] = 8.0 / 256.0;
@@ -230,10 +271,14 @@ fn leaves_fall_where_the_rules_say() {
 
 #[test]
 fn places_of_the_grid_and_numbers_of_features() {
-    // 16 x 16 cells of 13 channels, and differences of 25 places; the last one is of places 23 and 24.
+    // 16 x 16 cells of 13 channels, and differences of 25 places; the last one is of
+    // places 23 and 24.
     let o = *forest(&small()).unwrap().options();
     assert_eq!((o.plain(), o.pairs()), (3328, 3900));
-    assert_eq!((difference(0, 1), difference(0, 24), difference(1, 2), difference(23, 24)), (3328, 3351, 3352, 3627));
+    assert_eq!(
+        (difference(0, 1), difference(0, 24), difference(1, 2), difference(23, 24)),
+        (3328, 3351, 3352, 3627)
+    );
 }
 
 #[test]
@@ -254,7 +299,9 @@ fn files_that_cannot_be_used() {
         forest(&text).map(|_| ()).unwrap_err()
     };
     let set = |name: &'static str, value: usize| {
-        changed(&move |t: &mut Text| t.options.iter_mut().filter(|o| o.0 == name).for_each(|o| o.1 = value))
+        changed(&move |t: &mut Text| {
+            t.options.iter_mut().filter(|o| o.0 == name).for_each(|o| o.1 = value)
+        })
     };
     for (why, text) in [
         (set("stride", 0), "`stride` must be from 1 to 128, not 0"),
@@ -273,7 +320,10 @@ fn files_that_cannot_be_used() {
         (changed(&|t| t.children[7 + 2] = 2), "node 2 of tree 1 has the child 2"),
         (changed(&|t| t.features[0] = 7228), "node 0 of tree 0 asks for feature 7228 of 7228"),
         (changed(&|t| t.thresholds.truncate(13)), "14 numbers of `childs`, but 13 of `thresholds`"),
-        (changed(&|t| t.boundaries.truncate(10)), "14 nodes need 15 numbers of `edgeBoundaries`, not 10"),
+        (
+            changed(&|t| t.boundaries.truncate(10)),
+            "14 nodes need 15 numbers of `edgeBoundaries`, not 10",
+        ),
         (changed(&|t| t.boundaries[3] = 40), "must be ascending"),
         (changed(&|t| *t.boundaries.last_mut().unwrap() = 129), "at most 128"),
         (changed(&|t| t.pixels[0] = 13 * 256), "a patch's middle has 256 pixels"),
@@ -307,8 +357,10 @@ fn no_part_of_a_file_is_a_file() {
         }
         // What is read can be used.
         if let Ok(forest) = Forest::read(&text) {
-            let photo =
-                Photo::from_rgb(RgbImage::from_fn(30, 20, |x, y| Rgb([(8 * x) as u8, 99, (9 * y) as u8]))).unwrap();
+            let photo = Photo::from_rgb(RgbImage::from_fn(30, 20, |x, y| {
+                Rgb([(8 * x) as u8, 99, (9 * y) as u8])
+            }))
+            .unwrap();
             assert_eq!(forest.map(&photo, 64).values.len(), 600);
         }
     }
@@ -322,21 +374,28 @@ fn bombs_do_not_go_off() {
     assert!(Forest::read(&gzip(&bomb)).unwrap_err().to_string().contains("a list has no end"));
     let mut numbers = b"childs:\n   - [ 1".to_vec();
     (0..(1 << 23) + 1).for_each(|_| numbers.extend(b",1"));
-    assert!(Forest::read(&gzip(&numbers)).unwrap_err().to_string().contains("the forest is too large"));
+    assert!(
+        Forest::read(&gzip(&numbers)).unwrap_err().to_string().contains("the forest is too large")
+    );
 }
 
-/// How long a text of the length of the paper's forest takes to read: `cargo test --release --lib forest_of_full_size -- --ignored
-/// --nocapture`.
+/// How long a text of the length of the paper's forest takes to read:
+/// `cargo test --release --lib forest_of_full_size -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn forest_of_full_size() {
-    let say = |text: String| std::io::Write::write_all(&mut std::io::stdout(), format!("{text}\n").as_bytes()).unwrap();
+    let say = |text: String| {
+        std::io::Write::write_all(&mut std::io::stdout(), format!("{text}\n").as_bytes()).unwrap()
+    };
     let (trees, each, leaf) = (8usize, 60_001usize, 100usize);
     let mut text = Text { options: options(trees, 4), ..small() };
-    text.children =
-        (0..trees * each).map(|k| k % each).map(|k| if 2 * k + 2 < each { 2 * k as u32 + 2 } else { 0 }).collect();
+    text.children = (0..trees * each)
+        .map(|k| k % each)
+        .map(|k| if 2 * k + 2 < each { 2 * k as u32 + 2 } else { 0 })
+        .collect();
     text.features = (0..trees * each).map(|k| (fnv1a(&k.to_le_bytes()) % 7228) as u32).collect();
-    text.thresholds = (0..trees * each).map(|k| (fnv1a(&(k + 7).to_le_bytes()) % 1000) as f32 / 5000.0).collect();
+    text.thresholds =
+        (0..trees * each).map(|k| (fnv1a(&(k + 7).to_le_bytes()) % 1000) as f32 / 5000.0).collect();
     let is_leaf = |k: usize| text.children[k] == 0;
     text.boundaries = (0..trees * each)
         .scan(0, |n, k| {

@@ -1,4 +1,5 @@
-//! Down the trees of a structured forest, patch by patch, and what their leaves say together.
+//! Down the trees of a structured forest, patch by patch, and what their leaves say
+//! together.
 
 use super::features::{Features, Plane, rounded, smoothed};
 use super::{Forest, ForestOptions, Node};
@@ -11,7 +12,9 @@ struct Places {
 
 impl Places {
     fn new(f: &Features, o: &ForestOptions) -> Places {
-        let at = |row: usize, column: usize, channel: usize| (row * f.width + column) * f.channels + channel;
+        let at = |row: usize, column: usize, channel: usize| {
+            (row * f.width + column) * f.channels + channel
+        };
         let cells = o.cells();
         // Column by column, one channel after the other.
         let plain = |i: usize| at(i % cells, i / cells % cells, i / (cells * cells));
@@ -53,7 +56,10 @@ fn leaf(tree: &[Node], places: &Places, plain: &[f32], similar: &[f32]) -> usize
         };
         // The right child lies behind the left one; what is not smaller goes there.
         at = node.left as usize
-            + usize::from(!matches!(value.partial_cmp(&node.threshold), Some(std::cmp::Ordering::Less)));
+            + usize::from(!matches!(
+                value.partial_cmp(&node.threshold),
+                Some(std::cmp::Ordering::Less)
+            ));
     }
     at
 }
@@ -72,11 +78,14 @@ pub(super) fn edges(forest: &Forest, f: &Features, width: usize, height: usize) 
             for k in 0..o.evaluated {
                 // Neighbours are looked at by different trees.
                 let tree = ((i + j) % (2 * o.evaluated) + k) % o.trees;
-                let leaf = tree * each + leaf(&forest.nodes[tree * each..][..each], &places, plain, similar);
+                let leaf = tree * each
+                    + leaf(&forest.nodes[tree * each..][..each], &places, plain, similar);
                 let pixels = forest.begins[leaf] as usize..forest.begins[leaf + 1] as usize;
                 for &p in &forest.pixels[pixels] {
-                    let (row, column) =
-                        (i * o.stride + usize::from(p) % o.inner, j * o.stride + usize::from(p) / o.inner);
+                    let (row, column) = (
+                        i * o.stride + usize::from(p) % o.inner,
+                        j * o.stride + usize::from(p) / o.inner,
+                    );
                     if row < height && column < width {
                         said[row * width + column] += 1;
                     }

@@ -37,10 +37,12 @@ pub fn difference(a: u32, b: u32) -> u32 {
     16 * 16 * 13 + before + b - a - 1
 }
 
-/// Two trees that say where there is a gradient from left to right, and from top to bottom.
+/// Two trees that say where there is a gradient from left to right, and from top to
+/// bottom.
 pub fn small() -> Text {
-    // No such gradient in the middle cell: leaf 1. Else node 2, where a difference of lightness tells brighter from darker: leaves
-    // 3 and 4, which say the same of edges. Nodes 5 and 6 fill up.
+    // No such gradient in the middle cell: leaf 1. Else node 2, where a difference of
+    // lightness tells brighter from darker: leaves 3 and 4, which say the same of edges.
+    // Nodes 5 and 6 fill up.
     let children = [2, 0, 4, 0, 0, 0, 0];
     let features = |bin: u32, a, b| [(4 + bin) * 256 + 7 * 16 + 7, 0, difference(a, b), 0, 0, 0, 0];
     let thresholds = [0.7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -64,7 +66,11 @@ impl Text {
         for (name, value) in &self.options {
             let _ = writeln!(s, "   {name}: {value}");
         }
-        let trees = self.options.iter().find(|(n, _)| *n == "numberOfTrees").map_or(1, |(_, n)| (*n).max(1));
+        let trees = self
+            .options
+            .iter()
+            .find(|(n, _)| *n == "numberOfTrees")
+            .map_or(1, |(_, n)| (*n).max(1));
         let mut list = |name: &str, numbers: Vec<String>| {
             let _ = writeln!(s, "{name}:");
             for part in numbers.chunks((numbers.len() / trees).max(1)) {

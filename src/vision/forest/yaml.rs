@@ -1,5 +1,6 @@
-//! The part of YAML that OpenCV writes a forest in: names with numbers, lists of numbers and lists of such lists. Read from a
-//! stream, number by number, since a forest's text is some hundred megabytes long.
+//! The part of YAML that OpenCV writes a forest in: names with numbers, lists of numbers
+//! and lists of such lists. Read from a stream, number by number, since a forest's text
+//! is some hundred megabytes long.
 
 use std::io::{BufRead, ErrorKind};
 
@@ -22,7 +23,8 @@ pub struct Tokens<R> {
     /// Bytes read so far.
     read: u64,
     most: u64,
-    /// Whether something other than spaces has been on this line, and whether there were spaces.
+    /// Whether something other than spaces has been on this line, and whether there were
+    /// spaces.
     begun: bool,
     indented: bool,
     /// Brackets that are open.
@@ -45,7 +47,9 @@ impl<R: BufRead> Tokens<R> {
             return match self.from.fill_buf() {
                 Ok(bytes) => Ok(bytes.first().copied()),
                 Err(e) if e.kind() == ErrorKind::Interrupted => continue,
-                Err(e) if e.kind() == ErrorKind::UnexpectedEof => Err(self.wrong("the file is truncated")),
+                Err(e) if e.kind() == ErrorKind::UnexpectedEof => {
+                    Err(self.wrong("the file is truncated"))
+                }
                 Err(e) => Err(self.wrong(format!("cannot decompress it: {e}"))),
             };
         }
@@ -81,7 +85,8 @@ impl<R: BufRead> Tokens<R> {
                     self.indented |= !self.begun;
                     self.skip()?;
                 }
-                // `%YAML:1.0` before the text, `---` where it begins, `...` where it ends.
+                // `%YAML:1.0` before the text, `---` where it begins, `...` where it
+                // ends.
                 b'%' | b'#' if !self.begun && self.depth == 0 => self.skip_line()?,
                 b'[' => {
                     self.depth += 1;
@@ -92,7 +97,8 @@ impl<R: BufRead> Tokens<R> {
                     self.skip()?;
                 }
                 b']' => {
-                    self.depth = self.depth.checked_sub(1).ok_or_else(|| self.wrong("`]` without `[`"))?;
+                    self.depth =
+                        self.depth.checked_sub(1).ok_or_else(|| self.wrong("`]` without `[`"))?;
                     self.skip()?;
                 }
                 b',' if self.depth > 0 => self.skip()?,
@@ -125,7 +131,10 @@ impl<R: BufRead> Tokens<R> {
         let first = !std::mem::replace(&mut self.begun, true);
         if self.peek()? == Some(b':') && self.depth == 0 && first && n > 0 {
             self.skip()?;
-            return Ok(Some(Token::Name(String::from_utf8_lossy(word).into_owned(), self.indented)));
+            return Ok(Some(Token::Name(
+                String::from_utf8_lossy(word).into_owned(),
+                self.indented,
+            )));
         }
         match word {
             [] => {
@@ -141,7 +150,9 @@ impl<R: BufRead> Tokens<R> {
             b"---" | b"..." if first && !self.indented => Ok(None),
             _ => match number(word) {
                 Some(x) => Ok(Some(Token::Number(x))),
-                None => Err(self.wrong(format!("`{}` is not a number", String::from_utf8_lossy(word)))),
+                None => {
+                    Err(self.wrong(format!("`{}` is not a number", String::from_utf8_lossy(word))))
+                }
             },
         }
     }
@@ -153,7 +164,8 @@ fn number(word: &[u8]) -> Option<f64> {
         return Some(f64::from(word.iter().fold(0u32, |n, b| 10 * n + u32::from(b - b'0'))));
     }
     // "inf" and "nan" would be numbers, too.
-    let plain = word.iter().all(|b| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'e' | b'E'));
+    let plain =
+        word.iter().all(|b| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'e' | b'E'));
     let x: f64 = std::str::from_utf8(word).ok().filter(|_| plain)?.parse().ok()?;
     x.is_finite().then_some(x)
 }

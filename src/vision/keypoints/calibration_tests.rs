@@ -1,18 +1,28 @@
-//! Simulation-based calibration (Talts et al. 2018): of data drawn from the model, the quantile of the truth in the posterior is
-//! uniform. The model is a figure of eight joints, moved and scaled; its posterior is summed on a grid.
+//! Simulation-based calibration (Talts et al. 2018): of data drawn from the model, the
+//! quantile of the truth in the posterior is uniform. The model is a figure of eight
+//! joints, moved and scaled; its posterior is summed on a grid.
 
 use super::{Detection, KeypointLikelihood, KeypointOptions};
 use crate::rng::{Purpose, Stream, StreamKey};
 
-const JOINTS: [[f64; 2]; 8] =
-    [[0.0, -60.0], [-25.0, -30.0], [25.0, -30.0], [-40.0, 5.0], [40.0, 5.0], [0.0, 20.0], [-18.0, 65.0], [18.0, 65.0]];
+const JOINTS: [[f64; 2]; 8] = [
+    [0.0, -60.0],
+    [-25.0, -30.0],
+    [25.0, -30.0],
+    [-40.0, 5.0],
+    [40.0, 5.0],
+    [0.0, 20.0],
+    [-18.0, 65.0],
+    [18.0, 65.0],
+];
 const SHIFTS: usize = 61;
 const SCALES: usize = 31;
 const BINS: usize = 20;
 /// The 0.999 quantile of chi-square with 19 degrees of freedom.
 const CRITICAL: f64 = 43.82;
 
-/// The joints in an image of 640 x 480; both parameters have a normal prior on their grid.
+/// The joints in an image of 640 x 480; both parameters have a normal prior on their
+/// grid.
 fn joint(k: usize, shift: usize, scale: usize) -> [f64; 2] {
     let t = 40.0 * 6.0 * (shift as f64 / (SHIFTS - 1) as f64 - 0.5);
     let s = libm::exp(0.2 * 6.0 * (scale as f64 / (SCALES - 1) as f64 - 0.5));
@@ -33,7 +43,8 @@ fn pick(weights: &[f64], rng: &mut Stream) -> usize {
     past.unwrap_or(weights.len() - 1)
 }
 
-/// The quantile of `truth` in weights on a grid; ties are broken at random, so that it is exactly uniform under the prior.
+/// The quantile of `truth` in weights on a grid; ties are broken at random, so that it is
+/// exactly uniform under the prior.
 fn quantile(weights: &[f64], truth: usize, rng: &mut Stream) -> f64 {
     let below: f64 = weights[..truth].iter().sum();
     (below + rng.uniform() * weights[truth]) / weights.iter().sum::<f64>()
@@ -50,8 +61,10 @@ fn chi_squares(
 ) -> [f64; 2] {
     let model = |o| KeypointLikelihood::new(640.0, 480.0, 0.0, o).unwrap();
     let (from, to) = (model(drawn), model(assumed));
-    let (p, q): (Vec<f64>, Vec<f64>) =
-        ((0..SHIFTS).map(|i| prior(i, SHIFTS)).collect(), (0..SCALES).map(|i| prior(i, SCALES)).collect());
+    let (p, q): (Vec<f64>, Vec<f64>) = (
+        (0..SHIFTS).map(|i| prior(i, SHIFTS)).collect(),
+        (0..SCALES).map(|i| prior(i, SCALES)).collect(),
+    );
     let runs = 400;
     let mut bins = [[0.0f64; BINS]; 2];
     for run in 0..runs {
@@ -60,15 +73,18 @@ fn chi_squares(
         let mut seen = Vec::new();
         for k in 0..JOINTS.len() {
             let confidence = if sure { 1.0 } else { rng.uniform() };
-            let others = |z: &[[f64; 2]]| z.iter().copied().zip(minds.iter().copied()).collect::<Vec<_>>();
-            let blank = Detection::new([0.0; 2], confidence).or(minds.iter().map(|w| ([0.0; 2], *w)));
+            let others =
+                |z: &[[f64; 2]]| z.iter().copied().zip(minds.iter().copied()).collect::<Vec<_>>();
+            let blank =
+                Detection::new([0.0; 2], confidence).or(minds.iter().map(|w| ([0.0; 2], *w)));
             let z = from.sample(&blank, Some(joint(k, truth.0, truth.1)), &mut rng);
             if rng.uniform() >= missing {
                 seen.push((k, Detection::new(z[0], confidence).or(others(&z[1..]).into_iter())));
             }
         }
-        let log =
-            |i: usize, j: usize| -> f64 { seen.iter().map(|(k, z)| to.log_density(z, Some(joint(*k, i, j)))).sum() };
+        let log = |i: usize, j: usize| -> f64 {
+            seen.iter().map(|(k, z)| to.log_density(z, Some(joint(*k, i, j)))).sum()
+        };
         let mut posterior = vec![0.0; SHIFTS * SCALES];
         let mut most = f64::NEG_INFINITY;
         for (at, w) in posterior.iter_mut().enumerate() {
@@ -79,8 +95,11 @@ fn chi_squares(
             *w = libm::exp(*w - most) * p[at / SCALES] * q[at % SCALES];
         }
         let shift: Vec<f64> = posterior.chunks(SCALES).map(|row| row.iter().sum()).collect();
-        let scale: Vec<f64> = (0..SCALES).map(|j| posterior.iter().skip(j).step_by(SCALES).sum()).collect();
-        for (bins, u) in bins.iter_mut().zip([quantile(&shift, truth.0, &mut rng), quantile(&scale, truth.1, &mut rng)])
+        let scale: Vec<f64> =
+            (0..SCALES).map(|j| posterior.iter().skip(j).step_by(SCALES).sum()).collect();
+        for (bins, u) in bins
+            .iter_mut()
+            .zip([quantile(&shift, truth.0, &mut rng), quantile(&scale, truth.1, &mut rng)])
         {
             bins[((u * BINS as f64) as usize).min(BINS - 1)] += 1.0;
         }
@@ -95,7 +114,9 @@ fn options(sd: f64, outlier: f64) -> KeypointOptions {
 
 #[test]
 fn quantiles_of_the_truth_are_uniform() {
-    for (outlier, missing, sure) in [(1e-9, 0.0, true), (0.3, 0.0, true), (0.1, 0.4, true), (0.2, 0.3, false)] {
+    for (outlier, missing, sure) in
+        [(1e-9, 0.0, true), (0.3, 0.0, true), (0.1, 0.4, true), (0.2, 0.3, false)]
+    {
         let o = KeypointOptions { misses: missing / 2.0, ..options(1.5, outlier) };
         for minds in [&[][..], &[0.5], &[1.0, 0.25]] {
             let chi = chi_squares(&o, &o, missing, sure, minds);

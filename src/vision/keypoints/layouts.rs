@@ -1,6 +1,8 @@
-//! The layouts of files of keypoints, told apart by their shape; the [parent](super) says which there are.
+//! The layouts of files of keypoints, told apart by their shape; the [parent](super) says
+//! which there are.
 //!
-//! Only shapes: who is meant is chosen in `people.rs`, what the joints are in `matching.rs`.
+//! Only shapes: who is meant is chosen in `people.rs`, what the joints are in
+//! `matching.rs`.
 
 use super::names::{COCO, MEDIAPIPE, usual};
 use super::node::Node;
@@ -37,8 +39,9 @@ pub(super) fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
             if root.get("keypoints").is_some() {
                 return Ok(vec![person(root)?]);
             }
-            let is_person =
-                |n: &Node| n.get("keypoints").is_some() || MEDIAPIPE_KEYS.iter().any(|k| n.get(k).is_some());
+            let is_person = |n: &Node| {
+                n.get("keypoints").is_some() || MEDIAPIPE_KEYS.iter().any(|k| n.get(k).is_some())
+            };
             if root.fields().any(|(_, n)| is_person(&n)) {
                 let one = |(id, n): (&str, Node)| Ok(Person { id: id.to_owned(), ..person(&n)? });
                 return root.fields().map(one).collect();
@@ -92,7 +95,9 @@ fn named(all: &Node) -> Result<Keypoints, KeypointsError> {
         };
         let name = Arc::from(usual(name));
         if points.iter().any(|p| p.name == name) {
-            return Err(n.wrong(&format!("given only once, but `{name}` also occurs in another spelling")));
+            return Err(
+                n.wrong(&format!("given only once, but `{name}` also occurs in another spelling"))
+            );
         }
         let (x, y) = (x.number("a number of pixels")?, y.number("a number of pixels")?);
         points.push(Keypoint::new(name, [x, y], confidence));
@@ -110,17 +115,23 @@ fn confidence(c: &Node) -> Result<f64, KeypointsError> {
 fn triples(all: &Node, names: Option<&[String]>) -> Result<Keypoints, KeypointsError> {
     let count = names.map_or(COCO.len(), <[String]>::len);
     if all.len() != 3 * count || !all.value.is_array() {
-        return Err(all.wrong(&format!("a list of {} numbers, x, y and v of {count} joints", 3 * count)));
+        return Err(
+            all.wrong(&format!("a list of {} numbers, x, y and v of {count} joints", 3 * count))
+        );
     }
     let numbers: Vec<f64> = all.items().map(|n| n.number("a number")).collect::<Result<_, _>>()?;
     let mut points = Vec::new();
-    for (i, (joint, place)) in numbers.chunks_exact(3).zip(all.items().skip(2).step_by(3)).enumerate() {
+    for (i, (joint, place)) in
+        numbers.chunks_exact(3).zip(all.items().skip(2).step_by(3)).enumerate()
+    {
         let &[x, y, v] = joint else { continue };
         if v < 0.0 {
             return Err(place.wrong("0 for a joint that is missing, or more"));
         }
         if v > 0.0 {
-            let name = names.and_then(|n| n.get(i)).map_or(COCO.get(i).copied().unwrap_or_default(), String::as_str);
+            let name = names
+                .and_then(|n| n.get(i))
+                .map_or(COCO.get(i).copied().unwrap_or_default(), String::as_str);
             points.push(Keypoint::new(&*usual(name), [x, y], v.min(1.0)));
         }
     }
@@ -142,9 +153,14 @@ fn coco(all: &Node, root: &Node) -> Result<Vec<Person>, KeypointsError> {
     for n in all.items() {
         let Some(list) = n.get("keypoints") else { continue };
         let category = n.get("category_id").and_then(|id| with_id(&categories, id.value));
-        let names: Option<Vec<String>> = category.as_ref().and_then(|c| c.get("keypoints")).and_then(|names| {
-            names.as_array()?.iter().map(|s| s.as_str().map(str::to_owned)).collect::<Option<Vec<_>>>()
-        });
+        let names: Option<Vec<String>> =
+            category.as_ref().and_then(|c| c.get("keypoints")).and_then(|names| {
+                names
+                    .as_array()?
+                    .iter()
+                    .map(|s| s.as_str().map(str::to_owned))
+                    .collect::<Option<Vec<_>>>()
+            });
         let mut keypoints = triples(&list, names.as_deref())?;
         let mut of_image = Vec::new();
         if let Some(id) = n.get("image_id") {
@@ -152,7 +168,9 @@ fn coco(all: &Node, root: &Node) -> Result<Vec<Person>, KeypointsError> {
             if let Some(image) = with_id(&images, id.value) {
                 keypoints = sized(keypoints, Node::root(&image).size());
                 let file = image.get("file_name").and_then(Value::as_str).map(std::path::Path::new);
-                of_image.extend(file.and_then(|f| f.file_stem()).and_then(|s| s.to_str()).map(str::to_owned));
+                of_image.extend(
+                    file.and_then(|f| f.file_stem()).and_then(|s| s.to_str()).map(str::to_owned),
+                );
             }
         }
         let id = n.get("id").map(|id| id.id()).transpose()?.unwrap_or_default();

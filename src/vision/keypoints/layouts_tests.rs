@@ -18,33 +18,52 @@ fn points(k: &Keypoints) -> Vec<(&str, f64, f64, f64)> {
 #[test]
 fn one_person_by_names() {
     let expected = [("nose", 1.0, 2.0, 0.5), ("l_hip", 3.0, 4.5, 1.0), ("tail", -1.0, 0.0, 0.0)];
-    let joints = json!({ "nose": [1, 2, 0.5], "left_hip": [3, 4.5], "l_eye": null, "tail": [-1, 0, 0] });
+    let joints =
+        json!({ "nose": [1, 2, 0.5], "left_hip": [3, 4.5], "l_eye": null, "tail": [-1, 0, 0] });
     for v in [joints.clone(), json!({ "keypoints": joints, "seconds": 0.1 })] {
         assert_eq!(points(&parse(&v).pick(None, Some("any")).unwrap()), expected);
     }
     let sized = json!({ "keypoints": joints, "width": 640, "height": 480 });
     assert_eq!(parse(&sized).pick(None, None).unwrap().size(), Some((640, 480)));
-    for nobody in [json!(null), json!([]), json!({}), json!({ "keypoints": null }), json!({ "pose_landmarks": [] })] {
+    for nobody in [
+        json!(null),
+        json!([]),
+        json!({}),
+        json!({ "keypoints": null }),
+        json!({ "pose_landmarks": [] }),
+    ] {
         assert!(parse(&nobody).pick(None, None).unwrap().is_empty(), "{nobody}");
     }
 }
 
 #[test]
 fn many_by_id() {
-    let p = parse(&json!({ "a": { "keypoints": { "nose": [1, 2] } }, "b": { "keypoints": null }, "c": null }));
+    let p = parse(
+        &json!({ "a": { "keypoints": { "nose": [1, 2] } }, "b": { "keypoints": null }, "c": null }),
+    );
     assert_eq!(p.ids().collect::<Vec<_>>(), ["a", "b", "c"]);
     assert_eq!(points(&p.pick(Some("a"), Some("b")).unwrap()), [("nose", 1.0, 2.0, 1.0)]);
     assert!(p.pick(None, Some("b")).unwrap().is_empty());
-    assert_eq!(p.pick(Some("d"), None).unwrap_err().to_string(), "no person has the id `d`; there are a, b, c");
+    assert_eq!(
+        p.pick(Some("d"), None).unwrap_err().to_string(),
+        "no person has the id `d`; there are a, b, c"
+    );
     let choose = "add `#` and an id to the file name to choose one";
-    assert_eq!(p.pick(None, None).unwrap_err().to_string(), format!("it contains 3 people: a, b, c; {choose}"));
+    assert_eq!(
+        p.pick(None, None).unwrap_err().to_string(),
+        format!("it contains 3 people: a, b, c; {choose}")
+    );
     let message = p.pick(None, Some("photo")).unwrap_err().to_string();
     assert_eq!(
         message,
-        format!("it contains 3 people: a, b, c; none of them has the name of the picture, `photo`; {choose}")
+        format!(
+            "it contains 3 people: a, b, c; none of them has the name of the picture, `photo`; {choose}"
+        )
     );
-    let many: Value =
-        (0..9).map(|i| (format!("p{i}"), json!({ "keypoints": {} }))).collect::<serde_json::Map<_, _>>().into();
+    let many: Value = (0..9)
+        .map(|i| (format!("p{i}"), json!({ "keypoints": {} })))
+        .collect::<serde_json::Map<_, _>>()
+        .into();
     let message = parse(&many).pick(None, None).unwrap_err().message;
     assert_eq!(message, "it contains 9 people: p0, p1, p2, p3, p4, … 9 in all");
     assert_eq!(split_id("a/b.json#id 1"), ("a/b.json", Some("id 1")));
@@ -71,7 +90,9 @@ fn coco_annotations_and_results() {
     });
     let p = parse(&file);
     assert_eq!(p.ids().collect::<Vec<_>>(), ["70", "8", "81", "90"]);
-    for of in [p.pick(Some("70"), None), p.pick(None, Some("000000000007")), p.pick(Some("7"), None)] {
+    for of in
+        [p.pick(Some("70"), None), p.pick(None, Some("000000000007")), p.pick(Some("7"), None)]
+    {
         let of = of.unwrap();
         assert_eq!((of.size(), of.points().len()), (Some((60, 40)), 16));
         assert_eq!(points(&of)[1], ("l_eye", 1.0, 10.0, 1.0));
@@ -80,7 +101,10 @@ fn coco_annotations_and_results() {
     assert_eq!(points(&p.pick(Some("8"), None).unwrap())[0].1, 1.0, "a person's id goes first");
     let message = p.pick(None, Some("b")).unwrap_err().message;
     assert_eq!(message, "there are 2 people in the picture `b`: 8, 81");
-    assert_eq!(points(&p.pick(Some("90"), None).unwrap()), [("a", 1.0, 2.0, 1.0), ("b", 3.0, 4.0, 0.25)]);
+    assert_eq!(
+        points(&p.pick(Some("90"), None).unwrap()),
+        [("a", 1.0, 2.0, 1.0), ("b", 3.0, 4.0, 0.25)]
+    );
 
     let result = |image: Value, at: f64| json!({ "image_id": image, "score": 0.9, "keypoints": triples(at, 0.5) });
     let p = parse(&json!([result(json!(3), 0.0), result(json!("q"), 1.0), result(json!(3), 2.0)]));
@@ -90,8 +114,9 @@ fn coco_annotations_and_results() {
 
 #[test]
 fn mediapipe_landmarks() {
-    let list: Vec<Value> =
-        (0..33).map(|i| json!({ "x": f64::from(i) / 32.0, "y": 0.5, "z": 0, "visibility": 0.25 })).collect();
+    let list: Vec<Value> = (0..33)
+        .map(|i| json!({ "x": f64::from(i) / 32.0, "y": 0.5, "z": 0, "visibility": 0.25 }))
+        .collect();
     for v in [
         json!({ "pose_landmarks": list }),
         json!({ "landmarks": [list] }),
@@ -134,7 +159,10 @@ fn what_is_wrong_is_said_with_its_place() {
             json!({ "l_hip": [1, 2], "left_hip": [1, 2] }),
             "`left_hip` must be given only once, but `l_hip` also occurs in another spelling, got a list of 2",
         ),
-        (json!({ "a": { "keypoints": {} }, "b": 3 }), "`b` must be an object with `keypoints`, got 3"),
+        (
+            json!({ "a": { "keypoints": {} }, "b": 3 }),
+            "`b` must be an object with `keypoints`, got 3",
+        ),
         (
             json!({ "a": { "keypoints": 3 } }),
             "`a.keypoints` must be an object of joints, or null if nobody was found, got 3",
@@ -160,7 +188,9 @@ fn what_is_wrong_is_said_with_its_place() {
     for v in [json!(3), json!("x"), json!([3]), json!({ "a": 1 })] {
         let message = said(&v);
         assert!(
-            message.starts_with("the file must be one person's {\"nose\": [x, y, confidence], …}, people by id"),
+            message.starts_with(
+                "the file must be one person's {\"nose\": [x, y, confidence], …}, people by id"
+            ),
             "{message}"
         );
     }
@@ -171,7 +201,8 @@ fn what_is_wrong_is_said_with_its_place() {
 
 #[test]
 fn the_detections_of_the_development_pictures() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/humans/baselines/mediapipe_full.json");
+    let path =
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/humans/baselines/mediapipe_full.json");
     let Ok(bytes) = std::fs::read(path) else { return };
     let p = People::parse(&bytes).unwrap();
     assert_eq!(p.len(), 25);

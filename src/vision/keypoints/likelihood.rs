@@ -1,12 +1,16 @@
-//! How likely a detection is given where the model has the joint: it is near, or it is anywhere in the picture.
+//! How likely a detection is given where the model has the joint: it is near, or it is
+//! anywhere in the picture.
 //!
-//! Pure arithmetic on positions in pixels. A detection `z` of a joint at `p` has the density
-//! `(1 - e) N(z; p, s^2 I) + e / area` with `e = 1 - c (1 - outlier)` for a detector's confidence `c`: certain detections are
-//! off with the probability `outlier`, worthless ones tell nothing. `s^2 = sd^2 + offset^2`: the model's joint may be off, too, and
-//! where the joint really is then lies between it and the detection. A detector that is of several minds gives several places
-//! `z_m` with shares `w_m`, of which one is meant and the others are anywhere:
-//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. A share of joints may be missed by the model, with 8 times the
-//! spread: so a body that is far off still feels where its joints were seen. Invariant: finite and never NaN, as `e > 0`.
+//! Pure arithmetic on positions in pixels. A detection `z` of a joint at `p` has the
+//! density `(1 - e) N(z; p, s^2 I) + e / area` with `e = 1 - c (1 - outlier)` for a
+//! detector's confidence `c`: certain detections are off with the probability `outlier`,
+//! worthless ones tell nothing. `s^2 = sd^2 + offset^2`: the model's joint may be off,
+//! too, and where the joint really is then lies between it and the detection. A detector
+//! that is of several minds gives several places `z_m` with shares `w_m`, of which one is
+//! meant and the others are anywhere:
+//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. A share of joints
+//! may be missed by the model, with 8 times the spread: so a body that is far off still
+//! feels where its joints were seen. Invariant: finite and never NaN, as `e > 0`.
 
 use crate::rng::Stream;
 use crate::vision::VisionError;
@@ -29,23 +33,33 @@ pub struct KeypointOptions {
     pub sd: f64,
     /// The probability that a detection of full confidence is off; strictly between 0 and 1.
     pub outlier: f64,
-    /// How far the joint may be from where the model has it, as a standard deviation along each axis; not negative.
+    /// How far the joint may be from where the model has it, as a standard deviation
+    /// along each axis; not negative.
     pub offset: f64,
     /// What these are given in.
     pub unit: Unit,
     /// The share of joints that the model has further off; from 0 to less than 1.
     pub misses: f64,
-    /// How far joints are from where detector and model alike put them, as a standard deviation along each axis; not negative. No
-    /// detection tells of it, so it is in what is said of joints ([`KeypointLikelihood::located`]) and not in the density.
+    /// How far joints are from where detector and model alike put them, as a standard
+    /// deviation along each axis; not negative. No detection tells of it, so it is in
+    /// what is said of joints ([`KeypointLikelihood::located`]) and not in the density.
     pub systematic: f64,
 }
 
-/// How much wider detections are spread about joints that the model misses: it is the model that is off.
+/// How much wider detections are spread about joints that the model misses: it is the
+/// model that is off.
 const MISS: f64 = 8.0;
 
 impl Default for KeypointOptions {
     fn default() -> Self {
-        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0, unit: Unit::Diagonal, misses: 0.0, systematic: 0.0 }
+        KeypointOptions {
+            sd: 1.5,
+            outlier: 0.05,
+            offset: 0.0,
+            unit: Unit::Diagonal,
+            misses: 0.0,
+            systematic: 0.0,
+        }
     }
 }
 
@@ -64,7 +78,8 @@ impl Detection {
         Detection { places: smallvec![(at, 1.0)], confidence }
     }
 
-    /// At one place, or at others with positive weights in proportion to its own, which is 1.
+    /// At one place, or at others with positive weights in proportion to its own, which
+    /// is 1.
     #[must_use]
     pub fn or(mut self, others: impl Iterator<Item = ([f64; 2], f64)>) -> Self {
         self.places.extend(others);
@@ -74,8 +89,8 @@ impl Detection {
     }
 }
 
-/// The error model for one size of image. Positions are in its pixels. Its density integrates to 1 as far as joints lie inside the
-/// image, which is where outliers are.
+/// The error model for one size of image. Positions are in its pixels. Its density
+/// integrates to 1 as far as joints lie inside the image, which is where outliers are.
 #[derive(Clone, Debug)]
 pub struct KeypointLikelihood {
     width: f64,
@@ -99,7 +114,12 @@ impl KeypointLikelihood {
     ///
     /// # Errors
     /// If a side or an option is outside its range; a torso only where it is the unit.
-    pub fn new(width: f64, height: f64, torso: f64, options: &KeypointOptions) -> Result<Self, VisionError> {
+    pub fn new(
+        width: f64,
+        height: f64,
+        torso: f64,
+        options: &KeypointOptions,
+    ) -> Result<Self, VisionError> {
         let positive = |name, value: f64| match value > 0.0 && value < 1e9 {
             true => Ok(value),
             false => Err(VisionError::Range { name, rule: "positive and less than 1e9", value }),
@@ -109,7 +129,8 @@ impl KeypointLikelihood {
             Unit::Diagonal => (width * width + height * height).sqrt() / 100.0,
             Unit::Torso => positive("torso", torso)?,
         };
-        let not_negative = |name, value: f64| if value == 0.0 { Ok(0.0) } else { positive(name, value) };
+        let not_negative =
+            |name, value: f64| if value == 0.0 { Ok(0.0) } else { positive(name, value) };
         let offset = not_negative("offset", options.offset)? * unit;
         let systematic = not_negative("systematic", options.systematic)? * unit;
         let own = positive("sd", options.sd)? * unit;
@@ -118,23 +139,43 @@ impl KeypointLikelihood {
         let sd = sd.max(1e-100);
         let outlier = options.outlier;
         if !(outlier > 0.0 && outlier < 1.0) {
-            return Err(VisionError::Range { name: "outlier", rule: "strictly between 0 and 1", value: outlier });
+            return Err(VisionError::Range {
+                name: "outlier",
+                rule: "strictly between 0 and 1",
+                value: outlier,
+            });
         }
         let misses = options.misses;
         if !(0.0..1.0).contains(&misses) {
-            return Err(VisionError::Range { name: "misses", rule: "from 0 to less than 1", value: misses });
+            return Err(VisionError::Range {
+                name: "misses",
+                rule: "from 0 to less than 1",
+                value: misses,
+            });
         }
         let log_peak = -libm::log(2.0 * std::f64::consts::PI * sd * sd);
         let log_area = libm::log(width * height);
-        Ok(KeypointLikelihood { width, height, sd, offset, outlier, misses, systematic, log_peak, log_area })
+        Ok(KeypointLikelihood {
+            width,
+            height,
+            sd,
+            offset,
+            outlier,
+            misses,
+            systematic,
+            log_peak,
+            log_area,
+        })
     }
 
-    /// The standard deviation of a good detection about the model's joint along each axis, in pixels.
+    /// The standard deviation of a good detection about the model's joint along each
+    /// axis, in pixels.
     pub fn sd(&self) -> f64 {
         self.sd
     }
 
-    /// The variance along an axis of a joint about where detector and model alike put it, in squared pixels.
+    /// The variance along an axis of a joint about where detector and model alike put it,
+    /// in squared pixels.
     pub fn systematic_variance(&self) -> f64 {
         self.systematic * self.systematic
     }
@@ -146,14 +187,16 @@ impl KeypointLikelihood {
         1.0 - confidence * (1.0 - self.outlier)
     }
 
-    /// The logs of the parts of the density, but for the places that are not meant: of each place, and of none.
+    /// The logs of the parts of the density, but for the places that are not meant: of
+    /// each place, and of none.
     fn parts(&self, seen: &Detection, joint: Option<[f64; 2]>) -> (Logs, f64) {
         let e = self.outlier(seen.confidence);
         let off = libm::log(e) - self.log_area;
         let Some([x, y]) = joint.filter(|j| j.iter().all(|c| c.is_finite())) else {
             return (seen.places.iter().map(|_| [f64::NEG_INFINITY; 2]).collect(), off);
         };
-        let logs = [1.0 - self.misses, self.misses / (MISS * MISS)].map(|share| libm::log(share) + self.log_peak);
+        let logs = [1.0 - self.misses, self.misses / (MISS * MISS)]
+            .map(|share| libm::log(share) + self.log_peak);
         let near = |(at, share): &([f64; 2], f64)| {
             let (dx, dy) = ((at[0] - x) / self.sd, (at[1] - y) / self.sd);
             let (good, r2) = (libm::log1p(-e) + libm::log(*share), 0.5 * (dx * dx + dy * dy));
@@ -170,8 +213,8 @@ impl KeypointLikelihood {
         (near, libm::exp(off - sum))
     }
 
-    /// The log density of a detection. `joint` is where the model has the joint; of one that it has nowhere (behind the
-    /// camera) every detection is off.
+    /// The log density of a detection. `joint` is where the model has the joint; of one
+    /// that it has nowhere (behind the camera) every detection is off.
     pub fn log_density(&self, seen: &Detection, joint: Option<[f64; 2]>) -> f64 {
         let (near, off) = self.parts(seen, joint);
         log_sum(&near, off) - (near.len() - 1) as f64 * self.log_area
@@ -190,16 +233,19 @@ impl KeypointLikelihood {
         sum
     }
 
-    /// Where the joint is, given a detection and where the model has it: the mean, and the variance along an axis (the mean of
-    /// the two).
+    /// Where the joint is, given a detection and where the model has it: the mean, and
+    /// the variance along an axis (the mean of the two).
     pub fn located(&self, seen: &Detection, joint: [f64; 2]) -> ([f64; 2], f64) {
         let (shares, off) = self.shares(seen, joint);
         let between = self.offset * self.offset;
         let own = (self.sd * self.sd - between).max(0.0);
-        // Of the mixture of joints that the model has, those it misses and detections that are off: within each, and between them.
+        // Of the mixture of joints that the model has, those it misses and detections
+        // that are off: within each, and between them.
         let (mut shift, mut square, mut within) = ([0.0; 2], 0.0, off * between);
         for ((at, _), both) in seen.places.iter().zip(shares) {
-            for (share, wider) in both.into_iter().zip([1.0, MISS]).filter(|(share, _)| *share > 0.0) {
+            for (share, wider) in
+                both.into_iter().zip([1.0, MISS]).filter(|(share, _)| *share > 0.0)
+            {
                 let both = wider * wider * self.sd * self.sd;
                 let between = both - own;
                 let weight = between / both;
@@ -221,7 +267,12 @@ impl KeypointLikelihood {
     }
 
     /// Places drawn, as many as a detection has.
-    pub fn sample(&self, seen: &Detection, joint: Option<[f64; 2]>, rng: &mut Stream) -> SmallVec<[[f64; 2]; 3]> {
+    pub fn sample(
+        &self,
+        seen: &Detection,
+        joint: Option<[f64; 2]>,
+        rng: &mut Stream,
+    ) -> SmallVec<[[f64; 2]; 3]> {
         let mut meant = None;
         if let Some(at) = joint
             && rng.uniform() >= self.outlier(seen.confidence)
@@ -236,7 +287,9 @@ impl KeypointLikelihood {
         let missed = meant.is_some() && self.misses > 0.0 && rng.uniform() < self.misses;
         let sd = if missed { MISS * self.sd } else { self.sd };
         let one = |i: usize| match meant {
-            Some((m, [x, y])) if m == i => [x + sd * rng.standard_normal(), y + sd * rng.standard_normal()],
+            Some((m, [x, y])) if m == i => {
+                [x + sd * rng.standard_normal(), y + sd * rng.standard_normal()]
+            }
             _ => [self.width * rng.uniform(), self.height * rng.uniform()],
         };
         (0..seen.places.len()).map(one).collect()
@@ -269,16 +322,20 @@ mod tests {
 
     #[test]
     fn the_density_integrates_to_one() {
-        for (sd, outlier, confidence, misses) in
-            [(1.5, 0.05, 1.0, 0.0), (1.0, 0.3, 0.4, 0.0), (2.0, 0.05, 0.0, 0.0), (0.5, 0.1, 0.8, 0.3)]
-        {
+        for (sd, outlier, confidence, misses) in [
+            (1.5, 0.05, 1.0, 0.0),
+            (1.0, 0.3, 0.4, 0.0),
+            (2.0, 0.05, 0.0, 0.0),
+            (0.5, 0.1, 0.8, 0.3),
+        ] {
             let o = KeypointOptions { misses, ..options(sd, outlier) };
             let m = KeypointLikelihood::new(400.0, 300.0, 0.0, &o).unwrap();
             let mut sum = 0.0;
             for j in 0..600 {
                 for i in 0..800 {
                     let z = [0.5 * (f64::from(i) + 0.5), 0.5 * (f64::from(j) + 0.5)];
-                    sum += 0.25 * libm::exp(m.log_density(&one(z, confidence), Some([180.3, 140.2])));
+                    sum +=
+                        0.25 * libm::exp(m.log_density(&one(z, confidence), Some([180.3, 140.2])));
                 }
             }
             assert!((sum - 1.0).abs() < 1e-6, "{sum}");
@@ -290,8 +347,10 @@ mod tests {
         let m = model(1.0, 0.05);
         assert_eq!(m.sd(), 5.0, "one percent of 500 pixels");
         let at = |r: f64| m.log_density(&one([100.0 + r, 100.0], 1.0), Some([100.0, 100.0]));
-        let density =
-            |r: f64| 0.95 * libm::exp(-r * r / 50.0) / (2.0 * std::f64::consts::PI * 25.0) + 0.05 / (400.0 * 300.0);
+        let density = |r: f64| {
+            0.95 * libm::exp(-r * r / 50.0) / (2.0 * std::f64::consts::PI * 25.0)
+                + 0.05 / (400.0 * 300.0)
+        };
         for r in [0.0, 1.0, 7.0, 20.0, 30.0] {
             assert!((at(r) - libm::log(density(r))).abs() < 1e-12);
         }
@@ -300,23 +359,36 @@ mod tests {
         for nowhere in [None, Some([f64::NAN, 0.0]), Some([0.0, f64::INFINITY])] {
             assert!((m.log_density(&one([1.0, 2.0], 1.0), nowhere) - off).abs() < 1e-12);
         }
-        assert!((m.log_density(&one([1.0, 1.0], 0.0), Some([1.0, 1.0])) + libm::log(120_000.0)).abs() < 1e-12);
+        assert!(
+            (m.log_density(&one([1.0, 1.0], 0.0), Some([1.0, 1.0])) + libm::log(120_000.0)).abs()
+                < 1e-12
+        );
         assert_eq!(m.outlier(1.0), 0.050000000000000044, "{}", m.outlier(1.0));
-        assert!(model(1e-300, 1e-300).log_density(&one([1.0, 1.0], 1.0), Some([2.0, 1.0])).is_finite());
+        assert!(
+            model(1e-300, 1e-300).log_density(&one([1.0, 1.0], 1.0), Some([2.0, 1.0])).is_finite()
+        );
     }
 
     #[test]
     fn sizes_are_positive_and_less_than_a_thousand_million() {
         let options = options(1.0, 0.05);
-        for (width, fits) in [(1e9, false), (999_999_999.0, true), (1e-9, true), (0.0, false), (f64::NAN, false)] {
-            assert_eq!(KeypointLikelihood::new(width, 300.0, 0.0, &options).is_ok(), fits, "{width}");
+        for (width, fits) in
+            [(1e9, false), (999_999_999.0, true), (1e-9, true), (0.0, false), (f64::NAN, false)]
+        {
+            assert_eq!(
+                KeypointLikelihood::new(width, 300.0, 0.0, &options).is_ok(),
+                fits,
+                "{width}"
+            );
         }
     }
 
     #[test]
     fn the_gradient_is_that_of_central_differences() {
         let m = model(1.5, 0.1);
-        for joint in [[200.0, 150.0], [203.0, 148.5], [210.0, 170.0], [225.0, 150.0], [260.0, 150.0]] {
+        for joint in
+            [[200.0, 150.0], [203.0, 148.5], [210.0, 170.0], [225.0, 150.0], [260.0, 150.0]]
+        {
             for confidence in [1.0, 0.5, 0.01, 0.0] {
                 let z = [200.0, 150.0];
                 let g = m.gradient(&one(z, confidence), joint);
@@ -339,9 +411,15 @@ mod tests {
         let m = KeypointLikelihood::new(400.0, 300.0, 0.0, &options).unwrap();
         assert!((m.sd() - 5.0).abs() < 1e-12, "both spreads: 3 and 4 pixels");
         let (seen, joint) = ([103.0, 96.0], [100.0, 100.0]);
-        // By quadrature over where the joint is: N(q; joint, 4) times the density of the detection about q.
-        let own =
-            KeypointLikelihood::new(400.0, 300.0, 0.0, &KeypointOptions { offset: 0.0, ..options.clone() }).unwrap();
+        // By quadrature over where the joint is: N(q; joint, 4) times the density of the
+        // detection about q.
+        let own = KeypointLikelihood::new(
+            400.0,
+            300.0,
+            0.0,
+            &KeypointOptions { offset: 0.0, ..options.clone() },
+        )
+        .unwrap();
         for confidence in [1.0, 0.3, 0.0] {
             let (mut mass, mut mean, mut square) = (0.0, [0.0; 2], 0.0);
             for i in -80..=80 {
@@ -359,12 +437,18 @@ mod tests {
             let shift = [mean[0] - joint[0], mean[1] - joint[1]];
             let variance = 0.5 * (square / mass - shift[0] * shift[0] - shift[1] * shift[1]);
             let (at, found) = m.located(&one(seen, confidence), joint);
-            assert!((at[0] - mean[0]).abs() < 1e-3 && (at[1] - mean[1]).abs() < 1e-3, "{at:?} {mean:?}");
+            assert!(
+                (at[0] - mean[0]).abs() < 1e-3 && (at[1] - mean[1]).abs() < 1e-3,
+                "{at:?} {mean:?}"
+            );
             assert!((found - variance).abs() < 1e-2, "{found} {variance}");
             let wider = KeypointOptions { systematic: 0.4, ..options.clone() };
             let wider = KeypointLikelihood::new(400.0, 300.0, 0.0, &wider).unwrap();
             let (same, wide) = wider.located(&one(seen, confidence), joint);
-            assert!(same == at && (wide - found - 4.0).abs() < 1e-9, "two pixels more: {wide} {found}");
+            assert!(
+                same == at && (wide - found - 4.0).abs() < 1e-9,
+                "two pixels more: {wide} {found}"
+            );
         }
         let exact = model(1.0, 0.05);
         assert_eq!(
@@ -388,8 +472,10 @@ mod tests {
                 square += r2;
             }
         }
-        // Beyond 4 standard deviations lies exp(-8) of the normal part; within it a hundredth of the uniform one.
-        let expected = 0.4 * (1.0 - libm::exp(-8.0)) + 0.6 * std::f64::consts::PI * 400.0 / 120_000.0;
+        // Beyond 4 standard deviations lies exp(-8) of the normal part; within it a
+        // hundredth of the uniform one.
+        let expected =
+            0.4 * (1.0 - libm::exp(-8.0)) + 0.6 * std::f64::consts::PI * 400.0 / 120_000.0;
         assert!((near / f64::from(n) - expected).abs() < 0.01, "{}", near / f64::from(n));
         assert!((square / near - 50.0).abs() < 4.0, "{}", square / near);
         let m = model(1.0, 0.2);
@@ -398,7 +484,9 @@ mod tests {
 
     #[test]
     fn options_are_checked() {
-        let of = |w: f64, sd: f64, outlier: f64| KeypointLikelihood::new(w, 10.0, 0.0, &options(sd, outlier));
+        let of = |w: f64, sd: f64, outlier: f64| {
+            KeypointLikelihood::new(w, 10.0, 0.0, &options(sd, outlier))
+        };
         assert!(of(10.0, 1.0, 0.1).is_ok());
         for (w, sd, outlier) in [
             (0.0, 1.0, 0.1),

@@ -7,13 +7,15 @@ use super::{Keypoints, KeypointsError};
 /// At most this many landmarks are listed in a message.
 const LISTED: usize = 24;
 
-/// For each detected joint the index of the landmark of its name. Well-known joints that a rig may lack (eyes, ears, fingers,
-/// heels, …) have none where the scene has no such landmark.
+/// For each detected joint the index of the landmark of its name. Well-known joints that
+/// a rig may lack (eyes, ears, fingers, heels, …) have none where the scene has no such
+/// landmark.
 ///
 /// `nearest` finds the name most like another, for the message.
 ///
 /// # Errors
-/// If a joint that is detected is no landmark and not one of those: its name, and the landmarks there are.
+/// If a joint that is detected is no landmark and not one of those: its name, and the
+/// landmarks there are.
 pub fn matching(
     detected: &Keypoints,
     landmarks: &[&str],
@@ -23,10 +25,16 @@ pub fn matching(
     for p in detected.points() {
         let at = landmarks.iter().position(|l| *l == &*p.name);
         if at.is_none() && !may_lack(&p.name) {
-            let e = KeypointsError::new(format!("`{}` was detected, but the scene has no such landmark", p.name));
+            let e = KeypointsError::new(format!(
+                "`{}` was detected, but the scene has no such landmark",
+                p.name
+            ));
             return Err(match nearest(&p.name, landmarks) {
                 _ if landmarks.is_empty() => e.hint("it has no landmarks"),
-                Some(n) => e.hint(format!("did you mean `{n}`? It has {}", first(landmarks.iter().copied(), LISTED))),
+                Some(n) => e.hint(format!(
+                    "did you mean `{n}`? It has {}",
+                    first(landmarks.iter().copied(), LISTED)
+                )),
                 None => e.hint(format!("it has {}", first(landmarks.iter().copied(), LISTED))),
             });
         }
@@ -49,10 +57,14 @@ mod tests {
     fn joints_find_their_landmarks() {
         let none = |_: &str, _: &[&str]| None;
         let rig = ["l_wrist", "nose", "tail"];
-        assert_eq!(matching(&of(&["tail", "l_eye", "nose"]), &rig, none).unwrap(), [Some(2), None, Some(1)]);
+        assert_eq!(
+            matching(&of(&["tail", "l_eye", "nose"]), &rig, none).unwrap(),
+            [Some(2), None, Some(1)]
+        );
         assert_eq!(matching(&of(&[]), &[], none).unwrap(), []);
         let said = |d: &[&str], rig: &[&str]| {
-            let near = |_: &str, l: &[&str]| l.first().filter(|_| l.len() > 1).map(|n| n.to_string());
+            let near =
+                |_: &str, l: &[&str]| l.first().filter(|_| l.len() > 1).map(|n| n.to_string());
             matching(&of(d), rig, near).unwrap_err().to_string()
         };
         assert_eq!(
@@ -60,7 +72,10 @@ mod tests {
             "`l_wirst` was detected, but the scene has no such landmark; did you mean `l_wrist`? \
              It has l_wrist, nose, tail"
         );
-        assert_eq!(said(&["wing"], &["a"]), "`wing` was detected, but the scene has no such landmark; it has a");
+        assert_eq!(
+            said(&["wing"], &["a"]),
+            "`wing` was detected, but the scene has no such landmark; it has a"
+        );
         assert_eq!(
             said(&["l_hip"], &[]),
             "`l_hip` was detected, but the scene has no such landmark; it has no landmarks"

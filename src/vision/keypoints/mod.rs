@@ -1,20 +1,26 @@
-//! Keypoints: where a detector found the joints of a person, and how likely that is given where a model has them.
+//! Keypoints: where a detector found the joints of a person, and how likely that is given
+//! where a model has them.
 //!
-//! Reads what pose detectors write, picks one person, and holds the error model; not a detector, and it knows nothing of
-//! bodies: a joint is a name. Invariant of [`Keypoints`]: names are unique, numbers finite, confidences in 0..=1.
+//! Reads what pose detectors write, picks one person, and holds the error model; not a
+//! detector, and it knows nothing of bodies: a joint is a name. Invariant of
+//! [`Keypoints`]: names are unique, numbers finite, confidences in 0..=1.
 //!
-//! The layouts that [`People::parse`] reads, told apart by their shape; `null` for a person means that nobody was found, for
-//! a joint that it was not; the confidence is from 0 to 1 and may be left out:
+//! The layouts that [`People::parse`] reads, told apart by their shape; `null` for a
+//! person means that nobody was found, for a joint that it was not; the confidence is
+//! from 0 to 1 and may be left out:
 //!
 //! * one person: `{"nose": [x, y, confidence], …}`, or the same under `"keypoints"`;
 //! * many by id: `{"ID": {"keypoints": {"nose": [x, y, confidence], …}}, …}`;
-//! * COCO: `{"annotations": [{"keypoints": [x, y, v, …], "id": …, "image_id": …}], "images": …, "categories": …}` or the list
-//!   of results `[{"image_id": …, "keypoints": [x, y, v, …]}]`, with v = 0 for a joint that is missing and v above 1 counting
-//!   as 1;
-//! * MediaPipe: `{"pose_landmarks": [33 of {"x", "y", "visibility"}]}`, also called `"landmarks"`, also one such list per
-//!   person; x and y as shares of the image's width and height.
+//! * COCO:
+//!   `{"annotations": [{"keypoints": [x, y, v, …], "id": …, "image_id": …}], "images": …, "categories": …}`
+//!   or the list of results `[{"image_id": …, "keypoints": [x, y, v, …]}]`, with v = 0
+//!   for a joint that is missing and v above 1 counting as 1;
+//! * MediaPipe: `{"pose_landmarks": [33 of {"x", "y", "visibility"}]}`, also called
+//!   `"landmarks"`, also one such list per person; x and y as shares of the image's width
+//!   and height.
 //!
-//! Beside `"keypoints"`, and in COCO's `"images"`, `"width"` and `"height"` say which size of image the pixels are of.
+//! Beside `"keypoints"`, and in COCO's `"images"`, `"width"` and `"height"` say which
+//! size of image the pixels are of.
 
 mod error;
 mod layouts;
@@ -40,7 +46,8 @@ use std::sync::Arc;
 /// A joint that was detected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keypoint {
-    /// Its name, as the well-known lists [`COCO`] and [`MEDIAPIPE`] write it if it is one of theirs.
+    /// Its name, as the well-known lists [`COCO`] and [`MEDIAPIPE`] write it if it is one
+    /// of theirs.
     pub name: Arc<str>,
     /// From the left edge, in pixels; a share of the width if the set is normalised.
     pub x: f64,
@@ -82,7 +89,8 @@ pub struct Keypoints {
 
 /// The ways across a torso.
 const ACROSS: [[&str; 2]; 2] = [["l_shoulder", "r_hip"], ["r_shoulder", "l_hip"]];
-/// A torso is at least this share of the longer side of the box round all joints: seen from its end it is no measure.
+/// A torso is at least this share of the longer side of the box round all joints: seen
+/// from its end it is no measure.
 const LEAST_TORSO: f64 = 0.2;
 
 impl Keypoints {
@@ -96,9 +104,14 @@ impl Keypoints {
                 return Err(KeypointsError::new(format!("the keypoint `{}` occurs twice", p.name)));
             }
             if !(p.x.is_finite() && p.y.is_finite()) {
-                return Err(KeypointsError::new(format!("the position of the keypoint `{}` is not finite", p.name)));
+                return Err(KeypointsError::new(format!(
+                    "the position of the keypoint `{}` is not finite",
+                    p.name
+                )));
             }
-            let sound = |o: &Elsewhere| o.x.is_finite() && o.y.is_finite() && o.weight > 0.0 && o.weight.is_finite();
+            let sound = |o: &Elsewhere| {
+                o.x.is_finite() && o.y.is_finite() && o.weight > 0.0 && o.weight.is_finite()
+            };
             if !p.others.iter().all(sound) {
                 return Err(KeypointsError::new(format!(
                     "an alternative position of the keypoint `{}` is not finite",
@@ -107,7 +120,9 @@ impl Keypoints {
             }
             if !(0.0..=1.0).contains(&p.confidence) {
                 let (name, c) = (&p.name, p.confidence);
-                return Err(KeypointsError::new(format!("the confidence of `{name}` must be from 0 to 1, got {c}")));
+                return Err(KeypointsError::new(format!(
+                    "the confidence of `{name}` must be from 0 to 1, got {c}"
+                )));
             }
         }
         Ok(Keypoints { points, ..Keypoints::default() })
@@ -128,7 +143,8 @@ impl Keypoints {
         self.points.is_empty()
     }
 
-    /// Whether positions are shares of the image's width and height, as MediaPipe writes them.
+    /// Whether positions are shares of the image's width and height, as MediaPipe writes
+    /// them.
     pub fn is_normalised(&self) -> bool {
         self.normalised
     }
@@ -138,15 +154,21 @@ impl Keypoints {
         self.size
     }
 
-    /// The same joints at other places, in the same units: as many of `points` as there are joints.
+    /// The same joints at other places, in the same units: as many of `points` as there
+    /// are joints.
     #[must_use]
     pub fn moved(&self, points: &[Keypoint]) -> Keypoints {
-        let moved =
-            |(p, to): (&Keypoint, &Keypoint)| Keypoint { x: to.x, y: to.y, others: to.others.clone(), ..p.clone() };
+        let moved = |(p, to): (&Keypoint, &Keypoint)| Keypoint {
+            x: to.x,
+            y: to.y,
+            others: to.others.clone(),
+            ..p.clone()
+        };
         Keypoints { points: self.points.iter().zip(points).map(moved).collect(), ..self.clone() }
     }
 
-    /// The same, known to be of an image of this size; what a file says of its own size goes first.
+    /// The same, known to be of an image of this size; what a file says of its own size
+    /// goes first.
     #[must_use]
     pub fn in_image(self, width: u32, height: u32) -> Keypoints {
         let known = (width > 0 && height > 0).then_some((width, height));
@@ -159,13 +181,16 @@ impl Keypoints {
         Keypoints { torso: Some(torso), ..self }
     }
 
-    /// The length of the torso in pixels of an image of this size: the mean of the ways from a shoulder to the opposite hip, as far as
-    /// they were detected, and at least a fifth of the box round all joints. 0 without joints.
+    /// The length of the torso in pixels of an image of this size: the mean of the ways
+    /// from a shoulder to the opposite hip, as far as they were detected, and at least a
+    /// fifth of the box round all joints. 0 without joints.
     pub fn torso(&self, size: (u32, u32)) -> f64 {
         if let Some(torso) = self.torso {
             return torso;
         }
-        let find = |name: &str| self.points.iter().find(|p| &*p.name == name).map(|p| self.position(p, size));
+        let find = |name: &str| {
+            self.points.iter().find(|p| &*p.name == name).map(|p| self.position(p, size))
+        };
         let across = |[a, b]: [&str; 2]| {
             let (a, b) = (find(a)?, find(b)?);
             Some(libm::hypot(a[0] - b[0], a[1] - b[1]))
@@ -189,7 +214,8 @@ impl Keypoints {
         }
     }
 
-    /// The position of a joint in pixels of an image of this size, where the set itself is in pixels of it or normalised.
+    /// The position of a joint in pixels of an image of this size, where the set itself
+    /// is in pixels of it or normalised.
     pub fn position(&self, of: &Keypoint, (width, height): (u32, u32)) -> [f64; 2] {
         self.scaled([of.x, of.y], (width, height))
     }

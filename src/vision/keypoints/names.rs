@@ -1,8 +1,10 @@
-//! The joints that detectors name: COCO's 17 and MediaPipe's 33, with `l_` and `r_` for the person's own left and right.
+//! The joints that detectors name: COCO's 17 and MediaPipe's 33, with `l_` and `r_` for
+//! the person's own left and right.
 
 use std::borrow::Cow;
 
-/// COCO's joints in its order (Lin et al. 2014, "Microsoft COCO: Common Objects in Context").
+/// COCO's joints in its order (Lin et al. 2014, "Microsoft COCO: Common Objects in
+/// Context").
 pub const COCO: [&str; 17] = [
     "nose",
     "l_eye",
@@ -63,8 +65,8 @@ pub const MEDIAPIPE: [&str; 33] = [
 /// Joints of other well-known lists that a rig may lack.
 const MORE: [&str; 2] = ["neck", "head_top"];
 
-/// The name as the lists here have it: `left_eye` and `LEFT_EYE` are `l_eye`, `mouth_left` is `l_mouth`. Other names are left
-/// as they are.
+/// The name as the lists here have it: `left_eye` and `LEFT_EYE` are `l_eye`,
+/// `mouth_left` is `l_mouth`. Other names are left as they are.
 pub(super) fn usual(name: &str) -> Cow<'_, str> {
     let lower = name.to_ascii_lowercase();
     let short = match (lower.strip_prefix("left_"), lower.strip_prefix("right_"), &*lower) {
@@ -81,7 +83,8 @@ fn well_known(name: &str) -> bool {
     MEDIAPIPE.contains(&name) || MORE.contains(&name)
 }
 
-/// Whether a rig need not have this joint: the well-known ones except those of arms and legs.
+/// Whether a rig need not have this joint: the well-known ones except those of arms and
+/// legs.
 pub(super) fn may_lack(name: &str) -> bool {
     let limb = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
     well_known(name) && !name.get(2..).is_some_and(|rest| limb.contains(&rest))

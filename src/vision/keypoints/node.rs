@@ -53,7 +53,8 @@ impl<'a> Node<'a> {
             Value::Array(a) => format!("a list of {}", a.len()),
             Value::Object(_) => "an object".to_owned(),
         };
-        let place = if self.path.is_empty() { "the file".to_owned() } else { format!("`{}`", self.path) };
+        let place =
+            if self.path.is_empty() { "the file".to_owned() } else { format!("`{}`", self.path) };
         KeypointsError::new(format!("{place} must be {wanted}, got {got}"))
     }
 

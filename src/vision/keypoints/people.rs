@@ -23,7 +23,9 @@ pub(super) struct Person {
 /// A path without the `#ID` that picks a person out of the file, and that id.
 pub fn split_id(path: &str) -> (&str, Option<&str>) {
     match path.rsplit_once('#') {
-        Some((file, id)) if !file.is_empty() && !id.is_empty() && !id.contains(['/', '\\']) => (file, Some(id)),
+        Some((file, id)) if !file.is_empty() && !id.is_empty() && !id.contains(['/', '\\']) => {
+            (file, Some(id))
+        }
         _ => (path, None),
     }
 }
@@ -32,9 +34,11 @@ impl People {
     /// Reads a file; the layouts are those of the [module's head](super).
     ///
     /// # Errors
-    /// If it is not JSON or of no known layout, or has something wrong in it: a message with the path of it.
+    /// If it is not JSON or of no known layout, or has something wrong in it: a message
+    /// with the path of it.
     pub fn parse(bytes: &[u8]) -> Result<People, KeypointsError> {
-        let document = serde_json::from_slice(bytes).map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
+        let document = serde_json::from_slice(bytes)
+            .map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
         layouts::people(&Node::root(&document)).map(|all| People { all })
     }
 
@@ -53,8 +57,9 @@ impl People {
         self.all.iter().map(|p| p.id.as_str())
     }
 
-    /// One person: that of an id, or else that of a picture whose file is called `stem` (without folder and ending), or else
-    /// the only one there is. Of a file with nobody in it, no keypoints.
+    /// One person: that of an id, or else that of a picture whose file is called `stem`
+    /// (without folder and ending), or else the only one there is. Of a file with nobody
+    /// in it, no keypoints.
     ///
     /// # Errors
     /// If there is nobody of that id, or nothing says which of several people is meant.
@@ -68,10 +73,13 @@ impl People {
         match (&self.all[..], stem) {
             ([], _) => Ok(Keypoints::default()),
             ([one], _) => Ok(one.keypoints.clone()),
-            (_, Some(stem)) => match self.find(stem)? {
-                Some(p) => Ok(p.keypoints.clone()),
-                None => Err(self.several(&format!("; none of them has the name of the picture, `{stem}`"))),
-            },
+            (_, Some(stem)) => {
+                match self.find(stem)? {
+                    Some(p) => Ok(p.keypoints.clone()),
+                    None => Err(self
+                        .several(&format!("; none of them has the name of the picture, `{stem}`"))),
+                }
+            }
             _ => Err(self.several("")),
         }
     }
@@ -89,8 +97,10 @@ impl People {
             [one] => Ok(Some(one)),
             _ => {
                 let ids = first(found.iter().map(|p| p.id.as_str()), 8);
-                let message = format!("there are {} people in the picture `{id}`: {ids}", found.len());
-                Err(KeypointsError::new(message).hint("add `#` and an id to the file name to choose one"))
+                let message =
+                    format!("there are {} people in the picture `{id}`: {ids}", found.len());
+                Err(KeypointsError::new(message)
+                    .hint("add `#` and an id to the file name to choose one"))
             }
         }
     }
@@ -99,7 +109,9 @@ impl People {
         let e = KeypointsError::new(format!("no person has the id `{id}`"));
         match self.all[..] {
             [] => e.hint("the file contains no people"),
-            [Person { id: ref only, .. }] if only.is_empty() => e.hint("there is one person, without an id"),
+            [Person { id: ref only, .. }] if only.is_empty() => {
+                e.hint("there is one person, without an id")
+            }
             _ => e.hint(format!("there are {}", first(self.ids(), 8))),
         }
     }

@@ -1,14 +1,16 @@
-//! How likely a network's depth of a landmark is given the model's, both in metres from the middle of the hips: it is near, or it is
-//! anywhere within a body's reach.
+//! How likely a network's depth of a landmark is given the model's, both in metres from
+//! the middle of the hips: it is near, or it is anywhere within a body's reach.
 //!
 //! Pure arithmetic. A depth `z` of a landmark that the model has at `d` has the density
-//! `(1 - e) N(z; d, sd^2) + e N(z; 0, REACH^2)`: one picture says little about depth, and a network that takes a limb for one that
-//! points the other way is off by twice its depth. Invariant: finite and never NaN, as `e > 0`.
+//! `(1 - e) N(z; d, sd^2) + e N(z; 0, REACH^2)`: one picture says little about depth, and
+//! a network that takes a limb for one that points the other way is off by twice its
+//! depth. Invariant: finite and never NaN, as `e > 0`.
 
 use crate::rng::Stream;
 use crate::vision::VisionError;
 
-/// The spread of depths that tell nothing, in metres: half of what a body reaches about its hips.
+/// The spread of depths that tell nothing, in metres: half of what a body reaches about
+/// its hips.
 const REACH: f64 = 0.5;
 
 /// The error model of relative depths.
@@ -19,17 +21,25 @@ pub struct RelativeDepthLikelihood {
 }
 
 impl RelativeDepthLikelihood {
-    /// `sd`: the standard deviation of a good depth, in metres, positive; `outlier`: the share of depths that are off, strictly
-    /// between 0 and 1.
+    /// `sd`: the standard deviation of a good depth, in metres, positive; `outlier`: the
+    /// share of depths that are off, strictly between 0 and 1.
     ///
     /// # Errors
     /// If one of them is outside its range.
     pub fn new(sd: f64, outlier: f64) -> Result<Self, VisionError> {
         if !(sd > 0.0 && sd < 1e9) {
-            return Err(VisionError::Range { name: "sd", rule: "positive and less than 1e9", value: sd });
+            return Err(VisionError::Range {
+                name: "sd",
+                rule: "positive and less than 1e9",
+                value: sd,
+            });
         }
         if !(outlier > 0.0 && outlier < 1.0) {
-            return Err(VisionError::Range { name: "outlier", rule: "strictly between 0 and 1", value: outlier });
+            return Err(VisionError::Range {
+                name: "outlier",
+                rule: "strictly between 0 and 1",
+                value: outlier,
+            });
         }
         // Whose square is still a number.
         Ok(RelativeDepthLikelihood { sd: sd.max(1e-100), outlier })
@@ -80,10 +90,12 @@ mod tests {
         for (sd, outlier, model) in [(0.1, 0.05, 0.3), (0.02, 0.5, -1.0), (0.3, 0.01, 0.0)] {
             let l = RelativeDepthLikelihood::new(sd, outlier).unwrap();
             let at = |i: i32| f64::from(i) * 1e-3;
-            let sum: f64 = (-6000..6000).map(|i| 1e-3 * libm::exp(l.log_density(at(i), model))).sum();
+            let sum: f64 =
+                (-6000..6000).map(|i| 1e-3 * libm::exp(l.log_density(at(i), model))).sum();
             assert!((sum - 1.0).abs() < 1e-6, "{sum}");
             for seen in [-0.8, -0.1, 0.0, 0.25, 1.1] {
-                let by = (l.log_density(seen, model + 1e-6) - l.log_density(seen, model - 1e-6)) / 2e-6;
+                let by =
+                    (l.log_density(seen, model + 1e-6) - l.log_density(seen, model - 1e-6)) / 2e-6;
                 let slope = l.slope(seen, model);
                 assert!((by - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{by} {slope}");
             }
@@ -95,10 +107,17 @@ mod tests {
         let l = RelativeDepthLikelihood::new(0.1, 0.05).unwrap();
         let off = libm::log(0.05) - libm::log(REACH) - 0.5 * libm::log(2.0 * std::f64::consts::PI);
         for model in [1e200, -1e300, f64::INFINITY, f64::NAN] {
-            assert!((l.log_density(0.0, model) - off).abs() < 1e-12 && l.slope(0.0, model) == 0.0, "{model}");
+            assert!(
+                (l.log_density(0.0, model) - off).abs() < 1e-12 && l.slope(0.0, model) == 0.0,
+                "{model}"
+            );
         }
-        assert!(RelativeDepthLikelihood::new(1e-300, 1e-300).unwrap().log_density(0.0, 1.0).is_finite());
-        for (sd, outlier) in [(0.0, 0.1), (f64::NAN, 0.1), (1e9, 0.1), (0.1, 0.0), (0.1, 1.0), (0.1, f64::NAN)] {
+        assert!(
+            RelativeDepthLikelihood::new(1e-300, 1e-300).unwrap().log_density(0.0, 1.0).is_finite()
+        );
+        for (sd, outlier) in
+            [(0.0, 0.1), (f64::NAN, 0.1), (1e9, 0.1), (0.1, 0.0), (0.1, 1.0), (0.1, f64::NAN)]
+        {
             assert!(RelativeDepthLikelihood::new(sd, outlier).is_err(), "{sd} {outlier}");
         }
     }

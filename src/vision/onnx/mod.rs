@@ -1,5 +1,6 @@
-//! Networks that map a picture to a map of contours or objects, from ONNX files, run by `rten`. Any network will do that takes one
-//! picture and gives a map of one channel in the same shape. A network's last bits depend on the processor's instructions.
+//! Networks that map a picture to a map of contours or objects, from ONNX files, run by
+//! `rten`. Any network will do that takes one picture and gives a map of one channel in
+//! the same shape. A network's last bits depend on the processor's instructions.
 
 #[cfg(test)]
 mod tests;
@@ -13,7 +14,8 @@ use rten::{DataType, Dimension, Model, NodeId, Value, ValueType};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Networks that take any size get sides that are multiples of this: most halve their picture up to five times.
+/// Networks that take any size get sides that are multiples of this: most halve their
+/// picture up to five times.
 const MULTIPLE: u32 = 32;
 /// The most pixels a side that a network may ask for.
 const SIDE: usize = 4096;
@@ -43,7 +45,10 @@ struct Takes {
 
 impl fmt::Debug for Network {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Network").field("takes", &self.takes).field("output", &self.called).finish_non_exhaustive()
+        f.debug_struct("Network")
+            .field("takes", &self.takes)
+            .field("output", &self.called)
+            .finish_non_exhaustive()
     }
 }
 
@@ -53,21 +58,25 @@ fn wrong(message: impl fmt::Display) -> VisionError {
 
 /// Runs what may fail inside of a library on files that nobody has checked.
 fn guarded<T>(what: &str, work: impl FnOnce() -> Result<T, VisionError>) -> Result<T, VisionError> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(wrong(format!("the network cannot be {what}"))))
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|_| Err(wrong(format!("the network cannot be {what}"))))
 }
 
 impl Network {
     /// Reads an ONNX file.
     ///
     /// # Errors
-    /// If it is damaged, has operators that are not known, takes something other than one picture, or has no such output.
+    /// If it is damaged, has operators that are not known, takes something other than one
+    /// picture, or has no such output.
     pub fn read(bytes: &[u8], options: &NetworkOptions) -> Result<Network, VisionError> {
         let model = guarded("read", || {
             Model::load(bytes.to_vec()).map_err(|e| wrong(format!("cannot read the network: {e}")))
         })?;
         let &[input] = model.input_ids() else {
             let n = model.input_ids().len();
-            return Err(wrong(format!("the network takes {n} inputs; it must take one, a picture")));
+            return Err(wrong(format!(
+                "the network takes {n} inputs; it must take one, a picture"
+            )));
         };
         let takes = takes(&model, input)?;
         let (output, called) = output(&model, &options.output)?;
@@ -81,7 +90,8 @@ impl Network {
                 .collect();
             // What it says of itself; what it gives is looked at again.
             if let (Some(sizes), Some(width), Some(height)) = (sizes, takes.width, takes.height) {
-                side_lengths(&sizes, (width, height)).map_err(|why| wrong(format!("the output `{called}` {why}")))?;
+                side_lengths(&sizes, (width, height))
+                    .map_err(|why| wrong(format!("the output `{called}` {why}")))?;
             }
         }
         Ok(Network { model, input, takes, output, called, options: options.clone() })
@@ -92,11 +102,12 @@ impl Network {
         self.options.shows
     }
 
-    /// The map of a photograph, at the network's own size or else at a longer side of at most `size` pixels, at least a multiple of
-    /// 32 each side.
+    /// The map of a photograph, at the network's own size or else at a longer side of at
+    /// most `size` pixels, at least a multiple of 32 each side.
     ///
     /// # Errors
-    /// If the network fails, or gives something other than a map of one channel in the shape of its input.
+    /// If the network fails, or gives something other than a map of one channel in the
+    /// shape of its input.
     pub fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError> {
         let own = fitted(photo.width(), photo.height(), size);
         let round = |n: u32| ((n + MULTIPLE / 2) / MULTIPLE * MULTIPLE).max(MULTIPLE);
@@ -107,16 +118,20 @@ impl Network {
             let given = self.model.run(vec![(self.input, input.into())], &[self.output], None);
             given.map_err(|e| wrong(format!("the network failed: {e}")))
         })?;
-        let value = given.into_iter().next().ok_or_else(|| wrong("the network produced no output"))?;
-        let (shape, mut values) = numbers(value).ok_or_else(|| self.unfit("is not in single precision"))?;
-        let (width, height) = side_lengths(&shape, (width, height)).map_err(|why| self.unfit(&why))?;
+        let value =
+            given.into_iter().next().ok_or_else(|| wrong("the network produced no output"))?;
+        let (shape, mut values) =
+            numbers(value).ok_or_else(|| self.unfit("is not in single precision"))?;
+        let (width, height) =
+            side_lengths(&shape, (width, height)).map_err(|why| self.unfit(&why))?;
         if values.iter().any(|v| !v.is_finite()) {
             return Err(self.unfit("has values that are not finite"));
         }
         if self.options.logits {
             values.iter_mut().for_each(|v| *v = 1.0 / (1.0 + libm::expf(-*v)));
         }
-        let (least, most) = values.iter().fold((0.0f32, 0.0f32), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (least, most) =
+            values.iter().fold((0.0f32, 0.0f32), |(a, b), v| (a.min(*v), b.max(*v)));
         if least < -0.01 || most > 1.01 {
             return Err(self.unfit(&format!(
                 "has values from {least} to {most}, not from 0 to 1; if they are log odds, set logits = true"
@@ -147,7 +162,10 @@ impl Network {
         let n = self.takes.channels;
         let (w, h) = (width as usize, height as usize);
         let (shape, data) = match self.takes.channels_last {
-            true => ([1, h, w, n], rgb.iter().flat_map(|p| p[..n].iter().copied()).collect::<Vec<f32>>()),
+            true => (
+                [1, h, w, n],
+                rgb.iter().flat_map(|p| p[..n].iter().copied()).collect::<Vec<f32>>(),
+            ),
             false => ([1, n, h, w], (0..n).flat_map(|c| rgb.iter().map(move |p| p[c])).collect()),
         };
         Value::from_shape(shape, data).map_err(wrong)
@@ -175,10 +193,16 @@ fn takes(model: &Model, input: NodeId) -> Result<Takes, VisionError> {
         format!("[{}]", sizes.join(", "))
     };
     let [batch, second, third, last] = &shape[..] else {
-        return Err(wrong(format!("the network takes {}; the input must have 4 dimensions", shown())));
+        return Err(wrong(format!(
+            "the network takes {}; the input must have 4 dimensions",
+            shown()
+        )));
     };
     if matches!(batch, Dimension::Fixed(n) if *n != 1) {
-        return Err(wrong(format!("the network takes {}; it must take one picture at a time", shown())));
+        return Err(wrong(format!(
+            "the network takes {}; it must take one picture at a time",
+            shown()
+        )));
     }
     let count = |d: &Dimension| match d {
         Dimension::Fixed(n @ (1 | 3)) => Some(*n),
@@ -188,11 +212,18 @@ fn takes(model: &Model, input: NodeId) -> Result<Takes, VisionError> {
         (Some(n), _) => (false, n, third, last),
         (None, Some(n)) => (true, n, second, third),
         (None, None) if matches!(second, Dimension::Symbolic(_)) => (false, 3, third, last),
-        _ => return Err(wrong(format!("the network takes {}; it must take 1 or 3 channels", shown()))),
+        _ => {
+            return Err(wrong(format!(
+                "the network takes {}; it must take 1 or 3 channels",
+                shown()
+            )));
+        }
     };
     let side = |d: &Dimension| match d {
         Dimension::Fixed(n) if (1..=SIDE).contains(n) => Ok(Some(*n as u32)),
-        Dimension::Fixed(_) => Err(wrong(format!("the network takes {}; sides may be 1 to {SIDE}", shown()))),
+        Dimension::Fixed(_) => {
+            Err(wrong(format!("the network takes {}; sides may be 1 to {SIDE}", shown())))
+        }
         Dimension::Symbolic(_) => Ok(None),
     };
     Ok(Takes { channels_last, channels, width: side(width)?, height: side(height)? })
@@ -217,8 +248,12 @@ fn output(model: &Model, which: &Output) -> Result<(NodeId, String), VisionError
     };
     found.cloned().ok_or_else(|| match which {
         Output::Last => wrong("the network has no output"),
-        Output::Number(n) => wrong(format!("the network has no output {n}; it has {}: {}", all.len(), names())),
-        Output::Named(name) => wrong(format!("the network has no output `{name}`; it has {}", names())),
+        Output::Number(n) => {
+            wrong(format!("the network has no output {n}; it has {}: {}", all.len(), names()))
+        }
+        Output::Named(name) => {
+            wrong(format!("the network has no output `{name}`; it has {}", names()))
+        }
     })
 }
 
@@ -238,7 +273,11 @@ fn numbers(value: Value) -> Option<(Vec<usize>, Vec<f32>)> {
 fn side_lengths(shape: &[usize], (width, height): (u32, u32)) -> Result<(u32, u32), String> {
     let (h, w) = match *shape {
         [h, w] | [1, h, w] | [1, 1, h, w] | [1, h, w, 1] => (h, w),
-        _ => return Err(format!("is {shape:?}, not a map of one channel such as [1, 1, {height}, {width}]")),
+        _ => {
+            return Err(format!(
+                "is {shape:?}, not a map of one channel such as [1, 1, {height}, {width}]"
+            ));
+        }
     };
     let (a, b) = (w as u64 * u64::from(height), h as u64 * u64::from(width));
     // A pixel more or less comes from rounding.

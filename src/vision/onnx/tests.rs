@@ -61,7 +61,8 @@ mod writer {
             let ints = ints.iter().flat_map(|n| number(8, *n)).collect::<Vec<u8>>();
             bytes(5, &[bytes(1, name.as_bytes()), ints, number(20, 7)].concat())
         });
-        [inputs, bytes(2, output.as_bytes()), bytes(4, op.as_bytes()), attributes.collect()].concat()
+        [inputs, bytes(2, output.as_bytes()), bytes(4, op.as_bytes()), attributes.collect()]
+            .concat()
     }
 
     /// A network.
@@ -92,7 +93,8 @@ fn shape(channels: u64, sides: [Dim; 2]) -> Vec<Dim> {
     vec![Dim::Of(1), Dim::Of(channels), sides[0], sides[1]]
 }
 
-/// One convolution of 1 x 1, which adds up the channels with weights, and then something that is done to the sum.
+/// One convolution of 1 x 1, which adds up the channels with weights, and then something
+/// that is done to the sum.
 fn weighted(channels: u64, sides: [Dim; 2], weights: &[f32], then: &str) -> Graph {
     Graph {
         inputs: vec![("picture", 1, shape(channels, sides))],
@@ -127,18 +129,25 @@ fn middle(map: &SoftMap) -> f32 {
 fn the_picture_arrives_as_the_options_say() {
     let plain = NetworkOptions::default();
     let photo = photo(96, 64);
-    let get =
-        |graph: &Graph, options: &NetworkOptions| middle(&network(graph, options).unwrap().map(&photo, 512).unwrap());
+    let get = |graph: &Graph, options: &NetworkOptions| {
+        middle(&network(graph, options).unwrap().map(&photo, 512).unwrap())
+    };
     let near = |a: f32, b: f32| assert!((a - b).abs() < 1e-6, "{a} {b}");
     // One channel at a time: red, green, blue are 1, 0.4, 0.2 in the disc.
-    let one = |c: usize| weighted(3, SIDES, &std::array::from_fn::<f32, 3, _>(|k| f32::from(k == c)), "Identity");
+    let one = |c: usize| {
+        weighted(3, SIDES, &std::array::from_fn::<f32, 3, _>(|k| f32::from(k == c)), "Identity")
+    };
     near(get(&one(0), &plain), 1.0);
     near(get(&one(1), &plain), 0.4);
     near(get(&one(2), &plain), 0.2);
     let bgr = NetworkOptions { bgr: true, ..plain.clone() };
     near(get(&one(0), &bgr), 0.2);
-    let normalised =
-        NetworkOptions { white: 255.0, mean: [0.0, -51.0, 0.0], spread: [255.0, 510.0, 1.0], ..plain.clone() };
+    let normalised = NetworkOptions {
+        white: 255.0,
+        mean: [0.0, -51.0, 0.0],
+        spread: [255.0, 510.0, 1.0],
+        ..plain.clone()
+    };
     near(get(&one(0), &normalised), 1.0);
     near(get(&one(1), &normalised), 153.0 / 510.0);
     // Grey, by Rec. 601, whatever the order of colours.
@@ -152,15 +161,23 @@ fn outputs_by_place_and_by_name() {
     let graph = weighted(3, SIDES, &[0.5, 0.0, 0.0], "Sigmoid");
     let of = |output| {
         let options = NetworkOptions { output, ..NetworkOptions::default() };
-        network(&graph, &options).and_then(|n| n.map(&photo(96, 64), 96).map_err(|e| e.to_string())).map(|m| middle(&m))
+        network(&graph, &options)
+            .and_then(|n| n.map(&photo(96, 64), 96).map_err(|e| e.to_string()))
+            .map(|m| middle(&m))
     };
     let sigmoid = 1.0 / (1.0 + libm::expf(-0.5));
     assert!((of(Output::Last).unwrap() - sigmoid).abs() < 1e-5);
     assert!((of(Output::Number(2)).unwrap() - sigmoid).abs() < 1e-5);
     assert_eq!(of(Output::Number(1)).unwrap(), 0.5);
     assert_eq!(of(Output::Named("side".into())).unwrap(), 0.5);
-    assert_eq!(of(Output::Number(3)).unwrap_err(), "the network has no output 3; it has 2: side, fused");
-    assert_eq!(of(Output::Named("d0".into())).unwrap_err(), "the network has no output `d0`; it has side, fused");
+    assert_eq!(
+        of(Output::Number(3)).unwrap_err(),
+        "the network has no output 3; it has 2: side, fused"
+    );
+    assert_eq!(
+        of(Output::Named("d0".into())).unwrap_err(),
+        "the network has no output `d0`; it has side, fused"
+    );
 }
 
 #[test]
@@ -168,7 +185,11 @@ fn values_beyond_1_are_log_odds_or_an_error() {
     let graph = weighted(3, SIDES, &[-4.0, 0.0, 0.0], "Identity");
     let of = |logits| {
         let options = NetworkOptions { logits, ..NetworkOptions::default() };
-        network(&graph, &options).unwrap().map(&photo(64, 64), 64).map(|m| middle(&m)).map_err(|e| e.to_string())
+        network(&graph, &options)
+            .unwrap()
+            .map(&photo(64, 64), 64)
+            .map(|m| middle(&m))
+            .map_err(|e| e.to_string())
     };
     let why = of(false).unwrap_err();
     assert_eq!(
@@ -183,7 +204,8 @@ fn values_beyond_1_are_log_odds_or_an_error() {
 
 #[test]
 fn objects_and_contours_become_contour_maps_in_the_shape_of_the_photograph() {
-    // The disc itself: an object. A network of fixed size, which is not that of the photograph.
+    // The disc itself: an object. A network of fixed size, which is not that of the
+    // photograph.
     let fixed = weighted(3, [Dim::Of(64), Dim::Of(64)], &[1.0, 0.0, 0.0], "Identity");
     let objects = NetworkOptions { shows: Shows::Objects, ..NetworkOptions::default() };
     let detector = FileDetector::read(&fixed.file(), &objects).unwrap();
@@ -200,13 +222,18 @@ fn objects_and_contours_become_contour_maps_in_the_shape_of_the_photograph() {
         assert!(((map.tx[k] * x + map.ty[k] * y) / r).abs() < 0.3);
     }
     // What a map shows is for the options to say.
-    let contours = FileDetector::read(&fixed.file(), &NetworkOptions::default()).unwrap().detect(&photo).unwrap();
+    let contours = FileDetector::read(&fixed.file(), &NetworkOptions::default())
+        .unwrap()
+        .detect(&photo)
+        .unwrap();
     assert_ne!(contours, map);
 }
 
 #[test]
 fn sides_of_networks_that_take_any_size() {
-    let any = network(&weighted(3, SIDES, &[1.0, 0.0, 0.0], "Identity"), &NetworkOptions::default()).unwrap();
+    let any =
+        network(&weighted(3, SIDES, &[1.0, 0.0, 0.0], "Identity"), &NetworkOptions::default())
+            .unwrap();
     for ((w, h), size, expected) in [
         ((640, 480), 512, (512, 384)),
         ((640, 480), 200, (192, 160)),
@@ -236,9 +263,14 @@ fn networks_that_are_of_no_use() {
         let read = network(&graph, &plain);
         read.and_then(|n| n.map(&photo(64, 64), 64).map_err(|e| e.to_string())).unwrap_err()
     };
-    let input = |dims: &'static [u64]| with(&move |g| g.inputs[0].2 = dims.iter().map(|n| Dim::Of(*n)).collect());
+    let input = |dims: &'static [u64]| {
+        with(&move |g| g.inputs[0].2 = dims.iter().map(|n| Dim::Of(*n)).collect())
+    };
     for (why, says) in [
-        (with(&|g| g.inputs.push(("other", 1, shape(3, SIDES)))), "the network takes 2 inputs; it must take one"),
+        (
+            with(&|g| g.inputs.push(("other", 1, shape(3, SIDES)))),
+            "the network takes 2 inputs; it must take one",
+        ),
         (with(&|g| g.inputs[0].1 = 6), "input is not in single precision"),
         (input(&[3, 64, 64]), "the network takes [3, 64, 64]; the input must have 4 dimensions"),
         (input(&[2, 3, 64, 64]), "one picture at a time"),

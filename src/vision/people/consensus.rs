@@ -1,7 +1,9 @@
-//! One person out of several views: which views agree, what they agree on, and what the others say.
+//! One person out of several views: which views agree, what they agree on, and what the
+//! others say.
 //!
-//! Means over views are bad, since views have several modes (an arm here or there, left and right exchanged). So the view that most others
-//! agree with is looked for, and each landmark is the median over those that agree with it.
+//! Means over views are bad, since views have several modes (an arm here or there, left
+//! and right exchanged). So the view that most others agree with is looked for, and each
+//! landmark is the median over those that agree with it.
 
 use super::landmarks::{NAMED, Seen, View};
 use super::window::Window;
@@ -22,14 +24,17 @@ pub(super) struct Run {
     pub view: View,
 }
 
-/// Runs by person: windows about the same place and of about the same size, in the order of their first.
+/// Runs by person: windows about the same place and of about the same size, in the order
+/// of their first.
 pub(super) fn by_person(runs: Vec<Run>) -> Vec<Vec<Run>> {
     let mut people: Vec<Vec<Run>> = Vec::new();
     for run in runs {
         let same = people.iter_mut().find(|p| {
             let (centre, side) = middle(p);
             let apart = distance(run.found.centre, centre);
-            apart < 0.25 * side.min(run.found.side) && run.found.side < 2.0 * side && side < 2.0 * run.found.side
+            apart < 0.25 * side.min(run.found.side)
+                && run.found.side < 2.0 * side
+                && side < 2.0 * run.found.side
         });
         match same {
             Some(person) => person.push(run),
@@ -46,7 +51,8 @@ fn middle(runs: &[Run]) -> ([f64; 2], f64) {
     ([mean(&|r| r.found.centre[0]), mean(&|r| r.found.centre[1])], mean(&|r| r.found.side))
 }
 
-/// How much a picture of this size is about a person: how often and surely they are seen, how large, how near its middle.
+/// How much a picture of this size is about a person: how often and surely they are seen,
+/// how large, how near its middle.
 pub(super) fn prominence(runs: &[Run], width: u32, height: u32) -> f64 {
     let (centre, side) = middle(runs);
     let off = libm::hypot(centre[0] / f64::from(width) - 0.5, centre[1] / f64::from(height) - 0.5);
@@ -73,8 +79,9 @@ pub(super) fn consensus(runs: &[Run]) -> Option<Consensus> {
     let (mut first, mut others) = (None, Vec::new());
     while let Some(best) = most_agreed(runs, &left, torso) {
         let with = &runs[best].view;
-        let (agreeing, rest): (Vec<usize>, Vec<usize>) =
-            left.iter().partition(|i| **i == best || agreement(&runs[**i].view, with, torso) > AGREEING);
+        let (agreeing, rest): (Vec<usize>, Vec<usize>) = left
+            .iter()
+            .partition(|i| **i == best || agreement(&runs[**i].view, with, torso) > AGREEING);
         let landmarks = medians(runs, &agreeing)?;
         match first {
             None => first = Some((landmarks, agreeing)),
@@ -87,7 +94,8 @@ pub(super) fn consensus(runs: &[Run]) -> Option<Consensus> {
     Some(Consensus { landmarks, torso, agreeing, others })
 }
 
-/// The run, among some, that the others agree with most, by how sure they are; of equal ones the first.
+/// The run, among some, that the others agree with most, by how sure they are; of equal
+/// ones the first.
 fn most_agreed(runs: &[Run], among: &[usize], torso: f64) -> Option<usize> {
     let support = |i: usize| -> f64 {
         let each = |j: &usize| {
@@ -125,7 +133,9 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 fn medians(runs: &[Run], among: &[usize]) -> Option<[Landmark; NAMED]> {
     let mut out = [Landmark::default(); NAMED];
     for (k, landmark) in out.iter_mut().enumerate() {
-        let each = |f: &dyn Fn(&Seen) -> f64| median(among.iter().map(|i| f(&runs[*i].view.landmarks[k])).collect());
+        let each = |f: &dyn Fn(&Seen) -> f64| {
+            median(among.iter().map(|i| f(&runs[*i].view.landmarks[k])).collect())
+        };
         let at = [each(&|s| s.at[0])?, each(&|s| s.at[1])?];
         let squares = among.iter().map(|i| {
             let d = distance(runs[*i].view.landmarks[k].at, at);

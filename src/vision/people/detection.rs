@@ -1,4 +1,5 @@
-//! Where in a picture people are, roughly: an SSD network's boxes (Liu et al. 2016; MediaPipe's `pose_detection`).
+//! Where in a picture people are, roughly: an SSD network's boxes (Liu et al. 2016;
+//! MediaPipe's `pose_detection`).
 
 use super::window::{Beyond, Window};
 use crate::nn::{Network, NetworkError, sigmoid};
@@ -24,7 +25,8 @@ pub(super) struct Detection {
     pub window: Window,
 }
 
-/// A box with its points, as positions in the view: left, top, right, bottom, then x and y of each point.
+/// A box with its points, as positions in the view: left, top, right, bottom, then x and
+/// y of each point.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     score: f64,
@@ -45,7 +47,9 @@ fn anchors() -> impl Iterator<Item = [f64; 2]> {
 pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     let count = anchors().count();
     let outputs: Vec<&[usize]> = network.output_shapes().collect();
-    if network.input_shape() == [1, SIDE, SIDE, 3] && outputs == [&[1, count, NUMBERS][..], &[1, count, 1]] {
+    if network.input_shape() == [1, SIDE, SIDE, 3]
+        && outputs == [&[1, count, NUMBERS][..], &[1, count, 1]]
+    {
         return Ok(());
     }
     Err(NetworkError::Format("it is not a person detector (pose_detection.tflite)".into()))
@@ -87,7 +91,8 @@ fn found(c: &Candidate, view: &Window) -> Option<Detection> {
     window.is_sound().then_some(Detection { score: c.score, head, window })
 }
 
-/// One candidate for each group that overlaps the best of those left: their mean, weighted by score.
+/// One candidate for each group that overlaps the best of those left: their mean,
+/// weighted by score.
 fn people(mut all: Vec<Candidate>) -> Vec<Candidate> {
     let mut out = Vec::new();
     while let Some(best) = all.first().copied() {
@@ -119,8 +124,9 @@ mod tests {
     fn overlap_is_intersection_over_union() {
         let of = |a: [f64; 4], b: [f64; 4]| {
             // The points that follow a box's sides do not matter.
-            let with_points =
-                |sides: [f64; 4]| -> [f64; NUMBERS] { std::array::from_fn(|i| sides.get(i).copied().unwrap_or(9.0)) };
+            let with_points = |sides: [f64; 4]| -> [f64; NUMBERS] {
+                std::array::from_fn(|i| sides.get(i).copied().unwrap_or(9.0))
+            };
             let (a, b) = (with_points(a), with_points(b));
             assert_eq!(overlap(&a, &b), overlap(&b, &a));
             overlap(&a, &b)

@@ -1,11 +1,13 @@
-//! People as files that other programs read, and `--keypoints` too: COCO's layout and MediaPipe's.
+//! People as files that other programs read, and `--keypoints` too: COCO's layout and
+//! MediaPipe's.
 
 use super::{Landmark, Person};
 use crate::vision::keypoints::{COCO, MEDIAPIPE};
 use serde_json::{Map, Value, json};
 
-/// People in a picture of this size and name as COCO's annotations: 17 joints with the visibility as third number, box, score. Beside
-/// them, under `landmarks`, all 33 by name: x, y, visibility, spread in pixels; under `metres` their places about the hips.
+/// People in a picture of this size and name as COCO's annotations: 17 joints with the
+/// visibility as third number, box, score. Beside them, under `landmarks`, all 33 by
+/// name: x, y, visibility, spread in pixels; under `metres` their places about the hips.
 pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str) -> Value {
     let annotation = |(i, p): (usize, &Person)| {
         let [left, top, right, bottom] = p.bounds;
@@ -27,7 +29,8 @@ pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str) -> Value
     })
 }
 
-/// People in a picture of this size as MediaPipe has them: 33 landmarks each, as shares of its width and height, and in metres about the hips.
+/// People in a picture of this size as MediaPipe has them: 33 landmarks each, as shares
+/// of its width and height, and in metres about the hips.
 pub fn mediapipe(people: &[Person], (width, height): (u32, u32)) -> Value {
     let each = |one: &dyn Fn(&Landmark) -> Value| -> Value {
         people.iter().map(|p| p.landmarks.iter().map(one).collect::<Value>()).collect()

@@ -1,4 +1,5 @@
-//! The landmarks of one person in a window: MediaPipe's `pose_landmark` networks (Bazarevsky et al. 2020, "BlazePose").
+//! The landmarks of one person in a window: MediaPipe's `pose_landmark` networks
+//! (Bazarevsky et al. 2020, "BlazePose").
 
 use super::window::{Beyond, Window};
 use crate::nn::{Network, NetworkError, sigmoid};
@@ -23,7 +24,8 @@ pub(super) struct Seen {
     pub at: [f64; 2],
     /// 0 to 1.
     pub visibility: f64,
-    /// In metres from the middle of the hips: right and down in the picture, and away from the camera.
+    /// In metres from the middle of the hips: right and down in the picture, and away
+    /// from the camera.
     pub metres: [f64; 3],
 }
 
@@ -44,7 +46,8 @@ pub(super) struct View {
 /// Fails unless the network takes and gives what one for landmarks does.
 pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     let outputs: Vec<&[usize]> = network.output_shapes().collect();
-    let wanted: [&[usize]; 5] = [&[1, 5 * ALL], &[1, 1], &[1, SIDE, SIDE, 1], &[1, MAP, MAP, ALL], &[1, 3 * ALL]];
+    let wanted: [&[usize]; 5] =
+        [&[1, 5 * ALL], &[1, 1], &[1, SIDE, SIDE, 1], &[1, MAP, MAP, ALL], &[1, 3 * ALL]];
     if network.input_shape() == [1, SIDE, SIDE, 3] && outputs == wanted {
         return Ok(());
     }
@@ -62,8 +65,13 @@ fn other_side(i: usize) -> usize {
     }
 }
 
-/// What the network sees in a window of a picture; `None` if that is no window to go on from.
-pub(super) fn look(network: &Network, photo: &Photo, window: &Window) -> Result<Option<View>, NetworkError> {
+/// What the network sees in a window of a picture; `None` if that is no window to go on
+/// from.
+pub(super) fn look(
+    network: &Network,
+    photo: &Photo,
+    window: &Window,
+) -> Result<Option<View>, NetworkError> {
     let outputs = network.run(window.sample(photo, SIDE, [0.0, 1.0], Beyond::Edge))?;
     let [points, presence, mask, maps, metres] = &outputs[..] else { return Ok(None) };
     let (sin, cos) = libm::sincos(window.turn);
@@ -76,15 +84,24 @@ pub(super) fn look(network: &Network, photo: &Photo, window: &Window) -> Result<
         let metres = [cos * across - sin * m[1], sin * across + cos * m[1], m[2]];
         Seen { at, visibility: f64::from(sigmoid(p[3])), metres }
     };
-    let next = Window { mirrored: window.mirrored, ..Window::around(one(NAMED).at, one(NAMED + 1).at) };
+    let next =
+        Window { mirrored: window.mirrored, ..Window::around(one(NAMED).at, one(NAMED + 1).at) };
     let landmarks: [Seen; NAMED] = core::array::from_fn(one);
-    let numbers = landmarks.iter().flat_map(|l| l.at.iter().chain(&l.metres).chain([&l.visibility]));
+    let numbers =
+        landmarks.iter().flat_map(|l| l.at.iter().chain(&l.metres).chain([&l.visibility]));
     let sound = next.is_sound() && numbers.chain([&f64::from(presence[0])]).all(|x| x.is_finite());
     let mask = mask.clone();
-    Ok(sound.then(|| View { window: *window, presence: f64::from(presence[0]), landmarks, next, mask }))
+    Ok(sound.then(|| View {
+        window: *window,
+        presence: f64::from(presence[0]),
+        landmarks,
+        next,
+        mask,
+    }))
 }
 
-/// A position, moved to the mean of the landmark's heat map around it where that is sure of itself.
+/// A position, moved to the mean of the landmark's heat map around it where that is sure
+/// of itself.
 fn refined(maps: &[f32], landmark: usize, at: [f64; 2]) -> [f64; 2] {
     let cell = at.map(|x| x * MAP as f64);
     if !cell.iter().all(|c| (0.0..MAP as f64).contains(c)) {

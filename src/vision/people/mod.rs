@@ -1,8 +1,11 @@
-//! People in a photograph: where they are, 33 landmarks of each, and which pixels are theirs, by two small networks of MediaPipe.
+//! People in a photograph: where they are, 33 landmarks of each, and which pixels are
+//! theirs, by two small networks of MediaPipe.
 //!
-//! The picture is looked at in several views, padded and mirrored; what they agree on is the person, what they do not are other
-//! hypotheses ([`Person::others`]). A function of the picture alone, with the same bits on any machine and for any number of threads.
-//! Not here: which networks there are (`pcadlang-models`), and what is made of the landmarks.
+//! The picture is looked at in several views, padded and mirrored; what they agree on is
+//! the person, what they do not are other hypotheses ([`Person::others`]). A function of
+//! the picture alone, with the same bits on any machine and for any number of threads.
+//! Not here: which networks there are (`pcadlang-models`), and what is made of the
+//! landmarks.
 
 mod consensus;
 mod detection;
@@ -30,7 +33,8 @@ const PRESENT: f64 = 0.5;
 /// How people are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FindOptions {
-    /// How many views there are, half of them mirrored: 2, 4 or 8, by padding the picture by 0, 30 %, 15 % and 50 %.
+    /// How many views there are, half of them mirrored: 2, 4 or 8, by padding the picture
+    /// by 0, 30 %, 15 % and 50 %.
     pub views: u32,
     /// How many people a view is searched for at most.
     pub most: usize,
@@ -53,7 +57,8 @@ pub struct Landmark {
     pub spread: f64,
     /// How sure the network is that it can be seen, 0 to 1.
     pub visibility: f64,
-    /// In metres from the middle of the hips: right and down in the picture, and away from the camera.
+    /// In metres from the middle of the hips: right and down in the picture, and away
+    /// from the camera.
     pub metres: [f64; 3],
 }
 
@@ -69,9 +74,11 @@ pub struct Hypothesis {
 /// A person that was found.
 #[derive(Clone, Debug)]
 pub struct Person {
-    /// How much the picture is about them: how often and surely they are seen, how large, how near the middle.
+    /// How much the picture is about them: how often and surely they are seen, how large,
+    /// how near the middle.
     pub score: f64,
-    /// How sure it is that this is a person, 0 to 1: what both networks grant, in the view where that is most.
+    /// How sure it is that this is a person, 0 to 1: what both networks grant, in the
+    /// view where that is most.
     pub sure: f64,
     /// Left, top, right and bottom of all landmarks, in pixels.
     pub bounds: [f64; 4],
@@ -97,38 +104,51 @@ pub struct PeopleFinder {
 }
 
 impl PeopleFinder {
-    /// From the files of a detection and of a landmark network (`pose_detection.tflite`, `pose_landmark_*.tflite`).
+    /// From the files of a detection and of a landmark network (`pose_detection.tflite`,
+    /// `pose_landmark_*.tflite`).
     ///
     /// # Errors
     /// If a file cannot be read, or is of another network.
     pub fn new(detection: &[u8], landmarks: &[u8]) -> Result<PeopleFinder, NetworkError> {
-        let finder = PeopleFinder { detection: Network::read(detection)?, landmarks: Network::read(landmarks)? };
+        let finder = PeopleFinder {
+            detection: Network::read(detection)?,
+            landmarks: Network::read(landmarks)?,
+        };
         detection::check(&finder.detection)?;
         landmarks::check(&finder.landmarks)?;
         Ok(finder)
     }
 
-    /// The people in a photograph, the most prominent first; `threads` views (0: as many as there are cores) are looked at side by
-    /// side.
+    /// The people in a photograph, the most prominent first; `threads` views (0: as many
+    /// as there are cores) are looked at side by side.
     ///
     /// # Errors
     /// Those of the networks, which sound ones do not have.
-    pub fn find(&self, photo: &Photo, options: &FindOptions, threads: usize) -> Result<Vec<Person>, NetworkError> {
+    pub fn find(
+        &self,
+        photo: &Photo,
+        options: &FindOptions,
+        threads: usize,
+    ) -> Result<Vec<Person>, NetworkError> {
         let longer = photo.width().max(photo.height());
         let small = (longer > LONGEST).then(|| photo.shrunk(LONGEST));
         let looked_at = small.as_ref().unwrap_or(photo);
         let scale = f64::from(longer) / f64::from(longer.min(LONGEST));
         let (width, height) = (looked_at.width(), looked_at.height());
-        let paddings = [0.0, 0.3, 0.15, 0.5].into_iter().take(options.views.div_ceil(2).clamp(1, 4) as usize);
+        let paddings =
+            [0.0, 0.3, 0.15, 0.5].into_iter().take(options.views.div_ceil(2).clamp(1, 4) as usize);
         let whole = |padding| Window::whole(width, height, padding);
-        let views: Vec<Window> = paddings.flat_map(|p| [whole(p), Window { mirrored: true, ..whole(p) }]).collect();
+        let views: Vec<Window> =
+            paddings.flat_map(|p| [whole(p), Window { mirrored: true, ..whole(p) }]).collect();
         let mut seen: Vec<_> = views.into_iter().map(|view| (view, Ok(Vec::new()))).collect();
-        let threads = if threads == 0 { available_parallelism().map_or(1, usize::from) } else { threads };
+        let threads =
+            if threads == 0 { available_parallelism().map_or(1, usize::from) } else { threads };
         let share = seen.len().div_ceil(threads).max(1);
         side_by_side(seen.chunks_mut(share), |_, part| {
             part.iter_mut().for_each(|(view, runs)| *runs = self.runs(looked_at, view, options));
         });
-        let mut runs: Vec<Run> = seen.into_iter().map(|(_, runs)| runs).collect::<Result<Vec<_>, _>>()?.concat();
+        let mut runs: Vec<Run> =
+            seen.into_iter().map(|(_, runs)| runs).collect::<Result<Vec<_>, _>>()?.concat();
         if runs.iter().any(|r| r.view.presence > PRESENT) {
             runs.retain(|r| r.view.presence > PRESENT);
         }
@@ -139,7 +159,12 @@ impl PeopleFinder {
     }
 
     /// What is seen of each person that is detected in a view of the whole picture.
-    fn runs(&self, photo: &Photo, view: &Window, options: &FindOptions) -> Result<Vec<Run>, NetworkError> {
+    fn runs(
+        &self,
+        photo: &Photo,
+        view: &Window,
+        options: &FindOptions,
+    ) -> Result<Vec<Run>, NetworkError> {
         let mut runs = Vec::new();
         let found = detection::detect(&self.detection, photo, view, options.least)?;
         for d in found.into_iter().take(options.most) {
@@ -188,15 +213,17 @@ impl Person {
         MEDIAPIPE.iter().position(|n| *n == name).and_then(|i| self.landmarks.get(i))
     }
 
-    /// How likely each pixel is the person's, 0 to 1, in a picture of this size that shows what the photograph, `photo_width` pixels wide,
-    /// shows; the mean over the views that agree.
+    /// How likely each pixel is the person's, 0 to 1, in a picture of this size that
+    /// shows what the photograph, `photo_width` pixels wide, shows; the mean over the
+    /// views that agree.
     pub fn mask(&self, width: u32, height: u32, photo_width: u32) -> Vec<f32> {
         let scale = f64::from(photo_width) / f64::from(width.max(1));
         let mut out = Vec::with_capacity(width as usize * height as usize);
         for row in 0..height {
             for column in 0..width {
                 let pixel = [column, row].map(|x| (f64::from(x) + 0.5) * scale);
-                let sum: f32 = self.masks.iter().map(|(window, mask)| at(mask, window.position(pixel))).sum();
+                let sum: f32 =
+                    self.masks.iter().map(|(window, mask)| at(mask, window.position(pixel))).sum();
                 out.push(sum / self.masks.len().max(1) as f32);
             }
         }

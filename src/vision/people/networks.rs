@@ -1,4 +1,5 @@
-//! The networks that this process finds people with: those that come with the program, unless others were chosen.
+//! The networks that this process finds people with: those that come with the program,
+//! unless others were chosen.
 
 use super::PeopleFinder;
 use std::sync::OnceLock;

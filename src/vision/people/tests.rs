@@ -1,4 +1,5 @@
-//! Windows there and back, groups of detections, what views agree on; and, with the shipped networks, a photograph.
+//! Windows there and back, groups of detections, what views agree on; and, with the
+//! shipped networks, a photograph.
 
 use super::consensus::{Run, by_person, consensus};
 use super::landmarks::{NAMED, SIDE, Seen, View};
@@ -17,7 +18,10 @@ fn windows_lead_there_and_back() {
     assert!(near(upright.pixel([0.0, 0.0]), [40.0, 20.0], 1e-12));
     assert!(near(Window { mirrored: true, ..upright }.pixel([0.0, 0.0]), [60.0, 20.0], 1e-12));
     let quarter = Window { turn: std::f64::consts::FRAC_PI_2, ..upright };
-    assert!(near(quarter.pixel([1.0, 0.5]), [50.0, 40.0], 1e-12), "right in the window is down in the picture");
+    assert!(
+        near(quarter.pixel([1.0, 0.5]), [50.0, 40.0], 1e-12),
+        "right in the window is down in the picture"
+    );
     for mirrored in [false, true] {
         let w = Window { turn: 0.7, mirrored, ..upright };
         for p in [[0.0, 0.0], [0.3, 0.9], [-2.0, 1.5]] {
@@ -38,7 +42,9 @@ fn the_window_of_a_person_is_turned_as_they_are() {
 
 #[test]
 fn samples_are_those_of_the_picture() {
-    let photo = Photo::from_rgb(RgbImage::from_fn(8, 8, |x, y| Rgb([10 * x as u8, 10 * y as u8, 255]))).unwrap();
+    let photo =
+        Photo::from_rgb(RgbImage::from_fn(8, 8, |x, y| Rgb([10 * x as u8, 10 * y as u8, 255])))
+            .unwrap();
     let whole = Window::whole(8, 8, 0.0);
     let plain = whole.sample(&photo, 8, [0.0, 255.0], Beyond::Black);
     for (i, p) in plain.chunks_exact(3).enumerate() {
@@ -63,10 +69,18 @@ fn samples_are_interpolated_and_beyond_the_picture_black_or_as_at_its_edge() {
         all.into_iter().step_by(3).collect()
     };
     // Half a pixel apart.
-    let edge: [[f32; 4]; 4] =
-        [[10.0, 15.0, 20.0, 20.0], [25.0, 37.5, 50.0, 50.0], [40.0, 60.0, 80.0, 80.0], [40.0, 60.0, 80.0, 80.0]];
-    let black: [[f32; 4]; 4] =
-        [[10.0, 15.0, 20.0, 10.0], [25.0, 37.5, 50.0, 25.0], [40.0, 60.0, 80.0, 40.0], [20.0, 30.0, 40.0, 20.0]];
+    let edge: [[f32; 4]; 4] = [
+        [10.0, 15.0, 20.0, 20.0],
+        [25.0, 37.5, 50.0, 50.0],
+        [40.0, 60.0, 80.0, 80.0],
+        [40.0, 60.0, 80.0, 80.0],
+    ];
+    let black: [[f32; 4]; 4] = [
+        [10.0, 15.0, 20.0, 10.0],
+        [25.0, 37.5, 50.0, 25.0],
+        [40.0, 60.0, 80.0, 40.0],
+        [20.0, 30.0, 40.0, 20.0],
+    ];
     assert_eq!(sampled(0.0, Beyond::Edge), edge.as_flattened());
     assert_eq!(sampled(0.0, Beyond::Black), black.as_flattened());
     // A pixel apart, from one beyond the picture on.
@@ -93,7 +107,8 @@ fn masks_are_read_between_samples_up_to_the_last_ones() {
     }
 }
 
-/// A view of a person about these hips, with the torso's length and all landmarks moved by some pixels.
+/// A view of a person about these hips, with the torso's length and all landmarks moved
+/// by some pixels.
 fn run(hips: [f64; 2], torso: f64, moved: f64) -> Run {
     let at = |i: usize| {
         let (dx, up) = match i {
@@ -104,8 +119,11 @@ fn run(hips: [f64; 2], torso: f64, moved: f64) -> Run {
         let side = if i % 2 == 1 { 1.0 } else { -1.0 };
         [hips[0] + side * dx * torso + moved, hips[1] - up * torso]
     };
-    let landmarks: [Seen; NAMED] =
-        std::array::from_fn(|i| Seen { at: at(i), visibility: 0.5, metres: [moved, 0.0, i as f64] });
+    let landmarks: [Seen; NAMED] = std::array::from_fn(|i| Seen {
+        at: at(i),
+        visibility: 0.5,
+        metres: [moved, 0.0, i as f64],
+    });
     let window = Window { centre: hips, side: 4.0 * torso, turn: 0.0, mirrored: false };
     let view = View { window, presence: 0.9, landmarks, next: window, mask: Vec::new() };
     Run { score: 0.8, found: window, view }
@@ -130,7 +148,10 @@ fn the_view_that_most_agree_with_counts() {
     let c = consensus(&runs).unwrap();
     assert_eq!(c.agreeing, [0, 1, 3]);
     // Medians, and the deviation of a coordinate from them: (1 + 0 + 1) / (2 * 3).
-    assert!((c.landmarks[0].at[0] - 101.0).abs() < 1e-9 && (c.landmarks[0].metres[0] - 1.0).abs() < 1e-12);
+    assert!(
+        (c.landmarks[0].at[0] - 101.0).abs() < 1e-9
+            && (c.landmarks[0].metres[0] - 1.0).abs() < 1e-12
+    );
     assert!((c.landmarks[0].spread - (2.0f64 / 6.0).sqrt()).abs() < 1e-9);
     assert_eq!((c.others.len(), c.others[0].views), (1, 2));
     assert!((c.others[0].landmarks[0].at[0] - 180.0).abs() < 1e-9, "the lower of two");
@@ -170,7 +191,10 @@ mod shipped {
 
     /// All numbers of people, as bits.
     fn bits(people: &[Person]) -> Vec<u64> {
-        let landmarks = people.iter().flat_map(|p| p.landmarks).flat_map(|l| [l.at[0], l.at[1], l.spread, l.metres[2]]);
+        let landmarks = people
+            .iter()
+            .flat_map(|p| p.landmarks)
+            .flat_map(|l| [l.at[0], l.at[1], l.spread, l.metres[2]]);
         landmarks.map(f64::to_bits).collect()
     }
 
@@ -206,9 +230,12 @@ mod shipped {
 
     #[test]
     fn nobody_is_found_where_there_is_nobody() {
-        let grey = Photo::from_rgb(image::RgbImage::from_pixel(300, 200, image::Rgb([128; 3]))).unwrap();
+        let grey =
+            Photo::from_rgb(image::RgbImage::from_pixel(300, 200, image::Rgb([128; 3]))).unwrap();
         let dot = Photo::from_rgb(image::RgbImage::new(1, 1)).unwrap();
-        let wide = Photo::from_rgb(image::RgbImage::from_pixel(16_000, 3, image::Rgb([90, 20, 200]))).unwrap();
+        let wide =
+            Photo::from_rgb(image::RgbImage::from_pixel(16_000, 3, image::Rgb([90, 20, 200])))
+                .unwrap();
         for photo in [grey, dot, wide] {
             assert!(finder().find(&photo, &FindOptions::default(), 1).unwrap().is_empty());
         }
@@ -216,7 +243,8 @@ mod shipped {
 
     #[test]
     fn a_network_for_something_else_is_refused() {
-        let exchanged = PeopleFinder::new(pcadlang_models::LANDMARKS, pcadlang_models::DETECTION).unwrap_err();
+        let exchanged =
+            PeopleFinder::new(pcadlang_models::LANDMARKS, pcadlang_models::DETECTION).unwrap_err();
         assert!(exchanged.to_string().contains("it is not a person detector"), "{exchanged}");
         assert!(PeopleFinder::new(b"", pcadlang_models::LANDMARKS).is_err());
     }

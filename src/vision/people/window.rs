@@ -3,7 +3,8 @@
 use crate::vision::Photo;
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A square in a picture. Positions in it run from 0 to 1, right and down along its own sides.
+/// A square in a picture. Positions in it run from 0 to 1, right and down along its own
+/// sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
     /// Its centre, in pixels.
@@ -25,13 +26,20 @@ pub(super) enum Beyond {
 }
 
 impl Window {
-    /// The whole picture in its middle, with so much of its longer side added on every side.
+    /// The whole picture in its middle, with so much of its longer side added on every
+    /// side.
     pub fn whole(width: u32, height: u32, padding: f64) -> Window {
         let centre = [f64::from(width) / 2.0, f64::from(height) / 2.0];
-        Window { centre, side: f64::from(width.max(height)) * (1.0 + 2.0 * padding), turn: 0.0, mirrored: false }
+        Window {
+            centre,
+            side: f64::from(width.max(height)) * (1.0 + 2.0 * padding),
+            turn: 0.0,
+            mirrored: false,
+        }
     }
 
-    /// The window of a person: about the hips, turned so that a second point, which gives its size, is above them; after MediaPipe.
+    /// The window of a person: about the hips, turned so that a second point, which gives
+    /// its size, is above them; after MediaPipe.
     pub(super) fn around(hips: [f64; 2], above: [f64; 2]) -> Window {
         let [dx, dy] = [above[0] - hips[0], above[1] - hips[1]];
         let turn = FRAC_PI_2 - libm::atan2(-dy, dx);
@@ -55,15 +63,22 @@ impl Window {
         [if self.mirrored { -u } else { u } + 0.5, v + 0.5]
     }
 
-    /// Whether a window can be looked through: its numbers are finite, and it is not all but a point.
+    /// Whether a window can be looked through: its numbers are finite, and it is not all
+    /// but a point.
     pub(super) fn is_sound(&self) -> bool {
         let all = [self.centre[0], self.centre[1], self.turn, self.side];
         all.iter().all(|x| x.is_finite()) && (1e-3..1e7).contains(&self.side)
     }
 
-    /// `n` x `n` samples of the picture, red, green and blue from `lo` (black) to `hi`; interpolated linearly, sample (i, j) at
-    /// (i / n, j / n) as MediaPipe has it.
-    pub(super) fn sample(&self, photo: &Photo, n: usize, [lo, hi]: [f32; 2], beyond: Beyond) -> Vec<f32> {
+    /// `n` x `n` samples of the picture, red, green and blue from `lo` (black) to `hi`;
+    /// interpolated linearly, sample (i, j) at (i / n, j / n) as MediaPipe has it.
+    pub(super) fn sample(
+        &self,
+        photo: &Photo,
+        n: usize,
+        [lo, hi]: [f32; 2],
+        beyond: Beyond,
+    ) -> Vec<f32> {
         let rgb = photo.rgb();
         let (width, height) = (i64::from(rgb.width()), i64::from(rgb.height()));
         let at = |x: i64, y: i64| -> [f32; 3] {
@@ -77,11 +92,13 @@ impl Window {
         let scale = (hi - lo) / 255.0;
         let mut out = Vec::with_capacity(3 * n * n);
         // Positions are linear in the sample's row and column.
-        let (start, right, down) = (self.pixel([0.0, 0.0]), self.pixel([1.0, 0.0]), self.pixel([0.0, 1.0]));
+        let (start, right, down) =
+            (self.pixel([0.0, 0.0]), self.pixel([1.0, 0.0]), self.pixel([0.0, 1.0]));
         for j in 0..n {
             for i in 0..n {
                 let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);
-                let [x, y] = [0, 1].map(|k| start[k] + u * (right[k] - start[k]) + v * (down[k] - start[k]));
+                let [x, y] =
+                    [0, 1].map(|k| start[k] + u * (right[k] - start[k]) + v * (down[k] - start[k]));
                 let (left, top) = (libm::floor(x), libm::floor(y));
                 let (fx, fy) = ((x - left) as f32, (y - top) as f32);
                 let (left, top) = (left as i64, top as i64);

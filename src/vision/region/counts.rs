@@ -1,13 +1,16 @@
-//! Tables of ln Gamma for whole numbers added to a constant: what makes an evaluation a pass of counting and look-ups.
+//! Tables of ln Gamma for whole numbers added to a constant: what makes an evaluation a
+//! pass of counting and look-ups.
 //!
-//! Invariant: a look-up equals the formula to the last bit, whether the count is in the table or beyond it.
+//! Invariant: a look-up equals the formula to the last bit, whether the count is in the
+//! table or beyond it.
 
 use crate::num::ln_gamma;
 
 /// The longest table; larger counts are worked out each time.
 const LONGEST: usize = 1 << 16;
 
-/// `ln Gamma(a + n) - ln Gamma(a)` for n = 0, 1, ...: the log of the rising factorial of `a`.
+/// `ln Gamma(a + n) - ln Gamma(a)` for n = 0, 1, ...: the log of the rising factorial of
+/// `a`.
 #[derive(Debug, Clone)]
 pub(super) struct LnRising {
     a: f64,
@@ -19,7 +22,8 @@ impl LnRising {
     /// For a constant above 0 and counts mostly up to `most`.
     pub fn new(a: f64, most: usize) -> Self {
         let mut this = LnRising { a, ln_gamma_a: ln_gamma(a), table: Vec::new() };
-        this.table = (0..most.saturating_add(1).min(LONGEST) as u32).map(|n| this.formula(n)).collect();
+        this.table =
+            (0..most.saturating_add(1).min(LONGEST) as u32).map(|n| this.formula(n)).collect();
         this
     }
 
@@ -33,9 +37,10 @@ impl LnRising {
     }
 }
 
-/// Counts of colours scored as one exchangeable sequence whose probabilities have a symmetric Dirichlet prior:
-/// `ln Gamma(A) - ln Gamma(A + N) + sum over k of (ln Gamma(a + n_k) - ln Gamma(a))`, A = K a (the Dirichlet-multinomial
-/// without its number of orders).
+/// Counts of colours scored as one exchangeable sequence whose probabilities have a
+/// symmetric Dirichlet prior:
+/// `ln Gamma(A) - ln Gamma(A + N) + sum over k of (ln Gamma(a + n_k) - ln Gamma(a))`, A =
+/// K a (the Dirichlet-multinomial without its number of orders).
 #[derive(Debug, Clone)]
 pub(super) struct Urn {
     each: LnRising,
@@ -48,8 +53,8 @@ impl Urn {
         Urn { each: LnRising::new(a, most), all: LnRising::new(a * colours as f64, most) }
     }
 
-    /// How much the log-probability grows by one more pixel of a colour, for counts of that colour and of all: the mean of the last
-    /// one's and the next one's.
+    /// How much the log-probability grows by one more pixel of a colour, for counts of
+    /// that colour and of all: the mean of the last one's and the next one's.
     pub fn slope(&self, n: u32, all: u32) -> f64 {
         let mean = |table: &LnRising, n: u32| match n {
             0 => table.at(1),

@@ -1,11 +1,15 @@
-//! Regions: are the photograph's colours told apart by the silhouette? Pixels become numbers of few colours; those of each group
-//! (background, object, or parts of it) are an exchangeable sequence whose colour probabilities are integrated out under a Dirichlet
-//! prior, over the whole picture and again within each of a grid of tiles. A shading term can be added.
+//! Regions: are the photograph's colours told apart by the silhouette? Pixels become
+//! numbers of few colours; those of each group (background, object, or parts of it) are
+//! an exchangeable sequence whose colour probabilities are integrated out under a
+//! Dirichlet prior, over the whole picture and again within each of a grid of tiles. A
+//! shading term can be added.
 //!
-//! Not a segmentation, and nothing is learnt but from the picture itself. Colours, tiles and scored pixels (all of them) are fixed
-//! before inference. With a power of 1 for one of the two grids and 0 for all else it is a probability of quantised pictures that
-//! sum to 1, and [`Region::simulate`] draws from it; pixels are correlated, so powers are well below 1 by default and the result
-//! is a pseudo-likelihood. Invariant: scores are finite, and a silhouette without pixels scores 0.
+//! Not a segmentation, and nothing is learnt but from the picture itself. Colours, tiles
+//! and scored pixels (all of them) are fixed before inference. With a power of 1 for one
+//! of the two grids and 0 for all else it is a probability of quantised pictures that sum
+//! to 1, and [`Region::simulate`] draws from it; pixels are correlated, so powers are
+//! well below 1 by default and the result is a pseudo-likelihood. Invariant: scores are
+//! finite, and a silhouette without pixels scores 0.
 
 mod counts;
 mod palette;
@@ -37,7 +41,14 @@ pub struct RegionOptions {
 
 impl Default for RegionOptions {
     fn default() -> Self {
-        RegionOptions { power: 0.05, tiles: 8, tile_power: 0.1, colours: 32, prior: 0.5, shading: 0.0 }
+        RegionOptions {
+            power: 0.05,
+            tiles: 8,
+            tile_power: 0.1,
+            colours: 32,
+            prior: 0.5,
+            shading: 0.0,
+        }
     }
 }
 
@@ -52,7 +63,8 @@ impl RegionOptions {
         check("shading", "at least 0", self.shading, self.shading >= 0.0)
     }
 
-    /// Whether it is a probability of quantised pictures: one of the two terms with power 1 and nothing else.
+    /// Whether it is a probability of quantised pictures: one of the two terms with power
+    /// 1 and nothing else.
     pub fn is_proper(&self) -> bool {
         let tiles = if self.tiles == 0 { 0.0 } else { self.tile_power };
         self.shading == 0.0 && matches!((self.power, tiles), (1.0, 0.0) | (0.0, 1.0))
@@ -100,7 +112,12 @@ impl Region {
     ///
     /// # Errors
     /// A side outside 1 to 16384 pixels, or an option out of its range.
-    pub fn prepare(photo: &Photo, width: u32, height: u32, options: &RegionOptions) -> Result<Self, ComparatorError> {
+    pub fn prepare(
+        photo: &Photo,
+        width: u32,
+        height: u32,
+        options: &RegionOptions,
+    ) -> Result<Self, ComparatorError> {
         check_size(width, height)?;
         options.check()?;
         let linear = photo.linear(width, height);
@@ -111,7 +128,8 @@ impl Region {
         Ok(region)
     }
 
-    /// Prepares a picture whose pixels are numbers of colours already; it has no shading term.
+    /// Prepares a picture whose pixels are numbers of colours already; it has no shading
+    /// term.
     ///
     /// # Errors
     /// An option out of its range.
@@ -121,16 +139,28 @@ impl Region {
         let tiles = options.grid();
         let tile = |i: u32, side: u32| (u64::from(i) * u64::from(tiles) / u64::from(side)) as u32;
         let pixels = (0..h).flat_map(|j| (0..w).map(move |i| (i, j))).zip(picture.labels());
-        let cell = |((i, j), l): ((u32, u32), &u8)| (tile(j, h) * tiles + tile(i, w)) * colours as u32 + u32::from(*l);
+        let cell = |((i, j), l): ((u32, u32), &u8)| {
+            (tile(j, h) * tiles + tile(i, w)) * colours as u32 + u32::from(*l)
+        };
         let cells: Vec<u32> = pixels.map(cell).collect();
         let mut totals = vec![0; (tiles * tiles) as usize * colours];
         count(&mut totals, &cells);
         let urn = Urn::new(colours, options.prior, cells.len());
-        let empty_tiles = totals.chunks_exact(colours).map(|t| urn.score(t.iter().copied())).collect();
+        let empty_tiles =
+            totals.chunks_exact(colours).map(|t| urn.score(t.iter().copied())).collect();
         let mut whole = vec![0; colours];
         totals.chunks_exact(colours).for_each(|t| add(&mut whole, t));
         let empty = urn.score(whole.into_iter());
-        Ok(Region { options: options.clone(), colours, cells, totals, urn, empty_tiles, empty, brightness: Vec::new() })
+        Ok(Region {
+            options: options.clone(),
+            colours,
+            cells,
+            totals,
+            urn,
+            empty_tiles,
+            empty,
+            brightness: Vec::new(),
+        })
     }
 
     /// The options it was prepared with.
@@ -143,21 +173,30 @@ impl Region {
         self.colours
     }
 
-    /// The weighted log-probability of the colours if everything is background: a constant of the picture. Added to
-    /// [`Region::log_likelihood`] it gives the log-probability itself (without shading).
+    /// The weighted log-probability of the colours if everything is background: a
+    /// constant of the picture. Added to [`Region::log_likelihood`] it gives the
+    /// log-probability itself (without shading).
     pub fn log_background(&self) -> f64 {
-        self.options.power * self.empty + self.options.by_tile() * self.empty_tiles.iter().sum::<f64>()
+        self.options.power * self.empty
+            + self.options.by_tile() * self.empty_tiles.iter().sum::<f64>()
     }
 
-    /// The weighted log ratio of the picture's colours, and of its shading where asked for, against all of it being background. `groups`:
-    /// a number for each pixel, row by row; 0 is background, others have colours of their own. `normals`: unit normals in the
-    /// camera's frame, read where the group is not 0 and only for shading. What is missing at the slices' ends counts as background.
+    /// The weighted log ratio of the picture's colours, and of its shading where asked
+    /// for, against all of it being background. `groups`: a number for each pixel, row by
+    /// row; 0 is background, others have colours of their own. `normals`: unit normals in
+    /// the camera's frame, read where the group is not 0 and only for shading. What is
+    /// missing at the slices' ends counts as background.
     pub fn log_likelihood(&self, groups: &[u8], normals: &[[f32; 3]]) -> f64 {
         self.log_likelihood_with(groups, normals, &mut Scratch::default())
     }
 
     /// [`Region::log_likelihood`] without allocation once the scratch has grown.
-    pub fn log_likelihood_with(&self, groups: &[u8], normals: &[[f32; 3]], scratch: &mut Scratch) -> f64 {
+    pub fn log_likelihood_with(
+        &self,
+        groups: &[u8],
+        normals: &[[f32; 3]],
+        scratch: &mut Scratch,
+    ) -> f64 {
         let most = usize::from(groups.iter().copied().max().unwrap_or(0));
         if most == 0 {
             return 0.0;
@@ -204,8 +243,8 @@ impl Region {
         sum
     }
 
-    /// For each pixel, how much the score without shading grows if it goes over from the background to the object (every group but
-    /// 0 counts as one).
+    /// For each pixel, how much the score without shading grows if it goes over from the
+    /// background to the object (every group but 0 counts as one).
     pub fn gains(&self, groups: &[u8]) -> Vec<f64> {
         let k = self.colours;
         let mut own = vec![0; self.totals.len()];
@@ -216,7 +255,9 @@ impl Region {
         let gain = |own: &[u32], total: &[u32], power: f64| -> Vec<f64> {
             let (inside, all) = (own.iter().sum::<u32>(), total.iter().sum::<u32>());
             let one = |(n, t): (&u32, &u32)| {
-                power * (self.urn.slope(*n, inside) - self.urn.slope(t.saturating_sub(*n), all.saturating_sub(inside)))
+                power
+                    * (self.urn.slope(*n, inside)
+                        - self.urn.slope(t.saturating_sub(*n), all.saturating_sub(inside)))
             };
             own.iter().zip(total).map(one).collect()
         };
@@ -243,9 +284,11 @@ impl Region {
         score + self.urn.score(ground.iter().copied())
     }
 
-    /// Labels drawn given groups (row by row, as many as pixels; missing ones are background), each group by Polya's urn: within
-    /// tiles if the tiles' term is the only one, over the whole picture otherwise. Where the options are
-    /// [proper](RegionOptions::is_proper), these are draws from the probability that is scored.
+    /// Labels drawn given groups (row by row, as many as pixels; missing ones are
+    /// background), each group by Polya's urn: within tiles if the tiles' term is the
+    /// only one, over the whole picture otherwise. Where the options are
+    /// [proper](RegionOptions::is_proper), these are draws from the probability that is
+    /// scored.
     pub fn simulate(&self, groups: &[u8], rng: &mut Stream) -> Vec<u8> {
         let k = self.colours;
         let within = self.options.power == 0.0 && self.options.by_tile() > 0.0;

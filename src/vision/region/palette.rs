@@ -1,14 +1,17 @@
-//! Pictures in few colours: k-means in CIE L*a*b* from a deterministic start, and a label for every pixel.
+//! Pictures in few colours: k-means in CIE L*a*b* from a deterministic start, and a label
+//! for every pixel.
 //!
-//! Not a general clustering: three coordinates, at most 256 clusters. Invariant: every label is below the number of colours,
-//! and the same picture gives the same labels on every machine.
+//! Not a general clustering: three coordinates, at most 256 clusters. Invariant: every
+//! label is below the number of colours, and the same picture gives the same labels on
+//! every machine.
 
 use crate::num::simd::vectorised;
 use crate::vision::color::linear_to_labs;
 use crate::vision::elements::{ComparatorError, check_size};
 use crate::vision::photo::LinearImage;
 
-/// Clusters are found on at most about this many pixels, evenly spread; all pixels are then labelled.
+/// Clusters are found on at most about this many pixels, evenly spread; all pixels are
+/// then labelled.
 const FITTED: usize = 1 << 16;
 /// The most rounds of k-means; they end earlier when no centre moves.
 const ROUNDS: usize = 30;
@@ -26,16 +29,27 @@ impl Quantised {
     /// A picture from its labels, row by row.
     ///
     /// # Errors
-    /// A side outside 1 to 16384 pixels, a number of colours outside 1 to 256, or labels that are not one a pixel below that number.
-    pub fn new(width: u32, height: u32, colours: usize, labels: Vec<u8>) -> Result<Self, ComparatorError> {
+    /// A side outside 1 to 16384 pixels, a number of colours outside 1 to 256, or labels
+    /// that are not one a pixel below that number.
+    pub fn new(
+        width: u32,
+        height: u32,
+        colours: usize,
+        labels: Vec<u8>,
+    ) -> Result<Self, ComparatorError> {
         check_size(width, height)?;
         let fine = (1..=256).contains(&colours)
             && labels.len() == width as usize * height as usize
             && labels.iter().all(|l| usize::from(*l) < colours);
-        if fine { Ok(Quantised { width, height, colours, labels }) } else { Err(ComparatorError::Labels) }
+        if fine {
+            Ok(Quantised { width, height, colours, labels })
+        } else {
+            Err(ComparatorError::Labels)
+        }
     }
 
-    /// The picture in at most `colours` colours (1 to 256; fewer where it has no more): clusters of L*a*b* values, least squares.
+    /// The picture in at most `colours` colours (1 to 256; fewer where it has no more):
+    /// clusters of L*a*b* values, least squares.
     ///
     /// # Errors
     /// As [`Quantised::new`].
@@ -95,7 +109,8 @@ fn moments(points: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
     (mean, squares)
 }
 
-/// First centres: the box with the greatest spread is cut at its mean along its widest coordinate until there are enough.
+/// First centres: the box with the greatest spread is cut at its mean along its widest
+/// coordinate until there are enough.
 fn start(points: &[[f32; 3]], colours: usize) -> Vec<[f32; 3]> {
     type Cut = (Vec<[f32; 3]>, [f64; 3], [f64; 3]);
     let of = |points: Vec<[f32; 3]>| -> Cut {
@@ -113,7 +128,8 @@ fn start(points: &[[f32; 3]], colours: usize) -> Vec<[f32; 3]> {
         }
         let Some((points, mean, squares)) = boxes.get(widest).cloned() else { break };
         let axis = (0..3).fold(0, |best, c| if squares[c] > squares[best] { c } else { best });
-        let (low, high): (Vec<_>, Vec<_>) = points.into_iter().partition(|p| f64::from(p[axis]) < mean[axis]);
+        let (low, high): (Vec<_>, Vec<_>) =
+            points.into_iter().partition(|p| f64::from(p[axis]) < mean[axis]);
         // Nothing is left to tell apart, but for rounding.
         if squares[axis] < 1e-6 || low.is_empty() || high.is_empty() {
             break;
@@ -161,7 +177,8 @@ fn label([l, a, b]: &[Vec<f32>; 3], centres: &[[f32; 3]], labels: &mut [u8]) {
     }
 }
 
-/// Moves every centre to the mean of its points; whether any has moved. A centre without points stays.
+/// Moves every centre to the mean of its points; whether any has moved. A centre without
+/// points stays.
 fn recentre(points: &[[f32; 3]], labels: &[u8], centres: &mut [[f32; 3]]) -> bool {
     let mut sums = vec![([0.0f64; 3], 0u32); centres.len()];
     for (p, l) in points.iter().zip(labels) {
@@ -192,7 +209,11 @@ mod tests {
         let palette = [[0.0; 3], [0.9, 0.1, 0.1], [0.1, 0.7, 0.1], [0.1, 0.1, 0.8], [1.0; 3]];
         // A little noise that must not matter.
         let pixels: Vec<usize> = (0..400).map(|i| (i * i / 7) % 5).collect();
-        let rgb = pixels.iter().enumerate().map(|(i, p)| palette[*p].map(|v| v + 1e-3 * (i % 3) as f32)).collect();
+        let rgb = pixels
+            .iter()
+            .enumerate()
+            .map(|(i, p)| palette[*p].map(|v| v + 1e-3 * (i % 3) as f32))
+            .collect();
         let q = Quantised::of(&picture(20, rgb), 5).unwrap();
         assert_eq!((q.width(), q.height(), q.colours()), (20, 20, 5));
         for (i, p) in pixels.iter().enumerate() {
@@ -212,12 +233,17 @@ mod tests {
     #[test]
     fn rounds_lower_the_squares_of_the_start() {
         let points: Vec<[f32; 3]> = (0..900u32)
-            .map(|i| [i * 37 % 101, i * i % 97, i * 53 % 89].map(|v| v as f32 + if i % 4 == 0 { 60.0 } else { 0.0 }))
+            .map(|i| {
+                [i * 37 % 101, i * i % 97, i * 53 % 89]
+                    .map(|v| v as f32 + if i % 4 == 0 { 60.0 } else { 0.0 })
+            })
             .collect();
         let squares = |centres: &[[f32; 3]]| {
             let mut labels = vec![0; points.len()];
             label(&planes(&points), centres, &mut labels);
-            let d = |p: &[f32; 3], l: &u8| (0..3).map(|c| (p[c] - centres[*l as usize][c]).powi(2)).sum::<f32>();
+            let d = |p: &[f32; 3], l: &u8| {
+                (0..3).map(|c| (p[c] - centres[*l as usize][c]).powi(2)).sum::<f32>()
+            };
             points.iter().zip(&labels).map(|(p, l)| f64::from(d(p, l))).sum::<f64>()
         };
         let mut centres = start(&points, 12);

@@ -1,9 +1,13 @@
-//! Shading: does the brightness inside the silhouette follow the normals? A Bayesian linear regression of log brightness on seven
-//! functions of the normal, with coefficients and noise variance integrated out, as a log ratio against a constant brightness.
+//! Shading: does the brightness inside the silhouette follow the normals? A Bayesian
+//! linear regression of log brightness on seven functions of the normal, with
+//! coefficients and noise variance integrated out, as a log ratio against a constant
+//! brightness.
 //!
-//! Not a reflectance model and without shadows or light sources: the seven functions span what distant light does to a matt
-//! surface (Ramamoorthi & Hanrahan 2001, "An efficient representation for irradiance environment maps": harmonics of first and
-//! second order), but for the one of `3 z^2 - 1`, which on the visible half is close to `z`. Invariant: the result is finite.
+//! Not a reflectance model and without shadows or light sources: the seven functions span
+//! what distant light does to a matt surface (Ramamoorthi & Hanrahan 2001, "An efficient
+//! representation for irradiance environment maps": harmonics of first and second order),
+//! but for the one of `3 z^2 - 1`, which on the visible half is close to `z`. Invariant:
+//! the result is finite.
 
 use crate::num::simd::vectorised;
 use crate::vision::photo::LinearImage;
@@ -22,7 +26,8 @@ const DARK: f32 = 1.0 / 128.0;
 
 /// The log brightness of every pixel (ITU-R BT.709 luminance, natural logarithm).
 pub(super) fn log_brightness(picture: &LinearImage) -> Vec<f32> {
-    let log = |[r, g, b]: &[f32; 3]| libm::logf((0.2126 * r + 0.7152 * g + 0.0722 * b).max(0.0) + DARK);
+    let log =
+        |[r, g, b]: &[f32; 3]| libm::logf((0.2126 * r + 0.7152 * g + 0.0722 * b).max(0.0) + DARK);
     picture.rgb.iter().map(log).collect()
 }
 
@@ -31,14 +36,18 @@ fn terms([x, y, z]: [f32; 3]) -> [f64; TERMS] {
     [x, y, z, x * y, x * z, y * z, x * x - y * y]
 }
 
-/// The log ratio of the marginal likelihoods of the brightness of the pixels whose group is not 0: linear in functions of the
-/// normal against constant. 0 with fewer than two pixels. Pixels whose normal is not finite are left out.
+/// The log ratio of the marginal likelihoods of the brightness of the pixels whose group
+/// is not 0: linear in functions of the normal against constant. 0 with fewer than two
+/// pixels. Pixels whose normal is not finite are left out.
 pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
-    let mut sums = Sums { some: [[0.0; SOME]; ALL], count: 0, products: [[[0.0; LANES]; ALL]; ALL] };
+    let mut sums =
+        Sums { some: [[0.0; SOME]; ALL], count: 0, products: [[[0.0; LANES]; ALL]; ALL] };
     vectorised(
         #[inline(always)]
         || {
-            for ((_, n), b) in groups.iter().zip(normals).zip(brightness).filter(|((g, _), _)| **g > 0) {
+            for ((_, n), b) in
+                groups.iter().zip(normals).zip(brightness).filter(|((g, _), _)| **g > 0)
+            {
                 if (n[0] + n[1] + n[2] + b).is_finite() {
                     sums.push(*n, *b);
                 }
@@ -51,10 +60,12 @@ pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32])
 
 /// Pixels whose products are summed at a time.
 const SOME: usize = 64;
-/// Sums that are kept apart, so that they need not wait for each other: always as many, so that the result is always the same.
+/// Sums that are kept apart, so that they need not wait for each other: always as many,
+/// so that the result is always the same.
 const LANES: usize = 8;
 
-/// Sums of the products of (1, terms, brightness), of which those above the diagonal are kept.
+/// Sums of the products of (1, terms, brightness), of which those above the diagonal are
+/// kept.
 struct Sums {
     some: [[f64; SOME]; ALL],
     count: usize,
@@ -83,7 +94,9 @@ impl Sums {
         some.iter_mut().for_each(|column| column[*count..].fill(0.0));
         for (i, row) in products.iter_mut().enumerate() {
             for (j, sums) in row.iter_mut().enumerate().skip(i) {
-                for (x, y) in some[i].as_chunks::<LANES>().0.iter().zip(some[j].as_chunks::<LANES>().0) {
+                for (x, y) in
+                    some[i].as_chunks::<LANES>().0.iter().zip(some[j].as_chunks::<LANES>().0)
+                {
                     for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
                         *sum += x * y;
                     }
@@ -94,14 +107,15 @@ impl Sums {
     }
 }
 
-/// From sums of products of (1, terms, brightness), of which those above the diagonal count. The constant has a flat prior, so
-/// one degree of freedom goes to it.
+/// From sums of products of (1, terms, brightness), of which those above the diagonal
+/// count. The constant has a flat prior, so one degree of freedom goes to it.
 fn from_products(products: &[[f64; ALL]; ALL]) -> f64 {
     let n = products[0][0];
     if n < 2.0 {
         return 0.0;
     }
-    let centred = |i: usize, j: usize| products[i.min(j)][i.max(j)] - products[0][i] * products[0][j] / n;
+    let centred =
+        |i: usize, j: usize| products[i.min(j)][i.max(j)] - products[0][i] * products[0][j] / n;
     let total = centred(ALL - 1, ALL - 1).max(0.0);
     // Cholesky factor of X'X + ridge, and the forward solution of X'y, in one go.
     let mut factor = [[0.0f64; TERMS]; TERMS];
@@ -113,7 +127,8 @@ fn from_products(products: &[[f64; ALL]; ALL]) -> f64 {
             for k in 0..j {
                 sum -= factor[i][k] * factor[j][k];
             }
-            // Pivots of a matrix above the ridge are at least the ridge, but for rounding.
+            // Pivots of a matrix above the ridge are at least the ridge, but for
+            // rounding.
             factor[i][j] = if i == j { sum.max(RIDGE).sqrt() } else { sum / factor[j][j] };
         }
         let done: f64 = (0..i).map(|k| factor[i][k] * solved[k]).sum();
@@ -131,7 +146,8 @@ mod tests {
     use super::*;
     use crate::rng::{Purpose, StreamKey};
 
-    /// Normals of a sphere's visible half on a grid of `side` pixels, row by row; groups 1 on it.
+    /// Normals of a sphere's visible half on a grid of `side` pixels, row by row; groups
+    /// 1 on it.
     fn sphere(side: usize) -> (Vec<u8>, Vec<[f32; 3]>) {
         let at = |i: usize| (2.0 * i as f32 + 1.0) / side as f32 - 1.0;
         let pixels = (0..side * side).map(|i| (at(i % side), -at(i / side)));
@@ -145,11 +161,15 @@ mod tests {
     fn lit(normals: &[[f32; 3]], light: [f32; 3], noise: f64, seed: u64) -> Vec<f32> {
         let mut rng = StreamKey::new(seed, 0, Purpose::PREDICT).stream(0, 0, 0);
         let dot = |n: &[f32; 3]| n[0] * light[0] + n[1] * light[1] + n[2] * light[2];
-        normals.iter().map(|n| (0.3 + dot(n).max(0.0)).ln() + (noise * rng.standard_normal()) as f32).collect()
+        normals
+            .iter()
+            .map(|n| (0.3 + dot(n).max(0.0)).ln() + (noise * rng.standard_normal()) as f32)
+            .collect()
     }
 
-    /// The log ratio from the definition: contrasts free of the constant, their covariance under either model, and the noise
-    /// variance integrated out: a multivariate t density each.
+    /// The log ratio from the definition: contrasts free of the constant, their
+    /// covariance under either model, and the noise variance integrated out: a
+    /// multivariate t density each.
     fn reference(normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
         let n = normals.len();
         // Helmert's contrasts.
@@ -162,14 +182,16 @@ mod tests {
         };
         let y = contrast(&brightness.iter().map(|b| f64::from(*b)).collect::<Vec<_>>());
         let rows: Vec<[f64; TERMS]> = normals.iter().map(|n| terms(*n)).collect();
-        let x: Vec<Vec<f64>> = (0..TERMS).map(|t| contrast(&rows.iter().map(|r| r[t]).collect::<Vec<_>>())).collect();
+        let x: Vec<Vec<f64>> =
+            (0..TERMS).map(|t| contrast(&rows.iter().map(|r| r[t]).collect::<Vec<_>>())).collect();
         let density = |with: bool| {
             let m = n - 1;
             let mut c = vec![vec![0.0; m]; m];
             let (mut log_det, mut square, mut z) = (0.0, 0.0, vec![0.0; m]);
             for i in 0..m {
                 for j in 0..=i {
-                    let prior: f64 = if with { x.iter().map(|x| x[i] * x[j] / RIDGE).sum() } else { 0.0 };
+                    let prior: f64 =
+                        if with { x.iter().map(|x| x[i] * x[j] / RIDGE).sum() } else { 0.0 };
                     let mut s = prior + f64::from(u8::from(i == j));
                     s -= (0..j).map(|k| c[i][k] * c[j][k]).sum::<f64>();
                     c[i][j] = if i == j { s.sqrt() } else { s / c[j][j] };
@@ -201,7 +223,8 @@ mod tests {
         let (groups, normals) = sphere(40);
         let brightness = lit(&normals, [0.5, 0.6, 0.4], 0.1, 4);
         let right = log_ratio(&groups, &normals, &brightness);
-        let turned: Vec<_> = normals.iter().map(|[x, y, z]| [0.6 * y + 0.8 * x * z, *x * *y, *z]).collect();
+        let turned: Vec<_> =
+            normals.iter().map(|[x, y, z]| [0.6 * y + 0.8 * x * z, *x * *y, *z]).collect();
         let wrong = log_ratio(&groups, &turned, &brightness);
         assert!(right > 300.0 && right > wrong + 100.0, "{right} {wrong}");
         let noise = lit(&vec![[0.0; 3]; normals.len()], [0.0; 3], 0.3, 5);

@@ -1,4 +1,5 @@
-//! Against the urn written out, all pictures of a few pixels, and calibration on simulated pictures.
+//! Against the urn written out, all pictures of a few pixels, and calibration on
+//! simulated pictures.
 
 use super::*;
 use crate::rng::{Purpose, StreamKey};
@@ -16,7 +17,13 @@ fn random(n: usize, below: usize, step: u64) -> Vec<u8> {
 }
 
 /// The log-probability of labels, one pixel after another.
-fn reference(labels: &[u8], groups: &[u8], size: (u32, u32), colours: usize, o: &RegionOptions) -> f64 {
+fn reference(
+    labels: &[u8],
+    groups: &[u8],
+    size: (u32, u32),
+    colours: usize,
+    o: &RegionOptions,
+) -> f64 {
     let term = |tiles: u32| {
         let mut urns = std::collections::BTreeMap::<_, Vec<f64>>::new();
         let mut sum = 0.0;
@@ -47,7 +54,10 @@ fn agrees_with_one_pixel_after_another() {
             let groups = random(n, most, 100 + step as u64);
             let (got, background) = (region.log_likelihood(&groups, &[]), region.log_background());
             let expected = reference(&labels, &groups, (w, h), 5, &o);
-            assert!((got + background - expected).abs() < 1e-9 * expected.abs().max(1.0), "{got} {expected}");
+            assert!(
+                (got + background - expected).abs() < 1e-9 * expected.abs().max(1.0),
+                "{got} {expected}"
+            );
             let nothing = reference(&labels, &vec![0; n], (w, h), 5, &o);
             assert!((background - nothing).abs() < 1e-9 * nothing.abs().max(1.0));
             assert_eq!(region.log_likelihood(&vec![0; n], &[]), 0.0);
@@ -60,9 +70,12 @@ fn agrees_with_one_pixel_after_another() {
 
 #[test]
 fn probabilities_of_all_pictures_sum_to_one() {
-    for (colours, tiles, groups) in
-        [(3usize, 0, [0, 1, 1, 0, 2, 1]), (3, 2, [0, 1, 1, 0, 2, 1]), (2, 3, [1, 1, 1, 0, 0, 1]), (2, 0, [0; 6])]
-    {
+    for (colours, tiles, groups) in [
+        (3usize, 0, [0, 1, 1, 0, 2, 1]),
+        (3, 2, [0, 1, 1, 0, 2, 1]),
+        (2, 3, [1, 1, 1, 0, 0, 1]),
+        (2, 0, [0; 6]),
+    ] {
         let (power, tile_power) = if tiles == 0 { (1.0, 0.0) } else { (0.0, 1.0) };
         let o = RegionOptions { power, tiles, tile_power, ..GLOBAL };
         assert!(o.is_proper());
@@ -92,7 +105,8 @@ fn draws_have_the_probabilities_that_are_scored() {
         for (code, seen) in seen.into_iter().enumerate() {
             let labels = (0..4).rev().map(|i| (code >> i & 1) as u8).collect();
             let region = Region::of(&Quantised::new(4, 1, 2, labels).unwrap(), &o).unwrap();
-            let expected = f64::from(n) * libm::exp(region.log_likelihood(&groups, &[]) + region.log_background());
+            let expected = f64::from(n)
+                * libm::exp(region.log_likelihood(&groups, &[]) + region.log_background());
             chi2 += (seen - expected) * (seen - expected) / expected;
         }
         // 15 degrees of freedom: above with probability 0.001.
@@ -114,15 +128,20 @@ fn draws_are_within_tiles_only_where_nothing_else_counts() {
     assert_ne!(draws(0.0, 4, 1.0), whole);
 }
 
-/// Discs of unknown place and radius on 24 x 24 pixels: where the truth lies in exact posteriors of pictures simulated from
-/// it. Chi-square of 10 bins (9 degrees of freedom) for the horizontal place and for the radius.
+/// Discs of unknown place and radius on 24 x 24 pixels: where the truth lies in exact
+/// posteriors of pictures simulated from it. Chi-square of 10 bins (9 degrees of freedom)
+/// for the horizontal place and for the radius.
 fn calibration(simulated: &RegionOptions, scored: &RegionOptions) -> [f64; 2] {
     const SIDE: usize = 24;
     let mut states = Vec::new();
     for i in 0..6 {
         for j in 0..6 {
             for r in 0..5 {
-                states.push((7.0 + 2.0 * f64::from(i), 7.0 + 2.0 * f64::from(j), 3.0 + f64::from(r)));
+                states.push((
+                    7.0 + 2.0 * f64::from(i),
+                    7.0 + 2.0 * f64::from(j),
+                    3.0 + f64::from(r),
+                ));
             }
         }
     }
@@ -140,15 +159,19 @@ fn calibration(simulated: &RegionOptions, scored: &RegionOptions) -> [f64; 2] {
     for _ in 0..runs {
         let truth = rng.index(states.len());
         let labels = template.simulate(&groups[truth], &mut rng);
-        let region = Region::of(&Quantised::new(SIDE as u32, SIDE as u32, 4, labels).unwrap(), scored).unwrap();
-        let logs: Vec<f64> = groups.iter().map(|g| region.log_likelihood_with(g, &[], &mut scratch)).collect();
+        let region =
+            Region::of(&Quantised::new(SIDE as u32, SIDE as u32, 4, labels).unwrap(), scored)
+                .unwrap();
+        let logs: Vec<f64> =
+            groups.iter().map(|g| region.log_likelihood_with(g, &[], &mut scratch)).collect();
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = logs.iter().map(|l| libm::exp(l - most)).collect();
         let all: f64 = weights.iter().sum();
         let of = |s: &(f64, f64, f64)| [s.0, s.2];
         for (d, bins) in bins.iter_mut().enumerate() {
             let x = of(&states[truth])[d];
-            // A place at random among equals, so that the rank of a discrete quantity is uniform too.
+            // A place at random among equals, so that the rank of a discrete quantity is
+            // uniform too.
             let (mut below, mut equal) = (0.0, 0.0);
             for (s, w) in states.iter().zip(&weights) {
                 below += if of(s)[d] < x { *w } else { 0.0 };
@@ -172,7 +195,8 @@ fn posteriors_of_simulated_pictures_are_calibrated() {
         // Above with probability 0.001.
         assert!(chi2.iter().all(|c| *c < 27.9), "{chi2:?}");
     }
-    // A planted error shows: the picture counted three times over; another prior; tiles scored as one.
+    // A planted error shows: the picture counted three times over; another prior; tiles
+    // scored as one.
     let thrice = RegionOptions { power: 3.0, ..global.clone() };
     let other = RegionOptions { prior: 0.05, ..global.clone() };
     for wrong in [thrice, other] {
@@ -194,11 +218,15 @@ fn the_true_silhouette_wins_on_a_photograph() {
         image::Rgb(base.map(|b: u8| b.saturating_add(rng.index(50) as u8)))
     });
     let photo = Photo::from_rgb(rgb).unwrap();
-    let groups = |cx: f64| -> Vec<u8> { (0..side * side).map(|p| u8::from(inside(cx, p % side, p / side))).collect() };
+    let groups = |cx: f64| -> Vec<u8> {
+        (0..side * side).map(|p| u8::from(inside(cx, p % side, p / side))).collect()
+    };
     for o in [RegionOptions::default(), RegionOptions { power: 0.0, ..RegionOptions::default() }] {
         let region = Region::prepare(&photo, side, side, &o).unwrap();
         let at = |cx: f64| region.log_likelihood(&groups(cx), &[]);
-        assert!(at(20.0) > at(21.0) && at(21.0) > at(23.0) && at(23.0) > at(30.0) && at(20.0) > 0.0);
+        assert!(
+            at(20.0) > at(21.0) && at(21.0) > at(23.0) && at(23.0) > at(30.0) && at(20.0) > 0.0
+        );
     }
 }
 
@@ -221,5 +249,9 @@ fn options_are_checked_and_uniform_pictures_say_nothing() {
     let region = Region::of(&picture, &d()).unwrap();
     assert!(region.log_likelihood(&random(16, 2, 3), &[]).abs() < 1e-12);
     assert_eq!(region.options(), &d());
-    assert!(!d().is_proper() && GLOBAL.is_proper() && !RegionOptions { shading: 0.1, ..GLOBAL }.is_proper());
+    assert!(
+        !d().is_proper()
+            && GLOBAL.is_proper()
+            && !RegionOptions { shading: 0.1, ..GLOBAL }.is_proper()
+    );
 }

@@ -8,7 +8,8 @@ use crate::geom::{Bounds, GeomError, Mesh};
 use glam::{DVec3, Vec3};
 use std::collections::BTreeSet;
 
-/// Groups no farther apart than this share of the diagonal of the mesh's box are neighbours.
+/// Groups no farther apart than this share of the diagonal of the mesh's box are
+/// neighbours.
 const NEAR: f64 = 0.01;
 /// Beyond the contact a neighbour's influence ends at so many times its radius.
 const REACH: f64 = 1.5;
@@ -37,11 +38,16 @@ struct Contact {
     radius: f64,
 }
 
-pub(super) fn rig(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Result<Grouped, GeomError> {
+pub(super) fn rig(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    mesh: &Mesh,
+) -> Result<Grouped, GeomError> {
     if triangles.len() > MOST_GROUPED_TRIANGLES {
         let n = triangles.len();
-        let message =
-            format!("an armature by groups takes at most {MOST_GROUPED_TRIANGLES} triangles; the mesh has {n}");
+        let message = format!(
+            "an armature by groups takes at most {MOST_GROUPED_TRIANGLES} triangles; the mesh has {n}"
+        );
         return Err(GeomError::invalid(message));
     }
     let groups = groups(positions, triangles, mesh)?;
@@ -56,10 +62,12 @@ pub(super) fn rig(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Re
             (contacts[i][j], contacts[j][i]) = (Some(c), Some(c));
         }
     }
-    let (sum, area) = groups.iter().fold((DVec3::ZERO, 0.0), |(s, a), g| (s + g.centre * g.area, a + g.area));
+    let (sum, area) =
+        groups.iter().fold((DVec3::ZERO, 0.0), |(s, a), g| (s + g.centre * g.area, a + g.area));
     let middle = if area > 0.0 { sum / area } else { bounds.centre() };
     let off = |g: &Group| (g.centre - middle).length();
-    let root = (0..n).fold(0, |best, i| if off(&groups[i]) < off(&groups[best]) { i } else { best });
+    let root =
+        (0..n).fold(0, |best, i| if off(&groups[i]) < off(&groups[best]) { i } else { best });
     let (order, parents) = hang(&groups, &contacts, root, near);
     let mut number = vec![0; n];
     for (k, g) in order.iter().enumerate() {
@@ -68,11 +76,14 @@ pub(super) fn rig(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Re
     let joint = |g: usize| parents[g].and_then(|p| contacts[g][p]);
     let joints = order.iter().map(|&g| {
         let head = joint(g).map_or(groups[g].centre, |c| c.at);
-        let below: Vec<DVec3> =
-            (0..n).filter(|c| parents[*c] == Some(g)).filter_map(|c| joint(c).map(|j| j.at)).collect();
+        let below: Vec<DVec3> = (0..n)
+            .filter(|c| parents[*c] == Some(g))
+            .filter_map(|c| joint(c).map(|j| j.at))
+            .collect();
         let mean = below.iter().sum::<DVec3>() / below.len().max(1) as f64;
         let far = groups[g].vertices.iter().map(|v| positions[*v as usize].as_dvec3());
-        let far = far.fold(head, |f, p| if (p - head).length() > (f - head).length() { p } else { f });
+        let far =
+            far.fold(head, |f, p| if (p - head).length() > (f - head).length() { p } else { f });
         let tail = if below.is_empty() || (mean - head).length() < near { far } else { mean };
         Bone { name: groups[g].name.clone(), parent: parents[g].map(|p| number[p]), head, tail }
     });
@@ -81,7 +92,8 @@ pub(super) fn rig(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Re
     let mut mixes = vec![Mix::default(); positions.len()];
     for (g, group) in groups.iter().enumerate() {
         let beside = (0..n).filter(|o| parents[*o] == Some(g) || parents[g] == Some(*o));
-        let beside: Vec<(usize, Contact)> = beside.filter_map(|o| contacts[g][o].map(|c| (o, c))).collect();
+        let beside: Vec<(usize, Contact)> =
+            beside.filter_map(|o| contacts[g][o].map(|c| (o, c))).collect();
         for v in &group.vertices {
             let mix = &mut mixes[*v as usize];
             mix.add(number[g], 1.0);
@@ -103,19 +115,27 @@ fn fade(far: f64, radius: f64) -> f64 {
     1.0 - t * t * (3.0 - 2.0 * t)
 }
 
-fn groups(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Result<Vec<Group>, GeomError> {
+fn groups(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    mesh: &Mesh,
+) -> Result<Vec<Group>, GeomError> {
     let parts: BTreeSet<u16> = mesh.topology.parts.iter().copied().collect();
     if !(2..=MOST_GROUPS).contains(&parts.len()) {
         let n = parts.len();
-        let message = format!("an armature by groups needs 2 to {MOST_GROUPS} groups in the mesh; it has {n}");
+        let message = format!(
+            "an armature by groups needs 2 to {MOST_GROUPS} groups in the mesh; it has {n}"
+        );
         return Err(GeomError::invalid(message));
     }
     let mut taken = BTreeSet::new();
     let mut groups = Vec::with_capacity(parts.len());
     for (k, part) in parts.into_iter().enumerate() {
-        let own = triangles.iter().zip(&mesh.topology.parts).filter(|(_, p)| **p == part).map(|(t, _)| t);
+        let own =
+            triangles.iter().zip(&mesh.topology.parts).filter(|(_, p)| **p == part).map(|(t, _)| t);
         let vertices: BTreeSet<u32> = own.clone().flatten().copied().collect();
-        let faces: Vec<[DVec3; 3]> = own.map(|t| t.map(|v| positions[v as usize].as_dvec3())).collect();
+        let faces: Vec<[DVec3; 3]> =
+            own.map(|t| t.map(|v| positions[v as usize].as_dvec3())).collect();
         let (mut sum, mut area) = (DVec3::ZERO, 0.0);
         for [a, b, c] in &faces {
             let twice = (*b - *a).cross(*c - *a).length();
@@ -138,8 +158,8 @@ fn groups(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Result<Vec
     Ok(groups)
 }
 
-/// Half-way between either's vertices and the other, for those that are as near as any, give or take `near`; vertices inside
-/// the other are there.
+/// Half-way between either's vertices and the other, for those that are as near as any,
+/// give or take `near`; vertices inside the other are there.
 fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
     let (mut gap, mut found) = (f64::INFINITY, Vec::new());
     for (one, other) in [(a, b), (b, a)] {
@@ -161,8 +181,8 @@ fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
     Contact { gap, at, radius }
 }
 
-/// The groups, parents before children, and their parents: shortest paths from the root over contacts; where there are none
-/// left, across the smallest gap.
+/// The groups, parents before children, and their parents: shortest paths from the root
+/// over contacts; where there are none left, across the smallest gap.
 fn hang(
     groups: &[Group],
     contacts: &[Vec<Option<Contact>>],
@@ -176,13 +196,19 @@ fn hang(
     while order.len() < n {
         let open = (0..n).filter(|i| !done[*i]);
         let next =
-            open.fold(None, |best: Option<usize>, i| if best.is_none_or(|b| far[i] < far[b]) { Some(i) } else { best });
+            open.fold(
+                None,
+                |best: Option<usize>, i| {
+                    if best.is_none_or(|b| far[i] < far[b]) { Some(i) } else { best }
+                },
+            );
         let Some(mut next) = next else { break };
         if far[next].is_infinite() {
             let mut best: Option<(usize, usize, Contact)> = None;
             for i in (0..n).filter(|i| !done[*i]) {
                 for j in (0..n).filter(|j| done[*j]) {
-                    if let Some(c) = contacts[i][j].filter(|c| best.is_none_or(|b| c.gap < b.2.gap)) {
+                    if let Some(c) = contacts[i][j].filter(|c| best.is_none_or(|b| c.gap < b.2.gap))
+                    {
                         best = Some((i, j, c));
                     }
                 }

@@ -12,7 +12,8 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// The distance from a point and the nearest point of it; inside the distance is 0 and the point itself is nearest.
+    /// The distance from a point and the nearest point of it; inside the distance is 0
+    /// and the point itself is nearest.
     pub fn nearest(&self, p: DVec3) -> (f64, DVec3) {
         if self.to_box(p) == 0.0 && self.winding(p) > 0.5 {
             return (0.0, p);
@@ -31,8 +32,9 @@ impl Surface {
         (self.bounds.min - p).max(p - self.bounds.max).max(DVec3::ZERO).length()
     }
 
-    /// The generalized winding number (Jacobson et al. 2013), in magnitude: how often it goes round the point. The solid angle
-    /// of a triangle is van Oosterom and Strackee's (1983).
+    /// The generalized winding number (Jacobson et al. 2013), in magnitude: how often it
+    /// goes round the point. The solid angle of a triangle is van Oosterom and Strackee's
+    /// (1983).
     fn winding(&self, p: DVec3) -> f64 {
         let angle = |t: &[DVec3; 3]| {
             let [a, b, c] = t.map(|v| v - p);
@@ -45,7 +47,8 @@ impl Surface {
     }
 }
 
-/// The point of a triangle that is nearest to `p` (Ericson 2005, "Real-Time Collision Detection", section 5.1.5).
+/// The point of a triangle that is nearest to `p` (Ericson 2005, "Real-Time Collision
+/// Detection", section 5.1.5).
 fn closest(p: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
     let (ab, ac, ap) = (*b - *a, *c - *a, p - *a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -95,7 +98,8 @@ mod tests {
     fn distances_from_a_cube() {
         let m = cuboid(DVec3::splat(2.0)).unwrap();
         let at = |v: &u32| m.positions[*v as usize].as_dvec3();
-        let faces = m.topology.triangles.iter().map(|t| [at(&t[0]), at(&t[1]), at(&t[2])]).collect();
+        let faces =
+            m.topology.triangles.iter().map(|t| [at(&t[0]), at(&t[1]), at(&t[2])]).collect();
         let s = Surface { faces, bounds: m.bounds().unwrap() };
         let cases = [
             (DVec3::new(0.3, 0.2, -0.9), 0.0),
@@ -106,12 +110,18 @@ mod tests {
         ];
         for (p, d) in cases {
             let (found, at) = s.nearest(p);
-            assert!((found - d).abs() < 1e-6 && ((at - p).length() - d).abs() < 1e-6, "{p} {found}");
+            assert!(
+                (found - d).abs() < 1e-6 && ((at - p).length() - d).abs() < 1e-6,
+                "{p} {found}"
+            );
             assert!(s.to_box(p) <= d + 1e-6);
         }
         assert!((s.winding(DVec3::new(0.2, 0.1, 0.7)) - 1.0).abs() < 1e-9);
         assert!(s.winding(DVec3::new(1.2, 0.1, 0.7)) < 1e-9);
-        assert!((to_segment(DVec3::new(3.0, 4.0, 0.0), DVec3::ZERO, DVec3::Y) - 18f64.sqrt()).abs() < 1e-12);
+        assert!(
+            (to_segment(DVec3::new(3.0, 4.0, 0.0), DVec3::ZERO, DVec3::Y) - 18f64.sqrt()).abs()
+                < 1e-12
+        );
         assert_eq!(to_segment(DVec3::Y, DVec3::ZERO, DVec3::ZERO), 1.0);
     }
 }

@@ -1,14 +1,17 @@
 //! Curves through the middle of a grid's inside, as a tree of points.
 //!
-//! All ways come from one tree of cheapest ways to the root, so that they join and never part again.
+//! All ways come from one tree of cheapest ways to the root, so that they join and never
+//! part again.
 
 use super::voxels::Grid;
 use glam::DVec3;
 
-/// A way's surroundings, up to so many times its distance from the surface and a few cells, need no way of their own.
+/// A way's surroundings, up to so many times its distance from the surface and a few
+/// cells, need no way of their own.
 const COVERED: f64 = 1.5;
 const COVERED_CELLS: f64 = 2.0;
-/// Cells no more than so much nearer to the root than a tip are its end, whose middle the curve runs to.
+/// Cells no more than so much nearer to the root than a tip are its end, whose middle the
+/// curve runs to.
 const CAP_CELLS: f64 = 2.0;
 /// No more curves than these are looked for.
 const MOST_CURVES: usize = 256;
@@ -17,7 +20,8 @@ const MOST_CURVES: usize = 256;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     pub at: DVec3,
-    /// The point before it on the way from the root, which has a lesser number; `None` for the root, the first.
+    /// The point before it on the way from the root, which has a lesser number; `None`
+    /// for the root, the first.
     pub parent: Option<usize>,
     /// The distance from the surface, in the mesh's units.
     pub clearance: f64,
@@ -30,13 +34,21 @@ pub(super) fn curves(grid: &Grid) -> Vec<Node> {
     let (_, before) = grid.ways(root, |i| 1.0 / (grid.clearance(i) * grid.clearance(i)));
     let mut number: Vec<Option<usize>> = vec![None; grid.len()];
     let mut covered = vec![false; grid.len()];
-    let node = |i: usize, parent| Node { at: grid.middle(i), parent, clearance: grid.clearance(i) * grid.cell() };
+    let node = |i: usize, parent| Node {
+        at: grid.middle(i),
+        parent,
+        clearance: grid.clearance(i) * grid.cell(),
+    };
     let mut nodes = vec![node(root, None)];
     number[root] = Some(0);
     cover(grid, root, &mut covered);
     for _ in 0..MOST_CURVES {
         let open = grid.cells().filter(|i| !covered[*i] && far[*i].is_finite());
-        let Some(tip) = open.fold(None, |best, i| if best.is_none_or(|b| far[i] > far[b]) { Some(i) } else { best })
+        let Some(tip) =
+            open.fold(
+                None,
+                |best, i| if best.is_none_or(|b| far[i] > far[b]) { Some(i) } else { best },
+            )
         else {
             break;
         };
@@ -51,8 +63,11 @@ pub(super) fn curves(grid: &Grid) -> Vec<Node> {
         for i in end.iter().chain(&way) {
             cover(grid, *i, &mut covered);
         }
-        // What the end's ball reaches is at the surface, beside the middle: the curve goes straight on there.
-        let beside = way.iter().rposition(|i| (grid.middle(*i) - cap).length() <= grid.clearance(*i) * grid.cell());
+        // What the end's ball reaches is at the surface, beside the middle: the curve
+        // goes straight on there.
+        let beside = way
+            .iter()
+            .rposition(|i| (grid.middle(*i) - cap).length() <= grid.clearance(*i) * grid.cell());
         way.drain(..beside.map_or(0, |k| (k + 1).min(way.len() - 1)));
         let mut parent = None;
         for i in way.iter().rev() {
@@ -73,11 +88,15 @@ fn cover(grid: &Grid, i: usize, covered: &mut [bool]) {
     }
 }
 
-/// The cell with the least (distance to the centre of mass)^2 - (distance to the surface)^2; of equals the first.
+/// The cell with the least (distance to the centre of mass)^2 - (distance to the
+/// surface)^2; of equals the first.
 fn centre(grid: &Grid) -> usize {
-    let (sum, count) = grid.cells().fold((DVec3::ZERO, 0.0), |(s, n), i| (s + grid.middle(i), n + 1.0));
+    let (sum, count) =
+        grid.cells().fold((DVec3::ZERO, 0.0), |(s, n), i| (s + grid.middle(i), n + 1.0));
     let mean = sum / f64::max(count, 1.0);
-    let power = |i: usize| (grid.middle(i) - mean).length_squared() - (grid.clearance(i) * grid.cell()).powi(2);
+    let power = |i: usize| {
+        (grid.middle(i) - mean).length_squared() - (grid.clearance(i) * grid.cell()).powi(2)
+    };
     let best = grid.cells().fold(None, |best: Option<(usize, f64)>, i| {
         let p = power(i);
         if best.is_none_or(|(_, b)| p < b) { Some((i, p)) } else { best }

@@ -36,8 +36,8 @@ impl Mix {
     }
 }
 
-/// For each vertex the nearest bone, its parent, children and siblings, with weight ((least / distance)^2 - 1/4)^2: none from
-/// twice the least distance on.
+/// For each vertex the nearest bone, its parent, children and siblings, with weight
+/// ((least / distance)^2 - 1/4)^2: none from twice the least distance on.
 pub(super) fn by_distance(positions: &[Vec3], bones: &[Bone]) -> Vec<Influence> {
     let one = |p: &Vec3| {
         let p = p.as_dvec3();

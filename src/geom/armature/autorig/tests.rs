@@ -16,7 +16,9 @@ fn boxes(all: &[(&str, DVec3, DVec3)]) -> Mesh {
             let p = *at + *size * DVec3::new(sign(0), sign(1), sign(2));
             let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
         }
-        for f in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+        for f in
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+        {
             let [a, b, c, d] = f.map(|v| v + 1 + 8 * k);
             let _ = writeln!(text, "f {a} {b} {c} {d}");
         }
@@ -40,7 +42,10 @@ fn parent(a: &Armature, name: &str) -> Option<String> {
 
 fn sound(a: &Armature) {
     for i in a.influences() {
-        assert!((i.weights.iter().sum::<f32>() - 1.0).abs() < 1e-5 && i.weights.iter().all(|w| *w >= 0.0));
+        assert!(
+            (i.weights.iter().sum::<f32>() - 1.0).abs() < 1e-5
+                && i.weights.iter().all(|w| *w >= 0.0)
+        );
     }
     let rest = a.posed_vertices(&[], &Rules::default()).unwrap();
     assert!(rest.iter().zip(a.positions()).all(|(p, q)| (*p - q.as_dvec3()).length() < 1e-6));
@@ -55,7 +60,10 @@ fn three_boxes_in_a_row_are_three_bones() {
     sound(&a);
     assert_eq!(a.positions().len(), 16, "points at one place are one");
     assert_eq!(parent(&a, "fore"), None, "the middle one is the root");
-    assert_eq!([parent(&a, "hand"), parent(&a, "upper")], [Some("fore".into()), Some("fore".into())]);
+    assert_eq!(
+        [parent(&a, "hand"), parent(&a, "upper")],
+        [Some("fore".into()), Some("fore".into())]
+    );
     let near = |p: DVec3, x: f64| assert!((p - DVec3::new(x, 0.0, 0.0)).length() < 1e-6, "{p}");
     near(joint(&a, "fore").head, 2.0);
     near(joint(&a, "hand").head, 3.0);
@@ -64,8 +72,13 @@ fn three_boxes_in_a_row_are_three_bones() {
     // Shared vertices go half with either; all others with their own.
     let fore = a.rig().find("fore").unwrap() as u16;
     for (p, i) in a.positions().iter().zip(a.influences()) {
-        let on_fore =
-            i.joints.iter().zip(i.weights).filter(|(j, w)| **j == fore && *w > 0.0).map(|(_, w)| w).sum::<f32>();
+        let on_fore = i
+            .joints
+            .iter()
+            .zip(i.weights)
+            .filter(|(j, w)| **j == fore && *w > 0.0)
+            .map(|(_, w)| w)
+            .sum::<f32>();
         let end = p.x < 0.0 || p.x > 4.0;
         assert_eq!(on_fore, if end { 0.0 } else { 0.5 }, "{p}");
     }
@@ -108,7 +121,8 @@ fn names_given_twice_are_numbered() {
     let a = by_groups(&Solid::group(&[arm, upright]).to_mesh().unwrap()).unwrap();
     sound(&a);
     let parents = ["upper#2", "fore#2", "hand#2", "fore", "hand", "upper"].map(|n| parent(&a, n));
-    let expected = [None, Some("upper#2"), Some("fore#2"), Some("upper#2"), Some("fore"), Some("fore")];
+    let expected =
+        [None, Some("upper#2"), Some("fore#2"), Some("upper#2"), Some("fore"), Some("fore")];
     assert_eq!(parents, expected.map(|p| p.map(String::from)));
 }
 
@@ -118,11 +132,16 @@ fn star(tips: &[DVec3]) -> Mesh {
         let along = glam::DQuat::from_rotation_arc(DVec3::Y, tip.normalize());
         let ball = Solid::new(Arc::new(sphere(1.0, 24).unwrap()));
         let half = tip.length() / 2.0;
-        let m =
-            ball.placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(0.3, half + 0.15, 0.3))).to_mesh().unwrap();
+        let m = ball
+            .placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(0.3, half + 0.15, 0.3)))
+            .to_mesh()
+            .unwrap();
         let centre = *tip / 2.0 - tip.normalize() * 0.15;
-        let turned = m.positions.iter().map(|p| (along * p.as_dvec3() + centre).as_vec3()).collect();
-        Solid::new(Arc::new(Mesh::new(turned, m.topology.triangles.clone(), m.topology.parts.clone()).unwrap()))
+        let turned =
+            m.positions.iter().map(|p| (along * p.as_dvec3() + centre).as_vec3()).collect();
+        Solid::new(Arc::new(
+            Mesh::new(turned, m.topology.triangles.clone(), m.topology.parts.clone()).unwrap(),
+        ))
     };
     Solid::group(&tips.iter().map(arm).collect::<Vec<_>>()).to_mesh().unwrap()
 }
@@ -145,7 +164,11 @@ fn a_star_has_a_branch_for_each_tip() {
             let near = ends.iter().map(|e| (*e - tip).length()).fold(f64::INFINITY, f64::min);
             assert!(near < 0.25, "{tip}: {near} {ends:?}");
         }
-        assert!(joints[0].head.length() < 0.5 && &*joints[0].name == "root" && &*joints[1].name == "bone_1");
+        assert!(
+            joints[0].head.length() < 0.5
+                && &*joints[0].name == "root"
+                && &*joints[1].name == "bone_1"
+        );
         let b = by_skeleton(&mesh, 16).unwrap();
         assert!(a.rig() == b.rig() && a.influences() == b.influences(), "no chance in it");
         for most in [1, 2, 3] {
@@ -159,7 +182,10 @@ fn a_star_has_a_branch_for_each_tip() {
         for (p, q) in a.positions().iter().zip(turned) {
             let (p, moved) = (p.as_dvec3(), (p.as_dvec3() - q).length());
             assert!((p - tips[0]).length() > 0.3 || moved > 0.3, "{p}");
-            assert!(tips[1..].iter().all(|t| (p - *t).length() > 0.8) || moved == 0.0, "{p} {moved}");
+            assert!(
+                tips[1..].iter().all(|t| (p - *t).length() > 0.8) || moved == 0.0,
+                "{p} {moved}"
+            );
         }
     }
 }
@@ -185,13 +211,22 @@ fn a_bend_is_a_joint_and_a_ball_has_none() {
 fn what_cannot_be_rigged_is_refused() {
     let e = |r: Result<Armature, GeomError>| r.unwrap_err().to_string();
     let cube = cuboid(DVec3::ONE).unwrap();
-    assert_eq!(e(by_groups(&cube)), "an armature by groups needs 2 to 256 groups in the mesh; it has 1");
+    assert_eq!(
+        e(by_groups(&cube)),
+        "an armature by groups needs 2 to 256 groups in the mesh; it has 1"
+    );
     assert!(e(by_skeleton(&cube, 0)).contains("1 to 256 bones, not 0"));
     let tri = |p: [Vec3; 3]| Mesh::new(p.to_vec(), vec![[0, 1, 2]], vec![0]).unwrap();
     let open = tri([Vec3::ZERO, Vec3::X, Vec3::Y]);
-    assert_eq!(e(by_skeleton(&open, 16)), "a skeleton needs a closed mesh; this one has 3 open edges");
+    assert_eq!(
+        e(by_skeleton(&open, 16)),
+        "a skeleton needs a closed mesh; this one has 3 open edges"
+    );
     let thin = cuboid(DVec3::new(1.0, 1.0, 1e-4)).unwrap();
-    assert_eq!(e(by_skeleton(&thin, 16)), "a skeleton needs a mesh with an interior; this one is too thin");
+    assert_eq!(
+        e(by_skeleton(&thin, 16)),
+        "a skeleton needs a mesh with an interior; this one is too thin"
+    );
     let many = sphere(1.0, 256).unwrap();
     assert!(many.topology.triangles.len() > MOST_GROUPED_TRIANGLES);
     assert!(e(by_groups(&many)).contains("at most 20000 triangles"));

@@ -1,4 +1,5 @@
-//! From curves to bones: smoothed, cut where they part and where they bend, and no more than are wanted.
+//! From curves to bones: smoothed, cut where they part and where they bend, and no more
+//! than are wanted.
 
 use super::Bone;
 use super::skeleton::Node;
@@ -6,7 +7,8 @@ use glam::DVec3;
 
 /// Curves are smoothed so many times by the mean of each point and its neighbours'.
 const SMOOTHING: usize = 4;
-/// The first tolerance for straightness, in cells, and how it grows while there are too many bones.
+/// The first tolerance for straightness, in cells, and how it grows while there are too
+/// many bones.
 const TOLERANCE: f64 = 1.5;
 const GROWTH: f64 = 1.3;
 /// Tolerances tried before bones at the ends are dropped.
@@ -42,14 +44,17 @@ pub(super) fn bones(nodes: Vec<Node>, cell: f64, most: usize) -> Vec<Bone> {
         }
         tolerance *= GROWTH;
     }
-    let mut cut: Vec<Vec<DVec3>> = chains.iter().map(|c| simplified(&c.points, tolerance)).collect();
+    let mut cut: Vec<Vec<DVec3>> =
+        chains.iter().map(|c| simplified(&c.points, tolerance)).collect();
     // Straighter than straight there is nothing: then the shortest ends go.
     let mut dropped = vec![false; chains.len()];
     let count = |cut: &[Vec<DVec3>], dropped: &[bool]| -> usize {
         1 + cut.iter().zip(dropped).filter(|(_, d)| !**d).map(|(c, _)| c.len() - 1).sum::<usize>()
     };
     while count(&cut, &dropped) > most {
-        let open = |k: &usize| !dropped[*k] && !chains.iter().zip(&dropped).any(|(c, d)| c.parent == Some(*k) && !d);
+        let open = |k: &usize| {
+            !dropped[*k] && !chains.iter().zip(&dropped).any(|(c, d)| c.parent == Some(*k) && !d)
+        };
         let shortest = (0..chains.len()).filter(open);
         let shortest = shortest.fold(None, |best: Option<usize>, k| match best {
             Some(b) if chains[b].length() <= chains[k].length() => Some(b),
@@ -90,7 +95,8 @@ fn chains(nodes: &[Node]) -> Vec<Chain> {
     }
     let mut out: Vec<Chain> = Vec::new();
     // Each start: the node, the chain that ends there, the first node after it.
-    let mut open: Vec<(usize, Option<usize>, usize)> = below[0].iter().rev().map(|c| (0, None, *c)).collect();
+    let mut open: Vec<(usize, Option<usize>, usize)> =
+        below[0].iter().rev().map(|c| (0, None, *c)).collect();
     while let Some((start, parent, first)) = open.pop() {
         let mut points = vec![nodes[start].at, nodes[first].at];
         let mut end = first;
@@ -104,16 +110,24 @@ fn chains(nodes: &[Node]) -> Vec<Chain> {
                 points[k] = (before[k - 1] + before[k] + before[k + 1]) / 3.0;
             }
         }
-        out.push(Chain { parent, points, clearance: nodes[end].clearance, ends: below[end].is_empty() });
+        out.push(Chain {
+            parent,
+            points,
+            clearance: nodes[end].clearance,
+            ends: below[end].is_empty(),
+        });
         let this = out.len() - 1;
         open.extend(below[end].iter().rev().map(|c| (end, Some(this), *c)));
     }
     out
 }
 
-/// Short stretches between two partings, within the body's thickness, become one place: their end moves to their start.
+/// Short stretches between two partings, within the body's thickness, become one place:
+/// their end moves to their start.
 fn contract(chains: &mut Vec<Chain>, cell: f64) {
-    while let Some(k) = chains.iter().position(|c| !c.ends && c.length() < c.clearance.max(2.0 * cell)) {
+    while let Some(k) =
+        chains.iter().position(|c| !c.ends && c.length() < c.clearance.max(2.0 * cell))
+    {
         let gone = chains.remove(k);
         for c in chains.iter_mut() {
             if c.parent == Some(k) {
@@ -126,14 +140,16 @@ fn contract(chains: &mut Vec<Chain>, cell: f64) {
     }
 }
 
-/// Ramer, Douglas and Peucker: the ends, and where the curve is farther than the tolerance from what is left of it.
+/// Ramer, Douglas and Peucker: the ends, and where the curve is farther than the
+/// tolerance from what is left of it.
 fn simplified(points: &[DVec3], tolerance: f64) -> Vec<DVec3> {
     let mut keep = vec![false; points.len()];
     let mut open = vec![(0, points.len() - 1)];
     (keep[0], keep[points.len() - 1]) = (true, true);
     while let Some((a, b)) = open.pop() {
         let far = |k: usize| super::near::to_segment(points[k], points[a], points[b]);
-        let worst = (a + 1..b).fold((0, tolerance), |w, k| if far(k) > w.1 { (k, far(k)) } else { w });
+        let worst =
+            (a + 1..b).fold((0, tolerance), |w, k| if far(k) > w.1 { (k, far(k)) } else { w });
         if worst.0 > 0 {
             keep[worst.0] = true;
             open.extend([(a, worst.0), (worst.0, b)]);

@@ -1,7 +1,8 @@
-//! The inside of a closed mesh on a grid of cells, with each cell's distance to the outside, and shortest ways through it.
+//! The inside of a closed mesh on a grid of cells, with each cell's distance to the
+//! outside, and shortest ways through it.
 //!
-//! A cell is inside if at least two of three rays along the axes, from a point near its middle, say so; overlapping bodies
-//! make one. Only the largest connected piece is kept.
+//! A cell is inside if at least two of three rays along the axes, from a point near its
+//! middle, say so; overlapping bodies make one. Only the largest connected piece is kept.
 
 use glam::{DVec3, IVec3, Vec3};
 use std::cmp::Reverse;
@@ -9,7 +10,8 @@ use std::collections::BinaryHeap;
 
 /// The cells along the longest side of the mesh's box.
 const LONGEST: f64 = 48.0;
-/// Where in a cell rays pass, off its middle: on no symmetry plane or edge of a mesh that people would make.
+/// Where in a cell rays pass, off its middle: on no symmetry plane or edge of a mesh that
+/// people would make.
 const OFF: [f64; 2] = [0.5137, 0.4871];
 
 /// The cells.
@@ -19,7 +21,8 @@ pub(super) struct Grid {
     /// The corner of the first.
     origin: DVec3,
     cell: f64,
-    /// By cell: the distance of its middle to that of the nearest cell outside, in cells; 0 outside.
+    /// By cell: the distance of its middle to that of the nearest cell outside, in cells;
+    /// 0 outside.
     clearance: Vec<f64>,
 }
 
@@ -32,7 +35,8 @@ impl Grid {
             return None;
         }
         let size = bounds.size().to_array().map(|s| (s / cell).ceil() as usize + 2);
-        let grid = Grid { size, origin: bounds.min - DVec3::splat(cell), cell, clearance: Vec::new() };
+        let grid =
+            Grid { size, origin: bounds.min - DVec3::splat(cell), cell, clearance: Vec::new() };
         let mut votes = vec![0u8; size.iter().product()];
         for axis in 0..3 {
             grid.vote(axis, positions, triangles, &mut votes);
@@ -76,14 +80,16 @@ impl Grid {
     }
 
     fn at(&self, p: IVec3) -> Option<usize> {
-        let within = p.min_element() >= 0 && p.to_array().iter().zip(self.size).all(|(x, s)| (*x as usize) < s);
+        let within = p.min_element() >= 0
+            && p.to_array().iter().zip(self.size).all(|(x, s)| (*x as usize) < s);
         within.then(|| (p.z as usize * self.size[1] + p.y as usize) * self.size[0] + p.x as usize)
     }
 
     /// The cells around one, with the distances of their middles in cells.
     fn around(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let p = self.place(i);
-        let steps = (0..27).filter(|k| *k != 13).map(|k| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
+        let steps =
+            (0..27).filter(|k| *k != 13).map(|k| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
         steps.filter_map(move |d| self.at(p + d).map(|j| (j, f64::from(d.length_squared()).sqrt())))
     }
 
@@ -91,7 +97,9 @@ impl Grid {
     pub fn ball(&self, i: usize, radius: f64) -> impl Iterator<Item = usize> + '_ {
         let (p, r) = (self.place(i), radius.floor() as i32);
         let line = move |z| (-r..=r).flat_map(move |y| (-r..=r).map(move |x| IVec3::new(x, y, z)));
-        let all = (-r..=r).flat_map(line).filter(move |d| f64::from(d.length_squared()) <= radius * radius);
+        let all = (-r..=r)
+            .flat_map(line)
+            .filter(move |d| f64::from(d.length_squared()) <= radius * radius);
         all.filter_map(move |d| self.at(p + d))
     }
 
@@ -112,8 +120,8 @@ impl Grid {
         found
     }
 
-    /// The cheapest ways from a cell to all others inside: their costs, and the cell before. A step costs its length in cells
-    /// times the mean of `cost` at its ends.
+    /// The cheapest ways from a cell to all others inside: their costs, and the cell
+    /// before. A step costs its length in cells times the mean of `cost` at its ends.
     pub fn ways(&self, from: usize, cost: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<usize>) {
         let (mut far, mut before) = (vec![f64::INFINITY; self.len()], vec![from; self.len()]);
         // Costs are not negative, so that their bits are ordered as they are.
@@ -137,24 +145,33 @@ impl Grid {
         (far, before)
     }
 
-    /// One vote for every cell that a ray along an axis finds inside: where the faces before it do not cancel.
+    /// One vote for every cell that a ray along an axis finds inside: where the faces
+    /// before it do not cancel.
     fn vote(&self, axis: usize, positions: &[Vec3], triangles: &[[u32; 3]], votes: &mut [u8]) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut crossings: Vec<Vec<(f64, i32)>> = vec![Vec::new(); self.size[u] * self.size[v]];
         for t in triangles {
-            let p = t.map(|i| ((positions[i as usize].as_dvec3() - self.origin) / self.cell).to_array());
+            let p = t
+                .map(|i| ((positions[i as usize].as_dvec3() - self.origin) / self.cell).to_array());
             let range = |k: usize, off: f64| {
-                let (lo, hi) = p.iter().fold((f64::INFINITY, 0.0f64), |(lo, hi), q| (lo.min(q[k]), hi.max(q[k])));
+                let (lo, hi) = p
+                    .iter()
+                    .fold((f64::INFINITY, 0.0f64), |(lo, hi), q| (lo.min(q[k]), hi.max(q[k])));
                 ((lo - off).ceil().max(0.0) as usize)
                     ..((hi - off).floor() + 1.0).clamp(0.0, self.size[k] as f64) as usize
             };
             // Twice the signed area left of an edge, seen along the axis.
-            let side =
-                |a: &[f64; 3], b: &[f64; 3], x: f64, y: f64| (b[u] - a[u]) * (y - a[v]) - (b[v] - a[v]) * (x - a[u]);
+            let side = |a: &[f64; 3], b: &[f64; 3], x: f64, y: f64| {
+                (b[u] - a[u]) * (y - a[v]) - (b[v] - a[v]) * (x - a[u])
+            };
             for i in range(u, OFF[0]) {
                 for j in range(v, OFF[1]) {
                     let (x, y) = (i as f64 + OFF[0], j as f64 + OFF[1]);
-                    let w = [side(&p[1], &p[2], x, y), side(&p[2], &p[0], x, y), side(&p[0], &p[1], x, y)];
+                    let w = [
+                        side(&p[1], &p[2], x, y),
+                        side(&p[2], &p[0], x, y),
+                        side(&p[0], &p[1], x, y),
+                    ];
                     let sign = if w.iter().all(|w| *w >= 0.0) {
                         1
                     } else if w.iter().all(|w| *w <= 0.0) {
@@ -164,7 +181,8 @@ impl Grid {
                     };
                     let sum = w[0] + w[1] + w[2];
                     if sum != 0.0 {
-                        let depth = (w[0] * p[0][axis] + w[1] * p[1][axis] + w[2] * p[2][axis]) / sum;
+                        let depth =
+                            (w[0] * p[0][axis] + w[1] * p[1][axis] + w[2] * p[2][axis]) / sum;
                         crossings[j * self.size[u] + i].push((depth, sign));
                     }
                 }
@@ -217,10 +235,13 @@ impl Grid {
         out
     }
 
-    /// The exact Euclidean distance transform, axis after axis: the least of squared steps and what the axes before found.
+    /// The exact Euclidean distance transform, axis after axis: the least of squared
+    /// steps and what the axes before found.
     fn distances(&self, inside: &[bool]) -> Vec<f64> {
-        let mut square: Vec<f64> = inside.iter().map(|i| if *i { f64::INFINITY } else { 0.0 }).collect();
-        for (axis, stride) in [1, self.size[0], self.size[0] * self.size[1]].into_iter().enumerate() {
+        let mut square: Vec<f64> =
+            inside.iter().map(|i| if *i { f64::INFINITY } else { 0.0 }).collect();
+        for (axis, stride) in [1, self.size[0], self.size[0] * self.size[1]].into_iter().enumerate()
+        {
             let n = self.size[axis];
             let mut line = vec![0.0; n];
             for first in (0..square.len()).filter(|i| i / stride % n == 0) {
@@ -228,8 +249,10 @@ impl Grid {
                     *x = square[first + k * stride];
                 }
                 for k in 0..n {
-                    let from = |(m, x): (usize, &f64)| x + (m as f64 - k as f64) * (m as f64 - k as f64);
-                    square[first + k * stride] = line.iter().enumerate().map(from).fold(f64::INFINITY, f64::min);
+                    let from =
+                        |(m, x): (usize, &f64)| x + (m as f64 - k as f64) * (m as f64 - k as f64);
+                    square[first + k * stride] =
+                        line.iter().enumerate().map(from).fold(f64::INFINITY, f64::min);
                 }
             }
         }
@@ -247,7 +270,8 @@ mod tests {
     fn the_inside_of_two_overlapping_spheres_is_their_union() {
         let ball = Solid::new(Arc::new(sphere(1.0, 48).unwrap()));
         let shift = |x| Affine::new(DVec3::new(x, 0.0, 0.0), DVec3::ZERO, DVec3::ONE);
-        let m = Solid::group(&[ball.placed(shift(-0.6)), ball.placed(shift(0.6))]).to_mesh().unwrap();
+        let m =
+            Solid::group(&[ball.placed(shift(-0.6)), ball.placed(shift(0.6))]).to_mesh().unwrap();
         let g = Grid::inside(&m.positions, &m.topology.triangles).unwrap();
         let depth = |p: DVec3| 1.0 - (p - DVec3::new(0.6 * p.x.signum(), 0.0, 0.0)).length();
         let mut cells = 0;
@@ -256,12 +280,15 @@ mod tests {
             assert!(d.abs() < 1.0 || (d > 0.0) == (g.clearance(i) > 0.0), "{}", g.middle(i));
             cells += usize::from(g.clearance(i) > 0.0);
         }
-        // Two balls less the lens they share: of height 0.4 on either side, pi h^2 (3 - h) / 3 each.
+        // Two balls less the lens they share: of height 0.4 on either side, pi h^2 (3 -
+        // h) / 3 each.
         let volume = std::f64::consts::PI * (8.0 / 3.0 - 2.0 * 0.16 * 2.6 / 3.0);
         assert!((cells as f64 * g.cell().powi(3) / volume - 1.0).abs() < 0.03);
         // Clearance is the distance to the nearest cell outside, looked up one by one.
         for i in g.cells().step_by(997) {
-            let near = (0..g.len()).filter(|j| g.clearance(*j) == 0.0).map(|j| (g.middle(j) - g.middle(i)).length());
+            let near = (0..g.len())
+                .filter(|j| g.clearance(*j) == 0.0)
+                .map(|j| (g.middle(j) - g.middle(i)).length());
             assert!((near.fold(f64::INFINITY, f64::min) / g.cell() - g.clearance(i)).abs() < 1e-9);
         }
         let from = g.cells().next().unwrap();

@@ -1,5 +1,6 @@
-//! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman 2014, section 3.2) and a diagonal metric
-//! from the variances of windows that double in length, as in Stan.
+//! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
+//! 2014, section 3.2) and a diagonal metric from the variances of windows that double in
+//! length, as in Stan.
 
 use super::system::{self, Point, System};
 use crate::infer::state::{StateError, holds};
@@ -17,7 +18,8 @@ const KAPPA: f64 = 0.75;
 const SHORTEST: f64 = -350.0;
 const LONGEST: f64 = 10.0;
 
-/// The first step is found by so many doublings, a density that is flat having no step that is too long, or by so many halvings.
+/// The first step is found by so many doublings, a density that is flat having no step
+/// that is too long, or by so many halvings.
 const DOUBLINGS: u32 = 40;
 const HALVINGS: u32 = 400;
 
@@ -32,8 +34,8 @@ pub(super) struct Adaptation {
     /// What the metric belongs to: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
     pub inverse_mass: Vec<f64>,
-    /// By address, what windows ended with: choices that go and come back have theirs again, so that after warm-up the metric is a
-    /// function of what choices there are.
+    /// By address, what windows ended with: choices that go and come back have theirs
+    /// again, so that after warm-up the metric is a function of what choices there are.
     learnt: BTreeMap<u64, Vec<f64>>,
     /// A step size that was given; else it is learnt.
     fixed: Option<f64>,
@@ -45,7 +47,8 @@ pub(super) struct Adaptation {
     seen: u32,
     window_end: u32,
     window: u32,
-    /// The states of this window, by address: choices that go and come back are counted on.
+    /// The states of this window, by address: choices that go and come back are counted
+    /// on.
     states: BTreeMap<u64, Moments>,
 }
 
@@ -70,7 +73,8 @@ impl Moments {
         }
     }
 
-    /// The variances, drawn towards a small one, as Stan does, for few states; one state has none.
+    /// The variances, drawn towards a small one, as Stan does, for few states; one state
+    /// has none.
     fn variances(&self) -> Option<Vec<f64>> {
         let n = self.count;
         let variance = |s: &f64| (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
@@ -112,10 +116,16 @@ impl Adaptation {
     }
 
     /// The step size to use now, found by trial when there is none yet.
-    pub fn step(&mut self, system: &mut System, here: &Point, adapting: bool, rng: &mut Stream) -> TraceResult<f64> {
+    pub fn step(
+        &mut self,
+        system: &mut System,
+        here: &Point,
+        adapting: bool,
+        rng: &mut Stream,
+    ) -> TraceResult<f64> {
         if system.signature() != self.signature {
-            // Step size and windows go on over all structures: where these change every few steps they would otherwise learn
-            // nothing.
+            // Step size and windows go on over all structures: where these change every
+            // few steps they would otherwise learn nothing.
             self.signature = system.signature().to_vec();
             self.inverse_mass = self.metric();
         }
@@ -142,9 +152,14 @@ impl Adaptation {
         self.bias = (1.0 - weight) * self.bias + weight * off;
         let log_step = self.mean_log - self.bias * self.rounds.sqrt() / GAMMA;
         let share = libm::pow(self.rounds, -KAPPA);
-        let log_averaged = share * log_step + (1.0 - share) * libm::log(self.averaged.max(f64::MIN_POSITIVE));
+        let log_averaged =
+            share * log_step + (1.0 - share) * libm::log(self.averaged.max(f64::MIN_POSITIVE));
         self.step = libm::exp(log_step.clamp(SHORTEST, LONGEST));
-        self.averaged = if self.rounds == 1.0 { self.step } else { libm::exp(log_averaged.clamp(SHORTEST, LONGEST)) };
+        self.averaged = if self.rounds == 1.0 {
+            self.step
+        } else {
+            libm::exp(log_averaged.clamp(SHORTEST, LONGEST))
+        };
         self.seen = self.seen.saturating_add(1);
         if self.seen > BURN {
             let mut rest = y;
@@ -174,13 +189,19 @@ impl Adaptation {
 
     /// The inverse masses of the choices there are: what windows ended with, or 1.
     fn metric(&self) -> Vec<f64> {
-        let known = |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
+        let known =
+            |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
         self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect()
     }
 
-    /// Doubles or halves the step until one leapfrog step is accepted half of the time (algorithm 4).
+    /// Doubles or halves the step until one leapfrog step is accepted half of the time
+    /// (algorithm 4).
     fn restart(&mut self, system: &mut System, here: &Point, rng: &mut Stream) -> TraceResult<()> {
-        let mut step = if self.averaged > 0.0 { self.averaged } else { 0.5 / (system.dimensions() as f64).powf(0.25) };
+        let mut step = if self.averaged > 0.0 {
+            self.averaged
+        } else {
+            0.5 / (system.dimensions() as f64).powf(0.25)
+        };
         let mut direction = 0.0;
         for round in 0..HALVINGS {
             if direction > 0.0 && round >= DOUBLINGS {
@@ -189,7 +210,10 @@ impl Adaptation {
             let from = system.launch(here, &self.inverse_mass, rng);
             let start = system::kinetic(&from, &self.inverse_mass);
             let ratio = match system.leapfrog(&from, step, &self.inverse_mass)? {
-                Some(to) => to.log_density - here.log_density + start - system::kinetic(&to, &self.inverse_mass),
+                Some(to) => {
+                    to.log_density - here.log_density + start
+                        - system::kinetic(&to, &self.inverse_mass)
+                }
                 None => f64::NEG_INFINITY,
             };
             let up = if ratio > libm::log(0.8) { 1.0 } else { -1.0 };

@@ -1,10 +1,12 @@
-//! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps (Neal 2011).
+//! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps
+//! (Neal 2011).
 
 use super::{DIVERGENT, End, Hamiltonian, Path, Trajectory, system};
 use crate::infer::kernel::{Scope, accepts};
 use crate::trace::TraceResult;
 
-/// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin algorithm.
+/// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin
+/// algorithm.
 pub type Hmc = Hamiltonian<Leaps>;
 
 /// So many leapfrog steps, accepted or rejected as a whole.
@@ -12,9 +14,11 @@ pub type Hmc = Hamiltonian<Leaps>;
 pub struct Leaps(u32);
 
 impl Hmc {
-    /// The kernel for these choices, with so many leapfrog steps and a step size, or else one that is learnt.
+    /// The kernel for these choices, with so many leapfrog steps and a step size, or else
+    /// one that is learnt.
     pub fn new(scope: Scope, steps: u32, step: Option<f64>) -> Self {
-        // The best acceptance of long trajectories, and of Langevin steps (Roberts & Rosenthal 1998, Beskos et al. 2013).
+        // The best acceptance of long trajectories, and of Langevin steps (Roberts &
+        // Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };
         Hamiltonian::along(Leaps(steps.max(1)), scope, target, step)
     }
@@ -27,7 +31,8 @@ impl Trajectory for Leaps {
 
     fn walk(&self, path: &mut Path) -> TraceResult<End> {
         let Path { system, here, step, inverse_mass, rng } = path;
-        // Of uneven length, so that no trajectory comes back to where it began again and again.
+        // Of uneven length, so that no trajectory comes back to where it began again and
+        // again.
         let step = *step * (0.9 + 0.2 * rng.uniform());
         let mut point = system.launch(here, inverse_mass, rng);
         let energy = system::kinetic(&point, inverse_mass);
@@ -48,6 +53,11 @@ impl Trajectory for Leaps {
         };
         let accepted = there && accepts(ratio, rng);
         let divergent = ratio.is_nan() || ratio <= -DIVERGENT;
-        Ok(End { to: accepted.then_some(point), acceptance: libm::exp(ratio.min(0.0)), failed: !there, divergent })
+        Ok(End {
+            to: accepted.then_some(point),
+            acceptance: libm::exp(ratio.min(0.0)),
+            failed: !there,
+            divergent,
+        })
     }
 }

@@ -1,4 +1,5 @@
-//! What kernels that follow trajectories share: choices, what is summed out, adaptation, memory.
+//! What kernels that follow trajectories share: choices, what is summed out, adaptation,
+//! memory.
 
 use super::adapt::Adaptation;
 use super::summed::with_alternatives;
@@ -50,25 +51,42 @@ pub struct Hamiltonian<T> {
 }
 
 impl<T> Hamiltonian<T> {
-    /// For these choices: the mean acceptance aimed at, and a step size, or else one that is learnt.
+    /// For these choices: the mean acceptance aimed at, and a step size, or else one that
+    /// is learnt.
     pub(super) fn along(trajectory: T, scope: Scope, target: f64, step: Option<f64>) -> Self {
         let (scope, summed) = (Registered::new(scope), Registered::nothing());
-        Hamiltonian { trajectory, scope, summed, adaptation: Adaptation::new(target, step), memory: Memory::default() }
+        Hamiltonian {
+            trajectory,
+            scope,
+            summed,
+            adaptation: Adaptation::new(target, step),
+            memory: Memory::default(),
+        }
     }
 
     /// The same with these finite choices summed out of the density that it sees.
     #[must_use]
     pub fn summing_out(self, choices: Selector) -> Self {
-        Hamiltonian { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
+        Hamiltonian {
+            summed: Registered::new(Scope { selector: choices, pick: Pick::All }),
+            ..self
+        }
     }
 }
 
 #[allow(private_bounds)]
 impl<T: Trajectory> Hamiltonian<T> {
-    fn go(&mut self, trace: &mut Trace, at: &At, marginal: Option<Marginal>) -> TraceResult<Outcome> {
+    fn go(
+        &mut self,
+        trace: &mut Trace,
+        at: &At,
+        marginal: Option<Marginal>,
+    ) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets, marginal, &mut self.memory)? else {
+        let Some((mut system, here)) =
+            System::begin(trace, at, &targets, marginal, &mut self.memory)?
+        else {
             return Ok(Outcome::default());
         };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
@@ -80,7 +98,11 @@ impl<T: Trajectory> Hamiltonian<T> {
             let y = end.to.as_ref().filter(|_| moved).map_or(&here.y, |to| &to.y);
             self.adaptation.learn(end.acceptance, y);
         }
-        Ok(Outcome { failed: u32::from(end.failed), divergent: u32::from(end.divergent), ..Outcome::one(moved) })
+        Ok(Outcome {
+            failed: u32::from(end.failed),
+            divergent: u32::from(end.divergent),
+            ..Outcome::one(moved)
+        })
     }
 }
 

@@ -1,10 +1,12 @@
-//! A Gaussian about a mode of a density: Laplace's approximation (MacKay 2003, chapter 27).
+//! A Gaussian about a mode of a density: Laplace's approximation (MacKay 2003, chapter
+//! 27).
 
 use crate::rng::Stream;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
-/// Curvatures outside this range count as its ends: flat and inverted directions, which are not those of a mode, are as wide as 4.
+/// Curvatures outside this range count as its ends: flat and inverted directions, which
+/// are not those of a mode, are as wide as 4.
 const CURVATURES: (f64, f64) = (1.0 / 16.0, 1e12);
 
 /// A normal distribution in as many dimensions as its mean has.
@@ -48,7 +50,9 @@ impl Laplace {
     /// How many standard deviations a place is off, squared.
     pub fn distance(&self, y: &[f64]) -> f64 {
         let off = DVector::from_iterator(y.len(), y.iter().zip(&self.mean).map(|(y, m)| y - m));
-        let along = |i: usize| self.axis(i).iter().zip(off.iter()).map(|(a, o)| a * o).sum::<f64>() / self.spreads[i];
+        let along = |i: usize| {
+            self.axis(i).iter().zip(off.iter()).map(|(a, o)| a * o).sum::<f64>() / self.spreads[i]
+        };
         (0..self.spreads.len()).map(|i| along(i) * along(i)).sum()
     }
 
@@ -71,7 +75,10 @@ impl Laplace {
     pub fn is_sound(&self) -> bool {
         let n = self.mean.len();
         let finite = self.mean.iter().chain(&self.axes).all(|x| x.is_finite());
-        finite && self.axes.len() == n * n && self.spreads.len() == n && self.spreads.iter().all(|s| *s > 0.0)
+        finite
+            && self.axes.len() == n * n
+            && self.spreads.len() == n
+            && self.spreads.iter().all(|s| *s > 0.0)
     }
 }
 
@@ -84,12 +91,15 @@ mod tests {
         StreamKey::new(5, 0, Purpose::KERNEL).stream(0, 0, 0)
     }
 
-    /// The curvature [[2, 1], [1, 3]] has the determinant 5 and the inverse [[3, -1], [-1, 2]] / 5.
+    /// The curvature [[2, 1], [1, 3]] has the determinant 5 and the inverse [[3, -1],
+    /// [-1, 2]] / 5.
     #[test]
     fn density_and_draws_are_those_of_the_curvature() {
         let l = Laplace::new(vec![1.0, -2.0], &[2.0, 1.0, 1.0, 3.0]).unwrap();
         let tau = 2.0 * std::f64::consts::PI;
-        let by_hand = |x: f64, y: f64| -0.5 * (2.0 * x * x + 2.0 * x * y + 3.0 * y * y) - libm::log(tau / 5f64.sqrt());
+        let by_hand = |x: f64, y: f64| {
+            -0.5 * (2.0 * x * x + 2.0 * x * y + 3.0 * y * y) - libm::log(tau / 5f64.sqrt())
+        };
         for (x, y) in [(0.0, 0.0), (0.3, -1.0), (-2.0, 5.0)] {
             assert!((l.log_density(&[1.0 + x, -2.0 + y]) - by_hand(x, y)).abs() < 1e-9);
         }
@@ -108,10 +118,19 @@ mod tests {
     #[test]
     fn what_is_flat_or_no_number_does_no_harm() {
         let l = Laplace::new(vec![0.0, 0.0], &[-3.0, 0.0, 0.0, 0.0]).unwrap();
-        assert!(l.is_sound() && (l.log_density(&[4.0, 0.0]) - l.log_density(&[0.0, 0.0]) + 0.5).abs() < 1e-12);
-        assert!(Laplace::new(vec![0.0], &[f64::NAN]).is_none() && Laplace::new(vec![0.0], &[]).is_none());
+        assert!(
+            l.is_sound()
+                && (l.log_density(&[4.0, 0.0]) - l.log_density(&[0.0, 0.0]) + 0.5).abs() < 1e-12
+        );
+        assert!(
+            Laplace::new(vec![0.0], &[f64::NAN]).is_none()
+                && Laplace::new(vec![0.0], &[]).is_none()
+        );
         let point = Laplace::new(Vec::new(), &[]).unwrap();
-        assert!(point.is_sound() && point.log_density(&point.sample(&mut rng())) == 0.0, "of no dimensions");
+        assert!(
+            point.is_sound() && point.log_density(&point.sample(&mut rng())) == 0.0,
+            "of no dimensions"
+        );
         let mut broken = l;
         broken.axes.pop();
         assert!(!broken.is_sound());

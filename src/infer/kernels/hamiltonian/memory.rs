@@ -1,8 +1,11 @@
-//! What a Hamiltonian kernel keeps from step to step: the tape of the density, and places to be used again.
+//! What a Hamiltonian kernel keeps from step to step: the tape of the density, and places
+//! to be used again.
 //!
-//! A tape belongs to one state of a trace but for the kernel's own choices. Where other kernels move the trace in between, or every
-//! step moves other choices, it has to be recorded again, which costs about as much as two gradients: where that does not pay, the
-//! kernel goes on without for a while. None of this changes a result but in the last bits of gradients.
+//! A tape belongs to one state of a trace but for the kernel's own choices. Where other
+//! kernels move the trace in between, or every step moves other choices, it has to be
+//! recorded again, which costs about as much as two gradients: where that does not pay,
+//! the kernel goes on without for a while. None of this changes a result but in the last
+//! bits of gradients.
 
 use super::system::Point;
 use crate::trace::{Change, Recording, Target, Trace, Weight};
@@ -29,7 +32,8 @@ pub(super) struct Layout {
 impl Layout {
     pub fn new(asked: &[Target]) -> Self {
         let n = asked.len();
-        let (targets, ranges, signature) = (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
+        let (targets, ranges, signature) =
+            (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
         Layout { asked: asked.to_vec(), targets, ranges, signature }
     }
 
@@ -62,7 +66,8 @@ enum Kept {
     Past,
 }
 
-/// How often tapes are recorded, which comes back with a checkpoint: the last bits of gradients hang on it.
+/// How often tapes are recorded, which comes back with a checkpoint: the last bits of
+/// gradients hang on it.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Habits {
     runs: u32,
@@ -111,8 +116,14 @@ impl Memory {
         Memory { runs, wait, waited, kept, ..Memory::default() }
     }
 
-    /// Takes up the tape of the last step, if it is still of this state and these choices, and gives the coordinates.
-    pub fn stand(&mut self, trace: &Trace, asked: &[Target], y: &mut Vec<f64>) -> Option<Arc<Layout>> {
+    /// Takes up the tape of the last step, if it is still of this state and these
+    /// choices, and gives the coordinates.
+    pub fn stand(
+        &mut self,
+        trace: &Trace,
+        asked: &[Target],
+        y: &mut Vec<f64>,
+    ) -> Option<Arc<Layout>> {
         let (tape, layout) = self.tape.as_mut()?;
         let holds = tape.holds(trace) && layout.asked == asked && tape.begin(trace, y);
         holds.then(|| Arc::clone(layout))
@@ -161,7 +172,8 @@ impl Memory {
         }
     }
 
-    /// What a proposal of these coordinates would weigh; `None` if only a proposal can tell.
+    /// What a proposal of these coordinates would weigh; `None` if only a proposal can
+    /// tell.
     pub fn weigh(&mut self, y: &[f64]) -> Option<Weight> {
         self.runs = self.runs.saturating_add(1);
         self.tape.as_mut().and_then(|(tape, _)| tape.weigh(y))
@@ -177,7 +189,8 @@ impl Memory {
         self.tape.as_ref().map_or(0.0, |(tape, _)| tape.log_jacobian())
     }
 
-    /// The changes that make these coordinates the state: values, where a tape knows them, so that nothing is allocated for them.
+    /// The changes that make these coordinates the state: values, where a tape knows
+    /// them, so that nothing is allocated for them.
     pub fn changes(&mut self, y: &[f64], taped: bool, layout: &Layout) -> &[(Target, Change)] {
         self.changes.clear();
         match &self.tape {
@@ -192,7 +205,8 @@ impl Memory {
         unused(&mut self.points)
     }
 
-    /// Remembers a place, so that it can be used again when nothing refers to it any more.
+    /// Remembers a place, so that it can be used again when nothing refers to it any
+    /// more.
     pub fn keep(&mut self, point: &Arc<Point>) {
         self.points.push(Arc::clone(point));
     }

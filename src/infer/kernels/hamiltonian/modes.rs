@@ -1,8 +1,11 @@
-//! `modes(sel)`: independent Metropolis-Hastings from the Laplace approximations of modes that were found before.
+//! `modes(sel)`: independent Metropolis-Hastings from the Laplace approximations of modes
+//! that were found before.
 //!
-//! The first step looks for modes. From then on the mixture of their approximations is fixed, so that proposing from it is exact
-//! whatever it misses: what it misses is only visited by other kernels. In warm-up that step also takes the chain to one of the modes,
-//! drawn by their evidence: so it begins where the mass is, and not where it happened to climb.
+//! The first step looks for modes. From then on the mixture of their approximations is
+//! fixed, so that proposing from it is exact whatever it misses: what it misses is only
+//! visited by other kernels. In warm-up that step also takes the chain to one of the
+//! modes, drawn by their evidence: so it begins where the mass is, and not where it
+//! happened to climb.
 
 use super::laplace::Laplace;
 use super::optimize::{Past, ascend};
@@ -16,21 +19,26 @@ use serde::{Deserialize, Serialize};
 
 /// The step of the differences that curvatures are taken from.
 const STEP: f64 = 1e-4;
-/// Modes that are this much less likely than the best, in nats, are left out; and at most so many are kept.
+/// Modes that are this much less likely than the best, in nats, are left out; and at most
+/// so many are kept.
 const BEHIND: f64 = 30.0;
 const MOST: usize = 6;
-/// Climbs whose heights differ by less, in nats, and whose places by less along each coordinate, are of the same mode.
+/// Climbs whose heights differ by less, in nats, and whose places by less along each
+/// coordinate, are of the same mode.
 const SAME: (f64, f64) = (1e-6, 1e-2);
 /// How many steps the choices climb that climb first.
 const FIRST: u32 = 8;
-/// How many steps the chain climbs from a mode of surrogates towards that of the observations themselves.
+/// How many steps the chain climbs from a mode of surrogates towards that of the
+/// observations themselves.
 const LAST: u32 = 40;
-/// The share of a run's time after which a search ends with what it has: draws need the rest.
+/// The share of a run's time after which a search ends with what it has: draws need the
+/// rest.
 const SEARCH: f64 = 0.75;
 /// The share of proposals that go to all modes alike: evidence is an estimate.
 const ALIKE: f64 = 0.1;
 
-/// A mode: values of the discrete choices, a Gaussian for the others, the log of its share.
+/// A mode: values of the discrete choices, a Gaussian for the others, the log of its
+/// share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Mode {
     discrete: Vec<Datum>,
@@ -41,7 +49,8 @@ struct Mode {
 /// What was found, and for which choices.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Found {
-    /// By choice: its address, and how many free coordinates it has; none of those that are discrete.
+    /// By choice: its address, and how many free coordinates it has; none of those that
+    /// are discrete.
     signature: Vec<(u64, usize)>,
     modes: Vec<Mode>,
 }
@@ -80,7 +89,8 @@ impl Here {
         };
         for t in targets {
             let free = trace.free_to_move(*t).filter(|(own, _)| !own.is_empty());
-            here.signature.push((trace.address_hash(*t), free.as_ref().map_or(0, |(own, _)| own.len())));
+            here.signature
+                .push((trace.address_hash(*t), free.as_ref().map_or(0, |(own, _)| own.len())));
             match free {
                 Some((own, log_jacobian)) => {
                     here.y.extend(own);
@@ -169,9 +179,18 @@ impl Climb {
 }
 
 impl Modes {
-    /// For these choices: among so many draws from the prior, so many climb, by at most so many steps.
+    /// For these choices: among so many draws from the prior, so many climb, by at most
+    /// so many steps.
     pub fn new(scope: Scope, tries: u32, keep: u32, steps: u32) -> Self {
-        Modes { scope: Registered::new(scope), tries, keep, steps, first: None, coarse: Selector::Nothing, found: None }
+        Modes {
+            scope: Registered::new(scope),
+            tries,
+            keep,
+            steps,
+            first: None,
+            coarse: Selector::Nothing,
+            found: None,
+        }
     }
 
     /// With choices that climb alone in each draw, some steps, before draws are compared.
@@ -180,13 +199,15 @@ impl Modes {
         Modes { first: first.map(Registered::new), ..self }
     }
 
-    /// With observations in whose place their coarse surrogates stand while modes are looked for.
+    /// With observations in whose place their coarse surrogates stand while modes are
+    /// looked for.
     #[must_use]
     pub fn by_surrogates_of(self, coarse: Selector) -> Self {
         Modes { coarse, ..self }
     }
 
-    /// The likeliest of some draws of the choices; in warm-up the present state is among them.
+    /// The likeliest of some draws of the choices; in warm-up the present state is among
+    /// them.
     fn starts(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Climb>> {
         let mut best = Vec::new();
         if at.adapting {
@@ -216,8 +237,9 @@ impl Modes {
         Ok(best.into_iter().map(|(state, likely)| Climb::new(state, likely)).collect())
     }
 
-    /// The ends of climbs, the highest first. Half of them go on after a quarter of the steps, and a quarter after half of them
-    /// (successive halving: Jamieson & Talwalkar 2016).
+    /// The ends of climbs, the highest first. Half of them go on after a quarter of the
+    /// steps, and a quarter after half of them (successive halving: Jamieson & Talwalkar
+    /// 2016).
     fn tops(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Climb>> {
         let mut climbs = self.starts(trace, at)?;
         let mut gone = 0;
@@ -252,7 +274,11 @@ impl Modes {
 
     /// Looks for modes, and in warm-up leaves the trace in one of them.
     fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<()> {
-        let coarse = if self.coarse == Selector::Nothing { None } else { trace.under_surrogates(&self.coarse)? };
+        let coarse = if self.coarse == Selector::Nothing {
+            None
+        } else {
+            trace.under_surrogates(&self.coarse)?
+        };
         let Some(mut twin) = coarse else { return self.search(trace, at) };
         twin.observe_as(trace)?;
         self.search(&mut twin, at)?;
@@ -274,28 +300,42 @@ impl Modes {
         let highest = tops.first().map_or(0.0, |t| t.height);
         let mut signature = None;
         let mut modes: Vec<Mode> = Vec::new();
-        for Climb { state, height, .. } in tops.into_iter().filter(|t| t.height > highest - BEHIND).take(MOST) {
+        for Climb { state, height, .. } in
+            tops.into_iter().filter(|t| t.height > highest - BEHIND).take(MOST)
+        {
             trace.restore(&state, at.draws(0))?;
             let (targets, _) = self.scope.members(trace, at, &mut at.stream());
             let Some(here) = Here::of(trace, &targets) else { continue };
-            let known =
-                |m: &Mode| m.discrete == here.discrete && m.about.distance(&here.y) < 0.25 * here.y.len() as f64;
-            if *signature.get_or_insert_with(|| here.signature.clone()) != here.signature || modes.iter().any(known) {
+            let known = |m: &Mode| {
+                m.discrete == here.discrete
+                    && m.about.distance(&here.y) < 0.25 * here.y.len() as f64
+            };
+            if *signature.get_or_insert_with(|| here.signature.clone()) != here.signature
+                || modes.iter().any(known)
+            {
                 continue;
             }
             if trace.stop().has_used(SEARCH) && !modes.is_empty() {
                 break;
             }
             let Some(about) = curved(trace, at, &targets, here.y)? else { continue };
-            modes.push(Mode { discrete: here.discrete, log_share: height + about.log_volume(), about });
+            modes.push(Mode {
+                discrete: here.discrete,
+                log_share: height + about.log_volume(),
+                about,
+            });
         }
         let found = Found::new(signature.unwrap_or_default(), modes);
         trace.restore(&begun, at.draws(0))?;
         let (targets, _) = self.scope.members(trace, at, &mut at.stream());
         if at.adapting
-            && let (Some(here), Some(mode)) = (Here::of(trace, &targets), found.draw(&mut at.stream()))
+            && let (Some(here), Some(mode)) =
+                (Here::of(trace, &targets), found.draw(&mut at.stream()))
             && here.signature == found.signature
-            && recoverable(trace.propose(&here.changes(&mode.discrete, &mode.about.mean), at.draws(1)))?.is_some()
+            && recoverable(
+                trace.propose(&here.changes(&mode.discrete, &mode.about.mean), at.draws(1)),
+            )?
+            .is_some()
         {
             trace.commit();
         }
@@ -305,7 +345,13 @@ impl Modes {
 }
 
 /// Takes the continuous ones of some choices so many steps up; without a slope they stay.
-fn climb(trace: &mut Trace, at: &At, targets: &[Target], steps: u32, past: &mut Past) -> TraceResult<()> {
+fn climb(
+    trace: &mut Trace,
+    at: &At,
+    targets: &[Target],
+    steps: u32,
+    past: &mut Past,
+) -> TraceResult<()> {
     let mut memory = Memory::default();
     if let Some((mut system, here)) = System::begin(trace, at, targets, None, &mut memory)? {
         let top = ascend(&mut system, &here, steps, past)?;
@@ -315,7 +361,12 @@ fn climb(trace: &mut Trace, at: &At, targets: &[Target], steps: u32, past: &mut 
 }
 
 /// The Gaussian about a mode, where the trace is.
-fn curved(trace: &mut Trace, at: &At, targets: &[Target], y: Vec<f64>) -> TraceResult<Option<Laplace>> {
+fn curved(
+    trace: &mut Trace,
+    at: &At,
+    targets: &[Target],
+    y: Vec<f64>,
+) -> TraceResult<Option<Laplace>> {
     let mut memory = Memory::default();
     let Some((mut system, here)) = System::begin(trace, at, targets, None, &mut memory)? else {
         return Ok(Laplace::new(y, &[]));
@@ -324,7 +375,8 @@ fn curved(trace: &mut Trace, at: &At, targets: &[Target], y: Vec<f64>) -> TraceR
     for i in 0..y.len() {
         let moved = y.iter().enumerate().map(|(j, y)| if i == j { y + STEP } else { *y });
         match system.go(moved)? {
-            Some(there) => curvature.extend(here.gradient.iter().zip(&there.gradient).map(|(a, b)| (a - b) / STEP)),
+            Some(there) => curvature
+                .extend(here.gradient.iter().zip(&there.gradient).map(|(a, b)| (a - b) / STEP)),
             None => curvature.extend((0..y.len()).map(|j| f64::from(u8::from(i == j)))),
         }
     }
@@ -345,7 +397,9 @@ impl Kernel for Modes {
         let found: Option<Found> = unpack(state)?;
         let sound = |f: &Found| {
             let n: usize = f.signature.iter().map(|(_, n)| n).sum();
-            f.modes.iter().all(|m| m.about.is_sound() && m.about.mean.len() == n && !m.log_share.is_nan())
+            f.modes
+                .iter()
+                .all(|m| m.about.is_sound() && m.about.mean.len() == n && !m.log_share.is_nan())
         };
         if !found.as_ref().is_none_or(sound) {
             return Err(StateError::new("the modes of the checkpoint are damaged"));
@@ -362,7 +416,9 @@ impl Kernel for Modes {
         }
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let (Some(found), Some(here)) = (&self.found, Here::of(trace, &targets)) else { return Ok(Outcome::default()) };
+        let (Some(found), Some(here)) = (&self.found, Here::of(trace, &targets)) else {
+            return Ok(Outcome::default());
+        };
         let Some(mode) = found.draw(&mut rng).filter(|_| here.signature == found.signature) else {
             return Ok(Outcome::default());
         };
@@ -373,7 +429,8 @@ impl Kernel for Modes {
             trace.rollback();
             return Ok(Outcome::one(false));
         }
-        let ways = found.log_density(&here.discrete, &here.y) - found.log_density(&mode.discrete, &y);
+        let ways =
+            found.log_density(&here.discrete, &here.y) - found.log_density(&mode.discrete, &y);
         let ratio = at.tempered(&w) + w.log_jacobian - here.log_jacobian + ways;
         // Where no mode leads, there is no way back.
         Ok(settle(trace, if ratio.is_nan() { f64::NEG_INFINITY } else { ratio }, &mut rng))

@@ -1,5 +1,6 @@
-//! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial sampling over the trajectory and the
-//! generalised stopping rule, checked across subtrees too (Betancourt 2017; as Stan has it).
+//! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial
+//! sampling over the trajectory and the generalised stopping rule, checked across
+//! subtrees too (Betancourt 2017; as Stan has it).
 
 use super::{DIVERGENT, End, Hamiltonian, Path, Point, System, Trajectory, system};
 use crate::infer::kernel::Scope;
@@ -51,7 +52,14 @@ impl Walk<'_, '_> {
     /// A tree of one place.
     fn leaf(&mut self, point: Arc<Point>, log_weight: f64) -> Tree {
         let sum = self.system.numbers(point.momentum.iter().copied());
-        Tree { first: Arc::clone(&point), last: Arc::clone(&point), sum, proposal: point, log_weight, stop: false }
+        Tree {
+            first: Arc::clone(&point),
+            last: Arc::clone(&point),
+            sum,
+            proposal: point,
+            log_weight,
+            stop: false,
+        }
     }
 
     /// A tree of 2^depth leaps from an end; `None` when the very first leaves the space.
@@ -96,9 +104,11 @@ impl Walk<'_, '_> {
     }
 }
 
-/// Whether one end no longer moves along the way, whose momenta sum up to two sums together.
+/// Whether one end no longer moves along the way, whose momenta sum up to two sums
+/// together.
 fn turning(a: &Point, b: &Point, some: &[f64], more: &[f64]) -> bool {
-    let along = |v: &[f64]| v.iter().zip(some.iter().zip(more)).map(|(v, (s, t))| v * (s + t)).sum::<f64>();
+    let along =
+        |v: &[f64]| v.iter().zip(some.iter().zip(more)).map(|(v, (s, t))| v * (s + t)).sum::<f64>();
     // Also of NaN.
     !(along(&a.velocity) > 0.0 && along(&b.velocity) > 0.0)
 }
@@ -119,7 +129,8 @@ impl Trajectory for Doubling {
         let step = *step;
         let start = system.launch(here, mass, rng);
         let energy = system::kinetic(&start, mass) - here.log_density;
-        let mut walk = Walk { system, mass, step, energy, acceptance: 0.0, leaps: 0.0, divergent: false, rng };
+        let mut walk =
+            Walk { system, mass, step, energy, acceptance: 0.0, leaps: 0.0, divergent: false, rng };
         // In the order of time: `first` is the past.
         let mut tree = walk.leaf(start, 0.0);
         let mut moved = false;
@@ -131,7 +142,8 @@ impl Trajectory for Doubling {
             if new.stop {
                 break;
             }
-            // Biased towards the new half, which keeps the target (Betancourt 2017, A.3.2).
+            // Biased towards the new half, which keeps the target (Betancourt 2017,
+            // A.3.2).
             let take = walk.rng.uniform() < libm::exp(new.log_weight - tree.log_weight);
             let log_weight = log_sum_exp(&[tree.log_weight, new.log_weight]);
             let proposal = Arc::clone(if take { &new.proposal } else { &tree.proposal });

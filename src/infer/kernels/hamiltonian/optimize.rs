@@ -1,7 +1,8 @@
-//! `optimize(sel)`: climbs to a mode by L-BFGS (Nocedal & Wright 2006, algorithm 7.4) with a backtracking line search.
+//! `optimize(sel)`: climbs to a mode by L-BFGS (Nocedal & Wright 2006, algorithm 7.4)
+//! with a backtracking line search.
 //!
-//! Not a sampler: for a start, or an answer in a hurry. The mode is that of the density in the unconstrained space, where the
-//! other kernels of this family move.
+//! Not a sampler: for a start, or an answer in a hurry. The mode is that of the density
+//! in the unconstrained space, where the other kernels of this family move.
 
 use super::{Memory, Point, System};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
@@ -65,7 +66,8 @@ fn direction(gradient: &[f64], past: &Past) -> Vec<f64> {
     q
 }
 
-/// A point up along a direction that gains enough (Armijo's rule), trying ever shorter steps.
+/// A point up along a direction that gains enough (Armijo's rule), trying ever shorter
+/// steps.
 fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option<Arc<Point>>> {
     let slope = dot(along, &from.gradient);
     let mut step = 1.0;
@@ -81,7 +83,12 @@ fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option
 }
 
 /// The place that so many steps up from another lead to; `past` is of the steps before.
-pub(super) fn ascend(system: &mut System, begun: &Arc<Point>, steps: u32, past: &mut Past) -> TraceResult<Arc<Point>> {
+pub(super) fn ascend(
+    system: &mut System,
+    begun: &Arc<Point>,
+    steps: u32,
+    past: &mut Past,
+) -> TraceResult<Arc<Point>> {
     let mut here = Arc::clone(begun);
     for _ in 0..steps {
         let mut along = direction(&here.gradient, past);
@@ -98,7 +105,8 @@ pub(super) fn ascend(system: &mut System, begun: &Arc<Point>, steps: u32, past: 
             continue;
         };
         let step: Vec<f64> = next.y.iter().zip(&here.y).map(|(a, b)| a - b).collect();
-        let change: Vec<f64> = here.gradient.iter().zip(&next.gradient).map(|(a, b)| a - b).collect();
+        let change: Vec<f64> =
+            here.gradient.iter().zip(&next.gradient).map(|(a, b)| a - b).collect();
         let gain = next.log_density - here.log_density;
         if dot(&step, &change) > 1e-12 * dot(&change, &change) {
             past.push_back(Pair { step, change });
@@ -132,7 +140,8 @@ impl Kernel for Optimize {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)? else {
+        let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)?
+        else {
             return Ok(Outcome::default());
         };
         let here = ascend(&mut system, &begun, self.steps, &mut Past::new())?;
@@ -151,7 +160,8 @@ mod tests {
     use crate::model::Model;
     use crate::trace::{Draws, Selector};
 
-    /// -2 |y|^2 has the gradient -4 y: one step along an axis shows how steep the hill is in all directions.
+    /// -2 |y|^2 has the gradient -4 y: one step along an axis shows how steep the hill is
+    /// in all directions.
     #[test]
     fn the_direction_leads_to_the_top_of_a_round_hill() {
         let past = VecDeque::from([Pair { step: vec![1.0, 0.0], change: vec![4.0, 0.0] }]);
@@ -161,7 +171,8 @@ mod tests {
     /// The gradient points across a ridge, where the last steps know the way along it.
     #[test]
     fn a_narrow_ridge_takes_few_steps() {
-        let text = "assume a ~ normal(0, 1); assume b ~ normal(0, 1); observe normal(a + b, 0.1) = 1;";
+        let text =
+            "assume a ~ normal(0, 1); assume b ~ normal(0, 1); observe normal(a + b, 0.1) = 1;";
         let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
         for (address, x) in [("@a", 2.0), ("@b", -1.0)] {
             trace.set(address, x, Draws::default()).unwrap();
@@ -175,7 +186,8 @@ mod tests {
         }
     }
 
-    /// So little curvature promises so much that no share of it leads up: then the gradient alone does.
+    /// So little curvature promises so much that no share of it leads up: then the
+    /// gradient alone does.
     #[test]
     fn a_slope_that_is_almost_straight_is_climbed_by_its_gradient() {
         // Symmetric about 50, and straight on both sides.

@@ -1,24 +1,31 @@
-//! Densities and forces with finite choices summed out, and their draw from the conditional afterwards.
+//! Densities and forces with finite choices summed out, and their draw from the
+//! conditional afterwards.
 //!
-//! A place is looked at until every group of choices was at each of its joint values ([`Sums::looks`]), all groups at a value
-//! of theirs at a time. The force is the mean, over the conditional of the choices, of that of the log joint. Drawing the choices
-//! from that conditional at the end leaves the joint density of both invariant. Choices that only other values ask for (a component
-//! of a mixture that no label points at) are drawn from their prior for the time of the move, and forgotten after it. A place where
-//! other choices than those would be asked for has no density, from wherever it is reached.
+//! A place is looked at until every group of choices was at each of its joint values
+//! ([`Sums::looks`]), all groups at a value of theirs at a time. The force is the mean,
+//! over the conditional of the choices, of that of the log joint. Drawing the choices
+//! from that conditional at the end leaves the joint density of both invariant. Choices
+//! that only other values ask for (a component of a mixture that no label points at) are
+//! drawn from their prior for the time of the move, and forgotten after it. A place where
+//! other choices than those would be asked for has no density, from wherever it is
+//! reached.
 
 use super::{Point, System};
 use crate::infer::kernel::{At, Outcome, recoverable};
 use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Change, Explored, Marginal, Selection, Sums, Target, Trace, TraceResult, Weight};
+use crate::trace::{
+    Change, Explored, Marginal, Selection, Sums, Target, Trace, TraceResult, Weight,
+};
 use std::sync::Arc;
 
 /// What a system sums out.
 #[derive(Debug)]
 pub(super) struct Summed {
     marginal: Marginal,
-    /// The changes that lead back to where the system began, what was seen and the log density there.
+    /// The changes that lead back to where the system began, what was seen and the log
+    /// density there.
     start: Vec<(Target, Change)>,
     begun: Option<View>,
     origin: f64,
@@ -35,7 +42,8 @@ struct View {
     conditional: Vec<Vec<f64>>,
 }
 
-/// Makes a step with all choices there that the values of what is summed out ask for, and gives it what that is.
+/// Makes a step with all choices there that the values of what is summed out ask for, and
+/// gives it what that is.
 pub(super) fn with_alternatives(
     (sites, moving): (Selection, Selection),
     trace: &mut Trace,
@@ -52,7 +60,8 @@ pub(super) fn with_alternatives(
 }
 
 impl System<'_> {
-    /// Sums choices out from now on, and fills in the force at the present place; false if the density has no slope there then.
+    /// Sums choices out from now on, and fills in the force at the present place; false
+    /// if the density has no slope there then.
     pub(super) fn sum_out(&mut self, marginal: Marginal, point: &mut Point) -> TraceResult<bool> {
         let here = |t: &Target| Some((*t, Change::Set(self.trace.stored(*t)?)));
         let start = self.layout.targets.iter().filter_map(here).collect();
@@ -69,7 +78,12 @@ impl System<'_> {
     }
 
     /// Goes to a place, with the groups at joint values.
-    fn put(&mut self, sums: &Sums, at: &[(Target, Change)], values: &[usize]) -> TraceResult<Option<Weight>> {
+    fn put(
+        &mut self,
+        sums: &Sums,
+        at: &[(Target, Change)],
+        values: &[usize],
+    ) -> TraceResult<Option<Weight>> {
         let mut changes = at.to_vec();
         if let Some(summed) = &self.summed {
             summed.marginal.changes(sums, values, &mut changes);
@@ -95,9 +109,11 @@ impl System<'_> {
         }
     }
 
-    /// Looks at a place by sums that hold there. `None` if they do not, or if there is no density.
+    /// Looks at a place by sums that hold there. `None` if they do not, or if there is no
+    /// density.
     fn look(&mut self, sums: Arc<Sums>, at: &[(Target, Change)]) -> TraceResult<Option<View>> {
-        let mut conditional: Vec<Vec<f64>> = sums.seen().map(|s| vec![f64::NEG_INFINITY; s.len()]).collect();
+        let mut conditional: Vec<Vec<f64>> =
+            sums.seen().map(|s| vec![f64::NEG_INFINITY; s.len()]).collect();
         let (mut base, mut jacobian, mut terms) = (0.0, 0.0, Vec::new());
         for (k, values) in sums.looks.iter().enumerate() {
             let Some(w) = self.put(&sums, at, values)? else { return Ok(None) };
@@ -114,7 +130,9 @@ impl System<'_> {
                 let message = "internal error: an undetected dependence of a score on choices that are summed out; please report this";
                 return Err(fail(Default::default(), message.into()));
             }
-            for (((c, t), seen), v) in conditional.iter_mut().zip(&terms).zip(sums.seen()).zip(values) {
+            for (((c, t), seen), v) in
+                conditional.iter_mut().zip(&terms).zip(sums.seen()).zip(values)
+            {
                 if seen[*v] == Some(k) {
                     c[*v] = *t;
                 }
@@ -129,8 +147,9 @@ impl System<'_> {
         Ok(log_density.is_finite().then_some(View { sums, log_density, conditional }))
     }
 
-    /// The log density and force at a place, with the choices summed out; which of their values is pending is of no account.
-    /// What was seen there; `None` where there is no density or no slope.
+    /// The log density and force at a place, with the choices summed out; which of their
+    /// values is pending is of no account. What was seen there; `None` where there is no
+    /// density or no slope.
     fn evaluate_summed(&mut self, point: &mut Point) -> TraceResult<Option<View>> {
         let at = self.memory.changes(&point.y, false, &self.layout).to_vec();
         let Some(view) = self.view(&at)? else { return Ok(None) };
@@ -147,7 +166,8 @@ impl System<'_> {
             }
             let first = sums.seen().zip(values).map(|(seen, v)| seen[*v] == Some(k));
             let weights = first.zip(&view.conditional).zip(values);
-            let weights: Vec<f64> = weights.map(|((first, c), v)| if first { libm::exp(c[*v]) } else { 0.0 }).collect();
+            let weights: Vec<f64> =
+                weights.map(|((first, c), v)| if first { libm::exp(c[*v]) } else { 0.0 }).collect();
             let base = f64::from(u8::from(k == 0));
             let weight = |n: u32| self.trace.group_of(&sums, n).map_or(base, |i| weights[i]);
             part.clear();
@@ -172,7 +192,8 @@ impl System<'_> {
         Ok(there)
     }
 
-    /// Makes a place, or the one it began in, the state of the trace, with the choices drawn from their conditional there.
+    /// Makes a place, or the one it began in, the state of the trace, with the choices
+    /// drawn from their conditional there.
     pub(super) fn settle_summed(mut self, to: Option<&Point>) -> TraceResult<bool> {
         let mut rng = self.at.within(0).stream();
         let at = match (to, &mut self.summed) {
@@ -180,7 +201,8 @@ impl System<'_> {
             (None, Some(summed)) => std::mem::take(&mut summed.start),
             (None, None) => return Ok(false),
         };
-        let (begun, last) = self.summed.as_mut().map_or((None, None), |s| (s.begun.take(), s.last.take()));
+        let (begun, last) =
+            self.summed.as_mut().map_or((None, None), |s| (s.begun.take(), s.last.take()));
         let view = match (to, last) {
             (None, _) => begun,
             (Some(p), Some((y, view))) if bits(&y).eq(bits(&p.y)) => Some(view),

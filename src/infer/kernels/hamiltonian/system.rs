@@ -1,7 +1,10 @@
-//! The dynamical system behind a trace: positions, densities and forces, and leapfrog steps.
+//! The dynamical system behind a trace: positions, densities and forces, and leapfrog
+//! steps.
 //!
-//! Densities and forces come from a tape of the trace where there is one (see [`super::memory`]), else from pending proposals and
-//! reverse passes through the trace: the same densities to the last bit. What a transition ends with is a proposal either way.
+//! Densities and forces come from a tape of the trace where there is one (see
+//! [`super::memory`]), else from pending proposals and reverse passes through the trace:
+//! the same densities to the last bit. What a transition ends with is a proposal either
+//! way.
 
 use super::memory::{Layout, Memory};
 use super::summed::Summed;
@@ -19,7 +22,8 @@ pub(super) struct Point {
     pub momentum: Vec<f64>,
     /// The momentum times the inverse mass.
     pub velocity: Vec<f64>,
-    /// The log density in the unconstrained space, less that of the state the trace is in.
+    /// The log density in the unconstrained space, less that of the state the trace is
+    /// in.
     pub log_density: f64,
 }
 
@@ -36,8 +40,8 @@ pub(super) struct System<'a> {
 }
 
 impl<'a> System<'a> {
-    /// The continuous ones of some choices, and where they are, with others summed out. `None` if there are no continuous ones,
-    /// or the density there has no slope.
+    /// The continuous ones of some choices, and where they are, with others summed out.
+    /// `None` if there are no continuous ones, or the density there has no slope.
     ///
     /// # Errors
     /// An operation that has no derivative; choices that cannot be summed out.
@@ -64,7 +68,9 @@ impl<'a> System<'a> {
         let mut layout = Layout::new(all);
         point.y.clear();
         for t in all {
-            let Some((own, j)) = trace.free_to_move(*t).filter(|(own, _)| !own.is_empty()) else { continue };
+            let Some((own, j)) = trace.free_to_move(*t).filter(|(own, _)| !own.is_empty()) else {
+                continue;
+            };
             layout.add(trace, *t, own.len());
             jacobian.add(j);
             point.y.extend(own);
@@ -76,7 +82,8 @@ impl<'a> System<'a> {
         let taped = marginal.is_none()
             && memory.record(trace, &layout, &mut point.y)
             && memory.gradient(&point.y, at.power, &mut point.gradient);
-        let mut system = System { trace, at, memory, layout, taped, jacobian: jacobian.value(), summed: None };
+        let mut system =
+            System { trace, at, memory, layout, taped, jacobian: jacobian.value(), summed: None };
         if let Some(marginal) = marginal {
             let there = system.sum_out(marginal, point)?;
             return Ok(if there { system.usable(here) } else { None });
@@ -98,7 +105,8 @@ impl<'a> System<'a> {
         self.layout.dimensions()
     }
 
-    /// The addresses of the choices, and how many coordinates each has: what a metric belongs to.
+    /// The addresses of the choices, and how many coordinates each has: what a metric
+    /// belongs to.
     pub fn signature(&self) -> &[(u64, usize)] {
         &self.layout.signature
     }
@@ -108,7 +116,8 @@ impl<'a> System<'a> {
         self.trace.gradient(&self.layout.targets, self.at.power, &mut point.gradient)
     }
 
-    /// The log density and force at a place that was filled in. False where there is none.
+    /// The log density and force at a place that was filled in. False where there is
+    /// none.
     fn evaluate(&mut self, point: &mut Point) -> TraceResult<bool> {
         if point.y.iter().any(|x| !x.is_finite()) {
             return Ok(false);
@@ -136,7 +145,9 @@ impl<'a> System<'a> {
     /// Proposes a place: its log density, `None` where there is none.
     fn propose(&mut self, y: &[f64], as_values: bool) -> TraceResult<Option<f64>> {
         let changes = self.memory.changes(y, as_values, &self.layout);
-        let Some(w) = recoverable(self.trace.propose(changes, self.at.draws(0)))? else { return Ok(None) };
+        let Some(w) = recoverable(self.trace.propose(changes, self.at.draws(0)))? else {
+            return Ok(None);
+        };
         let log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
         Ok((w.appeared + w.vanished == 0 && log_density.is_finite()).then_some(log_density))
     }
@@ -153,13 +164,21 @@ impl<'a> System<'a> {
     }
 
     /// One leapfrog step with these inverse masses.
-    pub fn leapfrog(&mut self, from: &Point, step: f64, inverse_mass: &[f64]) -> TraceResult<Option<Arc<Point>>> {
+    pub fn leapfrog(
+        &mut self,
+        from: &Point,
+        step: f64,
+        inverse_mass: &[f64],
+    ) -> TraceResult<Option<Arc<Point>>> {
         let mut shared = self.memory.point();
         let Some(to) = Arc::get_mut(&mut shared) else { return Ok(None) };
         to.momentum.clear();
-        to.momentum.extend(from.momentum.iter().zip(&from.gradient).map(|(p, g)| p + 0.5 * step * g));
+        to.momentum
+            .extend(from.momentum.iter().zip(&from.gradient).map(|(p, g)| p + 0.5 * step * g));
         to.y.clear();
-        to.y.extend(from.y.iter().zip(&to.momentum).zip(inverse_mass).map(|((y, p), m)| y + step * m * p));
+        to.y.extend(
+            from.y.iter().zip(&to.momentum).zip(inverse_mass).map(|((y, p), m)| y + step * m * p),
+        );
         let there = self.evaluate(to)?;
         to.momentum.iter_mut().zip(&to.gradient).for_each(|(p, g)| *p += 0.5 * step * g);
         to.velocity.clear();
@@ -189,7 +208,8 @@ impl<'a> System<'a> {
         self.memory.numbers(from)
     }
 
-    /// Makes a place the state of the trace, or leaves it where it was; draws what was summed out.
+    /// Makes a place the state of the trace, or leaves it where it was; draws what was
+    /// summed out.
     pub fn settle(mut self, to: Option<&Point>) -> TraceResult<bool> {
         if self.summed.is_some() {
             return self.settle_summed(to);

@@ -1,8 +1,10 @@
-//! Tables as text (RFC 4180): a header line, then one row a line; quoted fields may hold separators and line ends.
+//! Tables as text (RFC 4180): a header line, then one row a line; quoted fields may hold
+//! separators and line ends.
 //!
-//! The separator is the one of comma, semicolon and tab that splits the header into most fields. A column is of numbers if
-//! all its fields are, else of bools if all are `true` or `false`, else of strings. There are no missing values: an empty
-//! field in a column of numbers is an error, not a NaN that shows up later.
+//! The separator is the one of comma, semicolon and tab that splits the header into most
+//! fields. A column is of numbers if all its fields are, else of bools if all are `true`
+//! or `false`, else of strings. There are no missing values: an empty field in a column
+//! of numbers is an error, not a NaN that shows up later.
 
 use crate::lang::value::{MOST_ELEMENTS, Record, Value};
 use std::sync::Arc;
@@ -12,7 +14,8 @@ type Row = (usize, Vec<String>);
 
 /// The columns of a table as a record of arrays.
 pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
-    let text = std::str::from_utf8(bytes).map_err(|e| format!("not UTF-8 text (byte {})", e.valid_up_to()))?;
+    let text = std::str::from_utf8(bytes)
+        .map_err(|e| format!("not UTF-8 text (byte {})", e.valid_up_to()))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut rows = rows(text, separator(text))?.into_iter();
     let Some((_, header)) = rows.next() else { return Err("the table is empty".into()) };
@@ -23,7 +26,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     }
     let rows: Vec<Row> = rows.collect();
     if let Some((line, row)) = rows.iter().find(|(_, row)| row.len() != header.len()) {
-        return Err(format!("line {line}: {} fields, but the header has {}", row.len(), header.len()));
+        return Err(format!(
+            "line {line}: {} fields, but the header has {}",
+            row.len(),
+            header.len()
+        ));
     }
     let mut table = Record::new();
     for (i, name) in header.iter().enumerate() {
@@ -58,7 +65,9 @@ fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
     if bools.len() == rows.len() {
         return Ok(Value::List(bools.into()));
     }
-    Ok(Value::List(rows.iter().map(|(_, row)| row.get(i).map_or(Value::Unit, |f| Value::str(f))).collect()))
+    Ok(Value::List(
+        rows.iter().map(|(_, row)| row.get(i).map_or(Value::Unit, |f| Value::str(f))).collect(),
+    ))
 }
 
 /// The separator that splits the header most often; a comma when none does.
@@ -136,7 +145,10 @@ mod tests {
     #[test]
     fn columns_get_the_type_of_all_their_fields() {
         assert_eq!(read("x,y\n1,2.5\n-3e2, 4\n"), "{ x: [1, -300], y: [2.5, 4] }");
-        assert_eq!(read("x;ok;n\n1;true;a\n2;false;2"), "{ x: [1, 2], ok: [true, false], n: [\"a\", \"2\"] }");
+        assert_eq!(
+            read("x;ok;n\n1;true;a\n2;false;2"),
+            "{ x: [1, 2], ok: [true, false], n: [\"a\", \"2\"] }"
+        );
         assert_eq!(read("\u{feff}a\tb\r\n1\t2\r\n\r\n"), "{ a: [1], b: [2] }");
         assert_eq!(read("x,y\n"), "{ x: [], y: [] }");
         assert_eq!(read("x\ninf\n"), "{ x: [inf] }");

@@ -1,9 +1,11 @@
-//! JSON (RFC 8259) as values: objects are records in their order, arrays of numbers pack, null is nothing.
+//! JSON (RFC 8259) as values: objects are records in their order, arrays of numbers pack,
+//! null is nothing.
 
 use crate::lang::value::{Extent, MOST_ELEMENTS, Value};
 use std::sync::Arc;
 
-/// The most bytes of a JSON text that is read as a value: its elements take many times as much.
+/// The most bytes of a JSON text that is read as a value: its elements take many times as
+/// much.
 const MOST_BYTES: usize = 1 << 26;
 
 /// The value of a JSON text. Nesting is limited by the reader, to 128.
@@ -25,9 +27,9 @@ fn convert(json: serde_json::Value) -> Value {
         serde_json::Value::Number(n) => Value::Num(n.as_f64().unwrap_or(f64::NAN)),
         serde_json::Value::String(s) => Value::Str(s.into()),
         serde_json::Value::Array(xs) => Value::from_elements(xs.into_iter().map(convert).collect()),
-        serde_json::Value::Object(fields) => {
-            Value::Record(Arc::new(fields.into_iter().map(|(k, v)| (Arc::from(k), convert(v))).collect()))
-        }
+        serde_json::Value::Object(fields) => Value::Record(Arc::new(
+            fields.into_iter().map(|(k, v)| (Arc::from(k), convert(v))).collect(),
+        )),
     }
 }
 
@@ -39,7 +41,10 @@ mod tests {
     fn values_keep_their_shape() {
         let text = r#"{"b": [1, 2.5], "a": {"x": null, "y": [true, "s"]}, "n": 1e-7, "e": []}"#;
         let v = parse(text.as_bytes()).unwrap();
-        assert_eq!(v.to_string(), r#"{ b: [1, 2.5], a: { x: nothing, y: [true, "s"] }, n: 0.0000001, e: [] }"#);
+        assert_eq!(
+            v.to_string(),
+            r#"{ b: [1, 2.5], a: { x: nothing, y: [true, "s"] }, n: 0.0000001, e: [] }"#
+        );
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Data: what a `data` item can hold, and the loaders that read it from a file's bytes.
 //!
-//! The names are built-ins so that they are documented and checked like any other; a program cannot call them on values
-//! it computes, because what a run reads must be known before it starts. Which files may be read, and where they lie, is
-//! the host's business: this module gets bytes.
+//! The names are built-ins so that they are documented and checked like any other; a
+//! program cannot call them on values it computes, because what a run reads must be known
+//! before it starts. Which files may be read, and where they lie, is the host's business:
+//! this module gets bytes.
 
 mod armature;
 mod csv;
@@ -28,17 +29,43 @@ const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program
 
 const SHAPE: &[Arg] = &[
     arg("file", Type::Str, "The path, relative to the program's folder."),
-    opt("up", Type::Str, "\"y\"", "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y."),
-    opt("unit", Type::Num, "1", "The length of the file's unit in scene units: 0.01 for centimetres.").unit("m"),
+    opt(
+        "up",
+        Type::Str,
+        "\"y\"",
+        "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y.",
+    ),
+    opt(
+        "unit",
+        Type::Num,
+        "1",
+        "The length of the file's unit in scene units: 0.01 for centimetres.",
+    )
+    .unit("m"),
 ];
 
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
-    opt("colours", Type::Str, "\"rgb\"", "The order of the network's input channels, \"rgb\" or \"bgr\"."),
-    opt("white", Type::Num, "1", "The value of white, above 0; the network's input is (value - mean) / spread."),
+    opt(
+        "colours",
+        Type::Str,
+        "\"rgb\"",
+        "The order of the network's input channels, \"rgb\" or \"bgr\".",
+    ),
+    opt(
+        "white",
+        Type::Num,
+        "1",
+        "The value of white, above 0; the network's input is (value - mean) / spread.",
+    ),
     opt("mean", Type::Any, "0", "The mean to subtract: a number, or one per channel."),
     opt("spread", Type::Any, "1", "The divisor: a number, or one per channel."),
-    opt("output", Type::Any, "the last", "The output to use as the map: its name, or its number from 1."),
+    opt(
+        "output",
+        Type::Any,
+        "the last",
+        "The output to use as the map: its name, or its number from 1.",
+    ),
     opt("logits", Type::Bool, "false", "Whether the map holds log odds instead of probabilities."),
     opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
 ];
@@ -48,7 +75,11 @@ const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Row {
 }
 
 pub(super) const TABLE: &[Row] = &[
-    kind("csv", Type::Record, "A table with a header line: a record of columns, numbers, bools or strings."),
+    kind(
+        "csv",
+        Type::Record,
+        "A table with a header line: a record of columns, numbers, bools or strings.",
+    ),
     kind("json", Type::Any, "JSON: objects are records, null is nothing."),
     kind(
         "image",
@@ -57,7 +88,11 @@ pub(super) const TABLE: &[Row] = &[
     ),
     kind("contours", Type::Object("an image"), "A contour map: bright pixels are contour."),
     kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
-    kind("depth", Type::Object("a depth map"), "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit."),
+    kind(
+        "depth",
+        Type::Object("a depth map"),
+        "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit.",
+    ),
     function(
         "detector",
         SECTION,
@@ -105,16 +140,18 @@ pub(super) const TABLE: &[Row] = &[
 fn not_an_expression(a: &Args) -> Result<Value, Fault> {
     let name = &a.builtin.name;
     let message = format!("{name}: only `data` items can read files");
-    Err(Fault::new(FaultKind::Other, message).with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
+    Err(Fault::new(FaultKind::Other, message)
+        .with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
 }
 
-/// The kinds of data that [`load`] reads: what may stand after the colon of `data d: kind;`.
+/// The kinds of data that [`load`] reads: what may stand after the colon of
+/// `data d: kind;`.
 pub fn kinds() -> impl Iterator<Item = &'static str> + Clone {
     TABLE.iter().map(|b| b.name)
 }
 
-/// The value of a data item of a kind that is given no file, for those that can do without: no keypoints, the detector that is
-/// built in.
+/// The value of a data item of a kind that is given no file, for those that can do
+/// without: no keypoints, the detector that is built in.
 pub fn without_file(kind: &str) -> Option<Value> {
     match kind {
         "keypoints" => Some(Value::object(KeypointsValue(Keypoints::default()))),
@@ -123,13 +160,14 @@ pub fn without_file(kind: &str) -> Option<Value> {
     }
 }
 
-/// The file to read for data of a kind: what is given, but for keypoints without the `#ID` that chooses a person.
+/// The file to read for data of a kind: what is given, but for keypoints without the
+/// `#ID` that chooses a person.
 pub fn path_of<'a>(kind: &str, file: &'a str) -> &'a str {
     if kind == "keypoints" { keypoints::split_id(file).0 } else { file }
 }
 
-/// Keypoints from the bytes of a file: of the person whom `#ID` at the end of `file` names, or else the one whom the picture
-/// is called by, or else the only one.
+/// Keypoints from the bytes of a file: of the person whom `#ID` at the end of `file`
+/// names, or else the one whom the picture is called by, or else the only one.
 ///
 /// # Errors
 /// As [`People::parse`] and [`People::pick`], with the file's name.
@@ -142,27 +180,41 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
     })
 }
 
-/// Reads data of a kind from the bytes of a file; `file` is what messages call it, and `beside` reads files by paths relative
-/// to it. Options are those of the item's default call.
+/// Reads data of a kind from the bytes of a file; `file` is what messages call it, and
+/// `beside` reads files by paths relative to it. Options are those of the item's default
+/// call.
 ///
 /// # Errors
-/// An unknown kind, or bytes that are not of that kind: a message with the line where there are lines.
-pub fn load(kind: &str, file: &str, bytes: &[u8], options: &Options, beside: &Beside) -> Result<Value, Fault> {
+/// An unknown kind, or bytes that are not of that kind: a message with the line where
+/// there are lines.
+pub fn load(
+    kind: &str,
+    file: &str,
+    bytes: &[u8],
+    options: &Options,
+    beside: &Beside,
+) -> Result<Value, Fault> {
     let limits = Limits::default();
     let text = |e: VisionError| e.to_string();
     let loaded = match kind {
         "csv" => csv::parse(bytes),
         "json" => json::parse(bytes),
-        "image" => photo::decode(bytes, &limits).map(|p| Value::object(ImageValue::photo(p))).map_err(text),
+        "image" => {
+            photo::decode(bytes, &limits).map(|p| Value::object(ImageValue::photo(p))).map_err(text)
+        }
         "contours" => photo::decode(bytes, &limits)
             .map(|p| ContourMap::from_image(&image::DynamicImage::from(p.rgb().clone()).to_luma8()))
             .map(|m| Value::object(ImageValue::contours(m, None)))
             .map_err(text),
-        "mask" => mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text),
+        "mask" => {
+            mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text)
+        }
         "depth" => {
             // An array holds depths; a picture's whole numbers are thousandths.
             let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
-            depth::decode(bytes, scale, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
+            depth::decode(bytes, scale, &limits)
+                .map(|d| Value::object(DepthValue::new(d)))
+                .map_err(text)
         }
         "detector" => FileDetector::read(bytes, options.network())
             .map(|d| Value::object(DetectorValue(Some(d.into()))))
@@ -175,7 +227,8 @@ pub fn load(kind: &str, file: &str, bytes: &[u8], options: &Options, beside: &Be
             } else {
                 obj::load_in(bytes, &options.frame())
             };
-            mesh.map(|m| Value::object(SolidValue(Solid::lasting(m)))).map_err(|e: GeomError| e.to_string())
+            mesh.map(|m| Value::object(SolidValue(Solid::lasting(m))))
+                .map_err(|e: GeomError| e.to_string())
         }
         _ => {
             let fault = Fault::type_error(format!("there is no data of type `{kind}`"));

@@ -1,4 +1,5 @@
-//! What a `data` item says of its file beside the path: `mesh("x.glb", up = "z", unit = 0.01)`.
+//! What a `data` item says of its file beside the path:
+//! `mesh("x.glb", up = "z", unit = 0.01)`.
 //!
 //! Written as constants, since what a run reads must be known before it starts.
 
@@ -27,10 +28,12 @@ impl Options {
         &self.network
     }
 
-    /// From the arguments of a call after the path; for [kinds](super::kinds) of data that have options.
+    /// From the arguments of a call after the path; for [kinds](super::kinds) of data
+    /// that have options.
     ///
     /// # Errors
-    /// An argument of another name or type, or given twice, or outside its domain: with its place among the arguments.
+    /// An argument of another name or type, or given twice, or outside its domain: with
+    /// its place among the arguments.
     pub fn parse(kind: &str, args: &[Arg]) -> Result<Options, (usize, Fault)> {
         let mut seen: Vec<&str> = Vec::new();
         let mut frame = (UpAxis::default(), 1.0);
@@ -58,7 +61,10 @@ impl Options {
             seen.push(name);
         }
         // Only the unit can be refused.
-        let at = args.iter().position(|a| a.name.as_ref().is_some_and(|n| &*n.node == "unit")).unwrap_or(0);
+        let at = args
+            .iter()
+            .position(|a| a.name.as_ref().is_some_and(|n| &*n.node == "unit"))
+            .unwrap_or(0);
         let frame = FileFrame::new(frame.0, frame.1);
         frame
             .map(|frame| Options { frame, network })
@@ -74,7 +80,9 @@ fn set_frame(frame: &mut (UpAxis, f64), name: &str, value: &Expr) -> Result<bool
                 "x" => UpAxis::X,
                 "y" => UpAxis::Y,
                 "z" => UpAxis::Z,
-                other => return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\"")),
+                other => {
+                    return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\""));
+                }
             };
         }
         ("unit", ExprKind::Num(x)) => frame.1 = *x,
@@ -99,10 +107,14 @@ fn set_network(network: &mut NetworkOptions, name: &str, value: &Expr) -> Result
         },
         _ => number(value).map(|x| [x; 3]),
     };
-    let each = || each().ok_or_else(|| format!("`{name}` must be a literal number or a list of three"));
+    let each =
+        || each().ok_or_else(|| format!("`{name}` must be a literal number or a list of three"));
     match name {
         "colours" => network.bgr = word(["rgb", "bgr"])?,
-        "shows" => network.shows = if word(["contours", "objects"])? { Shows::Objects } else { Shows::Contours },
+        "shows" => {
+            network.shows =
+                if word(["contours", "objects"])? { Shows::Objects } else { Shows::Contours }
+        }
         "white" => network.white = number(value).ok_or("`white` must be a literal number")?,
         "mean" => network.mean = each()?,
         "spread" => network.spread = each()?,
@@ -138,8 +150,13 @@ pub fn has_options(kind: &str) -> bool {
 
 fn hint(kind: &str) -> String {
     match kind {
-        "detector" => "for example detector(\"network.onnx\", colours = \"bgr\", white = 255, logits = true)".into(),
-        _ if has_options(kind) => format!("for example {kind}(\"file.glb\", up = \"z\", unit = 0.01)"),
+        "detector" => {
+            "for example detector(\"network.onnx\", colours = \"bgr\", white = 255, logits = true)"
+                .into()
+        }
+        _ if has_options(kind) => {
+            format!("for example {kind}(\"file.glb\", up = \"z\", unit = 0.01)")
+        }
         _ => format!("write {kind}(\"file\")"),
     }
 }

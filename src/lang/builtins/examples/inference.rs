@@ -44,7 +44,12 @@ infer { repeat 100 { block($pair); collect x, y; } }",
     ("gibbs", switches!("infer { repeat 100 { gibbs(@z[0]); collect z[0]; } }")),
     ("elliptical", number!("infer { repeat 100 { elliptical(@x); collect x; } }")),
     ("slice", number!("infer { repeat 100 { slice(@x, width = 2); collect x; } }")),
-    ("hmc", number!("infer { warmup 200 { hmc(@x, steps = 5); } repeat 100 { hmc(@x, steps = 5); collect x; } }")),
+    (
+        "hmc",
+        number!(
+            "infer { warmup 200 { hmc(@x, steps = 5); } repeat 100 { hmc(@x, steps = 5); collect x; } }"
+        ),
+    ),
     ("nuts", number!("infer { warmup 200 { nuts(@x); } repeat 100 { nuts(@x); collect x; } }")),
     ("mala", number!("infer { warmup 200 { mala(@x); } repeat 100 { mala(@x); collect x; } }")),
     ("knn", ball!("infer { repeat 100 { knn(@**, bank = \"balls.bank\", k = 5); collect r; } }")),
@@ -68,7 +73,12 @@ infer { repeat 100 { delayed(mh(@x), at = @y); collect x; } }",
     ("one", switches!("infer { repeat 100 { gibbs(one(@z)); collect z[0]; } }")),
     ("each", switches!("infer { repeat 100 { gibbs(each(@z)); collect z[0]; } }")),
     ("init", number!("infer { init(best_of(20)); repeat 100 { drift(@x); collect x; } }")),
-    ("anneal", number!("infer { warmup 200 { anneal(10); drift(@x); } repeat 100 { drift(@x); collect x; } }")),
+    (
+        "anneal",
+        number!(
+            "infer { warmup 200 { anneal(10); drift(@x); } repeat 100 { drift(@x); collect x; } }"
+        ),
+    ),
     ("prior", number!("infer { init(prior()); repeat 100 { drift(@x); collect x; } }")),
     (
         "best_of",
@@ -84,12 +94,21 @@ observe normal(x ** 2, 0.1) = 1 as y;
 kernel mirror() { propose @x = -value(@x); }
 infer { repeat 100 { drift(@x); mirror(); collect x; } }",
     ),
-    ("elapsed", number!("infer { repeat 1000000 { drift(@x); collect x; stop when elapsed() > 0.1; } }")),
+    (
+        "elapsed",
+        number!("infer { repeat 1000000 { drift(@x); collect x; stop when elapsed() > 0.1; } }"),
+    ),
     ("steps", number!("infer { repeat 1000 { drift(@x); collect x; stop when steps() >= 200; } }")),
-    ("acceptance", number!("infer { repeat 1000 { drift(@x); collect x; stop when acceptance() > 0.9; } }")),
+    (
+        "acceptance",
+        number!("infer { repeat 1000 { drift(@x); collect x; stop when acceptance() > 0.9; } }"),
+    ),
     ("rhat", number!("infer { repeat 1000 { drift(@x); collect x; stop when rhat(x) < 1.01; } }")),
     ("ess", number!("infer { repeat 1000 { drift(@x); collect x; stop when ess(x) > 400; } }")),
-    ("snapshot", ball!("infer { repeat 100 { drift(@r); every 10 { snapshot(view); } collect r; } }")),
+    (
+        "snapshot",
+        ball!("infer { repeat 100 { drift(@r); every 10 { snapshot(view); } collect r; } }"),
+    ),
     ("summary", number!("infer { repeat 100 { drift(@x); collect x; } }\nreport summary(@x);")),
     ("best", number!("infer { repeat 100 { drift(@x); collect x; } }\nreport best(x);")),
 ];

@@ -1,7 +1,7 @@
 //! An example for every built-in. Each one runs: `tests/examples.rs` sees to that.
 //!
-//! An example is an expression with its value behind `//`, or a program. What uses `scene` is to be read with the line
-//! [`INCLUDE`] before it.
+//! An example is an expression with its value behind `//`, or a program. What uses
+//! `scene` is to be read with the line [`INCLUDE`] before it.
 
 mod distributions;
 mod inference;

@@ -5,7 +5,11 @@ use super::Examples;
 /// A ball, a picture of something, and this observation.
 macro_rules! seen {
     ($data:literal, $observe:literal) => {
-        concat!($data, "\nassume r ~ uniform(0.5, 1.5);\nlet view = scene.render(scene.sphere(r));\n", $observe)
+        concat!(
+            $data,
+            "\nassume r ~ uniform(0.5, 1.5);\nlet view = scene.render(scene.sphere(r));\n",
+            $observe
+        )
     };
 }
 

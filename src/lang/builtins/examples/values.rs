@@ -118,7 +118,10 @@ observe normal(x, 1) = 2 as y;
 infer { repeat 100 { drift(@x); collect x, log_likelihood(); } }",
     ),
     ("csv", "data d = csv(\"data/line.csv\");\nlet n = len(d.x);"),
-    ("json", "data prior = json(\"std/human/pose_prior.json\");\nlet kinds = len(prior.weights_balanced);"),
+    (
+        "json",
+        "data prior = json(\"std/human/pose_prior.json\");\nlet kinds = len(prior.weights_balanced);",
+    ),
     ("image", "data photo = image(\"ball.png\");\nlet wide = photo.width;"),
     ("contours", "data edges = contours(\"contours.png\");\nlet wide = edges.width;"),
     (
@@ -135,7 +138,10 @@ data seen = depth(\"depth.npy\");
 assume r ~ uniform(0.5, 1.5);
 observe scene.depth(scene.render(scene.sphere(r)), size = 32) = seen as distance;",
     ),
-    ("armature", "data body = armature(\"std/human/human.lod2.rig.json\");\nlet n = len(body.joints);"),
+    (
+        "armature",
+        "data body = armature(\"std/human/human.lod2.rig.json\");\nlet n = len(body.joints);",
+    ),
     (
         "detector",
         "data photo = image(\"ball.png\");\ndata trees = detector(\"model.yml.gz\");\nlet found = scene.edges(photo, detector = trees);",

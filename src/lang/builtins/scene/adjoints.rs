@@ -1,6 +1,8 @@
-//! The adjoints of scene objects: derivatives by named points and by the vertices of surfaces, as points.
+//! The adjoints of scene objects: derivatives by named points and by the vertices of
+//! surfaces, as points.
 //!
-//! They travel as lists of arrays of numbers; what nothing depends on is zero, whatever its length, and costs nothing.
+//! They travel as lists of arrays of numbers; what nothing depends on is zero, whatever
+//! its length, and costs nothing.
 
 use crate::geom::Solid;
 use crate::geom::armature::{Armature, RestGradient};
@@ -8,7 +10,8 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
 use glam::DVec3;
 
-/// By a solid: what [`super::SolidValue`] says its adjoint is. An empty list stands for zeros.
+/// By a solid: what [`super::SolidValue`] says its adjoint is. An empty list stands for
+/// zeros.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BySolid {
     /// By each landmark.
@@ -48,7 +51,9 @@ pub(super) fn by_armature(by: &Adjoint, body: &Armature) -> RestGradient {
 
 /// The other way round.
 pub(super) fn armature_adjoint(by: &RestGradient) -> Adjoint {
-    Adjoint::List([&by.heads, &by.tails, &by.keypoints, &by.vertices].map(|p| from_points(p)).to_vec())
+    Adjoint::List(
+        [&by.heads, &by.tails, &by.keypoints, &by.vertices].map(|p| from_points(p)).to_vec(),
+    )
 }
 
 fn part(by: &Adjoint, i: usize) -> &Adjoint {
@@ -61,7 +66,9 @@ fn part(by: &Adjoint, i: usize) -> &Adjoint {
 /// Numbers as points, so many of them.
 pub(super) fn points(by: &Adjoint, n: usize) -> Vec<DVec3> {
     match by {
-        Adjoint::Array(gs) if gs.len() == 3 * n => gs.chunks_exact(3).map(DVec3::from_slice).collect(),
+        Adjoint::Array(gs) if gs.len() == 3 * n => {
+            gs.chunks_exact(3).map(DVec3::from_slice).collect()
+        }
         by => by.numbers(3 * n).chunks_exact(3).map(DVec3::from_slice).collect(),
     }
 }
@@ -74,13 +81,18 @@ pub(super) fn from_points(points: &[DVec3]) -> Adjoint {
     Adjoint::Array(points.iter().flat_map(DVec3::to_array).collect())
 }
 
-/// In the shape of a value that stands for three numbers: themselves, one for all, a record of x, y and z.
+/// In the shape of a value that stands for three numbers: themselves, one for all, a
+/// record of x, y and z.
 pub(super) fn shaped(v: &Value, g: DVec3) -> Adjoint {
     match v {
         Value::Unit => Adjoint::Zero,
         Value::Num(_) => Adjoint::Num(g.element_sum()),
         Value::Record(_) => Adjoint::Record(
-            ["x", "y", "z"].into_iter().zip(g.to_array()).map(|(k, g)| (k.into(), Adjoint::Num(g))).collect(),
+            ["x", "y", "z"]
+                .into_iter()
+                .zip(g.to_array())
+                .map(|(k, g)| (k.into(), Adjoint::Num(g)))
+                .collect(),
         ),
         _ => Adjoint::Array(g.to_array().to_vec()),
     }

@@ -138,7 +138,8 @@ pub(super) fn armature<'a>(a: &Args<'a>) -> Result<&'a Arc<Armature>, Fault> {
 /// The index of a joint of the argument's rig.
 pub(super) fn joint(a: &Args, body: &Armature, name: &str) -> Result<usize, Fault> {
     body.rig().find(name).ok_or_else(|| {
-        let f = Fault::type_error(format!("{}: the rig has no joint `{name}`", a.builtin.full_name()));
+        let f =
+            Fault::type_error(format!("{}: the rig has no joint `{name}`", a.builtin.full_name()));
         f.with_nearest(name, "it has", body.rig().joints().iter().map(|j| &*j.name))
     })
 }
@@ -178,13 +179,17 @@ pub(super) fn pose(a: &Args, body: &Armature) -> Result<Vec<JointPose>, Fault> {
         Value::Array(xs) if xs.is_empty() => Ok(Vec::new()),
         Value::Array(xs) => {
             if xs.len() != 3 * count {
-                return Err(a.wrong_length(1, &format!("three numbers for each of the {count} joints")));
+                return Err(
+                    a.wrong_length(1, &format!("three numbers for each of the {count} joints"))
+                );
             }
             Ok(xs.chunks_exact(3).map(|v| JointPose::turned(DVec3::from_slice(v))).collect())
         }
         Value::List(all) => {
             if all.len() != count {
-                return Err(a.wrong_length(1, &format!("one element for each of the {count} joints")));
+                return Err(
+                    a.wrong_length(1, &format!("one element for each of the {count} joints"))
+                );
             }
             all.iter().map(|v| one(a, v)).collect()
         }
@@ -199,7 +204,8 @@ pub(super) fn pose(a: &Args, body: &Armature) -> Result<Vec<JointPose>, Fault> {
     }
 }
 
-const WANTED: &str = "a placement, a rotation vector, or a record with `rotvec`, `rotate`, `location`, `scale`";
+const WANTED: &str =
+    "a placement, a rotation vector, or a record with `rotvec`, `rotate`, `location`, `scale`";
 
 /// What one joint does.
 fn one(a: &Args, v: &Value) -> Result<JointPose, Fault> {
@@ -208,7 +214,9 @@ fn one(a: &Args, v: &Value) -> Result<JointPose, Fault> {
     }
     match v {
         Value::Unit => Ok(JointPose::REST),
-        Value::Array(_) => vector_of(v).map(JointPose::turned).ok_or_else(|| a.element_wrong(1, WANTED, v)),
+        Value::Array(_) => {
+            vector_of(v).map(JointPose::turned).ok_or_else(|| a.element_wrong(1, WANTED, v))
+        }
         Value::Record(fields) => record(a, fields),
         _ => Err(a.element_wrong(1, WANTED, v)),
     }
@@ -219,7 +227,10 @@ fn affine(a: &Args, placement: &AffineValue) -> Result<JointPose, Fault> {
     let m = placement.0.0.matrix3;
     let scale = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
     let turn = DMat3::from_cols(m.x_axis / scale.x, m.y_axis / scale.y, m.z_axis / scale.z);
-    let off = (turn.transpose() * turn - DMat3::IDENTITY).to_cols_array().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let off = (turn.transpose() * turn - DMat3::IDENTITY)
+        .to_cols_array()
+        .iter()
+        .fold(0.0, |m: f64, x| m.max(x.abs()));
     // Also where a scale is 0 and `off` no number.
     if !(off < 1e-9 && turn.determinant() > 0.0) {
         let name = a.builtin.full_name();
@@ -240,13 +251,20 @@ fn record(a: &Args, fields: &Record) -> Result<JointPose, Fault> {
             "location" => pose.location = of,
             "scale" => pose.scale = of,
             _ => {
-                let f = Fault::type_error(format!("scene.skin: a joint's pose has no field `{name}`"));
-                return Err(f.with_nearest(name, "it has", ["rotvec", "rotate", "location", "scale"].into_iter()));
+                let f =
+                    Fault::type_error(format!("scene.skin: a joint's pose has no field `{name}`"));
+                return Err(f.with_nearest(
+                    name,
+                    "it has",
+                    ["rotvec", "rotate", "location", "scale"].into_iter(),
+                ));
             }
         }
     }
     if fields.contains_key("rotvec") && fields.contains_key("rotate") {
-        return Err(Fault::type_error("scene.skin: a joint's pose has either `rotvec` or `rotate`"));
+        return Err(Fault::type_error(
+            "scene.skin: a joint's pose has either `rotvec` or `rotate`",
+        ));
     }
     Ok(pose)
 }

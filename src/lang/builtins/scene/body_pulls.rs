@@ -1,4 +1,5 @@
-//! How derivatives pass through bodies: from surfaces and keypoints to poses, shapes and proportions.
+//! How derivatives pass through bodies: from surfaces and keypoints to poses, shapes and
+//! proportions.
 
 use super::adjoints::{BySolid, armature_adjoint, by_armature, from_points, shaped as like};
 use super::bodies::{armature, joint, pose, stops, stretches};
@@ -34,7 +35,9 @@ fn by_pose(a: &Args, body: &Armature, by: &[JointGradient]) -> Option<Adjoint> {
     Some(match a.get(1) {
         Value::Array(xs) if xs.is_empty() => Adjoint::Zero,
         Value::Array(_) => from_points(&by.iter().map(|g| g.turn).collect::<Vec<_>>()),
-        Value::List(all) => Adjoint::List(all.iter().zip(by).map(|(v, g)| by_joint(v, g)).collect()),
+        Value::List(all) => {
+            Adjoint::List(all.iter().zip(by).map(|(v, g)| by_joint(v, g)).collect())
+        }
         Value::Record(all) => {
             let one = |(name, v): (&Arc<str>, &Value)| {
                 Some((Arc::clone(name), by_joint(v, by.get(joint(a, body, name).ok()?)?)))
@@ -47,14 +50,16 @@ fn by_pose(a: &Args, body: &Armature, by: &[JointGradient]) -> Option<Adjoint> {
 
 fn by_joint(v: &Value, by: &JointGradient) -> Adjoint {
     if let Some(placement) = v.downcast::<AffineValue>() {
-        // Columns s_k R_k: they grow with the scale, and turn with a small rotation vector w by w x s_k R_k.
+        // Columns s_k R_k: they grow with the scale, and turn with a small rotation
+        // vector w by w x s_k R_k.
         let m = placement.0.0.matrix3;
         let column = |c: DVec3, by_scale: f64| {
             let scale = c.length();
             c * (by_scale / scale) + by.turn.cross(c) * (0.5 / (scale * scale))
         };
         let [x, y, z] = by.scale.to_array();
-        let linear = DMat3::from_cols(column(m.x_axis, x), column(m.y_axis, y), column(m.z_axis, z));
+        let linear =
+            DMat3::from_cols(column(m.x_axis, x), column(m.y_axis, y), column(m.z_axis, z));
         return affine_adjoint(linear, by.location);
     }
     match v {

@@ -1,4 +1,5 @@
-//! What may be an object of revolution in a photograph, as values: a thin layer over [`crate::vision::candidates`].
+//! What may be an object of revolution in a photograph, as values: a thin layer over
+//! [`crate::vision::candidates`].
 
 use super::observed::MaskValue;
 use super::{CAMERA, CameraValue, IMAGE, ImageValue, native};
@@ -14,7 +15,11 @@ pub(super) const TABLE: &[Row] = &[native(
     "candidates",
     "Finding",
     &[
-        arg("photo", IMAGE, "The photograph; from a contour map alone, the enclosed regions are used."),
+        arg(
+            "photo",
+            IMAGE,
+            "The photograph; from a contour map alone, the enclosed regions are used.",
+        ),
         opt("most", Type::Int, "20", "The maximum number of candidates, 1 to 64."),
         opt(
             "size",
@@ -41,7 +46,11 @@ pub(super) const TABLE: &[Row] = &[native(
         }
         let image = a.object::<ImageValue>(0, "an image")?;
         let (width, height) = image.size();
-        let most = if a.given(1) { a.int_in(1, 1, 64)? as usize } else { CandidateOptions::default().most };
+        let most = if a.given(1) {
+            a.int_in(1, 1, 64)? as usize
+        } else {
+            CandidateOptions::default().most
+        };
         let usual = if image.as_photo().is_some() { CandidateOptions::default().size } else { 256 };
         let size = if a.given(2) { a.int_in(2, 32, 512)? as u32 } else { usual };
         let camera = match a.given(3) {
@@ -53,9 +62,12 @@ pub(super) const TABLE: &[Row] = &[native(
             Some(photo) => Ok(candidates(photo, o)),
             None => Ok(enclosed(image.map()?, o)),
         });
-        let found = found.map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.candidates: {e}")))?;
-        let scale =
-            [f64::from(camera.width) / f64::from(width.max(1)), f64::from(camera.height) / f64::from(height.max(1))];
+        let found = found
+            .map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.candidates: {e}")))?;
+        let scale = [
+            f64::from(camera.width) / f64::from(width.max(1)),
+            f64::from(camera.height) / f64::from(height.max(1)),
+        ];
         Ok(Value::List(found.iter().map(|c| value(c, &camera, scale)).collect()))
     },
 )];
@@ -71,7 +83,8 @@ fn value(c: &Candidate, camera: &Camera, scale: [f64; 2]) -> Value {
 }
 
 fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
-    // Where the middle is seen at the depth of the origin, and the plane through it that faces the eye.
+    // Where the middle is seen at the depth of the origin, and the plane through it that
+    // faces the eye.
     let depth = (-camera.eye).dot(camera.forward).max(Camera::NEAR);
     let at = |[x, y]: [f64; 2], depth| camera.unproject(x * scale[0], y * scale[1], depth);
     let middle = at([0.5 * (a.foot[0] + a.top[0]), 0.5 * (a.foot[1] + a.top[1])], depth);
@@ -92,7 +105,9 @@ fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
     let last = a.widths.len() as f64;
     let width = |(i, w): (usize, &f64)| {
         let (t, across) = ((i as f64 + 0.5) / last, [-dy / pixels * w, dx / pixels * w]);
-        let side = |s: f64| there([a.foot[0] + t * dx + s * across[0], a.foot[1] + t * dy + s * across[1]]);
+        let side = |s: f64| {
+            there([a.foot[0] + t * dx + s * across[0], a.foot[1] + t * dy + s * across[1]])
+        };
         0.5 * side(1.0).distance(side(-1.0))
     };
     let vector = |v: DVec3| Value::array(v.to_array().to_vec());
@@ -114,7 +129,8 @@ fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
 mod tests {
     use super::*;
 
-    /// A disc that faces the eye, far from the middle of the picture, is as long as it is wide in every direction.
+    /// A disc that faces the eye, far from the middle of the picture, is as long as it is
+    /// wide in every direction.
     #[test]
     fn lengths_are_those_of_a_plane_that_faces_the_eye() {
         let camera = Camera::default_for(256, 256);
@@ -141,7 +157,11 @@ mod tests {
                 Some(Value::Array(xs)) => xs[0],
                 _ => panic!("{name}"),
             };
-            assert!((number("length") / (2.0 * radius) - 1.0).abs() < 0.004, "{i}: {}", number("length"));
+            assert!(
+                (number("length") / (2.0 * radius) - 1.0).abs() < 0.004,
+                "{i}: {}",
+                number("length")
+            );
             assert!((number("widths") / radius - 1.0).abs() < 0.012, "{i}: {}", number("widths"));
             assert!((number("distance") - camera.eye.distance(middle)).abs() < 0.02);
         }

@@ -12,8 +12,8 @@ use crate::rng::Stream;
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
-    Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap, Elements, MaskLikelihood,
-    Step, VisionError,
+    Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
+    Elements, MaskLikelihood, Step, VisionError,
 };
 use std::cell::{OnceCell, RefCell};
 use std::sync::{Arc, Weak};
@@ -21,7 +21,8 @@ use std::sync::{Arc, Weak};
 pub(super) const SECTION: &str = "Comparing";
 pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
 pub(super) const SIZE: Arg =
-    opt("size", Type::Int, "128", "The longer side of the rendered picture, 8 to 4096.").unit("pixels");
+    opt("size", Type::Int, "128", "The longer side of the rendered picture, 8 to 4096.")
+        .unit("pixels");
 
 pub(super) const TABLE: &[Row] = &[
     native(
@@ -168,7 +169,8 @@ fn chamfer(a: &Args) -> Result<Value, Fault> {
     likelihood(ChamferOf { view: view(a)?, size: size(a, 6)?, options })
 }
 
-/// The adjoints of a likelihood's arguments: by the view as given, by so many others unknown.
+/// The adjoints of a likelihood's arguments: by the view as given, by so many others
+/// unknown.
 pub(super) fn by_view(by: Adjoint, others: usize) -> Pulled {
     std::iter::once(by).chain((0..others).map(|_| Adjoint::Unknown)).collect()
 }
@@ -184,13 +186,28 @@ pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
 }
 
 fn elements(c: &Contours) -> Elements<'_> {
-    Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
+    Elements {
+        x: &c.x,
+        y: &c.y,
+        tx: &c.tx,
+        ty: &c.ty,
+        length: &c.length,
+        width: c.width,
+        height: c.height,
+    }
 }
 
 /// The observed image, if its shape is that of the view's picture.
-pub(super) fn image<'a>(observed: &'a Value, view: &View, what: &str) -> Result<&'a ImageValue, String> {
+pub(super) fn image<'a>(
+    observed: &'a Value,
+    view: &View,
+    what: &str,
+) -> Result<&'a ImageValue, String> {
     let Some(image) = observed.downcast::<ImageValue>() else {
-        return Err(format!("{what}: the observed value must be an image, got {}", observed.type_name()));
+        return Err(format!(
+            "{what}: the observed value must be an image, got {}",
+            observed.type_name()
+        ));
     };
     same_shape(image.size(), view, what)?;
     Ok(image)
@@ -243,7 +260,14 @@ impl<C, T: Default> Followed<C, T> {
 
 fn step(change: &Change) -> Step<'_> {
     let Change { from, to, gone, come, moving, count } = change;
-    Step { from, to, gone: elements(gone), come: elements(come), moving: elements(moving), count: *count }
+    Step {
+        from,
+        to,
+        gone: elements(gone),
+        come: elements(come),
+        moving: elements(moving),
+        count: *count,
+    }
 }
 
 #[derive(Debug)]
@@ -259,7 +283,8 @@ impl ContourOf {
         let image = image(observed, &self.view, self.name())?;
         let camera = self.view.camera().scaled_to(self.size);
         image.ratios.get((self.options.clone(), camera.width, camera.height), |(options, w, h)| {
-            ContourRatio::prepare(image.map()?, *w, *h, options).map_err(|e| format!("scene.contour: {e}"))
+            ContourRatio::prepare(image.map()?, *w, *h, options)
+                .map_err(|e| format!("scene.contour: {e}"))
         })
     }
 }
@@ -274,19 +299,22 @@ impl Likelihood for ContourOf {
         if let Some(change) = &*self.view.change(self.size) {
             let whole = OnceCell::new();
             let whole = || elements(whole.get_or_init(|| self.view.contours(self.size)));
-            return Ok(
-                RATIOS.with_borrow_mut(|known| ratio.log_likelihood_after(&step(change), whole, known.of(&ratio)))
-            );
+            return Ok(RATIOS.with_borrow_mut(|known| {
+                ratio.log_likelihood_after(&step(change), whole, known.of(&ratio))
+            }));
         }
         let contours = self.view.contours(self.size);
-        Ok(RATIO.with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
+        Ok(RATIO
+            .with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
     }
 
     /// By the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (ratio, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
-        RATIO.with_borrow_mut(|scratch| ratio.gradient(&elements(&contours), scratch, &mut by_piece));
+        RATIO.with_borrow_mut(|scratch| {
+            ratio.gradient(&elements(&contours), scratch, &mut by_piece)
+        });
         Some(by_contours(&self.view, self.size, &by_piece))
     }
 
@@ -295,7 +323,8 @@ impl Likelihood for ContourOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        let cut = format!("edges beyond {}% of the diagonal are not matched", self.options.truncate);
+        let cut =
+            format!("edges beyond {}% of the diagonal are not matched", self.options.truncate);
         vec![drawn(&self.view, self.size), cut]
     }
 }
@@ -312,9 +341,13 @@ impl ChamferOf {
     fn prepared(&self, observed: &Value) -> Result<Arc<Chamfer>, String> {
         let image = image(observed, &self.view, self.name())?;
         let camera = self.view.camera().scaled_to(self.size);
-        image.chamfers.get((self.options.clone(), camera.width, camera.height), |(options, w, h)| {
-            Chamfer::prepare(image.map()?, *w, *h, options).map_err(|e| format!("scene.chamfer: {e}"))
-        })
+        image.chamfers.get(
+            (self.options.clone(), camera.width, camera.height),
+            |(options, w, h)| {
+                Chamfer::prepare(image.map()?, *w, *h, options)
+                    .map_err(|e| format!("scene.chamfer: {e}"))
+            },
+        )
     }
 }
 
@@ -341,9 +374,13 @@ impl Likelihood for ChamferOf {
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (chamfer, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
-        let by_sigma =
-            CHAMFER.with_borrow_mut(|scratch| chamfer.gradient(&elements(&contours), scratch, &mut by_piece));
-        Some(Adjoint::List(vec![by_contours(&self.view, self.size, &by_piece), Adjoint::Num(by_sigma)]))
+        let by_sigma = CHAMFER.with_borrow_mut(|scratch| {
+            chamfer.gradient(&elements(&contours), scratch, &mut by_piece)
+        });
+        Some(Adjoint::List(vec![
+            by_contours(&self.view, self.size, &by_piece),
+            Adjoint::Num(by_sigma),
+        ]))
     }
 
     fn is_proper(&self) -> bool {
@@ -351,8 +388,14 @@ impl Likelihood for ChamferOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        let cut = self.options.truncate.map(|t| format!("distances are truncated at {t}% of the diagonal"));
-        let most = format!("of more than {} observed points, an evenly spaced subset is used", chamfer::MOST_OBSERVED);
+        let cut = self
+            .options
+            .truncate
+            .map(|t| format!("distances are truncated at {t}% of the diagonal"));
+        let most = format!(
+            "of more than {} observed points, an evenly spaced subset is used",
+            chamfer::MOST_OBSERVED
+        );
         [Some(drawn(&self.view, self.size)), cut, self.options.symmetric.then_some(most)]
             .into_iter()
             .flatten()
@@ -371,13 +414,19 @@ impl MaskOf {
     /// What is observed, ready at the size that is drawn, and what is drawn.
     fn prepared(&self, observed: &Value) -> Result<(Arc<MaskLikelihood>, Arc<Frame>), String> {
         let Some(mask) = observed.downcast::<MaskValue>() else {
-            return Err(format!("scene.mask: the observed value must be a mask, got {}", observed.type_name()));
+            return Err(format!(
+                "scene.mask: the observed value must be a mask, got {}",
+                observed.type_name()
+            ));
         };
         same_shape((mask.mask.width(), mask.mask.height()), &self.view, self.name())?;
         let frame = self.view.depth(self.size);
-        let prepared = mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
-            MaskLikelihood::new(&mask.mask, *i, *o).map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.mask: {e}"))
-        })?;
+        let prepared =
+            mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
+                MaskLikelihood::new(&mask.mask, *i, *o)
+                    .map(|l| l.resized(*w, *h))
+                    .map_err(|e| format!("scene.mask: {e}"))
+            })?;
         Ok((prepared, frame))
     }
 }
@@ -394,14 +443,17 @@ impl Likelihood for MaskOf {
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let (prepared, frame) = self.prepared(observed)?;
         let rendered: Vec<bool> = frame.mask().collect();
-        prepared.log_likelihood(&rendered, frame.width, frame.height).map_err(|e| format!("scene.mask: {e}"))
+        prepared
+            .log_likelihood(&rendered, frame.width, frame.height)
+            .map_err(|e| format!("scene.mask: {e}"))
     }
 
     /// A mask of the size that is drawn.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let draw = |(prepared, frame): (Arc<MaskLikelihood>, Arc<Frame>)| {
             let rendered: Vec<bool> = frame.mask().collect();
-            let drawn = prepared.simulate(&rendered, rng).map_err(|e| format!("scene.mask: {e}"))?;
+            let drawn =
+                prepared.simulate(&rendered, rng).map_err(|e| format!("scene.mask: {e}"))?;
             Ok(Value::object(MaskValue::new(drawn)))
         };
         Some(self.prepared(observed).and_then(draw))
@@ -425,15 +477,20 @@ impl DepthOf {
     /// What is observed, ready at the size that is drawn, and what is drawn.
     fn prepared(&self, observed: &Value) -> Result<(Arc<DepthLikelihood>, Arc<Frame>), String> {
         let Some(depth) = observed.downcast::<DepthValue>() else {
-            return Err(format!("scene.depth: the observed value must be a depth map, got {}", observed.type_name()));
+            return Err(format!(
+                "scene.depth: the observed value must be a depth map, got {}",
+                observed.type_name()
+            ));
         };
         same_shape((depth.depth.width(), depth.depth.height()), &self.view, "scene.depth")?;
         let frame = self.view.frame(self.size);
-        let prepared =
-            depth.prepared.get((self.options, frame.width, frame.height), |([sd, outlier, near, far], w, h)| {
+        let prepared = depth.prepared.get(
+            (self.options, frame.width, frame.height),
+            |([sd, outlier, near, far], w, h)| {
                 let whole = DepthLikelihood::new(&depth.depth, *sd, *outlier, (*near, *far));
                 whole.map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.depth: {e}"))
-            })?;
+            },
+        )?;
         Ok((prepared, frame))
     }
 }
@@ -449,7 +506,9 @@ impl Likelihood for DepthOf {
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let (prepared, frame) = self.prepared(observed)?;
-        prepared.log_likelihood(&frame.depth, frame.width, frame.height).map_err(|e| format!("scene.depth: {e}"))
+        prepared
+            .log_likelihood(&frame.depth, frame.width, frame.height)
+            .map_err(|e| format!("scene.depth: {e}"))
     }
 
     /// A map of the size that is drawn, missing where the observed one is.

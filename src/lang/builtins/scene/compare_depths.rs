@@ -1,4 +1,5 @@
-//! The likelihood of relative depths: how far in front of or behind the hips a network has the landmarks of a person.
+//! The likelihood of relative depths: how far in front of or behind the hips a network
+//! has the landmarks of a person.
 
 use super::adjoints::BySolid;
 use super::compare::{SECTION, SEEN, by_view, likelihood, view};
@@ -18,7 +19,8 @@ pub(super) const TABLE: &[Row] = &[native(
     SECTION,
     &[
         SEEN,
-        arg("scale", Type::Num, "The length of a metre: the scale of the body.").unit("scene units"),
+        arg("scale", Type::Num, "The length of a metre: the scale of the body.")
+            .unit("scene units"),
         opt(
             "share",
             Type::Num,
@@ -63,7 +65,8 @@ struct RelativeDepthOf {
 struct Term<'a> {
     name: &'a Arc<str>,
     point: &'a [f64],
-    /// The landmark, by its place among the solid's, and as much of its depth in metres from the hips' as is told.
+    /// The landmark, by its place among the solid's, and as much of its depth in metres
+    /// from the hips' as is told.
     landmark: usize,
     depth: f64,
 }
@@ -88,7 +91,9 @@ impl RelativeDepthOf {
         };
         let landmarks = self.view.solid().landmarks();
         let hips = self.hips(landmarks)?;
-        let along = |i: usize| (landmarks[i].position - self.view.camera().eye).dot(self.view.camera().forward);
+        let along = |i: usize| {
+            (landmarks[i].position - self.view.camera().eye).dot(self.view.camera().forward)
+        };
         let middle = 0.5 * (along(hips[0]) + along(hips[1]));
         for (name, point) in points.iter() {
             let point = match point {
@@ -119,7 +124,8 @@ impl Likelihood for RelativeDepthOf {
         Ok(sum)
     }
 
-    /// Depths of the landmarks that the scene has; the others, and what is beside and above, stay.
+    /// Depths of the landmarks that the scene has; the others, and what is beside and
+    /// above, stay.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let Value::Record(points) = observed else { return None };
         let mut drawn = (**points).clone();

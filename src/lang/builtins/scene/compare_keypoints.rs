@@ -1,7 +1,8 @@
-//! The likelihood of detected joints given a view: its landmarks projected, compared with where a detector found them.
+//! The likelihood of detected joints given a view: its landmarks projected, compared with
+//! where a detector found them.
 //!
-//! A thin layer over [`crate::vision::keypoints`]: here landmarks become positions in pixels of the picture that the
-//! detections belong to.
+//! A thin layer over [`crate::vision::keypoints`]: here landmarks become positions in
+//! pixels of the picture that the detections belong to.
 
 use super::adjoints::BySolid;
 use super::compare::{SECTION, SEEN, by_view, likelihood, same_shape, view};
@@ -32,7 +33,12 @@ pub(super) const TABLE: &[Row] = &[native(
              of numbers by joint, with `other` for the rest.",
         )
         .unit("percent of the diagonal"),
-        opt("outlier", Type::Num, "0.05", "The fraction of outliers among detections of full confidence."),
+        opt(
+            "outlier",
+            Type::Num,
+            "0.05",
+            "The fraction of outliers among detections of full confidence.",
+        ),
         opt(
             "offset",
             Type::Num,
@@ -48,7 +54,12 @@ pub(super) const TABLE: &[Row] = &[native(
             "The unit of `sd`, `offset` and `systematic`: \"diagonal\", percent of the picture's \
              diagonal; \"torso\", lengths of the detected torso.",
         ),
-        opt("confidence", Type::Bool, "true", "Whether detections of low confidence are more often outliers."),
+        opt(
+            "confidence",
+            Type::Bool,
+            "true",
+            "Whether detections of low confidence are more often outliers.",
+        ),
         opt(
             "misses",
             Type::Num,
@@ -89,7 +100,12 @@ pub(super) const TABLE: &[Row] = &[native(
         if !(options.systematic >= 0.0 && options.systematic.is_finite()) {
             return Err(a.outside(7, "not negative and finite"));
         }
-        likelihood(KeypointsOf { view: view(a)?, options, by_joint, confident: a.bool_or(5, true)? })
+        likelihood(KeypointsOf {
+            view: view(a)?,
+            options,
+            by_joint,
+            confident: a.bool_or(5, true)?,
+        })
     },
 )
 .pull(|_, _, by| Some(by_view(by.clone(), 7)))];
@@ -119,22 +135,34 @@ fn spreads(a: &Args) -> Result<(f64, ByJoint), Fault> {
         ));
     };
     let named = record.iter().filter(|(name, _)| &***name != "other");
-    let named = named.map(|(name, v)| Ok((Arc::clone(name), positive(v)?))).collect::<Result<_, Fault>>()?;
+    let named = named
+        .map(|(name, v)| Ok((Arc::clone(name), positive(v)?)))
+        .collect::<Result<_, Fault>>()?;
     Ok((positive(other)?, named))
 }
 
 /// Where a landmark is in a picture of some size; none behind the camera.
 fn project(l: &Landmark, camera: &Camera, (width, height): (u32, u32)) -> Option<[f64; 2]> {
     let (x, y, depth) = camera.project(l.position);
-    let (sx, sy) = (f64::from(width) / f64::from(camera.width), f64::from(height) / f64::from(camera.height));
+    let (sx, sy) =
+        (f64::from(width) / f64::from(camera.width), f64::from(height) / f64::from(camera.height));
     (depth > Camera::NEAR && x.is_finite() && y.is_finite()).then_some([x * sx, y * sy])
 }
 
 impl ViewValue {
-    /// The landmarks of its solid, each with its place in a picture of this size (pixels): none of those behind the camera.
-    pub fn landmarks(&self, width: u32, height: u32) -> impl Iterator<Item = (&Arc<str>, Option<[f64; 2]>)> {
+    /// The landmarks of its solid, each with its place in a picture of this size
+    /// (pixels): none of those behind the camera.
+    pub fn landmarks(
+        &self,
+        width: u32,
+        height: u32,
+    ) -> impl Iterator<Item = (&Arc<str>, Option<[f64; 2]>)> {
         let camera = self.0.camera();
-        self.0.solid().landmarks().iter().map(move |l| (&l.name, project(l, camera, (width, height))))
+        self.0
+            .solid()
+            .landmarks()
+            .iter()
+            .map(move |l| (&l.name, project(l, camera, (width, height))))
     }
 }
 
@@ -149,7 +177,8 @@ impl Likelihood for KeypointsOf {
         Ok(sum)
     }
 
-    /// Detections of the joints that were detected, with the same confidence. One that is of no landmark stays.
+    /// Detections of the joints that were detected, with the same confidence. One that is
+    /// of no landmark stays.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let KeypointsValue(seen) = observed.downcast::<KeypointsValue>()?;
         let mut points = seen.points().to_vec();
@@ -160,18 +189,25 @@ impl Likelihood for KeypointsOf {
             torso = t.torso;
             if let (Some(p), Some((first, rest))) = (points.get_mut(t.point), at.split_first()) {
                 (p.x, p.y) = (first[0] / w, first[1] / h);
-                p.others.iter_mut().zip(rest).for_each(|(o, at)| (o.x, o.y) = (at[0] / w, at[1] / h));
+                p.others
+                    .iter_mut()
+                    .zip(rest)
+                    .for_each(|(o, at)| (o.x, o.y) = (at[0] / w, at[1] / h));
             }
         });
         // In the same unit, wherever the shoulders and hips were drawn.
         let moved = || seen.moved(&points);
-        Some(
-            drawn
-                .map(|()| Value::object(KeypointsValue(if torso > 0.0 { moved().with_torso(torso) } else { moved() }))),
-        )
+        Some(drawn.map(|()| {
+            Value::object(KeypointsValue(if torso > 0.0 {
+                moved().with_torso(torso)
+            } else {
+                moved()
+            }))
+        }))
     }
 
-    /// The landmarks that were detected, between where the scene has them and where they were seen.
+    /// The landmarks that were detected, between where the scene has them and where they
+    /// were seen.
     fn located(&self, observed: &Value) -> Vec<Located> {
         let mut all = Vec::new();
         let landmarks = self.view.solid().landmarks();
@@ -229,7 +265,10 @@ struct Term<'a> {
 impl KeypointsOf {
     fn each(&self, observed: &Value, mut f: impl FnMut(Term)) -> Result<(), String> {
         let Some(KeypointsValue(seen)) = observed.downcast::<KeypointsValue>() else {
-            return Err(format!("scene.keypoints: the observed value must be keypoints, got {}", observed.type_name()));
+            return Err(format!(
+                "scene.keypoints: the observed value must be keypoints, got {}",
+                observed.type_name()
+            ));
         };
         if seen.is_empty() {
             return Ok(());
@@ -238,7 +277,8 @@ impl KeypointsOf {
         let size = seen.size().unwrap_or((camera.width, camera.height));
         same_shape(size, &self.view, "scene.keypoints")?;
         let names: Vec<&str> = landmarks.iter().map(|l| &*l.name).collect();
-        let near = |name: &str, known: &[&str]| nearest(name, known.iter().copied()).map(str::to_owned);
+        let near =
+            |name: &str, known: &[&str]| nearest(name, known.iter().copied()).map(str::to_owned);
         let found = matching(seen, &names, near).map_err(|e| format!("scene.keypoints: {e}"))?;
         let whole = (f64::from(size.0), f64::from(size.1));
         let torso = seen.torso(size);
@@ -250,12 +290,19 @@ impl KeypointsOf {
         let usual = model(self.options.sd)?;
         let scale = [whole.0 / f64::from(camera.width), whole.1 / f64::from(camera.height)];
         for (point, (p, at)) in seen.points().iter().zip(found).enumerate() {
-            let Some((landmark, l)) = at.and_then(|i| Some((i, landmarks.get(i)?))) else { continue };
+            let Some((landmark, l)) = at.and_then(|i| Some((i, landmarks.get(i)?))) else {
+                continue;
+            };
             let mut detection = seen.detection(p, size);
             if !self.confident {
                 detection.confidence = 1.0;
             }
-            let own = self.by_joint.iter().find(|(name, _)| *name == p.name).map(|(_, sd)| model(*sd)).transpose()?;
+            let own = self
+                .by_joint
+                .iter()
+                .find(|(name, _)| *name == p.name)
+                .map(|(_, sd)| model(*sd))
+                .transpose()?;
             f(Term {
                 model: own.as_ref().unwrap_or(&usual),
                 seen: detection,

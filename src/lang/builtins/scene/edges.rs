@@ -52,7 +52,8 @@ pub(super) const TABLE: &[Row] = &[native(
             return Ok(Value::Unit);
         }
         let image = a.object::<ImageValue>(0, "an image")?;
-        let detector = if a.given(4) { Some(a.object::<DetectorValue>(4, "a detector")?) } else { None };
+        let detector =
+            if a.given(4) { Some(a.object::<DetectorValue>(4, "a detector")?) } else { None };
         let (mut by, usual) = Detecting::usual(detector);
         let (most, old_size, old_sigma) = match &by {
             Detecting::Gradients(g) => (8192, g.size, g.sigma),
@@ -98,10 +99,17 @@ mod tests {
         let photo = Value::object(ImageValue::photo(Photo::from_rgb(rgb).unwrap()));
         let count = |v: &Value| v.downcast::<ImageValue>().unwrap().map().unwrap().len();
         let (plain, smooth) = (edges(&photo, &[]).unwrap(), edges(&photo, &[256.0, 6.0]).unwrap());
-        assert_eq!(count(&plain), count(&photo), "the defaults are those of a photograph by itself");
+        assert_eq!(
+            count(&plain),
+            count(&photo),
+            "the defaults are those of a photograph by itself"
+        );
         assert!(count(&smooth) < count(&plain) && count(&smooth) > 0);
         let again = edges(&photo, &[256.0, 6.0]).unwrap();
-        assert!(std::ptr::eq(smooth.downcast::<ImageValue>().unwrap(), again.downcast::<ImageValue>().unwrap()));
+        assert!(std::ptr::eq(
+            smooth.downcast::<ImageValue>().unwrap(),
+            again.downcast::<ImageValue>().unwrap()
+        ));
         assert!(smooth.downcast::<ImageValue>().unwrap().as_photo().is_some());
         assert!(edges(&photo, &[4.0]).is_err() && edges(&photo, &[64.0, f64::NAN]).is_err());
         let map = Value::object(ImageValue::contours(ContourMap::new(9, 9), None));

@@ -1,7 +1,9 @@
-//! The module `scene`: shapes, placements, cameras, and the likelihoods that compare a view with what was observed.
+//! The module `scene`: shapes, placements, cameras, and the likelihoods that compare a
+//! view with what was observed.
 //!
-//! A thin layer: geometry, rendering and comparison are the business of [`crate::geom`], [`crate::render`] and
-//! [`crate::vision`]; here their values become values of the language.
+//! A thin layer: geometry, rendering and comparison are the business of [`crate::geom`],
+//! [`crate::render`] and [`crate::vision`]; here their values become values of the
+//! language.
 
 mod adjoints;
 mod bodies;
@@ -50,13 +52,15 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = &'static Row> {
-    let keypoints = [people::TABLE, candidates::TABLE, compare_keypoints::TABLE, compare_depths::TABLE];
+    let keypoints =
+        [people::TABLE, candidates::TABLE, compare_keypoints::TABLE, compare_depths::TABLE];
     let comparing = [compare::TABLE, region::TABLE, edges::TABLE].into_iter().chain(keypoints);
     let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE].into_iter().chain(comparing);
     tables.flatten()
 }
 
-/// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.
+/// A shape that cannot be made: numbers outside their domain reject a proposal, anything
+/// else ends the run.
 fn fault(e: GeomError) -> Fault {
     match e {
         GeomError::Domain(m) => Fault::domain(m),

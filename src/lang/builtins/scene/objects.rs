@@ -11,8 +11,8 @@ use glam::{DMat3, DVec3};
 use std::any::Any;
 use std::sync::Arc;
 
-/// A solid. Its adjoint: a list of two arrays, by each landmark's x, y and z in turn, and by those of each vertex of its meshes in
-/// turn, in world coordinates.
+/// A solid. Its adjoint: a list of two arrays, by each landmark's x, y and z in turn, and
+/// by those of each vertex of its meshes in turn, in world coordinates.
 #[derive(Clone, Debug)]
 pub struct SolidValue(pub Solid);
 
@@ -35,14 +35,19 @@ impl Object for SolidValue {
             "size" => bounds().map(|b| Value::array(b.size().to_array())),
             "height" => bounds().map(|b| Value::Num(b.size().y)),
             "landmarks" => Some(Value::Record(Arc::new(
-                self.0.landmarks().iter().map(|l| (Arc::clone(&l.name), Value::array(l.position.to_array()))).collect(),
+                self.0
+                    .landmarks()
+                    .iter()
+                    .map(|l| (Arc::clone(&l.name), Value::array(l.position.to_array())))
+                    .collect(),
             ))),
             _ => None,
         }
     }
 }
 
-/// A placement. Its adjoint: by the columns of its linear part and by its shift, twelve numbers.
+/// A placement. Its adjoint: by the columns of its linear part and by its shift, twelve
+/// numbers.
 #[derive(Clone, Debug)]
 pub struct AffineValue(pub Affine);
 
@@ -55,7 +60,8 @@ impl Object for AffineValue {
         self
     }
 
-    /// A placement of a solid is a solid, of a placement a placement: first the right one, then the left one.
+    /// A placement of a solid is a solid, of a placement a placement: first the right
+    /// one, then the left one.
     fn multiply(&self, other: &Value) -> Option<Result<Value, String>> {
         if let Some(s) = other.downcast::<SolidValue>() {
             return Some(Ok(Value::object(SolidValue(s.0.placed(self.0)))));
@@ -75,7 +81,8 @@ impl Object for AffineValue {
         let b = other.downcast::<AffineValue>()?.0.0;
         let by = by.numbers(12);
         let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
-        let left = affine_adjoint(linear * b.matrix3.transpose() + outer(shift, b.translation), shift);
+        let left =
+            affine_adjoint(linear * b.matrix3.transpose() + outer(shift, b.translation), shift);
         Some([left, affine_adjoint(a.matrix3.transpose() * linear, a.matrix3.transpose() * shift)])
     }
 
@@ -93,8 +100,8 @@ pub(super) fn affine_adjoint(linear: DMat3, shift: DVec3) -> Adjoint {
     Adjoint::Array(linear.to_cols_array().into_iter().chain(shift.to_array()).collect())
 }
 
-/// An armature: a rig with its mesh. Its adjoint: a list of four arrays, by the places at rest of the joints' heads, of their tails,
-/// of the keypoints and of the vertices.
+/// An armature: a rig with its mesh. Its adjoint: a list of four arrays, by the places at
+/// rest of the joints' heads, of their tails, of the keypoints and of the vertices.
 #[derive(Clone, Debug)]
 pub struct ArmatureValue(pub Arc<Armature>);
 
@@ -108,7 +115,8 @@ impl Object for ArmatureValue {
     }
 
     fn field(&self, name: &str) -> Option<Value> {
-        let names = |names: &mut dyn Iterator<Item = &str>| Value::List(names.map(Value::str).collect());
+        let names =
+            |names: &mut dyn Iterator<Item = &str>| Value::List(names.map(Value::str).collect());
         let rig = self.0.rig();
         match name {
             "joints" => Some(names(&mut rig.joints().iter().map(|j| &*j.name))),

@@ -1,17 +1,20 @@
-//! What is observed: photographs and ready contour maps, masks, depth maps, keypoints. What comparators prepare from them alone is made
-//! once, on first use, and kept beside them.
+//! What is observed: photographs and ready contour maps, masks, depth maps, keypoints.
+//! What comparators prepare from them alone is made once, on first use, and kept beside
+//! them.
 
 use crate::lang::value::{Object, Value};
 use crate::vision::candidates::{Candidate, CandidateOptions};
 use crate::vision::people::Person;
 use crate::vision::{
-    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap, FileDetector,
-    GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region, RegionOptions, SoftMap,
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
+    DepthMap, FileDetector, GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region,
+    RegionOptions, SoftMap,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// The most prepared things of a kind that are kept: options may be choices, such as the `sigma` of a chamfer distance.
+/// The most prepared things of a kind that are kept: options may be choices, such as the
+/// `sigma` of a chamfer distance.
 const MOST: usize = 32;
 
 /// Prepared things by what they were prepared for.
@@ -26,14 +29,19 @@ impl<K, T> Default for Prepared<K, T> {
 
 impl<K: PartialEq, T> Prepared<K, T> {
     /// The one for a key, made if it is new.
-    pub fn get(&self, key: K, make: impl FnOnce(&K) -> Result<T, String>) -> Result<Arc<T>, String> {
+    pub fn get(
+        &self,
+        key: K,
+        make: impl FnOnce(&K) -> Result<T, String>,
+    ) -> Result<Arc<T>, String> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, t)) = all.iter().find(|(k, _)| *k == key) {
             return Ok(Arc::clone(t));
         }
         let made = Arc::new(make(&key)?);
         if all.len() == MOST {
-            // The first one may not be as it would be made again: what a likelihood draws is put there.
+            // The first one may not be as it would be made again: what a likelihood draws
+            // is put there.
             all.remove(1);
         }
         all.push((key, Arc::clone(&made)));
@@ -62,19 +70,22 @@ pub struct ImageValue {
     pub(super) ratios: Prepared<Key<ContourRatioOptions>, ContourRatio>,
     pub(super) chamfers: Prepared<Key<ChamferOptions>, Chamfer>,
     pub(super) regions: Prepared<Key<RegionOptions>, Region>,
-    /// The same photograph with contours found otherwise: by what, and how strong they must be.
+    /// The same photograph with contours found otherwise: by what, and how strong they
+    /// must be.
     detected: Prepared<(Detecting, f32), Value>,
     /// What detectors from files say of its pixels, at a size.
     soft: Prepared<(DetectorValue, u32), SoftMap>,
     /// What may be objects in it, by how they were looked for.
     pub(super) candidates: Prepared<CandidateOptions, Vec<Candidate>>,
-    /// The people in the photograph, by how they were looked for: views, and how many at most.
+    /// The people in the photograph, by how they were looked for: views, and how many at
+    /// most.
     pub(super) people: Prepared<(u32, u32), Vec<(Person, Value)>>,
 }
 
 impl ImageValue {
-    /// Points weaker than this are more often texture than outline: the detector's own best threshold against human
-    /// outlines is 0.47, and a few more edges help where the object is dim (docs/objects.md).
+    /// Points weaker than this are more often texture than outline: the detector's own
+    /// best threshold against human outlines is 0.47, and a few more edges help where the
+    /// object is dim (docs/objects.md).
     pub(super) const STRONG: f32 = 0.4;
 
     /// A photograph; its contours are found when they are needed.
@@ -92,7 +103,8 @@ impl ImageValue {
         self.photo.as_ref()
     }
 
-    /// The people that programs found in it, most prominent first; none if no program has asked.
+    /// The people that programs found in it, most prominent first; none if no program has
+    /// asked.
     pub fn people(&self) -> Option<Vec<Person>> {
         self.people.any().map(|all| all.iter().map(|(p, _)| p.clone()).collect())
     }
@@ -119,7 +131,8 @@ impl ImageValue {
         image.map.get()?.as_ref().ok().cloned()
     }
 
-    /// The photograph with its contours found by a detector wherever a program says nothing of it; contours that were given stay.
+    /// The photograph with its contours found by a detector wherever a program says
+    /// nothing of it; contours that were given stay.
     pub fn detecting(image: &Value, by: &DetectorValue) -> Value {
         match image.downcast::<ImageValue>() {
             Some(ImageValue { photo: Some(photo), ready: false, map, by: known, .. }) => {
@@ -130,13 +143,17 @@ impl ImageValue {
                 if known.get() == Some(by) {
                     return image.clone();
                 }
-                Value::object(ImageValue { by: OnceLock::from(by.clone()), ..ImageValue::photo(photo.clone()) })
+                Value::object(ImageValue {
+                    by: OnceLock::from(by.clone()),
+                    ..ImageValue::photo(photo.clone())
+                })
             }
             _ => image.clone(),
         }
     }
 
-    /// The same photograph with contours found in a way of its own, those at least so strong; `None` if there is no photograph.
+    /// The same photograph with contours found in a way of its own, those at least so
+    /// strong; `None` if there is no photograph.
     pub(super) fn detected_by(&self, by: Detecting, least: f32) -> Result<Option<Value>, String> {
         let Some(photo) = &self.photo else { return Ok(None) };
         let found = self.detected.get((by, least), |(by, least)| {
@@ -151,8 +168,9 @@ impl ImageValue {
             Detecting::Gradients(detector) => Ok(detector.contours(photo)),
             Detecting::File { detector, size, sigma } => {
                 let Some(file) = &detector.0 else { return Err("the detector has no file".into()) };
-                let soft =
-                    self.soft.get((detector.clone(), *size), |_| file.map(photo, *size).map_err(|e| e.to_string()))?;
+                let soft = self.soft.get((detector.clone(), *size), |_| {
+                    file.map(photo, *size).map_err(|e| e.to_string())
+                })?;
                 Ok(file.contours(&soft, photo, *sigma))
             }
         }
@@ -167,7 +185,8 @@ impl ImageValue {
     }
 }
 
-/// What finds contours, from a file; without one the detector that is built in. Clones share it.
+/// What finds contours, from a file; without one the detector that is built in. Clones
+/// share it.
 #[derive(Clone, Debug, Default)]
 pub struct DetectorValue(pub Option<Arc<FileDetector>>);
 
@@ -352,7 +371,10 @@ mod tests {
         prepared.get(0, |_| Ok(7)).unwrap();
         let first = Arc::downgrade(&prepared.get(1, |_| Ok(2)).unwrap());
         for key in 0..1000 {
-            assert_eq!(*prepared.get(key, |k| Ok(k + 1)).unwrap(), if key == 0 { 7 } else { key + 1 });
+            assert_eq!(
+                *prepared.get(key, |k| Ok(k + 1)).unwrap(),
+                if key == 0 { 7 } else { key + 1 }
+            );
         }
         assert_eq!(prepared.0.lock().unwrap().len(), MOST);
         assert!(first.upgrade().is_none() && *prepared.get(0, |_| Ok(8)).unwrap() == 7);

@@ -12,7 +12,8 @@ use std::sync::Arc;
 
 /// The longer side of the masks of people, in pixels.
 const MASK: u32 = 256;
-/// How likely a pose is that some views have in proportion to the one that most agree on, for each view.
+/// How likely a pose is that some views have in proportion to the one that most agree on,
+/// for each view.
 const ELSEWHERE: f64 = 0.05;
 
 pub(super) const TABLE: &[Row] = &[native(
@@ -20,10 +21,20 @@ pub(super) const TABLE: &[Row] = &[native(
     "Finding",
     &[
         arg("photo", IMAGE, "The photograph; people cannot be detected in a contour map."),
-        opt("views", Type::Int, "2", "The number of views, 2 to 8: with increasing padding, each also mirrored."),
+        opt(
+            "views",
+            Type::Int,
+            "2",
+            "The number of views, 2 to 8: with increasing padding, each also mirrored.",
+        ),
         opt("most", Type::Int, "2", "The maximum number of people per view, 1 to 100."),
-        opt("near", Type::Array, "[]", "A box [x, y, width, height]: people who fill it best come first.")
-            .unit("pixels"),
+        opt(
+            "near",
+            Type::Array,
+            "[]",
+            "A box [x, y, width, height]: people who fill it best come first.",
+        )
+        .unit("pixels"),
     ],
     Type::Array,
     "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 \
@@ -48,7 +59,8 @@ pub(super) const TABLE: &[Row] = &[native(
             let found = finder.find(photo, &options, 0).map_err(|e| e.to_string())?;
             found.into_iter().map(|p| Ok((p.clone(), value(&p, photo)?))).collect()
         });
-        let found = found.map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.people: {e}")))?;
+        let found = found
+            .map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.people: {e}")))?;
         let mut order: Vec<usize> = (0..found.len()).collect();
         if let [x, y, w, h] = near[..] {
             let wanted = [x, y, x + w, y + h];
@@ -81,16 +93,21 @@ fn value(p: &Person, photo: &Photo) -> Result<Value, String> {
         Keypoint { others: elsewhere.collect(), ..one }
     };
     let named = || MEDIAPIPE.iter().zip(&p.landmarks);
-    let keypoints = Keypoints::new(named().enumerate().map(point).collect()).map_err(|e| e.to_string())?;
+    let keypoints =
+        Keypoints::new(named().enumerate().map(point).collect()).map_err(|e| e.to_string())?;
     let keypoints = keypoints.in_image(photo.width(), photo.height());
     let landmarks = named().map(|(name, l)| {
-        let fields =
-            [("at", Value::array(l.at.to_vec())), ("spread", number(l.spread)), ("visibility", number(l.visibility))];
+        let fields = [
+            ("at", Value::array(l.at.to_vec())),
+            ("spread", number(l.spread)),
+            ("visibility", number(l.visibility)),
+        ];
         (*name, Value::record(fields))
     });
     let metres = named().map(|(name, l)| (*name, Value::array(l.metres.to_vec())));
     let longer = photo.width().max(photo.height()).max(1);
-    let side = |s: u32| (u64::from(s) * u64::from(MASK.min(longer)) / u64::from(longer)).max(1) as u32;
+    let side =
+        |s: u32| (u64::from(s) * u64::from(MASK.min(longer)) / u64::from(longer)).max(1) as u32;
     let (width, height) = (side(photo.width()), side(photo.height()));
     let pixels = p.mask(width, height, photo.width()).into_iter().map(|m| m > 0.5).collect();
     let mask = Mask::new(width, height, pixels).map_err(|e| e.to_string())?;

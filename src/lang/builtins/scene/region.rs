@@ -1,7 +1,9 @@
-//! The likelihood of a photograph's colours given a view: `scene.region`. The arithmetic is in [`crate::vision::region`]; here the
-//! drawn frame becomes a group for each pixel.
+//! The likelihood of a photograph's colours given a view: `scene.region`. The arithmetic
+//! is in [`crate::vision::region`]; here the drawn frame becomes a group for each pixel.
 
-use super::compare::{SECTION, SEEN, SIZE, by_silhouette, by_view, drawn, image, likelihood, size, view};
+use super::compare::{
+    SECTION, SEEN, SIZE, by_silhouette, by_view, drawn, image, likelihood, size, view,
+};
 use super::native;
 use super::observed::ImageValue;
 use crate::lang::adjoint::Adjoint;
@@ -72,7 +74,9 @@ struct RegionOf {
 
 fn region(a: &Args) -> Result<Value, Fault> {
     let d = RegionOptions::default();
-    let whole = |i: usize, lo: i64, hi: i64, default: i64| if a.given(i) { a.int_in(i, lo, hi) } else { Ok(default) };
+    let whole = |i: usize, lo: i64, hi: i64, default: i64| {
+        if a.given(i) { a.int_in(i, lo, hi) } else { Ok(default) }
+    };
     let options = RegionOptions {
         power: a.num_or(1, d.power)?,
         tiles: whole(2, 0, 64, i64::from(d.tiles))? as u32,
@@ -102,9 +106,13 @@ impl RegionOf {
     fn prepared(&self, observed: &Value) -> Result<(Arc<Region>, Arc<Frame>), String> {
         let image = image(observed, &self.view, self.name())?;
         let Some(photo) = image.as_photo() else {
-            return Err("scene.region: colours need a photograph, and only a contour map was observed".into());
+            return Err(
+                "scene.region: colours need a photograph, and only a contour map was observed"
+                    .into(),
+            );
         };
-        let frame = if self.outline() { self.view.depth(self.size) } else { self.view.frame(self.size) };
+        let frame =
+            if self.outline() { self.view.depth(self.size) } else { self.view.frame(self.size) };
         let key = (self.options.clone(), frame.width, frame.height);
         let region = image.regions.get(key, |(options, w, h)| {
             Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
@@ -139,8 +147,8 @@ impl Likelihood for RegionOf {
         }))
     }
 
-    /// Where the options make it a probability of quantised pictures: the observed photograph with other numbers of colours in
-    /// its pixels, at the size that is drawn.
+    /// Where the options make it a probability of quantised pictures: the observed
+    /// photograph with other numbers of colours in its pixels, at the size that is drawn.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         if !self.is_proper() {
             return None;
@@ -150,7 +158,8 @@ impl Likelihood for RegionOf {
             self.fill(&frame, &mut groups);
             let labels = region.simulate(&groups, rng);
             let wrong = |e| format!("scene.region: {e}");
-            let picture = Quantised::new(frame.width, frame.height, region.colours(), labels).map_err(wrong)?;
+            let picture = Quantised::new(frame.width, frame.height, region.colours(), labels)
+                .map_err(wrong)?;
             let other = Region::of(&picture, &self.options).map_err(wrong)?;
             let photo = image(observed, &self.view, self.name())?.as_photo().cloned();
             let value = photo.map_or_else(ImageValue::default, ImageValue::photo);
@@ -185,10 +194,16 @@ mod tests {
     use crate::vision::{ContourMap, Photo};
 
     fn vase(shift: f64) -> Arc<View> {
-        let parts =
-            [Profile { y: vec![-1.0, 0.0], r: vec![0.6, 0.8] }, Profile { y: vec![0.0, 1.0], r: vec![0.4, 0.3] }];
+        let parts = [
+            Profile { y: vec![-1.0, 0.0], r: vec![0.6, 0.8] },
+            Profile { y: vec![0.0, 1.0], r: vec![0.4, 0.3] },
+        ];
         let mesh = lathe(&parts, 32, 0.0, crate::geom::Caps::Both).unwrap();
-        let by = crate::geom::Affine::new([shift, 0.0, 0.0].into(), [0.4, 0.0, 0.1].into(), [1.0; 3].into());
+        let by = crate::geom::Affine::new(
+            [shift, 0.0, 0.0].into(),
+            [0.4, 0.0, 0.1].into(),
+            [1.0; 3].into(),
+        );
         Arc::new(View::new(Solid::new(Arc::new(mesh)).placed(by), Camera::default_for(64, 64)))
     }
 
@@ -203,7 +218,8 @@ mod tests {
                 0 => [150.0, 60.0, 40.0],
                 _ => [80.0, 150.0, 60.0],
             };
-            let light = if frame.part[i] == u16::MAX { 1.0 } else { 0.7 + 0.4 * frame.normal[i][1] };
+            let light =
+                if frame.part[i] == u16::MAX { 1.0 } else { 0.7 + 0.4 * frame.normal[i][1] };
             image::Rgb(base.map(|b| (b * light) as u8 + noise as u8))
         });
         Value::object(ImageValue::photo(Photo::from_rgb(rgb).unwrap()))

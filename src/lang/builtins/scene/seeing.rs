@@ -21,11 +21,22 @@ pub(super) const TABLE: &[Row] = &[
         "camera",
         SECTION,
         &[
-            opt("position", Type::Array, "[0, 0, 8]", "The position of the camera.").unit("scene units"),
-            opt("look_at", Type::Array, "[0, 0, 0]", "The point it looks at, at the centre of the picture.")
+            opt("position", Type::Array, "[0, 0, 8]", "The position of the camera.")
                 .unit("scene units"),
+            opt(
+                "look_at",
+                Type::Array,
+                "[0, 0, 0]",
+                "The point it looks at, at the centre of the picture.",
+            )
+            .unit("scene units"),
             opt("up", Type::Array, "[0, 1, 0]", "The direction that points up in the picture."),
-            opt("focal", Type::Num, "1.818", "The focal length as a multiple of the picture's longer side."),
+            opt(
+                "focal",
+                Type::Num,
+                "1.818",
+                "The focal length as a multiple of the picture's longer side.",
+            ),
             opt("width", Type::Int, "256", "The width of the picture.").unit("pixels"),
             opt("height", Type::Int, "256", "The height of the picture.").unit("pixels"),
         ],
@@ -41,7 +52,9 @@ pub(super) const TABLE: &[Row] = &[
             let forward = (target - eye).try_normalize();
             let right = forward.and_then(|f| f.cross(up).try_normalize());
             let (Some(forward), Some(right)) = (forward, right) else {
-                return Err(Fault::domain("scene.camera: the viewing direction must not be zero or parallel to `up`"));
+                return Err(Fault::domain(
+                    "scene.camera: the viewing direction must not be zero or parallel to `up`",
+                ));
             };
             let projection = Projection::Pinhole {
                 focal_px: focal * f64::from(width.max(height)),
@@ -49,7 +62,15 @@ pub(super) const TABLE: &[Row] = &[
                 cy: f64::from(height) / 2.0,
             };
             let up = right.cross(forward);
-            Ok(Value::object(CameraValue(Camera { eye, right, up, forward, width, height, projection })))
+            Ok(Value::object(CameraValue(Camera {
+                eye,
+                right,
+                up,
+                forward,
+                width,
+                height,
+                projection,
+            })))
         },
     ),
     native(
@@ -78,10 +99,16 @@ pub(super) const TABLE: &[Row] = &[
             };
             let detail = a.num_or(2, 0.0)?;
             if !(0.0..=MOST_DETAIL).contains(&detail) {
-                let message = format!("scene.render: `detail` must be from 0 to {MOST_DETAIL} pixels, got {detail}");
+                let message = format!(
+                    "scene.render: `detail` must be from 0 to {MOST_DETAIL} pixels, got {detail}"
+                );
                 return Err(Fault::domain(message));
             }
-            Ok(Value::object(ViewValue(Arc::new(View::with_detail(solid.0.clone(), camera, detail)))))
+            Ok(Value::object(ViewValue(Arc::new(View::with_detail(
+                solid.0.clone(),
+                camera,
+                detail,
+            )))))
         },
     )
     .pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),
@@ -95,8 +122,10 @@ pub(super) const TABLE: &[Row] = &[
          outside the picture. Infinite if it extends behind the camera, or has no vertices.",
         |a| {
             let view = a.object::<ViewValue>(0, "a view")?;
-            let (camera, mut b) =
-                (view.0.camera(), [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]);
+            let (camera, mut b) = (
+                view.0.camera(),
+                [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY],
+            );
             for v in view.0.solid().vertices() {
                 let (x, y, depth) = camera.project(v);
                 if depth.is_nan() || depth <= Camera::NEAR {
@@ -118,9 +147,15 @@ mod tests {
     use glam::DVec3;
 
     fn bounds(at: DVec3) -> Vec<f64> {
-        let cube = crate::geom::cuboid(DVec3::splat(1.0)).map(|m| crate::geom::Solid::new(Arc::new(m))).unwrap();
+        let cube = crate::geom::cuboid(DVec3::splat(1.0))
+            .map(|m| crate::geom::Solid::new(Arc::new(m)))
+            .unwrap();
         let solid = cube.placed(Affine::new(at, DVec3::ZERO, DVec3::ONE));
-        let view = Value::object(ViewValue(Arc::new(View::with_detail(solid, Camera::default_for(256, 256), 0.0))));
+        let view = Value::object(ViewValue(Arc::new(View::with_detail(
+            solid,
+            Camera::default_for(256, 256),
+            0.0,
+        ))));
         let table = crate::lang::builtins::Table::default();
         let builtin = table.get(table.find("scene", "bounds").unwrap());
         builtin.apply(&[&view]).unwrap().numbers()

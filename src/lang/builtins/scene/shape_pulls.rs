@@ -1,4 +1,5 @@
-//! How derivatives pass through shapes and placements: from the vertices of surfaces and named points to sizes and profiles.
+//! How derivatives pass through shapes and placements: from the vertices of surfaces and
+//! named points to sizes and profiles.
 
 use super::SolidValue;
 use super::adjoints::{BySolid, shaped};
@@ -11,7 +12,8 @@ use glam::{DMat3, DVec3};
 use smallvec::smallvec;
 use std::sync::Arc;
 
-/// A shape's mesh and the derivatives by its vertices; `None` where nothing depends on them.
+/// A shape's mesh and the derivatives by its vertices; `None` where nothing depends on
+/// them.
 fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> {
     let solid = &made.downcast::<SolidValue>()?.0;
     let vertices = BySolid::read(by, solid).vertices;
@@ -24,7 +26,9 @@ pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
     let Turned { profiles, sides, wall, caps } = turned(a).ok()?;
     let g = pull_lathe(&profiles, sides, wall, caps, &by_vertex).ok()?;
     let parts = match a.get(0) {
-        Value::List(all) => Adjoint::List(all.iter().zip(&g.profiles).map(|(v, g)| profile(v, g)).collect()),
+        Value::List(all) => {
+            Adjoint::List(all.iter().zip(&g.profiles).map(|(v, g)| profile(v, g)).collect())
+        }
         one => g.profiles.first().map_or(Adjoint::Zero, |g| profile(one, g)),
     };
     let [thickness, floor] = [g.wall.thickness, g.wall.floor].map(Adjoint::Num);
@@ -44,7 +48,9 @@ fn profile(v: &Value, by: &Profile) -> Adjoint {
         };
         (Arc::clone(name), by)
     };
-    Adjoint::Record(fields.iter().filter(|(name, _)| matches!(&***name, "y" | "r")).map(one).collect())
+    Adjoint::Record(
+        fields.iter().filter(|(name, _)| matches!(&***name, "y" | "r")).map(one).collect(),
+    )
 }
 
 /// Of `scene.sphere`.
@@ -74,7 +80,11 @@ pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
         let solid = &member.downcast::<SolidValue>()?.0;
         let own = BySolid {
             landmarks: next(&mut landmarks, solid.landmarks().len()),
-            vertices: if vertices.is_empty() { Vec::new() } else { next(&mut vertices, solid.vertex_count()) },
+            vertices: if vertices.is_empty() {
+                Vec::new()
+            } else {
+                next(&mut vertices, solid.vertex_count())
+            },
         };
         Some(own.into_adjoint())
     };
@@ -85,7 +95,8 @@ pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
 pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
     let by = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let solid: &Solid = &a.object::<SolidValue>(0, "a solid").ok()?.0;
-    let (vertices, landmarks) = solid.pull_centred(a.bool_or(1, false).ok()?, &by.vertices, &by.landmarks);
+    let (vertices, landmarks) =
+        solid.pull_centred(a.bool_or(1, false).ok()?, &by.vertices, &by.landmarks);
     Some(smallvec![BySolid { landmarks, vertices }.into_adjoint()])
 }
 
@@ -93,8 +104,12 @@ pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
 pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
     let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let own = a.record(1).ok()?.keys().zip(landmarks);
-    let by_points = own.map(|(name, g)| (Arc::clone(name), Adjoint::Array(g.to_array().to_vec()))).collect();
-    Some(smallvec![BySolid { vertices, ..BySolid::default() }.into_adjoint(), Adjoint::Record(by_points)])
+    let by_points =
+        own.map(|(name, g)| (Arc::clone(name), Adjoint::Array(g.to_array().to_vec()))).collect();
+    Some(smallvec![
+        BySolid { vertices, ..BySolid::default() }.into_adjoint(),
+        Adjoint::Record(by_points)
+    ])
 }
 
 /// Of `scene.affine`, T Rz Ry Rx S.
@@ -102,15 +117,21 @@ pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
     let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
     let by = by.numbers(12);
     let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
-    let turns = [DMat3::from_rotation_x(turn.x), DMat3::from_rotation_y(turn.y), DMat3::from_rotation_z(turn.z)];
+    let turns = [
+        DMat3::from_rotation_x(turn.x),
+        DMat3::from_rotation_y(turn.y),
+        DMat3::from_rotation_z(turn.z),
+    ];
     let rotation = turns[2] * turns[1] * turns[0];
     let by_scale: [f64; 3] = std::array::from_fn(|i| rotation.col(i).dot(linear.col(i)));
     // By R: the columns of the linear part are those of R times the scale.
-    let by_rotation = DMat3::from_cols(linear.x_axis * scale.x, linear.y_axis * scale.y, linear.z_axis * scale.z);
+    let by_rotation =
+        DMat3::from_cols(linear.x_axis * scale.x, linear.y_axis * scale.y, linear.z_axis * scale.z);
     let by_turn: [f64; 3] = std::array::from_fn(|i| {
         // d R_i(angle) / d angle = [axis]x R_i.
         let axis = DVec3::AXES[i];
-        let cross = DMat3::from_cols(axis.cross(DVec3::X), axis.cross(DVec3::Y), axis.cross(DVec3::Z));
+        let cross =
+            DMat3::from_cols(axis.cross(DVec3::X), axis.cross(DVec3::Y), axis.cross(DVec3::Z));
         let mut moved = turns;
         moved[i] = cross * turns[i];
         let slope = moved[2] * moved[1] * moved[0];

@@ -221,7 +221,9 @@ fn profiles(a: &Args) -> Result<Vec<Profile>, Fault> {
             Some(Value::Array(xs)) => Ok(xs.to_vec()),
             Some(Value::Num(x)) => Ok(vec![*x]),
             Some(v) => Err(a.element_wrong(0, wanted, v)),
-            None => Err(Fault::type_error(format!("scene.lathe: a profile needs the field `{name}`: {wanted}"))),
+            None => Err(Fault::type_error(format!(
+                "scene.lathe: a profile needs the field `{name}`: {wanted}"
+            ))),
         };
         let (y, mut r) = (numbers("y")?, numbers("r")?);
         if r.len() == 1 {

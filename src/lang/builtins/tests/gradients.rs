@@ -1,5 +1,6 @@
-//! Every function of the table says what its derivative is: a vector-Jacobian product, zero, or one of a few that have none. Every
-//! product is compared with differences, alone or composed with others, for random derivatives of what comes out.
+//! Every function of the table says what its derivative is: a vector-Jacobian product,
+//! zero, or one of a few that have none. Every product is compared with differences,
+//! alone or composed with others, for random derivatives of what comes out.
 
 use super::*;
 use crate::geom::Affine;
@@ -19,7 +20,8 @@ const NONE: &[(&str, &str)] = &[
     ("scene.people", "people are found in a photograph, which nothing moves"),
 ];
 
-/// Functions compared with differences elsewhere: in `tests/gradient.rs`, and beside the comparators and renderers.
+/// Functions compared with differences elsewhere: in `tests/gradient.rs`, and beside the
+/// comparators and renderers.
 const ELSEWHERE: &[&str] = &[
     "sq_exp",
     "matern32",
@@ -91,9 +93,14 @@ impl E {
                 let made = call(name, &values);
                 let builtin = find(name);
                 let values: Vec<&Value> = values.iter().collect();
-                let pulled = builtin.derivative.pull(&Args { builtin, values: &values }, &made, by).expect(name);
+                let pulled = builtin
+                    .derivative
+                    .pull(&Args { builtin, values: &values }, &made, by)
+                    .expect(name);
                 let zero = Adjoint::Zero;
-                args.iter().enumerate().for_each(|(i, a)| a.pull(pulled.get(i).unwrap_or(&zero), out));
+                args.iter()
+                    .enumerate()
+                    .for_each(|(i, a)| a.pull(pulled.get(i).unwrap_or(&zero), out));
             }
         }
     }
@@ -108,16 +115,23 @@ impl E {
 
 /// What comes out, as lists of numbers, and whether in single precision.
 fn numbers(v: &Value) -> (Vec<Vec<f64>>, bool) {
-    let points = |ps: &mut dyn Iterator<Item = DVec3>| ps.flat_map(|p| p.to_array()).collect::<Vec<f64>>();
+    let points =
+        |ps: &mut dyn Iterator<Item = DVec3>| ps.flat_map(|p| p.to_array()).collect::<Vec<f64>>();
     if let Some(SolidValue(s)) = v.downcast() {
-        return (vec![points(&mut s.landmarks().iter().map(|l| l.position)), points(&mut s.vertices())], true);
+        return (
+            vec![points(&mut s.landmarks().iter().map(|l| l.position)), points(&mut s.vertices())],
+            true,
+        );
     }
     if let Some(ArmatureValue(b)) = v.downcast() {
         let rig = b.rig();
         let heads = points(&mut rig.joints().iter().map(|j| j.head));
         let tails = points(&mut rig.joints().iter().map(|j| j.tail));
         let keypoints = points(&mut rig.keypoints().iter().map(|k| k.rest));
-        return (vec![heads, tails, keypoints, points(&mut b.positions().iter().map(|p| p.as_dvec3()))], true);
+        return (
+            vec![heads, tails, keypoints, points(&mut b.positions().iter().map(|p| p.as_dvec3()))],
+            true,
+        );
     }
     if let Some(AffineValue(Affine(a))) = v.downcast() {
         return (vec![a.to_cols_array().to_vec()], false);
@@ -137,9 +151,16 @@ fn shaped(v: &Value, next: &mut dyn FnMut() -> f64) -> Adjoint {
         Value::Array(xs) => Adjoint::Array(xs.iter().map(|_| next()).collect()),
         Value::List(xs) => Adjoint::List(xs.iter().map(|x| shaped(x, next)).collect()),
         Value::Object(_) => {
-            let lists: Vec<Adjoint> =
-                numbers(v).0.iter().map(|xs| Adjoint::Array(xs.iter().map(|_| next()).collect())).collect();
-            if v.downcast::<AffineValue>().is_some() { lists[0].clone() } else { Adjoint::List(lists) }
+            let lists: Vec<Adjoint> = numbers(v)
+                .0
+                .iter()
+                .map(|xs| Adjoint::Array(xs.iter().map(|_| next()).collect()))
+                .collect();
+            if v.downcast::<AffineValue>().is_some() {
+                lists[0].clone()
+            } else {
+                Adjoint::List(lists)
+            }
         }
         _ => panic!("{v} has no derivatives"),
     }
@@ -185,8 +206,12 @@ fn check(what: &str, e: &E) {
     assert!(!found.is_empty(), "{what}");
     for (k, found) in found.iter().enumerate() {
         // Of the fourth order: wide enough for single precision.
-        let slope = (8.0 * (at(k, h) - at(k, -h)) - (at(k, 2.0 * h) - at(k, -2.0 * h))) / (12.0 * h);
-        assert!((found - slope).abs() < tolerance * scale, "{what}, number {k}: {found} is not {slope}");
+        let slope =
+            (8.0 * (at(k, h) - at(k, -h)) - (at(k, 2.0 * h) - at(k, -2.0 * h))) / (12.0 * h);
+        assert!(
+            (found - slope).abs() < tolerance * scale,
+            "{what}, number {k}: {found} is not {slope}"
+        );
     }
 }
 
@@ -214,8 +239,8 @@ fn body() -> Value {
 fn cases() -> Vec<E> {
     let mut all = Vec::new();
     for name in [
-        "exp", "expm1", "log", "log1p", "sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh",
-        "tanh", "deg", "logit", "expit", "erf", "lgamma", "neg",
+        "exp", "expm1", "log", "log1p", "sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan",
+        "sinh", "cosh", "tanh", "deg", "logit", "expit", "erf", "lgamma", "neg",
     ] {
         all.push(Call(name, vec![by(0.4)]));
         all.push(Call(name, vec![By(list(&[arr(&[0.3, 0.7]), num(0.2)]))]));
@@ -258,7 +283,14 @@ fn cases() -> Vec<E> {
         Call("append", vec![xs(), by(0.8)]),
         Call("zip", vec![xs(), vector(&[1.0, 0.3, -0.2, 0.6])]),
         Call("select", vec![bools, xs(), by(0.4)]),
-        Call("interp", vec![vector(&[-1.0, 0.4, 1.7, 9.0]), vector(&[0.0, 1.0, 2.0]), vector(&[0.2, 0.9, -0.3])]),
+        Call(
+            "interp",
+            vec![
+                vector(&[-1.0, 0.4, 1.7, 9.0]),
+                vector(&[0.0, 1.0, 2.0]),
+                vector(&[0.2, 0.9, -0.3]),
+            ],
+        ),
         Call("values", vec![By(record(&[("a", num(0.3)), ("b", num(0.7))]))]),
         Call("matmul", vec![matrix(), two()]),
         Call("matmul", vec![matrix(), vector(&[0.4, 0.2])]),
@@ -268,7 +300,10 @@ fn cases() -> Vec<E> {
         Call("outer", vec![xs(), vector(&[0.4, 0.2])]),
     ]);
     let at = |x: f64| {
-        Call("scene.affine", vec![vector(&[x, 0.2, -0.4]), vector(&[0.3, -0.5, 0.8]), vector(&[0.9, 1.1, 1.3])])
+        Call(
+            "scene.affine",
+            vec![vector(&[x, 0.2, -0.4]), vector(&[0.3, -0.5, 0.8]), vector(&[0.9, 1.1, 1.3])],
+        )
     };
     let ball = || Call("scene.sphere", vec![by(0.8), whole(8.0)]);
     let block = || Call("scene.box", vec![vector(&[0.6, 0.9, 1.4])]);
@@ -283,7 +318,10 @@ fn cases() -> Vec<E> {
         at(0.1),
         Call("scene.affine", vec![vector(&[0.1, 0.2, 0.3]), by(0.4), by(1.2)]),
         Call("*", vec![at(0.1), at(0.5)]),
-        Call("*", vec![at(0.1), Call("*", vec![at(0.5), Call("scene.landmarks", vec![block(), tips()])])]),
+        Call(
+            "*",
+            vec![at(0.1), Call("*", vec![at(0.5), Call("scene.landmarks", vec![block(), tips()])])],
+        ),
         ball(),
         block(),
         Call("scene.box", vec![by(0.7)]),
@@ -296,15 +334,25 @@ fn cases() -> Vec<E> {
     ]);
     let pair = Call(
         "concat",
-        vec![Call("fill", vec![ball(), whole(1.0)]), Call("fill", vec![Call("*", vec![at(0.4), block()]), whole(1.0)])],
+        vec![
+            Call("fill", vec![ball(), whole(1.0)]),
+            Call("fill", vec![Call("*", vec![at(0.4), block()]), whole(1.0)]),
+        ],
     );
     all.push(Call("scene.group", vec![pair]));
     // Bodies: every way of posing, and shapes and proportions through poses.
     let rig = || Fixed(body());
     let turns: Vec<f64> = (0..66).map(|i| 0.5 * libm::sin(f64::from(i) * 1.3)).collect();
     let morphs = || By(record(&[("heavy", num(0.4)), ("thin", num(0.2))]));
-    let factors = || By(record(&[("thigh_l", num(1.2)), ("calf_l", num(0.9)), ("upperarm_r", arr(&[1.1, 0.9, 1.3]))]));
-    let reshaped = || Call("scene.stretched", vec![Call("scene.shaped", vec![rig(), morphs()]), factors()]);
+    let factors = || {
+        By(record(&[
+            ("thigh_l", num(1.2)),
+            ("calf_l", num(0.9)),
+            ("upperarm_r", arr(&[1.1, 0.9, 1.3])),
+        ]))
+    };
+    let reshaped =
+        || Call("scene.stretched", vec![Call("scene.shaped", vec![rig(), morphs()]), factors()]);
     let joints = record(&[
         ("thigh_l", arr(&[0.3, -0.2, 0.5])),
         ("calf_l", record(&[("rotate", arr(&[0.4, 0.1, 0.2])), ("scale", num(1.1))])),
@@ -330,7 +378,8 @@ fn derivatives_are_those_of_differences() {
         seen.extend(own);
     }
     let products = TABLE.iter().filter(|b| {
-        matches!(b.kind, Kind::Function(_)) && !matches!(b.derivative, Derivative::Unknown | Derivative::Zero)
+        matches!(b.kind, Kind::Function(_))
+            && !matches!(b.derivative, Derivative::Unknown | Derivative::Zero)
     });
     for name in products.map(|b| b.full_name()).filter(|n| !ELSEWHERE.contains(&&**n)) {
         assert!(seen.contains(&*name), "the derivative of {name} is compared with nothing");
@@ -340,10 +389,16 @@ fn derivatives_are_those_of_differences() {
 #[test]
 fn a_placed_joint_passes_its_derivative_to_its_placement() {
     let joint = |x: f64| {
-        Call("scene.affine", vec![vector(&[0.02, x, 0.01]), vector(&[0.3, -0.4, 0.2]), vector(&[1.1, 0.9, 1.2])])
+        Call(
+            "scene.affine",
+            vec![vector(&[0.02, x, 0.01]), vector(&[0.3, -0.4, 0.2]), vector(&[1.1, 0.9, 1.2])],
+        )
     };
     let pose = |n: usize| {
-        Call("concat", (0..n).map(|i| Call("fill", vec![joint(0.01 * i as f64), Fixed(num(1.0))])).collect())
+        Call(
+            "concat",
+            (0..n).map(|i| Call("fill", vec![joint(0.01 * i as f64), Fixed(num(1.0))])).collect(),
+        )
     };
     check("placements", &Call("scene.skin", vec![Fixed(body()), pose(22)]));
 }

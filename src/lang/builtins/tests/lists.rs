@@ -13,7 +13,10 @@ fn spaced_numbers_keep_their_ends() {
     same(call("range", &[num(0.0), num(1.0), num(0.25)]), arr(&[0.0, 0.25, 0.5, 0.75]));
     same(call("range", &[num(2.0), num(0.0), num(-1.0)]), arr(&[2.0, 1.0]));
     same(call("range", &[num(2.0), num(0.0)]), arr(&[]));
-    assert_eq!(fails("range", &[num(0.0), num(1.0), num(0.0)]), "range: steps of 0 do not lead from 0 to 1");
+    assert_eq!(
+        fails("range", &[num(0.0), num(1.0), num(0.0)]),
+        "range: steps of 0 do not lead from 0 to 1"
+    );
     assert!(fails("linspace", &[num(0.0), num(1.0), num(1e8)]).contains("too long"));
     assert_eq!(
         fails("linspace", &[num(0.0), num(1.0), num(-1.0)]),
@@ -33,11 +36,19 @@ fn arrays_are_made_and_joined() {
     same(call("append", &[arr(&[1.0]), "a".into()]), list(&[num(1.0), "a".into()]));
     same(call("reverse", &[arr(&[1.0, 2.0])]), arr(&[2.0, 1.0]));
     same(call("zip", &[arr(&[1.0]), list(&["a".into()])]), list(&[list(&[num(1.0), "a".into()])]));
-    assert_eq!(fails("zip", &[arr(&[1.0]), arr(&[])]), "zip: `ys` must have as many elements as `xs`, 1, got 0");
-    for (x, n) in [(arr(&[1.0, 2.0]), 2.0), ("häuser".into(), 6.0), (Value::record([("a", num(1.0))]), 1.0)] {
+    assert_eq!(
+        fails("zip", &[arr(&[1.0]), arr(&[])]),
+        "zip: `ys` must have as many elements as `xs`, 1, got 0"
+    );
+    for (x, n) in
+        [(arr(&[1.0, 2.0]), 2.0), ("häuser".into(), 6.0), (Value::record([("a", num(1.0))]), 1.0)]
+    {
         same(call("len", &[x]), num(n));
     }
-    assert_eq!(fails("len", &[num(1.0)]), "len: `x` must be an array, record or string, got a number (1)");
+    assert_eq!(
+        fails("len", &[num(1.0)]),
+        "len: `x` must be an array, record or string, got a number (1)"
+    );
 }
 
 #[test]
@@ -45,13 +56,19 @@ fn sorting_is_stable_and_total() {
     same(call("sort", &[arr(&[3.0, -1.0, 2.0])]), arr(&[-1.0, 2.0, 3.0]));
     same(call("argsort", &[arr(&[2.0, 1.0, 2.0, 0.0])]), arr(&[3.0, 1.0, 0.0, 2.0]));
     same(call("argsort", &[arr(&[0.0, -0.0, 0.0])]), arr(&[0.0, 1.0, 2.0]));
-    same(call("argsort", &[arr(&[-f64::NAN, 1.0, f64::NAN, f64::INFINITY])]), arr(&[1.0, 3.0, 0.0, 2.0]));
+    same(
+        call("argsort", &[arr(&[-f64::NAN, 1.0, f64::NAN, f64::INFINITY])]),
+        arr(&[1.0, 3.0, 0.0, 2.0]),
+    );
     same(call("sort", &[list(&["b".into(), "a".into()])]), list(&["a".into(), "b".into()]));
     same(call("argmax", &[arr(&[1.0, 3.0, 3.0, f64::NAN])]), num(1.0));
     same(call("argmin", &[arr(&[f64::NAN, 3.0, 3.0])]), num(1.0));
     assert_eq!(fails("argmax", &[arr(&[])]), "argmax: `xs` must have at least 1 element, got 0");
     assert_eq!(fails("argmin", &[arr(&[f64::NAN])]), "argmin: every element is NaN");
-    assert!(fails("sort", &[list(&["b".into(), num(1.0)])]).contains("array of numbers, or one of strings"));
+    assert!(
+        fails("sort", &[list(&["b".into(), num(1.0)])])
+            .contains("array of numbers, or one of strings")
+    );
 }
 
 #[test]
@@ -98,12 +115,17 @@ fn values_become_text() {
 fn tables_are_read_along_straight_lines() {
     let (xs, ys) = (arr(&[0.0, 1.0, 3.0]), arr(&[10.0, 20.0, 0.0]));
     let at = |x: f64| call("interp", &[num(x), xs.clone(), ys.clone()]);
-    for (x, y) in [(-5.0, 10.0), (0.0, 10.0), (0.5, 15.0), (1.0, 20.0), (2.0, 10.0), (3.0, 0.0), (9.0, 0.0)] {
+    for (x, y) in
+        [(-5.0, 10.0), (0.0, 10.0), (0.5, 15.0), (1.0, 20.0), (2.0, 10.0), (3.0, 0.0), (9.0, 0.0)]
+    {
         same(at(x), num(y));
     }
     same(call("interp", &[arr(&[0.5, 2.5]), xs.clone(), ys.clone()]), arr(&[15.0, 5.0]));
     same(call("interp", &[num(1.0), arr(&[1.0, 1.0]), arr(&[2.0, 3.0])]), num(3.0));
-    assert_eq!(fails("interp", &[num(0.0), arr(&[1.0, 0.0]), arr(&[0.0, 0.0])]), "interp: `xs` must be ascending");
+    assert_eq!(
+        fails("interp", &[num(0.0), arr(&[1.0, 0.0]), arr(&[0.0, 0.0])]),
+        "interp: `xs` must be ascending"
+    );
     assert!(fails("interp", &[num(0.0), xs.clone(), arr(&[0.0])]).contains("3 numbers, as many"));
     assert!(fails("interp", &[num(0.0), arr(&[]), arr(&[])]).contains("interp"));
 }

@@ -60,7 +60,10 @@ fn extremes_reduce_one_array_or_compare_several() {
     same(call("clamp", &[arr(&[-1.0, 0.5, 9.0]), num(0.0), num(1.0)]), arr(&[0.0, 0.5, 1.0]));
     for order in [[f64::NAN, 1.0], [1.0, f64::NAN]] {
         for f in ["min", "max"] {
-            assert!(matches!(call(f, &[arr(&order)]), Value::Num(x) if x.is_nan()), "NaN is not hidden");
+            assert!(
+                matches!(call(f, &[arr(&order)]), Value::Num(x) if x.is_nan()),
+                "NaN is not hidden"
+            );
         }
     }
     assert_eq!(fails("min", &[arr(&[])]), "min: `x` must have at least 1 element, got 0");
@@ -87,7 +90,10 @@ fn statistics_match_hand_calculation() {
     near(call("var", &[arr(&[1e9, 1e9 + 1.0, 1e9 + 2.0])]), 1.0);
     assert_eq!(fails("mean", &[arr(&[])]), "mean: `xs` must have at least 1 element, got 0");
     assert_eq!(fails("sd", &[arr(&[1.0])]), "sd: `xs` must have at least 2 elements, got 1");
-    assert_eq!(fails("sum", &[num(1.0)]), "sum: `xs` must be an array of numbers, got a number (1)");
+    assert_eq!(
+        fails("sum", &[num(1.0)]),
+        "sum: `xs` must be an array of numbers, got a number (1)"
+    );
     assert_eq!(
         fails("dot", &[arr(&[1.0]), arr(&[1.0, 2.0])]),
         "dot: `ys` must have as many elements as `xs`, 1, got 2"
@@ -106,7 +112,10 @@ fn matrices_multiply_and_turn() {
     same(call("matmul", &[call("identity", &[num(2.0)]), m.clone()]), m.clone());
     same(call("diag", &[arr(&[1.0, 2.0])]), list(&[arr(&[1.0, 0.0]), arr(&[0.0, 2.0])]));
     same(call("diag", std::slice::from_ref(&m)), arr(&[1.0, 5.0]));
-    same(call("outer", &[arr(&[1.0, 2.0]), arr(&[3.0, 4.0])]), list(&[arr(&[3.0, 4.0]), arr(&[6.0, 8.0])]));
+    same(
+        call("outer", &[arr(&[1.0, 2.0]), arr(&[3.0, 4.0])]),
+        list(&[arr(&[3.0, 4.0]), arr(&[6.0, 8.0])]),
+    );
     assert_eq!(fails("matmul", &[m.clone(), m]), "matmul: `a` has 3 columns, `b` has 2 rows");
     assert_eq!(
         fails("transpose", &[list(&[arr(&[1.0]), arr(&[1.0, 2.0])])]),

@@ -26,7 +26,8 @@ pub(super) fn find(name: &str) -> &'static Builtin {
 pub(super) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
     let builtin = find(name);
     let order = builtin.match_names(values.iter().map(|_| None)).map_err(Fault::type_error)?;
-    let values: Vec<&Value> = order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
+    let values: Vec<&Value> =
+        order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
     let args = Args { builtin, values: &values };
     match builtin.kind {
         Kind::Function(f) => f(&args),

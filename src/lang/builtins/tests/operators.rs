@@ -19,7 +19,10 @@ fn arrays_of_arrays_combine_through_and_through() {
     let m = list(&[arr(&[1.0, 2.0]), arr(&[3.0, 4.0])]);
     same(call("*", &[num(2.0), m.clone()]), list(&[arr(&[2.0, 4.0]), arr(&[6.0, 8.0])]));
     same(call("+", &[m.clone(), m.clone()]), list(&[arr(&[2.0, 4.0]), arr(&[6.0, 8.0])]));
-    same(call("+", &[m.clone(), arr(&[10.0, 20.0])]), list(&[arr(&[11.0, 12.0]), arr(&[23.0, 24.0])]));
+    same(
+        call("+", &[m.clone(), arr(&[10.0, 20.0])]),
+        list(&[arr(&[11.0, 12.0]), arr(&[23.0, 24.0])]),
+    );
     same(call("neg", &[m]), list(&[arr(&[-1.0, -2.0]), arr(&[-3.0, -4.0])]));
 }
 
@@ -33,7 +36,14 @@ fn plain_numbers_and_arrays_of_one_agree() {
                 for (a, b) in [(arr(&[x]), num(y)), (num(x), arr(&[y])), (arr(&[x]), arr(&[y]))] {
                     same(call(op, &[a, b]).element(0).unwrap(), plain.clone());
                 }
-                same(call(op, &[list(&[list(&[num(x)])]), num(y)]).element(0).unwrap().element(0).unwrap(), plain);
+                same(
+                    call(op, &[list(&[list(&[num(x)])]), num(y)])
+                        .element(0)
+                        .unwrap()
+                        .element(0)
+                        .unwrap(),
+                    plain,
+                );
             }
         }
     }
@@ -49,7 +59,9 @@ fn division_follows_ieee() {
 
 #[test]
 fn remainder_has_the_sign_of_the_divisor() {
-    for (x, y, wanted) in [(7.0, 3.0, 1.0), (-1.0, 3.0, 2.0), (1.0, -3.0, -2.0), (-7.0, -3.0, -1.0), (6.0, 3.0, 0.0)] {
+    for (x, y, wanted) in
+        [(7.0, 3.0, 1.0), (-1.0, 3.0, 2.0), (1.0, -3.0, -2.0), (-7.0, -3.0, -1.0), (6.0, 3.0, 0.0)]
+    {
         same(call("%", &[num(x), num(y)]), num(wanted));
     }
     same(call("%", &[num(5.5), num(f64::INFINITY)]), num(5.5));
@@ -58,7 +70,10 @@ fn remainder_has_the_sign_of_the_divisor() {
 #[test]
 fn strings_join_and_compare() {
     same(call("+", &["a".into(), "b".into()]), "ab".into());
-    same(call("+", &[list(&["a".into(), "b".into()]), "c".into()]), list(&["ac".into(), "bc".into()]));
+    same(
+        call("+", &[list(&["a".into(), "b".into()]), "c".into()]),
+        list(&["ac".into(), "bc".into()]),
+    );
     same(call("<", &["a".into(), "b".into()]), true.into());
     same(call(">=", &[list(&["a".into(), "c".into()]), "b".into()]), bools(&[false, true]));
 }
@@ -105,7 +120,10 @@ fn ranges_leave_out_their_end() {
 
 #[test]
 fn errors_name_what_stands_at_the_sides() {
-    assert_eq!(fails("+", &[arr(&[1.0; 3]), arr(&[1.0; 4])]), "+: arrays of lengths 3 and 4 do not match");
+    assert_eq!(
+        fails("+", &[arr(&[1.0; 3]), arr(&[1.0; 4])]),
+        "+: arrays of lengths 3 and 4 do not match"
+    );
     assert_eq!(
         fails("+", &["a".into(), num(1.0)]),
         "`+` needs numbers or strings, got a string and a number (`str(x)` makes a string of a number)"
@@ -114,8 +132,14 @@ fn errors_name_what_stands_at_the_sides() {
         fails("*", &[true.into(), num(1.0)]),
         "`*` needs numbers, got a bool and a number (`if b { 1 } else { 0 }` makes a number of a bool)"
     );
-    assert_eq!(fails("-", &[Value::record([]), num(1.0)]), "`-` needs numbers, got a record and a number");
-    assert_eq!(fails("<", &[num(1.0), "a".into()]), "`<` needs two numbers or two strings, got a number and a string");
+    assert_eq!(
+        fails("-", &[Value::record([]), num(1.0)]),
+        "`-` needs numbers, got a record and a number"
+    );
+    assert_eq!(
+        fails("<", &[num(1.0), "a".into()]),
+        "`<` needs two numbers or two strings, got a number and a string"
+    );
     assert_eq!(fails("not", &[num(1.0)]), "`not` needs a bool, got a number");
     assert_eq!(
         fails("neg", &[list(&[num(1.0), "x".into()])]),

@@ -14,7 +14,10 @@ fn matched(name: &str, args: &[Option<&str>]) -> Result<Vec<Option<usize>>, Stri
 #[test]
 fn arguments_are_matched_by_position_and_name() {
     assert_eq!(matched("clamp", &[None, None, None]).unwrap(), [Some(0), Some(1), Some(2)]);
-    assert_eq!(matched("clamp", &[None, Some("hi"), Some("lo")]).unwrap(), [Some(0), Some(2), Some(1)]);
+    assert_eq!(
+        matched("clamp", &[None, Some("hi"), Some("lo")]).unwrap(),
+        [Some(0), Some(2), Some(1)]
+    );
     assert_eq!(matched("range", &[None, None]).unwrap(), [Some(0), Some(1), None]);
     assert_eq!(matched("min", &[None, None, None]).unwrap(), [Some(0), Some(1), Some(2)]);
 }
@@ -24,8 +27,14 @@ fn mistakes_in_arguments_are_explained() {
     let wrong = |name, args: &[Option<&str>]| matched(name, args).unwrap_err();
     assert_eq!(wrong("sqrt", &[None, None]), "`sqrt` takes 1 argument, got 2: sqrt(x)");
     assert_eq!(wrong("log_joint", &[None]), "`log_joint` takes no arguments, got 1: log_joint()");
-    assert_eq!(wrong("range", &[None]), "`range` needs its argument `end`: range(start, end, step = 1)");
-    assert_eq!(wrong("range", &[None, None, Some("stepp")]), "`range` has no argument `stepp`; did you mean `step`?");
+    assert_eq!(
+        wrong("range", &[None]),
+        "`range` needs its argument `end`: range(start, end, step = 1)"
+    );
+    assert_eq!(
+        wrong("range", &[None, None, Some("stepp")]),
+        "`range` has no argument `stepp`; did you mean `step`?"
+    );
     assert_eq!(wrong("clamp", &[Some("q")]), "`clamp` has no argument `q`; it takes x, lo, hi");
     assert_eq!(wrong("prior", &[Some("q")]), "`prior` has no argument `q`; it takes none");
     assert_eq!(wrong("clamp", &[None, Some("x"), None]), "`clamp` got its argument `x` twice");
@@ -44,9 +53,10 @@ fn names_are_found_by_module() {
 
 /// The words that the grammar keeps for itself: none of them can be written as a name.
 const KEYWORDS: &[&str] = &[
-    "include", "param", "data", "fn", "kernel", "infer", "report", "export", "as", "to", "assume", "let", "observe",
-    "with", "coarse", "predict", "factor", "force", "freeze", "forget", "sample", "for", "in", "if", "else", "warmup",
-    "repeat", "every", "mix", "stop", "when", "collect", "propose", "or", "and", "true", "false",
+    "include", "param", "data", "fn", "kernel", "infer", "report", "export", "as", "to", "assume",
+    "let", "observe", "with", "coarse", "predict", "factor", "force", "freeze", "forget", "sample",
+    "for", "in", "if", "else", "warmup", "repeat", "every", "mix", "stop", "when", "collect",
+    "propose", "or", "and", "true", "false",
 ];
 
 #[test]
@@ -64,7 +74,11 @@ fn every_entry_is_well_formed() {
             assert!(names.insert(&*a.name), "{name}: {} is there twice", a.name);
             assert!(!KEYWORDS.contains(&&*a.name), "{name}: {} is a keyword", a.name);
             assert!(a.doc.ends_with('.'), "{name}: {}", a.doc);
-            assert!(a.default.is_some() || !optional, "{name}: {} must be given after one that need not be", a.name);
+            assert!(
+                a.default.is_some() || !optional,
+                "{name}: {} must be given after one that need not be",
+                a.name
+            );
             optional |= a.default.is_some();
         }
         assert!(!b.variadic || !b.args.is_empty(), "{name}");
@@ -119,7 +133,9 @@ fn forms_for_single_numbers_are_the_functions_themselves() {
             let args = Args { builtin: &b, values: &values };
             match b.kind {
                 Kind::Function(f) => f(&args).unwrap(),
-                Kind::Distribution(f) => f(&args).map_or(Value::Unit, |d| Value::str(&format!("{d:?}"))),
+                Kind::Distribution(f) => {
+                    f(&args).map_or(Value::Unit, |d| Value::str(&format!("{d:?}")))
+                }
                 _ => panic!("{} is no function", b.name),
             }
         };
@@ -128,23 +144,41 @@ fn forms_for_single_numbers_are_the_functions_themselves() {
             for y in numbers {
                 let (found, wanted) = match scalar {
                     Scalar::Unary(f) => (Value::Num(f(x)), call(&[Value::Num(x)])),
-                    Scalar::Binary(f) => (Value::Num(f(x, y)), call(&[Value::Num(x), Value::Num(y)])),
-                    Scalar::Test(f) => (Value::Bool(f(x, y)), call(&[Value::Num(x), Value::Num(y)])),
+                    Scalar::Binary(f) => {
+                        (Value::Num(f(x, y)), call(&[Value::Num(x), Value::Num(y)]))
+                    }
+                    Scalar::Test(f) => {
+                        (Value::Bool(f(x, y)), call(&[Value::Num(x), Value::Num(y)]))
+                    }
                     Scalar::Logic(f) => (Value::Bool(f(x > 0.0)), call(&[Value::Bool(x > 0.0)])),
                     Scalar::Family { make, log_density } => {
-                        let parameters: Vec<f64> = [x, y, x].into_iter().take(b.args.len()).collect();
-                        let values: Vec<Value> = parameters.iter().map(|x| Value::Num(*x)).collect();
-                        let (found, wanted) =
-                            (log_density(&parameters, 0.5), make(&parameters).map(|d| d.log_density_num(0.5)));
-                        assert_eq!(found.map(f64::to_bits), wanted.map(f64::to_bits), "{}({parameters:?})", b.name);
-                        let found = make(&parameters).map_or(Value::Unit, |d| Value::str(&format!("{d:?}")));
+                        let parameters: Vec<f64> =
+                            [x, y, x].into_iter().take(b.args.len()).collect();
+                        let values: Vec<Value> =
+                            parameters.iter().map(|x| Value::Num(*x)).collect();
+                        let (found, wanted) = (
+                            log_density(&parameters, 0.5),
+                            make(&parameters).map(|d| d.log_density_num(0.5)),
+                        );
+                        assert_eq!(
+                            found.map(f64::to_bits),
+                            wanted.map(f64::to_bits),
+                            "{}({parameters:?})",
+                            b.name
+                        );
+                        let found = make(&parameters)
+                            .map_or(Value::Unit, |d| Value::str(&format!("{d:?}")));
                         (found, call(&values))
                     }
                     Scalar::Weights { make, log_probability } => {
                         let weights: Arc<[f64]> = [x, 1.0, y].into();
-                        let (dist, made) = (make(&weights), call(&[Value::Array(Arc::clone(&weights))]));
+                        let (dist, made) =
+                            (make(&weights), call(&[Value::Array(Arc::clone(&weights))]));
                         let density = |d: &Dist| Value::Num(d.log_density_num(x));
-                        let (a, b) = (log_probability(&weights, x).map(Value::Num), dist.as_ref().map(density));
+                        let (a, b) = (
+                            log_probability(&weights, x).map(Value::Num),
+                            dist.as_ref().map(density),
+                        );
                         assert!(a.unwrap_or_default().same(&b.unwrap_or_default()), "{weights:?}");
                         (dist.map_or(Value::Unit, |d| Value::str(&format!("{d:?}"))), made)
                     }
