@@ -5,7 +5,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::dist::Datum;
-use pcadlang::infer::{At, Drift, Gibbs, Kernel, Mh, Pick, Scope};
+use pcadlang::infer::{Drift, Gibbs, Kernel, Mh, Pick, SiteSelection, StepContext};
 use pcadlang::lang::value::Value;
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Change, ChoiceKind, Draws, Selector, Trace};
@@ -32,7 +32,7 @@ fn line(n: usize, one_by_one: bool) -> Model {
 }
 
 fn draws(step: u64) -> Draws {
-    Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step, lane: 0 }
+    Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step, substream: 0 }
 }
 
 /// Steps a kernel.
@@ -41,7 +41,10 @@ fn steps(c: &mut Criterion, what: &str, trace: &mut Trace, kernel: &mut dyn Kern
     c.bench_function(what, |b| {
         b.iter(|| {
             step += 1;
-            kernel.step(trace, &At::new(1, 0, step)).map(|o| o.accepted).unwrap_or_default()
+            kernel
+                .step(trace, &StepContext::new(1, 0, step))
+                .map(|o| o.accepted)
+                .unwrap_or_default()
         });
     });
 }
@@ -50,7 +53,7 @@ fn transitions(c: &mut Criterion) {
     for n in [10, 10_000] {
         for (how, one_by_one) in [("array", false), ("loop", true)] {
             let model = line(n, one_by_one);
-            let scope = || Scope { selector: Selector::All, pick: Pick::One };
+            let scope = || SiteSelection { selector: Selector::All, pick: Pick::One };
             let kernels: [(&str, Box<dyn Kernel>); 2] = [
                 ("mh", Box::new(Mh::new(scope()))),
                 ("drift", Box::new(Drift::new(scope(), Some(0.1)))),
@@ -87,7 +90,8 @@ fn flags(n: usize) -> Trace {
 
 /// One choice that reaches one of n points.
 fn update(c: &mut Criterion) {
-    let scope = || Scope { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::One };
+    let scope =
+        || SiteSelection { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::One };
     for n in [10, 1_000, 100_000] {
         let mut trace = flags(n);
         steps(c, &format!("update: mh of a flag, n={n}"), &mut trace, &mut Mh::new(scope()));
@@ -97,7 +101,7 @@ fn update(c: &mut Criterion) {
 
 /// Every one of n such choices, one after the other.
 fn sweep(c: &mut Criterion) {
-    let scope = Scope { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::Each };
+    let scope = SiteSelection { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::Each };
     for n in [10, 1_000] {
         let mut trace = flags(n);
         let mut kernel = Gibbs::new(scope.clone());
@@ -107,7 +111,8 @@ fn sweep(c: &mut Criterion) {
                 let count = kernel.sweep(&mut trace).unwrap_or(1);
                 for member in 0..count {
                     step += 1;
-                    let moved = kernel.step(&mut trace, &At { member, ..At::new(1, 0, step) });
+                    let moved = kernel
+                        .step(&mut trace, &StepContext { member, ..StepContext::new(1, 0, step) });
                     black_box(moved.map(|o| o.accepted).unwrap_or_default());
                 }
             });

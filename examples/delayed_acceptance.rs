@@ -71,7 +71,7 @@ fn contours(set: &[(&str, String)]) -> Result<ContourMap, Box<dyn Error>> {
         .chains
         .remove(0)
         .last;
-    let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
+    let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, substream: 0 };
     let view = trace.global("view", draws).ok_or("no view")?.map_err(|e| model.run_error(*e))?;
     let c = view.downcast::<ViewValue>().ok_or("no view")?.0.contours(SEEN);
     let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());

@@ -40,7 +40,7 @@ fn rod(
 
 /// The adjoints of the arguments: the end moves with the start, and by 1 / k^2 with a
 /// conductivity.
-fn pull(a: &Args, _end: &Value, by: &Adjoint) -> Option<Vec<Adjoint>> {
+fn vjp(a: &Args, _end: &Value, by: &Adjoint) -> Option<Vec<Adjoint>> {
     let conductivity = a.array(0).ok()?;
     let each = conductivity.iter().map(|k| by.number() / (k * k)).collect();
     Some(vec![Adjoint::Array(each), by.clone()])
@@ -57,7 +57,7 @@ pub fn host() -> (Host, Arc<AtomicUsize>) {
         .unit("degrees")
         .returns(Type::Num)
         .about("The temperature at the far end of a rod through which a watt flows.")
-        .gradient(pull);
+        .gradient(vjp);
     (Host::new().with(rod), cells)
 }
 

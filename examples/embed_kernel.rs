@@ -5,13 +5,13 @@
 //! between two modes that walks seldom make.
 
 use pcadlang::host::{Datum, Entry, Host, Type};
-use pcadlang::infer::{At, Kernel, Outcome, Scope, decide, recoverable};
+use pcadlang::infer::{Kernel, Outcome, SiteSelection, StepContext, decide, recoverable};
 use pcadlang::trace::{Change, Trace, TraceResult};
 use pcadlang::{Error, Program, RunOptions};
 
 /// `reflect(sel, about)`.
 struct Reflect {
-    scope: Scope,
+    scope: SiteSelection,
     about: f64,
 }
 
@@ -20,7 +20,7 @@ impl Kernel for Reflect {
         "reflect".into()
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let selection = trace.select(&self.scope.selector);
         let targets = trace.targets(selection);

@@ -2,7 +2,7 @@
 //! `cargo run --release --example embed_run_dir [-- FOLDER]`.
 
 use pcadlang::infer::draws::Sink;
-use pcadlang::infer::{Observer, Progress};
+use pcadlang::infer::{Callbacks, Progress};
 use pcadlang::report::csv::CsvSink;
 use pcadlang::report::{Memory, RunDir, Tee, quantities};
 use pcadlang::{Model, RunOptions};
@@ -25,13 +25,15 @@ pub fn run(folder: &Path, most: u64) -> Result<usize, Box<dyn Error>> {
     // Callbacks come from the chains' threads; a break ends the run at the next step, and
     // so does `progress.cancelled`, which another thread or a signal handler may set at
     // any time.
-    let observer = Observer::new().on_step(move |_chain, steps, _trace| match steps < 200 + most {
-        true => ControlFlow::Continue(()),
-        false => ControlFlow::Break(()),
-    });
+    let callbacks =
+        Callbacks::new().on_step(move |_chain, steps, _trace| match steps < 200 + most {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
+        });
     let progress = Arc::new(Progress::default());
     let shown = Arc::clone(&progress);
-    let options = RunOptions { seed: 1, watch: Some(Arc::new(observer)), ..RunOptions::default() };
+    let options =
+        RunOptions { seed: 1, callback: Some(Arc::new(callbacks)), ..RunOptions::default() };
 
     // Draws go to files as they come, and to memory for what is said at the end.
     let memories = [Memory::default(), Memory::default()];

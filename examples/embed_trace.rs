@@ -20,8 +20,8 @@ pub fn chain(steps: u64) -> Result<Vec<f64>, Box<dyn Error>> {
         // density over that space has it as a factor.
         let (y, jacobian) = trace.free(p).ok_or("`p` has no coordinate")?;
         let moved = vec![y[0] + 0.8 * rng.standard_normal()];
-        let weight =
-            trace.propose(&[(p, Change::Free(moved))], Draws { key: values, step, lane: 0 })?;
+        let weight = trace
+            .propose(&[(p, Change::Free(moved))], Draws { key: values, step, substream: 0 })?;
         let ratio = weight.log_weight + weight.log_jacobian - jacobian;
         if rng.open_uniform().ln() < ratio {
             trace.commit()

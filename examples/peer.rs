@@ -11,7 +11,7 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::infer::{RunOptions, Watch};
+use pcadlang::infer::{Callback, RunOptions};
 use pcadlang::lang::value::Value;
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::{Model, Program};
@@ -36,7 +36,7 @@ const MODELS: &[(&str, &str, &[&str])] = &[
 #[derive(Debug, Default)]
 struct Clock(Mutex<Vec<(f64, u64)>>);
 
-impl Watch for Clock {
+impl Callback for Clock {
     fn draw(&self, _chain: u32, _trace: &mut Trace, draws: Draws) {
         let Ok(mut seen) = self.0.lock() else { return };
         // Reading the clock costs more than a small step, so not at every draw.
@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = RunOptions {
         seed: seed.parse()?,
         time: Some(Duration::from_secs_f64(budget)),
-        watch: Some(Arc::clone(&clock) as Arc<dyn Watch>),
+        callback: Some(Arc::clone(&clock) as Arc<dyn Callback>),
         ..RunOptions::default()
     };
     let posterior = model.run(&options, 1, 1)?;

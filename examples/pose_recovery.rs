@@ -7,7 +7,7 @@
 mod known_truth;
 
 use known_truth::{SIZE, argument, compile, draw, global, quantile, score, sorted};
-use pcadlang::infer::Watch;
+use pcadlang::infer::Callback;
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::vision::ContourMap;
@@ -37,7 +37,7 @@ fn joints(trace: &mut Trace) -> Joints {
 #[derive(Debug, Default)]
 struct Seen(Mutex<Vec<Joints>>);
 
-impl Watch for Seen {
+impl Callback for Seen {
     fn draw(&self, _chain: u32, trace: &mut Trace, _draws: Draws) {
         let joints = joints(trace);
         if let Ok(mut all) = self.0.lock() {
@@ -96,7 +96,7 @@ fn main() -> Result<(), pcadlang::Error> {
         let options = RunOptions {
             seed: case + 1,
             time: Some(Duration::from_secs(seconds)),
-            watch: Some(Arc::clone(&seen) as Arc<dyn Watch>),
+            callback: Some(Arc::clone(&seen) as Arc<dyn Callback>),
             ..RunOptions::default()
         };
         let posterior = model.run(&options, 4, 2)?;

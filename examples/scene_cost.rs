@@ -13,7 +13,7 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::infer::{At, Drift, Kernel, Pick, Scope};
+use pcadlang::infer::{Drift, Kernel, Pick, SiteSelection, StepContext};
 use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
@@ -62,8 +62,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for n in sizes {
         let (model, mut trace) = scene(n, &wanted)?;
         let pieces = view(&mut trace)?.0.contours(SIZE).len();
-        let scope =
-            Scope { selector: Selector::Tag { name: "pose".into(), value: None }, pick: Pick::All };
+        let scope = SiteSelection {
+            selector: Selector::Tag { name: "pose".into(), value: None },
+            pick: Pick::All,
+        };
         let mut kernel = Drift::new(scope, wanted.scale);
         run(&mut kernel, &mut trace, 0..WARM, true)?;
         let begun = processor_seconds();
@@ -88,7 +90,7 @@ fn run(
     let mut moved = 0;
     for step in steps {
         let outcome = kernel
-            .step(trace, &At { adapting, ..At::new(1, 0, step) })
+            .step(trace, &StepContext { adapting, ..StepContext::new(1, 0, step) })
             .map_err(|e| e.to_string())?;
         moved += u64::from(outcome.accepted);
     }
@@ -123,7 +125,7 @@ fn scene(n: usize, wanted: &Wanted) -> Result<(Model, Trace), Box<dyn Error>> {
 }
 
 fn draws() -> Draws {
-    Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 }
+    Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, substream: 0 }
 }
 
 fn view(trace: &mut Trace) -> Result<ViewValue, Box<dyn Error>> {

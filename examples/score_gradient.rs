@@ -40,7 +40,7 @@ const BODY: &str = "
         * scene.affine(translate = [0, -0.9, 0]) * scene.skin(body, pose);";
 
 fn draws() -> Draws {
-    Draws { key: StreamKey::new(0, 0, Purpose::VALUES), step: 0, lane: 0 }
+    Draws { key: StreamKey::new(0, 0, Purpose::VALUES), step: 0, substream: 0 }
 }
 
 fn compile(scene: &str, likelihood: &str, map: ContourMap) -> Result<Model> {

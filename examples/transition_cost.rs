@@ -11,7 +11,7 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::infer::{At, Gibbs, Kernel, Pick, Scope};
+use pcadlang::infer::{Gibbs, Kernel, Pick, SiteSelection, StepContext};
 use pcadlang::lang::value::Value;
 use pcadlang::trace::{Selector, Trace};
 use pcadlang::{Model, Program};
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut trace = model.simulate(1, 0)?;
     let started = processor_seconds();
     let selector = Selector::Tag { name: tag.into(), value: None };
-    let mut kernel = Gibbs::new(Scope { selector, pick });
+    let mut kernel = Gibbs::new(SiteSelection { selector, pick });
     let warm = WARM.min(count);
     run(&mut kernel, &mut trace, 0..warm)?;
     let ready = processor_seconds();
@@ -64,7 +64,7 @@ fn run(
         if member >= members {
             (member, members) = (0, kernel.sweep(trace).unwrap_or(0));
         }
-        let at = At { member, ..At::new(1, 0, step) };
+        let at = StepContext { member, ..StepContext::new(1, 0, step) };
         let outcome = kernel.step(trace, &at).map_err(|e| e.to_string())?;
         moved += u64::from(outcome.accepted);
     }

@@ -115,7 +115,8 @@ impl Model {
     /// # Errors
     /// What the program does wrong.
     pub fn simulate(&self, seed: u64, index: u64) -> Result<Trace, Error> {
-        let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: index, lane: 0 };
+        let draws =
+            Draws { key: StreamKey::new(seed, 0, Purpose::START), step: index, substream: 0 };
         Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone())
             .map_err(|e| self.run_error(*e))
     }
@@ -174,7 +175,7 @@ impl Model {
             return Ok((Arc::clone(&p.body), None));
         }
         let drawn = |i| {
-            let draws = Draws { key: StreamKey::new(0, 0, Purpose::START), step: i, lane: 0 };
+            let draws = Draws { key: StreamKey::new(0, 0, Purpose::START), step: i, substream: 0 };
             Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone())
         };
         let mut draws: Vec<Trace> = (0..DRAWS_FOR_PLAN).filter_map(|i| drawn(i).ok()).collect();

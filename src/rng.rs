@@ -57,10 +57,10 @@ impl StreamKey {
 
     /// The stream of a place: a step, a site (the hash of an address), and a lane to tell
     /// alternatives apart. Costs nothing until the first number is asked for.
-    pub fn stream(&self, step: u64, site: u64, lane: u64) -> Stream {
+    pub fn stream(&self, step: u64, site: u64, substream: u64) -> Stream {
         Stream {
             key: [self.seed, self.chain_and_purpose],
-            counter: [0, step, site, lane],
+            counter: [0, step, site, substream],
             block: [0; 4],
             used: 4,
         }

@@ -4,7 +4,7 @@
 //! passes on to the system's.
 
 use pcadlang::Model;
-use pcadlang::infer::{At, Gibbs, Hmc, Kernel, Mh, Nuts, Pick, Scope};
+use pcadlang::infer::{Gibbs, Hmc, Kernel, Mh, Nuts, Pick, SiteSelection, StepContext};
 use pcadlang::trace::{Selector, Trace};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -42,7 +42,7 @@ static ALLOCATOR: Counting = Counting;
 fn allocations(kernel: &mut dyn Kernel, trace: &mut Trace, steps: u64) -> u64 {
     let mut run = |first: u64| {
         for step in first..first + steps {
-            kernel.step(trace, &At::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}"));
+            kernel.step(trace, &StepContext::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}"));
         }
     };
     run(0);
@@ -51,8 +51,8 @@ fn allocations(kernel: &mut dyn Kernel, trace: &mut Trace, steps: u64) -> u64 {
     COUNT.with(Cell::get) - before
 }
 
-fn scope(tag: &str) -> Scope {
-    Scope { selector: Selector::Tag { name: tag.into(), value: None }, pick: Pick::One }
+fn scope(tag: &str) -> SiteSelection {
+    SiteSelection { selector: Selector::Tag { name: tag.into(), value: None }, pick: Pick::One }
 }
 
 const REGRESSION: &str = "let n = 50;
@@ -71,7 +71,7 @@ const CHAIN: &str = "let move = [[0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.
 
 #[test]
 fn transitions_of_fixed_structure_allocate_nothing() {
-    let kernels: [fn(Scope) -> Box<dyn Kernel>; 2] =
+    let kernels: [fn(SiteSelection) -> Box<dyn Kernel>; 2] =
         [|s| Box::new(Gibbs::new(s)), |s| Box::new(Mh::new(s))];
     for make in kernels {
         for (text, tag) in [(REGRESSION, "flag"), (CHAIN, "state")] {
@@ -110,7 +110,7 @@ fn schools(kernel: &mut dyn Kernel, steps: u64) -> u64 {
 
 #[test]
 fn leapfrog_steps_allocate_nothing() {
-    let all = || Scope { selector: Selector::All, pick: Pick::All };
+    let all = || SiteSelection { selector: Selector::All, pick: Pick::All };
     let steps = 200;
     // Steps so short that all are accepted: what a transition allocates is for its one
     // proposal.

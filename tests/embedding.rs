@@ -4,7 +4,9 @@
 #![allow(dead_code)]
 
 use pcadlang::host::{Entry, Host, Previous, Type};
-use pcadlang::infer::{At, Drift, Kernel, Mh, Observer, Pick, Progress, Scope, Slice};
+use pcadlang::infer::{
+    Callbacks, Drift, Kernel, Mh, Pick, Progress, SiteSelection, Slice, StepContext,
+};
 use pcadlang::report::{Memory, RunDir};
 use pcadlang::trace::{Change, Draws, Selector, Trace};
 use pcadlang::{Error, Model, Posterior, Program, RunOptions, Value};
@@ -109,8 +111,9 @@ fn state_goes_back_with_a_rejected_proposal_and_along_with_a_fork() {
         Program::parse(text).unwrap().host(&Host::new().with(trusting)).unwrap().compile().unwrap();
     let mut trace = model.simulate(1, 0).unwrap();
     let mut fork = trace.clone();
-    let mut kernel = Mh::new(Scope { selector: Selector::All, pick: Pick::One });
-    let (mut accepted, mut twin) = (0, Mh::new(Scope { selector: Selector::All, pick: Pick::One }));
+    let mut kernel = Mh::new(SiteSelection { selector: Selector::All, pick: Pick::One });
+    let (mut accepted, mut twin) =
+        (0, Mh::new(SiteSelection { selector: Selector::All, pick: Pick::One }));
     let from_scratch = |trace: &Trace| {
         let again = Trace::generate(
             model.code().clone(),
@@ -121,8 +124,8 @@ fn state_goes_back_with_a_rejected_proposal_and_along_with_a_fork() {
         again.unwrap().0.log_joint()
     };
     for step in 0..2000 {
-        accepted += kernel.step(&mut trace, &At::new(1, 0, step)).unwrap().accepted;
-        twin.step(&mut fork, &At::new(2, 0, step)).unwrap();
+        accepted += kernel.step(&mut trace, &StepContext::new(1, 0, step)).unwrap().accepted;
+        twin.step(&mut fork, &StepContext::new(2, 0, step)).unwrap();
         assert_eq!(
             trace.log_joint().to_bits(),
             from_scratch(&trace).to_bits(),
@@ -176,7 +179,7 @@ fn a_kernel_of_the_host_applies_another() {
         fn step(
             &mut self,
             trace: &mut Trace,
-            at: &At,
+            at: &StepContext,
         ) -> pcadlang::trace::TraceResult<pcadlang::infer::Outcome> {
             let mut all = self.0.step(trace, &at.within(0))?;
             all.add(self.0.step(trace, &at.within(1))?);
@@ -353,12 +356,12 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
     let text = "assume x ~ toss(1); observe normal(x[0], 1) = 0.5;";
     let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
     let scenes: Vec<_> = (0..5).map(|i| Latent::all(&model.simulate(2, i).unwrap())).collect();
-    let scope = Scope { selector: Selector::All, pick: Pick::All };
+    let scope = SiteSelection { selector: Selector::All, pick: Pick::All };
     let mut kernel = Knn::new(scope, std::sync::Arc::new(Neighbours::new(scenes, &[])));
     let mut trace = model.simulate(1, 0).unwrap();
     let (mut ones, mut accepted) = (0, 0);
     for step in 0..4000 {
-        accepted += kernel.step(&mut trace, &At::new(1, 0, step)).unwrap().accepted;
+        accepted += kernel.step(&mut trace, &StepContext::new(1, 0, step)).unwrap().accepted;
         let side = trace.value(trace.all_targets()[0]).element(1);
         ones += u32::from(side.is_some_and(|side| side.same(&Value::Num(1.0))));
     }
@@ -372,11 +375,12 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
     };
     let mut trace = (0..50).map(|i| model.simulate(1, i).unwrap()).find(is_one).unwrap();
     let before = x(&trace);
-    let all = || Scope { selector: Selector::All, pick: Pick::All };
+    let all = || SiteSelection { selector: Selector::All, pick: Pick::All };
     let mut kernels: [Box<dyn Kernel>; 2] =
         [Box::new(Drift::new(all(), None)), Box::new(Slice::new(all(), None, true))];
     for kernel in &mut kernels {
-        (0..50).for_each(|step| _ = kernel.step(&mut trace, &At::new(1, 0, step)).unwrap());
+        (0..50)
+            .for_each(|step| _ = kernel.step(&mut trace, &StepContext::new(1, 0, step)).unwrap());
         assert_eq!(x(&trace), before, "{}", kernel.name());
     }
 }
@@ -414,7 +418,7 @@ fn what_a_host_passes_between_threads_can_be() {
     shared::<Value>();
     shared::<RunOptions>();
     shared::<Progress>();
-    shared::<Observer>();
+    shared::<Callbacks>();
     shared::<Memory>();
     shared::<RunDir>();
 }

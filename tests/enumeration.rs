@@ -206,7 +206,7 @@ fn updates_agree(seed: u64) -> u64 {
     for i in 0..6 {
         let (state, _) = posterior.draw(&mut rng);
         let made = |incremental: bool| {
-            let draws = Draws { key, step: i, lane: 0 };
+            let draws = Draws { key, step: i, substream: 0 };
             let made =
                 Trace::generate(model.code().clone(), state.clone(), draws, Limits::default());
             let (mut trace, _) = made.unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
@@ -221,7 +221,7 @@ fn updates_agree(seed: u64) -> u64 {
         // Several in a row, so that what one leaves behind is what the next begins with.
         for step in 0..12 {
             let a = &addresses[rng.index(addresses.len())];
-            let draws = Draws { key, step, lane: 1 + i };
+            let draws = Draws { key, step, substream: 1 + i };
             let moved = |t: &mut Trace, keep: bool| {
                 let Some(target) = t.find(a) else { return "not there".to_owned() };
                 let said = match t.propose(&[(target, Change::Resample)], draws) {

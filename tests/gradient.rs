@@ -15,7 +15,7 @@ use pcadlang::trace::{Change, Draws, Selector, Target, Trace};
 use pcadlang::vision::{ContourMap, DepthMap, Mask, Photo};
 
 fn draws() -> Draws {
-    Draws { key: StreamKey::new(9, 0, Purpose::VALUES), step: 0, lane: 0 }
+    Draws { key: StreamKey::new(9, 0, Purpose::VALUES), step: 0, substream: 0 }
 }
 
 /// The continuous choices, and where each is.

@@ -3,13 +3,15 @@
 
 use pcadlang::Model;
 use pcadlang::host::Datum;
-use pcadlang::infer::{Abc, At, Delayed, Drift, Kernel, Mh, Pick, Scope, Smc, Temper};
+use pcadlang::infer::{
+    Abc, Delayed, Drift, Kernel, Mh, Pick, SiteSelection, Smc, StepContext, Temper,
+};
 use pcadlang::lang::value::Value;
 use pcadlang::syntax::span::Span;
 use pcadlang::trace::{Change, Draws, Pattern, Selector, Trace};
 
-fn scope() -> Scope {
-    Scope { selector: Selector::All, pick: Pick::All }
+fn scope() -> SiteSelection {
+    SiteSelection { selector: Selector::All, pick: Pick::All }
 }
 
 /// The mean of `x` after the data have become 2, with steps before that under the
@@ -18,14 +20,14 @@ fn under_new_data(kernel: &mut dyn Kernel, steps: u64) -> f64 {
     let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = -3;").unwrap();
     let mut trace: Trace = model.simulate(1, 0).unwrap();
     for i in 0..50 {
-        kernel.step(&mut trace, &At::new(1, 0, i)).unwrap();
+        kernel.step(&mut trace, &StepContext::new(1, 0, i)).unwrap();
     }
     let hash = trace.observed()[0].hash;
     trace.set_observed(&[(hash, Value::Num(2.0))]).unwrap();
     trace.commit();
     let (mut sum, skip) = (0.0, steps / 10);
     for i in 0..skip + steps {
-        kernel.step(&mut trace, &At::new(1, 0, 50 + i)).unwrap();
+        kernel.step(&mut trace, &StepContext::new(1, 0, 50 + i)).unwrap();
         assert!(trace.observed()[0].value.same(&Value::Num(2.0)));
         if i >= skip {
             let Value::Num(x) = trace.value(trace.all_targets()[0]) else { panic!("no number") };
@@ -63,11 +65,11 @@ fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
         let at = Selector::Address(Pattern::exact(&trace.observations()[0].0));
         let inner = Box::new(Mh::new(scope()));
         let mut kernel = Delayed::new(inner, at, Span::default());
-        kernel.step(&mut trace, &At::new(1, 0, 0)).unwrap();
-        trace.watch();
+        kernel.step(&mut trace, &StepContext::new(1, 0, 0)).unwrap();
+        trace.record_execution();
         let (mut states, mut accepted) = (Vec::new(), 0);
         for i in 1..2000 {
-            accepted += kernel.step(&mut trace, &At::new(1, 0, i)).unwrap().accepted;
+            accepted += kernel.step(&mut trace, &StepContext::new(1, 0, i)).unwrap().accepted;
             states.push(trace.log_joint().to_bits());
         }
         let fine = &text[text.find("normal(far").unwrap()..];
@@ -96,8 +98,8 @@ fn the_surrogate_does_not_follow_what_is_pending() {
     for i in 0..100 {
         let x = disturbed.all_targets()[0];
         disturbed.propose(&[(x, Change::Set(Datum::Num(3.0)))], Draws::default()).unwrap();
-        one.step(&mut trace, &At::new(1, 0, i)).unwrap();
-        other.step(&mut disturbed, &At::new(1, 0, i)).unwrap();
+        one.step(&mut trace, &StepContext::new(1, 0, i)).unwrap();
+        other.step(&mut disturbed, &StepContext::new(1, 0, i)).unwrap();
         assert!(value(&disturbed).same(&value(&trace)), "step {i}");
     }
 }
@@ -112,7 +114,7 @@ fn both_stages_take_the_likelihood_at_its_power() {
     let mut kernel = Delayed::new(Box::new(Drift::new(scope(), Some(1.0))), at, Span::default());
     let (mut sum, steps) = (0.0, 20_000);
     for i in 0..steps {
-        kernel.step(&mut trace, &At { power: 0.5, ..At::new(1, 0, i) }).unwrap();
+        kernel.step(&mut trace, &StepContext { power: 0.5, ..StepContext::new(1, 0, i) }).unwrap();
         let Value::Num(x) = trace.value(trace.all_targets()[0]) else { panic!("no number") };
         sum += x;
     }

@@ -14,7 +14,7 @@ fn trace(text: &str) -> Trace {
 }
 
 fn draws(step: u64) -> Draws {
-    Draws { key: StreamKey::new(7, 0, Purpose::VALUES), step, lane: 0 }
+    Draws { key: StreamKey::new(7, 0, Purpose::VALUES), step, substream: 0 }
 }
 
 fn given(values: &[(&str, Value)]) -> Vec<(Address, Given)> {

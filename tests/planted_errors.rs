@@ -6,7 +6,9 @@ use pcadlang::dist::Datum;
 use pcadlang::infer::calibration::{
     CalibrationError, KernelSampler, PlanSampler, Settings, geweke, sbc,
 };
-use pcadlang::infer::{At, Kernel, Mh, Outcome, Pick, Progress, RunOptions, Scope};
+use pcadlang::infer::{
+    Kernel, Mh, Outcome, Pick, Progress, RunOptions, SiteSelection, StepContext,
+};
 use pcadlang::lang::value::Value;
 use pcadlang::rng::Stream;
 use pcadlang::trace::{Change, Selector, Trace, TraceResult};
@@ -38,7 +40,7 @@ impl Kernel for LogWalk {
         "log walk".into()
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let all = trace.select(&Selector::All);
         let target = trace.targets(all)[0];
@@ -60,7 +62,7 @@ impl Kernel for Eager {
         "eager".into()
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let all = trace.select(&Selector::All);
         let target = trace.targets(all)[0];
@@ -77,7 +79,7 @@ const RIGHT: fn() -> Box<dyn Kernel> = || Box::new(LogWalk { hastings: true });
 const WRONG: fn() -> Box<dyn Kernel> = || Box::new(LogWalk { hastings: false });
 const EAGER: fn() -> Box<dyn Kernel> = || Box::new(Eager);
 const MH: fn() -> Box<dyn Kernel> =
-    || Box::new(Mh::new(Scope { selector: Selector::All, pick: Pick::One }));
+    || Box::new(Mh::new(SiteSelection { selector: Selector::All, pick: Pick::One }));
 
 fn settings(replicates: usize) -> Settings {
     Settings { replicates, seed: 11, threads: 2, ..Settings::default() }

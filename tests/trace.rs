@@ -10,14 +10,14 @@ use pcadlang::trace::{Change, Draws as Streams, Limits, Selector, Trace};
 
 fn trace(text: &str, seed: u64) -> (Model, Trace) {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
-    let draws = Streams { key: StreamKey::new(seed, 0, Purpose::START), step: 0, lane: 0 };
+    let draws = Streams { key: StreamKey::new(seed, 0, Purpose::START), step: 0, substream: 0 };
     let t = Trace::simulate(model.code().clone(), draws, Limits::default())
         .unwrap_or_else(|e| panic!("{e}"));
     (model, t)
 }
 
 fn at(step: u64) -> Streams {
-    Streams { key: StreamKey::new(99, 0, Purpose::VALUES), step, lane: 0 }
+    Streams { key: StreamKey::new(99, 0, Purpose::VALUES), step, substream: 0 }
 }
 
 /// The addresses of all active choices.
@@ -270,7 +270,7 @@ fn a_change_reruns_only_what_depends_on_it() {
                 observe normal(left, 1) = 0; observe normal(right, 1) = 0; observe normal(gate, 1) = 0;";
     let (_, mut t) = trace(text, 1);
     let a = t.find(&t.choices()[0].0).unwrap();
-    t.watch();
+    t.record_execution();
     t.propose(&[(a, Change::Set(pcadlang::dist::Datum::Num(0.25)))], at(1)).unwrap();
     let ran: Vec<&str> =
         t.executed().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
@@ -289,15 +289,15 @@ fn a_change_reruns_only_what_depends_on_it() {
 /// Who watches sees what a move executes, also where the move could be made without.
 #[test]
 fn moves_are_seen_by_who_watches() {
-    use pcadlang::infer::{At, Gibbs, Kernel, Pick, Scope};
+    use pcadlang::infer::{Gibbs, Kernel, Pick, SiteSelection, StepContext};
     let (_, mut t) =
         trace("assume f ~ flip(0.5); observe normal(if f { 1 } else { 0 }, 1) = 0.5;", 1);
-    let mut kernel = Gibbs::new(Scope { selector: Selector::All, pick: Pick::One });
+    let mut kernel = Gibbs::new(SiteSelection { selector: Selector::All, pick: Pick::One });
     let mut moves = 0;
     for step in 0..40 {
         let before = format!("{:?}", t.choices());
-        t.watch();
-        kernel.step(&mut t, &At::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}"));
+        t.record_execution();
+        kernel.step(&mut t, &StepContext::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}"));
         let ran = t.executed();
         if format!("{:?}", t.choices()) != before {
             moves += 1;
@@ -321,7 +321,7 @@ fn work_does_not_grow_with_the_trace() {
         let set = |v| [(target, Change::Set(pcadlang::dist::Datum::Bool(v)))];
         t.propose(&set(true), at(3)).unwrap();
         t.commit();
-        t.watch();
+        t.record_execution();
         t.propose(&set(false), at(4)).unwrap();
         t.executed().len()
     };
@@ -473,7 +473,7 @@ fn restored_states_are_the_saved_ones() {
 /// is found by it, after moves that were kept and moves that were not.
 #[test]
 fn choices_are_found_by_their_addresses_as_branches_change() {
-    use pcadlang::infer::{At, Kernel, Mh, Pick, Scope};
+    use pcadlang::infer::{Kernel, Mh, Pick, SiteSelection, StepContext};
     let model = Model::from_text(
         "assume c ~ flip(0.4);
          let f = if c { fn() { z[0] ~ normal(1, 1); z[0] } }
@@ -482,13 +482,13 @@ fn choices_are_found_by_their_addresses_as_branches_change() {
     )
     .unwrap_or_else(|e| panic!("{e}"));
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
-    let mut kernel = Mh::new(Scope { selector: Selector::All, pick: Pick::One });
+    let mut kernel = Mh::new(SiteSelection { selector: Selector::All, pick: Pick::One });
     for step in 0..200 {
         let accepted = kernel
-            .step(&mut trace, &At::new(1, 0, step))
+            .step(&mut trace, &StepContext::new(1, 0, step))
             .unwrap_or_else(|e| panic!("{e}"))
             .accepted;
-        let draws = Streams { key: StreamKey::new(1, 0, Purpose::PREDICT), step, lane: 0 };
+        let draws = Streams { key: StreamKey::new(1, 0, Purpose::PREDICT), step, substream: 0 };
         assert!(trace.global("x", draws).is_some_and(|x| x.is_ok()));
         for t in trace.all_targets().to_vec() {
             let address = trace.address(t);

@@ -6,7 +6,7 @@
 
 use ciborium::Value as Cbor;
 use pcadlang::Model;
-use pcadlang::infer::{At, Hmc, Kernel, Nuts, Pick, Scope, Slice};
+use pcadlang::infer::{Hmc, Kernel, Nuts, Pick, SiteSelection, Slice, StepContext};
 use pcadlang::lang::value::Value;
 use pcadlang::trace::{Draws, Selector, Trace};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
@@ -34,8 +34,8 @@ fn standard() -> Normal {
     Normal::new(0.0, 1.0).unwrap()
 }
 
-fn all() -> Scope {
-    Scope { selector: Selector::All, pick: Pick::All }
+fn all() -> SiteSelection {
+    SiteSelection { selector: Selector::All, pick: Pick::All }
 }
 
 fn trace(text: &str) -> Trace {
@@ -131,7 +131,7 @@ fn slices_of_two_modes() {
         for i in 0..12_000 {
             let from = (d.draw)(&mut rng);
             put(&mut trace, &[("@x", from.into())]);
-            kernel.step(&mut trace, &At::new(3, 0, i)).unwrap();
+            kernel.step(&mut trace, &StepContext::new(3, 0, i)).unwrap();
             let Ok(Value::Num(to)) = trace.get("@x") else { panic!("no number") };
             there += u64::from(from < d.middle && to > d.middle);
             back += u64::from(from > d.middle && to < d.middle);
@@ -154,7 +154,7 @@ const GAUSSIAN: &str = "assume a ~ iid(normal(0, 1), 5); assume b ~ normal(0, 8)
 /// those of `a`, that of `b`.
 fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5], f64)) -> K {
     put(trace, &[("@a", Value::array(vec![0.1; 5])), ("@b", 0.2.into())]);
-    kernel.step(trace, &At::new(1, 0, 0)).unwrap();
+    kernel.step(trace, &StepContext::new(1, 0, 0)).unwrap();
     let mut state: Cbor = ciborium::from_reader(&kernel.save(trace)[..]).unwrap();
     let adaptation = state.as_array_mut().unwrap()[0].as_map_mut().unwrap();
     let sizes = adaptation
@@ -203,7 +203,7 @@ fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count:
     for i in 0..count {
         let a: Vec<f64> = (0..5).map(|_| rng.normal()).collect();
         put(trace, &[("@a", Value::array(a)), ("@b", (8.0 * rng.normal()).into())]);
-        accepted += kernel.step(trace, &At::new(5, 0, i)).unwrap().accepted;
+        accepted += kernel.step(trace, &StepContext::new(5, 0, i)).unwrap().accepted;
         let (Ok(Value::Array(a)), Ok(Value::Num(b))) = (trace.get("@a"), trace.get("@b")) else {
             panic!("no numbers")
         };
@@ -255,7 +255,9 @@ fn metrics_learn_variances() {
     {
         let mut t = trace(text);
         for i in 0..1000 {
-            kernel.step(&mut t, &At { adapting: true, ..At::new(2, 0, i) }).unwrap();
+            kernel
+                .step(&mut t, &StepContext { adapting: true, ..StepContext::new(2, 0, i) })
+                .unwrap();
         }
         let state: Cbor = ciborium::from_reader(&kernel.save(&t)[..]).unwrap();
         let adaptation = state.as_array().unwrap()[0].as_map().unwrap().clone();

@@ -16,7 +16,7 @@ pub const SIZE: u32 = 256;
 
 /// Where values are drawn that no observation asks for.
 pub const DRAWS: fn() -> Draws =
-    || Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
+    || Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, substream: 0 };
 
 /// A number from the command line.
 pub fn argument(i: usize, default: u64) -> u64 {

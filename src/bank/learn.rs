@@ -77,7 +77,7 @@ pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Resul
 }
 
 fn draws(seed: u64, i: u64, attempt: u64) -> Draws {
-    Draws { key: StreamKey::new(seed, u32::MAX, Purpose::START), step: i, lane: attempt }
+    Draws { key: StreamKey::new(seed, u32::MAX, Purpose::START), step: i, substream: attempt }
 }
 
 /// The latents of entry `i`, and its scene.

@@ -68,7 +68,7 @@ pub enum Command {
 
 /// What a program is given.
 #[derive(Args, Clone, Debug)]
-pub struct Given {
+pub struct Inputs {
     /// The program: a file, or the name of a shipped one such as lathe.pcad
     #[arg(value_name = "PROG", value_hint = ValueHint::FilePath, value_parser = program_name)]
     pub program: String,
@@ -167,7 +167,7 @@ impl Sampling {
 pub struct Job {
     /// Program, parameters, camera
     #[command(flatten)]
-    pub given: Given,
+    pub inputs: Inputs,
     /// A file for a `data` item, or FILE#ID for one entry of a JSON file; the name may be
     /// omitted if only one item fits
     #[arg(long, value_name = "[NAME=]FILE")]
@@ -192,9 +192,9 @@ pub struct Job {
 
 impl Job {
     /// A run that observes nothing.
-    pub fn of(given: Given, sampling: Sampling) -> Job {
+    pub fn of(inputs: Inputs, sampling: Sampling) -> Job {
         Job {
-            given,
+            inputs,
             observe: Vec::new(),
             observe_contours: None,
             keypoints: None,
@@ -243,7 +243,7 @@ pub struct Run {
 pub struct Evaluate {
     /// Program, parameters, the camera for cases without one
     #[command(flatten)]
-    pub given: Given,
+    pub inputs: Inputs,
     /// The folder of the dataset
     #[arg(value_name = "DATASET")]
     pub dataset: PathBuf,
@@ -288,7 +288,7 @@ Repeat the command to resume after an interruption. Exit code 1 if a case failed
 pub struct Tradeoff {
     /// Program, parameters, camera
     #[command(flatten)]
-    pub given: Given,
+    pub inputs: Inputs,
     /// The cases: one folder each, with the observed data and the ground truth
     #[arg(long, value_name = "DIR")]
     pub cases: PathBuf,
@@ -346,7 +346,7 @@ than program, chains, time, steps and warmup are parameters of the program.";
 pub struct Sample {
     /// Program, parameters, camera
     #[command(flatten)]
-    pub given: Given,
+    pub inputs: Inputs,
     /// The number of scenes
     #[arg(short, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub n: u32,
@@ -366,7 +366,7 @@ pub struct Sample {
 pub struct Learn {
     /// Program, parameters, camera
     #[command(flatten)]
-    pub given: Given,
+    pub inputs: Inputs,
     /// The number of scenes
     #[arg(short, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub n: u32,

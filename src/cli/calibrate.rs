@@ -2,11 +2,11 @@
 //! posterior. The statistics are the library's ([`pcadlang::infer::calibration`]); here
 //! is what is run, and what is said of it.
 
-use super::args::{Check, Given, Job, Sampling};
+use super::args::{Check, Inputs, Job, Sampling};
 use super::job::{Interrupt, machine_threads};
 use super::people::Who;
 use super::progress::{self, Ending};
-use super::{Failure, given, plain};
+use super::{Failure, inputs, plain};
 use pcadlang::infer::calibration::{
     CalibrationError, FALSE_ALARMS, Geweke, PlanSampler, RANKS, Sampler, Sbc, Settings, geweke, sbc,
 };
@@ -26,7 +26,7 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
     let mut failed = Vec::new();
     for path in &a.programs {
         let job = job(a, path);
-        let (program, _) = given::observe(given::program(&job.given, false)?, &job)?;
+        let (program, _) = inputs::observe(inputs::program(&job.inputs, false)?, &job)?;
         let model = program.compile()?;
         let mut passes = true;
         if a.sbc {
@@ -55,7 +55,7 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
 fn job(a: &Check, path: &str) -> Job {
     Job {
         features_from: None,
-        given: Given {
+        inputs: Inputs {
             program: path.to_owned(),
             sets: a.sets.clone(),
             camera: None,

@@ -3,7 +3,7 @@
 
 use super::places::sized;
 use super::show::quoted;
-use super::{Failure, earlier, files, plain};
+use super::{Failure, files, plain, resume};
 use clap::Args;
 use pcadlang::report::pictures::{captioned_sheet, png};
 use pcadlang::report::{number, table};
@@ -37,7 +37,7 @@ struct Told {
 
 impl Told {
     fn of(folder: &Path) -> Result<Told, Failure> {
-        let run = earlier::run(folder)?;
+        let run = resume::run(folder)?;
         let path = folder.join("summary.json");
         let summary = serde_json::from_slice(&files::read(&path)?);
         Ok(Told { run, summary: summary.map_err(|e| plain(format!("{}: {e}", path.display())))? })

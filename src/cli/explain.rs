@@ -111,7 +111,7 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
 fn drawn_by(trace: &mut Trace, t: Target, seed: u64) -> Option<Work> {
     let (mut last, mut drawing): (Option<Work>, u32) = (None, 0);
     for step in 0..TRIES {
-        let draws = Draws { key: StreamKey::new(seed, 0, Purpose::PREDICT), step, lane: 0 };
+        let draws = Draws { key: StreamKey::new(seed, 0, Purpose::PREDICT), step, substream: 0 };
         let before = work();
         let done = trace.regenerate(&[t], draws).is_ok();
         trace.rollback();

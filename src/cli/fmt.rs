@@ -88,9 +88,9 @@ fn formatted(name: &str, bytes: &[u8]) -> Result<Option<String>, String> {
 
 /// Adds a program, or those in a folder and the folders in it; names that begin with a
 /// dot are hidden.
-fn find(path: &Path, given: bool, programs: &mut Vec<PathBuf>) -> Result<(), Failure> {
+fn find(path: &Path, inputs: bool, programs: &mut Vec<PathBuf>) -> Result<(), Failure> {
     if !path.is_dir() {
-        if given || path.extension().is_some_and(|extension| extension == "pcad") {
+        if inputs || path.extension().is_some_and(|extension| extension == "pcad") {
             programs.push(path.to_owned());
         }
         return Ok(());

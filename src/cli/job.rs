@@ -10,11 +10,11 @@ use super::page::{PROGRAM, write_page};
 use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
 use super::reopened::{TRACES, arguments};
-use super::{Failure, date, edges, files, given, people, plain, seen};
+use super::{Failure, date, edges, files, inputs, people, plain, seen};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
-    BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches,
+    BestSoFar, BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress,
     stuck_structure,
 };
 use pcadlang::lang::{self, builtins::scene::ImageValue};
@@ -113,7 +113,7 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
 /// Reads and compiles; the time of a run begins here.
 pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     let begun = Instant::now();
-    let (program, image) = given::observe(given::program(&job.given, quiet)?, job)?;
+    let (program, image) = inputs::observe(inputs::program(&job.inputs, quiet)?, job)?;
     let chooses = program.interface().params.iter().any(|p| p.name == "person");
     Ok(Ready { model: program.compile()?, image, chooses, begun })
 }
@@ -175,14 +175,14 @@ pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
     let named = job
         .observe
         .iter()
-        .map(|o| given::file_of(o))
-        .chain(job.keypoints.as_deref().map(given::file_of));
-    let plain = [&job.observe_contours, &job.given.camera].into_iter().flatten();
+        .map(|o| inputs::file_of(o))
+        .chain(job.keypoints.as_deref().map(inputs::file_of));
+    let plain = [&job.observe_contours, &job.inputs.camera].into_iter().flatten();
     for path in named.map(Path::new).chain(plain.map(|p| p.as_path())) {
         all.push_str(&bytes_hash(&files::read(path)?));
     }
-    if job.given.edges.is_some() {
-        all.push_str(&bytes_hash(&edges::bytes(job.given.edges.as_deref())?));
+    if job.inputs.edges.is_some() {
+        all.push_str(&bytes_hash(&edges::bytes(job.inputs.edges.as_deref())?));
     }
     Ok(text_hash(&all))
 }
@@ -214,13 +214,13 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
         "version": env!("CARGO_PKG_VERSION"),
         "state": "running",
         "begun": date::now(),
-        "program": job.given.program,
+        "program": job.inputs.program,
         "program_hash": program_hash,
         "inputs_hash": inputs,
         "seed": s.seed,
         "arguments": arguments(job),
         "observe": observed(job).collect::<Vec<_>>(),
-        "set": job.given.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
+        "set": job.inputs.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
         "settings": {
             "chains": s.chains(), "steps": s.steps, "warmup": s.warmup,
             "time": s.time.map(|t| t.as_secs_f64()), "incremental": !s.no_incremental,
@@ -228,7 +228,7 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
     });
     match record {
         Value::Object(mut record) => {
-            record.extend(job.given.edges.iter().map(|e| ("edges".to_owned(), json!(e))));
+            record.extend(job.inputs.edges.iter().map(|e| ("edges".to_owned(), json!(e))));
             record
         }
         _ => Map::new(),
@@ -308,7 +308,7 @@ pub fn perform(
 }
 
 /// How the chains of a job are run, and who watches them.
-pub fn options(job: &Job, ready: &Ready, watch: Option<Arc<dyn Watch>>) -> RunOptions {
+pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) -> RunOptions {
     let (s, model) = (&job.sampling, &ready.model);
     RunOptions {
         seed: s.seed,
@@ -318,10 +318,10 @@ pub fn options(job: &Job, ready: &Ready, watch: Option<Arc<dyn Watch>>) -> RunOp
         time: s.time.map(|t| t.saturating_sub(ready.begun.elapsed())),
         incremental: !s.no_incremental,
         limits: model.limits().clone(),
-        watch,
+        callback,
         banks: Some(Arc::new(BankFiles::new(
             model,
-            folder(&job.given.program),
+            folder(&job.inputs.program),
             job.features_from.clone(),
         ))),
         sites: true,
@@ -345,9 +345,9 @@ fn fill(
     // A single chain has one mode.
     let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
     let kept = Arc::new(KeptTraces::new(s.chains(), manner.keep as usize, model.hash()));
-    let watches: Vec<Arc<dyn Watch>> =
+    let callbacks: Vec<Arc<dyn Callback>> =
         vec![Arc::new(joints.clone()), best.clone(), evidence.clone(), kept.clone()];
-    let options = options(job, ready, Some(Arc::new(Watches(watches))));
+    let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
     let memories: Vec<Memory> =
         (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
@@ -389,7 +389,7 @@ fn fill(
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let modes = modes(&quantities, Some(&evidence));
     let mut warnings = table::warnings(&quantities, &modes, &kernels, chains.len());
-    let person = job.given.who.person.unwrap_or(1);
+    let person = job.inputs.who.person.unwrap_or(1);
     if *chooses {
         warnings
             .extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
@@ -397,9 +397,9 @@ fn fill(
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
-    let given = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
+    let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
     let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
-    warnings.extend(seen::warnings(given, job.keypoints.as_deref(), &located));
+    warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
     let places = best_of_each(&modes, &best);
     let best = best.state();
     let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;
@@ -524,7 +524,7 @@ fn sinks(
 ) -> Result<Vec<Box<dyn Sink>>, Failure> {
     let run = identity(record);
     let comments = [
-        ("program", job.given.program.clone()),
+        ("program", job.inputs.program.clone()),
         ("program_hash", model.hash().to_owned()),
         ("seed", job.sampling.seed.to_string()),
     ];

@@ -2,7 +2,7 @@
 //! `keypoints.json`.
 
 use super::scene::view_operand;
-use pcadlang::infer::{StateError, Watch};
+use pcadlang::infer::{Callback, StateError};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Located;
@@ -25,12 +25,12 @@ pub struct Joints {
 struct Chain {
     /// Where the view is: looked for once.
     view: Option<Option<Operand>>,
-    seen: Seen,
+    seen: LandmarkMoments,
 }
 
 /// What draws say of landmarks.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Seen {
+struct LandmarkMoments {
     /// Where the joints are in the picture: between the scene's and where they were
     /// detected.
     joints: Moments,
@@ -59,15 +59,15 @@ impl Joints {
         self.all().joints
     }
 
-    fn all(&self) -> Seen {
+    fn all(&self) -> LandmarkMoments {
         self.of(0..self.chains.len())
     }
 
     /// The draws of some chains, by their numbers from 0.
-    fn of(&self, chains: impl Iterator<Item = usize>) -> Seen {
-        let mut all = Seen::default();
+    fn of(&self, chains: impl Iterator<Item = usize>) -> LandmarkMoments {
+        let mut all = LandmarkMoments::default();
         for chain in chains.filter_map(|c| self.chains.get(c)) {
-            let Seen { joints, own, scene } =
+            let LandmarkMoments { joints, own, scene } =
                 &chain.lock().unwrap_or_else(PoisonError::into_inner).seen;
             all.joints.merge(joints);
             all.own.merge(own);
@@ -77,17 +77,21 @@ impl Joints {
     }
 
     /// The draws of all chains, each mode by its probability if that is known.
-    fn by_probability(&self, modes: &[Mode]) -> Seen {
+    fn by_probability(&self, modes: &[Mode]) -> LandmarkMoments {
         let each = modes
             .iter()
             .map(|m| Some((m.probability?, self.of(m.chains.iter().map(|c| c.wrapping_sub(1))))));
         let Some(each) = each.collect::<Option<Vec<_>>>().filter(|e| !e.is_empty()) else {
             return self.all();
         };
-        let mixed = |part: fn(&Seen) -> &Moments| {
+        let mixed = |part: fn(&LandmarkMoments) -> &Moments| {
             Moments::mixture(&each.iter().map(|(p, s)| (*p, part(s))).collect::<Vec<_>>())
         };
-        Seen { joints: mixed(|s| &s.joints), own: mixed(|s| &s.own), scene: mixed(|s| &s.scene) }
+        LandmarkMoments {
+            joints: mixed(|s| &s.joints),
+            own: mixed(|s| &s.own),
+            scene: mixed(|s| &s.scene),
+        }
     }
 
     /// The landmarks of a view; none before the camera.
@@ -111,7 +115,7 @@ impl Joints {
             });
             each.collect()
         };
-        let Seen { joints, own, scene } = self.by_probability(modes);
+        let LandmarkMoments { joints, own, scene } = self.by_probability(modes);
         let best: Map<String, Value> = best
             .iter()
             .filter_map(|(name, at)| Some((name.to_string(), numbers(&mut (*at)?.into_iter()))))
@@ -131,7 +135,7 @@ fn rounded(x: f64) -> Value {
     json!((x * 1000.0).round() / 1000.0)
 }
 
-impl Watch for Joints {
+impl Callback for Joints {
     fn save(&self, chain: u32) -> Vec<u8> {
         self.chain(chain).and_then(|c| serde_json::to_vec(&c.seen).ok()).unwrap_or_default()
     }

@@ -1,7 +1,7 @@
 //! `pcadlang learn`: a bank of scenes from the prior.
 
 use super::args::{FeatureKind, Learn};
-use super::{Failure, given, job, plain, progress};
+use super::{Failure, inputs, job, plain, progress};
 use pcadlang::bank::{self, BankError, Features};
 use pcadlang::lang::load::reason;
 use pcadlang::report::seconds;
@@ -11,7 +11,7 @@ use std::time::Instant;
 /// Draws scenes and writes the bank.
 pub fn learn(a: &Learn) -> Result<(), Failure> {
     let begun = Instant::now();
-    let model = given::program(&a.given, a.quiet)?.without_data().compile()?;
+    let model = inputs::program(&a.inputs, a.quiet)?.without_data().compile()?;
     let size = a.features_size;
     let features = match (&a.features_from, a.features) {
         (Some(command), _) => Features::Command { command: command.clone(), size },
@@ -19,7 +19,7 @@ pub fn learn(a: &Learn) -> Result<(), Failure> {
         (None, FeatureKind::Keypoints) => Features::Keypoints { names: Vec::new() },
     };
     let how = bank::Learn {
-        name: &a.given.program,
+        name: &a.inputs.program,
         count: u64::from(a.n),
         seed: a.seed,
         threads: a.threads.map_or_else(job::machine_threads, |n| n as usize),

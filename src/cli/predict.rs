@@ -46,7 +46,7 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
             hint,
         ));
     }
-    let stem = job::stem(&a.job.given.program);
+    let stem = job::stem(&a.job.inputs.program);
     let dir = match &a.out {
         Some(path) => RunDir::create(path),
         None => RunDir::fresh(Path::new("runs"), &format!("{stem}-predictive")),

@@ -28,7 +28,7 @@ pub fn presets(program: &str) -> Result<Option<(String, Presets)>, Failure> {
 /// Fills in what a run leaves open; what is to be said of it, if anything was.
 /// `keypoints`: whether it, or the dataset it is of, has some.
 pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> {
-    let program = &job.given.program;
+    let program = &job.inputs.program;
     let wanted = match (job.sampling.quality, job.sampling.time) {
         (Some(QualityArg::Own), _) | (None, None) => return Ok(None),
         (Some(QualityArg::Known(quality)), _) => Some(quality),
@@ -70,8 +70,8 @@ fn fill(job: &mut Job, choice: &Choice, name: &str) -> String {
     let setting = &choice.preset.setting;
     let mut said = Vec::new();
     for (param, value) in &setting.set {
-        if !job.given.sets.iter().any(|(p, _)| p == param) {
-            job.given.sets.push((param.clone(), value.clone()));
+        if !job.inputs.sets.iter().any(|(p, _)| p == param) {
+            job.inputs.sets.push((param.clone(), value.clone()));
             said.push(format!("--set {param}={value}"));
         }
     }
@@ -117,7 +117,7 @@ pub fn filled(job: &Job, quiet: bool) -> Result<Job, Failure> {
 
 /// How a run is told again: what is not in the program.
 pub fn again(job: &Job) -> String {
-    let sets = job.given.sets.iter().map(|(k, v)| format!(" --set {k}={v}"));
+    let sets = job.inputs.sets.iter().map(|(k, v)| format!(" --set {k}={v}"));
     let chains =
         job.sampling.chains.filter(|n| *n != Sampling::CHAINS).map(|n| format!(" --chains {n}"));
     sets.chain(chains).collect()
@@ -131,10 +131,10 @@ pub fn names() -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::args::Given;
+    use crate::cli::args::Inputs;
 
     fn job(quality: Option<QualityArg>, time: Option<f64>) -> Job {
-        let given = Given {
+        let inputs = Inputs {
             program: "x.pcad".into(),
             sets: vec![("size".into(), "64".into())],
             camera: None,
@@ -143,7 +143,7 @@ mod tests {
             allowed: Default::default(),
         };
         Job::of(
-            given,
+            inputs,
             Sampling { quality, time: time.map(Duration::from_secs_f64), ..Sampling::default() },
         )
     }
@@ -155,7 +155,7 @@ mod tests {
         let presets: Presets = serde_json::from_str(text).unwrap();
         let mut open = job(None, None);
         let said = fill(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
-        assert_eq!(open.given.sets, [("size".into(), "64".into()), ("keep".into(), "4".into())]);
+        assert_eq!(open.inputs.sets, [("size".into(), "64".into()), ("keep".into(), "4".into())]);
         assert_eq!((open.sampling.chains(), open.sampling.time), (2, Some(Duration::from_secs(1))));
         assert!(said.starts_with(
             "--quality fast: --set keep=4 --chains 2 --time 1s, from x.quality.json (error 0.3, 0.2 to 0.4"

@@ -25,7 +25,7 @@ pub struct Reopened {
 /// What is typed to run a job again, but for the name of the command: all that its draws
 /// depend on.
 pub fn arguments(job: &Job) -> Vec<String> {
-    let (g, s) = (&job.given, &job.sampling);
+    let (g, s) = (&job.inputs, &job.sampling);
     let mut all = vec![g.program.clone()];
     let mut add = |name: &str, value: String| all.extend([format!("--{name}"), value]);
     let path = |p: &PathBuf| p.display().to_string();
@@ -57,7 +57,7 @@ impl Reopened {
     /// # Errors
     /// If the folder holds no run, or one of a version that did not keep its command.
     pub fn open(folder: &Path) -> Result<Reopened, Failure> {
-        let run = super::earlier::run(folder)?;
+        let run = super::resume::run(folder)?;
         let told = || {
             let hint = "run it again with this version; `evaluate` keeps the pictures of its cases";
             Failure::Plain(

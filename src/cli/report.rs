@@ -1,7 +1,7 @@
 //! `pcadlang report`: the page of a run made anew, from what its folder holds.
 
 use super::page::{PAGE, write_page};
-use super::{Failure, earlier, files, job, plain};
+use super::{Failure, files, job, plain, resume};
 use clap::Args;
 use pcadlang::report::{Quantity, RunDir, modes, quantities, rename, reread, warnings};
 use serde_json::{Value, json};
@@ -17,7 +17,7 @@ pub struct Report {
 
 /// Makes the page of a run anew.
 pub fn report(a: &Report) -> Result<(), Failure> {
-    let run = earlier::run(&a.run)?;
+    let run = resume::run(&a.run)?;
     let dir = RunDir::open(&a.run).map_err(|e| plain(e.to_string()))?;
     let draws = reread(&dir, job::ROOM).map_err(|e| plain(e.to_string()))?;
     if draws.iter().all(|d| d.rows.is_empty()) {

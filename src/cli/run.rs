@@ -4,7 +4,7 @@ use super::args::{Job, Run};
 use super::explain::{Explanation, explain};
 use super::job::{self, Interrupt, Manner, Outcome};
 use super::print::paragraph;
-use super::{Failure, earlier, plain, quality};
+use super::{Failure, plain, quality, resume};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
@@ -21,15 +21,15 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     }
     let interrupt = Interrupt::listen();
     let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
-    let (runs, name) = (Path::new("runs"), job::stem(&job.given.program));
+    let (runs, name) = (Path::new("runs"), job::stem(&job.inputs.program));
     if let Some(path) =
-        a.out.as_ref().filter(|path| !a.resume && !a.quiet && earlier::left(path).is_some())
+        a.out.as_ref().filter(|path| !a.resume && !a.quiet && resume::left(path).is_some())
     {
         error_line!("note: replacing the earlier run in {}", path.display());
     }
     let dir = match &a.out {
-        Some(path) if a.resume => earlier::resumed(path, &record)?,
-        None if a.resume => earlier::resumed(&RunDir::latest(runs, name), &record)?,
+        Some(path) if a.resume => resume::resumed(path, &record)?,
+        None if a.resume => resume::resumed(&RunDir::latest(runs, name), &record)?,
         Some(path) => RunDir::create(path).map_err(|e| plain(e.to_string()))?,
         None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
     };

@@ -1,7 +1,7 @@
 //! `pcadlang sample`: draws from the prior on one sheet, as Figure 1 of Kulkarni et al. 2014.
 
 use super::args::Sample;
-use super::{Failure, files, given, plain, scene};
+use super::{Failure, files, inputs, plain, scene};
 use pcadlang::lang::value::Value;
 use pcadlang::report::pictures::{contact_sheet, png, shaded};
 use pcadlang::report::{number, table};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// Draws scenes from the prior; a program without a scene gets a table of its values.
 pub fn sample(a: &Sample) -> Result<(), Failure> {
-    let model = given::program(&a.given, false)?.without_data().compile()?;
+    let model = inputs::program(&a.inputs, false)?.without_data().compile()?;
     let mut pictures = Vec::new();
     let mut rows = Vec::new();
     for i in 0..a.n {

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Where values that no observation asks for are drawn.
 pub fn predictive(seed: u64, step: u64) -> Draws {
-    Draws { key: StreamKey::new(seed, u32::MAX, Purpose::PREDICT), step, lane: 0 }
+    Draws { key: StreamKey::new(seed, u32::MAX, Purpose::PREDICT), step, substream: 0 }
 }
 
 /// The state of these choices.

@@ -19,18 +19,18 @@ const EVERY: Duration = Duration::from_millis(200);
 pub fn watch(a: &Check) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     loop {
-        let seen = Seen::of(&a.programs, &a.allowed.allow_read);
+        let stamps = FileStamps::of(&a.programs, &a.allowed.allow_read);
         clear();
         if let Err(failure) = check::check(a) {
             term::fail(failure);
         }
-        print_line!("\nWatching {}; press Ctrl-C to stop.", files(seen.0.len()));
+        print_line!("\nWatching {}; press Ctrl-C to stop.", files(stamps.0.len()));
         loop {
             if interrupt.asked() {
                 return Ok(());
             }
             std::thread::sleep(EVERY);
-            let changed = seen.changed();
+            let changed = stamps.changed();
             if !changed.is_empty() {
                 print_line!("Changed: {}", changed.join(", "));
                 break;
@@ -55,22 +55,22 @@ type Stamp = Option<(SystemTime, u64)>;
 
 /// The files of programs, those that are looked for and missing too, as they are at one
 /// time.
-struct Seen(BTreeMap<String, Stamp>);
+struct FileStamps(BTreeMap<String, Stamp>);
 
-impl Seen {
-    fn of(programs: &[String], folders: &[PathBuf]) -> Seen {
+impl FileStamps {
+    fn of(programs: &[String], folders: &[PathBuf]) -> FileStamps {
         // What the text was read before is seen: a change that comes while it is checked
         // counts.
-        let mut seen = BTreeMap::new();
+        let mut stamps = BTreeMap::new();
         for program in programs {
             let own = Reach::default().of(program);
             let reach =
                 folders.iter().fold(own, |reach, f| reach.clone().allow(f).unwrap_or(reach));
-            let asked = Asked { reach, seen: Mutex::new(seen) };
+            let asked = Asked { reach, stamps: Mutex::new(stamps) };
             let _ = load(program, &asked, &mut SourceMap::new());
-            seen = asked.seen.into_inner().unwrap_or_else(PoisonError::into_inner);
+            stamps = asked.stamps.into_inner().unwrap_or_else(PoisonError::into_inner);
         }
-        Seen(seen)
+        FileStamps(stamps)
     }
 
     /// The files that are not as they were.
@@ -86,13 +86,13 @@ impl Seen {
 /// Reads what a program may read, and remembers what it was asked for.
 struct Asked {
     reach: Reach,
-    seen: Mutex<BTreeMap<String, Stamp>>,
+    stamps: Mutex<BTreeMap<String, Stamp>>,
 }
 
 impl Loader for Asked {
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        seen.entry(path.to_owned()).or_insert_with(|| stamp(path));
+        let mut stamps = self.stamps.lock().unwrap_or_else(PoisonError::into_inner);
+        stamps.entry(path.to_owned()).or_insert_with(|| stamp(path));
         self.reach.read(path)
     }
 }
@@ -115,17 +115,17 @@ mod tests {
         std::fs::write(&main, "include \"part.pcad\"; include \"missing.pcad\"; let a = 1;")
             .unwrap();
         std::fs::write(&part, "let b = ;").unwrap();
-        let seen = Seen::of(std::slice::from_ref(&main), &[]);
-        assert!(seen.changed().is_empty(), "{:?}", seen.changed());
+        let stamps = FileStamps::of(std::slice::from_ref(&main), &[]);
+        assert!(stamps.changed().is_empty(), "{:?}", stamps.changed());
         // A file that is included, though nothing parses, and one that is not there yet.
         std::fs::write(&part, "let b = 10;").unwrap();
-        assert_eq!(seen.changed(), [part.as_str()]);
+        assert_eq!(stamps.changed(), [part.as_str()]);
         std::fs::write(&missing, "").unwrap();
-        assert_eq!(seen.changed(), [missing.as_str(), part.as_str()]);
-        let seen = Seen::of(&[main], &[]);
-        assert!(seen.changed().is_empty(), "{:?}", seen.changed());
+        assert_eq!(stamps.changed(), [missing.as_str(), part.as_str()]);
+        let stamps = FileStamps::of(&[main], &[]);
+        assert!(stamps.changed().is_empty(), "{:?}", stamps.changed());
         std::fs::remove_file(&part).unwrap();
-        assert_eq!(seen.changed(), [part.as_str()]);
+        assert_eq!(stamps.changed(), [part.as_str()]);
         std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -23,7 +23,7 @@ pub trait Batch: fmt::Debug + Send + Sync {
 
     /// Adds `weight` times the derivatives of the log densities scored last to adjoints
     /// in the same places.
-    fn pull(
+    fn vjp(
         &self,
         buffer: &[f64],
         by: &mut [f64],
@@ -209,7 +209,7 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         }
     }
 
-    fn pull(
+    fn vjp(
         &self,
         buffer: &[f64],
         by: &mut [f64],
@@ -336,7 +336,7 @@ mod tests {
                     let (mut sum, mut expected) = (ExactSum::default(), ExactSum::default());
                     assert!(b.score(&v, x, &columns, n, &mut sum));
                     let mut by = vec![0.0; v.len()];
-                    b.pull(&v, &mut by, x, &columns, n, 2.0);
+                    b.vjp(&v, &mut by, x, &columns, n, 2.0);
                     let mut slopes = vec![0.0; v.len()];
                     for (i, s) in seen.iter().enumerate() {
                         let datum =

@@ -150,7 +150,7 @@ impl Covariance {
 
     /// Adds the derivatives of `by` times the covariance of two points at this distance,
     /// or of a point with itself, by the parameters in the order of the constructors.
-    pub fn pull(&self, d: Option<f64>, by: f64, out: &mut [f64]) {
+    pub fn vjp(&self, d: Option<f64>, by: f64, out: &mut [f64]) {
         let k = d.map_or_else(|| self.variance(), |d| self.at_distance(d));
         // By the standard deviation; and by the length, of r with dk/dr = -slope.
         let mut add = |i: usize, g: f64| {
@@ -194,14 +194,14 @@ impl Covariance {
             }
             Sum(two) => {
                 let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
-                two.0.pull(d, by, left);
-                two.1.pull(d, by, right);
+                two.0.vjp(d, by, left);
+                two.1.vjp(d, by, right);
             }
             Product(two) => {
                 let value = |c: &Covariance| d.map_or_else(|| c.variance(), |d| c.at_distance(d));
                 let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
-                two.0.pull(d, by * value(&two.1), left);
-                two.1.pull(d, by * value(&two.0), right);
+                two.0.vjp(d, by * value(&two.1), left);
+                two.1.vjp(d, by * value(&two.0), right);
             }
         }
     }

@@ -131,10 +131,10 @@ impl Dist {
         log_density_stored(s: &Datum) -> f64;
         /// See [`Distribution::gradient_stored`].
         gradient_stored(s: &Datum) -> Option<Gradient>;
-        /// See [`Distribution::realise`].
-        realise(s: &Datum) -> Datum;
-        /// See [`Distribution::unrealise`].
-        unrealise(value: &Datum) -> Option<Datum>;
+        /// See [`Distribution::from_noncentred`].
+        from_noncentred(s: &Datum) -> Datum;
+        /// See [`Distribution::to_noncentred`].
+        to_noncentred(value: &Datum) -> Option<Datum>;
         /// See [`Distribution::stored_support`].
         stored_support() -> Support;
         /// See [`Distribution::mean`].

@@ -99,13 +99,13 @@ pub trait Distribution: fmt::Debug + Send + Sync {
 
     /// The value of a stored form.
     #[doc(hidden)]
-    fn realise(&self, s: &Datum) -> Datum {
+    fn from_noncentred(&self, s: &Datum) -> Datum {
         s.clone()
     }
 
     /// The stored form of a value; `None` if it does not fit.
     #[doc(hidden)]
-    fn unrealise(&self, value: &Datum) -> Option<Datum> {
+    fn to_noncentred(&self, value: &Datum) -> Option<Datum> {
         Some(value.clone())
     }
 

@@ -94,7 +94,7 @@ impl Factor {
     /// From the derivatives by the packed entries of L to those by the entries of the
     /// symmetric matrix K = L L', its lower triangle packed: what lies off the diagonal
     /// stands for both of its places (Giles 2008; Murray 2016).
-    pub fn pull_cholesky(&self, by: &[f64]) -> Vec<f64> {
+    pub fn vjp_cholesky(&self, by: &[f64]) -> Vec<f64> {
         let n = self.n;
         let entry = |m: &[f64], i: usize, j: usize| m[row(i) + j];
         // Columns of P = the lower triangle of L' by, its diagonal halved.

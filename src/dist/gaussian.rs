@@ -112,7 +112,7 @@ impl Gaussian {
     }
 
     /// Noise of another length has no value: what there is of it is taken, the rest is 0.
-    pub fn realise(&self, s: &Datum) -> Datum {
+    pub fn from_noncentred(&self, s: &Datum) -> Datum {
         if !self.whitened {
             return s.clone();
         }
@@ -126,7 +126,7 @@ impl Gaussian {
         }
     }
 
-    pub fn unrealise(&self, value: &Datum) -> Option<Datum> {
+    pub fn to_noncentred(&self, value: &Datum) -> Option<Datum> {
         if self.whitened { self.whiten(value).map(Datum::from) } else { Some(value.clone()) }
     }
 }
@@ -160,8 +160,8 @@ macro_rules! gaussian_family {
                 sample_stored(rng: &mut $crate::rng::Stream) -> $crate::dist::Datum;
                 log_density_stored(s: &$crate::dist::Datum) -> f64;
                 gradient_stored(s: &$crate::dist::Datum) -> Option<$crate::dist::Gradient>;
-                realise(s: &$crate::dist::Datum) -> $crate::dist::Datum;
-                unrealise(value: &$crate::dist::Datum) -> Option<$crate::dist::Datum>;
+                from_noncentred(s: &$crate::dist::Datum) -> $crate::dist::Datum;
+                to_noncentred(value: &$crate::dist::Datum) -> Option<$crate::dist::Datum>;
             }
         }
     };

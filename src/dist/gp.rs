@@ -83,26 +83,26 @@ impl Gp {
 
     /// From those by the factor to those by the parameters of its covariance function,
     /// made at these points.
-    pub fn pull_covariance(
+    pub fn vjp_covariance(
         &self,
         cov: &Covariance,
         at: &[f64],
         by_factor: &[f64],
     ) -> Option<Vec<f64>> {
-        let by = self.0.factor.pull_cholesky(by_factor);
+        let by = self.0.factor.vjp_cholesky(by_factor);
         let mut out = vec![0.0; cov.param_count()];
         let mut entries = by.into_iter();
         for (i, x) in at.iter().enumerate() {
             for y in &at[..i] {
-                cov.pull(Some((x - y).abs()), entries.next()?, &mut out);
+                cov.vjp(Some((x - y).abs()), entries.next()?, &mut out);
             }
-            cov.pull(None, entries.next()? * (1.0 + self.1), &mut out);
+            cov.vjp(None, entries.next()? * (1.0 + self.1), &mut out);
         }
         Some(out)
     }
 
     /// The derivatives by the white noise behind a value, from those by the value.
-    pub fn pull_noise(&self, by: &[f64]) -> Vec<f64> {
+    pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
         self.0.factor.transposed_times(by)
     }
 }

@@ -84,7 +84,7 @@ impl Batch for Mixed {
             })
     }
 
-    fn pull(
+    fn vjp(
         &self,
         buffer: &[f64],
         by: &mut [f64],

@@ -104,12 +104,12 @@ impl MvNormal {
 
     /// From those by the factor to those by the entries of the covariance, its lower
     /// triangle by rows: what lies off the diagonal stands for both of its places.
-    pub fn pull_covariance(&self, by_factor: &[f64]) -> Vec<f64> {
-        self.0.factor.pull_cholesky(by_factor)
+    pub fn vjp_covariance(&self, by_factor: &[f64]) -> Vec<f64> {
+        self.0.factor.vjp_cholesky(by_factor)
     }
 
     /// The derivatives by the white noise behind a value, from those by the value.
-    pub fn pull_noise(&self, by: &[f64]) -> Vec<f64> {
+    pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
         self.0.factor.transposed_times(by)
     }
 }

@@ -71,10 +71,10 @@ impl Dist {
 
     /// For a value made from white noise, mean + L z: the derivatives by z of a function
     /// with these derivatives by the value.
-    pub fn realise_pull(&self, by: &[f64]) -> Option<Vec<f64>> {
+    pub fn from_noncentred_vjp(&self, by: &[f64]) -> Option<Vec<f64>> {
         match self {
-            Dist::MvNormal(d) => Some(d.pull_noise(by)),
-            Dist::Gp(d) => Some(d.pull_noise(by)),
+            Dist::MvNormal(d) => Some(d.vjp_noise(by)),
+            Dist::Gp(d) => Some(d.vjp_noise(by)),
             _ => None,
         }
     }

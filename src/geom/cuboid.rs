@@ -29,7 +29,7 @@ pub fn cuboid(size: DVec3) -> Result<Mesh, GeomError> {
 
 /// From the derivatives of something by the vertices of a box of this size to those by
 /// its edge lengths.
-pub fn pull_cuboid(size: DVec3, mesh: &Mesh, by_vertex: &[DVec3]) -> DVec3 {
+pub fn vjp_cuboid(size: DVec3, mesh: &Mesh, by_vertex: &[DVec3]) -> DVec3 {
     mesh.positions.iter().zip(by_vertex).map(|(p, g)| p.as_dvec3() * *g).sum::<DVec3>() / size
 }
 

@@ -9,7 +9,7 @@ use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Tolerance, floor_height, inner_wall};
 use super::real::{Real, Tape};
-use super::revolve::{Strip, pull_rings, revolve};
+use super::revolve::{Strip, revolve, vjp_rings};
 use super::{GeomError, Mesh, Solid};
 use glam::DVec3;
 
@@ -139,7 +139,7 @@ pub struct LatheGradient {
 ///
 /// # Errors
 /// As [`lathe`].
-pub fn pull_lathe(
+pub fn vjp_lathe(
     parts: &[Profile],
     sides: u32,
     wall: impl Into<Wall>,
@@ -157,7 +157,7 @@ pub fn pull_lathe(
         v
     };
     let strips = layout(parts, caps, wall, number)?.strips;
-    let rings = pull_rings(&strips, sides, by_vertex);
+    let rings = vjp_rings(&strips, sides, by_vertex);
     let outputs = strips
         .iter()
         .flat_map(|s| &s.points)

@@ -26,18 +26,18 @@ mod sphere;
 
 pub use affine::Affine;
 pub use bounds::Bounds;
-pub use cuboid::{cuboid, pull_cuboid};
+pub use cuboid::{cuboid, vjp_cuboid};
 pub use detail::{Coarse, Detail};
 pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;
-pub use lathe::{Caps, LatheGradient, Profile, Wall, lathe, pull_lathe};
+pub use lathe::{Caps, LatheGradient, Profile, Wall, lathe, vjp_lathe};
 pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
 pub use patches::Patches;
 pub(crate) use patches::Run;
 pub(crate) use solid::MeshesMark;
 pub use solid::{Instance, PlacedGradient, Solid};
-pub use sphere::{pull_sphere, sphere};
+pub use sphere::{sphere, vjp_sphere};
 
 /// The matrix a b'.
 pub(crate) fn outer(a: glam::DVec3, b: glam::DVec3) -> glam::DMat3 {

@@ -88,7 +88,7 @@ fn shared(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Shared
 
 /// From the derivatives of something by the vertices of [`revolve`] to those by each
 /// point (r, y) of the path in turn.
-pub(super) fn pull_rings<T: Real>(
+pub(super) fn vjp_rings<T: Real>(
     strips: &[Strip<T>],
     sides: u32,
     by_vertex: &[DVec3],

@@ -309,7 +309,7 @@ impl Solid {
     /// The vector-Jacobian product of [`Solid::placed`]: from the derivatives of
     /// something by the vertices and landmarks of the placed solid, in world coordinates.
     /// No vertices: nothing depends on them.
-    pub fn pull_placed(
+    pub fn vjp_placed(
         &self,
         by: Affine,
         by_vertex: &[DVec3],
@@ -337,8 +337,8 @@ impl Solid {
     }
 
     /// The vector-Jacobian product of [`Solid::centred`], like that of
-    /// [`Solid::pull_placed`]: by vertices and landmarks.
-    pub fn pull_centred(
+    /// [`Solid::vjp_placed`]: by vertices and landmarks.
+    pub fn vjp_centred(
         &self,
         fit: bool,
         by_vertex: &[DVec3],
@@ -353,7 +353,7 @@ impl Solid {
             return (by_vertex.to_vec(), by_landmark.to_vec());
         }
         let PlacedGradient { linear, shift, mut vertices, landmarks } =
-            self.pull_placed(by, by_vertex, by_landmark);
+            self.vjp_placed(by, by_vertex, by_landmark);
         vertices.resize(self.vertex_count(), DVec3::ZERO);
         let by_centre = shift * -scale;
         // By half the longest edge, through the scale.

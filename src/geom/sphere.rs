@@ -52,7 +52,7 @@ fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
 
 /// From the derivatives of something by the vertices of a sphere of this radius to that
 /// by the radius.
-pub fn pull_sphere(radius: f64, mesh: &Mesh, by_vertex: &[DVec3]) -> f64 {
+pub fn vjp_sphere(radius: f64, mesh: &Mesh, by_vertex: &[DVec3]) -> f64 {
     mesh.positions.iter().zip(by_vertex).map(|(p, g)| p.as_dvec3().dot(*g)).sum::<f64>() / radius
 }
 

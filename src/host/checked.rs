@@ -42,8 +42,8 @@ impl<D: Distribution> Distribution for Checked<D> {
         is_stored_whitened() -> bool;
         sample_stored(rng: &mut Stream) -> Datum;
         gradient_stored(s: &Datum) -> Option<Gradient>;
-        realise(s: &Datum) -> Datum;
-        unrealise(value: &Datum) -> Option<Datum>;
+        from_noncentred(s: &Datum) -> Datum;
+        to_noncentred(value: &Datum) -> Option<Datum>;
         stored_support() -> Support;
         mean() -> Option<f64>;
         sd() -> Option<f64>;

@@ -5,7 +5,7 @@ use super::checked::Checked;
 use crate::dist::{Dist, Distribution};
 use crate::infer::{Kernel, KernelCall, KernelMaker};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Argument, Before, Builtin, Derivative, Foreign, State, Type};
+use crate::lang::builtins::{Args, Argument, Before, Builtin, Derivative, HostItem, State, Type};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Likelihood, Value};
 use crate::syntax::{is_keyword, is_name};
@@ -30,9 +30,9 @@ impl Entry {
         name: impl Into<Cow<'static, str>>,
         section: &'static str,
         returns: Type,
-        foreign: Foreign,
+        host: HostItem,
     ) -> Entry {
-        let (kind, derivative) = foreign.entry();
+        let (kind, derivative) = host.entry();
         let builtin = Builtin {
             name: name.into(),
             module: "".into(),
@@ -44,7 +44,7 @@ impl Entry {
             kind,
             scalar: None,
             derivative,
-            foreign: Some(foreign),
+            host: Some(host),
         };
         Entry { builtin, replaces: false, wrong: None }
     }
@@ -71,7 +71,7 @@ impl Entry {
         name: impl Into<Cow<'static, str>>,
         call: impl Fn(&Args) -> Result<Value, Fault> + Send + Sync + 'static,
     ) -> Entry {
-        Entry::new(name, HOST, Type::Any, Foreign::Function { call: Arc::new(call), pull: None })
+        Entry::new(name, HOST, Type::Any, HostItem::Function { call: Arc::new(call), vjp: None })
     }
 
     /// A function that can go on from an earlier evaluation, and what it then keeps for
@@ -127,7 +127,7 @@ impl Entry {
             let previous = before.and_then(Previous::new);
             call(a, previous).map(|(value, state)| (value, Arc::new(state) as State))
         };
-        Entry::new(name, HOST, Type::Any, Foreign::Incremental { call: Arc::new(call), pull: None })
+        Entry::new(name, HOST, Type::Any, HostItem::Incremental { call: Arc::new(call), vjp: None })
     }
 
     /// A family of distributions: from its parameters to one of them. A parameter outside
@@ -141,12 +141,12 @@ impl Entry {
         make: impl Fn(&Args) -> Result<D, Fault> + Send + Sync + 'static,
     ) -> Entry {
         let make = move |a: &Args| make(a).map(|d| Dist::Custom(Arc::new(Checked(d))));
-        Entry::new(name, "Distributions", Type::Dist, Foreign::Family(Arc::new(make)))
+        Entry::new(name, "Distributions", Type::Dist, HostItem::Family(Arc::new(make)))
     }
 
     /// A family of likelihoods: from its arguments to one of them, which scores what is
     /// observed. A comparator is one whose argument is a view (see
-    /// [`Seen`](crate::host::Seen)).
+    /// [`SceneView`](crate::host::SceneView)).
     ///
     /// [`Likelihood::gradient`] is a list: the adjoint of each argument in turn.
     pub fn likelihood<L: Likelihood + 'static>(
@@ -154,7 +154,7 @@ impl Entry {
         make: impl Fn(&Args) -> Result<L, Fault> + Send + Sync + 'static,
     ) -> Entry {
         let make = move |a: &Args| make(a).map(|l| Value::Likelihood(Arc::new(l)));
-        Entry::new(name, "Comparing", Type::Likelihood, Foreign::Likelihood(Arc::new(make)))
+        Entry::new(name, "Comparing", Type::Likelihood, HostItem::Likelihood(Arc::new(make)))
     }
 
     /// A kernel for `infer` blocks: from the call as written to what moves the trace.
@@ -164,7 +164,7 @@ impl Entry {
         make: impl Fn(&mut KernelCall) -> Result<K, Fault> + Send + Sync + 'static,
     ) -> Entry {
         let maker = KernelMaker::new(move |call| Ok(Box::new(make(call)?)));
-        Entry::new(name, "Kernels", Type::Kernel, Foreign::Kernel(Arc::new(maker)))
+        Entry::new(name, "Kernels", Type::Kernel, HostItem::Kernel(Arc::new(maker)))
     }
 
     /// One more argument, which must be given.
@@ -240,16 +240,16 @@ impl Entry {
         mut self,
         product: impl Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync + 'static,
     ) -> Entry {
-        match &mut self.builtin.foreign {
-            Some(Foreign::Function { pull, .. } | Foreign::Incremental { pull, .. }) => {
-                *pull = Some(Arc::new(product))
+        match &mut self.builtin.host {
+            Some(HostItem::Function { vjp, .. } | HostItem::Incremental { vjp, .. }) => {
+                *vjp = Some(Arc::new(product))
             }
             _ => self.wrong = Some(
                 "only functions take a gradient; distributions and likelihoods define their own"
                     .into(),
             ),
         }
-        if let Some(f) = &self.builtin.foreign {
+        if let Some(f) = &self.builtin.host {
             self.builtin.derivative = f.entry().1;
         }
         self
@@ -258,8 +258,8 @@ impl Entry {
     /// Its derivative is zero wherever there is one: what counts, compares or rounds.
     #[must_use]
     pub fn flat(mut self) -> Entry {
-        match &self.builtin.foreign {
-            Some(Foreign::Function { .. } | Foreign::Incremental { .. }) => {
+        match &self.builtin.host {
+            Some(HostItem::Function { .. } | HostItem::Incremental { .. }) => {
                 self.builtin.derivative = Derivative::Zero
             }
             _ => self.wrong = Some("only functions can be flat".into()),

@@ -33,7 +33,7 @@
 mod checked;
 mod entry;
 mod previous;
-mod seen;
+mod scene_view;
 
 #[doc(inline)]
 pub use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
@@ -49,7 +49,7 @@ pub use crate::lang::error::{Fault, FaultKind};
 pub use crate::lang::value::{Likelihood, Located, Object};
 pub use entry::Entry;
 pub use previous::Previous;
-pub use seen::Seen;
+pub use scene_view::SceneView;
 
 use crate::Error;
 use crate::diag::{Diagnostic, Severity, SourceMap};

@@ -1,7 +1,8 @@
 //! The best state of each chain so far, warm-up included: what there is to show of a run,
 //! while it goes on and when it has ended.
 
-use super::plan::{Progress, Watch};
+use super::callback::Callback;
+use super::plan::Progress;
 use super::state::{StateError, pack, unpack};
 use crate::trace::{Constraint, Draws, Trace};
 use serde::{Deserialize, Serialize};
@@ -78,7 +79,7 @@ impl BestSoFar {
     }
 }
 
-impl Watch for BestSoFar {
+impl Callback for BestSoFar {
     fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws) {
         self.look(chain, draws.step, trace);
     }
@@ -114,7 +115,7 @@ mod tests {
         )
         .unwrap();
         let best = Arc::new(BestSoFar::new(2, &Arc::default()));
-        let options = RunOptions { watch: Some(best.clone()), seed: 3, ..RunOptions::default() };
+        let options = RunOptions { callback: Some(best.clone()), seed: 3, ..RunOptions::default() };
         let posterior = model.run(&options, 2, 1).unwrap();
         let drawn = posterior.scalars().into_iter().find(|q| q.0 == "log_joint").unwrap().1;
         let state = best.state().unwrap();

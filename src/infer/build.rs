@@ -1,16 +1,16 @@
 //! From the calls people write in inference blocks to kernels.
 
-use super::expr::{Scope, evaluate};
-use super::foreign::build_foreign;
+use super::expr::{PlanEnv, evaluate};
+use super::host_kernel::build_host_kernel;
 use super::kernel::{self, Kernel};
 use super::kernels::{
     Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Modes, Nuts, Optimize,
-    Own, Slice, Smc, Temper,
+    ProgramKernel, Slice, Smc, Temper,
 };
 use super::plan::banks::neighbours;
 use super::plan::{RunOptions, argument, call};
 use super::selection::{fail, scope, selector};
-use crate::lang::builtins::Foreign;
+use crate::lang::builtins::HostItem;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::syntax::ast::{Address, Arg, Expr, ExprKind, KernelDecl, Key, Param};
@@ -34,7 +34,7 @@ pub(super) fn build(
     e: &Expr,
     frozen: &Selector,
     options: &RunOptions,
-    env: &mut Scope,
+    env: &mut PlanEnv,
 ) -> Result<Built, Box<RunError>> {
     let Some((name, args)) = call(e) else {
         return Err(fail(e.span, "expected a kernel, such as mh(one(@**))".into()));
@@ -42,15 +42,15 @@ pub(super) fn build(
     if let Some(k) = env.code.kernels.iter().find(|k| &*k.name.node == name) {
         let arguments = arguments(k, args, e.span, env)?;
         let signature = format!("{name}{arguments:?}");
-        let kernel = Own::new(Arc::clone(env.code), k.clone(), arguments, env.started);
+        let kernel = ProgramKernel::new(Arc::clone(env.code), k.clone(), arguments, env.started);
         return Ok(Built { kernel: Box::new(kernel), signature });
     }
     let builtins = Arc::clone(&env.code.builtins);
     let known = builtins.find("", name).map(|i| builtins.get(i));
     if let Some(b) = known
-        && let Some(Foreign::Kernel(maker)) = &b.foreign
+        && let Some(HostItem::Kernel(maker)) = &b.host
     {
-        return build_foreign(e, (b, maker), args, frozen, options, env);
+        return build_host_kernel(e, (b, maker), args, frozen, options, env);
     }
     if known.is_some_and(|b| b.is_planned()) {
         let mut e =
@@ -148,7 +148,8 @@ pub(super) fn build(
             let keep = whole(argument(args, 2, "keep"), "keep", 16, 1, 1000, env)?;
             let steps = whole(argument(args, 3, "steps"), "steps", 60, 1, 1_000_000, env)?;
             let first = argument(args, 4, "first").map(|e| self::scope(e, env)).transpose()?;
-            let first = first.map(|s| kernel::Scope { selector: without(s.selector, frozen), ..s });
+            let first =
+                first.map(|s| kernel::SiteSelection { selector: without(s.selector, frozen), ..s });
             let coarse =
                 argument(args, 5, "at").map_or(Ok(Selector::Nothing), |e| selector(e, env))?;
             Box::new(
@@ -176,7 +177,7 @@ fn marginal(
     args: &[Arg],
     place: usize,
     frozen: &Selector,
-    env: &mut Scope,
+    env: &mut PlanEnv,
 ) -> Result<Selector, Box<RunError>> {
     let Some(e) = argument(args, place, "marginal") else { return Ok(Selector::Nothing) };
     Ok(without(selector(e, env)?, frozen))
@@ -190,7 +191,7 @@ pub(super) fn arguments(
     k: &KernelDecl,
     args: &[Arg],
     call: Span,
-    env: &mut Scope,
+    env: &mut PlanEnv,
 ) -> Result<Vec<(Arc<str>, Value)>, Box<RunError>> {
     let one = |(i, p): (usize, &Param)| {
         let given = argument(args, i, &p.name.node).or(p.default.as_ref());
@@ -206,7 +207,7 @@ fn positive(
     e: Option<&Expr>,
     kernel: &str,
     name: &str,
-    env: &mut Scope,
+    env: &mut PlanEnv,
 ) -> Result<Option<f64>, Box<RunError>> {
     let Some(e) = e else { return Ok(None) };
     match evaluate(e, env)? {
@@ -216,7 +217,7 @@ fn positive(
 }
 
 /// A switch that a kernel takes besides its selection; off unless given.
-fn truth(e: Option<&Expr>, name: &str, env: &mut Scope) -> Result<bool, Box<RunError>> {
+fn truth(e: Option<&Expr>, name: &str, env: &mut PlanEnv) -> Result<bool, Box<RunError>> {
     let Some(e) = e else { return Ok(false) };
     match evaluate(e, env)? {
         Value::Bool(b) => Ok(b),
@@ -231,7 +232,7 @@ fn whole(
     default: u32,
     least: u32,
     most: u32,
-    env: &mut Scope,
+    env: &mut PlanEnv,
 ) -> Result<u32, Box<RunError>> {
     let Some(e) = e else { return Ok(default) };
     match evaluate(e, env)? {

@@ -1,8 +1,8 @@
 //! What chains that do not agree say of the evidence of where each of them is: gathered
 //! draw by draw.
 
+use super::callback::Callback;
 use super::diagnostics::{Clouds, LogEvidence, log_density, log_evidence, shares};
-use super::plan::Watch;
 use super::state::{StateError, pack, unpack};
 use crate::trace::{Draws, Trace};
 use rustc_hash::FxHasher;
@@ -108,7 +108,7 @@ fn free(trace: &Trace) -> Option<(u64, Vec<f64>, f64)> {
     (y.len() <= MOST.0).then(|| (key.finish(), y, log_density))
 }
 
-impl Watch for Evidence {
+impl Callback for Evidence {
     fn draw(&self, chain: u32, trace: &mut Trace, _: Draws) {
         let Some(cell) = self.0.get(chain as usize) else { return };
         let mut chain = cell.lock().unwrap_or_else(PoisonError::into_inner);
@@ -158,7 +158,7 @@ mod tests {
         .unwrap();
         let evidence = Arc::new(Evidence::new(6));
         let options =
-            RunOptions { watch: Some(evidence.clone()), seed: 5, ..RunOptions::default() };
+            RunOptions { callback: Some(evidence.clone()), seed: 5, ..RunOptions::default() };
         let posterior = model.run(&options, 6, 2).unwrap();
         let far = posterior.quantity("far").unwrap();
         let of = |v: f64| (0..6).filter(|c| far.chains[*c][0] == v).collect::<Vec<_>>();

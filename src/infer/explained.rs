@@ -1,7 +1,7 @@
 //! What a plan says of a model's choices: which of its kernels select them. Nothing is
 //! run.
 
-use super::expr::Scope;
+use super::expr::PlanEnv;
 use super::plan::call;
 use super::selection::{selector, target};
 use crate::lang::code::Code;
@@ -23,7 +23,7 @@ pub struct Selecting {
 /// The kernels of a plan, those of warm-up too, each once, in the order of the plan.
 pub fn selecting(code: &Arc<Code>, plan: &[KStmt], trace: &mut Trace) -> Vec<Selecting> {
     let mut found = Vec::new();
-    let env = Scope {
+    let env = PlanEnv {
         code,
         trace,
         variables: &[],
@@ -38,7 +38,7 @@ pub fn selecting(code: &Arc<Code>, plan: &[KStmt], trace: &mut Trace) -> Vec<Sel
 
 struct Reader<'a, 'e> {
     code: &'a Code,
-    env: Scope<'e>,
+    env: PlanEnv<'e>,
     found: &'a mut Vec<Selecting>,
     /// Declared kernels being read: one may call itself.
     within: Vec<Arc<str>>,

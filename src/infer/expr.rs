@@ -13,7 +13,7 @@ use crate::trace::{Address, Draws, Trace};
 use std::sync::Arc;
 
 /// What an expression can see.
-pub(crate) struct Scope<'a> {
+pub(crate) struct PlanEnv<'a> {
     pub code: &'a Arc<Code>,
     pub trace: &'a mut Trace,
     /// The variables of the block, innermost last.
@@ -30,7 +30,7 @@ pub(crate) struct Scope<'a> {
 ///
 /// # Errors
 /// What goes wrong, at its place.
-pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>> {
+pub(crate) fn evaluate(e: &Expr, env: &mut PlanEnv) -> Result<Value, Box<RunError>> {
     match &e.kind {
         ExprKind::Num(x) => Ok(Value::Num(*x)),
         ExprKind::Bool(b) => Ok(Value::Bool(*b)),
@@ -133,7 +133,7 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
     }
 }
 
-fn variable(name: &Arc<str>, e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>> {
+fn variable(name: &Arc<str>, e: &Expr, env: &mut PlanEnv) -> Result<Value, Box<RunError>> {
     if let Some((_, v)) = env.variables.iter().rev().find(|(n, _)| n == name) {
         return Ok(v.clone());
     }
@@ -148,12 +148,12 @@ fn variable(name: &Arc<str>, e: &Expr, env: &mut Scope) -> Result<Value, Box<Run
     }
 }
 
-fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value, Box<RunError>> {
+fn builtin(name: &str, values: &[&Value], e: &Expr, env: &PlanEnv) -> Result<Value, Box<RunError>> {
     apply(known(name, e, env)?, values, e)
 }
 
 /// A builtin by its name.
-fn known<'a>(name: &str, e: &Expr, env: &'a Scope) -> Result<&'a Builtin, Box<RunError>> {
+fn known<'a>(name: &str, e: &Expr, env: &'a PlanEnv) -> Result<&'a Builtin, Box<RunError>> {
     let builtins = &env.code.builtins;
     let found = builtins.find("", name).map(|i| builtins.get(i));
     found.ok_or_else(|| fail(e.span, format!("unknown name `{name}`")))

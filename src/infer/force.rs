@@ -20,8 +20,11 @@ pub(crate) fn apply(
     options: &RunOptions,
     chain: u32,
 ) -> Result<(), Box<RunError>> {
-    let draws =
-        Draws { key: StreamKey::new(options.seed, chain, Purpose::START), step: u64::MAX, lane: 0 };
+    let draws = Draws {
+        key: StreamKey::new(options.seed, chain, Purpose::START),
+        step: u64::MAX,
+        substream: 0,
+    };
     put(&code.forces, trace, draws)
 }
 
@@ -49,7 +52,7 @@ pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(
         };
         let dist = trace.dist(target);
         let datum = value.to_datum().and_then(|d| match &dist {
-            Some(dist) if dist.is_stored_whitened() => dist.unrealise(&d),
+            Some(dist) if dist.is_stored_whitened() => dist.to_noncentred(&d),
             _ => Some(d),
         });
         let Some(datum) = datum else {

@@ -1,10 +1,10 @@
 //! Starts: traces of positive probability, and what to say when there is none.
 
 use super::build::arguments;
-use super::expr::{Scope, evaluate};
-use super::kernel::At;
-use super::kernels::Own;
-use super::kernels::own::proposes;
+use super::expr::{PlanEnv, evaluate};
+use super::kernel::StepContext;
+use super::kernels::ProgramKernel;
+use super::kernels::program_kernel::proposes;
 use super::plan::{ChainError, RunOptions, argument, call};
 use super::selection::fail;
 use crate::lang::address::Address;
@@ -100,7 +100,7 @@ pub(crate) fn attempts<T>(
 /// Draws from the prior and keeps nothing, for what is worked out once and kept by the
 /// data: a failure is for the chains to tell.
 pub(super) fn draw_once(code: &Arc<Code>, seed: u64, limits: Limits) {
-    let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: 0, lane: 0 };
+    let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: 0, substream: 0 };
     let _ = Trace::simulate(Arc::clone(code), draws, limits);
 }
 
@@ -125,16 +125,16 @@ pub(crate) fn starts_from(
     code: &Arc<Code>,
     (seed, chain): (u64, u32),
     how: Start,
-    from: Option<&Own>,
+    from: Option<&ProgramKernel>,
     limits: Limits,
 ) -> Result<Vec<Trace>, StartError> {
     let (key, mut begun) = (StreamKey::new(seed, chain, Purpose::START), Instant::now());
     let drawn = |attempt: u64| -> TraceResult<Option<Trace>> {
-        let draws = Draws { key, step: attempt, lane: 0 };
+        let draws = Draws { key, step: attempt, substream: 0 };
         let mut trace = Trace::simulate(Arc::clone(code), draws, limits.clone())?;
         let Some(from) = from else { return Ok(Some(trace)) };
         // Steps of the plan count from 0: this is apart from all of them.
-        let at = At::new(seed, chain, attempt).within(u64::MAX - 1);
+        let at = StepContext::new(seed, chain, attempt).within(u64::MAX - 1);
         Ok(from.leap(&mut trace, &at)?.map(|()| trace))
     };
     let mut best: Vec<Trace> = Vec::new();
@@ -201,7 +201,7 @@ pub(crate) fn start_of(
     code: &Arc<Code>,
     plan: &[KStmt],
     options: &RunOptions,
-) -> Result<(Start, Option<Own>), ChainError> {
+) -> Result<(Start, Option<ProgramKernel>), ChainError> {
     let init = plan.iter().find_map(|s| match &s.kind {
         KStmtKind::Expr(e) => {
             call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args))
@@ -214,7 +214,7 @@ pub(crate) fn start_of(
     let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
     let mut count = |e: &Expr| -> Result<u64, ChainError> {
         let (draws, started) = (Draws::default(), Instant::now());
-        let mut env = Scope {
+        let mut env = PlanEnv {
             code,
             trace: &mut trace,
             variables: &[],
@@ -248,7 +248,7 @@ pub(crate) fn start_of(
 }
 
 /// The kernel of the program that a start is proposed by.
-fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<Own, ChainError> {
+fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<ProgramKernel, ChainError> {
     let wrong = || {
         let mut wrong = fail(e.span, "`from` takes a kernel declared in the program".into());
         wrong.hint =
@@ -265,7 +265,7 @@ fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<Own, ChainErr
     let started = Instant::now();
     let (draws, variables) = (Draws::default(), &[]);
     let mut env =
-        Scope { code, trace: &mut trace, variables, draws, started, steps: 0, moved: None };
+        PlanEnv { code, trace: &mut trace, variables, draws, started, steps: 0, moved: None };
     let arguments = arguments(declared, args, e.span, &mut env)?;
-    Ok(Own::new(Arc::clone(code), declared.clone(), arguments, started))
+    Ok(ProgramKernel::new(Arc::clone(code), declared.clone(), arguments, started))
 }

@@ -1,7 +1,7 @@
 //! Whole states of chains at some of their draws: what any picture, mesh or quantity can
 //! be made from when a run has ended.
 
-use super::plan::Watch;
+use super::callback::Callback;
 use super::state::{StateError, pack, unpack};
 use crate::trace::{Draws, SavedTrace, Trace};
 use serde::{Deserialize, Serialize};
@@ -54,7 +54,7 @@ impl KeptTraces {
     }
 }
 
-impl Watch for KeptTraces {
+impl Callback for KeptTraces {
     fn draw(&self, chain: u32, trace: &mut Trace, _draws: Draws) {
         let Some(cell) = self.chains.get(chain as usize).filter(|_| self.room > 0) else { return };
         let mut c = cell.lock().unwrap_or_else(PoisonError::into_inner);
@@ -101,7 +101,7 @@ mod tests {
         )
         .unwrap();
         let kept = Arc::new(KeptTraces::new(2, 20, model.hash()));
-        let options = RunOptions { watch: Some(kept.clone()), seed: 3, ..RunOptions::default() };
+        let options = RunOptions { callback: Some(kept.clone()), seed: 3, ..RunOptions::default() };
         let posterior = model.run(&options, 2, 1).unwrap();
         let all = kept.all();
         assert!((10..=20).contains(&all.len()) && all.iter().filter(|k| k.chain == 2).count() >= 5);

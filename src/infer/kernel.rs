@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// Where in a chain a step is, and what randomness it may use.
 #[derive(Clone, Copy, Debug)]
-pub struct At {
+pub struct StepContext {
     /// The seed of the run.
     pub seed: u64,
     /// The chain.
@@ -23,27 +23,27 @@ pub struct At {
     pub power: f64,
     /// Which member of a sweep a step is for (see [`Kernel::sweep`]).
     pub member: usize,
-    /// Tells steps within a step apart (see [`At::within`]); 0 for the step itself.
+    /// Tells steps within a step apart (see [`StepContext::within`]); 0 for the step itself.
     pub part: u64,
 }
 
-impl At {
+impl StepContext {
     /// A step of the posterior itself, outside of warm-up.
     pub fn new(seed: u64, chain: u32, step: u64) -> Self {
-        At { seed, chain, step, adapting: false, power: 1.0, member: 0, part: 0 }
+        StepContext { seed, chain, step, adapting: false, power: 1.0, member: 0, part: 0 }
     }
 
-    /// The randomness of values drawn inside the trace; `lane` tells alternatives of one
+    /// The randomness of values drawn inside the trace; `substream` tells alternatives of one
     /// step apart.
-    pub fn draws(&self, lane: u64) -> Draws {
+    pub fn draws(&self, substream: u64) -> Draws {
         let key = StreamKey::new(self.seed, self.chain, Purpose::VALUES);
-        let lane = if self.part == 0 { lane } else { mix(self.part, lane) };
-        Draws { key, step: self.step, lane }
+        let substream = if self.part == 0 { substream } else { mix(self.part, substream) };
+        Draws { key, step: self.step, substream }
     }
 
     /// The place of a step that is part `i` of this one, with randomness of its own.
-    pub fn within(&self, i: u64) -> At {
-        At { part: mix(self.part, i + 1), member: 0, ..*self }
+    pub fn within(&self, i: u64) -> StepContext {
+        StepContext { part: mix(self.part, i + 1), member: 0, ..*self }
     }
 
     /// The kernel's own randomness.
@@ -107,7 +107,7 @@ pub trait Kernel: Send {
     fn name(&self) -> String;
 
     /// Begins a sweep, if the kernel goes through its choices in turn: how many steps it
-    /// has. [`At::member`] tells which of them a step is.
+    /// has. [`StepContext::member`] tells which of them a step is.
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
         let _ = trace;
         None
@@ -146,7 +146,7 @@ pub trait Kernel: Send {
     ///
     /// # Errors
     /// Errors of the program that are not a matter of the proposed values.
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome>;
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome>;
 }
 
 /// One step of a kernel inside another: a whole sweep where it goes through its choices
@@ -154,12 +154,12 @@ pub trait Kernel: Send {
 pub(crate) fn inner_step(
     kernel: &mut dyn Kernel,
     trace: &mut Trace,
-    at: &At,
+    at: &StepContext,
 ) -> TraceResult<Outcome> {
     let Some(members) = kernel.sweep(trace) else { return kernel.step(trace, at) };
     let mut all = Outcome::default();
     for member in 0..members {
-        all.add(kernel.step(trace, &At { member, ..at.within(member as u64) })?);
+        all.add(kernel.step(trace, &StepContext { member, ..at.within(member as u64) })?);
     }
     Ok(all)
 }
@@ -180,25 +180,25 @@ pub enum Pick {
 
 /// What a kernel works on: a selection, as a whole or one member at a time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scope {
+pub struct SiteSelection {
     /// The choices.
     pub selector: Selector,
     /// Which of them a step moves.
     pub pick: Pick,
 }
 
-impl Scope {
+impl SiteSelection {
     /// One or each of the choices at a time: one, if nothing is said.
     pub(crate) fn single(self) -> Self {
         let pick = if self.pick == Pick::All { Pick::One } else { self.pick };
-        Scope { pick, ..self }
+        SiteSelection { pick, ..self }
     }
 }
 
 /// A scope registered with a trace.
 #[derive(Clone, Debug)]
 pub(crate) struct Registered {
-    pub scope: Scope,
+    pub scope: SiteSelection,
     /// The selection, and the trace it is registered with.
     selection: Option<(Arc<()>, Selection)>,
     sweep: Option<Sweep>,
@@ -212,13 +212,13 @@ struct Sweep {
 }
 
 impl Registered {
-    pub fn new(scope: Scope) -> Self {
+    pub fn new(scope: SiteSelection) -> Self {
         Registered { scope, selection: None, sweep: None }
     }
 
     /// No choices.
     pub fn nothing() -> Self {
-        Registered::new(Scope { selector: Selector::Nothing, pick: Pick::All })
+        Registered::new(SiteSelection { selector: Selector::Nothing, pick: Pick::All })
     }
 
     /// The selection in this kernel's trace.
@@ -252,7 +252,7 @@ impl Registered {
     pub fn pick(
         &mut self,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
         rng: &mut Stream,
     ) -> Option<(Target, usize)> {
         if self.scope.pick == Pick::Each {
@@ -268,7 +268,12 @@ impl Registered {
 
     /// The members a step works on, and what picking them costs: the log of the number of
     /// ways.
-    pub fn members(&mut self, trace: &mut Trace, at: &At, rng: &mut Stream) -> (Vec<Target>, f64) {
+    pub fn members(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        rng: &mut Stream,
+    ) -> (Vec<Target>, f64) {
         if self.scope.pick == Pick::All {
             let selection = self.selection(trace);
             return (trace.targets(selection).to_vec(), 0.0);
@@ -281,7 +286,7 @@ impl Registered {
 
     /// What picking the same members costs in the proposed state: single-site picking
     /// pays the ratio of the numbers, a sweep cannot go on among other members.
-    pub fn ways_back(&self, trace: &Trace) -> f64 {
+    pub fn reverse_selection(&self, trace: &Trace) -> f64 {
         let Some((_, selection)) = self.selection else { return 0.0 };
         match (self.scope.pick, &self.sweep) {
             (Pick::One, _) => libm::log(trace.targets(selection).len() as f64),
@@ -301,11 +306,11 @@ pub(crate) fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
 
 /// Keeps or undoes the pending proposal. NaN is a rejection.
 pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
-    settle(trace, if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio }, rng)
+    accept_or_reject(trace, if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio }, rng)
 }
 
 /// The same for kernels that never ask about NaN.
-pub(crate) fn settle(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
+pub(crate) fn accept_or_reject(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     let accepted = accepts(log_ratio, rng);
     if accepted {
         trace.commit()

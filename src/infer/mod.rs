@@ -7,6 +7,7 @@ mod best;
 mod build;
 #[doc(hidden)]
 pub mod calibration;
+mod callback;
 mod chains;
 mod columns;
 mod default_plan;
@@ -17,13 +18,12 @@ mod evidence;
 mod explained;
 mod expr;
 mod force;
-mod foreign;
+mod host_kernel;
 mod init;
 mod kept;
 mod kernel;
 mod kernels;
 mod neighbours;
-mod observer;
 mod plain;
 mod plan;
 mod population;
@@ -35,11 +35,11 @@ mod selection;
 mod sites;
 mod state;
 mod structure;
-mod watches;
 
 use crate::platform::threads as parallel;
 pub(crate) use crate::platform::threads::in_parallel;
 pub use best::{BestSoFar, BestState};
+pub use callback::{Callback, Callbacks};
 #[doc(hidden)]
 pub use chains::run_chains;
 #[doc(hidden)]
@@ -48,15 +48,15 @@ pub use default_plan::default_plan;
 pub use evidence::{Evidence, Weighed};
 pub use explained::{Selecting, selecting};
 pub(crate) use force::put as force;
-pub use foreign::KernelCall;
-pub(crate) use foreign::KernelMaker;
+pub use host_kernel::KernelCall;
+pub(crate) use host_kernel::KernelMaker;
 pub(crate) use init::attempts;
 #[doc(hidden)]
 pub use init::{Start, StartError, starts};
 #[doc(hidden)]
 pub use kept::{KeptTrace, KeptTraces};
 pub(crate) use kernel::accepts;
-pub use kernel::{At, Kernel, Outcome, Pick, Scope, decide, recoverable};
+pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
 #[doc(hidden)]
 pub use kernels::{
     Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper,
@@ -64,15 +64,12 @@ pub use kernels::{
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
 #[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
-pub use observer::Observer;
 #[doc(hidden)]
 pub use plan::run_from;
-pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch};
+pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions};
 #[doc(hidden)]
 pub use selection::selected;
 pub use state::StateError;
 pub(crate) use state::{pack, unpack};
 #[doc(hidden)]
 pub use structure::stuck_structure;
-#[doc(hidden)]
-pub use watches::Watches;

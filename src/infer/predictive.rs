@@ -8,8 +8,9 @@
 //! fitness" (1996). Not here: judging.
 
 use super::calibration::simulate::{replicating, state};
+use super::callback::Callback;
 use super::parallel::in_parallel;
-use super::plan::{ChainError, Watch};
+use super::plan::ChainError;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
@@ -176,7 +177,7 @@ impl Predictive {
     }
 }
 
-impl Watch for Predictive {
+impl Callback for Predictive {
     fn draw(&self, chain: u32, trace: &mut Trace, _: Draws) {
         let Some(at) = self.chains.get(chain as usize) else { return };
         let mut at = at.lock().unwrap_or_else(PoisonError::into_inner);
@@ -227,9 +228,12 @@ mod tests {
         assert_eq!(from_prior[0].silent, [("@soft".to_owned(), "a factor".to_owned())]);
         let (mean, variance) = moments(&from_prior);
         assert!(mean.abs() < 0.2 && (variance - 5.0).abs() < 0.6, "{mean} {variance}");
-        let watch = Predictive::new(1, 3);
-        let options =
-            RunOptions { seed: 3, watch: Some(Arc::new(watch.clone())), ..RunOptions::default() };
+        let callback = Predictive::new(1, 3);
+        let options = RunOptions {
+            seed: 3,
+            callback: Some(Arc::new(callback.clone())),
+            ..RunOptions::default()
+        };
         let (plan, _) = model.plan().unwrap();
         let done = run_chains(
             model.code(),
@@ -240,7 +244,7 @@ mod tests {
             vec![Box::new(Discard)],
         );
         assert!(done[0].is_ok());
-        let draws = watch.draws().unwrap().concat();
+        let draws = callback.draws().unwrap().concat();
         let (mean, variance) = moments(&draws);
         assert!(
             draws.len() == 1000 && (mean - 1.44).abs() < 0.2 && (variance - 1.16).abs() < 0.3,

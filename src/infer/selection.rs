@@ -1,6 +1,6 @@
 //! From the selections people write to [`Selector`]s.
 
-use super::expr::{Scope, evaluate};
+use super::expr::{PlanEnv, evaluate};
 use super::kernel::{self, Pick};
 use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::key::Key;
@@ -15,13 +15,13 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// If the expression is not a selection, or a computed key fails.
-pub(crate) fn scope(e: &Expr, env: &mut Scope) -> Result<kernel::Scope, Box<RunError>> {
+pub(crate) fn scope(e: &Expr, env: &mut PlanEnv) -> Result<kernel::SiteSelection, Box<RunError>> {
     if let Some((name, [arg])) = super::plan::call(e)
         && let Some(pick) = pick(name)
     {
-        return Ok(kernel::Scope { selector: selector(&arg.value, env)?, pick });
+        return Ok(kernel::SiteSelection { selector: selector(&arg.value, env)?, pick });
     }
-    Ok(kernel::Scope { selector: selector(e, env)?, pick: Pick::All })
+    Ok(kernel::SiteSelection { selector: selector(e, env)?, pick: Pick::All })
 }
 
 /// Whether an argument is a selection, with `one(…)` or `each(…)` around it or not.
@@ -53,7 +53,7 @@ pub fn selected(e: &Expr, trace: &mut Trace, draws: Draws) -> Result<Selector, B
     let started = crate::platform::clock::Instant::now();
     selector(
         e,
-        &mut Scope { code: &code, trace, variables: &[], draws, started, steps: 0, moved: None },
+        &mut PlanEnv { code: &code, trace, variables: &[], draws, started, steps: 0, moved: None },
     )
 }
 
@@ -61,7 +61,7 @@ pub fn selected(e: &Expr, trace: &mut Trace, draws: Draws) -> Result<Selector, B
 ///
 /// # Errors
 /// As [`scope`].
-pub(crate) fn selector(e: &Expr, env: &mut Scope) -> Result<Selector, Box<RunError>> {
+pub(crate) fn selector(e: &Expr, env: &mut PlanEnv) -> Result<Selector, Box<RunError>> {
     match &e.kind {
         ExprKind::Address(a) => pattern(a, env).map(|p| match &p.segments[..] {
             [PatternSegment::Deep] => Selector::All,
@@ -107,7 +107,7 @@ fn literal_key(text: &str) -> Key {
 ///
 /// # Errors
 /// If a computed key fails or is not a key.
-pub(crate) fn pattern(a: &ast::Address, env: &mut Scope) -> Result<Pattern, Box<RunError>> {
+pub(crate) fn pattern(a: &ast::Address, env: &mut PlanEnv) -> Result<Pattern, Box<RunError>> {
     let mut segments = Vec::with_capacity(a.segments.len());
     for s in &a.segments {
         let name = match &s.name {
@@ -142,7 +142,7 @@ pub(crate) fn pattern(a: &ast::Address, env: &mut Scope) -> Result<Pattern, Box<
 ///
 /// # Errors
 /// If it has wildcards, or a computed key fails or is not a key.
-pub(crate) fn address(e: &Expr, env: &mut Scope) -> Result<Address, Box<RunError>> {
+pub(crate) fn address(e: &Expr, env: &mut PlanEnv) -> Result<Address, Box<RunError>> {
     let one = || fail(e.span, "expected the address of a single choice, without wildcards".into());
     let ExprKind::Address(a) = &e.kind else { return Err(one()) };
     let mut segments = Vec::with_capacity(a.segments.len());

@@ -18,7 +18,7 @@ pub fn stuck_structure(state: &Trace, sites: &[SiteStats]) -> Vec<(String, f64)>
     for (site, rate) in sites.iter().filter_map(|s| Some((s, stuck(s)?))) {
         let trace = trace.get_or_insert_with(|| state.clone());
         let Some(target) = site.address.parse().ok().and_then(|a| trace.find(&a)) else { continue };
-        let reach = trace.reached_from(target);
+        let reach = trace.dependents(target);
         if reach.terms.iter().any(|t| t.effect == Effect::Structural) {
             found.push((site.address.clone(), rate));
         }

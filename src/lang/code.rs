@@ -6,7 +6,7 @@
 //! of their own. The trace instantiates a block as a frame of nodes, one node a slot, and
 //! evaluates a slot when something asks for it.
 
-pub use super::slots::{SlotFacts, Spread};
+pub use super::slots::{SlotFacts, StaticScaffold};
 
 use super::builtins::Table;
 use super::key::Key;

@@ -306,10 +306,10 @@ pub(crate) fn by_matrix(a: &Args, dist: &Dist, by_factor: &[f64]) -> Option<Adjo
     match dist {
         Dist::Gp(d) => {
             let cov = a.get(1).downcast::<CovarianceValue>()?;
-            Some(Adjoint::Array(d.pull_covariance(&cov.0, &a.array(2).ok()?, by_factor)?))
+            Some(Adjoint::Array(d.vjp_covariance(&cov.0, &a.array(2).ok()?, by_factor)?))
         }
         Dist::MvNormal(d) if !matches!(a.get(1), Value::Unit) => {
-            Some(rows(&d.pull_covariance(by_factor), 0.5))
+            Some(rows(&d.vjp_covariance(by_factor), 0.5))
         }
         Dist::MvNormal(_) | Dist::Wishart(_) => Some(rows(by_factor, 0.0)),
         _ => None,

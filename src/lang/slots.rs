@@ -3,7 +3,7 @@
 //! choice spreads.
 
 use super::code::{Block, Callee, Code, Eager, Op, Operand, Slot};
-use super::formula::Formula;
+use super::local_density::LocalDensity;
 use super::value::Value;
 
 /// What updates need to know of a slot.
@@ -24,16 +24,16 @@ pub struct SlotFacts {
     pub users: Box<[Slot]>,
     /// For a choice that only computations of its own block depend on: how its change
     /// spreads.
-    pub spread: Option<Spread>,
+    pub scaffold: Option<StaticScaffold>,
     /// For a choice or an element of an array: what another number there does to the
     /// scores of its block.
-    pub formula: Option<Box<Formula>>,
+    pub local_density: Option<Box<LocalDensity>>,
 }
 
 /// The part of a choice's scaffold that lies in its own block, where that is the same in
 /// every state.
 #[derive(Clone, Debug)]
-pub struct Spread {
+pub struct StaticScaffold {
     /// What depends on the choice, each after what it reads, up to and including
     /// observations and other choices.
     pub slots: Box<[Slot]>,
@@ -81,28 +81,28 @@ impl Code {
                     is_result: block.result == Some(Operand::Local(slot as Slot)),
                     reads: op.reads(),
                     users: users.into(),
-                    spread: None,
-                    formula: None,
+                    scaffold: None,
+                    local_density: None,
                 });
                 self.ops.push(op);
             }
             let (ops, slots) =
                 (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
-            let asked = super::spread::always_asked(ops, slots);
+            let asked = super::scaffold::always_asked(ops, slots);
             let found: Vec<_> = (0..slots.len() as Slot)
                 .filter(|s| matches!(ops[*s as usize], Op::Draw { .. } | Op::Index { .. }))
                 .map(|s| {
-                    let spread = if slots[s as usize].is_draw {
-                        super::spread::spread(ops, slots, &asked, s)
+                    let scaffold = if slots[s as usize].is_draw {
+                        super::scaffold::scaffold(ops, slots, &asked, s)
                     } else {
                         None
                     };
-                    (s, spread, Formula::new(ops, slots, s, &self.builtins).map(Box::new))
+                    (s, scaffold, LocalDensity::new(ops, slots, s, &self.builtins).map(Box::new))
                 })
                 .collect();
-            for (slot, spread, formula) in found {
+            for (slot, scaffold, local_density) in found {
                 let facts = &mut self.slots[block.first as usize + slot as usize];
-                (facts.spread, facts.formula) = (spread, formula);
+                (facts.scaffold, facts.local_density) = (scaffold, local_density);
             }
         }
     }

@@ -83,7 +83,7 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     }
     /// The adjoints of both sides of `self * other`; `None` where they are not known.
     #[doc(hidden)]
-    fn pull_product(&self, _other: &Value, _by: &Adjoint) -> Option<[Adjoint; 2]> {
+    fn vjp_product(&self, _other: &Value, _by: &Adjoint) -> Option<[Adjoint; 2]> {
         None
     }
     /// `self.name`, where the type has fields.

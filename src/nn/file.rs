@@ -4,7 +4,7 @@
 use super::NetworkError;
 use super::assemble::{Entry, Unfit};
 use super::flatbuffer::Table;
-use super::network::{Network, Step};
+use super::network::{Layer, Network};
 use super::schema::{code, field};
 use super::sparse;
 use half::slice::HalfFloatSliceExt;
@@ -45,8 +45,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
     };
     file.check(input)?;
 
-    let (mut steps, mut filled, mut constants) =
-        (Vec::<Step>::new(), HashSet::from([input]), HashMap::new());
+    let (mut layers, mut filled, mut constants) =
+        (Vec::<Layer>::new(), HashSet::from([input]), HashMap::new());
     let (mut computed, mut work) = (0usize, 0usize);
     for (index, table) in graph.tables(field::graph::OPERATORS)?.iter().enumerate() {
         let entry = file.entry(&codes, table)?;
@@ -82,16 +82,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
         if computed > MOST_COMPUTED || work > MOST_WORK {
             return Err(NetworkError::TooLarge("it needs too many operations".into()));
         }
-        steps.push(Step { operator, inputs, output: entry.output });
+        layers.push(Layer { operator, inputs, output: entry.output });
     }
     let outputs = graph.indices(field::graph::OUTPUTS)?;
     if outputs.is_empty() || outputs.iter().any(|o| !filled.contains(o)) {
         return Err(format("an output is never computed"));
     }
     let mut last = vec![0; file.shapes.len()];
-    steps.iter().enumerate().for_each(|(i, s)| s.inputs.iter().for_each(|t| last[*t] = i));
+    layers.iter().enumerate().for_each(|(i, s)| s.inputs.iter().for_each(|t| last[*t] = i));
     outputs.iter().for_each(|o| last[*o] = usize::MAX);
-    Ok(Network { steps, shapes: file.shapes, constants, input, outputs, last, work })
+    Ok(Network { layers, shapes: file.shapes, constants, input, outputs, last, work })
 }
 
 fn format(why: &str) -> NetworkError {

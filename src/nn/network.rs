@@ -7,7 +7,7 @@ use std::collections::HashMap;
 /// A network that was read from a file.
 #[derive(Debug)]
 pub struct Network {
-    pub(super) steps: Vec<Step>,
+    pub(super) layers: Vec<Layer>,
     /// By tensor.
     pub(super) shapes: Vec<Vec<usize>>,
     pub(super) constants: HashMap<usize, Vec<f32>>,
@@ -20,7 +20,7 @@ pub struct Network {
 
 /// An operator with the tensors that it reads and the one that it fills.
 #[derive(Debug)]
-pub(super) struct Step {
+pub(super) struct Layer {
     pub operator: Operator,
     pub inputs: Vec<usize>,
     pub output: usize,
@@ -65,17 +65,17 @@ impl Network {
         values[self.input] = Some(input);
         // Memory that no tensor needs any more.
         let mut free: Vec<Vec<f32>> = Vec::new();
-        for (i, step) in self.steps.iter().enumerate() {
-            let shape = &self.shapes[step.output];
+        for (i, layer) in self.layers.iter().enumerate() {
+            let shape = &self.shapes[layer.output];
             let mut out = reuse(&mut free, shape.iter().product());
             let tensor = |t: &usize| {
                 let values = values[*t].as_ref().or_else(|| self.constants.get(t));
                 Tensor { shape: &self.shapes[*t], values: values.map_or(&[], |v| v) }
             };
-            let inputs: Vec<Tensor> = step.inputs.iter().map(tensor).collect();
-            step.operator.run(&inputs, shape, &mut out);
-            values[step.output] = Some(out);
-            for t in step.inputs.iter().filter(|t| self.last[**t] == i) {
+            let inputs: Vec<Tensor> = layer.inputs.iter().map(tensor).collect();
+            layer.operator.run(&inputs, shape, &mut out);
+            values[layer.output] = Some(out);
+            for t in layer.inputs.iter().filter(|t| self.last[**t] == i) {
                 free.extend(values[*t].take());
             }
         }

@@ -9,11 +9,11 @@
 //! That rests on looks being monotone: what another mesh or a smaller depth range hides
 //! stays hidden with both, in `f64` too.
 
-mod mover;
-mod still;
+mod dynamic_mesh;
+mod static_layer;
 
-use self::mover::{Mover, Tools};
-use self::still::Still;
+use self::dynamic_mesh::{DynamicMesh, Tools};
+use self::static_layer::StaticLayer;
 use super::contours::Contours;
 use super::layers::{Layer, Sight, affine_bits, camera_bits};
 use super::raster::Area;
@@ -71,8 +71,8 @@ pub(super) struct Backdrop {
     camera: [u64; 17],
     lists: Vec<Known>,
     leaves: Vec<Leaf>,
-    movers: Vec<Mover>,
-    still: Option<Still>,
+    dynamic: Vec<DynamicMesh>,
+    static_layer: Option<StaticLayer>,
     depth: Vec<f32>,
     extent: f64,
     /// Drawings since most of it moved.
@@ -150,8 +150,8 @@ impl Backdrop {
             camera: camera_bits(camera),
             lists: Vec::new(),
             leaves: Vec::new(),
-            movers: Vec::new(),
-            still: None,
+            dynamic: Vec::new(),
+            static_layer: None,
             depth: Vec::new(),
             extent: 0.0,
             waited: 0,
@@ -172,7 +172,7 @@ impl Backdrop {
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<Change> {
         let count = solid.mesh_count();
         let changed = self.find_changed(solid);
-        if self.still.is_none() && changed.is_empty() {
+        if self.static_layer.is_none() && changed.is_empty() {
             // The same solid again, which was better drawn in another way.
             return None;
         }
@@ -182,13 +182,13 @@ impl Backdrop {
         }
         for (leaf, _) in &changed {
             if !std::mem::replace(&mut self.leaves[*leaf].moves, true) {
-                let at = self.movers.partition_point(|m| m.leaf < *leaf);
-                self.movers.insert(at, Mover::new(*leaf));
-                self.still = None;
+                let at = self.dynamic.partition_point(|m| m.leaf < *leaf);
+                self.dynamic.insert(at, DynamicMesh::new(*leaf));
+                self.static_layer = None;
             }
         }
-        if 2 * self.movers.len() > count {
-            self.still = None;
+        if 2 * self.dynamic.len() > count {
+            self.static_layer = None;
             self.waited += 1;
             if self.waited > PATIENCE {
                 self.forget();
@@ -196,38 +196,47 @@ impl Backdrop {
             return None;
         }
         self.waited = 0;
-        let known = self.still.is_some();
+        let known = self.static_layer.is_some();
         if !known && (self.refused == Some(count) || self.build(solid, camera, tools).is_none()) {
             self.refused = Some(count);
             return None;
         }
         self.areas.clear();
-        let only = self.movers.len() == 1;
+        let only = self.dynamic.len() == 1;
         for (leaf, instance) in &changed {
-            let Some(mover) = self.movers.iter_mut().find(|m| m.leaf == *leaf) else { continue };
-            self.areas.push(mover.now.layer.area);
-            mover.move_to(instance, camera, tools, self.still.as_ref().filter(|_| known), only);
-            self.areas.push(mover.now.layer.area);
+            let Some(dynamic_mesh) = self.dynamic.iter_mut().find(|m| m.leaf == *leaf) else {
+                continue;
+            };
+            self.areas.push(dynamic_mesh.now.layer.area);
+            dynamic_mesh.move_to(
+                instance,
+                camera,
+                tools,
+                self.static_layer.as_ref().filter(|_| known),
+                only,
+            );
+            self.areas.push(dynamic_mesh.now.layer.area);
         }
         if known && !changed.is_empty() {
             work::count(|work| work.kept += (count - changed.len()) as u64);
         }
-        let still = self.still.as_mut()?;
-        let range = self.movers.iter().fold(still.range, |range, m| range.and(&m.now.layer.range));
+        let static_layer = self.static_layer.as_mut()?;
+        let range =
+            self.dynamic.iter().fold(static_layer.range, |range, m| range.and(&m.now.layer.range));
         let (extent, before) = (range.extent(), self.extent);
         self.extent = extent;
-        if known && still.holds(extent) {
-            let moved = |m: &Mover| changed.iter().any(|(leaf, _)| *leaf == m.leaf);
+        if known && static_layer.holds(extent) {
+            let moved = |m: &DynamicMesh| changed.iter().any(|(leaf, _)| *leaf == m.leaf);
             return self.step(camera, [before, extent], moved);
         }
-        still.settle(camera, extent, known)?;
-        if self.movers.iter().any(|m| !m.now.is_whole()) {
+        static_layer.sort_pieces(camera, extent, known)?;
+        if self.dynamic.iter().any(|m| !m.now.is_whole()) {
             // What was hidden, or did not matter, need not be so with another depth
             // range.
-            let mut movers = self.movers.iter_mut().peekable();
+            let mut dynamic = self.dynamic.iter_mut().peekable();
             for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
-                if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
-                    mover.move_to(instance, camera, tools, None, only);
+                if let Some(dynamic_mesh) = dynamic.next_if(|m| m.leaf == leaf) {
+                    dynamic_mesh.move_to(instance, camera, tools, None, only);
                 }
             }
         }
@@ -237,22 +246,22 @@ impl Backdrop {
     /// The contours that it shows.
     pub fn contours(&self, camera: &Camera) -> Contours {
         let mut out = Contours::with_room(camera, self.count);
-        let mut movers = self.movers.iter().peekable();
-        for (piece, leaf) in self.still.iter().flat_map(Still::shown) {
-            while let Some(mover) = movers.next_if(|m| m.leaf < *leaf) {
-                out.append(&mover.seen);
+        let mut dynamic = self.dynamic.iter().peekable();
+        for (piece, leaf) in self.static_layer.iter().flat_map(StaticLayer::shown) {
+            while let Some(dynamic_mesh) = dynamic.next_if(|m| m.leaf < *leaf) {
+                out.append(&dynamic_mesh.seen);
             }
             out.push(piece);
         }
-        movers.for_each(|mover| out.append(&mover.seen));
+        dynamic.for_each(|dynamic_mesh| out.append(&dynamic_mesh.seen));
         out
     }
 
     /// Forgets what has moved.
     fn forget(&mut self) {
-        self.movers.clear();
+        self.dynamic.clear();
         self.leaves.iter_mut().for_each(|leaf| leaf.moves = false);
-        (self.still, self.waited, self.refused) = (None, 0, None);
+        (self.static_layer, self.waited, self.refused) = (None, 0, None);
     }
 
     /// The meshes that are not as they were drawn last; what is known of the solid
@@ -286,7 +295,7 @@ impl Backdrop {
                             affine,
                             moves: false,
                         });
-                        self.still = None;
+                        self.static_layer = None;
                         changed.push((leaf, instance));
                     }
                 }
@@ -301,51 +310,51 @@ impl Backdrop {
         self.lists.truncate(lists);
         if first < self.leaves.len() {
             self.leaves.truncate(first);
-            self.movers.retain(|m| m.leaf < first);
-            self.still = None;
+            self.dynamic.retain(|m| m.leaf < first);
+            self.static_layer = None;
         }
         changed
     }
 
     /// Draws all meshes, those that stand still and the others.
     fn build(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<()> {
-        let mut still = Still::new(camera);
+        let mut static_layer = StaticLayer::new(camera);
         let (whole, width) = (Area::whole(camera), camera.width as usize);
-        let mut movers = self.movers.iter_mut().peekable();
+        let mut dynamic = self.dynamic.iter_mut().peekable();
         for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
-            if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
-                mover.move_to(instance, camera, tools, None, false);
+            if let Some(dynamic_mesh) = dynamic.next_if(|m| m.leaf == leaf) {
+                dynamic_mesh.move_to(instance, camera, tools, None, false);
                 continue;
             }
             let layer = &mut self.scratch;
             let Tools { projected, candidates, room } = tools;
             layer.draw(instance, camera, (projected, candidates), room, |_, _| Sight::Whole);
-            layer.show(&mut still.depth, width, &whole);
-            still.range = still.range.and(&layer.range);
-            still.pieces.extend(layer.pieces.iter().map(|piece| (*piece, leaf)));
-            if still.pieces.len() > MOST_PIECES {
+            layer.show(&mut static_layer.depth, width, &whole);
+            static_layer.range = static_layer.range.and(&layer.range);
+            static_layer.pieces.extend(layer.pieces.iter().map(|piece| (*piece, leaf)));
+            if static_layer.pieces.len() > MOST_PIECES {
                 return None;
             }
         }
-        self.still = Some(still);
+        self.static_layer = Some(static_layer);
         Some(())
     }
 
     /// Composes the whole picture and looks at everything.
     fn begin(&mut self, camera: &Camera) -> Option<Change> {
-        let Backdrop { still, movers, depth, extent, .. } = self;
-        let still = still.as_mut()?;
+        let Backdrop { static_layer, dynamic, depth, extent, .. } = self;
+        let static_layer = static_layer.as_mut()?;
         work::count(|work| {
             work.partial += 1;
             work.pixels += camera.pixels() as u64;
         });
-        depth.clone_from(&still.depth);
-        movers
+        depth.clone_from(&static_layer.depth);
+        dynamic
             .iter()
             .for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
-        self.shown = still.look_at_all(&depths);
-        movers.iter_mut().for_each(|mover| mover.look(&depths));
+        self.shown = static_layer.look_at_all(&depths);
+        dynamic.iter_mut().for_each(|dynamic_mesh| dynamic_mesh.look(&depths));
         self.at = Arc::default();
         let none = || Contours::with_room(camera, 0);
         Some(self.change(camera, Arc::default(), [none(), none()]))
@@ -354,8 +363,8 @@ impl Backdrop {
     /// The change to what is there now.
     fn change(&mut self, camera: &Camera, from: Arc<()>, [gone, come]: [Contours; 2]) -> Change {
         let mut moving =
-            Contours::with_room(camera, self.movers.iter().map(|m| m.seen.len()).sum());
-        self.movers.iter().for_each(|mover| moving.append(&mover.seen));
+            Contours::with_room(camera, self.dynamic.iter().map(|m| m.seen.len()).sum());
+        self.dynamic.iter().for_each(|dynamic_mesh| moving.append(&dynamic_mesh.seen));
         self.count = self.shown + moving.len();
         Change { from, to: self.at.clone(), gone, come, moving, count: self.count }
     }
@@ -366,12 +375,13 @@ impl Backdrop {
         &mut self,
         camera: &Camera,
         extents: [f64; 2],
-        moved: impl Fn(&Mover) -> bool,
+        moved: impl Fn(&DynamicMesh) -> bool,
     ) -> Option<Change> {
         let same_extent = extents[0].to_bits() == extents[1].to_bits();
-        let anything = !same_extent || self.movers.iter().any(&moved);
-        let Backdrop { still, movers, depth, extent, rows, pixels, areas, again, .. } = self;
-        let (still, width) = (still.as_mut()?, camera.width as usize);
+        let anything = !same_extent || self.dynamic.iter().any(&moved);
+        let Backdrop { static_layer, dynamic, depth, extent, rows, pixels, areas, again, .. } =
+            self;
+        let (static_layer, width) = (static_layer.as_mut()?, camera.width as usize);
         Area::join(areas);
         work::count(|work| {
             work.partial += u64::from(anything);
@@ -384,37 +394,40 @@ impl Backdrop {
             });
             rows.clear();
             for row in area.top..area.bottom {
-                let (Some(there), Some(still)) =
-                    (depth.get_mut(span(row)), still.depth.get(span(row)))
+                let (Some(there), Some(static_layer)) =
+                    (depth.get_mut(span(row)), static_layer.depth.get(span(row)))
                 else {
                     continue;
                 };
                 rows.extend_from_slice(there);
-                there.copy_from_slice(still);
+                there.copy_from_slice(static_layer);
             }
             again.clear();
             again.resize(area.pixels(), 0);
             vectorised(
                 #[inline(always)]
                 || {
-                    movers.iter().for_each(|m| m.now.layer.show(depth, width, area));
+                    dynamic.iter().for_each(|m| m.now.layer.show(depth, width, area));
                     let lists = rows.chunks_exact(columns).zip(again.chunks_exact_mut(columns));
                     for (row, (before, again)) in (area.top..area.bottom).zip(lists) {
                         let lists = (
                             depth.get(span(row)),
-                            still.depth.get(span(row)),
-                            still.nearest.get(span(row)),
+                            static_layer.depth.get(span(row)),
+                            static_layer.nearest.get(span(row)),
                         );
-                        let (Some(now), Some(still), Some(nearest)) = lists else { continue };
+                        let (Some(now), Some(static_layer), Some(nearest)) = lists else {
+                            continue;
+                        };
                         let lists =
-                            now.iter().zip(before).zip(still.iter().zip(nearest)).zip(again);
-                        for (((now, before), (still, nearest)), again) in lists {
+                            now.iter().zip(before).zip(static_layer.iter().zip(nearest)).zip(again);
+                        for (((now, before), (static_layer, nearest)), again) in lists {
                             // Where something is so near that all looks of the backdrop end at
                             // it, a change means nothing; where there is a mover, what is seen
                             // may also change with the depth range.
                             let hidden = (now < nearest) & (before < nearest);
                             *again = u8::from(
-                                !hidden & ((now != before) | (!same_extent & (now != still))),
+                                !hidden
+                                    & ((now != before) | (!same_extent & (now != static_layer))),
                             );
                         }
                     }
@@ -430,16 +443,18 @@ impl Backdrop {
             }
         }
         if !same_extent {
-            for mover in movers.iter().filter(|m| !moved(m)) {
-                let area = mover.now.layer.area;
+            for dynamic_mesh in dynamic.iter().filter(|m| !moved(m)) {
+                let area = dynamic_mesh.now.layer.area;
                 let all = (area.top..area.bottom)
                     .flat_map(|row| row * width + area.left..row * width + area.right);
                 let open = |at: &usize| match (
                     depth.get(*at),
-                    still.depth.get(*at),
-                    still.nearest.get(*at),
+                    static_layer.depth.get(*at),
+                    static_layer.nearest.get(*at),
                 ) {
-                    (Some(now), Some(still), Some(nearest)) => now != still && now >= nearest,
+                    (Some(now), Some(static_layer), Some(nearest)) => {
+                        now != static_layer && now >= nearest
+                    }
                     _ => false,
                 };
                 pixels.extend(all.filter(open).map(|at| at as u32));
@@ -447,13 +462,13 @@ impl Backdrop {
         }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
         let [mut gone, mut come] = [0; 2].map(|_| Contours::with_room(camera, 256));
-        still.look_again(&depths, pixels, extents, |piece, shown| {
+        static_layer.look_again(&depths, pixels, extents, |piece, shown| {
             if shown { &mut come } else { &mut gone }.push(piece);
         });
-        for mover in movers {
-            let (area, moved) = (mover.now.layer.looks, moved(mover));
+        for dynamic_mesh in dynamic {
+            let (area, moved) = (dynamic_mesh.now.layer.looks, moved(dynamic_mesh));
             if moved || !same_extent || areas.iter().any(|dirty| dirty.meets(&area)) {
-                mover.look(&depths);
+                dynamic_mesh.look(&depths);
             }
         }
         self.shown = self.shown + come.len() - gone.len();

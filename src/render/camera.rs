@@ -142,7 +142,7 @@ impl Camera {
 
     /// The derivative by a scene point of a function of where it is in the picture, from
     /// that by its two pixel coordinates.
-    pub fn pull_point(&self, point: DVec3, [by_x, by_y]: [f64; 2]) -> DVec3 {
+    pub fn vjp_point(&self, point: DVec3, [by_x, by_y]: [f64; 2]) -> DVec3 {
         let from = point - self.eye;
         let (x, y, depth) = (from.dot(self.right), from.dot(self.up), from.dot(self.forward));
         match self.projection {
@@ -216,7 +216,7 @@ mod tests {
                 let (x, y, _) = camera.project(p);
                 by[0] * x + by[1] * y
             };
-            let g = camera.pull_point(p, by);
+            let g = camera.vjp_point(p, by);
             for (axis, g) in DVec3::AXES.into_iter().zip(g.to_array()) {
                 let slope = (f(p + axis * 1e-6) - f(p - axis * 1e-6)) / 2e-6;
                 assert!((g - slope).abs() < 1e-6, "{g} {slope}");

@@ -5,11 +5,11 @@
 //! branch-free, and triangles set up many at a time.
 
 use super::coverage::is_turned;
-use super::lanes::{Batch, Kind, LANES};
-use super::marks::Marks;
+use super::pixel_bitmap::PixelBitmap;
 use super::place::Extent;
 use super::project::Vertices;
 use super::raster::{Area, Wanted};
+use super::simd_raster::{Batch, Kind, LANES};
 use super::triangle::{Plane, is_flat, keep_all, put_face};
 use crate::geom::{Patches, Topology};
 use glam::Vec4;
@@ -26,7 +26,7 @@ pub(super) struct Candidates {
 
 impl Candidates {
     /// Those of one mesh all of whose vertices are in view, but for backs that need not
-    /// be drawn; with marks, those that reach some.
+    /// be drawn; with bitmap, those that reach some.
     #[inline(always)]
     fn find(
         &mut self,
@@ -34,7 +34,7 @@ impl Candidates {
         vertices: &Vertices<'_>,
         size: Vec4,
         back: f64,
-        marks: Option<&Marks>,
+        bitmap: Option<&PixelBitmap>,
     ) {
         let triangles = &topology.triangles;
         if self.faces.len() < triangles.len() {
@@ -42,16 +42,16 @@ impl Candidates {
             self.extents.resize(triangles.len(), Extent::default());
         }
         self.count = 0;
-        let Some(marks) = marks else {
+        let Some(bitmap) = bitmap else {
             return self.add(0, triangles, vertices, size, back, |_| true);
         };
         for (i, (patch, triangles)) in
             topology.patches.of(triangles).zip(triangles.chunks(Patches::FACES)).enumerate()
         {
             let extent = Extent::between(vertices.least(patch), size);
-            if !extent.is_empty() && marks.hold(extent.ends()) {
+            if !extent.is_empty() && bitmap.hold(extent.ends()) {
                 self.add(i * Patches::FACES, triangles, vertices, size, back, |ends| {
-                    marks.may_hold(ends)
+                    bitmap.may_hold(ends)
                 });
             }
         }
@@ -60,7 +60,7 @@ impl Candidates {
             let (Some(&face), Some(&extent)) = (self.faces.get(i), self.extents.get(i)) else {
                 continue;
             };
-            self.put(face, extent, marks.hold(extent.ends()));
+            self.put(face, extent, bitmap.hold(extent.ends()));
         }
     }
 
@@ -112,14 +112,14 @@ impl Candidates {
         buffer: &mut [f32],
         seen: &mut [u32],
     ) {
-        let marks = wanted.marks();
-        self.find(topology, vertices, size, back, marks);
+        let bitmap = wanted.bitmap();
+        self.find(topology, vertices, size, back, bitmap);
         let width = area.right - area.left;
         let large = |face: u32, extent: Extent, buffer: &mut [f32], seen: &mut [u32]| match vertices
             .triangle(topology, face, extent, back)
         {
             Some(triangle) if FACES => triangle.fill_faces(buffer, (seen, face), area),
-            Some(triangle) => triangle.keep(buffer, area, marks),
+            Some(triangle) => triangle.keep(buffer, area, bitmap),
             None => {}
         };
         let Candidates { faces, extents, count, batch } = self;
@@ -147,8 +147,8 @@ impl Candidates {
                     #[inline(always)]
                     |row, from, outside| {
                         let at = (row - area.top) * width + from - area.left;
-                        if marks.is_some_and(|marks| {
-                            marks.window(at, LANES) as u32 & !outside.to_bitmask() == 0
+                        if bitmap.is_some_and(|bitmap| {
+                            bitmap.window(at, LANES) as u32 & !outside.to_bitmask() == 0
                         }) {
                             return;
                         }

@@ -7,9 +7,9 @@
 //! lists have one entry per piece, all finite, positions inside the image, tangents of
 //! unit length.
 
-use super::looked::Looked;
+use super::extraction::{Room, extract_mesh};
 use super::project::{DepthRange, Placement, Projected, project};
-use super::trace::{Room, trace_mesh};
+use super::sparse_depth::SparseDepth;
 use super::visibility::{Depths, Piece};
 use super::{Camera, backdrop, layers, work};
 use crate::geom::Solid;
@@ -41,7 +41,7 @@ pub struct Contours {
 struct Scratch {
     projected: Projected,
     room: Room,
-    looked: Looked,
+    looked: SparseDepth,
     /// Pieces, hidden or not.
     pieces: Vec<Piece>,
     hidden: Vec<bool>,
@@ -183,7 +183,7 @@ impl Scratch {
             }
             work::drawn(&instance.mesh);
             let pieces = &mut self.pieces;
-            trace_mesh(
+            extract_mesh(
                 &instance.mesh,
                 &placement,
                 camera,

@@ -4,7 +4,7 @@
 //! triangles that share an edge neither overlap nor leave gaps, at any size: a pixel
 //! belongs to a triangle when its centre is inside, centres on an edge go to the triangle
 //! to the right of or below it (the top-left rule). Any triangle is told here, by runs;
-//! small ones of whole meshes are told by [`super::lanes`].
+//! small ones of whole meshes are told by [`super::simd_raster`].
 
 use super::crossing::{Crossing, Int};
 use super::place::{BITS, Extent, Place, UNIT, is_near};

@@ -173,11 +173,11 @@ mod tests {
                 .iter()
                 .map(|x| [0.5 + 0.1 * libm::sin(f64::from(*x)), libm::cos(f64::from(*x)), 0.7, 0.0])
                 .collect();
-            let found = view.pull_contours(96, &by);
+            let found = view.vjp_contours(96, &by);
             assert_eq!(found.len(), view.solid().vertex_count());
             assert!(view.triangles(96) < triangles(view.solid()).iter().sum());
             let drawn = view.drawn(&camera);
-            let plain = contours.pull(&drawn.solid, &camera, &by);
+            let plain = contours.vjp(&drawn.solid, &camera, &by);
             let sum = |all: &[DVec3]| all.iter().map(|g| g.length_squared()).sum::<f64>();
             assert!(sum(&found) > 0.0 && (sum(&found) - sum(&plain)).abs() < 1e-9 * sum(&plain));
             // Turned round the middle of the picture, the same pieces go round it, as do

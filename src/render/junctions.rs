@@ -7,9 +7,9 @@
 //! end is looked for. Invariant: the order of what is added is that of the pieces.
 
 use super::Camera;
+use super::extraction::Origin;
 use super::project::{Lens, Vertices};
-use super::pull::Traced;
-use super::trace::Origin;
+use super::vjp::Extracted;
 use rustc_hash::FxHashMap;
 
 /// How far from the last piece seen the nearer contour may be, in pixels: looks go 1.2
@@ -61,29 +61,31 @@ type Links = Vec<[Option<usize>; 2]>;
 /// The derivatives by each piece, with those by the lengths of contours passed on to what
 /// hides their ends.
 pub(super) fn moved_ends(
-    traced: &[Traced<'_>],
+    extracted: &[Extracted<'_>],
     camera: &Camera,
     by_piece: &[[f64; 4]],
 ) -> Vec<[f64; 4]> {
     let mut out = by_piece.to_vec();
-    if traced.iter().all(|t| t.seen.is_some()) {
+    if extracted.iter().all(|t| t.seen.is_some()) {
         return out;
     }
-    let links = links(traced);
-    let bands = Bands::new(traced, camera);
-    for (j, (t, next)) in traced.iter().zip(&links).enumerate() {
+    let links = links(extracted);
+    let bands = Bands::new(extracted, camera);
+    for (j, (t, next)) in extracted.iter().zip(&links).enumerate() {
         let Some(seen) = t.seen else { continue };
         for (side, sense) in [(0, -1.0), (1, 1.0)] {
-            let Some(hidden) = next[side].filter(|h| traced[*h].seen.is_none()) else { continue };
-            if is_short(traced, &links, hidden, j) {
+            let Some(hidden) = next[side].filter(|h| extracted[*h].seen.is_none()) else {
+                continue;
+            };
+            if is_short(extracted, &links, hidden, j) {
                 continue;
             }
             let tangent = [sense * f64::from(t.piece.tx), sense * f64::from(t.piece.ty)];
-            let Some((nearer, [nx, ny])) = bands.nearer(traced, camera, t, tangent) else {
+            let Some((nearer, [nx, ny])) = bands.nearer(extracted, camera, t, tangent) else {
                 continue;
             };
             let (Some(&[gx, gy, by_length, _]), Some(nearer)) =
-                (by_piece.get(seen), traced[nearer].seen)
+                (by_piece.get(seen), extracted[nearer].seen)
             else {
                 continue;
             };
@@ -103,7 +105,7 @@ pub(super) fn moved_ends(
 }
 
 /// Where a piece ends along its tangent (1) or against it (0).
-fn end(t: &Traced<'_>, side: usize) -> [f64; 2] {
+fn end(t: &Extracted<'_>, side: usize) -> [f64; 2] {
     let by = (side as f64 - 0.5) * f64::from(t.piece.length);
     [
         f64::from(t.piece.x) + by * f64::from(t.piece.tx),
@@ -112,22 +114,22 @@ fn end(t: &Traced<'_>, side: usize) -> [f64; 2] {
 }
 
 /// Which pieces follow each other.
-fn links(traced: &[Traced<'_>]) -> Links {
-    let mut links: Links = vec![[None; 2]; traced.len()];
+fn links(extracted: &[Extracted<'_>]) -> Links {
+    let mut links: Links = vec![[None; 2]; extracted.len()];
     let mut join = |[(i, a), (j, b)]: [(usize, usize); 2]| {
-        let (p, q) = (end(&traced[i], a), end(&traced[j], b));
+        let (p, q) = (end(&extracted[i], a), end(&extracted[j], b));
         // Silhouettes on both sides of a crease end on it in different places.
         if i != j && (p[0] - q[0]).abs() + (p[1] - q[1]).abs() < 0.05 {
             (links[i][a], links[j][b]) = (Some(j), Some(i));
         }
     };
     let mut open: FxHashMap<End, (usize, usize)> = FxHashMap::default();
-    open.reserve(traced.len());
-    for (i, t) in traced.iter().enumerate() {
+    open.reserve(extracted.len());
+    for (i, t) in extracted.iter().enumerate() {
         let sides = if t.origin.forward { [0, 1] } else { [1, 0] };
         let from = t.origin.at - 0.5 * t.origin.share;
         if let Some(before) = i.checked_sub(1).filter(|_| from > 1e-9)
-            && traced[before].origin.corners == t.origin.corners
+            && extracted[before].origin.corners == t.origin.corners
         {
             join([(before, sides[1]), (i, sides[0])]);
         }
@@ -149,17 +151,17 @@ fn links(traced: &[Traced<'_>]) -> Links {
 }
 
 /// Whether the hidden stretch that begins with a piece, coming from another, ends soon.
-fn is_short(traced: &[Traced<'_>], links: &Links, first: usize, from: usize) -> bool {
+fn is_short(extracted: &[Extracted<'_>], links: &Links, first: usize, from: usize) -> bool {
     let (mut before, mut at, mut length) = (from, first, 0.0);
     for _ in 0..MOST {
-        length += f64::from(traced[at].piece.length);
+        length += f64::from(extracted[at].piece.length);
         if length >= SHORT {
             return false;
         }
         let Some(next) = links[at].iter().flatten().copied().find(|n| *n != before) else {
             return true;
         };
-        if traced[next].seen.is_some() {
+        if extracted[next].seen.is_some() {
             return true;
         }
         (before, at) = (at, next);
@@ -175,11 +177,11 @@ struct Bands {
 }
 
 impl Bands {
-    fn new(traced: &[Traced<'_>], camera: &Camera) -> Bands {
+    fn new(extracted: &[Extracted<'_>], camera: &Camera) -> Bands {
         let count = band(f64::from(camera.height)) + 1;
         let mut start = vec![0; count + 2];
-        let seen = || traced.iter().enumerate().filter(|(_, t)| t.seen.is_some());
-        let of = |t: &Traced<'_>| band(f64::from(t.piece.y)).min(count - 1);
+        let seen = || extracted.iter().enumerate().filter(|(_, t)| t.seen.is_some());
+        let of = |t: &Extracted<'_>| band(f64::from(t.piece.y)).min(count - 1);
         seen().for_each(|(_, t)| start[of(t) + 2] += 1);
         (2..start.len()).for_each(|b| start[b] += start[b - 1]);
         let mut pieces = vec![0; start[count + 1]];
@@ -196,9 +198,9 @@ impl Bands {
     /// its normal.
     fn nearer(
         &self,
-        traced: &[Traced<'_>],
+        extracted: &[Extracted<'_>],
         camera: &Camera,
-        of: &Traced<'_>,
+        of: &Extracted<'_>,
         [tx, ty]: [f64; 2],
     ) -> Option<(usize, [f64; 2])> {
         let half = 0.5 * f64::from(of.piece.length);
@@ -212,7 +214,7 @@ impl Bands {
         let mut best = None;
         let mut least = REACH;
         for &k in self.pieces.get(range)? {
-            let p = &traced[k].piece;
+            let p = &extracted[k].piece;
             let (dx, dy) = (x - f64::from(p.x), y - f64::from(p.y));
             if dx.abs() > REACH + 1.0 || p.depth >= of.piece.depth - pixel {
                 continue;

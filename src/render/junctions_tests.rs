@@ -22,7 +22,7 @@ fn slopes(near: &Solid, far: &Solid, camera: &Camera) -> Vec<[f64; 3]> {
     let contours = Contours::of(&here, camera);
     let by = weighted(&contours).1;
     let [moving, fixed] =
-        [contours.pull(&here, camera, &by), contours.pull_fixed(&here, camera, &by)];
+        [contours.vjp(&here, camera, &by), contours.vjp_fixed(&here, camera, &by)];
     let one = |k: usize| {
         let moved = |h: f64| at(std::array::from_fn(|i| if i == k { h } else { 0.0 }));
         // Pieces come and go one by one: over many the steps even out.
@@ -75,7 +75,7 @@ fn a_plate_before_a_bar_hides_as_much_as_it_moves() {
     };
     let here = at(0.0, 0.0);
     let contours = Contours::of(&here, &camera);
-    let by = contours.pull(&here, &camera, &vec![[0.0, 0.0, 1.0, 0.0]; contours.len()]);
+    let by = contours.vjp(&here, &camera, &vec![[0.0, 0.0, 1.0, 0.0]; contours.len()]);
     // Looked at straight, a bar has two lines along x that go on behind the plate, on
     // each of its faces that can be told apart.
     let lines = along(&by, &at(-1e-6, 0.0), &at(1e-6, 0.0), 2e-6) * 0.02;

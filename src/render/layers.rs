@@ -10,11 +10,11 @@
 
 use super::candidates::Candidates;
 use super::contours::Contours;
+use super::extraction::{Room, extract_mesh};
 use super::frame::{depth_of, to_depth};
 use super::project::{DepthRange, Lens, Placement, Projected};
 use super::raster::{Area, Wanted, draw_mesh};
 use super::simd::vectorised;
-use super::trace::{Room, trace_mesh};
 use super::visibility::{BESIDE, Depths, Piece};
 use super::{Camera, Projection, work};
 use crate::geom::{Affine, Instance, Mesh, Solid};
@@ -309,7 +309,7 @@ impl Layer {
             return;
         }
         work::drawn(&instance.mesh);
-        trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| {
+        extract_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| {
             self.pieces.push(piece)
         });
         self.looks = Area::looked_at(&self.pieces, camera);

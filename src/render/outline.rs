@@ -16,7 +16,7 @@ impl View {
     /// The derivatives of the sum of `gain` over the pixels that show the solid, in the
     /// picture whose longer side has `size` pixels, by each vertex of the solid's meshes
     /// in turn, in world coordinates. `gain` has a number for each pixel, row by row.
-    pub fn pull_mask(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
+    pub fn vjp_mask(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
         // Drawn before the contours, which then use it.
         let frame = self.depth(size);
         let contours = self.contours(size);
@@ -31,7 +31,7 @@ impl View {
             .collect();
         let camera = self.camera().scaled_to(size);
         let drawn = self.drawn(&camera);
-        drawn.by_vertices_of(self.solid(), contours.pull_fixed(&drawn.solid, &camera, &by_piece))
+        drawn.by_vertices_of(self.solid(), contours.vjp_fixed(&drawn.solid, &camera, &by_piece))
     }
 }
 
@@ -116,7 +116,7 @@ mod tests {
                 frame.mask().zip(&gain).map(|(m, g)| if m { *g } else { 0.0 }).sum::<f64>()
             };
             let here = [0.05, -0.1, 0.0, 0.0, 0.0];
-            let found = at(&here).pull_mask(SIZE, &gain);
+            let found = at(&here).vjp_mask(SIZE, &gain);
             let vertices = |p: &[f64; 5]| at(p).solid().vertices().collect::<Vec<_>>();
             for k in 0..5 {
                 let moved = |h: f64| {

@@ -221,15 +221,15 @@ impl Projected {
             self.nearness.resize(needed, 0.0);
             self.places.resize(needed, Place::ZERO);
         }
-        let seen = vectorised(
+        let extents = vectorised(
             #[inline(always)]
             || match lens.pinhole {
                 true => self.write::<true>(first, &mesh.positions, placement, lens),
                 false => self.write::<false>(first, &mesh.positions, placement, lens),
             },
         );
-        self.meshes.push((first + mesh.positions.len(), seen.whole));
-        DepthRange { near: seen.near, far: seen.far }
+        self.meshes.push((first + mesh.positions.len(), extents.whole));
+        DepthRange { near: extents.near, far: extents.far }
     }
 
     #[inline(always)]
@@ -239,8 +239,8 @@ impl Projected {
         positions: &[Vec3],
         placement: &Placement,
         lens: &Lens,
-    ) -> Seen {
-        let mut seen = Seen { near: f64::INFINITY, far: f64::NEG_INFINITY, whole: true };
+    ) -> Extents {
+        let mut extents = Extents { near: f64::INFINITY, far: f64::NEG_INFINITY, whole: true };
         // By value, so that it is plain that nothing written changes them.
         let (Placement { m, t, .. }, lens) = (*placement, Lens { pinhole: PINHOLE, ..*lens });
         let rows = [0, 1, 2].map(|r| [m.x_axis[r], m.y_axis[r], m.z_axis[r], t[r]]);
@@ -263,9 +263,9 @@ impl Projected {
                 (cx[i], cy[i], depth[i]) = (vx, vy, -vz);
             }
             if !inside {
-                seen.whole = false;
+                extents.whole = false;
                 for i in 0..LANES {
-                    let point = seen.odd(&lens, DVec3::new(cx[i], cy[i], -depth[i]));
+                    let point = extents.odd(&lens, DVec3::new(cx[i], cy[i], -depth[i]));
                     (x[i], y[i], nearness[i]) =
                         (point.x as f32, point.y as f32, point.nearness as f32);
                     places[i] = place(point.x, point.y);
@@ -284,11 +284,11 @@ impl Projected {
                 places[i] = Place::new(u[i], v[i], -u[i], -v[i]);
             }
             for depth in depth {
-                seen.near = if depth < seen.near { depth } else { seen.near };
-                seen.far = if depth > seen.far { depth } else { seen.far };
+                extents.near = if depth < extents.near { depth } else { extents.near };
+                extents.far = if depth > extents.far { depth } else { extents.far };
             }
         }
-        seen
+        extents
     }
 }
 
@@ -299,7 +299,7 @@ fn groups<T>(list: &mut [T]) -> std::slice::IterMut<'_, [T; LANES]> {
 }
 
 /// What was seen of the vertices.
-struct Seen {
+struct Extents {
     /// Least and greatest depth.
     near: f64,
     far: f64,
@@ -307,7 +307,7 @@ struct Seen {
     whole: bool,
 }
 
-impl Seen {
+impl Extents {
     /// A vertex of which it is not known whether it is in view.
     #[inline(never)]
     fn odd(&mut self, lens: &Lens, p: DVec3) -> Point {

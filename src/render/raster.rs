@@ -6,11 +6,11 @@
 
 use super::Camera;
 use super::candidates::Candidates;
-use super::lanes::LANES;
-use super::marks::Marks;
+use super::pixel_bitmap::PixelBitmap;
 use super::place::{Extent, place, size};
 use super::project::{DepthRange, Lens, Placement, Point, Projected, Vertices, project};
 use super::simd::vectorised;
+use super::simd_raster::LANES;
 use super::triangle::Triangle;
 use crate::geom::{Mesh, Solid};
 use glam::DVec3;
@@ -184,18 +184,18 @@ pub(super) enum Wanted<'a> {
     /// Everywhere.
     All,
     /// At marked pixels of the whole image; nothing is said of others.
-    Marked(&'a Marks),
+    Marked(&'a PixelBitmap),
     /// At those pixels of an area, a byte each, that are not 0; at others that the mesh
     /// covers, anything from this least nearness on.
     Exact(&'a [u8], f32),
 }
 
 impl<'a> Wanted<'a> {
-    /// The marks, if there are some.
+    /// The bitmap, if there are some.
     #[inline(always)]
-    pub fn marks(self) -> Option<&'a Marks> {
+    pub fn bitmap(self) -> Option<&'a PixelBitmap> {
         match self {
-            Wanted::Marked(marks) => Some(marks),
+            Wanted::Marked(bitmap) => Some(bitmap),
             _ => None,
         }
     }
@@ -228,7 +228,7 @@ pub(super) fn draw_mesh(
     fill_mesh(mesh, placement, camera, vertices, candidates, (area, wanted), buffer);
 }
 
-/// Keeps the nearer of one mesh and what is there, in the rows of an area; with marks,
+/// Keeps the nearer of one mesh and what is there, in the rows of an area; with bitmap,
 /// the area is the whole image.
 pub(super) fn fill_mesh(
     mesh: &Mesh,
@@ -241,7 +241,7 @@ pub(super) fn fill_mesh(
 ) {
     if !vertices.whole {
         return cut_triangles(mesh, placement, camera, vertices, |t, _, _| {
-            t.keep(buffer, area, wanted.marks())
+            t.keep(buffer, area, wanted.bitmap())
         });
     }
     let how = (size(camera.width, camera.height), back(mesh, placement, vertices));

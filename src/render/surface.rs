@@ -3,7 +3,7 @@
 //!
 //! At a pixel the depth is where its line of sight meets the plane of the face that is
 //! seen; which face that is, is taken as it is. The motion of the outline is the business
-//! of [`View::pull_mask`].
+//! of [`View::vjp_mask`].
 
 use super::View;
 use super::project::{Projected, project};
@@ -14,7 +14,7 @@ impl View {
     /// The derivatives by each vertex of the solid's meshes in turn, in world
     /// coordinates, from those by the depth at each pixel, row by row, of the picture
     /// whose longer side has `size` pixels. What is not seen counts as 0.
-    pub fn pull_depth(&self, size: u32, by_depth: &[f64]) -> Vec<DVec3> {
+    pub fn vjp_depth(&self, size: u32, by_depth: &[f64]) -> Vec<DVec3> {
         let (solid, camera) = (self.solid(), self.camera().scaled_to(size));
         let mut projected = Projected::default();
         project(solid, &camera, &mut projected);
@@ -94,7 +94,7 @@ mod tests {
         ] {
             let mut by_depth = [0.0; 9];
             by_depth[pixel] = 2.0;
-            let by_vertex = View::new(triangle.clone(), camera).pull_depth(3, &by_depth);
+            let by_vertex = View::new(triangle.clone(), camera).vjp_depth(3, &by_depth);
             assert_eq!(by_vertex.len(), 3);
             for (p, g) in triangle.vertices().zip(by_vertex) {
                 let corner = corners.iter().position(|c| c.as_dvec3() == p).unwrap();

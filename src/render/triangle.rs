@@ -5,11 +5,11 @@
 //! same numbers.
 
 use super::coverage::Coverage;
-use super::lanes::{LANES, all_bits};
-use super::marks::Marks;
+use super::pixel_bitmap::PixelBitmap;
 use super::place::{Extent, Place};
 use super::project::Point;
 use super::raster::Area;
+use super::simd_raster::{LANES, all_bits};
 use glam::Vec4;
 use pulp::bytemuck::cast;
 use wide::{f32x8, i32x8};
@@ -189,10 +189,10 @@ impl Triangle {
     }
 
     /// Keeps the nearer of the triangle and what is there, in the rows of an area; with
-    /// marks, at marked pixels at least, and the area is the whole image.
-    pub fn keep(&self, buffer: &mut [f32], area: &Area, marks: Option<&Marks>) {
-        match marks {
-            Some(marks) => self.fill_some(buffer, area.right - area.left, marks),
+    /// bitmap, at marked pixels at least, and the area is the whole image.
+    pub fn keep(&self, buffer: &mut [f32], area: &Area, bitmap: Option<&PixelBitmap>) {
+        match bitmap {
+            Some(bitmap) => self.fill_some(buffer, area.right - area.left, bitmap),
             None => self.fill(buffer, [area.left, area.right], area.top),
         }
     }
@@ -246,10 +246,10 @@ impl Triangle {
     /// As [`Triangle::fill`] for a whole image of some columns, but pixels that are not
     /// marked need not be drawn.
     #[inline(never)]
-    fn fill_some(&self, buffer: &mut [f32], width: usize, marks: &Marks) {
+    fn fill_some(&self, buffer: &mut [f32], width: usize, bitmap: &PixelBitmap) {
         self.runs(|run| {
             for from in (run.from..run.to).step_by(64) {
-                for i in bits(marks.window(run.row * width + from, (run.to - from).min(64))) {
+                for i in bits(bitmap.window(run.row * width + from, (run.to - from).min(64))) {
                     if let Some(pixel) = buffer.get_mut(run.row * width + from + i) {
                         let q = run.nearness(from + i);
                         *pixel = if q > *pixel { q } else { *pixel };
@@ -332,15 +332,15 @@ mod tests {
         assert_eq!(count, wanted);
     }
 
-    /// Whole, in part of the picture, and where there are marks.
+    /// Whole, in part of the picture, and where there are bitmap.
     #[test]
     fn triangles_are_filled_as_by_their_runs() {
         let mut random = Uniform(3);
         let (width, height) = (40, 30);
-        let mut marks = Marks::default();
-        marks.clear(&Camera::default_for(width, height));
-        (0..width * height).step_by(3).for_each(|pixel| marks.set(pixel));
-        marks.settle();
+        let mut bitmap = PixelBitmap::default();
+        bitmap.clear(&Camera::default_for(width, height));
+        (0..width * height).step_by(3).for_each(|pixel| bitmap.set(pixel));
+        bitmap.finish();
         let mut drawn = 0;
         for round in 0..1000 {
             let points = random.corners([1.5, 7.0, 15.0, 30.0][round % 4], round % 3 == 0);
@@ -366,7 +366,7 @@ mod tests {
                     "round {round}"
                 );
             }
-            triangle.fill_some(&mut some, width, &marks);
+            triangle.fill_some(&mut some, width, &bitmap);
             let third = |list: &[f32]| list.iter().step_by(3).copied().collect::<Vec<_>>();
             assert_eq!(third(&some), third(&by_runs), "round {round}");
         }

@@ -104,11 +104,11 @@ impl View {
     }
 
     /// The vector-Jacobian product of [`View::contours`] by the solid's vertices:
-    /// [`Contours::pull`], 0 for those that are not drawn.
-    pub fn pull_contours(&self, size: u32, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
+    /// [`Contours::vjp`], 0 for those that are not drawn.
+    pub fn vjp_contours(&self, size: u32, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
         let camera = self.camera.scaled_to(size);
         let drawn = self.drawn(&camera);
-        drawn.by_vertices_of(&self.solid, self.contours(size).pull(&drawn.solid, &camera, by_piece))
+        drawn.by_vertices_of(&self.solid, self.contours(size).vjp(&drawn.solid, &camera, by_piece))
     }
 
     /// How many triangles contours and depth show in the picture whose longer side has

@@ -7,8 +7,8 @@
 //!
 //! Invariant: whenever the process stops, either file holds all draws of the chain.
 
+use super::atomic_write::begin;
 use super::csv::{CsvSink, DrawReader, named};
-use super::whole::begin;
 use crate::infer::draws::{Column, DrawRow, Sink, merged};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Write};

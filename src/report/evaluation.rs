@@ -7,7 +7,7 @@
 //! absent.
 
 use super::RunDirError;
-use super::whole::{is_partial, write_whole};
+use super::atomic_write::{is_partial, write_atomically};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -57,7 +57,7 @@ impl EvaluationDir {
     /// # Errors
     /// If it cannot be written; an older file of the name is kept then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        write_whole(&self.path, name, bytes)
+        write_atomically(&self.path, name, bytes)
             .map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
 }

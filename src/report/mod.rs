@@ -7,6 +7,7 @@
 #![doc = include_str!("guide.md")]
 
 mod aligned;
+mod atomic_write;
 mod chain_file;
 #[doc(hidden)]
 pub mod checkpoint;
@@ -30,13 +31,14 @@ mod sinks;
 #[doc(hidden)]
 pub mod table;
 mod warnings;
-mod whole;
 #[doc(hidden)]
 pub mod zarr;
 
 pub use crate::infer::diagnostics::Summary;
 #[doc(hidden)]
 pub use aligned::align;
+#[doc(hidden)]
+pub use atomic_write::write_file;
 #[doc(hidden)]
 pub use chain_file::{ChainFile, ChainFiles};
 #[doc(hidden)]
@@ -56,5 +58,3 @@ pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
 #[doc(hidden)]
 pub use warnings::warnings;
-#[doc(hidden)]
-pub use whole::write_file;

@@ -4,7 +4,7 @@
 //! only files that grow. The folder holds one run: what an earlier run left is removed
 //! before the next one starts.
 
-use super::whole::{is_partial, write_whole};
+use super::atomic_write::{is_partial, write_atomically};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -86,7 +86,7 @@ impl RunDir {
         }
         // Its mark must not stand for a whole run when this is stopped half way.
         if names.contains(&MARK) {
-            write_whole(path, MARK, CLEARED).map_err(io)?;
+            write_atomically(path, MARK, CLEARED).map_err(io)?;
         }
         for name in
             names.into_iter().filter(|n| is_partial(n) || is_numbered(n) || WRITTEN.contains(n))
@@ -140,7 +140,7 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written; an older file of the name is kept then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        write_whole(&self.path, name, bytes)
+        write_atomically(&self.path, name, bytes)
             .map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::look::{ROWS, addressed, more};
 use super::{Reply, Session, Trouble, shown};
-use crate::infer::{At, accepts};
+use crate::infer::{StepContext, accepts};
 use crate::report::number;
 use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Draws, Given, Trace};
@@ -48,7 +48,7 @@ impl Session {
         let old: Vec<_> = targets.iter().map(|t| self.trace.value(*t)).collect();
         let before = Scores::of(&self.trace);
         let past = self.remember(&format!(":flip {text}"));
-        let at = At::new(self.seed, 0, self.clock);
+        let at = StepContext::new(self.seed, 0, self.clock);
         let weight = match self.trace.regenerate(&targets, self.values()) {
             Ok(weight) => weight,
             Err(e) if e.is_recoverable() => {
@@ -120,7 +120,7 @@ impl Session {
     /// `:draw`.
     pub(super) fn draw(&mut self) -> Result<Reply, Trouble> {
         let past = self.remember(":draw");
-        let (mut trace, said) = self.settle(&self.model, &[], self.trace.replacements())?;
+        let (mut trace, said) = self.restart(&self.model, &[], self.trace.replacements())?;
         self.force(&self.model, &mut trace, 0)?;
         self.trace = trace;
         self.keep(past);
@@ -129,7 +129,7 @@ impl Session {
 
     /// Where what is proposed here is drawn.
     fn values(&self) -> Draws {
-        Draws { key: StreamKey::new(self.seed, 0, Purpose::VALUES), step: self.clock, lane: 0 }
+        Draws { key: StreamKey::new(self.seed, 0, Purpose::VALUES), step: self.clock, substream: 0 }
     }
 }
 

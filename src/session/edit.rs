@@ -153,7 +153,7 @@ impl Session {
             .collect();
         let kept: Vec<_> =
             self.trace.constraints().into_iter().filter(|(h, _)| !gone.contains(h)).collect();
-        let (trace, _) = self.settle(&self.model, &kept, self.trace.replacements())?;
+        let (trace, _) = self.restart(&self.model, &kept, self.trace.replacements())?;
         let is_possible = trace.log_joint() > f64::NEG_INFINITY;
         if is_possible {
             self.trace = trace;
@@ -205,7 +205,7 @@ impl Session {
     pub(super) fn rewrite(&mut self, program: Program) -> Result<String, Trouble> {
         let model = program.clone().compile()?;
         let choices = self.trace.constraints();
-        let (mut trace, said) = self.settle(&model, &choices, self.trace.replacements())?;
+        let (mut trace, said) = self.restart(&model, &choices, self.trace.replacements())?;
         let known = self.model.code().forces.len();
         self.force(&model, &mut trace, known)?;
         (self.program, self.model, self.trace) = (Arc::new(program), Arc::new(model), trace);
@@ -253,7 +253,7 @@ impl Session {
 
     /// A trace of another model with the same choices and observed values.
     pub(super) fn moved_to(&self, model: &Model, from: &Trace) -> Result<Trace, Trouble> {
-        self.settle(model, &from.constraints(), from.replacements()).map(|(t, _)| t)
+        self.restart(model, &from.constraints(), from.replacements()).map(|(t, _)| t)
     }
 
     /// Gives a param of the main file another default.

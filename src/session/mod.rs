@@ -9,10 +9,10 @@
 mod change;
 mod command;
 mod complete;
+mod draws;
 mod edit;
 mod export;
 mod files;
-mod kept;
 mod look;
 mod picture;
 mod plot;
@@ -135,7 +135,7 @@ impl Session {
             watch: None,
         };
         let model = Arc::clone(&session.model);
-        let (mut trace, said) = session.settle(&model, &[], &Arc::default())?;
+        let (mut trace, said) = session.restart(&model, &[], &Arc::default())?;
         session.force(&model, &mut trace, 0)?;
         session.trace = trace;
         Ok((session, Reply::text(note.unwrap_or_default() + &said)))
@@ -187,14 +187,14 @@ impl Session {
         Draws {
             key: StreamKey::new(self.seed, u32::MAX, Purpose::PREDICT),
             step: self.clock,
-            lane: 0,
+            substream: 0,
         }
     }
 
     /// A trace of a model with choices and observed values taken over where it has them,
     /// and what is to be said of that. Other choices are drawn; again, a few times, where
     /// they lead nowhere.
-    fn settle(
+    fn restart(
         &self,
         model: &Model,
         kept: &[(u64, Constraint)],
@@ -213,8 +213,8 @@ impl Session {
                 "note: the log density is undefined for the current choices, so all were redrawn from the prior\n",
             ),
         ] {
-            for lane in 0..ATTEMPTS {
-                let draws = Draws { key, step: self.clock, lane };
+            for substream in 0..ATTEMPTS {
+                let draws = Draws { key, step: self.clock, substream };
                 match Trace::generate(
                     Arc::clone(&code),
                     kept.iter().cloned(),
@@ -255,7 +255,7 @@ impl Session {
         let draws = Draws {
             key: StreamKey::new(self.seed, 0, Purpose::START),
             step: self.clock,
-            lane: ATTEMPTS,
+            substream: ATTEMPTS,
         };
         crate::infer::force(forces, trace, draws).map_err(|e| Trouble::run(model, *e))
     }
@@ -289,7 +289,7 @@ impl Session {
 
     /// Goes back to a past.
     fn go_back(&mut self, past: &Past) -> Result<(), Trouble> {
-        let (trace, _) = self.settle(&past.model, &past.choices, &past.observed)?;
+        let (trace, _) = self.restart(&past.model, &past.choices, &past.observed)?;
         (self.program, self.model) = (Arc::clone(&past.program), Arc::clone(&past.model));
         self.trace = trace;
         Ok(())

@@ -5,7 +5,7 @@
 //! twice. What a run finds becomes the session's state when it is waited for or stopped,
 //! and can be undone.
 
-use super::kept::{Kept, Seen};
+use super::draws::{DrawCounts, SampledDraws};
 use super::{INPUT, Reply, Session, Trouble};
 use crate::bank::BankFiles;
 use crate::infer::draws::{KernelStats, SiteStats};
@@ -39,7 +39,7 @@ pub(super) struct Background {
     progress: Arc<Progress>,
     /// Steps after which it ends, where that was said.
     steps: Option<u64>,
-    kept: Kept,
+    kept: SampledDraws,
     began: Instant,
     /// Told when it is over, and whether it is.
     done: Receiver<()>,
@@ -52,7 +52,7 @@ pub(super) struct Finished {
     what: String,
     steps: u64,
     warmup: u64,
-    seen: Seen,
+    counts: DrawCounts,
     kernels: Vec<KernelStats>,
     sites: Vec<SiteStats>,
     seconds: f64,
@@ -201,7 +201,7 @@ impl Session {
             limits,
             ..RunOptions::default()
         };
-        let (progress, kept) = (Arc::new(Progress::default()), Kept::default());
+        let (progress, kept) = (Arc::new(Progress::default()), SampledDraws::default());
         let (over, done) = channel();
         let is_done = Arc::new(AtomicBool::new(false));
         let thread = {
@@ -260,7 +260,7 @@ impl Session {
             what: run.what,
             steps: result.steps,
             warmup: result.warmup,
-            seen: run.kept.seen(),
+            counts: run.kept.counts(),
             kernels: result.kernels,
             sites: result.sites,
             seconds: result.seconds,
@@ -393,7 +393,7 @@ impl Status {
 
 impl Background {
     fn status(&self) -> Status {
-        let seen = self.kept.seen();
+        let seen = self.kept.counts();
         Status {
             steps: self.progress.steps.load(Ordering::Relaxed),
             draws: seen.draws,
@@ -417,7 +417,7 @@ impl Background {
     fn part(&self) -> (u64, u64) {
         let number = |n: &AtomicU64| n.load(Ordering::Relaxed);
         match self.steps {
-            Some(steps) if self.phase() == "sampling" => (self.kept.seen().last_step, steps),
+            Some(steps) if self.phase() == "sampling" => (self.kept.counts().last_step, steps),
             _ => (number(&self.progress.pass), number(&self.progress.passes)),
         }
     }
@@ -429,7 +429,7 @@ impl Background {
 
     /// What is known of it, in a line.
     fn line(&self) -> String {
-        let (s, seen) = (self.status(), self.kept.seen());
+        let (s, seen) = (self.status(), self.kept.counts());
         let state = match s.is_done {
             true => "done; `:stop` keeps its state".to_owned(),
             false => s.part(),
@@ -441,7 +441,7 @@ impl Background {
 }
 
 /// How many draws there are, how many were new states, and the best.
-fn drawn(seen: &Seen) -> String {
+fn drawn(seen: &DrawCounts) -> String {
     let Some(best) = seen.best.filter(|_| seen.draws > 0) else { return String::new() };
     let share = 100.0 * seen.moved as f64 / seen.draws as f64;
     format!(", {} draws ({share:.0}% new states), best log joint {}", seen.draws, number(best))
@@ -479,6 +479,6 @@ impl Finished {
             0 => String::new(),
             _ => format!(", {:.0}% of proposals accepted", 100.0 * accepted as f64 / tried as f64),
         };
-        format!("{}: {} steps{warmup}{accepted}{}\n", self.what, self.steps, drawn(&self.seen))
+        format!("{}: {} steps{warmup}{accepted}{}\n", self.what, self.steps, drawn(&self.counts))
     }
 }

@@ -24,7 +24,7 @@ impl Session {
             let names: Vec<String> = origins.iter().take(ROWS).map(ToString::to_string).collect();
             s += &format!("depends on {}\n{}", names.join(", "), more(origins.len(), "choices"));
         }
-        let reach = self.trace.reached_from(*target);
+        let reach = self.trace.dependents(*target);
         if !reach.names.is_empty() {
             let names: Vec<&str> = reach.names.iter().map(|n| &**n).collect();
             s += &format!("used by {}\n", names.join(", "));

@@ -6,10 +6,10 @@
 //! of how it came about. Who appears or leaves in an update is noted, and entered at its
 //! end.
 
-use super::demand::Failure;
 use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
+use super::propagate::Failure;
 use super::select::{Facts, Selector};
 use crate::dist::{Dist, Support};
 use crate::lang::address::Address;
@@ -341,7 +341,7 @@ impl Graph {
 
     /// Ends an update: selections get their new members, and two choices at one address
     /// are an error at the second.
-    pub fn settle_choices(&mut self, code: &Code) -> Result<(), Failure> {
+    pub fn update_selections(&mut self, code: &Code) -> Result<(), Failure> {
         for i in 0..self.choices.selections.len() {
             if let Some(before) = self.choices.selections[i].apply() {
                 self.note(Entry::TargetsReplaced { selection: i as u32, before });

@@ -1,7 +1,7 @@
 //! Why a trace is as it is: what an update of a choice would reach, and which choices
 //! something was made from.
 //!
-//! What is reached is told by marking, as an update marks (`mark.rs`), and undoing that.
+//! What is reached is told by marking, as an update marks (`invalidate.rs`), and undoing that.
 //! Nothing runs.
 
 use super::graph::Graph;
@@ -38,7 +38,7 @@ pub enum Effect {
 
 /// A term of the log joint density that an update reaches.
 #[derive(Clone, Debug)]
-pub struct Reached {
+pub struct Dependent {
     /// Its address.
     pub address: Address,
     /// What it is.
@@ -51,9 +51,9 @@ pub struct Reached {
 
 /// What an update of a choice would reach.
 #[derive(Clone, Debug, Default)]
-pub struct Reach {
+pub struct Dependents {
     /// Terms of the log joint density, by address.
-    pub terms: Vec<Reached>,
+    pub terms: Vec<Dependent>,
     /// Top-level names, in the order of the program.
     pub names: Vec<Arc<str>>,
     /// How many values would be worked out anew if all that they read changed.
@@ -62,11 +62,11 @@ pub struct Reach {
 
 impl Trace {
     /// What an update of a choice would reach.
-    pub fn reached_from(&mut self, t: Target) -> Reach {
+    pub fn dependents(&mut self, t: Target) -> Dependents {
         self.rollback();
         let before = self.graph.begin();
-        self.graph.mark_target(&self.code, t.node);
-        let reach = self.graph.marked(&self.code, t.node);
+        self.graph.invalidate_target(&self.code, t.node);
+        let reach = self.graph.dependents_of(&self.code, t.node);
         self.graph.rollback(&self.code, before);
         reach
     }
@@ -95,11 +95,11 @@ impl Trace {
 
 impl Graph {
     /// What is marked, but for the choice that it began with.
-    fn marked(&self, code: &Code, from: NodeId) -> Reach {
-        let mut reach = Reach::default();
+    fn dependents_of(&self, code: &Code, from: NodeId) -> Dependents {
+        let mut reach = Dependents::default();
         let mut add = |n: NodeId, term, effect| {
             let address = self.address(code, n);
-            reach.terms.push(Reached { address, term, effect, log_density: self.term_score(n) });
+            reach.terms.push(Dependent { address, term, effect, log_density: self.term_score(n) });
         };
         for (n, node) in (0..).zip(&self.nodes) {
             let is_marked = node.state == State::Stale;
@@ -218,7 +218,7 @@ mod tests {
         }
     }
 
-    fn spelt(r: &Reach) -> Vec<String> {
+    fn spelt(r: &Dependents) -> Vec<String> {
         r.terms.iter().map(|t| format!("{} {:?} {:?}", t.address, t.term, t.effect)).collect()
     }
 
@@ -232,7 +232,7 @@ mod tests {
         let mut t = trace(TEXT);
         let before = t.log_joint();
         let a = at(&t, "@a");
-        let reach = t.reached_from(a);
+        let reach = t.dependents(a);
         assert_eq!(
             spelt(&reach),
             ["@b Choice Scored", "@deep/d Choice Scored", "@y Observation Scored"],
@@ -240,7 +240,7 @@ mod tests {
         );
         assert_eq!(reach.names.iter().map(|n| &**n).collect::<Vec<_>>(), ["mu"]);
         let c = at(&t, "@c");
-        let reach = t.reached_from(c);
+        let reach = t.dependents(c);
         let terms = spelt(&reach);
         assert!(terms.contains(&"@deep/d Choice Structural".to_owned()), "{terms:?}");
         assert!(

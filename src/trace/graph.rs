@@ -93,7 +93,7 @@ pub(crate) struct Graph {
     pub limits: Limits,
     pub spent: Spent,
     /// What was executed, when somebody watches.
-    pub watched: Option<Vec<(u32, u32)>>,
+    pub execution_log: Option<Vec<(u32, u32)>>,
 }
 
 impl Graph {
@@ -139,7 +139,7 @@ impl Graph {
             incremental: true,
             limits,
             spent: Spent::default(),
-            watched: None,
+            execution_log: None,
         };
         let root = Frame {
             block: 0,

@@ -2,9 +2,9 @@
 //! place in the program, rather than memory or patience that run out. The numbers are in
 //! `docs/reliability.md`.
 
-use super::demand::Failure;
 use super::graph::Graph;
 use super::node::NodeId;
+use super::propagate::Failure;
 use crate::lang::code::Code;
 use crate::lang::error::FaultKind;
 use crate::lang::value::{Extent, MOST_ELEMENTS, MOST_NESTED, Value};

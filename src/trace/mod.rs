@@ -7,35 +7,35 @@
 
 #![doc = include_str!("guide.md")]
 
-mod assign;
 mod choices;
-mod demand;
+mod enumeration;
 mod eval;
 mod explain;
-mod formula;
 mod gradient;
 mod graph;
 mod inspect;
+mod invalidate;
 mod journal;
 mod limits;
+mod local_density;
 mod marginal;
-mod mark;
 mod node;
 mod observed;
 mod operations;
 mod path;
-mod peek;
+mod propagate;
 mod propose;
 mod query;
 mod save;
+mod scaffold;
 mod select;
-mod spread;
-mod twin;
+mod set_in_place;
+mod surrogate;
 
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
 #[doc(hidden)]
-pub use explain::{Effect, Reach, Reached, Term};
+pub use explain::{Dependent, Dependents, Effect, Term};
 pub use limits::{Limits, Stop};
 pub use observed::{Observation, Replicate};
 pub use operations::{Given, Update};
@@ -46,13 +46,13 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 use crate::lang::code::Code;
 pub use crate::lang::error::RunError;
 use crate::lang::value::Value;
+pub(crate) use enumeration::Enumeration;
 #[doc(hidden)]
 pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
-pub(crate) use marginal::{Explored, Marginal, Sums};
+pub(crate) use marginal::{Elimination, Explored, Marginal};
 use node::NONE;
-pub(crate) use peek::Peek;
 use std::sync::Arc;
 
 /// One execution of a program: the values of its choices and all that follows from them.
@@ -113,7 +113,7 @@ impl Trace {
         }
         g.effects.extend(effects);
         g.starting = true;
-        g.settle(&trace.code)?;
+        g.propagate(&trace.code)?;
         g.starting = false;
         let weight = g.weight(&before.prior, &before.likelihood);
         g.commit(&trace.code);
@@ -164,19 +164,19 @@ impl Trace {
         self.graph.draws = draws;
         self.graph.constraints.extend(constraints.iter().cloned());
         self.put_observed(observed);
-        let spread = match changes {
+        let scaffold = match changes {
             [(target, change)] if observed.is_empty() => {
-                self.graph.spread_of(&self.code, *target).map(|s| (*target, change, s))
+                self.graph.scaffold_of(&self.code, *target).map(|s| (*target, change, s))
             }
             _ => None,
         };
-        let settled = match spread {
-            Some((target, change, spread)) => {
-                self.graph.update_by_spread(&self.code, target, change, spread)
+        let settled = match scaffold {
+            Some((target, change, scaffold)) => {
+                self.graph.update_along_scaffold(&self.code, target, change, scaffold)
             }
             None => {
                 self.graph.queue(&self.code, changes);
-                self.graph.settle(&self.code)
+                self.graph.propagate(&self.code)
             }
         };
         self.graph.constraints.clear();
@@ -345,15 +345,15 @@ impl Trace {
 
     /// Starts to note which operations are executed.
     #[doc(hidden)]
-    pub fn watch(&mut self) {
-        self.graph.watched = Some(Vec::new());
+    pub fn record_execution(&mut self) {
+        self.graph.execution_log = Some(Vec::new());
     }
 
-    /// What was executed since [`Trace::watch`]: the text of each expression, where the
+    /// What was executed since [`Trace::record_execution`]: the text of each expression, where the
     /// source is at hand by its span.
     #[doc(hidden)]
     pub fn executed(&mut self) -> Vec<crate::syntax::span::Span> {
-        let log = self.graph.watched.take().unwrap_or_default();
+        let log = self.graph.execution_log.take().unwrap_or_default();
         log.into_iter().map(|(b, s)| self.code.blocks[b as usize].spans[s as usize]).collect()
     }
 

@@ -7,10 +7,10 @@
 //! proposal like any other: pending until it is committed, undone by a roll-back. Not
 //! here: scoring ([`super::eval`]).
 
-use super::demand::Failure;
 use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
+use super::propagate::Failure;
 use super::{Address, Draws, Trace, TraceResult, Weight};
 use crate::dist::{Datum, Dist, Support};
 use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};
@@ -194,7 +194,7 @@ impl Trace {
             if let Some(n) = nodes.get(hash) {
                 self.graph.save(*n);
                 self.graph.nodes[*n as usize].flags |= TARGET;
-                self.graph.mark_target(&self.code, *n);
+                self.graph.invalidate_target(&self.code, *n);
             }
         }
     }
@@ -347,7 +347,7 @@ mod tests {
     use crate::trace::Change;
 
     fn draws(step: u64) -> Draws {
-        Draws { key: StreamKey::new(3, 0, Purpose::REPLICATE), step, lane: 0 }
+        Draws { key: StreamKey::new(3, 0, Purpose::REPLICATE), step, substream: 0 }
     }
 
     fn trace(text: &str) -> Trace {

@@ -113,7 +113,7 @@ impl Trace {
     ///      observe normal(x, 1) = 2.5 as y;",
     /// )?;
     /// let mut trace = model.simulate(1, 0)?;
-    /// let draws = Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step: 0, lane: 0 };
+    /// let draws = Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step: 0, substream: 0 };
     ///
     /// // Another branch, a value for the choice that appears in it, other data: one update, and back.
     /// trace.set("@spare", false, draws)?;

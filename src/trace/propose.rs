@@ -19,13 +19,13 @@ pub struct Draws {
     /// The step of the chain.
     pub step: u64,
     /// Which of several alternatives at one step.
-    pub lane: u64,
+    pub substream: u64,
 }
 
 impl Draws {
     /// The stream of an address.
     pub(crate) fn stream(&self, address_hash: u64) -> Stream {
-        self.key.stream(self.step, address_hash, self.lane)
+        self.key.stream(self.step, address_hash, self.substream)
     }
 }
 
@@ -119,13 +119,13 @@ impl Graph {
         }));
         self.pending.sort_by_key(|p| p.node);
         if !self.incremental {
-            self.mark_everything(code);
+            self.invalidate_everything(code);
         }
         for (t, _) in changes {
             self.save(t.node);
             if self.nodes[t.node as usize].flags & TARGET == 0 {
                 self.nodes[t.node as usize].flags |= TARGET;
-                self.mark_target(code, t.node);
+                self.invalidate_target(code, t.node);
             }
         }
     }

@@ -31,7 +31,7 @@ impl Trace {
         look: impl FnOnce(&Trace, Vec<Value>) -> T,
     ) -> TraceResult<T> {
         self.asked(operands, draws, |trace, values| {
-            trace.graph.settle_choices(&trace.code)?;
+            trace.graph.update_selections(&trace.code)?;
             Ok(look(trace, values))
         })
     }
@@ -90,11 +90,11 @@ impl Graph {
         let mut values = Vec::with_capacity(operands.len());
         for o in operands {
             if let Some(n) = self.resolve(0, *o) {
-                self.demand(code, n)?;
+                self.evaluate(code, n)?;
             }
             if let Value::Container(r) = self.value(code, 0, *o) {
                 let gather = r.node + 1;
-                self.demand(code, gather)?;
+                self.evaluate(code, gather)?;
             }
             let mut deps = Deps::new();
             values.push(self.plain(code, 0, *o, &mut deps).clone());

@@ -11,7 +11,7 @@ mod reverse;
 
 use self::reverse::Reverse;
 use super::contour_map::ContourMap;
-use super::elements::{ComparatorError, Element, Elements, Step, check};
+use super::elements::{ComparatorError, ContourDelta, Element, Elements, check};
 use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use crate::num::LN_SQRT_2PI;
 use crate::num::simd::vectorised;
@@ -101,10 +101,10 @@ impl Steps {
         add(&mut self.second, length * distance * distance);
     }
 
-    fn sums(&self) -> Sums {
+    fn sums(&self) -> ChamferSums {
         let [length, first, second] =
             [self.length, self.first, self.second].map(|sum| sum as f64 / FIXED);
-        Sums { length, first, second }
+        ChamferSums { length, first, second }
     }
 }
 
@@ -118,7 +118,7 @@ pub struct Tally {
 
 /// Sums over one direction.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct ChamferSums {
     /// Contour length in percent.
     length: f64,
     /// Length times distance.
@@ -127,7 +127,7 @@ struct Sums {
     second: f64,
 }
 
-impl Sums {
+impl ChamferSums {
     #[inline(always)]
     fn add(&mut self, length: f64, distance: f64) {
         self.length += length;
@@ -199,7 +199,7 @@ impl Chamfer {
     /// `whole` gives all of them.
     pub fn log_likelihood_after<'a>(
         &self,
-        step: &Step<'_>,
+        step: &ContourDelta<'_>,
         whole: impl Fn() -> Elements<'a>,
         tally: &mut Tally,
         scratch: &mut Scratch,
@@ -221,19 +221,19 @@ impl Chamfer {
         self.score(steps.sums(), back)
     }
 
-    fn mean(&self, forth: Sums, back: Option<Sums>) -> f64 {
+    fn mean(&self, forth: ChamferSums, back: Option<ChamferSums>) -> f64 {
         match back {
             None => forth.mean(),
             Some(back) => 0.5 * (forth.mean() + back.mean()),
         }
     }
 
-    fn score(&self, forth: Sums, back: Option<Sums>) -> f64 {
-        let sum = |s: Sums| {
+    fn score(&self, forth: ChamferSums, back: Option<ChamferSums>) -> f64 {
+        let sum = |s: ChamferSums| {
             let s = if s.length > 0.0 {
                 s
             } else {
-                Sums { length: 100.0, first: 0.0, second: 100.0 * NOTHING * NOTHING }
+                ChamferSums { length: 100.0, first: 0.0, second: 100.0 * NOTHING * NOTHING }
             };
             s.length * self.log_normal(0.0)
                 - 0.5 * s.second / (self.options.sigma * self.options.sigma)
@@ -277,7 +277,7 @@ impl Chamfer {
         (d, [dx * self.grid.sx, dy * self.grid.sy, turn])
     }
 
-    fn forth(&self, elements: &Elements<'_>) -> Sums {
+    fn forth(&self, elements: &Elements<'_>) -> ChamferSums {
         let mut steps = Steps::default();
         self.count(elements, 1, &mut steps);
         steps.sums()
@@ -301,9 +301,9 @@ impl Chamfer {
         );
     }
 
-    fn back(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> Option<Sums> {
+    fn back(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> Option<ChamferSums> {
         let reverse = self.reverse.as_ref()?;
-        let mut sums = Sums::default();
+        let mut sums = ChamferSums::default();
         reverse.each(elements, self.turn(), scratch, |length, distance, _| {
             let distance = (f64::from(distance) * self.percent).min(NOTHING);
             sums.add(f64::from(length) * self.percent, self.cut(distance as f32));

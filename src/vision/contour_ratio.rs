@@ -12,18 +12,18 @@
 //! A piece far from every edge gets ln 0.25; one in dense texture about 0.
 
 mod background;
-mod credit;
 mod gradient;
+mod match_capacity;
 mod ratio;
 
 use self::background::scores;
-use self::credit::{Capacity, NO_GROUP};
+use self::match_capacity::{MatchCapacity, NO_GROUP};
 use super::contour_map::ContourMap;
-use super::elements::{ComparatorError, Elements, Step, check};
+use super::elements::{ComparatorError, ContourDelta, Elements, check};
 use super::field::{CHANNELS, Edge, Edges, channels_of, turn_between};
 use crate::platform::threads::side_by_side;
 
-pub use self::credit::Scratch;
+pub use self::match_capacity::Scratch;
 
 /// What [`ContourRatio`] can be told. Lengths are percent of the image diagonal. The
 /// defaults were chosen on ten pictures of 256 x 256 pixels.
@@ -111,7 +111,7 @@ pub struct ContourRatio {
     grid: Edges,
     /// Channel after channel, each as the grid.
     cells: Vec<Cell>,
-    capacity: Capacity,
+    capacity: MatchCapacity,
     /// Percent of the diagonal per pixel of the frame.
     percent: f64,
 }
@@ -136,7 +136,7 @@ impl ContourRatio {
         let grid = Edges::new(map, width, height)?;
         let samples = grid.width as usize * grid.height as usize;
         let frame_pixel = grid.sx.max(grid.sy);
-        let capacity = Capacity::new(&grid, frame_pixel, options.credit);
+        let capacity = MatchCapacity::new(&grid, frame_pixel, options.credit);
         let none = Cell { score: libm::log(1.0 - options.foreground) as f32, group: NO_GROUP };
         let mut cells = vec![none; samples * CHANNELS];
         side_by_side(cells.chunks_exact_mut(samples), |k, out| {
@@ -181,7 +181,7 @@ impl ContourRatio {
     /// them. A scratch belongs to one comparator.
     pub fn log_likelihood_after<'a>(
         &self,
-        step: &Step<'_>,
+        step: &ContourDelta<'_>,
         whole: impl FnOnce() -> Elements<'a>,
         scratch: &mut Scratch,
     ) -> f64 {
@@ -196,8 +196,8 @@ impl ContourRatio {
             }
             scratch.of = Some(step.to.clone());
         }
-        scratch.settle(&self.capacity);
-        let before = scratch.mark();
+        scratch.score_matches(&self.capacity);
+        let before = scratch.savepoint();
         self.count(&step.moving, 1, scratch);
         let score = self.score(scratch);
         scratch.restore(before);
@@ -224,7 +224,7 @@ impl ContourRatio {
                         total = total
                             .saturating_add(sign * (length * f64::from(cell.score) * FIXED) as i64);
                     } else {
-                        scratch.claim(cell.group, length, length * f64::from(cell.score), sign);
+                        scratch.assign(cell.group, length, length * f64::from(cell.score), sign);
                     }
                 }
             }
@@ -234,7 +234,7 @@ impl ContourRatio {
 
     /// The score of what has been counted.
     fn score(&self, scratch: &mut Scratch) -> f64 {
-        let evidence = scratch.total as f64 / FIXED + scratch.settle(&self.capacity);
+        let evidence = scratch.total as f64 / FIXED + scratch.score_matches(&self.capacity);
         let length = scratch.length as f64 / FIXED;
         let missing = (1.0 - length / self.options.least).max(0.0);
         let penalty = missing * self.options.nothing * libm::log(1.0 - self.options.foreground);

@@ -95,7 +95,7 @@ impl Elements<'_> {
 /// From some rendered contours to others. Contours are told by the address of what stands
 /// for them.
 #[derive(Debug, Clone, Copy)]
-pub struct Step<'a> {
+pub struct ContourDelta<'a> {
     /// Stands for the contours before.
     pub from: &'a Arc<()>,
     /// Stands for the contours now.
@@ -110,7 +110,7 @@ pub struct Step<'a> {
     pub count: usize,
 }
 
-impl Step<'_> {
+impl ContourDelta<'_> {
     /// Whether it begins at these contours, and is shorter than beginning from nothing.
     pub(super) fn follows(&self, known: Option<&Arc<()>>) -> bool {
         self.gone.len() + self.come.len() < self.count

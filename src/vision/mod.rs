@@ -46,7 +46,7 @@ pub use contour_ratio::{ContourRatio, ContourRatioOptions};
 pub use depth::{DepthLikelihood, DepthMap};
 pub use detector::{ContourDetector, GradientDetector};
 pub use distance_transform::{DistanceMap, distance_transform};
-pub use elements::{ComparatorError, Elements, Step};
+pub use elements::{ComparatorError, ContourDelta, Elements};
 pub use error::VisionError;
 pub use file_detector::{FileDetector, NetworkOptions};
 pub use forest::Forest;

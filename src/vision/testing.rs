@@ -148,7 +148,7 @@ pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
 /// steps are told by what they were and are.
 pub(super) fn comings_and_goings(
     all: &Pieces,
-    mut each: impl FnMut(&super::elements::Step<'_>, &Pieces),
+    mut each: impl FnMut(&super::elements::ContourDelta<'_>, &Pieces),
 ) {
     let only = |keep: &dyn Fn(usize) -> bool| {
         let mut some = Pieces::new(all.width, all.height);
@@ -170,7 +170,10 @@ pub(super) fn comings_and_goings(
         let to = std::sync::Arc::new(());
         let ([gone, come, moving], count) =
             ([&gone, &come, &moving].map(Pieces::elements), whole.x.len());
-        each(&super::elements::Step { from: &from, to: &to, gone, come, moving, count }, &whole);
+        each(
+            &super::elements::ContourDelta { from: &from, to: &to, gone, come, moving, count },
+            &whole,
+        );
         from = to;
     }
 }

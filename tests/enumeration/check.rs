@@ -7,7 +7,7 @@ use super::posterior::Posterior;
 use super::verdict::{Counts, Pooled};
 use pcadlang::Program;
 use pcadlang::infer::draws::Discard;
-use pcadlang::infer::{ChainError, Latent, Neighbours, Progress, RunOptions, Watch, run_from};
+use pcadlang::infer::{Callback, ChainError, Latent, Neighbours, Progress, RunOptions, run_from};
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Draws, Limits, Trace};
 use std::sync::{Arc, Mutex};
@@ -50,7 +50,7 @@ struct Seen {
     failed: Option<String>,
 }
 
-impl Watch for Restart {
+impl Callback for Restart {
     fn draw(&self, _chain: u32, trace: &mut Trace, draws: Draws) {
         let Ok(mut seen) = self.seen.lock() else { return };
         let place = |t: &Trace| self.posterior.place(t);
@@ -101,7 +101,7 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
         Err(e) => return Said::Failed(format!("{e}")),
     };
     let (state, _) = posterior.draw(&mut StreamKey::new(seed, 1, Purpose::TRUTH).stream(0, 0, 0));
-    let draws = Draws { key: StreamKey::new(seed, 2, Purpose::VALUES), step: 0, lane: 0 };
+    let draws = Draws { key: StreamKey::new(seed, 2, Purpose::VALUES), step: 0, substream: 0 };
     let trace = match Trace::generate(model.code().clone(), state, draws, Limits::default()) {
         Ok((t, _)) => t,
         Err(e) => return Said::Failed(format!("{e}")),
@@ -114,8 +114,8 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
     });
     let watch =
         Arc::new(Restart { posterior: Arc::clone(posterior), seed, seen: Mutex::default() });
-    let watched: Arc<dyn Watch> = watch.clone();
-    let options = RunOptions { seed, watch: Some(watched), banks, ..RunOptions::default() };
+    let watched: Arc<dyn Callback> = watch.clone();
+    let options = RunOptions { seed, callback: Some(watched), banks, ..RunOptions::default() };
     let plan = match model.plan() {
         Ok((plan, _)) => plan,
         Err(e) => return Said::Failed(format!("{e}")),
@@ -205,7 +205,7 @@ impl std::fmt::Debug for Visits {
     }
 }
 
-impl Watch for Visits {
+impl Callback for Visits {
     fn draw(&self, _chain: u32, trace: &mut Trace, _draws: Draws) {
         if let (Ok(mut counts), Some((kind, _))) = (self.counts.lock(), self.posterior.place(trace))
         {
@@ -223,8 +223,8 @@ pub fn distance(text: &str, plan: &str, posterior: &Arc<Posterior>, seed: u64) -
     let probabilities = posterior.probabilities();
     let counts = Mutex::new(vec![0.0; probabilities.len()]);
     let visits = Arc::new(Visits { posterior: Arc::clone(posterior), counts });
-    let watched: Arc<dyn Watch> = visits.clone();
-    let options = RunOptions { seed, watch: Some(watched), ..RunOptions::default() };
+    let watched: Arc<dyn Callback> = visits.clone();
+    let options = RunOptions { seed, callback: Some(watched), ..RunOptions::default() };
     model.run(&options, 4, 2).unwrap_or_else(|e| panic!("{e}"));
     let counts = visits.counts.lock().map(|c| c.clone()).unwrap_or_default();
     let total: f64 = counts.iter().sum();

@@ -58,13 +58,13 @@ impl Gaussian {
     /// the prior of choice `i` has slope 1 by it.
     pub fn new(n: usize, residuals: &[(Affine, f64)]) -> Gaussian {
         let mut precision = vec![vec![0.0; n]; n];
-        let mut pull = vec![0.0; n];
+        let mut vjp = vec![0.0; n];
         let mut log_evidence = n as f64 * LOG_SQRT_TAU;
         for (r, sd) in residuals {
             let w = 1.0 / (sd * sd);
             log_evidence -= LOG_SQRT_TAU + sd.ln() + 0.5 * w * r.constant * r.constant;
             for i in 0..n {
-                pull[i] -= w * r.slopes[i] * r.constant;
+                vjp[i] -= w * r.slopes[i] * r.constant;
                 (0..n).for_each(|j| precision[i][j] += w * r.slopes[i] * r.slopes[j]);
             }
         }
@@ -79,7 +79,7 @@ impl Gaussian {
         let mut white = vec![0.0; n];
         for i in 0..n {
             let inner: f64 = (0..i).map(|k| factor[i][k] * white[k]).sum();
-            white[i] = (pull[i] - inner) / factor[i][i];
+            white[i] = (vjp[i] - inner) / factor[i][i];
             log_evidence += 0.5 * white[i] * white[i] - factor[i][i].ln();
         }
         let mut g = Gaussian { mean: vec![0.0; n], factor, log_evidence };

@@ -9,7 +9,7 @@ use pcadlang::rng::{Purpose, Stream, StreamKey};
 /// What expressions may read: discrete names with their greatest value, and numbers that
 /// may be affine in Gaussian choices.
 #[derive(Clone, Default)]
-struct Scope {
+struct SiteSelection {
     truths: Vec<Expr>,
     counts: Vec<(Expr, usize)>,
     reals: Vec<Expr>,
@@ -28,7 +28,7 @@ struct Generator {
     rng: Stream,
     program: Program,
     integration: Integration,
-    scope: Scope,
+    scope: SiteSelection,
     functions: Vec<(Vec<Kind>, Kind)>,
     memos: Vec<(Kind, Kind)>,
 }
@@ -37,7 +37,7 @@ struct Generator {
 pub fn program(seed: u64) -> (Program, Integration) {
     let mut rng = StreamKey::new(seed, 0, Purpose::VALUES).stream(0, 0, 0);
     let integration = if rng.uniform() < 0.25 { Integration::Grid } else { Integration::Gaussian };
-    let (program, scope) = (Program::default(), Scope::default());
+    let (program, scope) = (Program::default(), SiteSelection::default());
     let mut g =
         Generator { rng, program, integration, scope, functions: Vec::new(), memos: Vec::new() };
     g.fill();

@@ -6,7 +6,7 @@ use super::points::Points;
 use crate::common::{assert_mean, integrate, normal_pdf, run};
 use pcadlang::Model;
 use pcadlang::infer::draws::Discard;
-use pcadlang::infer::{ChainResult, Progress, RunOptions, Watch};
+use pcadlang::infer::{Callback, ChainResult, Progress, RunOptions};
 use pcadlang::trace::{Draws, Trace};
 use std::sync::{Arc, Mutex};
 
@@ -66,7 +66,7 @@ fn program(posterior: &str, kernel: &str, scale: &str, counts: [u32; 2]) -> Stri
 #[derive(Debug, Default)]
 struct Faults(Mutex<Vec<String>>);
 
-impl Watch for Faults {
+impl Callback for Faults {
     fn draw(&self, _: u32, trace: &mut Trace, _: Draws) {
         let mut faults = self.0.lock().unwrap();
         if !trace.log_joint().is_finite() {
@@ -85,7 +85,7 @@ impl Watch for Faults {
 fn watched(text: &str, seed: u64) -> Result<ChainResult, String> {
     let model = Model::from_text(text).map_err(|e| e.to_string())?;
     let faults = Arc::new(Faults::default());
-    let options = RunOptions { seed, watch: Some(faults.clone()), ..RunOptions::default() };
+    let options = RunOptions { seed, callback: Some(faults.clone()), ..RunOptions::default() };
     let chains = model.run_into(&options, 1, &Progress::default(), vec![Box::new(Discard)]);
     let chain = chains
         .map_err(|e| e.to_string())?

@@ -7,10 +7,10 @@
 mod dataset;
 mod observed;
 
-use super::args::{Evaluate, Given, Job};
+use super::args::{Evaluate, Inputs, Job};
 use super::job::{CHECKPOINT, Interrupt, Manner};
-use super::{Failure, given, job, plain, quality, term};
-use super::{earlier, edges};
+use super::{Failure, inputs, job, plain, quality, term};
+use super::{edges, resume};
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
 pub use observed::{Detections, Items, observations_for};
@@ -106,23 +106,23 @@ impl<'a> Evaluation<'a> {
     fn prepare(a: &'a Evaluate) -> Result<Evaluation<'a>, Failure> {
         let Dataset { layout, cases, skipped } = Dataset::open(&a.dataset)?;
         dataset::known(&a.dataset, &a.only, cases.iter().map(|c| c.name.as_str()))?;
-        let program = given::program(&a.given, a.quiet)?;
+        let program = inputs::program(&a.inputs, a.quiet)?;
         let hash = program.hash();
         let detections = a.keypoints.clone().map(Detections::open).transpose()?;
         let items = Items::of(&program, detections.is_some())?;
         program.without_data().compile()?;
         let dir = EvaluationDir::open(&a.out).map_err(|e| plain(e.to_string()))?;
-        let edges = edges::bytes(a.given.edges.as_deref())?;
+        let edges = edges::bytes(a.inputs.edges.as_deref())?;
         let mut said = None;
         let task = |case: Case| {
-            let camera = case.camera.clone().or_else(|| a.given.camera.clone());
+            let camera = case.camera.clone().or_else(|| a.inputs.camera.clone());
             let case = Case { camera: camera.clone(), ..case };
             let observe = observations_for(&case, detections.as_ref())
                 .iter()
                 .map(|o| items.spec(o))
                 .collect();
-            let given = Given { camera, ..a.given.clone() };
-            let mut job = Job { observe, ..Job::of(given, a.sampling.clone()) };
+            let inputs = Inputs { camera, ..a.inputs.clone() };
+            let mut job = Job { observe, ..Job::of(inputs, a.sampling.clone()) };
             said = quality::apply(&mut job, detections.is_some())?;
             let inputs =
                 bytes_hash(&[observed::bytes(&case, detections.as_ref()), edges.clone()].concat());
@@ -155,8 +155,8 @@ impl<'a> Evaluation<'a> {
         for t in &mut self.tasks {
             t.row = t.chosen.then(|| Row::pending(&t.case.name));
             let folder = self.dir.file(&t.case.name);
-            let Some(run) = earlier::left(&folder) else { continue };
-            let differences = earlier::differences(&run, &t.record);
+            let Some(run) = resume::left(&folder) else { continue };
+            let differences = resume::differences(&run, &t.record);
             if differences.is_empty() && !(self.a.fresh && t.chosen) {
                 t.row = Some(Row::of(&t.case.name, &run));
             } else if !differences.is_empty() && run["state"] != "failed" {
@@ -203,7 +203,7 @@ impl<'a> Evaluation<'a> {
         let begun = Instant::now();
         match self.fill(t) {
             Ok(()) => {
-                let run = earlier::left(&self.dir.file(&t.case.name)).unwrap_or_default();
+                let run = resume::left(&self.dir.file(&t.case.name)).unwrap_or_default();
                 (Row::of(&t.case.name, &run), None)
             }
             // Its folder may be what failed.

@@ -10,9 +10,9 @@ mod sixel;
 #[cfg(test)]
 mod testing;
 
-use super::args::{Given, Graphics, Job, Repl, Sampling};
+use super::args::{Graphics, Inputs, Job, Repl, Sampling};
 use super::reopened::Reopened;
-use super::{Failure, given, has_colors, plain, term};
+use super::{Failure, has_colors, inputs, plain, term};
 use editor::{Lines, Typed, is_whole};
 use pcadlang::report::number;
 use pcadlang::session::{Reply, Request, Session, Status, Trouble};
@@ -60,14 +60,14 @@ fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
         return reopened(Path::new(path), a.seed, stop);
     }
     let job = job(a, path);
-    let (program, _) = given::observe(given::program(&job.given, false)?, &job)?;
+    let (program, _) = inputs::observe(inputs::program(&job.inputs, false)?, &job)?;
     Ok(Session::open(program, a.seed, stop)?)
 }
 
 /// The program, data and settings of a run, in its best state.
 fn reopened(folder: &Path, seed: u64, stop: Stop) -> Result<(Session, Reply), Failure> {
     let run = Reopened::open(folder)?;
-    let (program, _) = given::observe(given::program(&run.job.given, true)?, &run.job)?;
+    let (program, _) = inputs::observe(inputs::program(&run.job.inputs, true)?, &run.job)?;
     let (mut session, _) = Session::open(program, seed, stop)?;
     let said = session.take_up(&run.best()?)?;
     Ok((session, said))
@@ -77,7 +77,7 @@ fn reopened(folder: &Path, seed: u64, stop: Stop) -> Result<(Session, Reply), Fa
 fn job(a: &Repl, path: &str) -> Job {
     let sampling = Sampling { seed: a.seed, chains: Some(1), ..Sampling::default() };
     Job {
-        given: Given {
+        inputs: Inputs {
             program: path.to_owned(),
             sets: a.sets.clone(),
             camera: a.camera.clone(),

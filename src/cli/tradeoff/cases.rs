@@ -6,7 +6,7 @@
 use super::truth::{self, Truth};
 use crate::cli::args::Tradeoff;
 use crate::cli::evaluate::{Dataset, Detections, Items, Layout, observations_for};
-use crate::cli::{Failure, files, given, plain};
+use crate::cli::{Failure, files, inputs, plain};
 use pcadlang::Program;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ pub struct Case {
 impl Case {
     /// All files that what is measured depends on.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
-        let observed = self.observe.iter().map(|spec| PathBuf::from(given::file_of(spec)));
+        let observed = self.observe.iter().map(|spec| PathBuf::from(inputs::file_of(spec)));
         observed.chain(self.camera.clone()).chain(self.said.clone())
     }
 }
@@ -54,7 +54,7 @@ pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
     };
     let mut all = Vec::new();
     for case in cases {
-        let camera = case.camera.clone().or_else(|| a.given.camera.clone());
+        let camera = case.camera.clone().or_else(|| a.inputs.camera.clone());
         let folder = a.cases.join(&case.name);
         let (found, said) = match &mut truths {
             Some(people) => (

@@ -15,7 +15,7 @@ mod work;
 use super::args::Tradeoff;
 use super::evaluate::known;
 use super::job::{self, Interrupt};
-use super::{Failure, given, plain};
+use super::{Failure, inputs, plain};
 use cases::Case;
 use folder::Folder;
 use pcadlang::report::{bytes_hash, seconds, text_hash};
@@ -100,7 +100,7 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
 impl<'a> Sitting<'a> {
     /// Everything that can be wrong is said before the first run.
     fn prepare(a: &'a Tradeoff) -> Result<Sitting<'a>, Failure> {
-        let program = given::program(&a.given, a.quiet)?;
+        let program = inputs::program(&a.inputs, a.quiet)?;
         let Settings { all: settings, candidates } = settings::read(a)?;
         let hashes = settings::programs(a, &settings)?;
         let mut cases = cases::open(a, &program)?;
@@ -119,9 +119,9 @@ impl<'a> Sitting<'a> {
             .collect();
         let head = json!({
             "version": env!("CARGO_PKG_VERSION"),
-            "program": a.given.program,
+            "program": a.inputs.program,
             "programs": hashes,
-            "set": a.given.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
+            "set": a.inputs.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
             "cases": cases.iter().map(|c| c.name.clone()).collect::<Vec<_>>(),
             "inputs": text_hash(&inputs),
             "threads": threads,
@@ -250,8 +250,8 @@ impl<'a> Sitting<'a> {
         let mut front = Preset::front(&self.candidates, rows);
         for preset in &mut front {
             // What all runs were told is part of what was measured.
-            let given = self.a.given.sets.iter().cloned();
-            preset.setting.set = given.chain(std::mem::take(&mut preset.setting.set)).collect();
+            let inputs = self.a.inputs.sets.iter().cloned();
+            preset.setting.set = inputs.chain(std::mem::take(&mut preset.setting.set)).collect();
         }
         Presets { about, error: self.error_name().into(), needs, front }
     }

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Numbers of draws so far, their means, and sums of squares about them (Welford 1962).
 #[derive(Clone, Debug, Default)]
-pub struct Sums {
+pub struct RunningSums {
     names: Vec<String>,
     count: f64,
     mean: Vec<f64>,
@@ -17,11 +17,11 @@ pub struct Sums {
 
 /// A sink that adds up. Clones share the sums.
 #[derive(Clone, Debug, Default)]
-pub struct Running(Arc<Mutex<Sums>>);
+pub struct Running(Arc<Mutex<RunningSums>>);
 
 impl Running {
     /// The sums so far.
-    pub fn sums(&self) -> Sums {
+    pub fn sums(&self) -> RunningSums {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
@@ -39,7 +39,7 @@ impl Sink for Running {
 
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
         let mut s = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let one = Sums {
+        let one = RunningSums {
             names: Vec::new(),
             count: 1.0,
             mean: row.values.clone(),
@@ -60,9 +60,9 @@ impl Sink for Running {
     }
 }
 
-impl Sums {
+impl RunningSums {
     /// Adds the draws of another chain (Chan, Golub and LeVeque 1979).
-    pub fn merge(&mut self, o: &Sums) {
+    pub fn merge(&mut self, o: &RunningSums) {
         if self.names.is_empty() {
             self.names.clone_from(&o.names);
         }
@@ -114,7 +114,7 @@ mod tests {
             c.columns(&[Column::scalar("a"), Column::vector("v", 2)]).unwrap();
         }
         (0..10).for_each(|i| chains[usize::from(i > 3)].draw(&row(f64::from(i))).unwrap());
-        let mut all = Sums::default();
+        let mut all = RunningSums::default();
         assert!(all.normals().is_empty());
         chains.iter().for_each(|c| all.merge(&c.sums()));
         let n = all.normals();

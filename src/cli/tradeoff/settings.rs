@@ -1,7 +1,7 @@
 //! The settings that are to be tried, and the programs they are of.
 
-use crate::cli::args::{Given, Tradeoff};
-use crate::cli::{Failure, given, plain};
+use crate::cli::args::{Inputs, Tradeoff};
+use crate::cli::{Failure, inputs, plain};
 use pcadlang::lang::load;
 use pcadlang::tradeoff::{Plan, Setting};
 use serde_json::{Map, Value, json};
@@ -42,11 +42,11 @@ pub fn read(a: &Tradeoff) -> Result<Settings, Failure> {
 pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>, Failure> {
     let mut hashes = Map::new();
     for setting in settings {
-        let name = setting.program.as_deref().unwrap_or(&a.given.program);
-        let given = Given { program: name.to_owned(), sets: Vec::new(), ..a.given.clone() };
-        let mut other = given::program(&given, true)?;
+        let name = setting.program.as_deref().unwrap_or(&a.inputs.program);
+        let inputs = Inputs { program: name.to_owned(), sets: Vec::new(), ..a.inputs.clone() };
+        let mut other = inputs::program(&inputs, true)?;
         hashes.insert(name.to_owned(), json!(other.hash()));
-        for (param, value) in a.given.sets.iter().cloned().chain(setting.set.clone()) {
+        for (param, value) in a.inputs.sets.iter().cloned().chain(setting.set.clone()) {
             other = other.set(&param, &value);
         }
         other.without_data().compile()?;
@@ -65,7 +65,7 @@ fn files(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
     if named.len() > 0 {
         return named.collect();
     }
-    let name = Path::new(&a.given.program).with_extension("settings.json").display().to_string();
+    let name = Path::new(&a.inputs.program).with_extension("settings.json").display().to_string();
     match std::fs::read_to_string(&name).ok().or_else(|| load::embedded(&name).map(str::to_owned)) {
         Some(text) => Ok(vec![(name, text)]),
         None => Err(Failure::Plain(

@@ -1,16 +1,16 @@
 //! One run of one setting on one case, looked at while it runs and scored afterwards.
 
 use super::cases::Case;
-use super::running::{Running, Sums};
+use super::running::{Running, RunningSums};
 use super::truth::Truth;
-use crate::cli::args::{Given, Job, QualityArg, Sampling, Tradeoff};
+use crate::cli::args::{Inputs, Job, QualityArg, Sampling, Tradeoff};
 use crate::cli::job::{self, Interrupt, Ready};
 use crate::cli::keypoints::Joints;
 use crate::cli::progress::Ending;
 use crate::cli::{Failure, plain, scene};
 use indexmap::IndexMap;
 use pcadlang::infer::draws::Sink;
-use pcadlang::infer::{BestSoFar, BestState, Progress, Watch, Watches};
+use pcadlang::infer::{BestSoFar, BestState, Callback, Callbacks, Progress};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::render::View;
 use pcadlang::report::{Memory, Moments, Tee, quantities};
@@ -28,7 +28,7 @@ struct Snapshot {
     seconds: f64,
     best: Option<Arc<BestState>>,
     joints: Moments,
-    sums: Sums,
+    sums: RunningSums,
 }
 
 /// What is looked at while chains run.
@@ -41,7 +41,7 @@ struct Watched {
 
 impl Watched {
     fn look(&self, at: Option<f64>) -> Snapshot {
-        let mut sums = Sums::default();
+        let mut sums = RunningSums::default();
         self.running.iter().for_each(|r| sums.merge(&r.sums()));
         let seconds = self.begun.elapsed().as_secs_f64();
         Snapshot { at, seconds, best: self.best.state(), joints: self.joints.moments(), sums }
@@ -85,13 +85,13 @@ pub fn run(a: &Tradeoff, task: Task, threads: u32, interrupt: &Interrupt) -> Opt
 /// What `pcadlang run` would be told.
 fn job(a: &Tradeoff, Task { setting, case, seed }: Task, threads: u32) -> Job {
     let set = setting.set.iter().map(|(k, v)| (k.clone(), v.clone()));
-    let given = Given {
-        program: setting.program.clone().unwrap_or_else(|| a.given.program.clone()),
-        sets: a.given.sets.iter().cloned().chain(set).collect(),
+    let inputs = Inputs {
+        program: setting.program.clone().unwrap_or_else(|| a.inputs.program.clone()),
+        sets: a.inputs.sets.iter().cloned().chain(set).collect(),
         camera: case.camera.clone(),
-        edges: a.given.edges.clone(),
-        who: a.given.who.clone(),
-        allowed: a.given.allowed.clone(),
+        edges: a.inputs.edges.clone(),
+        who: a.inputs.who.clone(),
+        allowed: a.inputs.allowed.clone(),
     };
     let sampling = Sampling {
         seed,
@@ -103,7 +103,7 @@ fn job(a: &Tradeoff, Task { setting, case, seed }: Task, threads: u32) -> Job {
         time: setting.time.map(Duration::from_secs_f64),
         no_incremental: false,
     };
-    Job { observe: case.observe.clone(), ..Job::of(given, sampling) }
+    Job { observe: case.observe.clone(), ..Job::of(inputs, sampling) }
 }
 
 fn measure(
@@ -124,11 +124,11 @@ fn measure(
         joints: Joints::new(chains, ready.size()),
         running: (0..chains).map(|_| Running::default()).collect(),
     };
-    let mut watches: Vec<Arc<dyn Watch>> = vec![watched.best.clone()];
+    let mut callbacks: Vec<Arc<dyn Callback>> = vec![watched.best.clone()];
     if matches!(task.case.truth, Truth::Joints(_)) {
-        watches.push(Arc::new(watched.joints.clone()));
+        callbacks.push(Arc::new(watched.joints.clone()));
     }
-    let options = job::options(&job, &ready, Some(Arc::new(Watches(watches))));
+    let options = job::options(&job, &ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
     let memories: Vec<Memory> = (0..chains).map(|_| Memory::bounded(ROOM)).collect();
     let sink = |(r, m): (&Running, &Memory)| -> Box<dyn Sink> {
         Box::new(Tee(vec![Box::new(r.clone()), Box::new(m.clone())]))

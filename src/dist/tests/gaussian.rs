@@ -121,8 +121,8 @@ fn values_and_noise_map_onto_each_other() {
     assert!(gp.is_stored_whitened() && gp.is_gaussian());
     let mut rng = stream(702);
     let z = gp.sample_stored(&mut rng);
-    let x = gp.realise(&z);
-    let Some(Datum::Vec(back)) = gp.unrealise(&x) else { panic!() };
+    let x = gp.from_noncentred(&z);
+    let Some(Datum::Vec(back)) = gp.to_noncentred(&x) else { panic!() };
     let Datum::Vec(z) = z else { panic!() };
     assert!(z.iter().zip(back.iter()).all(|(a, b)| (a - b).abs() < 1e-6));
     let normal = Normal::new(0.0, 1.0).unwrap();
@@ -136,7 +136,7 @@ fn values_and_noise_map_onto_each_other() {
     assert!(g.x.iter().zip(z.iter()).all(|(g, z)| *g == -z));
     // The noise fits no other number of points.
     assert_eq!(gp.log_density_stored(&vec![0.0; 3].into()), f64::NEG_INFINITY);
-    assert!(gp.unrealise(&vec![0.0; 3].into()).is_none());
+    assert!(gp.to_noncentred(&vec![0.0; 3].into()).is_none());
     // Only Gaussian families whiten.
     let n = make("normal", &[3.0, 2.0]);
     assert_eq!(n.colour(&[0.5]), Some(Datum::Num(4.0)));

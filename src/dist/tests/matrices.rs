@@ -222,14 +222,14 @@ fn whitened_vectors_follow_their_parameters() {
         Dist::MvNormal(Arc::new(MvNormal::from_cov(&[m, 0.0], &cov).unwrap().to_whitened()))
     };
     let z = d(1.0).sample_stored(&mut stream(802));
-    let (near, far) = (numbers(&d(1.0).realise(&z)), numbers(&d(5.0).realise(&z)));
+    let (near, far) = (numbers(&d(1.0).from_noncentred(&z)), numbers(&d(5.0).from_noncentred(&z)));
     assert!((far[0] - near[0] - 4.0).abs() < 1e-12 && (far[1] - near[1]).abs() < 1e-12);
     assert_eq!(d(1.0).log_density_stored(&z), d(5.0).log_density_stored(&z));
-    let back = d(1.0).unrealise(&d(1.0).realise(&z)).unwrap();
+    let back = d(1.0).to_noncentred(&d(1.0).from_noncentred(&z)).unwrap();
     assert!(numbers(&back).iter().zip(numbers(&z)).all(|(a, b)| (a - b).abs() < 1e-12));
     // The densities of the two forms differ by the map's Jacobian, the factor's
     // determinant.
-    let x = d(1.0).realise(&z);
+    let x = d(1.0).from_noncentred(&z);
     let jacobian = 0.5 * cov.determinant().ln();
     assert!((d(1.0).log_density_stored(&z) - d(1.0).log_density(&x) - jacobian).abs() < 1e-12);
     // Elements of a product have no stored form.

@@ -309,7 +309,7 @@ impl Armature {
 
     /// From the derivatives by the body at rest to that by the amount of a morph; `None`
     /// if it has no such morph.
-    pub fn pull_morph(&self, name: &str, by: &RestGradient) -> Option<f64> {
+    pub fn vjp_morph(&self, name: &str, by: &RestGradient) -> Option<f64> {
         let m = self.skin.morphs.iter().find(|m| *m.name == *name)?;
         let dot = |offsets: &[DVec3], by: &[DVec3]| {
             offsets.iter().zip(by).map(|(d, g)| d.dot(*g)).sum::<f64>()
@@ -327,13 +327,13 @@ impl Armature {
 
     /// From the derivatives by the body at rest to that by its cloth; see
     /// [`Armature::clothed`].
-    pub fn pull_cloth(&self, by: &RestGradient) -> f64 {
+    pub fn vjp_cloth(&self, by: &RestGradient) -> f64 {
         self.skin.rest.normals.iter().zip(&by.vertices).map(|(n, g)| n.as_dvec3().dot(*g)).sum()
     }
 
     /// From derivatives by the vertices of a posed body's meshes in turn to those by the
     /// body's own; the parts share some.
-    pub fn pull_parts(&self, by_vertex: &[DVec3]) -> Vec<DVec3> {
+    pub fn vjp_parts(&self, by_vertex: &[DVec3]) -> Vec<DVec3> {
         let mut all = vec![DVec3::ZERO; self.skin.influences.len()];
         for (v, g) in self.skin.parts.iter().flat_map(|p| &p.vertices).zip(by_vertex) {
             all[*v as usize] += *g;

@@ -66,7 +66,7 @@ impl Armature {
     ///
     /// # Errors
     /// As [`Armature::stretched`].
-    pub fn pull_stretched(
+    pub fn vjp_stretched(
         &self,
         by_joint: &[(usize, Stretch)],
         by: &RestGradient,

@@ -36,7 +36,7 @@ impl Armature {
     ///
     /// # Errors
     /// A pose that is not finite.
-    pub fn pull_posed(
+    pub fn vjp_posed(
         &self,
         pose: &[JointPose],
         rules: &Rules,

@@ -54,7 +54,7 @@ pub(super) struct Fine<'a> {
 }
 
 /// A coarser surface, by the vertices of the fine one.
-pub(super) struct Step {
+pub(super) struct Coarsened {
     pub triangles: Vec<[u32; 3]>,
     /// The part of each triangle.
     pub parts: Vec<u16>,
@@ -65,7 +65,7 @@ pub(super) struct Step {
 }
 
 /// Ever coarser surfaces, down to some hundred triangles.
-pub(super) fn decimate(fine: &Fine) -> Vec<Step> {
+pub(super) fn decimate(fine: &Fine) -> Vec<Coarsened> {
     let mut steps = Vec::new();
     if fine.triangles.len() < 2 * FEWEST {
         return steps;
@@ -386,7 +386,7 @@ impl<'a> Surface<'a> {
         }
     }
 
-    fn step(&mut self) -> Step {
+    fn step(&mut self) -> Coarsened {
         // A vertex that went to one that went on goes to the last of them.
         for v in 0..self.merged.len() {
             let mut end = self.merged[v];
@@ -396,7 +396,7 @@ impl<'a> Surface<'a> {
             self.merged[v] = end;
         }
         let kept = || (0..self.triangles.len()).filter(|f| self.left[*f]);
-        Step {
+        Coarsened {
             triangles: kept().map(|f| self.triangles[f]).collect(),
             parts: kept().map(|f| self.parts.get(f).copied().unwrap_or(0)).collect(),
             creases: self

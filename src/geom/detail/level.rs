@@ -6,7 +6,7 @@
 //! in any other pose. Invariant: indices fit the mesh that the level was made of.
 
 use super::Coarse;
-use super::decimate::Step;
+use super::decimate::Coarsened;
 use crate::geom::edges::{pair_edges, weld};
 use crate::geom::{Edge, Edges, Mesh, NO_FACE, Topology};
 use glam::{DVec3, Vec3};
@@ -34,7 +34,7 @@ pub(in crate::geom) struct Level {
 
 impl Level {
     /// A level of a mesh with these positions and topology.
-    pub(super) fn new(positions: &[Vec3], fine: &Topology, step: &Step) -> Level {
+    pub(super) fn new(positions: &[Vec3], fine: &Topology, step: &Coarsened) -> Level {
         let mut own = vec![u32::MAX; positions.len()];
         step.triangles.iter().flatten().for_each(|v| own[*v as usize] = 0);
         let vertices: Arc<[u32]> =
@@ -93,7 +93,7 @@ impl Level {
     }
 }
 
-fn edges(point: &[u32], triangles: &[[u32; 3]], step: &Step) -> Edges {
+fn edges(point: &[u32], triangles: &[[u32; 3]], step: &Coarsened) -> Edges {
     let welded: Vec<[u32; 3]> =
         step.triangles.iter().map(|t| t.map(|v| point[v as usize])).collect();
     let all = pair_edges(&welded, |_, _| false).into_iter().map(|(f, c, g, _)| {

@@ -12,7 +12,7 @@ mod quadric;
 mod turned;
 
 use super::{Mesh, Topology};
-use decimate::{Fine, Step, decimate};
+use decimate::{Coarsened, Fine, decimate};
 use glam::{DVec3, Vec3};
 use rustc_hash::FxHashSet;
 use std::fmt;
@@ -156,7 +156,7 @@ pub(super) fn levels_of_parts(
         // Where a point joins parts that share no edge, one of them may get a vertex that
         // it does not have: no levels from there on.
         let mine = |v: u32| Some(of_part[v as usize]).filter(|i| *i != u32::MAX);
-        let part = |step: &Step| {
+        let part = |step: &Coarsened| {
             let theirs =
                 step.triangles.iter().zip(&step.parts).filter(|(_, part)| **part == number);
             let triangles = theirs.map(|([a, b, c], _)| Some([mine(*a)?, mine(*b)?, mine(*c)?]));
@@ -167,7 +167,7 @@ pub(super) fn levels_of_parts(
             Some(Level::new(
                 &at,
                 topology,
-                &Step { triangles, parts, creases: FxHashSet::default(), merged },
+                &Coarsened { triangles, parts, creases: FxHashSet::default(), merged },
             ))
         };
         let levels = steps.iter().map_while(part).collect();

@@ -18,7 +18,7 @@ use super::quantities::{OF_DATA, Quantities, read_data};
 use super::sampler::Sampler;
 use super::simulate::{replicating, same_data, simulate};
 use super::{CalibrationError, FALSE_ALARMS, FEWEST, Settings, each};
-use crate::infer::plan::Watch;
+use crate::infer::callback::Callback;
 use crate::lang::code::Code;
 use crate::num::inv_normal_cdf;
 use crate::trace::{Draws, Trace};
@@ -92,15 +92,15 @@ pub fn geweke(
         simulate(code, settings, i).map(|mut s| read(&quantities, &mut s.trace))
     })?;
     let successive = each(settings, 0..chains, |i| {
-        let watch = Arc::new(Turns {
+        let callback = Arc::new(Turns {
             code: Arc::clone(code),
             quantities: Arc::clone(&quantities),
             settings: settings.clone(),
             taken: Mutex::default(),
         });
-        sampler.run(code, i, settings.steps, Arc::clone(&watch) as Arc<dyn Watch>)?;
+        sampler.run(code, i, settings.steps, Arc::clone(&callback) as Arc<dyn Callback>)?;
         let taken =
-            std::mem::take(&mut *watch.taken.lock().unwrap_or_else(PoisonError::into_inner));
+            std::mem::take(&mut *callback.taken.lock().unwrap_or_else(PoisonError::into_inner));
         match taken.failed {
             Some(e) => Err(e),
             None if taken.readings.is_empty() => Err(CalibrationError::TooFew(
@@ -136,7 +136,7 @@ struct Taken {
     failed: Option<CalibrationError>,
 }
 
-impl Watch for Turns {
+impl Callback for Turns {
     fn draw(&self, chain: u32, trace: &mut Trace, _: Draws) {
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         if taken.failed.is_some() {

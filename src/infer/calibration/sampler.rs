@@ -1,8 +1,9 @@
 //! What is checked: something that runs a chain and shows its states.
 
+use crate::infer::callback::Callback;
 use crate::infer::draws::Discard;
-use crate::infer::kernel::{At, Kernel};
-use crate::infer::plan::{ChainError, Progress, RunOptions, Watch, run_chain};
+use crate::infer::kernel::{Kernel, StepContext};
+use crate::infer::plan::{ChainError, Progress, RunOptions, run_chain};
 use crate::infer::{Start, starts};
 use crate::lang::code::Code;
 use crate::rng::{Purpose, StreamKey};
@@ -12,7 +13,7 @@ use std::sync::Arc;
 
 /// Something that draws from the posterior of a program.
 pub trait Sampler: Sync {
-    /// Runs a chain and shows its states, one draw after the other, to `watch`, which may
+    /// Runs a chain and shows its states, one draw after the other, to `callback`, which may
     /// put the chain in another state. `steps` bounds the kernel applications after
     /// warm-up, in place of the sampler's own number. Gives how many there were.
     ///
@@ -23,7 +24,7 @@ pub trait Sampler: Sync {
         code: &Arc<Code>,
         chain: u32,
         steps: Option<u64>,
-        watch: Arc<dyn Watch>,
+        callback: Arc<dyn Callback>,
     ) -> Result<u64, ChainError>;
 }
 
@@ -43,11 +44,11 @@ impl Sampler for PlanSampler<'_> {
         code: &Arc<Code>,
         chain: u32,
         steps: Option<u64>,
-        watch: Arc<dyn Watch>,
+        callback: Arc<dyn Callback>,
     ) -> Result<u64, ChainError> {
         let options = RunOptions {
             steps: steps.or(self.options.steps),
-            watch: Some(watch),
+            callback: Some(callback),
             ..self.options.clone()
         };
         let done = run_chain(code, self.plan, &options, self.progress, &mut Discard, chain)?;
@@ -75,7 +76,7 @@ impl<F: Fn() -> Box<dyn Kernel> + Sync> Sampler for KernelSampler<F> {
         code: &Arc<Code>,
         chain: u32,
         steps: Option<u64>,
-        watch: Arc<dyn Watch>,
+        callback: Arc<dyn Callback>,
     ) -> Result<u64, ChainError> {
         let begun = starts(code, self.seed, chain, Start::default(), Limits::default())
             .map_err(ChainError::Start)?;
@@ -86,9 +87,12 @@ impl<F: Fn() -> Box<dyn Kernel> + Sync> Sampler for KernelSampler<F> {
         let predict = StreamKey::new(self.seed, chain, Purpose::PREDICT);
         for step in 0..self.warmup + steps {
             let adapting = step < self.warmup;
-            kernel.step(&mut trace, &At { adapting, ..At::new(self.seed, chain, step) })?;
+            kernel.step(
+                &mut trace,
+                &StepContext { adapting, ..StepContext::new(self.seed, chain, step) },
+            )?;
             if !adapting && (step - self.warmup + 1).is_multiple_of(every) {
-                watch.draw(chain, &mut trace, Draws { key: predict, step, lane: 0 });
+                callback.draw(chain, &mut trace, Draws { key: predict, step, substream: 0 });
             }
         }
         Ok(steps)

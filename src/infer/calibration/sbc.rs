@@ -10,8 +10,8 @@ use super::quantities::Quantities;
 use super::sampler::Sampler;
 use super::simulate::{replicating, same_data, simulate};
 use super::{CalibrationError, FALSE_ALARMS, FEWEST, Settings, each};
+use crate::infer::callback::Callback;
 use crate::infer::diagnostics::ess_bulk;
-use crate::infer::plan::Watch;
 use crate::lang::code::Code;
 use crate::num::chi_square_tail;
 use crate::trace::{Draws, Trace};
@@ -94,10 +94,11 @@ pub fn sbc(
         .collect();
     let one = |i: u32, steps: Option<u64>| {
         let (truth, code) = &truths[i as usize];
-        let watch =
+        let callback =
             Arc::new(Collect { quantities: Arc::clone(&quantities), rows: Mutex::default() });
-        let steps = sampler.run(code, i, steps, Arc::clone(&watch) as Arc<dyn Watch>)?;
-        let rows = std::mem::take(&mut *watch.rows.lock().unwrap_or_else(PoisonError::into_inner));
+        let steps = sampler.run(code, i, steps, Arc::clone(&callback) as Arc<dyn Callback>)?;
+        let rows =
+            std::mem::take(&mut *callback.rows.lock().unwrap_or_else(PoisonError::into_inner));
         ranked(truth, &rows, settings, i).map(|ranks| (steps, ranks))
     };
     let mut done = each(settings, 0..count.min(PILOTS), |i| one(i, settings.steps))?;
@@ -126,7 +127,7 @@ struct Collect {
     rows: Mutex<Vec<Vec<f64>>>,
 }
 
-impl Watch for Collect {
+impl Callback for Collect {
     fn draw(&self, _: u32, trace: &mut Trace, _: Draws) {
         let row = self.quantities.read(trace);
         self.rows.lock().unwrap_or_else(PoisonError::into_inner).push(row);

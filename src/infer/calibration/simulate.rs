@@ -30,7 +30,7 @@ pub(super) struct Simulated {
 
 /// The randomness of redrawing observations for the `step`-th time.
 pub(in crate::infer) fn replicating(seed: u64, index: u32, step: u64) -> Draws {
-    Draws { key: StreamKey::new(seed, index, Purpose::REPLICATE), step, lane: 0 }
+    Draws { key: StreamKey::new(seed, index, Purpose::REPLICATE), step, substream: 0 }
 }
 
 /// Draws a state and data.
@@ -54,7 +54,7 @@ pub(in crate::infer) fn state(
 ) -> Result<Trace, ChainError> {
     let key = StreamKey::new(seed, index, Purpose::TRUTH);
     let draw =
-        |step| Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits.clone());
+        |step| Trace::simulate(Arc::clone(code), Draws { key, step, substream: 0 }, limits.clone());
     attempts(RETRIES, draw).map_err(|e| match e.is_recoverable() {
         true => ChainError::Start(StartError::Run(e)),
         false => ChainError::Run(e),

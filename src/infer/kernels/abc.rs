@@ -8,7 +8,7 @@
 //! `eps` goes to 0. The distance is the root mean square of the differences between the
 //! observed numbers and the drawn ones.
 
-use crate::infer::kernel::{At, Kernel, Outcome};
+use crate::infer::kernel::{Kernel, Outcome, StepContext};
 use crate::infer::selection::fail;
 use crate::infer::state::{StateError, pack, unpack};
 use crate::lang::code::Observed;
@@ -45,7 +45,7 @@ impl Abc {
 pub(super) fn step_within(
     kernel: &mut dyn Kernel,
     trace: &mut Trace,
-    at: &At,
+    at: &StepContext,
     (distance, eps): (&mut f64, f64),
     span: Span,
 ) -> TraceResult<Outcome> {
@@ -53,7 +53,7 @@ pub(super) fn step_within(
         return Err(fail(span, "abc takes a kernel that makes a single step, not each(…)".into()));
     }
     let before = trace.constraints();
-    let inner = kernel.step(trace, &At { power: 0.0, ..at.within(0) })?;
+    let inner = kernel.step(trace, &StepContext { power: 0.0, ..at.within(0) })?;
     if inner.accepted == 0 && *distance <= eps {
         return Ok(Outcome::one(false));
     }
@@ -126,7 +126,7 @@ impl Kernel for Abc {
         self.kernel.load(&inner)
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         if std::mem::take(&mut self.loaded) {
             self.observed = Some(Arc::clone(trace.replacements()));
         }

@@ -11,7 +11,7 @@
 
 use super::abc::{simulate, step_within};
 use super::particles::{Independent, Prior, Way};
-use crate::infer::kernel::{At, Kernel};
+use crate::infer::kernel::{Kernel, StepContext};
 use crate::infer::resampling::systematic;
 use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::syntax::span::Span;
@@ -74,7 +74,7 @@ impl Way for Closer {
         &mut self,
         prior: &Prior,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
     ) -> TraceResult<(Vec<Trace>, f64)> {
         let mut particles = prior.draw(trace, self.particles, at)?;
         let mut distances = Vec::with_capacity(particles.len());

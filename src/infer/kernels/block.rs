@@ -1,6 +1,8 @@
 //! Blocked Metropolis-Hastings from the prior: q_block of Kulkarni et al. 2014, section 3.
 
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
+use crate::infer::kernel::{
+    Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
+};
 use crate::trace::{Trace, TraceResult};
 
 /// `block(sel)`: draws all selected choices anew from their priors, together. Choices
@@ -13,7 +15,7 @@ pub struct Block {
 
 impl Block {
     /// The kernel for these choices.
-    pub fn new(scope: Scope) -> Self {
+    pub fn new(scope: SiteSelection) -> Self {
         Block { scope: Registered::new(scope) }
     }
 }
@@ -23,7 +25,7 @@ impl Kernel for Block {
         "block".into()
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, ways) = self.scope.members(trace, at, &mut rng);
         if targets.is_empty() {
@@ -31,7 +33,7 @@ impl Kernel for Block {
         }
         let proposed = trace.regenerate(&targets, at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
-        let ratio = at.tempered(&weight) + ways - self.scope.ways_back(trace);
-        Ok(settle(trace, ratio, &mut rng))
+        let ratio = at.tempered(&weight) + ways - self.scope.reverse_selection(trace);
+        Ok(accept_or_reject(trace, ratio, &mut rng))
     }
 }

@@ -9,7 +9,7 @@
 //! says, as long as it is possible wherever the observation is. The observation itself is
 //! evaluated for what the first stage lets through, and for nothing else.
 
-use crate::infer::kernel::{At, Kernel, Outcome, recoverable, settle};
+use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
 use crate::infer::selection::fail;
 use crate::infer::state::StateError;
 use crate::lang::error::RunError;
@@ -23,35 +23,35 @@ pub struct Delayed {
     observations: Selector,
     span: Span,
     /// The trace under the surrogates.
-    twin: Option<Trace>,
+    surrogate: Option<Trace>,
 }
 
 impl Delayed {
     /// A kernel, and the observations that have surrogates. `span` is where errors point.
     pub fn new(kernel: Box<dyn Kernel>, observations: Selector, span: Span) -> Self {
-        Delayed { kernel, observations, span, twin: None }
+        Delayed { kernel, observations, span, surrogate: None }
     }
 
     /// Brings the twin to the present state.
     fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Trace> {
         trace.rollback();
-        let mut twin = match self.twin.take() {
-            Some(twin) => twin,
+        let mut surrogate = match self.surrogate.take() {
+            Some(surrogate) => surrogate,
             None => {
                 trace.under_surrogates(&self.observations)?.ok_or_else(|| self.nothing_coarse())?
             }
         };
-        twin.observe_as(trace)?;
-        twin.propose_choices_of(trace)?;
-        twin.commit();
-        if let Some(extra) = trace.lacks(&twin) {
-            let address = twin.address(extra);
+        surrogate.observe_as(trace)?;
+        surrogate.propose_choices_of(trace)?;
+        surrogate.commit();
+        if let Some(extra) = trace.lacks(&surrogate) {
+            let address = surrogate.address(extra);
             return Err(fail(
                 self.span,
                 format!("delayed: only the surrogate depends on the choice {address}"),
             ));
         }
-        Ok(self.twin.insert(twin))
+        Ok(self.surrogate.insert(surrogate))
     }
 
     fn nothing_coarse(&self) -> Box<RunError> {
@@ -76,7 +76,7 @@ impl Kernel for Delayed {
     }
 
     fn save(&self, trace: &Trace) -> Vec<u8> {
-        self.kernel.save(self.twin.as_ref().unwrap_or(trace))
+        self.kernel.save(self.surrogate.as_ref().unwrap_or(trace))
     }
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
@@ -86,21 +86,22 @@ impl Kernel for Delayed {
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
         // What goes wrong shows in the step.
         self.follow(trace).ok()?;
-        self.kernel.sweep(self.twin.as_mut()?)
+        self.kernel.sweep(self.surrogate.as_mut()?)
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         self.follow(trace)?;
-        let Some(twin) = &mut self.twin else { return Ok(Outcome::default()) };
-        let before = tempered(twin, at.power);
-        let beyond = trace.beyond(twin);
-        let inner = self.kernel.step(twin, &At { member: at.member, ..at.within(0) })?;
-        twin.rollback();
+        let Some(surrogate) = &mut self.surrogate else { return Ok(Outcome::default()) };
+        let before = tempered(surrogate, at.power);
+        let beyond = trace.beyond(surrogate);
+        let inner =
+            self.kernel.step(surrogate, &StepContext { member: at.member, ..at.within(0) })?;
+        surrogate.rollback();
         if inner.accepted == 0 {
             return Ok(Outcome { site: None, ..inner });
         }
-        let coarse = tempered(twin, at.power) - before;
-        let mut outcome = match recoverable(trace.propose_choices_of(twin))? {
+        let coarse = tempered(surrogate, at.power) - before;
+        let mut outcome = match recoverable(trace.propose_choices_of(surrogate))? {
             None => Outcome { accepted: 0, failed: 1, ..inner },
             Some(w) => {
                 let fine = if at.power == 1.0 {
@@ -110,10 +111,10 @@ impl Kernel for Delayed {
                 };
                 // Choices that only the observation asks for stay as they are: nothing
                 // here would pay for others.
-                let same = trace.lacks(twin).is_none()
-                    && trace.beyond(twin) == beyond
+                let same = trace.lacks(surrogate).is_none()
+                    && trace.beyond(surrogate) == beyond
                     && !trace.takes_away(&beyond);
-                let decided = settle(
+                let decided = accept_or_reject(
                     trace,
                     if same { fine - coarse } else { f64::NEG_INFINITY },
                     &mut at.stream(),
@@ -122,8 +123,8 @@ impl Kernel for Delayed {
             }
         };
         if outcome.accepted == 0 {
-            twin.propose_choices_of(trace)?;
-            twin.commit();
+            surrogate.propose_choices_of(trace)?;
+            surrogate.commit();
         }
         outcome.site = None;
         Ok(outcome)

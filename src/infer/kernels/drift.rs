@@ -8,7 +8,9 @@
 
 use super::shape::{MOST, Shape};
 use crate::dist::{Datum, Support};
-use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, recoverable, settle};
+use crate::infer::kernel::{
+    Kernel, Outcome, Pick, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
+};
 use crate::infer::state::{StateError, holds, in_order, pack, unpack};
 use crate::lang::key::mix;
 use crate::rng::Stream;
@@ -103,7 +105,7 @@ impl Move {
 
 impl Drift {
     /// The kernel for these choices. Without a scale it is learnt in warm-up.
-    pub fn new(scope: Scope, scale: Option<f64>) -> Self {
+    pub fn new(scope: SiteSelection, scale: Option<f64>) -> Self {
         Drift {
             scope: Registered::new(scope),
             initial: scale.unwrap_or(0.5),
@@ -214,7 +216,7 @@ impl Kernel for Drift {
         holds(self.shapes.values().all(Shape::fits), "drift")
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, ways) = self.scope.members(trace, at, &mut rng);
         if targets.is_empty() {
@@ -260,13 +262,13 @@ impl Kernel for Drift {
             None => Outcome::failed(),
             Some(w) => {
                 let mut ratio =
-                    at.tempered(&w) + w.log_jacobian + ways - self.scope.ways_back(trace);
+                    at.tempered(&w) + w.log_jacobian + ways - self.scope.reverse_selection(trace);
                 // A choice that vanishes goes whatever its move was, and comes back from
                 // its prior.
                 for (t, m) in moves.iter().filter(|(t, _)| !trace.was_removed(*t)) {
                     ratio += m.back(trace, *t).unwrap_or(f64::NEG_INFINITY) - m.old_term;
                 }
-                settle(trace, ratio, &mut rng)
+                accept_or_reject(trace, ratio, &mut rng)
             }
         };
         outcome.site = (!joint).then_some(targets[0]);
@@ -291,7 +293,7 @@ fn shape_key(trace: &Trace, targets: &[Target], frees: &[Option<(Vec<f64>, f64)>
 impl Drift {
     /// Learns the spreads and the shape of what moves together, from where the chain is
     /// now.
-    fn learn(&mut self, trace: &mut Trace, at: &At) {
+    fn learn(&mut self, trace: &mut Trace, at: &StepContext) {
         let selection = self.scope.selection(trace);
         let targets = trace.targets(selection);
         let frees: Vec<_> = targets.iter().map(|t| trace.free_to_move(*t)).collect();

@@ -7,7 +7,7 @@
 //! structure, and leaves the posterior given that structure invariant.
 
 use crate::dist::Datum;
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable};
+use crate::infer::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, recoverable};
 use crate::lang::error::{FaultKind, RunError};
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
@@ -25,7 +25,7 @@ pub struct Elliptical {
 
 impl Elliptical {
     /// The kernel for these choices.
-    pub fn new(scope: Scope) -> Self {
+    pub fn new(scope: SiteSelection) -> Self {
         Elliptical { scope: Registered::new(scope) }
     }
 }
@@ -45,7 +45,7 @@ impl Kernel for Elliptical {
         "elliptical".into()
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
         if targets.is_empty() {

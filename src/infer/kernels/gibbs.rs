@@ -7,10 +7,12 @@
 //! values but the old one, make the ratio.
 
 use crate::dist::{Datum, Dist};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts, recoverable};
+use crate::infer::kernel::{
+    Kernel, Outcome, Registered, SiteSelection, StepContext, accepts, recoverable,
+};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Change, Peek, Target, Trace, TraceResult};
+use crate::trace::{Change, Enumeration, Target, Trace, TraceResult};
 
 /// `gibbs(sel)`: draws one choice from its distribution given all else.
 #[derive(Clone, Debug)]
@@ -21,7 +23,7 @@ pub struct Gibbs {
     values: Vec<Datum>,
     log: Vec<f64>,
     weights: Vec<f64>,
-    peek: Peek,
+    enumeration: Enumeration,
 }
 
 /// What weighing the values of a choice showed.
@@ -36,14 +38,14 @@ struct Weighed {
 
 impl Gibbs {
     /// The kernel for one of these choices at a time.
-    pub fn new(scope: Scope) -> Self {
+    pub fn new(scope: SiteSelection) -> Self {
         let scope = Registered::new(scope.single());
         Gibbs {
             scope,
             values: Vec::new(),
             log: Vec::new(),
             weights: Vec::new(),
-            peek: Peek::default(),
+            enumeration: Enumeration::default(),
         }
     }
 
@@ -52,7 +54,7 @@ impl Gibbs {
     fn weigh_beside(
         &mut self,
         trace: &Trace,
-        at: &At,
+        at: &StepContext,
         target: Target,
         dist: &Dist,
         old: usize,
@@ -60,11 +62,11 @@ impl Gibbs {
         let mut weighed = Weighed::default();
         let log = &mut self.log;
         log.clear();
-        let told = trace.weigh_values(
+        let told = trace.enumerate_conditional(
             target,
             dist,
             (&self.values, old),
-            &mut self.peek,
+            &mut self.enumeration,
             at.power,
             |w| {
                 weighed.failed += u32::from(w.is_none());
@@ -75,14 +77,14 @@ impl Gibbs {
     }
 
     /// The same by updates. `ways` is what picking the choice in that state costs, and
-    /// the lane of value `i` is `first_lane + i`.
+    /// the lane of value `i` is `first_substream + i`.
     fn weigh(
         &mut self,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
         target: Target,
         old: usize,
-        (ways, first_lane): (f64, u64),
+        (ways, first_substream): (f64, u64),
     ) -> TraceResult<Weighed> {
         let mut weighed = Weighed::default();
         self.log.clear();
@@ -92,9 +94,9 @@ impl Gibbs {
                 continue;
             }
             let change = [(target, Change::Set(v.clone()))];
-            match recoverable(trace.propose(&change, at.draws(first_lane + i as u64)))? {
+            match recoverable(trace.propose(&change, at.draws(first_substream + i as u64)))? {
                 Some(w) => {
-                    let log = at.tempered(&w) + (ways - self.scope.ways_back(trace));
+                    let log = at.tempered(&w) + (ways - self.scope.reverse_selection(trace));
                     self.log.push(if log.is_nan() { f64::NEG_INFINITY } else { log });
                     weighed.structural |= w.appeared > 0 || w.vanished > 0;
                     weighed.pending = Some(i);
@@ -119,7 +121,7 @@ impl Kernel for Gibbs {
         self.scope.sweep(trace)
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else {
             return Ok(Outcome::default());
@@ -143,7 +145,7 @@ impl Kernel for Gibbs {
             trace.rollback();
             return Ok(outcome);
         }
-        if !forward.structural && trace.assign(target, &dist, &self.values[chosen]) {
+        if !forward.structural && trace.set_in_place(target, &dist, &self.values[chosen]) {
             outcome.accepted = 1;
             return Ok(outcome);
         }
@@ -162,7 +164,7 @@ impl Kernel for Gibbs {
         let (forth, log_forward) = (self.log[chosen], log_sum_exp(&self.log));
         let removed = trace.removed();
         trace.commit();
-        let ways = self.scope.ways_back(trace);
+        let ways = self.scope.reverse_selection(trace);
         self.weigh(trace, at, target, chosen, (ways, self.values.len() as u64))?;
         trace.rollback();
         // The old state itself stands for the old value: its weight back is minus its
@@ -209,11 +211,11 @@ mod tests {
             let finite = Selector::Kind(ChoiceKind::Finite);
             let selection = trace.select(&finite);
             let k = trace.targets(selection)[0];
-            let mut kernel = Gibbs::new(Scope { selector: finite, pick: Pick::One });
+            let mut kernel = Gibbs::new(SiteSelection { selector: finite, pick: Pick::One });
             let mut moves = 0;
             for step in 0..200 {
                 let before = trace.stored(k);
-                let outcome = kernel.step(&mut trace, &At::new(1, 0, step)).unwrap();
+                let outcome = kernel.step(&mut trace, &StepContext::new(1, 0, step)).unwrap();
                 let moved = u32::from(trace.stored(k) != before);
                 assert_eq!(
                     (outcome.proposals, outcome.accepted, outcome.failed),

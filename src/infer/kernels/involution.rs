@@ -16,9 +16,11 @@
 //! that of the old value in the play on the new state. The map must not read what is
 //! proposed beside it, or does not return.
 
-use super::own::{Image, Own, Played, Source, log_density, log_volume, sampled, values};
+use super::program_kernel::{
+    Image, Played, ProgramKernel, Source, log_density, log_volume, sampled, values,
+};
 use crate::dist::Datum;
-use crate::infer::kernel::{At, Outcome, accepts, recoverable};
+use crate::infer::kernel::{Outcome, StepContext, accepts, recoverable};
 use crate::infer::selection::fail;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
@@ -91,9 +93,9 @@ fn near(a: &Value, b: &Value) -> bool {
     }
 }
 
-impl Own {
+impl ProgramKernel {
     /// One step by a map.
-    pub(super) fn involve(&self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    pub(super) fn involve(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         trace.rollback();
         let mut rng = at.stream();
         let forth = self.play(trace, at, Source::Drawn(&mut rng), Some(&[]))?;
@@ -187,7 +189,7 @@ impl Own {
     fn log_jacobian(
         &self,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
         played: &Played,
         map: &[Mapped],
     ) -> TraceResult<f64> {

@@ -21,7 +21,9 @@
 //! [`Weight::log_weight`](crate::trace::Weight) has of it.
 
 use crate::dist::{Datum, Support};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
+use crate::infer::kernel::{
+    Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
+};
 use crate::infer::neighbours::{Latent, Neighbours};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
@@ -52,7 +54,7 @@ pub struct Knn {
 
 impl Knn {
     /// The kernel for these choices and neighbours. Without neighbours it is `block`.
-    pub fn new(scope: Scope, neighbours: Arc<Neighbours>) -> Self {
+    pub fn new(scope: SiteSelection, neighbours: Arc<Neighbours>) -> Self {
         let bandwidths = bandwidths(&neighbours);
         Knn { scope: Registered::new(scope), neighbours, bandwidths }
     }
@@ -270,7 +272,7 @@ impl Kernel for Knn {
         "knn".into()
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, ways) = self.scope.members(trace, at, &mut rng);
         let here: Vec<Place> = targets.iter().filter_map(|t| Place::of(trace, *t)).collect();
@@ -282,7 +284,7 @@ impl Kernel for Knn {
         let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else {
             return Ok(Outcome::failed());
         };
-        let mut ratio = at.tempered(&w) + ways - self.scope.ways_back(trace);
+        let mut ratio = at.tempered(&w) + ways - self.scope.reverse_selection(trace);
         let (mut before, mut after) =
             (Vec::with_capacity(here.len()), Vec::with_capacity(here.len()));
         for ((t, change), old) in changes.iter().zip(here) {
@@ -305,7 +307,7 @@ impl Kernel for Knn {
         if w.log_joint == f64::NEG_INFINITY {
             ratio = f64::NEG_INFINITY;
         }
-        Ok(settle(trace, ratio, &mut rng))
+        Ok(accept_or_reject(trace, ratio, &mut rng))
     }
 }
 

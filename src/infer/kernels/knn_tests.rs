@@ -13,7 +13,7 @@ fn trace(text: &str) -> Trace {
 }
 
 fn kernel(entries: Vec<Latents>, among: &[Latents]) -> Knn {
-    let scope = Scope { selector: Selector::All, pick: Pick::All };
+    let scope = SiteSelection { selector: Selector::All, pick: Pick::All };
     Knn::new(scope, Arc::new(Neighbours::new(entries, among)))
 }
 

@@ -1,7 +1,9 @@
 //! Single-site Metropolis-Hastings from the prior: q_single of Kulkarni et al. 2014,
 //! section 3.
 
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
+use crate::infer::kernel::{
+    Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
+};
 use crate::trace::{Change, Trace, TraceResult};
 
 /// `mh(sel)`: draws one choice anew from its prior, given the rest.
@@ -12,7 +14,7 @@ pub struct Mh {
 
 impl Mh {
     /// The kernel for one of these choices at a time.
-    pub fn new(scope: Scope) -> Self {
+    pub fn new(scope: SiteSelection) -> Self {
         Mh { scope: Registered::new(scope.single()) }
     }
 }
@@ -26,14 +28,15 @@ impl Kernel for Mh {
         self.scope.sweep(trace)
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else {
             return Ok(Outcome::default());
         };
         let proposed = trace.propose(&[(target, Change::Resample)], at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed().at(target)) };
-        let ratio = at.tempered(&weight) + libm::log(n as f64) - self.scope.ways_back(trace);
-        Ok(settle(trace, ratio, &mut rng).at(target))
+        let ratio =
+            at.tempered(&weight) + libm::log(n as f64) - self.scope.reverse_selection(trace);
+        Ok(accept_or_reject(trace, ratio, &mut rng).at(target))
     }
 }

@@ -3,7 +3,7 @@
 //! Andrieu, Doucet & Holenstein 2010, section 2.4.2). Not here: how particles go from the
 //! prior to the posterior.
 
-use crate::infer::kernel::{At, Kernel, Outcome, accepts};
+use crate::infer::kernel::{Kernel, Outcome, StepContext, accepts};
 use crate::infer::selection::fail;
 use crate::infer::state::{StateError, pack, unpack};
 use crate::lang::code::Observed;
@@ -28,8 +28,12 @@ pub(super) trait Way {
 
     /// Draws particles and leads them there; gives them and the log of the evidence's
     /// estimate.
-    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At)
-    -> TraceResult<(Vec<Trace>, f64)>;
+    fn lead(
+        &mut self,
+        prior: &Prior,
+        trace: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<(Vec<Trace>, f64)>;
 }
 
 /// Nothing was estimated yet.
@@ -63,7 +67,12 @@ impl Prior {
     ///
     /// # Errors
     /// Those of the program.
-    pub fn draw(&self, trace: &mut Trace, particles: usize, at: &At) -> TraceResult<Vec<Trace>> {
+    pub fn draw(
+        &self,
+        trace: &mut Trace,
+        particles: usize,
+        at: &StepContext,
+    ) -> TraceResult<Vec<Trace>> {
         let selection = trace.select(&self.frozen);
         let fixed: Vec<(u64, Constraint)> = trace
             .targets(selection)
@@ -89,7 +98,7 @@ impl<W: Way> Independent<W> {
     ///
     /// # Errors
     /// If the state is not the one that was accepted last.
-    fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<bool> {
+    fn begin(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<bool> {
         trace.rollback();
         if std::mem::take(&mut self.loaded) {
             self.observed = Some(Arc::clone(trace.replacements()));
@@ -161,7 +170,7 @@ impl<W: Way + Send> Kernel for Independent<W> {
         self.way.load(&way)
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         if self.begin(trace, at)? {
             self.way.forget();
         }

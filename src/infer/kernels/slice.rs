@@ -6,7 +6,7 @@
 //! has no value, or where choices appear or vanish, counts as outside the slice, so the
 //! kernel moves within the present structure.
 
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable};
+use crate::infer::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, recoverable};
 use crate::infer::state::{StateError, in_order, pack, unpack};
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
@@ -36,7 +36,7 @@ pub struct Slice {
 impl Slice {
     /// The kernel for these choices, with a width in the unconstrained space, or else
     /// widths that are learnt; the interval doubles or steps out.
-    pub fn new(scope: Scope, width: Option<f64>, doubling: bool) -> Self {
+    pub fn new(scope: SiteSelection, width: Option<f64>, doubling: bool) -> Self {
         Slice { scope: Registered::new(scope), width, doubling, learnt: FxHashMap::default() }
     }
 
@@ -56,7 +56,7 @@ impl Slice {
 /// One coordinate of a choice.
 struct Line<'a> {
     trace: &'a mut Trace,
-    at: &'a At,
+    at: &'a StepContext,
     target: Target,
     y: Vec<f64>,
     coordinate: usize,
@@ -201,7 +201,7 @@ impl Kernel for Slice {
         Ok(())
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
         let site = if let [one] = targets[..] { Some(one) } else { None };

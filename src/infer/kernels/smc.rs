@@ -10,7 +10,7 @@
 //! first run, so that half of the weights count at each, and stay as they are.
 
 use super::particles::{Independent, Prior, Way};
-use crate::infer::kernel::{At, Kernel, inner_step};
+use crate::infer::kernel::{Kernel, StepContext, inner_step};
 use crate::infer::resampling::systematic;
 use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::num::log_sum_exp;
@@ -69,7 +69,7 @@ impl Way for Annealed {
         &mut self,
         prior: &Prior,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
     ) -> TraceResult<(Vec<Trace>, f64)> {
         let mut particles = prior.draw(trace, self.particles, at)?;
         let find = self.powers.is_empty();
@@ -104,7 +104,7 @@ impl Way for Annealed {
                 inner_step(
                     &mut *self.kernel,
                     p,
-                    &At { power: at.power * power, ..within.within(i as u64) },
+                    &StepContext { power: at.power * power, ..within.within(i as u64) },
                 )?;
             }
         }

@@ -7,7 +7,7 @@
 //! and the odd ones in turn (Okabe et al. 2001). In warm-up the ladder is spaced so that
 //! neighbours swap about as often everywhere (Miasojedow, Moulines & Vihola 2013).
 
-use crate::infer::kernel::{At, Kernel, Outcome, accepts, inner_step};
+use crate::infer::kernel::{Kernel, Outcome, StepContext, accepts, inner_step};
 use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::trace::{Constraint, Trace, TraceResult};
 
@@ -87,7 +87,7 @@ impl Kernel for Temper {
         self.kernels.iter_mut().zip(kernels).try_for_each(|(k, state)| k.load(&state))
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let pairs = self.gaps.len();
         for state in std::mem::take(&mut self.saved) {
             self.replicas.push(trace.another(state, at.draws(0))?);
@@ -104,7 +104,7 @@ impl Kernel for Temper {
             inner_step(
                 &mut **kernel,
                 state,
-                &At { power: at.power * powers[level], ..at.within(level as u64) },
+                &StepContext { power: at.power * powers[level], ..at.within(level as u64) },
             )?;
         }
         let mut rng = at.stream();

@@ -5,8 +5,8 @@ use super::runner::{Flow, Instance, Runner};
 use super::{ChainError, call};
 use crate::infer::build::{arguments, build, is_constant};
 use crate::infer::draws::KernelStats;
-use crate::infer::kernel::{At, Outcome};
-use crate::infer::kernels::own::proposes;
+use crate::infer::kernel::{Outcome, StepContext};
+use crate::infer::kernels::program_kernel::proposes;
 use crate::infer::selection::fail;
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
@@ -128,7 +128,7 @@ impl Runner<'_> {
 
     /// One step of a kernel.
     fn step(&mut self, i: usize, member: usize) -> Result<Outcome, ChainError> {
-        let at = At { member, ..self.at() };
+        let at = StepContext { member, ..self.at() };
         let Some(kernel) = &mut self.instances[i].kernel else { return Ok(Outcome::default()) };
         let outcome = kernel.step(&mut self.trace, &at)?;
         if self.options.sites && !self.in_warmup {
@@ -136,8 +136,8 @@ impl Runner<'_> {
         }
         self.step += 1;
         self.progress.steps.fetch_add(1, Ordering::Relaxed);
-        if let Some(watch) = &self.options.watch {
-            watch.step(self.chain, self.step, &self.trace);
+        if let Some(callback) = &self.options.callback {
+            callback.step(self.chain, self.step, &self.trace);
         }
         Ok(outcome)
     }

@@ -1,7 +1,7 @@
 //! Banks in plans: which ones a plan names, and the neighbours a kernel gets from them.
 
 use super::{RunOptions, argument, call};
-use crate::infer::expr::{Scope, evaluate};
+use crate::infer::expr::{PlanEnv, evaluate};
 use crate::infer::neighbours::Neighbours;
 use crate::infer::selection::fail;
 use crate::lang::error::RunError;
@@ -68,7 +68,7 @@ pub(in crate::infer) fn neighbours(
     e: &Expr,
     args: &[Arg],
     options: &RunOptions,
-    env: &mut Scope,
+    env: &mut PlanEnv,
 ) -> Result<Arc<Neighbours>, Box<RunError>> {
     let Some(bank) = argument(args, 1, "bank") else {
         return Err(fail(e.span, "knn needs a bank made by `pcadlang learn`".into()));

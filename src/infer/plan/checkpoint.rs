@@ -51,7 +51,8 @@ pub struct Checkpoint {
     columns: Vec<Column>,
     observed: Option<Vec<(u64, usize)>>,
     frozen: Selector,
-    watch: Vec<u8>,
+    #[serde(rename = "watch")]
+    callback: Vec<u8>,
 }
 
 /// A kernel of a chain.
@@ -103,7 +104,7 @@ impl Checkpoint {
             columns: r.recorder.columns().to_vec(),
             observed: r.recorder.observed().clone(),
             frozen: r.frozen.clone(),
-            watch: r.options.watch.as_ref().map(|w| w.save(r.chain)).unwrap_or_default(),
+            callback: r.options.callback.as_ref().map(|w| w.save(r.chain)).unwrap_or_default(),
         })
     }
 
@@ -184,8 +185,8 @@ impl<'a> Runner<'a> {
                 StateError::new("the checkpoint's choices are not those of the program").into()
             );
         }
-        if let Some(watch) = &options.watch {
-            watch.load(chain, &c.watch)?;
+        if let Some(callback) = &options.callback {
+            callback.load(chain, &c.callback)?;
         }
         let past = Duration::try_from_secs_f64(c.seconds).unwrap_or_default();
         let now = Instant::now();

@@ -9,6 +9,7 @@ mod warmup;
 
 pub use checkpoint::Checkpoint;
 
+use super::callback::Callback;
 use super::draws::{KernelStats, Sink, SiteStats};
 use super::init::{StartError, start_of, starts_from};
 use super::neighbours::Banks;
@@ -18,9 +19,8 @@ use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::platform::clock::Instant;
 use crate::syntax::ast::{Expr, ExprKind, KStmt};
-use crate::trace::{Constraint, Draws, Limits, Trace};
+use crate::trace::{Constraint, Limits, Trace};
 use runner::Runner;
-use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
@@ -41,8 +41,8 @@ pub struct RunOptions {
     pub incremental: bool,
     /// Bounds on what the program may build.
     pub limits: Limits,
-    /// Who looks at every draw.
-    pub watch: Option<Arc<dyn Watch>>,
+    /// What is called at steps and draws.
+    pub callback: Option<Arc<dyn Callback>>,
     /// Who finds the neighbours that `knn` proposes from.
     pub banks: Option<Arc<dyn Banks>>,
     /// Whether to count what single-site kernels do by address; it costs a few percent of
@@ -62,46 +62,11 @@ impl Default for RunOptions {
             time: None,
             incremental: true,
             limits: Limits::default(),
-            watch: None,
+            callback: None,
             banks: None,
             sites: false,
             pointwise: false,
         }
-    }
-}
-
-/// Looks at the state of a chain whenever a draw is recorded, and at steps.
-/// [`Observer`](super::Observer) is one made of closures.
-pub trait Watch: fmt::Debug + Send + Sync {
-    /// A draw of a chain has been recorded, and this is its state. What it asks for and
-    /// no observation does is drawn from `draws`. It leaves the state as it is, unless it
-    /// is there to change it ([`super::calibration::geweke()`]): the chain goes on from
-    /// what it leaves. Draws of one chain come in order, chains in any.
-    fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws);
-
-    /// What it has gathered of a chain, for a checkpoint.
-    fn save(&self, chain: u32) -> Vec<u8> {
-        let _ = chain;
-        Vec::new()
-    }
-
-    /// Takes up what it had gathered of a chain.
-    ///
-    /// # Errors
-    /// If these are no bytes of [`Watch::save`].
-    fn load(&self, chain: u32, state: &[u8]) -> Result<(), StateError> {
-        let _ = chain;
-        if state.is_empty() { Ok(()) } else { Err(StateError::new("another watch gathered this")) }
-    }
-
-    /// A chain has made so many steps, and this is its state.
-    fn step(&self, chain: u32, steps: u64, trace: &Trace) {
-        let _ = (chain, steps, trace);
-    }
-
-    /// Asked between steps: whether the run is to end, all chains of it.
-    fn is_over(&self) -> bool {
-        false
     }
 }
 

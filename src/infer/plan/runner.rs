@@ -4,8 +4,8 @@ use super::checkpoint::Checkpoint;
 use super::place::{Doing, Place};
 use super::{ChainError, ChainResult, Progress, RunOptions};
 use crate::infer::draws::{DrawRow, KernelStats, Sink};
-use crate::infer::expr::{Scope, evaluate};
-use crate::infer::kernel::{At, Kernel};
+use crate::infer::expr::{PlanEnv, evaluate};
+use crate::infer::kernel::{Kernel, StepContext};
 use crate::infer::plain::Plain;
 use crate::infer::population::Population;
 use crate::infer::record::Recorder;
@@ -178,21 +178,21 @@ impl<'a> Runner<'a> {
         })
     }
 
-    pub fn at(&self) -> At {
-        let at = At::new(self.options.seed, self.chain, self.step);
-        At { adapting: self.in_warmup, power: self.power, ..at }
+    pub fn at(&self) -> StepContext {
+        let at = StepContext::new(self.options.seed, self.chain, self.step);
+        StepContext { adapting: self.in_warmup, power: self.power, ..at }
     }
 
     pub fn predictive(&self) -> Draws {
         let key = StreamKey::new(self.options.seed, self.chain, Purpose::PREDICT);
-        Draws { key, step: self.step, lane: 0 }
+        Draws { key, step: self.step, substream: 0 }
     }
 
     /// What expressions can see.
-    pub fn env(&mut self) -> Scope<'_> {
+    pub fn env(&mut self) -> PlanEnv<'_> {
         let draws = self.predictive();
         let (started, steps) = (self.started, self.step);
-        Scope {
+        PlanEnv {
             code: self.code,
             trace: &mut self.trace,
             variables: &self.variables,
@@ -398,7 +398,7 @@ impl<'a> Runner<'a> {
     /// limits, or who watches it.
     pub fn is_cancelled(&self) -> bool {
         self.options.limits.stop.is_set()
-            || self.options.watch.as_ref().is_some_and(|w| w.is_over())
+            || self.options.callback.as_ref().is_some_and(|w| w.is_over())
     }
 
     /// Whether the run, or the warm-up, has used up what it was given.
@@ -460,8 +460,8 @@ impl<'a> Runner<'a> {
             values,
         };
         self.sink.draw(&row).map_err(ChainError::Sink)?;
-        if let Some(watch) = &self.options.watch {
-            watch.draw(self.chain, &mut self.trace, draws);
+        if let Some(callback) = &self.options.callback {
+            callback.draw(self.chain, &mut self.trace, draws);
         }
         self.draws += 1;
         if self.best.as_ref().is_none_or(|(b, _)| log_joint > *b) {

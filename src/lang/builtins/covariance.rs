@@ -1,6 +1,6 @@
 //! Covariance functions of Gaussian processes, as values: `sq_exp(0.5) + white(0.01)`.
 
-use super::{Arg, Args, Pulled, Row, Type, arg, function, opt};
+use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, opt};
 use crate::dist::{Covariance, ParamError};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
@@ -30,14 +30,14 @@ impl Object for CovarianceValue {
         Some(Self::joined(&self.0, &other.0, |x, y| x * y))
     }
 
-    fn pull_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
-        CovarianceValue::pull_both(&Value::object(self.clone()), other, by)
+    fn vjp_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+        CovarianceValue::vjp_both(&Value::object(self.clone()), other, by)
     }
 }
 
 impl CovarianceValue {
     /// The adjoints of both sides of a sum or product.
-    pub(super) fn pull_both(x: &Value, y: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+    pub(super) fn vjp_both(x: &Value, y: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
         let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
         let (left, right) = (x.0.param_count(), y.0.param_count());
         let all = by.numbers(left + right);
@@ -71,7 +71,7 @@ const fn covariance(
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
 ) -> Row {
-    function(name, SECTION, args, Type::Covariance, doc, f).pull(pull_params)
+    function(name, SECTION, args, Type::Covariance, doc, f).vjp(vjp_params)
 }
 
 pub(super) const TABLE: &[Row] = &[
@@ -113,7 +113,7 @@ pub(super) const TABLE: &[Row] = &[
 
 /// The adjoint of a covariance has a number for each parameter, in the order of the
 /// arguments.
-fn pull_params(a: &Args, y: &Value, by: &Adjoint) -> Option<Pulled> {
+fn vjp_params(a: &Args, y: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let n = y.downcast::<CovarianceValue>()?.0.param_count();
     Some(by.numbers(n).into_iter().take(a.values.len()).map(Adjoint::Num).collect())
 }

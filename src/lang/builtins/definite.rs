@@ -33,11 +33,11 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::List((0..n).map(|i| array(n, |j| l.row(i).get(j).copied().unwrap_or(0.0))).collect()))
         },
     )
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let l = read(a).ok()?;
         let n = l.size();
         let by: Vec<f64> = (0..n).flat_map(|i| by.element(i).numbers(n).into_iter().take(i + 1)).collect();
-        let by = l.pull_cholesky(&by);
+        let by = l.vjp_cholesky(&by);
         // What lies off the diagonal stands for both of its places.
         let entry = |i: usize, j: usize| if i == j { by[packed(i, i)] } else { 0.5 * by[packed(i.max(j), i.min(j))] };
         Some(smallvec![symmetric(n, entry)])
@@ -58,7 +58,7 @@ pub(super) const TABLE: &[Row] = &[
             })
         },
     )
-    .pull(|a, value, by| {
+    .vjp(|a, value, by| {
         let l = read(a).ok()?;
         let n = l.size();
         let vector = matches!(value, Value::Array(_));
@@ -96,7 +96,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::Num(2.0 * l.log_det()))
         },
     )
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let l = read(a).ok()?;
         let n = l.size();
         let unit = |j: usize| (0..n).map(|i| f64::from(u8::from(i == j))).collect::<Vec<_>>();

@@ -9,11 +9,11 @@ use crate::num::Column;
 use smallvec::{SmallVec, smallvec};
 
 /// The adjoints of a call's arguments, in order; those left out at the end are zero.
-pub type Pulled = SmallVec<[Adjoint; 4]>;
+pub type ArgAdjoints = SmallVec<[Adjoint; 4]>;
 
 /// From the arguments, the result and its adjoint to the adjoints of the arguments;
 /// `None` where nobody knows them.
-pub type Pull = fn(&Args, &Value, &Adjoint) -> Option<Pulled>;
+pub type Vjp = fn(&Args, &Value, &Adjoint) -> Option<ArgAdjoints>;
 
 /// The derivative of a function.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ pub enum Derivative {
     /// in it.
     Zero,
     /// Its vector-Jacobian product.
-    Product(Pull),
+    Product(Vjp),
     /// dy/dx of a function of one number, element by element: of x and y.
     Unary(fn(f64, f64) -> f64),
     /// That of a function of two numbers, element by element.
@@ -45,7 +45,7 @@ pub struct Binary {
     /// adjoints of the arguments.
     pub reverse: fn(&[f64], &mut [f64], Column, Column, usize, usize),
     /// The product where the result is an object.
-    pub objects: Option<Pull>,
+    pub objects: Option<Vjp>,
 }
 
 /// A function of an array that gives one number.
@@ -59,14 +59,14 @@ pub struct Reduction {
 
 impl Derivative {
     /// The adjoints of the arguments of a call with this result.
-    pub fn pull(&self, a: &Args, value: &Value, by: &Adjoint) -> Option<Pulled> {
+    pub fn vjp(&self, a: &Args, value: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
         match (self, value) {
             (Derivative::Unknown, _) => None,
-            (Derivative::Zero, _) => Some(Pulled::new()),
+            (Derivative::Zero, _) => Some(ArgAdjoints::new()),
             (Derivative::Product(f), _) => f(a, value, by),
             (Derivative::Unary(f), _) => unary(a, value, by, *f),
             (Derivative::Binary(f), Value::Object(_)) => {
-                f.objects.and_then(|pull| pull(a, value, by))
+                f.objects.and_then(|vjp| vjp(a, value, by))
             }
             (Derivative::Binary(f), _) => of_two(a, value, by, f.slopes),
             (Derivative::Reduction(f), _) => reduction(a, value, by, f.slopes),
@@ -81,12 +81,12 @@ macro_rules! of_pairs {
         of_pairs!($row, $f, $slopes, None)
     };
     ($row:expr, $f:expr, $slopes:expr, $objects:expr) => {{
-        use $crate::lang::builtins::derivative::{Binary, each_pair, pull_pairs};
+        use $crate::lang::builtins::derivative::{Binary, each_pair, vjp_pairs};
         let form: &'static Binary = &const {
             Binary {
                 slopes: $slopes,
                 forward: |v, x, y, out, n| each_pair(v, x, y, out, n, $f),
-                reverse: |v, g, x, y, out, n| pull_pairs(v, g, x, y, out, n, $slopes),
+                reverse: |v, g, x, y, out, n| vjp_pairs(v, g, x, y, out, n, $slopes),
                 objects: $objects,
             }
         };
@@ -126,7 +126,7 @@ pub(super) fn each_pair(
 
 /// Adds to the adjoints of both columns.
 #[inline(always)]
-pub(super) fn pull_pairs(
+pub(super) fn vjp_pairs(
     v: &[f64],
     g: &mut [f64],
     x: Column,
@@ -163,7 +163,7 @@ fn number(v: &Value, i: usize) -> Option<f64> {
 }
 
 /// A function of one number, element by element: `slope(x, y)` is dy/dx.
-fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Pulled> {
+fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<ArgAdjoints> {
     fn go(x: &Value, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Adjoint> {
         Some(match (x, y, by) {
             (_, _, Adjoint::Zero) => Adjoint::Zero,
@@ -239,7 +239,7 @@ fn of_two(
     z: &Value,
     by: &Adjoint,
     slopes: fn(f64, f64, f64) -> [f64; 2],
-) -> Option<Pulled> {
+) -> Option<ArgAdjoints> {
     binary(a.get(0), a.get(1), z, by, slopes).map(|both| both.into_iter().collect())
 }
 
@@ -249,7 +249,7 @@ fn reduction(
     y: &Value,
     by: &Adjoint,
     slopes: fn(&[f64], f64, &mut [f64]),
-) -> Option<Pulled> {
+) -> Option<ArgAdjoints> {
     let xs = a.numbers(0).ok()?;
     let Value::Num(y) = y else { return None };
     let g = by.number();
@@ -267,8 +267,8 @@ pub(super) fn one_of(
     order: &[usize],
     z: &Value,
     by: &Adjoint,
-) -> Option<Pulled> {
-    let mut all: Pulled = smallvec![Adjoint::Zero; values.len()];
+) -> Option<ArgAdjoints> {
+    let mut all: ArgAdjoints = smallvec![Adjoint::Zero; values.len()];
     match (z, by) {
         (_, Adjoint::Zero) => {}
         (Value::Num(z), by) => {

@@ -1,6 +1,6 @@
 //! Linear interpolation of tables.
 
-use super::{Args, Pulled, Row, Type, arg, function};
+use super::{ArgAdjoints, Args, Row, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -18,7 +18,7 @@ pub(super) const TABLE: &[Row] = &[function(
     "Linear interpolation of a table at `x`; constant beyond its ends.",
     interp,
 )
-.pull(pull)];
+.vjp(vjp)];
 
 fn interp(a: &Args) -> Result<Value, Fault> {
     let xs = a.numbers_from(1, 1)?;
@@ -50,7 +50,7 @@ fn interp(a: &Args) -> Result<Value, Fault> {
 
 /// By the places read, and by the values of the table; by its places where lines are
 /// straight between them.
-fn pull(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+fn vjp(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let (xs, ys) = (a.numbers(1).ok()?, a.numbers(2).ok()?);
     let (mut by_xs, mut by_ys) = (vec![0.0; xs.len()], vec![0.0; ys.len()]);
     let mut read = |x: f64, g: f64| {

@@ -1,7 +1,7 @@
 //! Making, joining and searching arrays and records; truth tests over arrays; strings.
 
 use super::elementwise::{array, array_len, common_len, part};
-use super::{Arg, Args, Pulled, Row, Type, arg, function, opt};
+use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, opt};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
@@ -40,7 +40,7 @@ pub(super) const TABLE: &[Row] = &[
         "`n` evenly spaced numbers from `lo` to `hi`, both included.",
         linspace,
     )
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let n = a.count(2).ok()?;
         let (mut lo, mut hi) = (0.0, 0.0);
         for (i, g) in by.numbers(n).into_iter().enumerate() {
@@ -62,7 +62,7 @@ pub(super) const TABLE: &[Row] = &[
         "`start`, `start + step`, … up to but excluding `end`; for whole numbers write `a .. b`.",
         range,
     )
-    .pull(|_, y, by| {
+    .vjp(|_, y, by| {
         let g = by.numbers(y.len()?);
         let step = g.iter().enumerate().map(|(i, g)| i as f64 * g).sum();
         Some(smallvec![Adjoint::Num(g.iter().sum()), Adjoint::Zero, Adjoint::Num(step)])
@@ -80,7 +80,7 @@ pub(super) const TABLE: &[Row] = &[
             x => Ok(Value::from_elements(vec![x.clone(); a.count(1)?])),
         },
     )
-    .pull(|_, y, by| {
+    .vjp(|_, y, by| {
         let mut sum = Adjoint::Zero;
         (0..y.len()?).for_each(|i| sum.add(by.element(i)));
         Some(smallvec![sum])
@@ -94,7 +94,7 @@ pub(super) const TABLE: &[Row] = &[
         concat,
     )
     .variadic()
-    .pull(pull_concat),
+    .vjp(vjp_concat),
     function(
         "append",
         SECTION,
@@ -107,7 +107,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::from_elements(xs))
         },
     )
-    .pull(|a, y, by| {
+    .vjp(|a, y, by| {
         let n = y.len()?.saturating_sub(1);
         Some(smallvec![moved(a.get(0), by, |i| i), by.element(n)])
     }),
@@ -116,7 +116,7 @@ pub(super) const TABLE: &[Row] = &[
         xs.reverse();
         Ok(Value::from_elements(xs))
     })
-    .pull(|a, y, by| {
+    .vjp(|a, y, by| {
         let n = y.len()?;
         Some(smallvec![moved(a.get(0), by, |i| n - 1 - i)])
     }),
@@ -125,7 +125,7 @@ pub(super) const TABLE: &[Row] = &[
         let order = sorted(a, &xs)?;
         Ok(Value::from_elements(order.into_iter().filter_map(|i| xs.get(i).cloned()).collect()))
     })
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let order = sorted(a, &a.elements(0).ok()?).ok()?;
         let mut sum = Adjoint::Zero;
         order.iter().enumerate().for_each(|(to, from)| sum.add_element(order.len(), *from, by.element(to)));
@@ -159,7 +159,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::List(xs.iter().zip(ys.iter()).map(pair).collect()))
         },
     )
-    .pull(|_, z, by| {
+    .vjp(|_, z, by| {
         let n = z.len()?;
         let side = |k: usize| {
             let mut all = Adjoint::Zero;
@@ -178,7 +178,7 @@ pub(super) const TABLE: &[Row] = &[
         v if array_len(v).is_some() => Ok(v.clone()),
         _ => Err(a.wrong(0, "a record or array")),
     })
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let mut all = Adjoint::Zero;
         (0..a.get(0).len()?).for_each(|i| all.add_position(a.get(0), i, by.element(i)));
         Some(smallvec![all])
@@ -222,8 +222,8 @@ pub(super) const TABLE: &[Row] = &[
         "`a` where the condition is true, `b` elsewhere, element by element; both are always computed.",
         |a| select(a, a.get(0), a.get(1), a.get(2)),
     )
-    .pull(|a, z, by| {
-        let [x, y] = pull_select(a.get(0), a.get(1), a.get(2), z, by)?;
+    .vjp(|a, z, by| {
+        let [x, y] = vjp_select(a.get(0), a.get(1), a.get(2), z, by)?;
         Some(smallvec![Adjoint::Zero, x, y])
     }),
     function(
@@ -310,7 +310,7 @@ fn moved(xs: &Value, by: &Adjoint, to: impl Fn(usize) -> usize) -> Adjoint {
     all
 }
 
-fn pull_concat(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+fn vjp_concat(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let mut from = 0;
     let part = |v: &&Value| {
         let (n, start) = (array_len(v).unwrap_or(0), from);
@@ -325,13 +325,7 @@ fn pull_concat(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
     Some(a.values.iter().map(part).collect())
 }
 
-fn pull_select(
-    cond: &Value,
-    x: &Value,
-    y: &Value,
-    z: &Value,
-    by: &Adjoint,
-) -> Option<[Adjoint; 2]> {
+fn vjp_select(cond: &Value, x: &Value, y: &Value, z: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
     if let Value::Bool(b) = cond {
         return Some(if *b { [by.clone(), Adjoint::Zero] } else { [Adjoint::Zero, by.clone()] });
     }
@@ -339,7 +333,7 @@ fn pull_select(
     let mut both = [Adjoint::Zero, Adjoint::Zero];
     for i in 0..n {
         let parts =
-            pull_select(&part(cond, i), &part(x, i), &part(y, i), &z.element(i)?, &by.element(i))?;
+            vjp_select(&part(cond, i), &part(x, i), &part(y, i), &z.element(i)?, &by.element(i))?;
         for ((sum, v), one) in both.iter_mut().zip([x, y]).zip(parts) {
             if array_len(v).is_some() { sum.add_element(n, i, one) } else { sum.add(one) }
         }

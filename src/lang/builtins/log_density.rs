@@ -1,7 +1,7 @@
 //! The log density of a value under a distribution, as a number: for mixtures written
 //! out, pointwise scores, factors.
 
-use super::{Args, Pulled, Row, Type, arg, function};
+use super::{ArgAdjoints, Args, Row, Type, arg, function};
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::density::{self, Score};
@@ -33,7 +33,7 @@ pub(super) const TABLE: &[Row] = &[function(
         }))
     },
 )
-.pull(pull)];
+.vjp(vjp)];
 
 fn dist<'a>(a: &Args<'a>) -> Result<&'a Dist, Fault> {
     match a.get(0) {
@@ -78,11 +78,11 @@ fn drawn(d: &Dist) -> String {
 
 /// By the distribution: by its parameters, and behind them by the factor of its
 /// covariance. Where the density is 0 it stays so.
-fn pull(a: &Args, value: &Value, by: &Adjoint) -> Option<Pulled> {
+fn vjp(a: &Args, value: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let (Value::Dist(d), Value::Num(score)) = (a.get(0), value) else { return None };
     let weight = by.number();
     if weight == 0.0 || !score.is_finite() {
-        return Some(Pulled::new());
+        return Some(ArgAdjoints::new());
     }
     // What is scored is the value, however a choice would be stored.
     let d = Dist::clone(d).centred();

@@ -4,7 +4,7 @@
 use super::derivative::{of_pairs, one_of};
 use super::elementwise::{mapped, numeric};
 use super::reduce::{largest, smallest};
-use super::{Arg, Args, Derivative, Pulled, Row, Scalar, Type, arg, function};
+use super::{Arg, ArgAdjoints, Args, Derivative, Row, Scalar, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -64,7 +64,7 @@ pub(super) const TABLE: &[Row] = &[
         |a| extreme(a, smaller, smallest),
     )
     .variadic()
-    .pull(pull_extreme),
+    .vjp(vjp_extreme),
     function(
         "max",
         SECTION,
@@ -74,7 +74,7 @@ pub(super) const TABLE: &[Row] = &[
         |a| extreme(a, larger, largest),
     )
     .variadic()
-    .pull(pull_extreme),
+    .vjp(vjp_extreme),
     function(
         "clamp",
         SECTION,
@@ -89,7 +89,7 @@ pub(super) const TABLE: &[Row] = &[
     )
     // The bounds first, of which the upper one wins: at a bound the argument moves
     // nothing.
-    .pull(|a, z, by| one_of(a.values, &[2, 1, 0], z, by)),
+    .vjp(|a, z, by| one_of(a.values, &[2, 1, 0], z, by)),
     smooth!("sin", ANGLE, "The sine.", libm::sin, |x, _| libm::cos(x)),
     smooth!("cos", ANGLE, "The cosine.", libm::cos, |x, _| -libm::sin(x)),
     smooth!("tan", ANGLE, "The tangent.", libm::tan, |_, y| 1.0 + y * y),
@@ -132,7 +132,7 @@ pub(super) fn pow_slopes(x: f64, y: f64, z: f64) -> [f64; 2] {
     ]
 }
 
-fn pull_extreme(a: &Args, z: &Value, by: &Adjoint) -> Option<Pulled> {
+fn vjp_extreme(a: &Args, z: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     if a.values.len() > 1 {
         let order: Vec<usize> = (0..a.values.len()).collect();
         return one_of(a.values, &order, z, by);

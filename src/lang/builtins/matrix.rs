@@ -5,7 +5,7 @@
 
 use super::elementwise::array;
 use super::reduce::dot;
-use super::{Args, Pulled, Row, Type, arg, function};
+use super::{ArgAdjoints, Args, Row, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -26,7 +26,7 @@ pub(super) const TABLE: &[Row] = &[
         "The matrix product; a vector gives a vector, two vectors their dot product.",
         matmul,
     )
-    .pull(pull_matmul),
+    .vjp(vjp_matmul),
     function(
         "transpose",
         SECTION,
@@ -38,7 +38,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(m.transposed().into_value())
         },
     )
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let m = Matrix::read(a, 0).ok()?;
         let g = Matrix::of(by, m.width, m.rows.len());
         Some(smallvec![g.transposed().into_adjoint()])
@@ -60,7 +60,7 @@ pub(super) const TABLE: &[Row] = &[
             }
         },
     )
-    .pull(|a, _, by| match a.get(0) {
+    .vjp(|a, _, by| match a.get(0) {
         Value::Array(xs) => {
             let g = Matrix::of(by, xs.len(), xs.len());
             Some(smallvec![Adjoint::Array((0..xs.len()).map(|i| g.rows[i][i]).collect())])
@@ -84,7 +84,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(rows(xs.len(), |i| array(ys.len(), |j| xs[i] * ys[j])))
         },
     )
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let (xs, ys) = (a.numbers(0).ok()?, a.numbers(1).ok()?);
         let g = Matrix::of(by, xs.len(), ys.len());
         let by_xs = g.rows.iter().map(|r| dot(r, &ys)).collect();
@@ -186,7 +186,7 @@ fn matmul(a: &Args) -> Result<Value, Fault> {
 }
 
 /// With C = A B: by A it is G B', by B it is A' G.
-fn pull_matmul(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+fn vjp_matmul(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let is_vector = |i: usize| matches!(a.get(i), Value::Array(_));
     let left = if is_vector(0) { single_row(a, 0).ok()? } else { Matrix::read(a, 0).ok()? };
     // Its columns.

@@ -15,8 +15,8 @@ mod distributions;
 pub mod doc;
 mod elementwise;
 pub mod examples;
-mod foreign;
 mod forms;
+mod host;
 mod inference;
 mod interp;
 mod known_as;
@@ -34,8 +34,8 @@ mod table;
 pub use args::Args;
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
-pub use derivative::{Binary, Derivative, Pull, Pulled, Reduction};
-pub use foreign::{Before, Foreign, State};
+pub use derivative::{ArgAdjoints, Binary, Derivative, Reduction, Vjp};
+pub use host::{Before, HostItem, State};
 pub(crate) use reduce::dot;
 use row::{Arg, Row, arg, function, opt};
 pub use table::{Constant, Table};
@@ -203,7 +203,7 @@ pub struct Builtin {
     /// Its derivative.
     pub derivative: Derivative,
     /// What stands behind it, where that is a host's and not the language's own.
-    pub foreign: Option<Foreign>,
+    pub host: Option<HostItem>,
 }
 
 impl fmt::Debug for Builtin {
@@ -251,7 +251,7 @@ impl Builtin {
     /// Whether this version only checks and documents it, and cannot run it yet.
     pub fn is_planned(&self) -> bool {
         matches!(self.kind, Kind::Inference)
-            && self.foreign.is_none()
+            && self.host.is_none()
             && inference::PLANNED.contains(&&*self.name)
     }
 

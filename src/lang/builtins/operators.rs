@@ -39,7 +39,7 @@ pub(super) const TABLE: &[Row] = &[
         infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add),
         |x, y| x + y,
         |_, _, _| [1.0, 1.0],
-        Some(|a, _, by| { CovarianceValue::pull_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect()) })
+        Some(|a, _, by| { CovarianceValue::vjp_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect()) })
     ),
     arithmetic!("-", "Difference, element by element.", |x, y| x - y, |_, _, _| [1.0, -1.0]),
     of_pairs!(
@@ -52,7 +52,7 @@ pub(super) const TABLE: &[Row] = &[
         |x, y| x * y,
         |x, y, _| [y, x],
         Some(|a, _, by| match a.get(0) {
-            Value::Object(o) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
+            Value::Object(o) => o.vjp_product(a.get(1), by).map(|both| both.into_iter().collect()),
             _ => None,
         })
     ),

@@ -66,7 +66,7 @@ pub(super) const TABLE: &[Row] = &[
         };
         a.numbers(0).map(|xs| Value::array(xs.iter().map(running).collect::<Vec<_>>()))
     })
-    .pull(|_, y, by| {
+    .vjp(|_, y, by| {
         let mut g = by.numbers(y.len()?);
         for i in (1..g.len()).rev() {
             g[i - 1] += g[i];
@@ -81,7 +81,7 @@ pub(super) const TABLE: &[Row] = &[
         "The dot product: the sum of the products of corresponding elements.",
         |a| a.number_pair(0, 1).map(|(xs, ys)| Value::Num(dot(&xs, &ys))),
     )
-    .pull(|a, _, by| {
+    .vjp(|a, _, by| {
         let (xs, ys) = a.number_pair(0, 1).ok()?;
         let along = |v: &[f64]| Adjoint::Array(v.iter().map(|x| times(by.number(), *x)).collect());
         Some(smallvec![along(&ys), along(&xs)])

@@ -1,7 +1,7 @@
 //! The rows that the language's own built-ins are written in: constants, from which the
 //! table's entries are made.
 
-use super::{Args, Argument, Builtin, Derivative, Kind, Pull, Scalar, Type};
+use super::{Args, Argument, Builtin, Derivative, Kind, Scalar, Type, Vjp};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 
@@ -95,7 +95,7 @@ impl Row {
     }
 
     /// The same with its vector-Jacobian product.
-    pub const fn pull(self, f: Pull) -> Row {
+    pub const fn vjp(self, f: Vjp) -> Row {
         Row { derivative: Derivative::Product(f), ..self }
     }
 
@@ -131,7 +131,7 @@ impl From<&Row> for Builtin {
             kind: r.kind,
             scalar: r.scalar,
             derivative: r.derivative,
-            foreign: None,
+            host: None,
         }
     }
 }

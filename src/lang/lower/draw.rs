@@ -25,9 +25,7 @@ impl Lowerer<'_> {
     fn drawn_type(&self, d: &DistSpec) -> Type {
         match d {
             // What a host's family draws only the host knows.
-            DistSpec::Family { builtin, .. }
-                if self.code.builtins.get(*builtin).foreign.is_some() =>
-            {
+            DistSpec::Family { builtin, .. } if self.code.builtins.get(*builtin).host.is_some() => {
                 Type::Any
             }
             DistSpec::Family { builtin, args } => match &*self.code.builtins.get(*builtin).name {

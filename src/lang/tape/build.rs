@@ -6,7 +6,7 @@
 
 use super::form::{Form, Made};
 use super::op::Op;
-use super::{Input, Sums, Tape};
+use super::{Input, ScoreSums, Tape};
 use crate::dist::{Dist, Support, batch, batch_of_mixture};
 use crate::lang::builtins::{
     Before, Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Scalar,
@@ -36,7 +36,7 @@ impl Builder {
     pub fn finish(self) -> Tape {
         let adjoints = vec![0.0; self.values.len()];
         let (values, inputs, ops) = (self.values, self.inputs, self.ops);
-        Tape { values, adjoints, inputs, ops, sums: Sums::default(), scratch: Vec::new() }
+        Tape { values, adjoints, inputs, ops, sums: ScoreSums::default(), scratch: Vec::new() }
     }
 
     fn reserve(&mut self, n: usize) -> usize {
@@ -109,7 +109,7 @@ impl Builder {
             },
             (Derivative::Binary(f), [x, y]) if numeric(now) => self.binary(f, x, y, now),
             (Derivative::Reduction(f), [x]) => self.reduce(f, x),
-            _ if builtin.foreign.is_none() && builtin.full_name() == "matmul" => self.matrix(&args),
+            _ if builtin.host.is_none() && builtin.full_name() == "matmul" => self.matrix(&args),
             _ => None,
         };
         if special.is_some() {

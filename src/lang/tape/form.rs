@@ -153,7 +153,7 @@ impl Form {
 
     /// Adds an adjoint to those of the numbers this is made of; false if a derivative is
     /// not known.
-    pub(super) fn pull(&self, by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
+    pub(super) fn vjp(&self, by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
         if by.is_zero() || self.is_fixed() {
             return true;
         }
@@ -176,13 +176,13 @@ impl Form {
                 true
             }
             Form::List(all) => {
-                all.iter().enumerate().all(|(i, f)| f.pull(&by.element(i), buffer, adjoints))
+                all.iter().enumerate().all(|(i, f)| f.vjp(&by.element(i), buffer, adjoints))
             }
             Form::Record(all) => {
-                all.iter().all(|(name, f)| f.pull(&by.field(name), buffer, adjoints))
+                all.iter().all(|(name, f)| f.vjp(&by.field(name), buffer, adjoints))
             }
             Form::Made(m) => match call(&m.builtin, &m.args, buffer) {
-                Some((_, value)) => pull_call(&m.builtin, &m.args, value, by, buffer, adjoints),
+                Some((_, value)) => vjp_call(&m.builtin, &m.args, value, by, buffer, adjoints),
                 None => false,
             },
         }
@@ -190,7 +190,7 @@ impl Form {
 
     /// Passes the derivatives by the parameters of a distribution, and by a covariance
     /// among them, on to what it was made of.
-    pub(super) fn pull_dist(
+    pub(super) fn vjp_dist(
         &self,
         dist: &Dist,
         params: Vec<f64>,
@@ -199,7 +199,7 @@ impl Form {
         adjoints: &mut [f64],
     ) -> bool {
         let Form::Made(m) = self else {
-            return self.pull(&Adjoint::Array(params), buffer, adjoints);
+            return self.vjp(&Adjoint::Array(params), buffer, adjoints);
         };
         let Some((values, _)) = call(&m.builtin, &m.args, buffer) else { return false };
         let values: SmallVec<[&Value; 4]> = values.iter().collect();
@@ -216,7 +216,7 @@ impl Form {
                 }
             }
         }
-        m.args.iter().zip(&pulled).all(|(f, by)| f.pull(by, buffer, adjoints))
+        m.args.iter().zip(&pulled).all(|(f, by)| f.vjp(by, buffer, adjoints))
     }
 }
 
@@ -254,7 +254,7 @@ pub(super) fn call_from(
 }
 
 /// Passes the adjoint of a call's result, which is this value, on to its arguments.
-pub(super) fn pull_call(
+pub(super) fn vjp_call(
     builtin: &Builtin,
     args: &[Form],
     value: Value,
@@ -271,10 +271,10 @@ pub(super) fn pull_call(
             let params = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
             density::by_arguments(&a, d, &params)
         }
-        _ => match builtin.derivative.pull(&a, &value, by) {
+        _ => match builtin.derivative.vjp(&a, &value, by) {
             Some(pulled) => pulled,
             None => return false,
         },
     };
-    args.iter().zip(&pulled).all(|(f, by)| f.pull(by, buffer, adjoints))
+    args.iter().zip(&pulled).all(|(f, by)| f.vjp(by, buffer, adjoints))
 }

@@ -26,7 +26,7 @@ use op::Op;
 
 /// What the scores on a tape add up to.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sums {
+pub struct ScoreSums {
     /// The log prior of the choices on the tape.
     pub prior: ExactSum,
     /// The log density of the observations and factors on the tape.
@@ -51,20 +51,20 @@ pub struct Tape {
     adjoints: Vec<f64>,
     inputs: Vec<Input>,
     ops: Vec<Op>,
-    sums: Sums,
+    sums: ScoreSums,
     scratch: Vec<f64>,
 }
 
 impl Tape {
     /// What the scores added up to when it was last run.
-    pub fn sums(&self) -> &Sums {
+    pub fn sums(&self) -> &ScoreSums {
         &self.sums
     }
 
     /// Runs it where its inputs have these values, by their number, and gives the
     /// coordinates. False where it cannot tell what the program does there.
     pub fn stand(&mut self, mut value: impl FnMut(usize) -> Value, y: &mut Vec<f64>) -> bool {
-        self.sums = Sums::default();
+        self.sums = ScoreSums::default();
         y.clear();
         for (i, input) in self.inputs.iter().enumerate() {
             let (x, from) = (value(i), y.len());
@@ -85,7 +85,7 @@ impl Tape {
     /// Runs it at a point of unconstrained space. False where it cannot tell what the
     /// program does there.
     pub fn run(&mut self, y: &[f64]) -> bool {
-        self.sums = Sums::default();
+        self.sums = ScoreSums::default();
         let mut rest = y;
         for input in &self.inputs {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };

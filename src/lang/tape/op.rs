@@ -1,7 +1,7 @@
 //! The operations of a tape, forwards and backwards.
 
-use super::Sums;
-use super::form::{Form, call_from, pull_call};
+use super::ScoreSums;
+use super::form::{Form, call_from, vjp_call};
 use crate::dist::{Batch, Dist};
 use crate::lang::builtins::{Before, Binary, Builtin, Reduction, times};
 use crate::lang::density;
@@ -49,7 +49,7 @@ pub(super) enum Op {
 
 impl Op {
     /// Runs it; false if that cannot be told from here.
-    pub fn forward(&mut self, v: &mut [f64], sums: &mut Sums) -> bool {
+    pub fn forward(&mut self, v: &mut [f64], sums: &mut ScoreSums) -> bool {
         match self {
             Op::Unary { f, x, out, n, .. } => {
                 let (before, y) = v.split_at_mut(*out);
@@ -138,15 +138,15 @@ impl Op {
             }
             Op::Call { builtin, args, out, .. } => {
                 let by = out.adjoint(g);
-                out.value(v).is_some_and(|value| pull_call(builtin, args, value, &by, v, g))
+                out.value(v).is_some_and(|value| vjp_call(builtin, args, value, &by, v, g))
             }
             Op::Guard { .. } => true,
             Op::Density { batch, x, params, n, observed } => {
-                batch.pull(v, g, *x, params, *n, weight(*observed));
+                batch.vjp(v, g, *x, params, *n, weight(*observed));
                 true
             }
             Op::Score { dist, x, observed } => {
-                pull_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false)
+                vjp_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false)
             }
             Op::Factor { x } => {
                 g[*x] += power;
@@ -156,7 +156,7 @@ impl Op {
     }
 }
 
-impl Sums {
+impl ScoreSums {
     fn of(&mut self, observed: bool) -> &mut ExactSum {
         if observed { &mut self.likelihood } else { &mut self.prior }
     }
@@ -181,7 +181,7 @@ fn score(dist: &Value, x: &Value, observed: bool, sum: &mut ExactSum) -> bool {
     true
 }
 
-fn pull_score(
+fn vjp_score(
     dist: &Form,
     x: &Form,
     observed: bool,
@@ -193,7 +193,7 @@ fn pull_score(
     if let Value::Likelihood(l) = &made {
         let mut by = l.gradient(&value)?;
         by.scale(weight);
-        return Some(dist.pull(&by, v, g));
+        return Some(dist.vjp(&by, v, g));
     }
     let Value::Dist(d) = &made else { return None };
     let (mut by_x, mut params) = density::gradient(d, &value)?;
@@ -207,5 +207,5 @@ fn pull_score(
         by.scale(weight);
         Some(by)
     };
-    Some(x.pull(&by_x, v, g) && dist.pull_dist(d, params, by_matrix, v, g))
+    Some(x.vjp(&by_x, v, g) && dist.vjp_dist(d, params, by_matrix, v, g))
 }

@@ -3,7 +3,7 @@
 
 /// Where something stood in the source.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct SourcePlace {
     pub line: usize,
     pub column: usize,
     /// How many spaces were before it.
@@ -15,7 +15,7 @@ pub(super) struct Seen {
 pub(super) struct Stop {
     /// Its column.
     pub at: usize,
-    pub seen: Seen,
+    pub seen: SourcePlace,
 }
 
 /// A line of output.
@@ -83,7 +83,8 @@ pub(super) fn line_up(rows: &mut [Row], width: usize) {
 /// The longest runs of rows whose stops were in one column of lines below each other, if
 /// spaces were put there for it.
 fn runs(rows: &[Row], stop: impl Fn(&Row) -> Option<Stop>) -> Vec<std::ops::Range<usize>> {
-    let seen: Vec<Option<Seen>> = rows.iter().map(|row| stop(row).map(|stop| stop.seen)).collect();
+    let seen: Vec<Option<SourcePlace>> =
+        rows.iter().map(|row| stop(row).map(|stop| stop.seen)).collect();
     let mut runs = Vec::new();
     let mut start = 0;
     while start < seen.len() {

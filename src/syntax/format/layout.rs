@@ -5,7 +5,7 @@
 //! lines are broken. A group that holds a broken one is not itself broken by that:
 //! `map(fn(x) {`, the body, `}, xs)`.
 
-use super::columns::{self, Row, Seen, Stop};
+use super::columns::{self, Row, SourcePlace, Stop};
 use super::source::{Comment, Place};
 use std::borrow::Cow;
 
@@ -52,7 +52,7 @@ enum Op<'s> {
     IfBroken(&'static str),
     Comment(Comment<'s>),
     /// A place that the writer may have lined up with those above and below.
-    Stop(Seen),
+    Stop(SourcePlace),
 }
 
 /// A text in the making.
@@ -92,7 +92,7 @@ impl<'s> Layout<'s> {
         self.ops.push(Op::Dedent);
     }
 
-    pub fn stop(&mut self, seen: Seen) {
+    pub fn stop(&mut self, seen: SourcePlace) {
         self.ops.push(Op::Stop(seen));
     }
 

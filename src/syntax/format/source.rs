@@ -1,6 +1,6 @@
 //! The text that is formatted, read token by token, and the comments between them.
 
-use super::columns::Seen;
+use super::columns::SourcePlace;
 use crate::syntax::lexer::lex;
 use crate::syntax::span::FileId;
 use std::ops::Range;
@@ -26,7 +26,7 @@ pub(super) struct Comment<'s> {
     pub place: Place,
     /// Whether an empty line is before it.
     pub blank: bool,
-    pub seen: Seen,
+    pub seen: SourcePlace,
 }
 
 /// A text, its tokens, and which comes next.
@@ -108,15 +108,15 @@ impl<'s> Source<'s> {
     }
 
     /// Where the next token stands.
-    pub fn seen(&self) -> Seen {
+    pub fn seen(&self) -> SourcePlace {
         self.place(self.tokens.get(self.next).map_or(self.text.len(), |token| token.start))
     }
 
-    fn place(&self, byte: usize) -> Seen {
+    fn place(&self, byte: usize) -> SourcePlace {
         let line = self.lines.partition_point(|start| *start <= byte).saturating_sub(1);
         let before = &self.text[self.lines.get(line).copied().unwrap_or(0)..byte];
         let column = before.chars().count();
-        Seen { line, column, spaces: column - before.trim_end().chars().count() }
+        SourcePlace { line, column, spaces: column - before.trim_end().chars().count() }
     }
 
     /// What is between the token before and a token.

@@ -3,10 +3,10 @@
 use crate::lang::code::{Block, BlockKind, Callee, Code, Op, Operand};
 use crate::lang::key::Key;
 use crate::lang::value::{Closure, NodeRef, Value};
-use crate::trace::demand::{Failure, Step};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
+use crate::trace::propagate::{Failure, Poll};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ impl Graph {
         n: NodeId,
         index: u16,
         default: Option<Operand>,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some((af, o)) = self.argument(code, n) {
             if let Some(m) = self.unready(af, o) {
@@ -56,7 +56,7 @@ impl Graph {
         cond: Operand,
         then: u32,
         otherwise: u32,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(m) = self.unready(frame, cond) {
             return self.need(code, m);
@@ -100,7 +100,7 @@ impl Graph {
         cond: Operand,
         then: Operand,
         otherwise: Operand,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(m) = self.unready(frame, cond) {
             return self.need(code, m);
@@ -134,7 +134,7 @@ impl Graph {
         callee: Callee,
         args: &WrittenArgs,
         site: u32,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         let closure = match callee {
             Callee::Static(block) => Closure { block, frame: 0 },
@@ -196,7 +196,7 @@ impl Graph {
     }
 
     /// Takes the value of a call or branch from its child frame.
-    fn finish_child(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    fn finish_child(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let Some(Side::Child(child)) = self.nodes[n as usize].side.as_deref() else {
             return Ok(self.finish(code, n, Value::Unit));
         };
@@ -245,7 +245,7 @@ impl Graph {
         n: NodeId,
         builtin: u32,
         args: &WrittenArgs,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         if !matches!(
             self.nodes[n as usize].side.as_deref(),
             None | Some(Side::Deps(_) | Side::Kept(_))
@@ -282,7 +282,7 @@ impl Graph {
         code: &Code,
         n: NodeId,
         f: Operand,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(m) = self.unready(frame, f) {
             return self.need(code, m);
@@ -299,7 +299,7 @@ impl Graph {
             (self.nodes[n as usize].side.as_deref(), &self.nodes[n as usize].value)
             && (m.block, m.parent) == (closure.block, closure.frame)
         {
-            return Ok(self.settle_node(code, n));
+            return Ok(self.finish_unchanged(code, n));
         }
         self.drop_structure(code, n);
         let memo =
@@ -317,7 +317,7 @@ impl Graph {
         n: NodeId,
         memo: NodeId,
         args: &WrittenArgs,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         let operands: SmallVec<[Operand; 4]> = args.iter().map(|(_, o)| *o).collect();
         if let Some(step) = self.await_plain(code, n, frame, &operands)? {
@@ -350,7 +350,7 @@ impl Graph {
         self.finish_memo(code, n)
     }
 
-    fn finish_memo(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    fn finish_memo(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let Some(Side::MemoCall(call)) = self.nodes[n as usize].side.as_deref() else {
             return Ok(self.finish(code, n, Value::Unit));
         };

@@ -5,10 +5,10 @@ use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
 use crate::lang::value::Value;
-use crate::trace::demand::{Failure, Step};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
+use crate::trace::propagate::{Failure, Poll};
 use crate::trace::propose::{Change, Constraint};
 use smallvec::SmallVec;
 
@@ -20,7 +20,7 @@ impl Graph {
         spec: &DistSpec,
         site: u32,
         keys: &[Operand],
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         let mut deps = Deps::new();
         let dist = match self.dist_now(code, n, frame, spec, &mut deps) {
@@ -40,7 +40,7 @@ impl Graph {
             let moved = own.is_some_and(|h| self.choice_hash(code, n) != h);
             if !moved && self.update_choice(code, n, &dist)? {
                 self.set_deps(n, deps);
-                return Ok(self.settle_node(code, n));
+                return Ok(self.finish_unchanged(code, n));
             }
             // Marking stops at numbers: what reads this one was not told that it may
             // become something else.
@@ -65,7 +65,7 @@ impl Graph {
         node.value = value;
         node.changed = epoch;
         node.flags &= !TARGET;
-        Ok(self.settle_node(code, n))
+        Ok(self.finish_unchanged(code, n))
     }
 
     fn reformed(&self, code: &Code, n: NodeId) -> Failure {
@@ -224,8 +224,11 @@ impl Graph {
         self.add_prior(score, given.is_none());
         self.nodes[n as usize].score = score;
         let whitened = dist.is_stored_whitened();
-        let value =
-            Value::from_datum(&if whitened { dist.realise(&stored) } else { stored.clone() });
+        let value = Value::from_datum(&if whitened {
+            dist.from_noncentred(&stored)
+        } else {
+            stored.clone()
+        });
         if whitened || own.is_some() {
             let side = ChoiceSide {
                 stored: whitened.then_some(stored),
@@ -301,7 +304,7 @@ impl Graph {
         let (new, from_prior) = match change {
             None => (None, false),
             Some(Change::Set(d)) => (Some(d), false),
-            Some(Change::Value(d)) => match dist.unrealise(&d) {
+            Some(Change::Value(d)) => match dist.to_noncentred(&d) {
                 Some(x) => (Some(x), false),
                 None => {
                     return Err(self.type_error(
@@ -345,8 +348,11 @@ impl Graph {
         self.nodes[n as usize].score = score;
         self.nodes[n as usize].flags &= !TARGET;
         if new.is_some() || whitened {
-            let value =
-                Value::from_datum(&if whitened { dist.realise(stored) } else { stored.clone() });
+            let value = Value::from_datum(&if whitened {
+                dist.from_noncentred(stored)
+            } else {
+                stored.clone()
+            });
             let epoch = self.epoch;
             let node = &mut self.nodes[n as usize];
             if !value.same(&node.value) {
@@ -388,7 +394,7 @@ impl Graph {
                 let new = match change {
                     Change::Set(d) | Change::Value(d) if *element == NONE => self::element(d, i),
                     Change::Set(d) => Some(d.clone()),
-                    Change::Value(d) => one.unrealise(d),
+                    Change::Value(d) => one.to_noncentred(d),
                     Change::Free(y) => {
                         let (x, jacobian) = one.stored_support().from_free(y);
                         self.jacobian.add(jacobian);
@@ -518,7 +524,7 @@ impl Constraint {
     fn whole(&self, dist: &Dist) -> Option<Datum> {
         match self {
             Constraint::Stored(d) => Some(d.clone()),
-            Constraint::Value(d) if dist.is_stored_whitened() => dist.unrealise(d),
+            Constraint::Value(d) if dist.is_stored_whitened() => dist.to_noncentred(d),
             Constraint::Value(d) => Some(d.clone()),
         }
     }

@@ -4,9 +4,9 @@ use crate::lang::code::{Code, Op, Operand, Source, SourceKey};
 use crate::lang::error::FaultKind;
 use crate::lang::key::Key;
 use crate::lang::value::{NodeRef, Value};
-use crate::trace::demand::{Failure, Step};
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
+use crate::trace::propagate::{Failure, Poll};
 use indexmap::IndexMap;
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ enum Place {
 enum Found {
     Place(Place),
     Missing,
-    Wait(Step),
+    Pending(Poll),
 }
 
 impl Graph {
@@ -31,7 +31,7 @@ impl Graph {
         code: &Code,
         n: NodeId,
         sources: &[Source],
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         let mut deps = Deps::new();
         let entries = if let [Source { loops, keys, .. }] = sources
@@ -71,7 +71,7 @@ impl Graph {
         self.let_side_go(code, n);
         self.set_side(n, Some(Side::Table(Table { deps, entries })));
         if keep {
-            return Ok(self.settle_node(code, n));
+            return Ok(self.finish_unchanged(code, n));
         }
         self.version += 1;
         let version = self.version;
@@ -90,7 +90,7 @@ impl Graph {
         passes: &mut SmallVec<[u32; 2]>,
         deps: &mut Deps,
         entries: &mut IndexMap<SmallVec<[Key; 1]>, Element>,
-    ) -> Result<Option<Step>, Failure> {
+    ) -> Result<Option<Poll>, Failure> {
         if let Some(slot) = source.loops.get(passes.len()) {
             let node = self.frames[frame as usize].base + slot;
             if self.nodes[node as usize].state != State::Clean {
@@ -176,7 +176,7 @@ impl Graph {
                 let Some(element) = entries.get(keys).cloned() else { return Ok(Found::Missing) };
                 self.element_node(code, container, &element).map(|n| Found::Place(Place::Node(n)))
             }
-            _ => self.need(code, container).map(Found::Wait),
+            _ => self.need(code, container).map(Found::Pending),
         }
     }
 
@@ -208,7 +208,7 @@ impl Graph {
     }
 
     /// Reads all elements of the container in the slot before.
-    pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let container = n - 1;
         if self.nodes[container as usize].state != State::Clean {
             return self.need(code, container);
@@ -253,7 +253,7 @@ impl Graph {
             deps.push(*m);
         }
         if waiting {
-            return Ok(Step::Wait);
+            return Ok(Poll::Pending);
         }
         let mut values = Vec::with_capacity(places.len());
         let mut nested: Deps = smallvec![];
@@ -321,7 +321,7 @@ impl Graph {
         n: NodeId,
         base: Operand,
         keys: &[Operand],
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(step) = self.await_all(code, frame, &[base])? {
             return Ok(step);
@@ -364,7 +364,7 @@ impl Graph {
                 };
                 let place = match self.find(code, container, &found)? {
                     Found::Place(p) => p,
-                    Found::Wait(step) => return Ok(step),
+                    Found::Pending(step) => return Ok(step),
                     Found::Missing => return Err(self.missing(code, n, container, &found)),
                 };
                 value = match place {

@@ -4,17 +4,17 @@ use crate::lang::code::{BlockKind, Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
 use crate::lang::value::{NodeRef, Value};
-use crate::trace::demand::{Failure, Step};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
+use crate::trace::propagate::{Failure, Poll};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Graph {
     /// The element a pass is for.
-    pub(super) fn evaluate_item(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    pub(super) fn evaluate_item(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let frame = &self.frames[self.nodes[n as usize].frame as usize];
         let (owner, pass) = (frame.owner, frame.pass as usize);
         if self.nodes[owner as usize].state == State::Stale {
@@ -28,7 +28,7 @@ impl Graph {
     }
 
     /// The running value of a `fold` before a pass.
-    pub(super) fn evaluate_accumulator(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    pub(super) fn evaluate_accumulator(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let frame = &self.frames[self.nodes[n as usize].frame as usize];
         let (owner, pass) = (frame.owner, frame.pass as usize);
         let home = self.nodes[owner as usize].frame;
@@ -58,7 +58,7 @@ impl Graph {
         n: NodeId,
         iter: Operand,
         body: u32,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(step) = self.await_plain(code, n, frame, &[iter])? {
             return Ok(step);
@@ -96,7 +96,7 @@ impl Graph {
         f: Operand,
         over: Operand,
         _site: u32,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(step) = self.await_all(code, frame, &[f])? {
             return Ok(step);
@@ -154,7 +154,7 @@ impl Graph {
         init: Operand,
         over: Operand,
         _site: u32,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(step) = self.await_all(code, frame, &[f])? {
             return Ok(step);
@@ -311,8 +311,8 @@ impl Graph {
     }
 
     /// Ends the evaluation of a node whose value is a reference to its structure.
-    fn finish_structure(&mut self, code: &Code, n: NodeId) -> Step {
-        self.settle_node(code, n)
+    fn finish_structure(&mut self, code: &Code, n: NodeId) -> Poll {
+        self.finish_unchanged(code, n)
     }
 
     fn make_all_passes(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {

@@ -8,9 +8,9 @@ mod observe;
 
 pub(crate) use observe::Score;
 
-use super::demand::{Failure, Step};
 use super::graph::Graph;
 use super::node::*;
+use super::propagate::{Failure, Poll};
 use crate::lang::builtins::{Before, Builtin};
 use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
@@ -19,7 +19,7 @@ use smallvec::SmallVec;
 
 impl Graph {
     /// One attempt at the operation of a node.
-    pub(super) fn evaluate(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         match self.op(code, n) {
             Op::Param { index, default } => self.evaluate_param(code, n, *index, *default),
@@ -98,7 +98,7 @@ impl Graph {
         code: &Code,
         frame: FrameId,
         operands: &[Operand],
-    ) -> Result<Option<Step>, Failure> {
+    ) -> Result<Option<Poll>, Failure> {
         for o in operands {
             if let Some(m) = self.unready(frame, *o) {
                 return self.need(code, m).map(Some);
@@ -114,7 +114,7 @@ impl Graph {
         _n: NodeId,
         frame: FrameId,
         operands: &[Operand],
-    ) -> Result<Option<Step>, Failure> {
+    ) -> Result<Option<Poll>, Failure> {
         for o in operands {
             if let Some(m) = self.unready(frame, *o) {
                 return self.need(code, m).map(Some);
@@ -203,7 +203,7 @@ impl Graph {
         n: NodeId,
         deps: Deps,
         made: Made,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         match made {
             Made::Value(value) => {
                 self.set_deps(n, deps);

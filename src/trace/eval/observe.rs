@@ -6,10 +6,10 @@ use crate::lang::density::{self, likelihood_score};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::num::ExactSum;
-use crate::trace::demand::{Failure, Step};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
+use crate::trace::propagate::{Failure, Poll};
 
 impl Graph {
     pub(super) fn evaluate_observe(
@@ -18,7 +18,7 @@ impl Graph {
         n: NodeId,
         spec: &DistSpec,
         value: Operand,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         let mut deps = Deps::new();
         // Of a view, it draws a picture.
@@ -125,7 +125,7 @@ impl Graph {
         };
         for o in [*value, *coarse] {
             if let Some(m) = self.unready(frame, o) {
-                self.demand(code, m)?;
+                self.evaluate(code, m)?;
             }
         }
         let observed = match self.replaced(code, n) {
@@ -151,7 +151,7 @@ impl Graph {
         code: &Code,
         n: NodeId,
         weight: Operand,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         if let Some(m) = self.unready(frame, weight) {
             return self.need(code, m);

@@ -3,16 +3,16 @@
 
 use super::Reverse;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Builtin, Kind, Pulled};
+use crate::lang::builtins::{ArgAdjoints, Args, Builtin, Kind};
 use crate::lang::code::{Callee, Op, Operand};
 use crate::lang::value::Value;
-use crate::trace::demand::Failure;
 use crate::trace::node::*;
+use crate::trace::propagate::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
     /// A call written as such.
-    pub(super) fn pull_builtin(
+    pub(super) fn vjp_builtin(
         &mut self,
         n: NodeId,
         builtin: &Builtin,
@@ -27,7 +27,7 @@ impl Reverse<'_> {
     }
 
     /// A call of a built-in that is a value; false if the node is none.
-    pub(super) fn pull_called(&mut self, n: NodeId, by: &Adjoint) -> Result<bool, Failure> {
+    pub(super) fn vjp_called(&mut self, n: NodeId, by: &Adjoint) -> Result<bool, Failure> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
         let Op::Call { callee: Callee::Value(f), args, .. } = g.op(self.code, n) else {
@@ -59,7 +59,7 @@ impl Reverse<'_> {
     }
 
     /// A built-in applied to each element.
-    pub(super) fn pull_mapped(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
+    pub(super) fn vjp_mapped(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
         let Op::Map { f, over, .. } = g.op(self.code, n) else { return Ok(()) };
@@ -100,7 +100,7 @@ impl Reverse<'_> {
         value: &Value,
         by: &Adjoint,
         operand: impl Fn(usize) -> Option<Operand>,
-    ) -> Result<Pulled, Failure> {
+    ) -> Result<ArgAdjoints, Failure> {
         let unknown = || self.no_derivative(n, &format!("`{}`", a.builtin.full_name()));
         match (a.builtin.kind, a.builtin.derivative, value) {
             (Kind::Distribution(_), _, Value::Dist(d)) => {
@@ -108,7 +108,7 @@ impl Reverse<'_> {
                 let source = |i: usize| operand(i).and_then(|o| self.source(frame, o));
                 self.by_distribution(n, a, d, by, |i| source(i).is_some_and(|s| self.is_active(s)))
             }
-            (_, derivative, value) => derivative.pull(a, value, by).ok_or_else(unknown),
+            (_, derivative, value) => derivative.vjp(a, value, by).ok_or_else(unknown),
         }
     }
 

@@ -8,17 +8,17 @@
 //! those of their transforms.
 
 mod calls;
-mod pull;
 mod record;
 mod recording;
 mod scores;
+mod vjp;
 
 pub use recording::Recording;
 
 use super::choices::Target;
-use super::demand::Failure;
 use super::graph::Graph;
 use super::node::*;
+use super::propagate::Failure;
 use crate::dist::{Datum, Dist};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::code::{Code, DistSpec, Operand};
@@ -99,9 +99,9 @@ impl Graph {
         for n in active_scores {
             pass.weight = weight(n);
             pass.power = pass.weight * power;
-            pass.pull_score(n)?;
+            pass.vjp_score(n)?;
         }
-        let mut own: FxHashMap<NodeId, Option<Own>> =
+        let mut own: FxHashMap<NodeId, Option<TargetAdjoint>> =
             targets.iter().map(|t| (t.node, None)).collect();
         while let Some(n) = pass.order.pop() {
             let by = pass.adjoints.remove(&n).unwrap_or_default();
@@ -115,10 +115,10 @@ impl Graph {
                 return Err(pass.no_derivative(n, "a value computed from this"));
             }
             if let Some(place) = own.get_mut(&n) {
-                pass.pull_support(n, targets, &by)?;
+                pass.vjp_support(n, targets, &by)?;
                 *place = self.own(code, n, by);
             } else if !by.is_zero() {
-                pass.pull(n, &by)?;
+                pass.vjp(n, &by)?;
             }
         }
         for t in targets {
@@ -129,26 +129,26 @@ impl Graph {
         Ok(())
     }
 
-    fn own(&self, code: &Code, n: NodeId, mut by: Adjoint) -> Option<Own> {
+    fn own(&self, code: &Code, n: NodeId, mut by: Adjoint) -> Option<TargetAdjoint> {
         let (dist, stored) = (self.dist_of(code, n)?, self.stored(n)?);
         if dist.is_stored_whitened() {
             // The value moves with the noise, which has a density of its own.
-            let mut g = dist.realise_pull(&by.numbers(stored.len()?))?;
+            let mut g = dist.from_noncentred_vjp(&by.numbers(stored.len()?))?;
             g.iter_mut().zip(dist.gradient_stored(&stored)?.x).for_each(|(g, own)| *g += own);
             by = Adjoint::Array(g);
         }
-        Some(Own { dist, stored, by })
+        Some(TargetAdjoint { dist, stored, by })
     }
 }
 
 /// A choice and the derivative by its stored form.
-struct Own {
+struct TargetAdjoint {
     dist: Dist,
     stored: Datum,
     by: Adjoint,
 }
 
-impl Own {
+impl TargetAdjoint {
     /// Appends the derivatives by the unconstrained coordinates of a target.
     fn free_gradient(&self, t: Target, out: &mut Vec<f64>) {
         let of = |dist: &Dist, stored: &Datum, by: &Adjoint, out: &mut Vec<f64>| {
@@ -203,8 +203,8 @@ impl<'a> Reverse<'a> {
             };
             match self.marks[input as usize] {
                 Mark::Unseen | Mark::Target => self.open(input, &mut stack),
-                mark => {
-                    *active |= mark == Mark::Active;
+                invalidate => {
+                    *active |= invalidate == Mark::Active;
                     *next += 1;
                 }
             }

@@ -24,7 +24,7 @@ impl Graph {
         for (i, t) in targets.iter().enumerate() {
             // Elements of one choice come one after the other.
             if i == 0 || targets[i - 1].node != t.node {
-                self.mark_target(code, t.node);
+                self.invalidate_target(code, t.node);
             }
         }
         let mut all: Vec<NodeId> = self

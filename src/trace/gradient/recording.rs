@@ -4,7 +4,7 @@
 //! revision, and who moves only the choices that the density is a function of says so
 //! ([`Recording::moved`]). A clone of a trace has an identity of its own.
 
-use crate::lang::tape::{Sums, Tape};
+use crate::lang::tape::{ScoreSums, Tape};
 use crate::num::ExactSum;
 use crate::trace::{Change, NONE, Target, Trace, Weight};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ pub struct Recording {
     identity: Arc<()>,
     revision: u64,
     /// What the scores add up to in the state the trace is in.
-    start: Sums,
+    start: ScoreSums,
 }
 
 impl Trace {
@@ -35,7 +35,7 @@ impl Trace {
             targets: targets.to_vec(),
             identity,
             revision,
-            start: Sums::default(),
+            start: ScoreSums::default(),
         })
     }
 }

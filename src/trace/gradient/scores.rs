@@ -8,8 +8,8 @@ use crate::lang::builtins::Args;
 use crate::lang::code::{DistSpec, Op};
 use crate::lang::density;
 use crate::lang::value::Value;
-use crate::trace::demand::Failure;
 use crate::trace::node::*;
+use crate::trace::propagate::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
@@ -35,7 +35,7 @@ impl Reverse<'_> {
     }
 
     /// Derivatives of one score.
-    pub(super) fn pull_score(&mut self, n: NodeId) -> Result<(), Failure> {
+    pub(super) fn vjp_score(&mut self, n: NodeId) -> Result<(), Failure> {
         let (g, code) = (self.graph, self.code);
         let frame = g.nodes[n as usize].frame;
         match g.op(code, n) {

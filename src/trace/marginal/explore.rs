@@ -9,7 +9,7 @@
 
 use super::partition::Partition;
 use super::reads::{Found, Label, Reader};
-use super::{Group, Marginal, Sums};
+use super::{Elimination, Group, Marginal};
 use crate::lang::code::Op;
 use crate::lang::error::FaultKind;
 use crate::trace::node::*;
@@ -22,7 +22,7 @@ const MOST_VALUES: usize = 1000;
 /// What looking at the joint values showed.
 pub(crate) enum Explored {
     /// Every one has the same choices.
-    Sums(Sums),
+    Elimination(Elimination),
     /// These changes make choices appear or vanish.
     Structure(Vec<(Target, Change)>),
     /// The program has no value here whatever the choices are, there are choices that it
@@ -208,7 +208,7 @@ impl Trace {
             if m.partition.joins() == joins {
                 let all = !strict || asked.has_all(self.all_targets());
                 return Ok(if all {
-                    Explored::Sums(table.into_sums(found))
+                    Explored::Elimination(table.into_elimination(found))
                 } else {
                     Explored::Nowhere
                 });
@@ -229,7 +229,7 @@ impl Trace {
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.queue(&self.code, changes);
-        match self.graph.settle(&self.code) {
+        match self.graph.propagate(&self.code) {
             Err(e) if e.is_recoverable() => {
                 let failed = std::mem::take(&mut self.graph.failed);
                 let new = failed.last().filter(|n| self.is_improper_draw(**n)).copied();
@@ -277,27 +277,27 @@ impl Trace {
 }
 
 impl Table {
-    fn into_sums(self, found: Found) -> Sums {
+    fn into_elimination(self, found: Found) -> Elimination {
         let Found { structure_moves, values_move, .. } = found;
-        let mut sums = Sums {
+        let mut elimination = Elimination {
             groups: self.groups,
             looks: self.looks,
             structure_moves,
             values_move,
-            ..Sums::default()
+            ..Elimination::default()
         };
         for (n, site) in found.scores {
             let group = self.group_of[site as usize];
-            if sums.reached.insert(n, group).is_none() {
-                sums.groups[group].scores.push(n);
+            if elimination.reached.insert(n, group).is_none() {
+                elimination.groups[group].scores.push(n);
             }
         }
         for (n, site) in found.owners {
             let group = self.group_of[site as usize];
-            if sums.owners.insert(n, group).is_none() {
-                sums.groups[group].owners.push(n);
+            if elimination.owners.insert(n, group).is_none() {
+                elimination.groups[group].owners.push(n);
             }
         }
-        sums
+        elimination
     }
 }

@@ -68,14 +68,14 @@ impl Trace {
         loop {
             self.take_up(&mut m, sites, moving)?;
             match self.explore(&[], drawn, &mut m, draws)? {
-                Explored::Sums(sums) => {
+                Explored::Elimination(elimination) => {
                     self.rollback();
                     // Elsewhere others may be asked for.
-                    if sums.structure_moves && held.nodes.is_empty() {
+                    if elimination.structure_moves && held.nodes.is_empty() {
                         self.hold_all(held)?;
                     }
                     if drawn || held.nodes.iter().all(|n| there.contains(n)) {
-                        m.sums = sums.into();
+                        m.elimination = elimination.into();
                         break;
                     }
                     self.draw_others(m.sites[0], &original, &there, draws)?;
@@ -218,7 +218,7 @@ impl Trace {
         let before = self.graph.begin();
         held.nodes.iter().chain(&held.loops).for_each(|n| self.graph.release(*n, false));
         held.entries.iter().for_each(|(memo, key)| self.graph.leave_memo(*memo, key));
-        let settled = self.graph.settle(&self.code);
+        let settled = self.graph.propagate(&self.code);
         self.pend(before, settled)?;
         self.commit();
         Ok(())

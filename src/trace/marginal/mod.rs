@@ -36,12 +36,12 @@ pub(crate) struct Marginal {
     moving: Vec<NodeId>,
     partition: Partition,
     /// How a place is looked at that has the structure of the one where the step begins.
-    pub sums: Arc<Sums>,
+    pub elimination: Arc<Elimination>,
 }
 
 /// The groups of the choices, and which looks at a place show all that there is to see.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sums {
+pub(crate) struct Elimination {
     groups: Vec<Group>,
     /// By look: the joint value of each group, by its number.
     pub looks: Vec<Vec<usize>>,
@@ -83,12 +83,17 @@ impl Marginal {
     }
 
     /// The same by these sums.
-    pub fn changes(&self, sums: &Sums, values: &[usize], out: &mut Vec<(Target, Change)>) {
-        self.put(&sums.groups, values, out);
+    pub fn changes(
+        &self,
+        elimination: &Elimination,
+        values: &[usize],
+        out: &mut Vec<(Target, Change)>,
+    ) {
+        self.put(&elimination.groups, values, out);
     }
 }
 
-impl Sums {
+impl Elimination {
     /// By group: in which look each joint value is seen first.
     pub fn seen(&self) -> impl Iterator<Item = &[Option<usize>]> {
         self.groups.iter().map(|g| &g.seen[..])
@@ -111,17 +116,19 @@ impl Trace {
     }
 
     /// The group that a score belongs to.
-    pub(crate) fn group_of(&self, sums: &Sums, score: u32) -> Option<usize> {
-        if let Some(group) = sums.reached.get(&score) {
+    pub(crate) fn group_of(&self, elimination: &Elimination, score: u32) -> Option<usize> {
+        if let Some(group) = elimination.reached.get(&score) {
             return Some(*group);
         }
-        if sums.owners.is_empty() || matches!(self.graph.op(&self.code, score), Op::Draw { .. }) {
+        if elimination.owners.is_empty()
+            || matches!(self.graph.op(&self.code, score), Op::Draw { .. })
+        {
             return None;
         }
         let mut n = score;
         let mut found = None;
         while n != NONE {
-            found = sums.owners.get(&n).copied().or(found);
+            found = elimination.owners.get(&n).copied().or(found);
             n = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
         }
         found
@@ -130,7 +137,7 @@ impl Trace {
     /// Whether the choices have the values in the present state that they have elsewhere,
     /// also in that of a pending proposal.
     pub(crate) fn has_same_values(&self, m: &Marginal) -> bool {
-        !m.sums.values_move || self.moved_support(m).is_none()
+        !m.elimination.values_move || self.moved_support(m).is_none()
     }
 
     /// The first choice whose values are others in the present state.
@@ -143,13 +150,13 @@ impl Trace {
     /// The parts of the log prior plus `power` times the log likelihood in the present
     /// state, also that of a pending proposal: the base, and in `terms` what each group
     /// reaches.
-    pub(crate) fn parts(&self, sums: &Sums, power: f64, terms: &mut Vec<f64>) -> f64 {
+    pub(crate) fn parts(&self, elimination: &Elimination, power: f64, terms: &mut Vec<f64>) -> f64 {
         let tempered = |prior: &ExactSum, likelihood: &ExactSum| {
             prior.value() + if power == 0.0 { 0.0 } else { power * likelihood.value() }
         };
         let (mut prior, mut likelihood) = (self.graph.prior.clone(), self.graph.likelihood.clone());
         terms.clear();
-        for group in &sums.groups {
+        for group in &elimination.groups {
             let (mut own_prior, mut own_likelihood) = (ExactSum::default(), ExactSum::default());
             for n in &group.scores {
                 match self.graph.op(&self.code, *n) {

@@ -30,7 +30,7 @@ const NOTHING: Label = Label { site: NONE, moves: false };
 
 /// How far a node has been followed.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Seen {
+enum Visit {
     Not,
     Open,
     Done,
@@ -72,7 +72,7 @@ pub(super) struct Reader<'a> {
     /// Choices that are summed out, and those that move.
     own: &'a FxHashMap<NodeId, Label>,
     partition: &'a mut Partition,
-    seen: Vec<Seen>,
+    seen: Vec<Visit>,
     labels: Vec<Label>,
     pub found: Found,
 }
@@ -85,7 +85,7 @@ impl<'a> Reader<'a> {
         partition: &'a mut Partition,
     ) -> Self {
         let n = graph.nodes.len();
-        let (seen, labels) = (vec![Seen::Not; n], vec![NOTHING; n]);
+        let (seen, labels) = (vec![Visit::Not; n], vec![NOTHING; n]);
         Reader { graph, code, own, partition, seen, labels, found: Found::default() }
     }
 
@@ -163,16 +163,16 @@ impl<'a> Reader<'a> {
 
     /// What a node's value depends on.
     fn visit(&mut self, root: NodeId) -> Label {
-        if self.seen[root as usize] != Seen::Not {
+        if self.seen[root as usize] != Visit::Not {
             return self.labels[root as usize];
         }
         let mut stack: Vec<(NodeId, Inputs, usize, Label)> =
             vec![(root, self.inputs(root), 0, NOTHING)];
-        self.seen[root as usize] = Seen::Open;
+        self.seen[root as usize] = Visit::Open;
         while let Some((n, inputs, next, label)) = stack.last_mut() {
             if let Some(input) = inputs.get(*next).copied() {
-                if self.seen[input as usize] == Seen::Not {
-                    self.seen[input as usize] = Seen::Open;
+                if self.seen[input as usize] == Visit::Not {
+                    self.seen[input as usize] = Visit::Open;
                     let inner = self.inputs(input);
                     stack.push((input, inner, 0, NOTHING));
                 } else {
@@ -188,7 +188,7 @@ impl<'a> Reader<'a> {
             let (n, read) = (*n, *label);
             stack.pop();
             self.labels[n as usize] = self.ended(n, read);
-            self.seen[n as usize] = Seen::Done;
+            self.seen[n as usize] = Visit::Done;
         }
         self.labels[root as usize]
     }

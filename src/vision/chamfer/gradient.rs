@@ -76,7 +76,7 @@ impl Chamfer {
         let by_sigma = match self.options.mode {
             Mode::Mean => rho * rho / (square * sigma) - 1.0 / sigma,
             Mode::Sum => {
-                let one = |s: &super::Sums| s.second / (square * sigma) - s.length / sigma;
+                let one = |s: &super::ChamferSums| s.second / (square * sigma) - s.length / sigma;
                 one(&forth) + back.as_ref().map_or(0.0, one)
             }
         };

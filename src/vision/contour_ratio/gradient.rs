@@ -4,7 +4,7 @@
 
 use super::super::elements::Elements;
 use super::super::field::{PER_RADIAN, channels_of};
-use super::credit::NO_GROUP;
+use super::match_capacity::NO_GROUP;
 use super::{ContourRatio, Scratch};
 
 impl ContourRatio {

@@ -5,7 +5,7 @@
 //! and right exchanged). So the view that most others agree with is looked for, and each
 //! landmark is the median over those that agree with it.
 
-use super::landmarks::{NAMED, Seen, View};
+use super::landmarks::{NAMED, SeenLandmark, View};
 use super::window::Window;
 use super::{Hypothesis, Landmark};
 
@@ -133,7 +133,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 fn medians(runs: &[Run], among: &[usize]) -> Option<[Landmark; NAMED]> {
     let mut out = [Landmark::default(); NAMED];
     for (k, landmark) in out.iter_mut().enumerate() {
-        let each = |f: &dyn Fn(&Seen) -> f64| {
+        let each = |f: &dyn Fn(&SeenLandmark) -> f64| {
             median(among.iter().map(|i| f(&runs[*i].view.landmarks[k])).collect())
         };
         let at = [each(&|s| s.at[0])?, each(&|s| s.at[1])?];

@@ -19,7 +19,7 @@ const LOWEST: f32 = 0.5;
 
 /// A landmark as a network sees it in one window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct SeenLandmark {
     /// In pixels of the picture.
     pub at: [f64; 2],
     /// 0 to 1.
@@ -36,7 +36,7 @@ pub(super) struct View {
     /// How sure it is that there is a person, 0 to 1.
     pub presence: f64,
     /// In the order of [`MEDIAPIPE`].
-    pub landmarks: [Seen; NAMED],
+    pub landmarks: [SeenLandmark; NAMED],
     /// The window that these landmarks suggest.
     pub next: Window,
     /// Logits of the person's mask, by row of the window.
@@ -82,11 +82,11 @@ pub(super) fn look(
         let m = [0, 1, 2].map(|j| f64::from(metres[3 * i + j]));
         let across = if window.mirrored { -m[0] } else { m[0] };
         let metres = [cos * across - sin * m[1], sin * across + cos * m[1], m[2]];
-        Seen { at, visibility: f64::from(sigmoid(p[3])), metres }
+        SeenLandmark { at, visibility: f64::from(sigmoid(p[3])), metres }
     };
     let next =
         Window { mirrored: window.mirrored, ..Window::around(one(NAMED).at, one(NAMED + 1).at) };
-    let landmarks: [Seen; NAMED] = core::array::from_fn(one);
+    let landmarks: [SeenLandmark; NAMED] = core::array::from_fn(one);
     let numbers =
         landmarks.iter().flat_map(|l| l.at.iter().chain(&l.metres).chain([&l.visibility]));
     let sound = next.is_sound() && numbers.chain([&f64::from(presence[0])]).all(|x| x.is_finite());

@@ -2,7 +2,7 @@
 //! shipped networks, a photograph.
 
 use super::consensus::{Run, by_person, consensus};
-use super::landmarks::{NAMED, SIDE, Seen, View};
+use super::landmarks::{NAMED, SIDE, SeenLandmark, View};
 use super::window::{Beyond, Window};
 use crate::nn::sigmoid;
 use crate::vision::Photo;
@@ -119,7 +119,7 @@ fn run(hips: [f64; 2], torso: f64, moved: f64) -> Run {
         let side = if i % 2 == 1 { 1.0 } else { -1.0 };
         [hips[0] + side * dx * torso + moved, hips[1] - up * torso]
     };
-    let landmarks: [Seen; NAMED] = std::array::from_fn(|i| Seen {
+    let landmarks: [SeenLandmark; NAMED] = std::array::from_fn(|i| SeenLandmark {
         at: at(i),
         visibility: 0.5,
         metres: [moved, 0.0, i as f64],

@@ -41,7 +41,7 @@ fn terms([x, y, z]: [f32; 3]) -> [f64; TERMS] {
 /// pixels. Pixels whose normal is not finite are left out.
 pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
     let mut sums =
-        Sums { some: [[0.0; SOME]; ALL], count: 0, products: [[[0.0; LANES]; ALL]; ALL] };
+        Moments { some: [[0.0; SOME]; ALL], count: 0, products: [[[0.0; LANES]; ALL]; ALL] };
     vectorised(
         #[inline(always)]
         || {
@@ -66,13 +66,13 @@ const LANES: usize = 8;
 
 /// Sums of the products of (1, terms, brightness), of which those above the diagonal are
 /// kept.
-struct Sums {
+struct Moments {
     some: [[f64; SOME]; ALL],
     count: usize,
     products: [[[f64; LANES]; ALL]; ALL],
 }
 
-impl Sums {
+impl Moments {
     #[inline(always)]
     fn push(&mut self, normal: [f32; 3], brightness: f32) {
         let i = self.count % SOME;
@@ -90,7 +90,7 @@ impl Sums {
     /// Adds the products of the pixels that wait; places without one count 0.
     #[inline(always)]
     fn add(&mut self) {
-        let Sums { some, count, products } = self;
+        let Moments { some, count, products } = self;
         some.iter_mut().for_each(|column| column[*count..].fill(0.0));
         for (i, row) in products.iter_mut().enumerate() {
             for (j, sums) in row.iter_mut().enumerate().skip(i) {

@@ -2,7 +2,7 @@
 //! (Neal 2011).
 
 use super::{DIVERGENT, End, Hamiltonian, Path, Trajectory, system};
-use crate::infer::kernel::{Scope, accepts};
+use crate::infer::kernel::{SiteSelection, accepts};
 use crate::trace::TraceResult;
 
 /// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin
@@ -16,7 +16,7 @@ pub struct Leaps(u32);
 impl Hmc {
     /// The kernel for these choices, with so many leapfrog steps and a step size, or else
     /// one that is learnt.
-    pub fn new(scope: Scope, steps: u32, step: Option<f64>) -> Self {
+    pub fn new(scope: SiteSelection, steps: u32, step: Option<f64>) -> Self {
         // The best acceptance of long trajectories, and of Langevin steps (Roberts &
         // Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };

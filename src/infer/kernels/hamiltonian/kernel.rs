@@ -4,7 +4,7 @@
 use super::adapt::Adaptation;
 use super::summed::with_alternatives;
 use super::{Memory, Point, System};
-use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
+use crate::infer::kernel::{Kernel, Outcome, Pick, Registered, SiteSelection, StepContext};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
 use crate::trace::{Marginal, Selector, Trace, TraceResult};
@@ -53,7 +53,12 @@ pub struct Hamiltonian<T> {
 impl<T> Hamiltonian<T> {
     /// For these choices: the mean acceptance aimed at, and a step size, or else one that
     /// is learnt.
-    pub(super) fn along(trajectory: T, scope: Scope, target: f64, step: Option<f64>) -> Self {
+    pub(super) fn along(
+        trajectory: T,
+        scope: SiteSelection,
+        target: f64,
+        step: Option<f64>,
+    ) -> Self {
         let (scope, summed) = (Registered::new(scope), Registered::nothing());
         Hamiltonian {
             trajectory,
@@ -68,7 +73,7 @@ impl<T> Hamiltonian<T> {
     #[must_use]
     pub fn summing_out(self, choices: Selector) -> Self {
         Hamiltonian {
-            summed: Registered::new(Scope { selector: choices, pick: Pick::All }),
+            summed: Registered::new(SiteSelection { selector: choices, pick: Pick::All }),
             ..self
         }
     }
@@ -79,7 +84,7 @@ impl<T: Trajectory> Hamiltonian<T> {
     fn go(
         &mut self,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
         marginal: Option<Marginal>,
     ) -> TraceResult<Outcome> {
         let mut rng = at.stream();
@@ -93,7 +98,7 @@ impl<T: Trajectory> Hamiltonian<T> {
         let inverse_mass = &self.adaptation.inverse_mass;
         let mut path = Path { system: &mut system, here: &here, step, inverse_mass, rng: &mut rng };
         let end = self.trajectory.walk(&mut path)?;
-        let moved = system.settle(end.to.as_deref())?;
+        let moved = system.finish_at(end.to.as_deref())?;
         if at.adapting {
             let y = end.to.as_ref().filter(|_| moved).map_or(&here.y, |to| &to.y);
             self.adaptation.learn(end.acceptance, y);
@@ -125,7 +130,7 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
         self.adaptation.take_up(adaptation)
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let selections = (self.summed.selection(trace), self.scope.selection(trace));
         with_alternatives(selections, trace, at, |trace, marginal| self.go(trace, at, marginal))
     }

@@ -11,7 +11,9 @@ use super::laplace::Laplace;
 use super::optimize::{Past, ascend};
 use super::{Memory, System};
 use crate::dist::Datum;
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
+use crate::infer::kernel::{
+    Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
+};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
 use crate::trace::{Change, Constraint, Selector, Target, Trace, TraceResult};
@@ -181,7 +183,7 @@ impl Climb {
 impl Modes {
     /// For these choices: among so many draws from the prior, so many climb, by at most
     /// so many steps.
-    pub fn new(scope: Scope, tries: u32, keep: u32, steps: u32) -> Self {
+    pub fn new(scope: SiteSelection, tries: u32, keep: u32, steps: u32) -> Self {
         Modes {
             scope: Registered::new(scope),
             tries,
@@ -195,7 +197,7 @@ impl Modes {
 
     /// With choices that climb alone in each draw, some steps, before draws are compared.
     #[must_use]
-    pub fn climbing_first(self, first: Option<Scope>) -> Self {
+    pub fn climbing_first(self, first: Option<SiteSelection>) -> Self {
         Modes { first: first.map(Registered::new), ..self }
     }
 
@@ -208,7 +210,7 @@ impl Modes {
 
     /// The likeliest of some draws of the choices; in warm-up the present state is among
     /// them.
-    fn starts(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Climb>> {
+    fn starts(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Vec<Climb>> {
         let mut best = Vec::new();
         if at.adapting {
             best.push((trace.constraints(), trace.log_likelihood()));
@@ -240,7 +242,7 @@ impl Modes {
     /// The ends of climbs, the highest first. Half of them go on after a quarter of the
     /// steps, and a quarter after half of them (successive halving: Jamieson & Talwalkar
     /// 2016).
-    fn tops(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Climb>> {
+    fn tops(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Vec<Climb>> {
         let mut climbs = self.starts(trace, at)?;
         let mut gone = 0;
         for (round, share) in [4, 2, 1].into_iter().enumerate() {
@@ -273,28 +275,28 @@ impl Modes {
     }
 
     /// Looks for modes, and in warm-up leaves the trace in one of them.
-    fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<()> {
+    fn begin(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
         let coarse = if self.coarse == Selector::Nothing {
             None
         } else {
             trace.under_surrogates(&self.coarse)?
         };
-        let Some(mut twin) = coarse else { return self.search(trace, at) };
-        twin.observe_as(trace)?;
-        self.search(&mut twin, at)?;
-        trace.propose_choices_of(&twin)?;
+        let Some(mut surrogate) = coarse else { return self.search(trace, at) };
+        surrogate.observe_as(trace)?;
+        self.search(&mut surrogate, at)?;
+        trace.propose_choices_of(&surrogate)?;
         trace.commit();
         if at.adapting {
             // The mode is the surrogates'; the observations' own is near it.
             let (targets, _) = self.scope.members(trace, at, &mut at.stream());
-            climb(trace, &At { power: 1.0, ..*at }, &targets, LAST, &mut Past::new())?;
+            climb(trace, &StepContext { power: 1.0, ..*at }, &targets, LAST, &mut Past::new())?;
         }
         Ok(())
     }
 
     /// Looks for modes of a trace, and in warm-up leaves it in one of them.
-    fn search(&mut self, trace: &mut Trace, at: &At) -> TraceResult<()> {
-        let at = &At { power: 1.0, ..*at };
+    fn search(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
+        let at = &StepContext { power: 1.0, ..*at };
         let begun = trace.constraints();
         let tops = self.tops(trace, at)?;
         let highest = tops.first().map_or(0.0, |t| t.height);
@@ -347,7 +349,7 @@ impl Modes {
 /// Takes the continuous ones of some choices so many steps up; without a slope they stay.
 fn climb(
     trace: &mut Trace,
-    at: &At,
+    at: &StepContext,
     targets: &[Target],
     steps: u32,
     past: &mut Past,
@@ -355,7 +357,7 @@ fn climb(
     let mut memory = Memory::default();
     if let Some((mut system, here)) = System::begin(trace, at, targets, None, &mut memory)? {
         let top = ascend(&mut system, &here, steps, past)?;
-        system.settle(Some(&top))?;
+        system.finish_at(Some(&top))?;
     }
     Ok(())
 }
@@ -363,7 +365,7 @@ fn climb(
 /// The Gaussian about a mode, where the trace is.
 fn curved(
     trace: &mut Trace,
-    at: &At,
+    at: &StepContext,
     targets: &[Target],
     y: Vec<f64>,
 ) -> TraceResult<Option<Laplace>> {
@@ -380,7 +382,7 @@ fn curved(
             None => curvature.extend((0..y.len()).map(|j| f64::from(u8::from(i == j)))),
         }
     }
-    system.settle(None)?;
+    system.finish_at(None)?;
     Ok(Laplace::new(y, &curvature))
 }
 
@@ -408,7 +410,7 @@ impl Kernel for Modes {
         Ok(())
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         trace.rollback();
         if self.found.is_none() {
             self.begin(trace, at)?;
@@ -433,6 +435,10 @@ impl Kernel for Modes {
             found.log_density(&here.discrete, &here.y) - found.log_density(&mode.discrete, &y);
         let ratio = at.tempered(&w) + w.log_jacobian - here.log_jacobian + ways;
         // Where no mode leads, there is no way back.
-        Ok(settle(trace, if ratio.is_nan() { f64::NEG_INFINITY } else { ratio }, &mut rng))
+        Ok(accept_or_reject(
+            trace,
+            if ratio.is_nan() { f64::NEG_INFINITY } else { ratio },
+            &mut rng,
+        ))
     }
 }

@@ -3,7 +3,7 @@
 //! subtrees too (Betancourt 2017; as Stan has it).
 
 use super::{DIVERGENT, End, Hamiltonian, Path, Point, System, Trajectory, system};
-use crate::infer::kernel::Scope;
+use crate::infer::kernel::SiteSelection;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use crate::trace::TraceResult;
@@ -18,7 +18,7 @@ pub struct Doubling(u32);
 
 impl Nuts {
     /// The kernel for these choices; a trajectory doubles at most `max_depth` times.
-    pub fn new(scope: Scope, max_depth: u32) -> Self {
+    pub fn new(scope: SiteSelection, max_depth: u32) -> Self {
         Hamiltonian::along(Doubling(max_depth), scope, 0.8, None)
     }
 }

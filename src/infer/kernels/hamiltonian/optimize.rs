@@ -5,7 +5,7 @@
 //! in the unconstrained space, where the other kernels of this family move.
 
 use super::{Memory, Point, System};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
+use crate::infer::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::trace::{Trace, TraceResult};
 use std::collections::VecDeque;
@@ -34,7 +34,7 @@ pub(super) type Past = VecDeque<Pair>;
 
 impl Optimize {
     /// The kernel for these choices, with at most so many steps.
-    pub fn new(scope: Scope, steps: u32) -> Self {
+    pub fn new(scope: SiteSelection, steps: u32) -> Self {
         Optimize { scope: Registered::new(scope), steps, memory: Memory::default() }
     }
 }
@@ -137,7 +137,7 @@ impl Kernel for Optimize {
         Ok(())
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
         let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)?
@@ -145,7 +145,7 @@ impl Kernel for Optimize {
             return Ok(Outcome::default());
         };
         let here = ascend(&mut system, &begun, self.steps, &mut Past::new())?;
-        let moved = here.log_density > begun.log_density && system.settle(Some(&here))?;
+        let moved = here.log_density > begun.log_density && system.finish_at(Some(&here))?;
         if !moved {
             trace.rollback();
         }
@@ -177,8 +177,8 @@ mod tests {
         for (address, x) in [("@a", 2.0), ("@b", -1.0)] {
             trace.set(address, x, Draws::default()).unwrap();
         }
-        let scope = Scope { selector: Selector::All, pick: Pick::All };
-        Optimize::new(scope, 40).step(&mut trace, &At::new(1, 0, 0)).unwrap();
+        let scope = SiteSelection { selector: Selector::All, pick: Pick::All };
+        Optimize::new(scope, 40).step(&mut trace, &StepContext::new(1, 0, 0)).unwrap();
         for t in trace.all_targets() {
             let x = trace.stored(*t).and_then(|x| x.num()).unwrap();
             // Where a = b and a + 100 (a + b - 1) = 0.
@@ -194,8 +194,8 @@ mod tests {
         let text = "assume x ~ flat(); factor(x - 2 * log1p(exp(x - 50)));";
         let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
         trace.set("@x", 15.0, Draws::default()).unwrap();
-        let scope = Scope { selector: Selector::All, pick: Pick::All };
-        Optimize::new(scope, 60).step(&mut trace, &At::new(1, 0, 0)).unwrap();
+        let scope = SiteSelection { selector: Selector::All, pick: Pick::All };
+        Optimize::new(scope, 60).step(&mut trace, &StepContext::new(1, 0, 0)).unwrap();
         let x = trace.stored(trace.all_targets()[0]).and_then(|x| x.num()).unwrap();
         assert!((x - 50.0).abs() < 1e-3, "{x}");
     }

@@ -2,7 +2,7 @@
 //! conditional afterwards.
 //!
 //! A place is looked at until every group of choices was at each of its joint values
-//! ([`Sums::looks`]), all groups at a value of theirs at a time. The force is the mean,
+//! ([`Elimination::looks`]), all groups at a value of theirs at a time. The force is the mean,
 //! over the conditional of the choices, of that of the log joint. Drawing the choices
 //! from that conditional at the end leaves the joint density of both invariant. Choices
 //! that only other values ask for (a component of a mixture that no label points at) are
@@ -11,12 +11,12 @@
 //! reached.
 
 use super::{Point, System};
-use crate::infer::kernel::{At, Outcome, recoverable};
+use crate::infer::kernel::{Outcome, StepContext, recoverable};
 use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use crate::trace::{
-    Change, Explored, Marginal, Selection, Sums, Target, Trace, TraceResult, Weight,
+    Change, Elimination, Explored, Marginal, Selection, Target, Trace, TraceResult, Weight,
 };
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ pub(super) struct Summed {
 /// A place with all choices that are summed out at each of their values.
 #[derive(Debug)]
 struct View {
-    sums: Arc<Sums>,
+    elimination: Arc<Elimination>,
     log_density: f64,
     /// By group and joint value: the log probability given the place.
     conditional: Vec<Vec<f64>>,
@@ -47,7 +47,7 @@ struct View {
 pub(super) fn with_alternatives(
     (sites, moving): (Selection, Selection),
     trace: &mut Trace,
-    at: &At,
+    at: &StepContext,
     step: impl FnOnce(&mut Trace, Option<Marginal>) -> TraceResult<Outcome>,
 ) -> TraceResult<Outcome> {
     if trace.targets(sites).is_empty() {
@@ -80,13 +80,13 @@ impl System<'_> {
     /// Goes to a place, with the groups at joint values.
     fn put(
         &mut self,
-        sums: &Sums,
+        elimination: &Elimination,
         at: &[(Target, Change)],
         values: &[usize],
     ) -> TraceResult<Option<Weight>> {
         let mut changes = at.to_vec();
         if let Some(summed) = &self.summed {
-            summed.marginal.changes(sums, values, &mut changes);
+            summed.marginal.changes(elimination, values, &mut changes);
         }
         let w = recoverable(self.trace.propose(&changes, self.at.draws(0)))?;
         Ok(w.filter(|w| w.appeared + w.vanished == 0))
@@ -95,7 +95,7 @@ impl System<'_> {
     /// Looks at a place. `None` where there is no density.
     fn view(&mut self, at: &[(Target, Change)]) -> TraceResult<Option<View>> {
         let Some(summed) = &mut self.summed else { return Ok(None) };
-        let known = Arc::clone(&summed.marginal.sums);
+        let known = Arc::clone(&summed.marginal.elimination);
         if !known.structure_moves
             && let Some(view) = self.look(known, at)?
         {
@@ -104,23 +104,27 @@ impl System<'_> {
         // What is read there may be something else.
         let Some(summed) = &mut self.summed else { return Ok(None) };
         match self.trace.explore(at, true, &mut summed.marginal, self.at.draws(0))? {
-            Explored::Sums(sums) => self.look(sums.into(), at),
+            Explored::Elimination(elimination) => self.look(elimination.into(), at),
             Explored::Structure(_) | Explored::Nowhere => Ok(None),
         }
     }
 
     /// Looks at a place by sums that hold there. `None` if they do not, or if there is no
     /// density.
-    fn look(&mut self, sums: Arc<Sums>, at: &[(Target, Change)]) -> TraceResult<Option<View>> {
+    fn look(
+        &mut self,
+        elimination: Arc<Elimination>,
+        at: &[(Target, Change)],
+    ) -> TraceResult<Option<View>> {
         let mut conditional: Vec<Vec<f64>> =
-            sums.seen().map(|s| vec![f64::NEG_INFINITY; s.len()]).collect();
+            elimination.seen().map(|s| vec![f64::NEG_INFINITY; s.len()]).collect();
         let (mut base, mut jacobian, mut terms) = (0.0, 0.0, Vec::new());
-        for (k, values) in sums.looks.iter().enumerate() {
-            let Some(w) = self.put(&sums, at, values)? else { return Ok(None) };
+        for (k, values) in elimination.looks.iter().enumerate() {
+            let Some(w) = self.put(&elimination, at, values)? else { return Ok(None) };
             if self.summed.as_ref().is_some_and(|s| !self.trace.has_same_values(&s.marginal)) {
                 return Ok(None);
             }
-            let rest = self.trace.parts(&sums, self.at.power, &mut terms);
+            let rest = self.trace.parts(&elimination, self.at.power, &mut terms);
             if k == 0 {
                 (base, jacobian) = (rest, w.log_jacobian);
             } else if w.log_jacobian.to_bits() != jacobian.to_bits() {
@@ -131,7 +135,7 @@ impl System<'_> {
                 return Err(fail(Default::default(), message.into()));
             }
             for (((c, t), seen), v) in
-                conditional.iter_mut().zip(&terms).zip(sums.seen()).zip(values)
+                conditional.iter_mut().zip(&terms).zip(elimination.seen()).zip(values)
             {
                 if seen[*v] == Some(k) {
                     c[*v] = *t;
@@ -144,7 +148,7 @@ impl System<'_> {
             log_density += total;
             c.iter_mut().for_each(|t| *t -= total);
         }
-        Ok(log_density.is_finite().then_some(View { sums, log_density, conditional }))
+        Ok(log_density.is_finite().then_some(View { elimination, log_density, conditional }))
     }
 
     /// The log density and force at a place, with the choices summed out; which of their
@@ -157,19 +161,19 @@ impl System<'_> {
         point.log_density = view.log_density - origin;
         point.gradient.clear();
         point.gradient.resize(point.y.len(), 0.0);
-        let (sums, layout) = (Arc::clone(&view.sums), Arc::clone(&self.layout));
+        let (elimination, layout) = (Arc::clone(&view.elimination), Arc::clone(&self.layout));
         let mut part = Vec::with_capacity(point.y.len());
-        for (k, values) in sums.looks.iter().enumerate().rev() {
+        for (k, values) in elimination.looks.iter().enumerate().rev() {
             // The last look is pending.
-            if k + 1 < sums.looks.len() && self.put(&sums, &at, values)?.is_none() {
+            if k + 1 < elimination.looks.len() && self.put(&elimination, &at, values)?.is_none() {
                 return Ok(None);
             }
-            let first = sums.seen().zip(values).map(|(seen, v)| seen[*v] == Some(k));
+            let first = elimination.seen().zip(values).map(|(seen, v)| seen[*v] == Some(k));
             let weights = first.zip(&view.conditional).zip(values);
             let weights: Vec<f64> =
                 weights.map(|((first, c), v)| if first { libm::exp(c[*v]) } else { 0.0 }).collect();
             let base = f64::from(u8::from(k == 0));
-            let weight = |n: u32| self.trace.group_of(&sums, n).map_or(base, |i| weights[i]);
+            let weight = |n: u32| self.trace.group_of(&elimination, n).map_or(base, |i| weights[i]);
             part.clear();
             self.trace.weighted_gradient(&layout.targets, self.at.power, &weight, &mut part)?;
             point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g += p);
@@ -177,7 +181,7 @@ impl System<'_> {
         // Each look has the Jacobians in it, and one is enough.
         part.clear();
         self.trace.weighted_gradient(&layout.targets, self.at.power, &|_| 0.0, &mut part)?;
-        let more = sums.looks.len() as f64 - 1.0;
+        let more = elimination.looks.len() as f64 - 1.0;
         point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g -= more * p);
         Ok(point.gradient.iter().all(|g| g.is_finite()).then_some(view))
     }
@@ -194,7 +198,7 @@ impl System<'_> {
 
     /// Makes a place, or the one it began in, the state of the trace, with the choices
     /// drawn from their conditional there.
-    pub(super) fn settle_summed(mut self, to: Option<&Point>) -> TraceResult<bool> {
+    pub(super) fn finish_summed(mut self, to: Option<&Point>) -> TraceResult<bool> {
         let mut rng = self.at.within(0).stream();
         let at = match (to, &mut self.summed) {
             (Some(p), _) => self.memory.changes(&p.y, false, &self.layout).to_vec(),
@@ -213,7 +217,7 @@ impl System<'_> {
             return Ok(false);
         };
         let drawn: Vec<usize> = view.conditional.iter().map(|c| draw(c, &mut rng)).collect();
-        let there = self.put(&view.sums, &at, &drawn)?.is_some();
+        let there = self.put(&view.elimination, &at, &drawn)?.is_some();
         if there {
             self.trace.commit()
         } else {

@@ -8,7 +8,7 @@
 
 use super::memory::{Layout, Memory};
 use super::summed::Summed;
-use crate::infer::kernel::{At, recoverable};
+use crate::infer::kernel::{StepContext, recoverable};
 use crate::num::ExactSum;
 use crate::rng::Stream;
 use crate::trace::{Marginal, Target, Trace, TraceResult};
@@ -27,10 +27,10 @@ pub(super) struct Point {
     pub log_density: f64,
 }
 
-/// A trace as a system; proposals are pending until [`System::settle`].
+/// A trace as a system; proposals are pending until [`System::finish_at`].
 pub(super) struct System<'a> {
     pub(super) trace: &'a mut Trace,
-    pub(super) at: &'a At,
+    pub(super) at: &'a StepContext,
     pub(super) memory: &'a mut Memory,
     pub(super) layout: Arc<Layout>,
     /// Whether the memory has a tape of the state the trace is in.
@@ -47,7 +47,7 @@ impl<'a> System<'a> {
     /// An operation that has no derivative; choices that cannot be summed out.
     pub fn begin(
         trace: &'a mut Trace,
-        at: &'a At,
+        at: &'a StepContext,
         all: &[Target],
         marginal: Option<Marginal>,
         memory: &'a mut Memory,
@@ -210,9 +210,9 @@ impl<'a> System<'a> {
 
     /// Makes a place the state of the trace, or leaves it where it was; draws what was
     /// summed out.
-    pub fn settle(mut self, to: Option<&Point>) -> TraceResult<bool> {
+    pub fn finish_at(mut self, to: Option<&Point>) -> TraceResult<bool> {
         if self.summed.is_some() {
-            return self.settle_summed(to);
+            return self.finish_summed(to);
         }
         let Some(point) = to else {
             self.trace.rollback();

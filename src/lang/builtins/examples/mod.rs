@@ -19,7 +19,7 @@ type Examples = &'static [(&'static str, &'static str)];
 impl Builtin {
     /// An example of its use, if it is the language's own.
     pub fn example(&self) -> Option<&'static str> {
-        if self.foreign.is_some() {
+        if self.host.is_some() {
             return None;
         }
         let name = self.full_name();

@@ -1,7 +1,7 @@
 //! Bodies: armatures in a shape and a pose, and those made from a mesh.
 
 use super::shapes::vector_of;
-use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, body_pulls, fault, native};
+use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, body_vjps, fault, native};
 use crate::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, autorig};
 use crate::lang::builtins::{Args, Row, Type, arg, opt};
 use crate::lang::error::Fault;
@@ -42,7 +42,7 @@ pub(super) const TABLE: &[Row] = &[
             body.posed(&pose, &rules).map(|s| Value::object(SolidValue(s))).map_err(fault)
         },
     )
-    .pull(body_pulls::skin),
+    .vjp(body_vjps::skin),
     native(
         "shaped",
         SECTION,
@@ -75,7 +75,7 @@ pub(super) const TABLE: &[Row] = &[
             body.clothed(&list, a.num_or(2, 0.0)?).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
         },
     )
-    .pull(body_pulls::shaped),
+    .vjp(body_vjps::shaped),
     native(
         "stretched",
         SECTION,
@@ -95,7 +95,7 @@ pub(super) const TABLE: &[Row] = &[
             body.stretched(&stretches(a, body)?).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
         },
     )
-    .pull(body_pulls::stretched),
+    .vjp(body_vjps::stretched),
     native(
         "autorig",
         SECTION,

@@ -4,7 +4,7 @@ use super::adjoints::BySolid;
 use super::observed::{DepthValue, ImageValue, MaskValue};
 use super::{VIEW, ViewValue, native};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Arg, Args, Pulled, Row, Type, arg, opt};
+use crate::lang::builtins::{Arg, ArgAdjoints, Args, Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
 use crate::render::{Change, Contours, Frame, View};
@@ -12,8 +12,8 @@ use crate::rng::Stream;
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
-    Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    Elements, MaskLikelihood, Step, VisionError,
+    Chamfer, ChamferOptions, ContourDelta, ContourRatio, ContourRatioOptions, DepthLikelihood,
+    DepthMap, Elements, MaskLikelihood, VisionError,
 };
 use std::cell::{OnceCell, RefCell};
 use std::sync::{Arc, Weak};
@@ -48,7 +48,7 @@ pub(super) const TABLE: &[Row] = &[
         "The likelihood ratio of the observed contours: object against clutter. The default for photographs.",
         contour,
     )
-    .pull(|_, _, by| Some(by_view(by.clone(), 6))),
+    .vjp(|_, _, by| Some(by_view(by.clone(), 6))),
     native(
         "chamfer",
         SECTION,
@@ -72,7 +72,7 @@ pub(super) const TABLE: &[Row] = &[
          unnormalised score, not a density over photographs.",
         chamfer,
     )
-    .pull(|_, _, by| {
+    .vjp(|_, _, by| {
         let mut pulled = by_view(by.element(0), 6);
         pulled[1] = by.element(1);
         Some(pulled)
@@ -93,7 +93,7 @@ pub(super) const TABLE: &[Row] = &[
             likelihood(MaskOf { view: view(a)?, size: size(a, 3)?, eps: [eps_in, eps_out] })
         },
     )
-    .pull(|_, _, by| Some(by_view(by.clone(), 3))),
+    .vjp(|_, _, by| Some(by_view(by.clone(), 3))),
     native(
         "depth",
         SECTION,
@@ -113,7 +113,7 @@ pub(super) const TABLE: &[Row] = &[
             likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options })
         },
     )
-    .pull(|_, _, by| Some(by_view(by.clone(), 5))),
+    .vjp(|_, _, by| Some(by_view(by.clone(), 5))),
 ];
 
 /// How a picture is drawn, as far as it is not exact.
@@ -171,18 +171,18 @@ fn chamfer(a: &Args) -> Result<Value, Fault> {
 
 /// The adjoints of a likelihood's arguments: by the view as given, by so many others
 /// unknown.
-pub(super) fn by_view(by: Adjoint, others: usize) -> Pulled {
+pub(super) fn by_view(by: Adjoint, others: usize) -> ArgAdjoints {
     std::iter::once(by).chain((0..others).map(|_| Adjoint::Unknown)).collect()
 }
 
 /// By the view, from derivatives by the pieces of its contours.
 pub(crate) fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
-    BySolid { landmarks: Vec::new(), vertices: view.pull_contours(size, by_piece) }.into_adjoint()
+    BySolid { landmarks: Vec::new(), vertices: view.vjp_contours(size, by_piece) }.into_adjoint()
 }
 
 /// By the view, from what each pixel brings that the object covers.
 pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
-    BySolid { landmarks: Vec::new(), vertices: view.pull_mask(size, gains) }.into_adjoint()
+    BySolid { landmarks: Vec::new(), vertices: view.vjp_mask(size, gains) }.into_adjoint()
 }
 
 fn elements(c: &Contours) -> Elements<'_> {
@@ -258,9 +258,9 @@ impl<C, T: Default> Followed<C, T> {
     }
 }
 
-fn step(change: &Change) -> Step<'_> {
+fn step(change: &Change) -> ContourDelta<'_> {
     let Change { from, to, gone, come, moving, count } = change;
-    Step {
+    ContourDelta {
         from,
         to,
         gone: elements(gone),
@@ -527,8 +527,8 @@ impl Likelihood for DepthOf {
     /// By the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (prepared, frame) = self.prepared(observed).ok()?;
-        let mut vertices = self.view.pull_depth(self.size, &prepared.slopes(&frame.depth));
-        let outline = self.view.pull_mask(self.size, &prepared.gains(&frame.depth));
+        let mut vertices = self.view.vjp_depth(self.size, &prepared.slopes(&frame.depth));
+        let outline = self.view.vjp_mask(self.size, &prepared.gains(&frame.depth));
         vertices.iter_mut().zip(outline).for_each(|(v, o)| *v += o);
         Some(BySolid { landmarks: Vec::new(), vertices }.into_adjoint())
     }

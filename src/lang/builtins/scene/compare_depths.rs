@@ -45,7 +45,7 @@ pub(super) const TABLE: &[Row] = &[native(
         likelihood(RelativeDepthOf { view: view(a)?, scale, share, model })
     },
 )
-.pull(|_, _, by| {
+.vjp(|_, _, by| {
     let mut pulled = by_view(by.element(0), 4);
     pulled[1] = by.element(1);
     Some(pulled)

@@ -108,7 +108,7 @@ pub(super) const TABLE: &[Row] = &[native(
         })
     },
 )
-.pull(|_, _, by| Some(by_view(by.clone(), 7)))];
+.vjp(|_, _, by| Some(by_view(by.clone(), 7)))];
 
 #[derive(Debug)]
 struct KeypointsOf {
@@ -238,7 +238,7 @@ impl Likelihood for KeypointsOf {
             let Some(joint) = term.joint else { return };
             let by = term.model.gradient(&term.seen, joint);
             let by = [by[0] * term.scale[0], by[1] * term.scale[1]];
-            all[term.landmark] += camera.pull_point(landmarks[term.landmark].position, by);
+            all[term.landmark] += camera.vjp_point(landmarks[term.landmark].position, by);
         };
         self.each(observed, add).ok()?;
         Some(BySolid { landmarks: all, vertices: Vec::new() }.into_adjoint())

@@ -7,7 +7,7 @@
 
 mod adjoints;
 mod bodies;
-mod body_pulls;
+mod body_vjps;
 mod candidates;
 mod compare;
 mod compare_depths;
@@ -18,7 +18,7 @@ mod observed;
 mod people;
 mod region;
 mod seeing;
-mod shape_pulls;
+mod shape_vjps;
 mod shapes;
 
 pub(crate) use compare::{by_contours, by_silhouette};

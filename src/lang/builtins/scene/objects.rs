@@ -70,11 +70,11 @@ impl Object for AffineValue {
         Some(Ok(Value::object(AffineValue(self.0 * other.0))))
     }
 
-    fn pull_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+    fn vjp_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
         let a = self.0.0;
         if let Some(s) = other.downcast::<SolidValue>() {
             let by = BySolid::read(by, &s.0);
-            let g = s.0.pull_placed(self.0, &by.vertices, &by.landmarks);
+            let g = s.0.vjp_placed(self.0, &by.vertices, &by.landmarks);
             let inner = BySolid { landmarks: g.landmarks, vertices: g.vertices };
             return Some([affine_adjoint(g.linear, g.shift), inner.into_adjoint()]);
         }

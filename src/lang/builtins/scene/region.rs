@@ -56,7 +56,7 @@ pub(super) const TABLE: &[Row] = &[native(
      only if one term has power 1 and the others 0.",
     region,
 )
-.pull(|_, _, by| Some(by_view(by.clone(), 7)))];
+.vjp(|_, _, by| Some(by_view(by.clone(), 7)))];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Groups {

@@ -111,7 +111,7 @@ pub(super) const TABLE: &[Row] = &[
             )))))
         },
     )
-    .pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),
+    .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),
     native(
         "bounds",
         SECTION,

@@ -1,6 +1,6 @@
 //! Shapes and placements.
 
-use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_pulls};
+use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_vjps};
 use crate::geom::{Affine, Caps, Landmark, Profile, Solid, Wall, cuboid};
 use crate::lang::builtins::{Args, Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
@@ -45,7 +45,7 @@ pub(super) const TABLE: &[Row] = &[
             Solid::lathe(&profiles, sides, wall, caps).map(solid).map_err(fault)
         },
     )
-    .pull(shape_pulls::lathe),
+    .vjp(shape_vjps::lathe),
     native(
         "sphere",
         SECTION,
@@ -60,7 +60,7 @@ pub(super) const TABLE: &[Row] = &[
             Solid::sphere(a.num(0)?, sides).map(solid).map_err(fault)
         },
     )
-    .pull(shape_pulls::sphere),
+    .vjp(shape_vjps::sphere),
     native(
         "box",
         SECTION,
@@ -69,7 +69,7 @@ pub(super) const TABLE: &[Row] = &[
         "A box centred at the origin.",
         |a| cuboid(vector(a, 0, DVec3::ONE)?).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault),
     )
-    .pull(shape_pulls::cuboid),
+    .vjp(shape_vjps::cuboid),
     native(
         "group",
         SECTION,
@@ -96,7 +96,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(SolidValue(Solid::group(&members))))
         },
     )
-    .pull(shape_pulls::group),
+    .vjp(shape_vjps::group),
     native(
         "centred",
         SECTION,
@@ -111,7 +111,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(SolidValue(s.0.centred(a.bool_or(1, false)?))))
         },
     )
-    .pull(shape_pulls::centred),
+    .vjp(shape_vjps::centred),
     native(
         "landmarks",
         SECTION,
@@ -136,7 +136,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(SolidValue(s.0.clone().with_landmarks(points))))
         },
     )
-    .pull(shape_pulls::landmarks),
+    .vjp(shape_vjps::landmarks),
     native(
         "affine",
         SECTION,
@@ -156,7 +156,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(AffineValue(placed)))
         },
     )
-    .pull(shape_pulls::affine),
+    .vjp(shape_vjps::affine),
 ];
 
 fn solid(solid: Solid) -> Value {

@@ -84,7 +84,7 @@ impl E {
         }
     }
 
-    fn pull(&self, by: &Adjoint, out: &mut Vec<f64>) {
+    fn vjp(&self, by: &Adjoint, out: &mut Vec<f64>) {
         match self {
             By(v) => flat(v, by, out),
             Fixed(_) => {}
@@ -95,12 +95,12 @@ impl E {
                 let values: Vec<&Value> = values.iter().collect();
                 let pulled = builtin
                     .derivative
-                    .pull(&Args { builtin, values: &values }, &made, by)
+                    .vjp(&Args { builtin, values: &values }, &made, by)
                     .expect(name);
                 let zero = Adjoint::Zero;
                 args.iter()
                     .enumerate()
-                    .for_each(|(i, a)| a.pull(pulled.get(i).unwrap_or(&zero), out));
+                    .for_each(|(i, a)| a.vjp(pulled.get(i).unwrap_or(&zero), out));
             }
         }
     }
@@ -192,7 +192,7 @@ fn check(what: &str, e: &E) {
     let weights = weights(&made, &by);
     let single = numbers(&made).1;
     let mut found = Vec::new();
-    e.pull(&by, &mut found);
+    e.vjp(&by, &mut found);
     let at = |k: usize, h: f64| -> f64 {
         let mut i = 0;
         let moved = e.value(&mut |x| {

@@ -10,14 +10,14 @@ const NUMBERS: usize = 4_000_000;
 
 /// The draws so far. Clones share them: one goes to the chain, the other is looked into.
 #[derive(Clone, Debug)]
-pub(super) struct Kept {
+pub(super) struct SampledDraws {
     memory: Memory,
-    seen: Arc<Mutex<Seen>>,
+    counts: Arc<Mutex<DrawCounts>>,
 }
 
 /// What is known of all draws so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct DrawCounts {
     pub draws: u64,
     /// Draws that are another state than the one before, as far as the log joint density
     /// tells.
@@ -28,16 +28,16 @@ pub(super) struct Seen {
     last: Option<f64>,
 }
 
-impl Default for Kept {
+impl Default for SampledDraws {
     fn default() -> Self {
-        Kept { memory: Memory::bounded(NUMBERS), seen: Arc::default() }
+        SampledDraws { memory: Memory::bounded(NUMBERS), counts: Arc::default() }
     }
 }
 
-impl Kept {
+impl SampledDraws {
     /// What is known of all draws so far.
-    pub fn seen(&self) -> Seen {
-        *self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    pub fn counts(&self) -> DrawCounts {
+        *self.counts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The draws that are kept.
@@ -46,19 +46,20 @@ impl Kept {
     }
 }
 
-impl Sink for Kept {
+impl Sink for SampledDraws {
     fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
         self.memory.columns(columns)
     }
 
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
-        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        seen.draws += 1;
-        seen.last_step = row.step;
-        seen.moved += u64::from(seen.last.is_none_or(|l| l.to_bits() != row.log_joint.to_bits()));
-        seen.last = Some(row.log_joint);
-        seen.best = Some(seen.best.map_or(row.log_joint, |b| b.max(row.log_joint)));
-        drop(seen);
+        let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        counts.draws += 1;
+        counts.last_step = row.step;
+        counts.moved +=
+            u64::from(counts.last.is_none_or(|l| l.to_bits() != row.log_joint.to_bits()));
+        counts.last = Some(row.log_joint);
+        counts.best = Some(counts.best.map_or(row.log_joint, |b| b.max(row.log_joint)));
+        drop(counts);
         self.memory.draw(row)
     }
 
@@ -73,8 +74,8 @@ mod tests {
 
     #[test]
     fn all_draws_count_and_clones_see_them() {
-        let kept = Kept::default();
-        let mut sink = kept.clone();
+        let sampled = SampledDraws::default();
+        let mut sink = sampled.clone();
         sink.columns(&[Column::scalar("x")]).unwrap();
         for (draw, log_joint) in [-3.0, -1.0, -1.0, -2.0].into_iter().enumerate() {
             let draw = draw as u64;
@@ -90,8 +91,8 @@ mod tests {
             };
             sink.draw(&row).unwrap();
         }
-        let seen = kept.seen();
-        assert_eq!((seen.draws, seen.moved, seen.best), (4, 3, Some(-1.0)));
-        assert_eq!(kept.draws().rows.len(), 4);
+        let counts = sampled.counts();
+        assert_eq!((counts.draws, counts.moved, counts.best), (4, 3, Some(-1.0)));
+        assert_eq!(sampled.draws().rows.len(), 4);
     }
 }

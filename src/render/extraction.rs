@@ -19,7 +19,7 @@ fn usable(p: &Point) -> bool {
 
 /// Where on the surface a piece comes from: a share of a segment between two points of a
 /// face or edge. What silhouettes do besides moving with these points is said in
-/// [`super::wander`].
+/// [`super::silhouette_derivative`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Origin {
     /// Vertices of the mesh; of an edge, its second one twice.
@@ -43,7 +43,7 @@ pub(super) struct Room {
 
 /// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices`
 /// are its own in the image.
-pub(super) fn trace_mesh(
+pub(super) fn extract_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
@@ -55,7 +55,7 @@ pub(super) fn trace_mesh(
     let size = [f64::from(camera.width), f64::from(camera.height)];
     fronts.find(mesh, placement);
     let lens = Lens::new(camera);
-    let mut tracer = Tracer { mesh, placement, vertices, open: true, lens, image, size, out };
+    let mut tracer = Extractor { mesh, placement, vertices, open: true, lens, image, size, out };
     // Through holes too small to be seen nothing is seen.
     let hole =
         |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
@@ -82,7 +82,7 @@ const LONGEST: f64 = 1.5;
 /// A segment's corners and ends, as in [`Origin`].
 type Segment = ([u32; 3], [[f64; 3]; 2]);
 
-struct Tracer<'a, F> {
+struct Extractor<'a, F> {
     mesh: &'a Mesh,
     placement: &'a Placement,
     vertices: &'a Vertices<'a>,
@@ -95,7 +95,7 @@ struct Tracer<'a, F> {
     out: F,
 }
 
-impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
+impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
     /// Pieces of some silhouettes.
     #[inline(always)]
     fn silhouettes(&mut self, batch: &silhouette::Batch, count: usize) {
@@ -148,7 +148,7 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
 
     /// A crease or boundary edge.
     fn edge(&mut self, vertices: [u32; 2], faces: [u32; 2]) {
-        let Tracer { mesh, placement, vertices: points, open, .. } = *self;
+        let Extractor { mesh, placement, vertices: points, open, .. } = *self;
         let [Some(from), Some(to)] = vertices.map(|v| mesh.positions.get(v as usize)) else {
             return;
         };

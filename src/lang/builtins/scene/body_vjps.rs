@@ -7,20 +7,20 @@ use super::objects::affine_adjoint;
 use super::{AffineValue, SolidValue};
 use crate::geom::armature::{Armature, JointGradient, Rules, Stretch};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Pulled};
+use crate::lang::builtins::{ArgAdjoints, Args};
 use crate::lang::value::Value;
 use glam::{DMat3, DVec3};
 use smallvec::smallvec;
 use std::sync::Arc;
 
 /// Of `scene.skin`. By the armature for poses of rotation vectors only.
-pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<Pulled> {
+pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let body = armature(a).ok()?;
     let by = BySolid::read(by, &posed.downcast::<SolidValue>()?.0);
-    let vertices = if by.vertices.is_empty() { Vec::new() } else { body.pull_parts(&by.vertices) };
+    let vertices = if by.vertices.is_empty() { Vec::new() } else { body.vjp_parts(&by.vertices) };
     let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool_or(3, false).ok()? };
     let pose = pose(a, body).ok()?;
-    if let Some(g) = body.pull_posed(&pose, &rules, &by.landmarks, &vertices).ok()? {
+    if let Some(g) = body.vjp_posed(&pose, &rules, &by.landmarks, &vertices).ok()? {
         let turned = |turn: DVec3| JointGradient { turn, ..JointGradient::default() };
         let by_pose = by_pose(a, body, &g.turns.into_iter().map(turned).collect::<Vec<_>>())?;
         return Some(smallvec![armature_adjoint(&g.rest), by_pose]);
@@ -79,21 +79,21 @@ fn by_joint(v: &Value, by: &JointGradient) -> Adjoint {
 }
 
 /// Of `scene.shaped`: offsets add up, so what was there moves as before.
-pub(super) fn shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+pub(super) fn shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let body = armature(a).ok()?;
     let Value::Record(amounts) = a.get(1) else { return None };
     let rest = by_armature(by, body);
-    let slope = |k: &Arc<str>| Some((Arc::clone(k), Adjoint::Num(body.pull_morph(k, &rest)?)));
+    let slope = |k: &Arc<str>| Some((Arc::clone(k), Adjoint::Num(body.vjp_morph(k, &rest)?)));
     let by_amounts = Adjoint::Record(amounts.keys().map(slope).collect::<Option<_>>()?);
-    Some(smallvec![by.clone(), by_amounts, Adjoint::Num(body.pull_cloth(&rest))])
+    Some(smallvec![by.clone(), by_amounts, Adjoint::Num(body.vjp_cloth(&rest))])
 }
 
 /// Of `scene.stretched`.
-pub(super) fn stretched(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+pub(super) fn stretched(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let body = armature(a).ok()?;
     let Value::Record(factors) = a.get(1) else { return None };
     let list = stretches(a, body).ok()?;
-    let (by_factor, rest) = body.pull_stretched(&list, &by_armature(by, body)).ok()?;
+    let (by_factor, rest) = body.vjp_stretched(&list, &by_armature(by, body)).ok()?;
     let mut by_factors = Vec::with_capacity(list.len());
     for (((name, v), (_, stretch)), g) in factors.iter().zip(&list).zip(by_factor) {
         let by = match stretch {

@@ -2,22 +2,22 @@
 //! the vertices.
 //!
 //! A piece moves as the points of the surface do that make its segment. That is exact for
-//! creases; smooth silhouettes also slide over faces that turn (`wander`), and contours
+//! creases; smooth silhouettes also slide over faces that turn (`silhouette_derivative`), and contours
 //! that pass behind others become longer or shorter there (`junctions`). Nothing is
 //! drawn: the pieces of the meshes are traced again, and those that were seen are told by
 //! their numbers.
 
+use super::extraction::{Origin, Room, extract_mesh};
 use super::junctions::{End, moved_ends};
 use super::project::{Lens, Placement, Projected};
-use super::trace::{Origin, Room, trace_mesh};
+use super::silhouette_derivative::{STEADY, SilhouetteDerivative};
 use super::visibility::Piece;
-use super::wander::{STEADY, Wander};
 use super::{Camera, Contours};
 use crate::geom::{Instance, Solid};
 use glam::DVec3;
 
 /// A piece of contour, hidden or not, and where it comes from.
-pub(super) struct Traced<'a> {
+pub(super) struct Extracted<'a> {
     pub piece: Piece,
     pub origin: Origin,
     /// What the ends of its segment lie on.
@@ -37,36 +37,36 @@ impl Contours {
     ///
     /// Normals are taken to turn as the faces around them do. Pieces that come and go by
     /// themselves are not followed.
-    pub fn pull(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
-        self.pull_with(solid, camera, by_piece, STEADY)
+    pub fn vjp(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
+        self.vjp_with(solid, camera, by_piece, STEADY)
     }
 
-    /// As [`Contours::pull`], with another angle than [`STEADY`].
-    pub(super) fn pull_with(
+    /// As [`Contours::vjp`], with another angle than [`STEADY`].
+    pub(super) fn vjp_with(
         &self,
         solid: &Solid,
         camera: &Camera,
         by_piece: &[[f64; 4]],
         steady: f64,
     ) -> Vec<DVec3> {
-        let mut traced = Vec::with_capacity(self.len() + self.len() / 4);
-        self.each(solid, camera, |t| traced.push(t));
-        let by_piece = moved_ends(&traced, camera, by_piece);
+        let mut extracted = Vec::with_capacity(self.len() + self.len() / 4);
+        self.each(solid, camera, |t| extracted.push(t));
+        let by_piece = moved_ends(&extracted, camera, by_piece);
         let mut out = vec![DVec3::ZERO; solid.vertex_count()];
-        let mut wander = Wander::new(out.len(), steady);
-        for t in &traced {
+        let mut silhouette_derivative = SilhouetteDerivative::new(out.len(), steady);
+        for t in &extracted {
             let Some(by) = t.seen.and_then(|i| by_piece.get(i)) else { continue };
             if let (Some(by_ends), Some(own)) = (by_ends(t, camera, by), out.get_mut(t.base..)) {
-                pull_ends(&t.origin, &by_ends, own);
-                wander.add(t.instance, camera, t.base, &t.origin, &by_ends, own);
+                vjp_ends(&t.origin, &by_ends, own);
+                silhouette_derivative.add(t.instance, camera, t.base, &t.origin, &by_ends, own);
             }
         }
-        wander.pull(solid, &mut out);
+        silhouette_derivative.vjp(solid, &mut out);
         out
     }
 
-    /// As [`Contours::pull`], with each piece held to its points of the surface.
-    pub(super) fn pull_fixed(
+    /// As [`Contours::vjp`], with each piece held to its points of the surface.
+    pub(super) fn vjp_fixed(
         &self,
         solid: &Solid,
         camera: &Camera,
@@ -78,14 +78,14 @@ impl Contours {
             if let (Some(by), Some(own)) =
                 (by.and_then(|by| by_ends(&t, camera, by)), out.get_mut(t.base..))
             {
-                pull_ends(&t.origin, &by, own);
+                vjp_ends(&t.origin, &by, own);
             }
         });
         out
     }
 
     /// Calls `f` for each piece in turn, hidden or not.
-    fn each<'a>(&self, solid: &'a Solid, camera: &Camera, mut f: impl FnMut(Traced<'a>)) {
+    fn each<'a>(&self, solid: &'a Solid, camera: &Camera, mut f: impl FnMut(Extracted<'a>)) {
         let (mut projected, mut room) = (Projected::default(), Room::default());
         let (mut next, mut base) = (0, 0);
         for instance in solid.instances() {
@@ -93,7 +93,7 @@ impl Contours {
             projected.clear();
             projected.add(&instance.mesh, &placement, &Lens::new(camera));
             let vertices = projected.mesh(0);
-            trace_mesh(
+            extract_mesh(
                 &instance.mesh,
                 &placement,
                 camera,
@@ -103,7 +103,7 @@ impl Contours {
                     let seen = self.is(next, &piece).then_some(next);
                     next += usize::from(seen.is_some());
                     let ends = End::both(origin, &vertices);
-                    f(Traced { piece, origin: *origin, ends, seen, instance, base });
+                    f(Extracted { piece, origin: *origin, ends, seen, instance, base });
                 },
             );
             base += vertices.len();
@@ -124,11 +124,11 @@ impl Contours {
 /// From the derivatives by a piece to those by the ends of its segment, in world
 /// coordinates.
 fn by_ends(
-    t: &Traced<'_>,
+    t: &Extracted<'_>,
     camera: &Camera,
     &[gx, gy, by_length, by_angle]: &[f64; 4],
 ) -> Option<[DVec3; 2]> {
-    let Traced { instance, origin, .. } = t;
+    let Extracted { instance, origin, .. } = t;
     let corners = origin.corners.map(|v| instance.mesh.positions.get(v as usize));
     let [Some(p), Some(q), Some(r)] = corners else { return None };
     let ends = origin.ends.map(|[a, b, c]| {
@@ -144,16 +144,15 @@ fn by_ends(
     let (tx, ty) = (dx / length, dy / length);
     let (stretch, turn) = (by_length * origin.share, by_angle / length);
     let along = [stretch * tx - turn * ty, stretch * ty + turn * tx];
-    let pull = |end: DVec3, share: f64, sign: f64| {
-        let g =
-            camera.pull_point(end, [share * gx + sign * along[0], share * gy + sign * along[1]]);
+    let vjp = |end: DVec3, share: f64, sign: f64| {
+        let g = camera.vjp_point(end, [share * gx + sign * along[0], share * gy + sign * along[1]]);
         if g.is_finite() { g } else { DVec3::ZERO }
     };
-    Some([pull(ends[0], 1.0 - origin.at, -1.0), pull(ends[1], origin.at, 1.0)])
+    Some([vjp(ends[0], 1.0 - origin.at, -1.0), vjp(ends[1], origin.at, 1.0)])
 }
 
 /// From the derivatives by the ends of a segment to those by the vertices that hold them.
-fn pull_ends(origin: &Origin, by_ends: &[DVec3; 2], out: &mut [DVec3]) {
+fn vjp_ends(origin: &Origin, by_ends: &[DVec3; 2], out: &mut [DVec3]) {
     for (g, shares) in by_ends.iter().zip(origin.ends) {
         for (v, share) in origin.corners.into_iter().zip(shares) {
             if let Some(place) = out.get_mut(v as usize) {
@@ -208,7 +207,7 @@ mod tests {
                 [1.0, 1.0, 1.0, f64::from(*length)].map(|by| by * (rng.next() - 0.5))
             };
             let by: Vec<[f64; 4]> = contours.length.iter().map(one).collect();
-            let found = contours.pull_fixed(&group, &camera, &by);
+            let found = contours.vjp_fixed(&group, &camera, &by);
             let mut origins = Vec::new();
             contours
                 .each(&group, &camera, |t| origins.extend(t.seen.map(|i| (i, t.base, t.origin))));

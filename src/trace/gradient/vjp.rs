@@ -8,8 +8,8 @@ use crate::lang::code::{DistSpec, Op, Operand};
 use crate::lang::value::Value;
 use crate::num::accumulate;
 use crate::trace::choices::Target;
-use crate::trace::demand::Failure;
 use crate::trace::node::*;
+use crate::trace::propagate::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
@@ -76,13 +76,13 @@ impl Reverse<'_> {
     }
 
     /// Passes an adjoint on.
-    pub(super) fn pull(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
+    pub(super) fn vjp(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
         match g.op(self.code, n) {
             Op::Prim { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
-                self.pull_builtin(n, builtin, args, by)?;
+                self.vjp_builtin(n, builtin, args, by)?;
             }
             Op::Array(items) => {
                 for (i, o) in items.iter().enumerate() {
@@ -116,8 +116,8 @@ impl Reverse<'_> {
                     self.give_part(source, i, by);
                 }
             }
-            Op::Gather => self.pull_gather(n, by)?,
-            Op::Call { .. } if self.pull_called(n, by)? => {}
+            Op::Gather => self.vjp_gather(n, by)?,
+            Op::Call { .. } if self.vjp_called(n, by)? => {}
             Op::Accumulator | Op::Call { .. } | Op::If { .. } | Op::Fold { .. } => {
                 match &self.inputs(n, false)[..] {
                     [one] => self.give_node(*one, by.clone()),
@@ -129,8 +129,8 @@ impl Reverse<'_> {
                     self.give(frame, o, by.clone());
                 }
             }
-            Op::Map { .. } => self.pull_mapped(n, by)?,
-            Op::Draw { dist, .. } => self.pull_realised(n, dist, by)?,
+            Op::Map { .. } => self.vjp_mapped(n, by)?,
+            Op::Draw { dist, .. } => self.vjp_noncentred(n, dist, by)?,
             _ => {}
         }
         Ok(())
@@ -206,7 +206,7 @@ impl Reverse<'_> {
         Some((source, rest))
     }
 
-    fn pull_gather(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
+    fn vjp_gather(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         if !matches!(self.graph.nodes[n as usize].side.as_deref(), Some(Side::Deps(_))) {
             return Ok(());
         }
@@ -243,7 +243,7 @@ impl Reverse<'_> {
     }
 
     /// A choice stored as white noise moves with its mean and covariance.
-    fn pull_realised(&mut self, n: NodeId, dist: &DistSpec, by: &Adjoint) -> Result<(), Failure> {
+    fn vjp_noncentred(&mut self, n: NodeId, dist: &DistSpec, by: &Adjoint) -> Result<(), Failure> {
         let Some(d) = self.graph.dist_of(self.code, n) else { return Ok(()) };
         let Some(size) = self.graph.stored(n).and_then(|z| z.len()) else { return Ok(()) };
         // value = mean + L z
@@ -256,7 +256,7 @@ impl Reverse<'_> {
 
     /// The part of a target's adjoint that goes to what moves its support or its
     /// realisation; changes nothing in its own.
-    pub(super) fn pull_support(
+    pub(super) fn vjp_support(
         &mut self,
         n: NodeId,
         targets: &[Target],
@@ -265,7 +265,7 @@ impl Reverse<'_> {
         let Op::Draw { dist: spec, .. } = self.graph.op(self.code, n) else { return Ok(()) };
         let Some(dist) = self.graph.dist_of(self.code, n) else { return Ok(()) };
         if dist.is_stored_whitened() {
-            return self.pull_realised(n, spec, by);
+            return self.vjp_noncentred(n, spec, by);
         }
         if !dist.has_moving_support() {
             return Ok(());

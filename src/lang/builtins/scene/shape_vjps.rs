@@ -4,9 +4,9 @@
 use super::SolidValue;
 use super::adjoints::{BySolid, shaped};
 use super::shapes::{Turned, turned, vector};
-use crate::geom::{Mesh, Profile, Solid, pull_cuboid, pull_lathe, pull_sphere};
+use crate::geom::{Mesh, Profile, Solid, vjp_cuboid, vjp_lathe, vjp_sphere};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Pulled};
+use crate::lang::builtins::{ArgAdjoints, Args};
 use crate::lang::value::Value;
 use glam::{DMat3, DVec3};
 use smallvec::smallvec;
@@ -21,10 +21,10 @@ fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> 
 }
 
 /// Of `scene.lathe`.
-pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
-    let Some((_, by_vertex)) = surface(made, by) else { return Some(Pulled::new()) };
+pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let Some((_, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
     let Turned { profiles, sides, wall, caps } = turned(a).ok()?;
-    let g = pull_lathe(&profiles, sides, wall, caps, &by_vertex).ok()?;
+    let g = vjp_lathe(&profiles, sides, wall, caps, &by_vertex).ok()?;
     let parts = match a.get(0) {
         Value::List(all) => {
             Adjoint::List(all.iter().zip(&g.profiles).map(|(v, g)| profile(v, g)).collect())
@@ -54,20 +54,20 @@ fn profile(v: &Value, by: &Profile) -> Adjoint {
 }
 
 /// Of `scene.sphere`.
-pub(super) fn sphere(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
-    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(Pulled::new()) };
-    Some(smallvec![Adjoint::Num(pull_sphere(a.num(0).ok()?, mesh, &by_vertex))])
+pub(super) fn sphere(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
+    Some(smallvec![Adjoint::Num(vjp_sphere(a.num(0).ok()?, mesh, &by_vertex))])
 }
 
 /// Of `scene.box`.
-pub(super) fn cuboid(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
-    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(Pulled::new()) };
-    let by_size = pull_cuboid(vector(a, 0, DVec3::ONE).ok()?, mesh, &by_vertex);
+pub(super) fn cuboid(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
+    let by_size = vjp_cuboid(vector(a, 0, DVec3::ONE).ok()?, mesh, &by_vertex);
     Some(smallvec![shaped(a.get(0), by_size)])
 }
 
 /// Of `scene.group`: what is one after the other goes to its members.
-pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let (mut landmarks, mut vertices) = (&landmarks[..], &vertices[..]);
     let next = |rest: &mut &[DVec3], n: usize| {
@@ -92,16 +92,16 @@ pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
 }
 
 /// Of `scene.centred`: the box goes with the vertices at its sides.
-pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let by = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let solid: &Solid = &a.object::<SolidValue>(0, "a solid").ok()?.0;
     let (vertices, landmarks) =
-        solid.pull_centred(a.bool_or(1, false).ok()?, &by.vertices, &by.landmarks);
+        solid.vjp_centred(a.bool_or(1, false).ok()?, &by.vertices, &by.landmarks);
     Some(smallvec![BySolid { landmarks, vertices }.into_adjoint()])
 }
 
 /// Of `scene.landmarks`.
-pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let own = a.record(1).ok()?.keys().zip(landmarks);
     let by_points =
@@ -113,7 +113,7 @@ pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> 
 }
 
 /// Of `scene.affine`, T Rz Ry Rx S.
-pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
     let by = by.numbers(12);
     let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));

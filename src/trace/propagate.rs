@@ -17,11 +17,11 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// What became of one attempt to evaluate a node.
-pub(crate) enum Step {
+pub(crate) enum Poll {
     /// It has its value.
-    Done,
+    Ready,
     /// It waits for the nodes it put on the stack.
-    Wait,
+    Pending,
 }
 
 /// A failure with its place.
@@ -30,7 +30,7 @@ pub(crate) type Failure = Box<RunError>;
 impl Graph {
     /// Finishes an update: runs new and stale effects, re-scores absorbing choices, drops
     /// what nothing holds.
-    pub fn settle(&mut self, code: &Code) -> Result<(), Failure> {
+    pub fn propagate(&mut self, code: &Code) -> Result<(), Failure> {
         loop {
             self.run_effects(code)?;
             // What one node lets go of a choice may take up, so choices come first, but
@@ -42,9 +42,11 @@ impl Graph {
                 }
                 continue;
             }
-            let doomed = if self.stale_choices.is_empty() { Vec::new() } else { self.doomed(code) };
+            let unreachable =
+                if self.stale_choices.is_empty() { Vec::new() } else { self.unreachable(code) };
             let stays = |n: &NodeId| {
-                self.nodes[*n as usize].state == State::Stale && doomed.binary_search(n).is_err()
+                self.nodes[*n as usize].state == State::Stale
+                    && unreachable.binary_search(n).is_err()
             };
             let next = self.stale_choices.iter().rposition(stays).filter(|_| self.idle.is_empty());
             match next {
@@ -56,20 +58,20 @@ impl Graph {
             }
         }
         self.sweep(code);
-        self.settle_choices(code)
+        self.update_selections(code)
     }
 
     /// What would be emptied if nothing took up again what was let go, in order.
-    fn doomed(&self, code: &Code) -> Vec<NodeId> {
+    fn unreachable(&self, code: &Code) -> Vec<NodeId> {
         let mut open = self.unheld.clone();
         open.retain(|n| self.nodes[*n as usize].refs == 0);
-        let (mut doomed, mut left) = (Vec::new(), FxHashMap::<NodeId, u32>::default());
+        let (mut unreachable, mut left) = (Vec::new(), FxHashMap::<NodeId, u32>::default());
         while let Some(n) = open.pop() {
             let node = &self.nodes[n as usize];
             if node.state == State::Empty {
                 continue;
             }
-            doomed.push(n);
+            unreachable.push(n);
             let mut release = |d: NodeId| {
                 let refs = left.entry(d).or_insert(self.nodes[d as usize].refs);
                 *refs = refs.saturating_sub(1);
@@ -88,8 +90,8 @@ impl Graph {
                     .for_each(|s| release(frame.base + s));
             }
         }
-        doomed.sort_unstable();
-        doomed
+        unreachable.sort_unstable();
+        unreachable
     }
 
     fn run_effects(&mut self, code: &Code) -> Result<(), Failure> {
@@ -129,18 +131,18 @@ impl Graph {
         }
         while let Some(owner) = owners.pop() {
             if self.nodes[owner as usize].state == State::Stale {
-                self.demand(code, owner)?;
+                self.evaluate(code, owner)?;
             }
             let below = owners.last().copied().unwrap_or(n);
             if !self.frames[self.nodes[below as usize].frame as usize].attached {
                 return Ok(());
             }
         }
-        self.demand(code, n)
+        self.evaluate(code, n)
     }
 
     /// Brings a node up to date.
-    pub fn demand(&mut self, code: &Code, root: NodeId) -> Result<(), Failure> {
+    pub fn evaluate(&mut self, code: &Code, root: NodeId) -> Result<(), Failure> {
         let bottom = self.stack.len();
         self.stack.push(root);
         self.run_stack(code, bottom)
@@ -166,8 +168,8 @@ impl Graph {
                 }
             }
             match self.count_operation(code, n).and_then(|()| self.step(code, n)) {
-                Ok(Step::Done) => {}
-                Ok(Step::Wait) => {}
+                Ok(Poll::Ready) => {}
+                Ok(Poll::Pending) => {}
                 Err(e) => {
                     self.failed.clear();
                     self.failed.extend(self.stack.drain(bottom..));
@@ -179,7 +181,7 @@ impl Graph {
     }
 
     /// Puts a node that is needed on the stack.
-    pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         if self.nodes[n as usize].state == State::Running {
             let message = match self.name_of(code, n) {
                 Some(name) => format!("`{name}` depends on its own value"),
@@ -188,29 +190,29 @@ impl Graph {
             return Err(self.fail(code, n, FaultKind::Cycle, message, None));
         }
         self.stack.push(n);
-        Ok(Step::Wait)
+        Ok(Poll::Pending)
     }
 
     /// Ends the evaluation of a node with a value.
-    pub fn finish(&mut self, code: &Code, n: NodeId, value: Value) -> Step {
+    pub fn finish(&mut self, code: &Code, n: NodeId, value: Value) -> Poll {
         let epoch = self.epoch;
         let node = &mut self.nodes[n as usize];
         if node.flags & WAS_STALE == 0 || !value.same(&node.value) {
             node.value = value;
             node.changed = epoch;
         }
-        self.settle_node(code, n)
+        self.finish_unchanged(code, n)
     }
 
     /// Ends the evaluation of a node with a value that it made, which counts towards the
     /// limits.
-    pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Step, Failure> {
+    pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Poll, Failure> {
         self.count_elements(code, n, &value)?;
         Ok(self.finish(code, n, value))
     }
 
     /// Ends the evaluation of a node whose value stays.
-    pub fn settle_node(&mut self, code: &Code, n: NodeId) -> Step {
+    pub fn finish_unchanged(&mut self, code: &Code, n: NodeId) -> Poll {
         let node = &mut self.nodes[n as usize];
         node.state = State::Clean;
         node.flags &= !WAS_STALE;
@@ -222,7 +224,7 @@ impl Graph {
                 self.acquire(d, n, outside);
             }
         }
-        Step::Done
+        Poll::Ready
     }
 
     /// Replaces what a node holds besides its operands.
@@ -279,7 +281,7 @@ impl Graph {
     }
 
     /// One attempt to evaluate a node.
-    fn step(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+    fn step(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         if self.nodes[n as usize].flags & WAS_STALE != 0 && self.incremental {
             let mut changed = false;
             let mut wait = NONE;
@@ -302,7 +304,7 @@ impl Graph {
                 let op = self.op(code, n);
                 let reads_more = matches!(op, Op::Item | Op::Accumulator | Op::Param { .. });
                 if !reads_more && self.nodes[n as usize].flags & TARGET == 0 {
-                    return Ok(self.settle_node(code, n));
+                    return Ok(self.finish_unchanged(code, n));
                 }
             }
         }
@@ -310,9 +312,9 @@ impl Graph {
     }
 
     /// One attempt at the operation of a node.
-    pub fn run(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
-        let step = self.evaluate(code, n)?;
-        if let (Step::Done, Some(log)) = (&step, &mut self.watched) {
+    pub fn run(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
+        let step = self.run_op(code, n)?;
+        if let (Poll::Ready, Some(log)) = (&step, &mut self.execution_log) {
             let f = &self.frames[self.nodes[n as usize].frame as usize];
             log.push((f.block, n - f.base));
         }

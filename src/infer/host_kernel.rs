@@ -1,8 +1,8 @@
 //! Kernels that a host brings: their calls in inference blocks, and what makes them.
 
 use super::build::{Built, build, without};
-use super::expr::{Scope as Env, evaluate};
-use super::kernel::{Kernel, Scope};
+use super::expr::{PlanEnv as Env, evaluate};
+use super::kernel::{Kernel, SiteSelection};
 use super::plain::Plain;
 use super::plan::RunOptions;
 use super::selection::{fail, fault, scope};
@@ -16,7 +16,7 @@ use crate::trace::Selector;
 /// The call of a host's kernel in an `infer` block, its arguments evaluated.
 pub struct KernelCall<'a> {
     args: Args<'a>,
-    scopes: Vec<Option<Scope>>,
+    scopes: Vec<Option<SiteSelection>>,
     kernels: Vec<Option<Box<dyn Kernel>>>,
 }
 
@@ -30,7 +30,7 @@ impl KernelCall<'_> {
     ///
     /// # Errors
     /// If it is no selection.
-    pub fn scope(&self, i: usize) -> Result<Scope, Fault> {
+    pub fn scope(&self, i: usize) -> Result<SiteSelection, Fault> {
         self.scopes
             .get(i)
             .cloned()
@@ -67,7 +67,7 @@ impl KernelMaker {
 ///
 /// # Errors
 /// What is wrong with it, at its place.
-pub(super) fn build_foreign(
+pub(super) fn build_host_kernel(
     e: &Expr,
     (builtin, maker): (&Builtin, &State),
     args: &[Arg],

@@ -10,8 +10,8 @@
 //! value proposed in it.
 
 use crate::dist::{Datum, Dist};
-use crate::infer::expr::{Scope, evaluate};
-use crate::infer::kernel::{At, Kernel, Outcome, accepts, recoverable, settle};
+use crate::infer::expr::{PlanEnv, evaluate};
+use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, accepts, recoverable};
 use crate::infer::selection::{address, fail};
 use crate::lang::code::Code;
 use crate::lang::value::Value;
@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 /// A kernel of the program, with its arguments.
 #[derive(Clone, Debug)]
-pub(crate) struct Own {
+pub(crate) struct ProgramKernel {
     code: Arc<Code>,
     pub(super) declared: KernelDecl,
     arguments: Vec<(Arc<str>, Value)>,
@@ -79,7 +79,7 @@ pub(super) enum Source<'a> {
     Moved(&'a [Value]),
 }
 
-impl Own {
+impl ProgramKernel {
     /// A declared kernel with the values of its parameters, in a chain that began at
     /// `started`.
     pub fn new(
@@ -88,7 +88,7 @@ impl Own {
         arguments: Vec<(Arc<str>, Value)>,
         started: Instant,
     ) -> Self {
-        Own { code, declared, arguments, started }
+        ProgramKernel { code, declared, arguments, started }
     }
 
     /// What the body proposes in a state; in a map, with values in place of those that
@@ -96,12 +96,12 @@ impl Own {
     pub(super) fn play(
         &self,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
         source: Source,
         moved: Option<&[(Address, Value)]>,
     ) -> TraceResult<Played> {
         let key = StreamKey::new(at.seed, at.chain, Purpose::PREDICT);
-        let draws = Draws { key, step: at.step, lane: at.part };
+        let draws = Draws { key, step: at.step, substream: at.part };
         let mut play =
             Play { own: self, draws, steps: at.step, source, moved, played: Played::default() };
         let mut variables = self.arguments.clone();
@@ -114,7 +114,7 @@ impl Own {
     fn way_back(
         &self,
         trace: &mut Trace,
-        at: &At,
+        at: &StepContext,
         all: &[Proposed],
         new: &[Option<Datum>],
         auxiliaries: &[Value],
@@ -133,7 +133,7 @@ impl Own {
     /// # Errors
     /// As [`Kernel::step`], and if the body has a map, which only leads from one state to
     /// another.
-    pub fn leap(&self, trace: &mut Trace, at: &At) -> TraceResult<Option<()>> {
+    pub fn leap(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Option<()>> {
         if maps(&self.declared.body) {
             let message =
                 "the kernel of a start must propose choices from distributions, not by a map";
@@ -151,7 +151,7 @@ impl Own {
 }
 
 struct Play<'a> {
-    own: &'a Own,
+    own: &'a ProgramKernel,
     draws: Draws,
     steps: u64,
     source: Source<'a>,
@@ -161,9 +161,9 @@ struct Play<'a> {
 
 impl Play<'_> {
     /// What expressions can see.
-    fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> Scope<'b> {
+    fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> PlanEnv<'b> {
         let (code, started) = (&self.own.code, self.own.started);
-        Scope {
+        PlanEnv {
             code,
             trace,
             variables,
@@ -397,12 +397,12 @@ pub(super) fn log_density(all: &[Proposed], values: &[Option<Datum>]) -> f64 {
     all.iter().zip(values).map(one).sum()
 }
 
-impl Kernel for Own {
+impl Kernel for ProgramKernel {
     fn name(&self) -> String {
         self.declared.name.node.to_string()
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         if maps(&self.declared.body) {
             return self.involve(trace, at);
         }
@@ -442,7 +442,7 @@ impl Kernel for Own {
         if w.appeared + w.vanished == 0
             && let Some(back) = self.way_back(trace, at, &forth.all, &new, &auxiliaries)
         {
-            return Ok(settle(trace, ratio(trace, Some(back)), &mut rng));
+            return Ok(accept_or_reject(trace, ratio(trace, Some(back)), &mut rng));
         }
         // The replay asks the new state, which must not be pending for that.
         let removed = trace.removed();

@@ -7,10 +7,10 @@
 //! would change structure, or is of a kind not handled here, is left to an update.
 
 use super::choices::Target;
-use super::demand::Failure;
 use super::eval::Score;
 use super::graph::Graph;
 use super::node::*;
+use super::propagate::Failure;
 use super::propose::Weight;
 use super::{Trace, TraceResult};
 use crate::dist::{Datum, Dist};
@@ -22,7 +22,7 @@ use smallvec::SmallVec;
 
 /// What depends on a choice: found once, good until the trace changes.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Peek {
+pub(crate) struct Enumeration {
     target: NodeId,
     /// Computations, with their values under the value being weighed, and those that only
     /// it asks for.
@@ -58,12 +58,12 @@ impl Trace {
     /// an update, each relative to the present state (that of the `current` one is 0),
     /// with the likelihood raised to a power; `None` for values that the program does not
     /// have. False if that takes updates, since structure depends on the choice.
-    pub(crate) fn weigh_values(
+    pub(crate) fn enumerate_conditional(
         &self,
         target: Target,
         dist: &Dist,
         (values, current): (&[Datum], usize),
-        peek: &mut Peek,
+        enumeration: &mut Enumeration,
         power: f64,
         mut weight: impl FnMut(Option<f64>),
     ) -> TraceResult<bool> {
@@ -71,25 +71,25 @@ impl Trace {
         if self.update.is_some() || target.element != NONE {
             return Ok(false);
         }
-        let formulas = g.formulas(&self.code, target.node);
+        let local_densities = g.local_densities(&self.code, target.node);
         let mut evaluation = g.evaluation(&self.code);
-        let mut peeked = false;
+        let mut enumerated = false;
         for (i, v) in values.iter().enumerate() {
             if i == current {
                 weight(Some(0.0));
                 continue;
             }
-            if let Some(f) = &formulas
+            if let Some(f) = &local_densities
                 && let Some(w) = evaluation.weigh(target.node, f, dist, v, power)
             {
                 weight(Some(w));
                 continue;
             }
-            if !peeked && !g.peek_at(&self.code, target.node, peek) {
+            if !enumerated && !g.enumerate_at(&self.code, target.node, enumeration) {
                 return Ok(false);
             }
-            peeked = true;
-            match g.peek(&self.code, peek, dist, v, power) {
+            enumerated = true;
+            match g.enumeration(&self.code, enumeration, dist, v, power) {
                 Ok(w) => weight(Some(w)),
                 Err(Obstacle::Fault(e)) if e.is_recoverable() => weight(None),
                 Err(_) => return Ok(false),
@@ -101,27 +101,27 @@ impl Trace {
 
 impl Graph {
     /// Finds what depends on a choice; false if its values must be weighed by updates.
-    pub fn peek_at(&self, code: &Code, target: NodeId, peek: &mut Peek) -> bool {
-        peek.target = target;
-        peek.values.clear();
-        peek.sinks.clear();
+    pub fn enumerate_at(&self, code: &Code, target: NodeId, enumeration: &mut Enumeration) -> bool {
+        enumeration.target = target;
+        enumeration.values.clear();
+        enumeration.sinks.clear();
         let finite = self.prior.is_fine() && self.likelihood.is_fine();
         if !self.incremental || !finite || !self.is_plain_choice(target) {
             return false;
         }
-        peek.stack.clear();
-        peek.stack.push(target);
-        while let Some(n) = peek.stack.pop() {
+        enumeration.stack.clear();
+        enumeration.stack.push(target);
+        while let Some(n) = enumeration.stack.pop() {
             let facts = self.slot_facts(code, n);
             if facts.is_result {
                 return false;
             }
             let outside = &self.outside[self.nodes[n as usize].outside as usize].users;
-            if outside.len() + peek.values.len() + peek.sinks.len() > MOST {
+            if outside.len() + enumeration.values.len() + enumeration.sinks.len() > MOST {
                 return false;
             }
             for m in facts.users.iter().map(|u| n - facts.slot + u).chain(outside.iter().copied()) {
-                if self.nodes[m as usize].state != State::Clean || peek.knows(m) {
+                if self.nodes[m as usize].state != State::Clean || enumeration.knows(m) {
                     continue;
                 }
                 match self.op(code, m) {
@@ -130,27 +130,28 @@ impl Graph {
                     | Op::Record { .. }
                     | Op::Index { .. }
                     | Op::Select { .. } => {
-                        peek.values.push((m, None));
-                        peek.stack.push(m);
+                        enumeration.values.push((m, None));
+                        enumeration.stack.push(m);
                     }
-                    Op::Observe { .. } | Op::Factor { .. } => peek.sinks.push(m),
+                    Op::Observe { .. } | Op::Factor { .. } => enumeration.sinks.push(m),
                     Op::Draw { dist: DistSpec::Family { .. }, .. } if self.is_plain_choice(m) => {
-                        peek.sinks.push(m)
+                        enumeration.sinks.push(m)
                     }
                     _ => return false,
                 }
             }
         }
-        peek.dependent = peek.values.len();
+        enumeration.dependent = enumeration.values.len();
         let keyed = |n: &NodeId| match self.op(code, *n) {
             Op::Draw { keys, .. } => {
                 let frame = self.nodes[*n as usize].frame;
-                keys.iter()
-                    .any(|k| self.resolve(frame, *k).is_some_and(|d| d == target || peek.knows(d)))
+                keys.iter().any(|k| {
+                    self.resolve(frame, *k).is_some_and(|d| d == target || enumeration.knows(d))
+                })
             }
             _ => false,
         };
-        !peek.sinks.iter().any(keyed)
+        !enumeration.sinks.iter().any(keyed)
     }
 
     /// A single number or truth value, stored as the program sees it.
@@ -165,28 +166,29 @@ impl Graph {
     }
 
     /// The log weight of a value of the choice, relative to the present one.
-    fn peek(
+    fn enumeration(
         &self,
         code: &Code,
-        peek: &mut Peek,
+        enumeration: &mut Enumeration,
         dist: &Dist,
         value: &Datum,
         power: f64,
     ) -> Result<f64, Obstacle> {
-        peek.values.truncate(peek.dependent);
-        peek.values.iter_mut().for_each(|(_, v)| *v = None);
-        peek.released.clear();
-        let target = peek.target;
+        enumeration.values.truncate(enumeration.dependent);
+        enumeration.values.iter_mut().for_each(|(_, v)| *v = None);
+        enumeration.released.clear();
+        let target = enumeration.target;
         let (mut prior, mut likelihood) = (ExactSum::default(), ExactSum::default());
         prior.sub(self.nodes[target as usize].score);
         prior.add(dist.log_density_stored(value));
         let value = Value::from_datum(value);
-        for i in 0..peek.sinks.len() {
-            let n = peek.sinks[i];
+        for i in 0..enumeration.sinks.len() {
+            let n = enumeration.sinks[i];
             let node = &self.nodes[n as usize];
             match self.op(code, n) {
                 Op::Draw { dist: spec, .. } => {
-                    let values = self.peek_all(code, peek, &value, node.frame, spec.operands())?;
+                    let values =
+                        self.values_of(code, enumeration, &value, node.frame, spec.operands())?;
                     let dist = self.dist_of_values(code, n, spec, &refs(&values))?;
                     let stored = self
                         .stored(n)
@@ -199,10 +201,13 @@ impl Graph {
                     prior.add(dist.log_density_stored(&stored));
                 }
                 Op::Observe { dist: spec, value: observed, .. } => {
-                    let values = self.peek_all(code, peek, &value, node.frame, spec.operands())?;
+                    let values =
+                        self.values_of(code, enumeration, &value, node.frame, spec.operands())?;
                     let observed = match self.replaced(code, n) {
                         Some(v) => v.clone(),
-                        None => self.peek_operand(code, peek, &value, node.frame, *observed)?,
+                        None => {
+                            self.value_of_operand(code, enumeration, &value, node.frame, *observed)?
+                        }
                     };
                     let score = self.score_of_values(code, n, spec, &refs(&values), &observed)?;
                     self.take_score(n, &mut likelihood);
@@ -212,7 +217,7 @@ impl Graph {
                     }
                 }
                 Op::Factor { weight, .. } => {
-                    match self.peek_operand(code, peek, &value, node.frame, *weight)? {
+                    match self.value_of_operand(code, enumeration, &value, node.frame, *weight)? {
                         Value::Num(w) if !w.is_nan() => {
                             likelihood.sub(node.score);
                             likelihood.add(w);
@@ -226,32 +231,32 @@ impl Graph {
         Ok(Weight::beside(&prior, &likelihood, power))
     }
 
-    fn peek_all(
+    fn values_of(
         &self,
         code: &Code,
-        peek: &mut Peek,
+        enumeration: &mut Enumeration,
         value: &Value,
         frame: FrameId,
         operands: &[Operand],
     ) -> Result<SmallVec<[Value; 4]>, Obstacle> {
         let mut values = SmallVec::new();
         for o in operands {
-            values.push(self.peek_operand(code, peek, value, frame, *o)?);
+            values.push(self.value_of_operand(code, enumeration, value, frame, *o)?);
         }
         Ok(values)
     }
 
-    fn peek_operand(
+    fn value_of_operand(
         &self,
         code: &Code,
-        peek: &mut Peek,
+        enumeration: &mut Enumeration,
         value: &Value,
         frame: FrameId,
         o: Operand,
     ) -> Result<Value, Obstacle> {
         let v = match self.resolve(frame, o) {
             None => self.value(code, frame, o).clone(),
-            Some(n) => self.peek_node(code, peek, value, n)?,
+            Some(n) => self.value_of_node(code, enumeration, value, n)?,
         };
         let Value::Container(r) = v else { return Ok(v) };
         let gather = &self.nodes[r.node as usize + 1];
@@ -263,50 +268,52 @@ impl Graph {
     }
 
     /// The value a node would have.
-    fn peek_node(
+    fn value_of_node(
         &self,
         code: &Code,
-        peek: &mut Peek,
+        enumeration: &mut Enumeration,
         value: &Value,
         n: NodeId,
     ) -> Result<Value, Obstacle> {
-        if n == peek.target {
+        if n == enumeration.target {
             return Ok(value.clone());
         }
         let node = &self.nodes[n as usize];
-        let place = peek.values.iter().position(|(m, _)| *m == n);
-        match place.map(|i| &peek.values[i].1) {
+        let place = enumeration.values.iter().position(|(m, _)| *m == n);
+        match place.map(|i| &enumeration.values[i].1) {
             Some(Some(v)) => return Ok(v.clone()),
             None if node.state == State::Clean => return Ok(node.value.clone()),
-            None if peek.values.len() > MOST => return Err(Obstacle::Unsuitable),
+            None if enumeration.values.len() > MOST => return Err(Obstacle::Unsuitable),
             _ => {}
         }
         let frame = node.frame;
         let v = match self.op(code, n) {
             Op::Prim { builtin, args } => {
-                let values = self.peek_all(code, peek, value, frame, args)?;
+                let values = self.values_of(code, enumeration, value, frame, args)?;
                 let made = self.apply_at(n, code.builtins.get(*builtin), &refs(&values));
                 made.map_err(|f| self.fault(code, n, f))?.into_value()
             }
-            Op::Array(items) => {
-                Value::from_elements(self.peek_all(code, peek, value, frame, items)?.into_vec())
-            }
+            Op::Array(items) => Value::from_elements(
+                self.values_of(code, enumeration, value, frame, items)?.into_vec(),
+            ),
             Op::Record { names, values } => {
-                let values = self.peek_all(code, peek, value, frame, values)?;
+                let values = self.values_of(code, enumeration, value, frame, values)?;
                 Value::Record(std::sync::Arc::new(names.iter().cloned().zip(values).collect()))
             }
-            Op::Index { base, keys } => self.peek_index(code, peek, value, n, *base, keys)?,
+            Op::Index { base, keys } => {
+                self.value_of_index(code, enumeration, value, n, *base, keys)?
+            }
             Op::Select { cond, then, otherwise } => {
-                let holds = match self.peek_operand(code, peek, value, frame, *cond)? {
+                let holds = match self.value_of_operand(code, enumeration, value, frame, *cond)? {
                     Value::Bool(b) => b,
                     _ => return Err(Obstacle::Unsuitable),
                 };
                 let (chosen, other) = if holds { (then, otherwise) } else { (otherwise, then) };
                 if node.state == State::Clean && holds != (node.flags & OTHERWISE == 0) {
-                    self.let_go(code, peek, frame, *other)?;
+                    self.let_go(code, enumeration, frame, *other)?;
                 }
                 match self.resolve(frame, *chosen) {
-                    Some(m) => self.peek_node(code, peek, value, m)?,
+                    Some(m) => self.value_of_node(code, enumeration, value, m)?,
                     None => self.value(code, frame, *chosen).clone(),
                 }
             }
@@ -314,16 +321,16 @@ impl Graph {
             _ => return Err(Obstacle::Unsuitable),
         };
         match place {
-            Some(i) => peek.values[i].1 = Some(v.clone()),
-            None => peek.values.push((n, Some(v.clone()))),
+            Some(i) => enumeration.values[i].1 = Some(v.clone()),
+            None => enumeration.values.push((n, Some(v.clone()))),
         }
         Ok(v)
     }
 
-    fn peek_index(
+    fn value_of_index(
         &self,
         code: &Code,
-        peek: &mut Peek,
+        enumeration: &mut Enumeration,
         value: &Value,
         n: NodeId,
         base: Operand,
@@ -331,26 +338,27 @@ impl Graph {
     ) -> Result<Value, Obstacle> {
         let frame = self.nodes[n as usize].frame;
         let whole = match self.resolve(frame, base) {
-            Some(b) => self.peek_node(code, peek, value, b)?,
+            Some(b) => self.value_of_node(code, enumeration, value, b)?,
             None => self.value(code, frame, base).clone(),
         };
         if let Value::Container(r) = whole {
             // The same element as before, if the keys are the same.
             let depends = |o: &Operand| {
-                self.resolve(frame, *o).is_some_and(|d| d == peek.target || peek.knows(d))
+                self.resolve(frame, *o)
+                    .is_some_and(|d| d == enumeration.target || enumeration.knows(d))
             };
             return match self.nodes[n as usize].side.as_deref() {
                 Some(Side::Deps(deps))
                     if deps.len() == 1 && deps[0] != r.node + 1 && !keys.iter().any(depends) =>
                 {
-                    self.peek_node(code, peek, value, deps[0])
+                    self.value_of_node(code, enumeration, value, deps[0])
                 }
                 _ => Err(Obstacle::Unsuitable),
             };
         }
         let mut v = whole;
         for k in keys {
-            let key = self.peek_operand(code, peek, value, frame, *k)?;
+            let key = self.value_of_operand(code, enumeration, value, frame, *k)?;
             v = index_value(&v, &key).map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?;
             if matches!(v, Value::Container(_)) {
                 return Err(Obstacle::Unsuitable);
@@ -364,19 +372,19 @@ impl Graph {
     fn let_go(
         &self,
         code: &Code,
-        peek: &mut Peek,
+        enumeration: &mut Enumeration,
         frame: FrameId,
         o: Operand,
     ) -> Result<(), Obstacle> {
         let mut gone: SmallVec<[NodeId; 8]> = self.resolve(frame, o).into_iter().collect();
         while let Some(n) = gone.pop() {
-            let times = match peek.released.iter_mut().find(|(m, _)| *m == n) {
+            let times = match enumeration.released.iter_mut().find(|(m, _)| *m == n) {
                 Some((_, times)) => {
                     *times += 1;
                     *times
                 }
                 None => {
-                    peek.released.push((n, 1));
+                    enumeration.released.push((n, 1));
                     1
                 }
             };
@@ -400,7 +408,7 @@ impl Graph {
     }
 }
 
-impl Peek {
+impl Enumeration {
     fn knows(&self, n: NodeId) -> bool {
         self.values.iter().any(|(m, _)| *m == n) || self.sinks.contains(&n)
     }
@@ -425,11 +433,18 @@ mod tests {
         let values = dist.support().finite_values().unwrap();
         let current = values.iter().position(|v| Some(v) == trace.stored(target).as_ref()).unwrap();
         for power in [1.0, 0.3] {
-            let (mut peek, mut weights) = (Peek::default(), Vec::new());
+            let (mut enumeration, mut weights) = (Enumeration::default(), Vec::new());
             let put = |w| weights.push(w);
             assert!(
                 trace
-                    .weigh_values(target, &dist, (&values, current), &mut peek, power, put)
+                    .enumerate_conditional(
+                        target,
+                        &dist,
+                        (&values, current),
+                        &mut enumeration,
+                        power,
+                        put
+                    )
                     .unwrap()
             );
             assert_eq!(weights.len(), 3);

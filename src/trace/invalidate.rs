@@ -2,7 +2,7 @@
 //!
 //! Marking follows users, not values, and stops at choices: an absorbing choice keeps its
 //! value whatever its distribution becomes, so only its density is in question (but for
-//! those that may have to be drawn anew). The second half ([`super::demand`]) re-runs
+//! those that may have to be drawn anew). The second half ([`super::propagate`]) re-runs
 //! marked nodes on demand and stops where values come out equal.
 
 use super::graph::Graph;
@@ -13,14 +13,14 @@ use crate::lang::value::Value;
 impl Graph {
     /// Marks a choice or observation that is about to change, and everything that reads
     /// it.
-    pub fn mark_target(&mut self, code: &Code, n: NodeId) {
+    pub fn invalidate_target(&mut self, code: &Code, n: NodeId) {
         self.make_stale(code, n);
-        self.mark_users(code, n);
-        self.mark_all(code);
+        self.invalidate_users(code, n);
+        self.invalidate_pending(code);
     }
 
     /// Marks every evaluated node (full re-execution).
-    pub fn mark_everything(&mut self, code: &Code) {
+    pub fn invalidate_everything(&mut self, code: &Code) {
         for n in 0..self.nodes.len() as NodeId {
             if self.nodes[n as usize].state == State::Clean {
                 self.make_stale(code, n);
@@ -29,33 +29,33 @@ impl Graph {
     }
 
     /// Marks what reads a choice from other frames.
-    pub fn mark_outside_users(&mut self, code: &Code, n: NodeId) {
-        self.mark_each_outside(code, n);
-        self.mark_all(code);
+    pub fn invalidate_outside_users(&mut self, code: &Code, n: NodeId) {
+        self.invalidate_each_outside(code, n);
+        self.invalidate_pending(code);
     }
 
-    fn mark_each_outside(&mut self, code: &Code, n: NodeId) {
+    fn invalidate_each_outside(&mut self, code: &Code, n: NodeId) {
         let list = self.nodes[n as usize].outside as usize;
         for i in 0..self.outside[list].users.len() {
             let user = self.outside[list].users[i];
-            self.mark(code, user);
+            self.invalidate(code, user);
         }
     }
 
     /// Works off the stack of nodes whose users are to be marked.
-    fn mark_all(&mut self, code: &Code) {
+    fn invalidate_pending(&mut self, code: &Code) {
         while let Some(n) = self.stack.pop() {
-            self.mark_users(code, n);
+            self.invalidate_users(code, n);
         }
     }
 
     /// Marks the users of a node; those that may pass a change on go to the stack.
-    fn mark_users(&mut self, code: &Code, n: NodeId) {
+    fn invalidate_users(&mut self, code: &Code, n: NodeId) {
         let facts = self.slot_facts(code, n);
         for user in &facts.users {
-            self.mark_static_user(code, n, n - facts.slot + user);
+            self.invalidate_static_user(code, n, n - facts.slot + user);
         }
-        self.mark_each_outside(code, n);
+        self.invalidate_each_outside(code, n);
         if !facts.is_result {
             return;
         }
@@ -63,8 +63,8 @@ impl Graph {
         let owner = self.frames[frame as usize].owner;
         if owner != NONE {
             match self.op(code, owner) {
-                Op::Call { .. } | Op::If { .. } => self.mark(code, owner),
-                Op::Fold { .. } => self.mark_next_pass(code, owner, frame),
+                Op::Call { .. } | Op::If { .. } => self.invalidate(code, owner),
+                Op::Fold { .. } => self.invalidate_next_pass(code, owner, frame),
                 _ => {}
             }
         }
@@ -72,28 +72,28 @@ impl Graph {
 
     /// Marks a user in the same frame. An argument's change goes to the parameter it
     /// feeds, past the call itself.
-    fn mark_static_user(&mut self, code: &Code, n: NodeId, user: NodeId) {
+    fn invalidate_static_user(&mut self, code: &Code, n: NodeId, user: NodeId) {
         let (callee, args) = match self.op(code, user) {
             Op::Call { callee, args, .. } => (callee, args),
             Op::Select { cond, then, otherwise } => {
                 let node = &self.nodes[user as usize];
                 let taken = if node.flags & OTHERWISE == 0 { then } else { otherwise };
                 if [cond, taken].iter().any(|o| self.resolve(node.frame, **o) == Some(n)) {
-                    self.mark(code, user);
+                    self.invalidate(code, user);
                 }
                 return;
             }
-            _ => return self.mark(code, user),
+            _ => return self.invalidate(code, user),
         };
         let Some(Side::Child(child)) = self.nodes[user as usize].side.as_deref() else {
-            return self.mark(code, user);
+            return self.invalidate(code, user);
         };
         let child = *child;
         let frame = self.nodes[user as usize].frame;
         if let Callee::Value(v) = callee
             && self.resolve(frame, *v) == Some(n)
         {
-            self.mark(code, user);
+            self.invalidate(code, user);
         }
         let base = self.frames[child.frame as usize].base;
         for (i, (_, a)) in args.iter().enumerate() {
@@ -106,27 +106,27 @@ impl Graph {
                 _ => None,
             };
             if let Some(p) = param {
-                self.mark(code, base + p as u32);
+                self.invalidate(code, base + p as u32);
             }
         }
     }
 
     /// Marks what reads the result of a pass of a `fold`: the next pass, or the fold
     /// itself.
-    fn mark_next_pass(&mut self, code: &Code, owner: NodeId, frame: FrameId) {
+    fn invalidate_next_pass(&mut self, code: &Code, owner: NodeId, frame: FrameId) {
         let pass = self.frames[frame as usize].pass as usize;
         let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else { return };
         match l.frames.get(pass + 1) {
             Some(next) if *next != NONE => {
                 let accumulator = self.frames[*next as usize].base;
-                self.mark(code, accumulator);
+                self.invalidate(code, accumulator);
             }
-            _ => self.mark(code, owner),
+            _ => self.invalidate(code, owner),
         }
     }
 
     /// Marks one node, if it is evaluated and not yet marked.
-    fn mark(&mut self, code: &Code, n: NodeId) {
+    fn invalidate(&mut self, code: &Code, n: NodeId) {
         let state = self.nodes[n as usize].state;
         if state != State::Clean {
             // A choice marked before its key was.
@@ -147,7 +147,7 @@ impl Graph {
             }
             Op::Observe { .. } | Op::Factor { .. } => {}
             Op::For { .. } | Op::Map { .. } | Op::Fold { .. } => {
-                self.mark_items(code, n);
+                self.invalidate_items(code, n);
                 self.stack.push(n);
             }
             _ => self.stack.push(n),
@@ -172,7 +172,7 @@ impl Graph {
     }
 
     /// Marks the elements of a loop's passes: what it runs over may have changed.
-    fn mark_items(&mut self, code: &Code, n: NodeId) {
+    fn invalidate_items(&mut self, code: &Code, n: NodeId) {
         let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref() else { return };
         let item = u32::from(matches!(self.op(code, n), Op::Fold { .. }));
         let passes = l.frames.len();
@@ -181,9 +181,9 @@ impl Graph {
             let f = l.frames[i];
             if f != NONE {
                 let base = self.frames[f as usize].base;
-                self.mark(code, base + item);
+                self.invalidate(code, base + item);
                 if item == 1 && i == 0 {
-                    self.mark(code, base);
+                    self.invalidate(code, base);
                 }
             }
         }

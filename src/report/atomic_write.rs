@@ -12,7 +12,7 @@ const PARTIAL: &str = ".partial";
 ///
 /// # Errors
 /// As the file system has it.
-pub fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
+pub fn write_atomically(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
     let partial = begin(folder, name, |f| f.write_all(bytes))?;
     partial.end().inspect_err(|_| {
         // The error that is told is the first one.
@@ -21,10 +21,10 @@ pub fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// A file under its other name.
-pub(super) struct Partial(PathBuf, PathBuf);
+pub(super) struct PartialFile(PathBuf, PathBuf);
 
 /// Writes a file of a folder under another name: it is at its place when it is
-/// [ended](Partial::end).
+/// [ended](PartialFile::end).
 ///
 /// # Errors
 /// If it cannot be written; nothing is left of it then.
@@ -32,7 +32,7 @@ pub(super) fn begin(
     folder: &Path,
     name: &str,
     write: impl FnOnce(&mut File) -> io::Result<()>,
-) -> io::Result<Partial> {
+) -> io::Result<PartialFile> {
     let (path, partial) = (folder.join(name), folder.join(format!(".{name}{PARTIAL}")));
     let written = File::create(&partial).and_then(|mut f| {
         write(&mut f)?;
@@ -40,7 +40,7 @@ pub(super) fn begin(
         f.sync_data()
     });
     match written {
-        Ok(()) => Ok(Partial(partial, path)),
+        Ok(()) => Ok(PartialFile(partial, path)),
         Err(e) => {
             let _ = std::fs::remove_file(&partial);
             Err(e)
@@ -48,7 +48,7 @@ pub(super) fn begin(
     }
 }
 
-impl Partial {
+impl PartialFile {
     /// Puts it at its place, with the permissions of an older file there.
     ///
     /// # Errors
@@ -67,10 +67,10 @@ impl Partial {
 /// If it cannot be written, or the path names no file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let name = path.file_name().and_then(|n| n.to_str()).ok_or(io::ErrorKind::InvalidInput)?;
-    write_whole(path.parent().unwrap_or(Path::new("")), name, bytes)
+    write_atomically(path.parent().unwrap_or(Path::new("")), name, bytes)
 }
 
-/// Whether a file is half of one, as [`write_whole`] names them.
+/// Whether a file is half of one, as [`write_atomically`] names them.
 pub(super) fn is_partial(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(PARTIAL)
 }

@@ -1,6 +1,6 @@
 //! How often observed edges pay: edges in one small cell of the picture and of like
 //! orientation form a group, whose positive scores are scaled down once the contour that
-//! claims them is longer than `credit` times the edges themselves. It scores nothing.
+//! claims them is longer than `match_capacity` times the edges themselves. It scores nothing.
 //! Invariant: exact integer sums per group, so the order of the claims has no influence,
 //! and every share is a continuous function of the claims.
 //!
@@ -22,17 +22,17 @@ const FIXED: f64 = (1u64 << 32) as f64;
 
 /// The groups of observed edges.
 #[derive(Debug, Clone)]
-pub(super) struct Capacity {
+pub(super) struct MatchCapacity {
     /// Group of every edge.
     group: Vec<u32>,
     /// The length each group pays for, in percent of the diagonal.
     limit: Vec<f64>,
 }
 
-impl Capacity {
+impl MatchCapacity {
     /// Groups edges; a cell is no smaller than a pixel of the frame (`pixel`, in grid
     /// units).
-    pub fn new(grid: &Edges, pixel: f32, credit: f64) -> Self {
+    pub fn new(grid: &Edges, pixel: f32, match_capacity: f64) -> Self {
         let side = (grid.width.max(grid.height) as f32 / CELLS).max(pixel);
         let mut numbers: FxHashMap<(u32, u32, u32), u32> = FxHashMap::default();
         let mut limit: Vec<f64> = Vec::new();
@@ -47,11 +47,11 @@ impl Capacity {
                 if id as usize == limit.len() {
                     limit.push(0.0);
                 }
-                limit[id as usize] += credit * f64::from(2.0 * e.half * grid.percent);
+                limit[id as usize] += match_capacity * f64::from(2.0 * e.half * grid.percent);
                 id
             })
             .collect();
-        Capacity { group, limit }
+        MatchCapacity { group, limit }
     }
 
     /// The group of an edge.
@@ -67,19 +67,19 @@ impl Capacity {
 
 /// What a group was asked for, and what it paid when that was settled last.
 #[derive(Debug, Clone, Copy, Default)]
-struct Claim {
+struct Assignment {
     length: i64,
     score: i64,
-    paid: i64,
+    matched: i64,
     /// Whether it was ever asked, and whether so since it was settled.
     known: bool,
     open: bool,
 }
 
 /// A state to come back to.
-pub(super) struct Mark {
+pub(super) struct Savepoint {
     known: usize,
-    paid: i64,
+    matched: i64,
     total: i64,
     length: i64,
 }
@@ -88,17 +88,17 @@ pub(super) struct Mark {
 /// evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
-    claims: Vec<Claim>,
+    assignments: Vec<Assignment>,
     /// Groups that were ever asked.
     known: Vec<u32>,
     /// Groups asked since the last settlement.
     open: Vec<u32>,
-    paid: i64,
+    matched: i64,
     /// Length times score of what no group pays for, and length.
     pub(super) total: i64,
     pub(super) length: i64,
     /// Claims as they were at the mark, and whether there is one.
-    log: Vec<(u32, Claim)>,
+    log: Vec<(u32, Assignment)>,
     marked: bool,
     /// The contours whose claims these are, if they have a name.
     pub(super) of: Option<Arc<()>>,
@@ -108,88 +108,94 @@ impl Scratch {
     /// Makes room for `groups`, all unclaimed.
     pub(super) fn begin(&mut self, groups: usize) {
         for id in self.known.drain(..) {
-            if let Some(claim) = self.claims.get_mut(id as usize) {
-                *claim = Claim::default();
+            if let Some(assign) = self.assignments.get_mut(id as usize) {
+                *assign = Assignment::default();
             }
         }
-        if self.claims.len() < groups {
-            self.claims.resize(groups, Claim::default());
+        if self.assignments.len() < groups {
+            self.assignments.resize(groups, Assignment::default());
         }
         self.open.clear();
-        (self.paid, self.total, self.length, self.of) = (0, 0, 0, None);
+        (self.matched, self.total, self.length, self.of) = (0, 0, 0, None);
     }
 
     /// Adds a claim (`sign` 1) or takes it back (-1): a length of contour in percent and
     /// the score (length times log ratio) it would bring.
     #[inline]
-    pub(super) fn claim(&mut self, group: u32, length: f64, score: f64, sign: i64) {
-        if let Some(claim) = self.claims.get_mut(group as usize) {
-            if !claim.open {
+    pub(super) fn assign(&mut self, group: u32, length: f64, score: f64, sign: i64) {
+        if let Some(assign) = self.assignments.get_mut(group as usize) {
+            if !assign.open {
                 if self.marked {
-                    self.log.push((group, *claim));
+                    self.log.push((group, *assign));
                 }
-                claim.open = true;
+                assign.open = true;
                 self.open.push(group);
-                if !claim.known {
-                    claim.known = true;
+                if !assign.known {
+                    assign.known = true;
                     self.known.push(group);
                 }
             }
-            claim.length = claim.length.saturating_add(sign * ((length * FIXED) as i64).max(1));
-            claim.score = claim.score.saturating_add(sign * (score * FIXED) as i64);
+            assign.length = assign.length.saturating_add(sign * ((length * FIXED) as i64).max(1));
+            assign.score = assign.score.saturating_add(sign * (score * FIXED) as i64);
         }
     }
 
     /// Marks a settled state to come back to.
-    pub(super) fn mark(&mut self) -> Mark {
+    pub(super) fn savepoint(&mut self) -> Savepoint {
         self.marked = true;
-        Mark { known: self.known.len(), paid: self.paid, total: self.total, length: self.length }
+        Savepoint {
+            known: self.known.len(),
+            matched: self.matched,
+            total: self.total,
+            length: self.length,
+        }
     }
 
     /// Goes back to a mark, once all is settled.
-    pub(super) fn restore(&mut self, mark: Mark) {
+    pub(super) fn restore(&mut self, savepoint: Savepoint) {
         for (group, before) in self.log.drain(..) {
-            if let Some(claim) = self.claims.get_mut(group as usize) {
-                *claim = before;
+            if let Some(assign) = self.assignments.get_mut(group as usize) {
+                *assign = before;
             }
         }
-        self.known.truncate(mark.known);
+        self.known.truncate(savepoint.known);
         self.marked = false;
-        (self.paid, self.total, self.length) = (mark.paid, mark.total, mark.length);
+        (self.matched, self.total, self.length) =
+            (savepoint.matched, savepoint.total, savepoint.length);
     }
 
     /// What a group pays for one more unit of length that would bring `score` for each.
-    pub(super) fn slope(&self, capacity: &Capacity, group: u32, score: f64) -> f64 {
-        let (Some(claim), Some(&limit)) =
-            (self.claims.get(group as usize), capacity.limit.get(group as usize))
+    pub(super) fn slope(&self, capacity: &MatchCapacity, group: u32, score: f64) -> f64 {
+        let (Some(assign), Some(&limit)) =
+            (self.assignments.get(group as usize), capacity.limit.get(group as usize))
         else {
             return 0.0;
         };
-        let length = claim.length as f64 / FIXED;
+        let length = assign.length as f64 / FIXED;
         if length > limit {
-            limit / length * (score - claim.score as f64 / FIXED / length)
+            limit / length * (score - assign.score as f64 / FIXED / length)
         } else {
             score
         }
     }
 
     /// The scores paid. Each group's is rounded to the fixed point before they are added.
-    pub(super) fn settle(&mut self, capacity: &Capacity) -> f64 {
+    pub(super) fn score_matches(&mut self, capacity: &MatchCapacity) -> f64 {
         for id in self.open.drain(..) {
-            let (Some(claim), Some(&limit)) =
-                (self.claims.get_mut(id as usize), capacity.limit.get(id as usize))
+            let (Some(assign), Some(&limit)) =
+                (self.assignments.get_mut(id as usize), capacity.limit.get(id as usize))
             else {
                 continue;
             };
             let limit = limit * FIXED;
-            let paid = if claim.length as f64 > limit {
-                (claim.score as f64 * (limit / claim.length as f64)) as i64
+            let matched = if assign.length as f64 > limit {
+                (assign.score as f64 * (limit / assign.length as f64)) as i64
             } else {
-                claim.score
+                assign.score
             };
-            self.paid = self.paid.saturating_add(paid - claim.paid);
-            (claim.paid, claim.open) = (paid, false);
+            self.matched = self.matched.saturating_add(matched - assign.matched);
+            (assign.matched, assign.open) = (matched, false);
         }
-        self.paid as f64 / FIXED
+        self.matched as f64 / FIXED
     }
 }

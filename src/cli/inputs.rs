@@ -1,6 +1,6 @@
 //! From the command line to a program with its data.
 
-use super::args::{Given, Job};
+use super::args::{Inputs, Job};
 use super::{Failure, files, plain};
 use image::DynamicImage;
 use pcadlang::Program;
@@ -13,8 +13,8 @@ use pcadlang::vision::ContourMap;
 use std::path::Path;
 
 /// Opens the program, with its parameters and camera.
-pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
-    let mut program = Program::open_allowing(&given.program, &given.allowed.allow_read)?;
+pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
+    let mut program = Program::open_allowing(&inputs.program, &inputs.allowed.allow_read)?;
     if !quiet {
         for path in
             program.embedded().iter().filter(|p| p.ends_with(".pcad") && !p.starts_with("std/"))
@@ -23,22 +23,22 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
         }
     }
     let limits =
-        given.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));
+        inputs.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));
     program = program.limits(limits.map_err(plain)?);
-    super::detect::choose(given.who.models.as_deref())?;
-    if let Some(n) = given.who.person {
+    super::detect::choose(inputs.who.models.as_deref())?;
+    if let Some(n) = inputs.who.person {
         program = program.set("person", &n.to_string());
     }
-    if let Some([x, y, w, h]) = given.who.near {
+    if let Some([x, y, w, h]) = inputs.who.near {
         program = program.set("near", &format!("[{x}, {y}, {w}, {h}]"));
     }
-    for (name, value) in &given.sets {
+    for (name, value) in &inputs.sets {
         program = program.set(name, value);
     }
-    if let Some(spec) = &given.edges {
+    if let Some(spec) = &inputs.edges {
         program = program.detector(super::edges::detector(spec)?);
     }
-    if let Some(path) = &given.camera {
+    if let Some(path) = &inputs.camera {
         let text = String::from_utf8(files::read(path)?)
             .map_err(|_| plain(format!("{}: not text", path.display())))?;
         let camera =

@@ -5,20 +5,20 @@
 //! choice is the same list in every state, and an update can go through it in order
 //! instead of marking and asking.
 
-use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, Spread};
+use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, StaticScaffold};
 use smallvec::SmallVec;
 
-/// The longest list worth keeping; a bit each in [`Spread::conditional`].
+/// The longest list worth keeping; a bit each in [`StaticScaffold::conditional`].
 const LONGEST: usize = u64::BITS as usize;
 
 /// The spread of the choice in slot `from` of a block, if it is the same in every state.
 /// `asked` are the slots that are always asked for.
-pub(super) fn spread(
+pub(super) fn scaffold(
     ops: &[Op],
     slots: &[SlotFacts],
     asked: &[bool],
     from: Slot,
-) -> Option<Spread> {
+) -> Option<StaticScaffold> {
     let order = dependents(ops, slots, from)?;
     // A keyed choice may turn into another one.
     if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty()))
@@ -31,7 +31,7 @@ pub(super) fn spread(
     let decides = |o: &Operand| matches!(o, Operand::Local(s) if *s == from || order.contains(s));
     let turns =
         order.iter().any(|s| matches!(&ops[*s as usize], Op::Select { cond, .. } if decides(cond)));
-    Some(Spread { slots: order.into(), is_closed, conditional, turns })
+    Some(StaticScaffold { slots: order.into(), is_closed, conditional, turns })
 }
 
 /// Which slots effects of their block ask for whatever conditions say.

@@ -1,11 +1,11 @@
-//! Marked pixels of an image, so kept that a rectangle without marks is quickly told.
+//! Marked pixels of an image, so kept that a rectangle without bitmap is quickly told.
 
 use super::Camera;
 use super::simd::vectorised;
 
 /// Marks at pixels. Reused from image to image.
 #[derive(Default)]
-pub(super) struct Marks {
+pub(super) struct PixelBitmap {
     /// A bit for each pixel, row by row, and one word more.
     words: Vec<u64>,
     /// For each pixel the side of the smallest square that holds a mark and has the pixel
@@ -16,7 +16,7 @@ pub(super) struct Marks {
     stride: usize,
     /// Some of a row, to read from while another is written.
     read: Vec<u8>,
-    /// The first and last columns and rows of marks; none if the first one is the larger.
+    /// The first and last columns and rows of bitmap; none if the first one is the larger.
     columns: [usize; 2],
     rows: [usize; 2],
     width: u32,
@@ -29,8 +29,8 @@ const WIDE: usize = 64;
 /// More than that.
 const FAR: u8 = SIDE as u8 + 1;
 
-impl Marks {
-    /// Removes all marks, for a camera's image.
+impl PixelBitmap {
+    /// Removes all bitmap, for a camera's image.
     pub fn clear(&mut self, camera: &Camera) {
         self.width = camera.width;
         self.stride = (camera.width as usize).next_multiple_of(WIDE) + WIDE;
@@ -56,9 +56,11 @@ impl Marks {
         }
     }
 
-    /// To be called when all marks are set, before rectangles are asked for.
-    pub fn settle(&mut self) {
-        let Marks { reach, stride, read, columns: [left, right], rows: [top, bottom], .. } = self;
+    /// To be called when all bitmap are set, before rectangles are asked for.
+    pub fn finish(&mut self) {
+        let PixelBitmap {
+            reach, stride, read, columns: [left, right], rows: [top, bottom], ..
+        } = self;
         if *top > *bottom {
             return;
         }
@@ -97,12 +99,12 @@ impl Marks {
         );
     }
 
-    /// All marks, 64 pixels at a time.
+    /// All bitmap, 64 pixels at a time.
     pub fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// The marks of some pixels in a row, at most 64, as bits.
+    /// The bitmap of some pixels in a row, at most 64, as bits.
     #[inline(always)]
     pub fn window(&self, from: usize, count: usize) -> u64 {
         let Some([low, high]) = self.words.get(from / 64..).and_then(|m| m.first_chunk()) else {
@@ -140,7 +142,7 @@ impl Marks {
             | near(at + across + down * self.stride)
     }
 
-    /// As [`Marks::hold`], for any rectangle, by squares of some side.
+    /// As [`PixelBitmap::hold`], for any rectangle, by squares of some side.
     #[inline(never)]
     fn hold_long(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2], side: usize) -> bool {
         (top..bottom).step_by(side).any(|y| {
@@ -160,29 +162,32 @@ mod tests {
 
     #[test]
     fn windows_are_runs_of_bits() {
-        let marks = Marks { words: vec![0x8000_0000_0000_0001u64, 0b1011, 0], ..Marks::default() };
-        assert_eq!(marks.window(0, 64), marks.words[0]);
-        assert_eq!(marks.window(0, 63), 1);
-        assert_eq!(marks.window(63, 5), 0b10111);
-        assert_eq!(marks.window(64, 2), 0b11);
-        assert_eq!(marks.window(65, 64), 0b101);
-        assert_eq!((marks.window(128, 8), marks.window(1 << 40, 8)), (0, 0));
+        let bitmap = PixelBitmap {
+            words: vec![0x8000_0000_0000_0001u64, 0b1011, 0],
+            ..PixelBitmap::default()
+        };
+        assert_eq!(bitmap.window(0, 64), bitmap.words[0]);
+        assert_eq!(bitmap.window(0, 63), 1);
+        assert_eq!(bitmap.window(63, 5), 0b10111);
+        assert_eq!(bitmap.window(64, 2), 0b11);
+        assert_eq!(bitmap.window(65, 64), 0b101);
+        assert_eq!((bitmap.window(128, 8), bitmap.window(1 << 40, 8)), (0, 0));
     }
 
     #[test]
     fn rectangles_that_hold_marks_are_told() {
         let mut random = Uniform(31);
-        let mut marks = Marks::default();
+        let mut bitmap = PixelBitmap::default();
         let mut held = 0;
         for (width, height) in [(1, 1), (7, 90), (128, 96), (200, 33)] {
             let camera = Camera::default_for(width, height);
             let mut below = |n: u32| (random.next() * f64::from(n)) as u32;
             for _ in 0..20 {
-                marks.clear(&camera);
+                bitmap.clear(&camera);
                 let set: Vec<u32> =
                     (0..1 + width * height / 300).map(|_| below(width * height)).collect();
-                set.iter().for_each(|pixel| marks.set(*pixel));
-                marks.settle();
+                set.iter().for_each(|pixel| bitmap.set(*pixel));
+                bitmap.finish();
                 for _ in 0..200 {
                     let [x, y] = [below(width), below(height)];
                     let most = [3, 9, 30, 200][below(4) as usize];
@@ -193,8 +198,8 @@ mod tests {
                     };
                     let wanted = set.iter().any(inside);
                     let extent = [[x, right], [y, bottom]].map(|ends| ends.map(|v| v as usize));
-                    assert_eq!(marks.hold(extent), wanted, "{extent:?} in {width} x {height}");
-                    assert!(!wanted || marks.may_hold(extent), "{extent:?} in {width} x {height}");
+                    assert_eq!(bitmap.hold(extent), wanted, "{extent:?} in {width} x {height}");
+                    assert!(!wanted || bitmap.may_hold(extent), "{extent:?} in {width} x {height}");
                     held += usize::from(wanted);
                 }
             }

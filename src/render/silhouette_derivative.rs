@@ -6,7 +6,7 @@
 //! across itself, too. Invariant: exact (but for `steady`) where the vertices move
 //! together as a rigid body.
 
-use super::trace::Origin;
+use super::extraction::Origin;
 use super::{Camera, Projection};
 use crate::geom::{Instance, Solid};
 use glam::{DMat3, DVec3};
@@ -17,7 +17,7 @@ use glam::{DMat3, DVec3};
 pub(super) const STEADY: f64 = 0.1;
 
 /// Derivatives by the turns of normals, until they are taken to the vertices.
-pub(super) struct Wander {
+pub(super) struct SilhouetteDerivative {
     /// By a turn of each vertex's normal about the axes, in world coordinates.
     turns: Vec<DVec3>,
     /// The square of [`STEADY`].
@@ -26,10 +26,10 @@ pub(super) struct Wander {
     normals: (usize, DMat3),
 }
 
-impl Wander {
+impl SilhouetteDerivative {
     /// Of a solid with so many vertices.
-    pub fn new(vertices: usize, steady: f64) -> Wander {
-        Wander {
+    pub fn new(vertices: usize, steady: f64) -> SilhouetteDerivative {
+        SilhouetteDerivative {
             turns: vec![DVec3::ZERO; vertices],
             steady: steady * steady,
             normals: (usize::MAX, DMat3::ZERO),
@@ -91,7 +91,7 @@ impl Wander {
 
     /// Adds to the derivatives by the vertices: a normal turns as the faces around it do,
     /// by their areas.
-    pub fn pull(&self, solid: &Solid, out: &mut [DVec3]) {
+    pub fn vjp(&self, solid: &Solid, out: &mut [DVec3]) {
         let mut base = 0;
         let mut faces = Vec::new();
         for instance in solid.instances() {
@@ -110,7 +110,7 @@ impl Wander {
                         .for_each(drop);
                     faces.push(face);
                 }
-                faces.iter().for_each(|face| face.pull(turns, &areas, out));
+                faces.iter().for_each(|face| face.vjp(turns, &areas, out));
             }
             base = past;
         }
@@ -148,7 +148,7 @@ impl Face {
 
     /// Takes its share of the derivatives by the turns of its corners' normals to the
     /// corners.
-    fn pull(&self, turns: &[DVec3], areas: &[f64], out: &mut [DVec3]) {
+    fn vjp(&self, turns: &[DVec3], areas: &[f64], out: &mut [DVec3]) {
         let by = |v: &u32| Some(*turns.get(*v as usize)? * (self.area / areas.get(*v as usize)?));
         let by: DVec3 = self.corners.iter().filter_map(by).sum();
         for (v, o) in self.corners.iter().zip(self.opposite) {
@@ -192,8 +192,8 @@ mod tests {
                 let contours = |solid: &Solid| Contours::of(solid, &camera);
                 let here = at([0.0; 7]);
                 let by = weighted(&contours(&here)).1;
-                let exact = contours(&here).pull_with(&here, &camera, &by, 0.0);
-                let fixed = contours(&here).pull_fixed(&here, &camera, &by);
+                let exact = contours(&here).vjp_with(&here, &camera, &by, 0.0);
+                let fixed = contours(&here).vjp_fixed(&here, &camera, &by);
                 let (mut wrong, mut without) = (0.0f64, 0.0f64);
                 for k in 0..7 {
                     let h = 2e-4;

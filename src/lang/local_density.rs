@@ -31,7 +31,7 @@ pub enum Source {
 /// A step of a formula.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
-pub enum Step {
+pub enum Instruction {
     /// Goes on at `to` if the slot is not evaluated: nothing asks for it.
     SkipUnasked { slot: Slot, to: u16 },
     /// Takes the value of the slot and goes on at `to`, if it is evaluated.
@@ -63,7 +63,7 @@ pub enum Step {
 
 /// Something that an alternative of a selection holds.
 #[derive(Clone, Copy, Debug)]
-pub struct Held {
+pub struct KeptAlternative {
     /// The selection.
     pub selection: Slot,
     /// Whether it is the first alternative.
@@ -76,9 +76,9 @@ pub struct Held {
 
 /// The scores of a block as a function of the value of one slot.
 #[derive(Clone, Debug, Default)]
-pub struct Formula {
+pub struct LocalDensity {
     /// What is done.
-    pub steps: Box<[Step]>,
+    pub instructions: Box<[Instruction]>,
     /// The computations that depend on the value; they must not be read from other
     /// blocks.
     pub computations: Box<[Slot]>,
@@ -87,27 +87,27 @@ pub struct Formula {
     pub results: Box<[(Slot, u8)]>,
     /// What the alternatives of its selections hold: who else holds it keeps it when a
     /// selection takes the other alternative.
-    pub held: Box<[Held]>,
+    pub held: Box<[KeptAlternative]>,
     /// The computations of the alternatives; they must hold nothing besides their
     /// operands.
     pub computed: Box<[Slot]>,
 }
 
-impl Formula {
+impl LocalDensity {
     /// The formula of a slot of a block, if there is one.
     pub(super) fn new(
         ops: &[Op],
         slots: &[SlotFacts],
         from: Slot,
         builtins: &Table,
-    ) -> Option<Formula> {
-        let dependents = super::spread::dependents(ops, slots, from)?;
+    ) -> Option<LocalDensity> {
+        let dependents = super::scaffold::dependents(ops, slots, from)?;
         let mut compiler = Compiler {
             ops,
             builtins,
             from,
             dependent: vec![false; ops.len()],
-            steps: Vec::new(),
+            instructions: Vec::new(),
             known: vec![None; ops.len()],
             registers: 1,
             inside: false,
@@ -122,12 +122,12 @@ impl Formula {
         let (scores, computations): (Vec<Slot>, Vec<Slot>) =
             dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
-        let Compiler { steps, results, mut held, computed, .. } = compiler;
+        let Compiler { instructions, results, mut held, computed, .. } = compiler;
         let operands: Vec<Operand> = held.iter().map(|h| h.operand).collect();
         held.iter_mut()
             .for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
-        Some(Formula {
-            steps: steps.into(),
+        Some(LocalDensity {
+            instructions: instructions.into(),
             computations: computations.into(),
             results: results.into(),
             held: held.into(),
@@ -142,7 +142,7 @@ struct Compiler<'a> {
     from: Slot,
     /// By slot: whether it depends on the value.
     dependent: Vec<bool>,
-    steps: Vec<Step>,
+    instructions: Vec<Instruction>,
     /// By slot: the register that has its value wherever the next step runs.
     known: Vec<Option<u8>>,
     registers: usize,
@@ -150,7 +150,7 @@ struct Compiler<'a> {
     /// evaluated.
     inside: bool,
     results: Vec<(Slot, u8)>,
-    held: Vec<Held>,
+    held: Vec<KeptAlternative>,
     computed: Vec<Slot>,
 }
 
@@ -158,22 +158,24 @@ impl Compiler<'_> {
     /// The steps that score a slot.
     fn score(&mut self, slot: Slot) -> Option<()> {
         let known = self.known.clone();
-        let skip = self.push(Step::SkipUnasked { slot, to: 0 })?;
-        let step = match &self.ops[slot as usize] {
+        let skip = self.push(Instruction::SkipUnasked { slot, to: 0 })?;
+        let instruction = match &self.ops[slot as usize] {
             Op::Draw { dist: DistSpec::Family { builtin, args }, keys, .. } => {
                 if keys.iter().any(|k| self.depends(*k)) {
                     return None;
                 }
-                Step::Draw { slot, builtin: *builtin, parameters: self.parameters(args)? }
+                Instruction::Draw { slot, builtin: *builtin, parameters: self.parameters(args)? }
             }
             Op::Observe { dist: DistSpec::Family { builtin, args }, value, .. } => {
                 let (parameters, value) = (self.parameters(args)?, self.source(*value)?);
-                Step::Observe { slot, builtin: *builtin, parameters, value }
+                Instruction::Observe { slot, builtin: *builtin, parameters, value }
             }
-            Op::Factor { weight, .. } => Step::Factor { slot, weight: self.source(*weight)? },
+            Op::Factor { weight, .. } => {
+                Instruction::Factor { slot, weight: self.source(*weight)? }
+            }
             _ => return None,
         };
-        self.push(step)?;
+        self.push(instruction)?;
         self.land(skip);
         // What was computed for it was not if it was skipped.
         self.known = known;
@@ -214,10 +216,10 @@ impl Compiler<'_> {
             return Some(Source::Operand(o));
         }
         let into = self.register()?;
-        let recall = self.push(Step::Recall { slot, into, to: 0 })?;
+        let recall = self.push(Instruction::Recall { slot, into, to: 0 })?;
         let known = self.known.clone();
         let r = self.compute(slot)?;
-        self.push(Step::Copy { from: Source::Register(r), into })?;
+        self.push(Instruction::Copy { from: Source::Register(r), into })?;
         self.known = known;
         self.land(recall);
         self.known[slot as usize] = Some(into);
@@ -241,20 +243,20 @@ impl Compiler<'_> {
                 let mut arg = |i: usize| self.source(*args.get(i)?);
                 let (x, y) = (arg(0)?, arg(1));
                 let into = self.register()?;
-                let step = match (self.builtins.get(*builtin).scalar?, y) {
-                    (Scalar::Unary(f), _) => Step::Unary { f, x, into },
-                    (Scalar::Logic(f), _) => Step::Logic { f, x, into },
-                    (Scalar::Binary(f), Some(y)) => Step::Binary { f, x, y, into },
-                    (Scalar::Test(f), Some(y)) => Step::Test { f, x, y, into },
+                let instruction = match (self.builtins.get(*builtin).scalar?, y) {
+                    (Scalar::Unary(f), _) => Instruction::Unary { f, x, into },
+                    (Scalar::Logic(f), _) => Instruction::Logic { f, x, into },
+                    (Scalar::Binary(f), Some(y)) => Instruction::Binary { f, x, y, into },
+                    (Scalar::Test(f), Some(y)) => Instruction::Test { f, x, y, into },
                     _ => return None,
                 };
-                self.push(step)?;
+                self.push(instruction)?;
                 Some(into)
             }
             Op::Index { base, keys } if keys.len() == 1 => {
                 let (base, key) = (self.source(*base)?, self.source(keys[0])?);
                 let into = self.register()?;
-                self.push(Step::Index { base, key, into })?;
+                self.push(Instruction::Index { base, key, into })?;
                 Some(into)
             }
             Op::Select { cond, then, otherwise } => {
@@ -262,9 +264,9 @@ impl Compiler<'_> {
                 let chosen = self.depends(cond);
                 let cond = self.source(cond)?;
                 let into = self.register()?;
-                let branch = self.push(Step::Branch { slot, cond, otherwise: 0 })?;
+                let branch = self.push(Instruction::Branch { slot, cond, otherwise: 0 })?;
                 self.alternative(then, into)?;
-                let go = self.push(Step::Go { to: 0 })?;
+                let go = self.push(Instruction::Go { to: 0 })?;
                 self.land(branch);
                 self.alternative(otherwise, into)?;
                 self.land(go);
@@ -281,7 +283,7 @@ impl Compiler<'_> {
     fn alternative(&mut self, o: Operand, into: u8) -> Option<()> {
         let (known, inside) = (self.known.clone(), std::mem::replace(&mut self.inside, true));
         let from = self.source(o)?;
-        self.push(Step::Copy { from, into })?;
+        self.push(Instruction::Copy { from, into })?;
         (self.known, self.inside) = (known, inside);
         Some(())
     }
@@ -294,7 +296,7 @@ impl Compiler<'_> {
             Operand::Outer { .. } => None,
         };
         let Some((slot, inner)) = inner else {
-            self.held.push(Held { selection, first, operand: o, times: 1 });
+            self.held.push(KeptAlternative { selection, first, operand: o, times: 1 });
             return (self.held.len() <= LONGEST).then_some(());
         };
         self.computed.push(slot);
@@ -322,18 +324,18 @@ impl Compiler<'_> {
         (self.registers <= REGISTERS).then(|| self.registers as u8 - 1)
     }
 
-    fn push(&mut self, step: Step) -> Option<usize> {
-        self.steps.push(step);
-        (self.steps.len() <= LONGEST).then(|| self.steps.len() - 1)
+    fn push(&mut self, instruction: Instruction) -> Option<usize> {
+        self.instructions.push(instruction);
+        (self.instructions.len() <= LONGEST).then(|| self.instructions.len() - 1)
     }
 
     /// Lets the jump at a step lead to the next one.
     fn land(&mut self, jump: usize) {
-        let here = self.steps.len() as u16;
-        if let Step::SkipUnasked { to, .. }
-        | Step::Recall { to, .. }
-        | Step::Go { to }
-        | Step::Branch { otherwise: to, .. } = &mut self.steps[jump]
+        let here = self.instructions.len() as u16;
+        if let Instruction::SkipUnasked { to, .. }
+        | Instruction::Recall { to, .. }
+        | Instruction::Go { to }
+        | Instruction::Branch { otherwise: to, .. } = &mut self.instructions[jump]
         {
             *to = here;
         }

@@ -1,9 +1,9 @@
-//! Weights of other values of a choice by formulas (see [`crate::lang::formula`]):
+//! Weights of other values of a choice by formulas (see [`crate::lang::local_density`]):
 //! nothing in the trace changes.
 //!
 //! The scores are computed by the same functions as in an update and quantised as there,
 //! so the weights are the same to the last bit. Whatever a formula does not cover makes
-//! it give up; then [`super::peek`] or an update decides.
+//! it give up; then [`super::enumeration`] or an update decides.
 
 use super::graph::Graph;
 use super::node::*;
@@ -11,14 +11,16 @@ use super::propose::Weight;
 use crate::dist::{Datum, Dist};
 use crate::lang::builtins::{Args, Builtin, Kind, Scalar};
 use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
-use crate::lang::formula::{Formula, Held, PARAMETERS, REGISTERS, Source, Step};
 use crate::lang::index::place;
+use crate::lang::local_density::{
+    Instruction, KeptAlternative, LocalDensity, PARAMETERS, REGISTERS, Source,
+};
 use crate::lang::value::Value;
 use crate::num::ExactSum;
 use smallvec::SmallVec;
 
 /// The formulas that tell what another value of a choice does.
-pub(crate) type Formulas<'c> = SmallVec<[Placed<'c>; 4]>;
+pub(crate) type LocalDensities<'c> = SmallVec<[Placed<'c>; 4]>;
 
 /// A formula in a frame.
 #[derive(Clone, Copy)]
@@ -28,7 +30,7 @@ pub(crate) struct Placed<'c> {
     /// The node that has the value: the choice, or an element of a container that is the
     /// choice.
     pub entry: NodeId,
-    pub formula: &'c Formula,
+    pub local_density: &'c LocalDensity,
 }
 
 /// The most other frames that may read the choice.
@@ -61,14 +63,27 @@ pub(crate) struct Evaluation<'a, const N: usize> {
 impl Graph {
     /// The formulas that together tell what another value of a choice does; `None` if
     /// there are none in this state.
-    pub fn formulas<'c>(&self, code: &'c Code, target: NodeId) -> Option<Formulas<'c>> {
+    pub fn local_densities<'c>(
+        &self,
+        code: &'c Code,
+        target: NodeId,
+    ) -> Option<LocalDensities<'c>> {
         let facts = self.slot_facts(code, target);
         let finite = self.prior.is_fine() && self.likelihood.is_fine();
-        if !self.incremental || !finite || self.watched.is_some() || !self.is_plain_choice(target) {
+        if !self.incremental
+            || !finite
+            || self.execution_log.is_some()
+            || !self.is_plain_choice(target)
+        {
             return None;
         }
-        let mut all = Formulas::new();
-        self.add_formula(target, target - facts.slot, facts.formula.as_deref()?, &mut all)?;
+        let mut all = LocalDensities::new();
+        self.add_local_density(
+            target,
+            target - facts.slot,
+            facts.local_density.as_deref()?,
+            &mut all,
+        )?;
         let readers = &self.outside[self.nodes[target as usize].outside as usize].users;
         if readers.len() > READERS {
             return None;
@@ -88,29 +103,29 @@ impl Graph {
             if self.is_read_outside(*m) {
                 return None;
             }
-            self.add_formula(*m, m - facts.slot, facts.formula.as_deref()?, &mut all)?;
+            self.add_local_density(*m, m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
         }
         Some(all)
     }
 
     /// Adds a formula, if it sees all that depends on its value.
-    fn add_formula<'c>(
+    fn add_local_density<'c>(
         &self,
         entry: NodeId,
         base: NodeId,
-        formula: &'c Formula,
-        all: &mut Formulas<'c>,
+        local_density: &'c LocalDensity,
+        all: &mut LocalDensities<'c>,
     ) -> Option<()> {
-        if formula.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
+        if local_density.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
             return None;
         }
         // Two in one frame could move the same score.
-        if !formula.steps.is_empty()
-            && all.iter().any(|p| p.base == base && !p.formula.steps.is_empty())
+        if !local_density.instructions.is_empty()
+            && all.iter().any(|p| p.base == base && !p.local_density.instructions.is_empty())
         {
             return None;
         }
-        all.push(Placed { base, entry, formula });
+        all.push(Placed { base, entry, local_density });
         Some(())
     }
 
@@ -142,7 +157,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
     pub fn weigh(
         &mut self,
         target: NodeId,
-        formulas: &Formulas,
+        local_densities: &LocalDensities,
         dist: &Dist,
         value: &Datum,
         power: f64,
@@ -150,7 +165,9 @@ impl<'a> Evaluation<'a, REGISTERS> {
         self.begin(Register::of_datum(value)?);
         self.prior.sub(self.graph.nodes[target as usize].score);
         self.prior.add(dist.log_density_stored(value));
-        formulas.iter().try_for_each(|placed| self.run(placed, formulas.len() == 1))?;
+        local_densities
+            .iter()
+            .try_for_each(|placed| self.run(placed, local_densities.len() == 1))?;
         Some(Weight::beside(&self.prior, &self.likelihood, power))
     }
 
@@ -165,42 +182,47 @@ impl<'a> Evaluation<'a, REGISTERS> {
 
     /// Runs a formula. `may_choose`: selections may take their other alternative.
     pub fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
-        let formula = placed.formula;
+        let local_density = placed.local_density;
         (self.base, self.filled) = (placed.base, 1);
         let mut next = 0;
-        while let Some(step) = formula.steps.get(next) {
+        while let Some(instruction) = local_density.instructions.get(next) {
             next += 1;
-            match *step {
-                Step::SkipUnasked { slot, to } => {
+            match *instruction {
+                Instruction::SkipUnasked { slot, to } => {
                     if self.node(slot).state != State::Clean {
                         next = to as usize;
                     }
                 }
-                Step::Recall { slot, into, to } => {
+                Instruction::Recall { slot, into, to } => {
                     let node = self.node(slot);
                     if node.state == State::Clean {
                         self.fill(into, Register::of(&node.value));
                         next = to as usize;
                     }
                 }
-                Step::Unary { f, x, into } => self.fill(into, Register::Num(f(self.number(x)?))),
-                Step::Binary { f, x, y, into } => {
+                Instruction::Unary { f, x, into } => {
+                    self.fill(into, Register::Num(f(self.number(x)?)))
+                }
+                Instruction::Binary { f, x, y, into } => {
                     self.fill(into, Register::Num(f(self.number(x)?, self.number(y)?)));
                 }
-                Step::Test { f, x, y, into } => {
+                Instruction::Test { f, x, y, into } => {
                     self.fill(into, Register::Bool(f(self.number(x)?, self.number(y)?)));
                 }
-                Step::Logic { f, x, into } => self.fill(into, Register::Bool(f(self.truth(x)?))),
-                Step::Index { base, key, into } => {
+                Instruction::Logic { f, x, into } => {
+                    self.fill(into, Register::Bool(f(self.truth(x)?)))
+                }
+                Instruction::Index { base, key, into } => {
                     self.fill(into, element(self.read(base)?, self.number(key)?)?);
                 }
-                Step::Branch { slot, cond, otherwise } => {
+                Instruction::Branch { slot, cond, otherwise } => {
                     let holds = self.truth(cond)?;
                     let node = self.node(slot);
                     let other =
                         node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
                     if other && !self.turned.contains(&(self.base + slot)) {
-                        if self.turned.is_empty() && !(may_choose && self.can_choose(formula)) {
+                        if self.turned.is_empty() && !(may_choose && self.can_choose(local_density))
+                        {
                             return None;
                         }
                         self.turned.push(self.base + slot);
@@ -209,9 +231,9 @@ impl<'a> Evaluation<'a, REGISTERS> {
                         next = otherwise as usize;
                     }
                 }
-                Step::Go { to } => next = to as usize,
-                Step::Copy { from, into } => self.fill(into, self.read(from)?),
-                Step::Draw { slot, builtin, ref parameters } => {
+                Instruction::Go { to } => next = to as usize,
+                Instruction::Copy { from, into } => self.fill(into, self.read(from)?),
+                Instruction::Draw { slot, builtin, ref parameters } => {
                     if !self.graph.is_plain_choice(self.base + slot) {
                         return None;
                     }
@@ -224,7 +246,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     self.prior.add(score);
                     self.scores.push((self.base + slot, score));
                 }
-                Step::Observe { slot, builtin, ref parameters, value } => {
+                Instruction::Observe { slot, builtin, ref parameters, value } => {
                     let n = self.base + slot;
                     let replaced = self.graph.replaced(self.code, n).map(Register::of);
                     let value = replaced.map_or_else(|| self.read(value), Some)?;
@@ -233,7 +255,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     self.likelihood.add(score);
                     self.scores.push((n, score));
                 }
-                Step::Factor { slot, weight } => {
+                Instruction::Factor { slot, weight } => {
                     let weight = self.number(weight).filter(|w| !w.is_nan())?;
                     self.likelihood.sub(self.node(slot).score);
                     self.likelihood.add(weight);
@@ -262,18 +284,18 @@ impl<'a> Evaluation<'a, REGISTERS> {
 
     /// Whether its selections can take their other alternatives without letting anything
     /// go but computations.
-    fn can_choose(&self, formula: &Formula) -> bool {
-        let is_taken = |h: &Held| {
+    fn can_choose(&self, local_density: &LocalDensity) -> bool {
+        let is_taken = |h: &KeptAlternative| {
             let node = self.node(h.selection);
             node.state == State::Clean && h.first == (node.flags & OTHERWISE == 0)
         };
-        let is_kept = |h: &Held| {
+        let is_kept = |h: &KeptAlternative| {
             let Some(n) = self.graph.resolve(self.frame(), h.operand) else { return true };
             let node = &self.graph.nodes[n as usize];
             if node.refs > h.times || !is_taken(h) {
                 return true;
             }
-            let now = formula
+            let now = local_density
                 .held
                 .iter()
                 .filter(|other| other.operand == h.operand && is_taken(other))
@@ -282,8 +304,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
             node.refs as usize > now || holds_nothing
         };
-        formula.computed.iter().all(|slot| self.node(*slot).side.is_none())
-            && formula.held.iter().all(is_kept)
+        local_density.computed.iter().all(|slot| self.node(*slot).side.is_none())
+            && local_density.held.iter().all(is_kept)
     }
 
     /// The log density of a single number or truth value.
@@ -448,5 +470,5 @@ fn element(base: Register, key: f64) -> Option<Register> {
 }
 
 #[cfg(test)]
-#[path = "formula_tests.rs"]
+#[path = "local_density_tests.rs"]
 mod tests;

@@ -7,7 +7,7 @@
 use super::Camera;
 use super::candidates::Candidates;
 use super::frame::depth_of;
-use super::marks::Marks;
+use super::pixel_bitmap::PixelBitmap;
 use super::project::{Lens, Placement, Projected};
 use super::raster::{Area, Wanted, empty, fill_mesh};
 use super::triangle::bits;
@@ -15,18 +15,18 @@ use crate::geom::Solid;
 
 /// Marked pixels of an image, and their depth. Reused from image to image.
 #[derive(Default)]
-pub(super) struct Looked {
-    marks: Marks,
+pub(super) struct SparseDepth {
+    bitmap: PixelBitmap,
     /// Nearness, then depth; of no meaning where there is no mark.
     depth: Vec<f32>,
     empty: f32,
     candidates: Candidates,
 }
 
-impl Looked {
-    /// Removes all marks.
+impl SparseDepth {
+    /// Removes all bitmap.
     pub fn clear(&mut self, camera: &Camera) {
-        self.marks.clear(camera);
+        self.bitmap.clear(camera);
         if self.depth.len() < camera.pixels() {
             self.depth.resize(camera.pixels(), 0.0);
         }
@@ -36,7 +36,7 @@ impl Looked {
     /// Marks a pixel.
     #[inline]
     pub fn mark(&mut self, pixel: u32) {
-        self.marks.set(pixel);
+        self.bitmap.set(pixel);
         if let Some(depth) = self.depth.get_mut(pixel as usize) {
             *depth = self.empty;
         }
@@ -45,8 +45,8 @@ impl Looked {
     /// Draws the solid at the marked pixels, and says what depth they have: entries of an
     /// image of which the others mean nothing.
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) -> &[f32] {
-        let Looked { marks, depth, candidates, .. } = self;
-        marks.settle();
+        let SparseDepth { bitmap, depth, candidates, .. } = self;
+        bitmap.finish();
         let depth = &mut depth[..camera.pixels()];
         let area = Area::whole(camera);
         for (i, item) in solid.instances().iter().enumerate() {
@@ -58,13 +58,13 @@ impl Looked {
                     camera,
                     &vertices,
                     candidates,
-                    (&area, Wanted::Marked(marks)),
+                    (&area, Wanted::Marked(bitmap)),
                     depth,
                 );
             }
         }
         let pinhole = Lens::new(camera).pinhole;
-        for (i, word) in marks.words().iter().enumerate() {
+        for (i, word) in bitmap.words().iter().enumerate() {
             for bit in bits(*word) {
                 let at = &mut depth[i * 64 + bit];
                 *at = depth_of(pinhole, *at);

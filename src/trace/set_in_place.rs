@@ -4,8 +4,8 @@
 
 use super::Trace;
 use super::choices::Target;
-use super::formula::Register;
 use super::graph::Graph;
+use super::local_density::Register;
 use super::node::*;
 use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, Op, Operand};
@@ -28,38 +28,40 @@ impl Trace {
     /// Gives a choice with this distribution another value for good, where that changes
     /// no structure and can be done in short; false, and nothing is done, otherwise: then
     /// an update does it.
-    pub(crate) fn assign(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
+    pub(crate) fn set_in_place(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
         self.update.is_none()
             && target.element == NONE
-            && self.graph.assign(&self.code, target.node, dist, value)
+            && self.graph.set_in_place(&self.code, target.node, dist, value)
     }
 }
 
 impl Graph {
-    /// See [`Trace::assign`].
-    fn assign(&mut self, code: &Code, target: NodeId, dist: &Dist, value: &Datum) -> bool {
-        let Some(formulas) = self.formulas(code, target) else { return false };
+    /// See [`Trace::set_in_place`].
+    fn set_in_place(&mut self, code: &Code, target: NodeId, dist: &Dist, value: &Datum) -> bool {
+        let Some(local_densities) = self.local_densities(code, target) else { return false };
         let Some(at) = Register::of_datum(value) else { return false };
         let mut following = Following::default();
         let mut e = self.evaluation(code);
         e.begin(at);
-        for placed in &formulas {
-            if e.run(placed, formulas.len() == 1).is_none() {
+        for placed in &local_densities {
+            if e.run(placed, local_densities.len() == 1).is_none() {
                 return false;
             }
             following.values.push((placed.entry, at.to_value()));
             if !e.turned.is_empty() {
-                for (slot, r) in placed.formula.results.iter().filter(|(_, r)| e.is_filled(*r)) {
+                for (slot, r) in
+                    placed.local_density.results.iter().filter(|(_, r)| e.is_filled(*r))
+                {
                     let n = placed.base + slot;
                     if self.nodes[n as usize].state == State::Empty {
                         following.fresh.push((n, e.register(*r).to_value()));
                     }
                 }
             }
-            for slot in &placed.formula.computations {
+            for slot in &placed.local_density.computations {
                 let n = placed.base + slot;
                 if self.nodes[n as usize].state == State::Clean {
-                    let mut results = placed.formula.results.iter();
+                    let mut results = placed.local_density.results.iter();
                     match results.find(|(s, r)| s == slot && e.is_filled(*r)) {
                         Some((_, r)) => following.values.push((n, e.register(*r).to_value())),
                         None => following.unasked.push(n),
@@ -163,7 +165,7 @@ impl Graph {
                     read.into_iter()
                         .try_for_each(|(r, outside)| self.take_up(code, r, d, outside, fresh))?;
                 }
-                None => self.demand(code, d).ok()?,
+                None => self.evaluate(code, d).ok()?,
             }
         }
         self.acquire(d, user, outside);

@@ -1,14 +1,14 @@
 //! A mesh that moves before a backdrop: its layer where it is, and where it was before.
 
-use super::still::Still;
+use super::static_layer::StaticLayer;
 use crate::geom::{Instance, Mesh};
 use crate::render::Camera;
 use crate::render::candidates::Candidates;
 use crate::render::contours::Contours;
+use crate::render::extraction::Room;
 use crate::render::layers::{Layer, Sight, affine_bits};
 use crate::render::project::{DepthRange, Projected};
 use crate::render::raster::Area;
-use crate::render::trace::Room;
 use crate::render::visibility::Depths;
 use std::sync::{Arc, Weak};
 
@@ -22,7 +22,7 @@ pub struct Tools {
 
 /// A layer and whose it is.
 #[derive(Default)]
-pub struct Own {
+pub struct PlacedLayer {
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     pub layer: Layer,
@@ -31,7 +31,7 @@ pub struct Own {
     settled: Option<Arc<()>>,
 }
 
-impl Own {
+impl PlacedLayer {
     /// Whether it may be looked at before something else, too.
     pub fn is_whole(&self) -> bool {
         self.settled.is_none()
@@ -40,17 +40,17 @@ impl Own {
 
 /// A mesh that has moved: its layer where it is, and where it was before.
 #[derive(Default)]
-pub struct Mover {
+pub struct DynamicMesh {
     pub leaf: usize,
-    pub now: Own,
-    before: Own,
+    pub now: PlacedLayer,
+    before: PlacedLayer,
     pub seen: Contours,
 }
 
-impl Mover {
+impl DynamicMesh {
     /// A mesh by its number, nowhere yet.
-    pub fn new(leaf: usize) -> Mover {
-        Mover { leaf, ..Mover::default() }
+    pub fn new(leaf: usize) -> DynamicMesh {
+        DynamicMesh { leaf, ..DynamicMesh::default() }
     }
 
     /// Its layer is that of the instance from here on. Nothing is drawn of one that this
@@ -61,16 +61,16 @@ impl Mover {
         instance: &Instance,
         camera: &Camera,
         tools: &mut Tools,
-        behind: Option<&Still>,
+        behind: Option<&StaticLayer>,
         only: bool,
     ) {
         let affine = affine_bits(&instance.affine);
-        let holds = |own: &Own| {
+        let holds = |own: &PlacedLayer| {
             own.settled
                 .as_ref()
                 .is_none_or(|known| only && behind.is_some_and(|b| Arc::ptr_eq(known, &b.settled)))
         };
-        let is_it = |own: &Own| {
+        let is_it = |own: &PlacedLayer| {
             holds(own)
                 && own.affine == affine
                 && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
@@ -85,13 +85,13 @@ impl Mover {
             let settled = &mut self.now.settled;
             *settled = None;
             let sight = |range: &DepthRange, area: &Area| {
-                let Some(still) = behind else { return Sight::Whole };
-                let sight = match still.hides(range, area, camera) {
+                let Some(static_layer) = behind else { return Sight::Whole };
+                let sight = match static_layer.hides(range, area, camera) {
                     true => Sight::Hidden,
-                    false if only => Sight::Before(&still.nearest),
+                    false if only => Sight::Before(&static_layer.nearest),
                     false => return Sight::Whole,
                 };
-                *settled = Some(Arc::clone(&still.settled));
+                *settled = Some(Arc::clone(&static_layer.settled));
                 sight
             };
             self.now.layer.draw(instance, camera, (projected, candidates), room, sight);
@@ -101,7 +101,7 @@ impl Mover {
     /// Tells which of its pieces are seen.
     pub fn look(&mut self, depths: &Depths<'_>) {
         self.seen.clear();
-        let Mover { now, seen, .. } = self;
+        let DynamicMesh { now, seen, .. } = self;
         now.layer
             .pieces
             .iter()

@@ -1,10 +1,10 @@
 //! What a host stands behind a built-in: closures, with what they have captured.
 //!
-//! The entry of the table has plain functions as any other ([`Foreign::entry`]); they
+//! The entry of the table has plain functions as any other ([`HostItem::entry`]); they
 //! find the closures at the built-in that their arguments name. So nothing that calls
 //! built-ins needs to know of hosts.
 
-use super::{Args, Builtin, Derivative, Kind, Pulled};
+use super::{ArgAdjoints, Args, Builtin, Derivative, Kind};
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
@@ -44,20 +44,20 @@ impl fmt::Debug for Before {
 
 /// A host's part of a built-in.
 #[derive(Clone)]
-pub enum Foreign {
+pub enum HostItem {
     /// A function.
     Function {
         /// The function.
         call: Arc<Function>,
         /// Its vector-Jacobian product.
-        pull: Option<Arc<Product>>,
+        vjp: Option<Arc<Product>>,
     },
     /// One that may start from an earlier evaluation.
     Incremental {
         /// The function.
         call: Arc<Incremental>,
         /// Its vector-Jacobian product.
-        pull: Option<Arc<Product>>,
+        vjp: Option<Arc<Product>>,
     },
     /// A family of distributions.
     Family(Arc<Make>),
@@ -67,21 +67,19 @@ pub enum Foreign {
     Kernel(State),
 }
 
-impl Foreign {
+impl HostItem {
     /// What the entry of the table is.
     pub fn entry(&self) -> (Kind, Derivative) {
-        let product = |pull: &Option<_>| match pull {
-            Some(_) => Derivative::Product(pull_foreign),
+        let product = |vjp: &Option<_>| match vjp {
+            Some(_) => Derivative::Product(vjp_host),
             None => Derivative::Unknown,
         };
         match self {
-            Foreign::Function { pull, .. } => (Kind::Function(call_foreign), product(pull)),
-            Foreign::Incremental { pull, .. } => (Kind::Function(call_foreign), product(pull)),
-            Foreign::Family(_) => (Kind::Distribution(make_foreign), Derivative::Unknown),
-            Foreign::Likelihood(_) => {
-                (Kind::Function(call_foreign), Derivative::Product(pull_foreign))
-            }
-            Foreign::Kernel(_) => (Kind::Inference, Derivative::Unknown),
+            HostItem::Function { vjp, .. } => (Kind::Function(call_host), product(vjp)),
+            HostItem::Incremental { vjp, .. } => (Kind::Function(call_host), product(vjp)),
+            HostItem::Family(_) => (Kind::Distribution(make_host_dist), Derivative::Unknown),
+            HostItem::Likelihood(_) => (Kind::Function(call_host), Derivative::Product(vjp_host)),
+            HostItem::Kernel(_) => (Kind::Inference, Derivative::Unknown),
         }
     }
 }
@@ -95,8 +93,8 @@ impl Builtin {
         values: &[&Value],
         before: Option<&Before>,
     ) -> Option<Result<Before, Fault>> {
-        match &self.foreign {
-            Some(Foreign::Incremental { call, .. }) => {
+        match &self.host {
+            Some(HostItem::Incremental { call, .. }) => {
                 Some(self.resume_with(&**call, values, before))
             }
             _ => None,
@@ -127,28 +125,28 @@ fn no_such(a: &Args) -> Fault {
     Fault::type_error(format!("`{}` cannot be called here", a.builtin.full_name()))
 }
 
-fn call_foreign(a: &Args) -> Result<Value, Fault> {
-    match &a.builtin.foreign {
-        Some(Foreign::Function { call, .. } | Foreign::Likelihood(call)) => call(a),
-        Some(Foreign::Incremental { call, .. }) => call(a, None).map(|(value, _)| value),
+fn call_host(a: &Args) -> Result<Value, Fault> {
+    match &a.builtin.host {
+        Some(HostItem::Function { call, .. } | HostItem::Likelihood(call)) => call(a),
+        Some(HostItem::Incremental { call, .. }) => call(a, None).map(|(value, _)| value),
         _ => Err(no_such(a)),
     }
 }
 
-fn make_foreign(a: &Args) -> Result<Dist, Fault> {
-    match &a.builtin.foreign {
-        Some(Foreign::Family(make)) => make(a),
+fn make_host_dist(a: &Args) -> Result<Dist, Fault> {
+    match &a.builtin.host {
+        Some(HostItem::Family(make)) => make(a),
         _ => Err(no_such(a)),
     }
 }
 
-fn pull_foreign(a: &Args, value: &Value, by: &Adjoint) -> Option<Pulled> {
-    match &a.builtin.foreign {
-        Some(Foreign::Function { pull, .. } | Foreign::Incremental { pull, .. }) => {
-            pull.as_ref()?(a, value, by).map(Pulled::from_vec)
+fn vjp_host(a: &Args, value: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    match &a.builtin.host {
+        Some(HostItem::Function { vjp, .. } | HostItem::Incremental { vjp, .. }) => {
+            vjp.as_ref()?(a, value, by).map(ArgAdjoints::from_vec)
         }
         // Its gradient is by its arguments already.
-        Some(Foreign::Likelihood(_)) => Some((0..a.values.len()).map(|i| by.element(i)).collect()),
+        Some(HostItem::Likelihood(_)) => Some((0..a.values.len()).map(|i| by.element(i)).collect()),
         _ => None,
     }
 }

@@ -18,7 +18,7 @@ const SHOWN: u8 = 0b100;
 
 /// What stands still.
 #[derive(Default)]
-pub struct Still {
+pub struct StaticLayer {
     pub depth: Vec<f32>,
     pub range: DepthRange,
     /// All pieces, with the number of their mesh.
@@ -47,13 +47,13 @@ pub struct Still {
     touched: Vec<u32>,
 }
 
-impl Still {
+impl StaticLayer {
     /// Nothing in a picture.
-    pub fn new(camera: &Camera) -> Still {
-        Still {
+    pub fn new(camera: &Camera) -> StaticLayer {
+        StaticLayer {
             depth: vec![f32::INFINITY; camera.pixels()],
             width: FIRST_WIDTH,
-            ..Still::default()
+            ..StaticLayer::default()
         }
     }
 
@@ -81,7 +81,7 @@ impl Still {
 
     /// Sorts the pieces for depth ranges about this one; for more of them if it has been
     /// done before.
-    pub fn settle(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
+    pub fn sort_pieces(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
         self.settled = Arc::default();
         self.width = if again { (2.0 * self.width).min(0.5) } else { self.width };
         self.extents = [extent * (1.0 - self.width), extent * (1.0 + self.width)];
@@ -156,7 +156,7 @@ impl Still {
         extents: [f64; 2],
         mut changed: impl FnMut(&Piece, bool),
     ) {
-        let Still { looks, start, state, touched, live, unsure, .. } = self;
+        let StaticLayer { looks, start, state, touched, live, unsure, .. } = self;
         touched.clear();
         let mut look = |glance: &Glance, pixel: usize| {
             let Some(state) = state.get_mut(glance.piece as usize) else { return };

@@ -37,11 +37,11 @@ impl Trace {
             return Ok(None);
         }
         let code = Arc::new(self.present_code().with_surrogates(&ops));
-        let (mut twin, _) =
+        let (mut surrogate, _) =
             Trace::generate(code, self.constraints(), Draws::default(), self.graph.limits.clone())?;
-        twin.graph.observed = Arc::clone(&self.graph.observed);
-        twin.graph.incremental = self.graph.incremental;
-        Ok(Some(twin))
+        surrogate.graph.observed = Arc::clone(&self.graph.observed);
+        surrogate.graph.incremental = self.graph.incremental;
+        Ok(Some(surrogate))
     }
 
     /// Proposes the values that another trace's choices have. Choices that the other one

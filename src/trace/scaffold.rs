@@ -1,5 +1,5 @@
 //! Updates of one choice whose change spreads through its own frame in a known order (see
-//! [`crate::lang::code::Spread`]).
+//! [`crate::lang::code::StaticScaffold`]).
 //!
 //! The general way marks all that may change and asks for it; here the list is known, so
 //! each entry runs at once if something it reads has changed. What is outside of the
@@ -8,24 +8,28 @@
 //! use for it. Both ways give the same values and the same exact sums.
 
 use super::choices::Target;
-use super::demand::{Failure, Step};
 use super::graph::Graph;
 use super::node::*;
+use super::propagate::{Failure, Poll};
 use super::propose::{Change, Pending};
-use crate::lang::code::{Code, Spread};
+use crate::lang::code::{Code, StaticScaffold};
 use crate::lang::value::Value;
 
 impl Graph {
     /// How the change of a choice spreads, if it can be updated this way in this state,
     /// and which of its slots run only if they are asked for, a bit each.
-    pub fn spread_of<'c>(&self, code: &'c Code, target: Target) -> Option<(&'c Spread, u64)> {
+    pub fn scaffold_of<'c>(
+        &self,
+        code: &'c Code,
+        target: Target,
+    ) -> Option<(&'c StaticScaffold, u64)> {
         let facts = self.slot_facts(code, target.node);
-        let spread = facts.spread.as_ref()?;
+        let scaffold = facts.scaffold.as_ref()?;
         if !self.incremental || self.nodes[target.node as usize].state != State::Clean {
             return None;
         }
         let mut leaves = self.is_read_outside(target.node);
-        for slot in &spread.slots {
+        for slot in &scaffold.slots {
             let m = target.node - facts.slot + slot;
             leaves |= self.is_read_outside(m);
             let node = &self.nodes[m as usize];
@@ -37,8 +41,8 @@ impl Graph {
         }
         // What is outside may come back to what reads from there: then only the general
         // way has the right order.
-        let conditional = if leaves || spread.turns { spread.conditional } else { 0 };
-        (spread.is_closed || !leaves).then_some((spread, conditional))
+        let conditional = if leaves || scaffold.turns { scaffold.conditional } else { 0 };
+        (scaffold.is_closed || !leaves).then_some((scaffold, conditional))
     }
 
     /// Whether nodes of other frames read this one.
@@ -48,12 +52,12 @@ impl Graph {
     }
 
     /// Changes a choice and updates what depends on it.
-    pub fn update_by_spread(
+    pub fn update_along_scaffold(
         &mut self,
         code: &Code,
         target: Target,
         change: &Change,
-        (spread, conditional): (&Spread, u64),
+        (scaffold, conditional): (&StaticScaffold, u64),
     ) -> Result<(), Failure> {
         let n = target.node;
         self.pending.push(Pending { node: n, element: target.element, change: change.clone() });
@@ -61,7 +65,7 @@ impl Graph {
         self.nodes[n as usize].flags |= TARGET;
         self.rerun(code, n)?;
         let base = n - self.slot_facts(code, n).slot;
-        for (i, slot) in spread.slots.iter().enumerate() {
+        for (i, slot) in scaffold.slots.iter().enumerate() {
             let m = base + slot;
             if self.nodes[m as usize].state == State::Clean && self.reads_changed(code, m) {
                 if conditional >> i & 1 == 0 {
@@ -71,14 +75,14 @@ impl Graph {
                 }
             }
         }
-        for m in std::iter::once(n).chain(spread.slots.iter().map(|slot| base + slot)) {
+        for m in std::iter::once(n).chain(scaffold.slots.iter().map(|slot| base + slot)) {
             let node = &self.nodes[m as usize];
             if (node.changed == self.epoch || node.state == State::Stale) && self.is_read_outside(m)
             {
-                self.mark_outside_users(code, m);
+                self.invalidate_outside_users(code, m);
             }
         }
-        self.settle(code)
+        self.propagate(code)
     }
 
     fn reads_changed(&self, code: &Code, n: NodeId) -> bool {
@@ -99,11 +103,11 @@ impl Graph {
         let bottom = self.stack.len();
         self.stack.push(n);
         match self.run(code, n) {
-            Ok(Step::Done) => {
+            Ok(Poll::Ready) => {
                 self.stack.truncate(bottom);
                 Ok(())
             }
-            Ok(Step::Wait) => self.run_stack(code, bottom),
+            Ok(Poll::Pending) => self.run_stack(code, bottom),
             Err(e) => {
                 self.stack.truncate(bottom);
                 Err(e)

@@ -28,10 +28,10 @@ fn compared(text: &str) -> [usize; 2] {
             let current = trace.stored(t);
             for value in values.into_iter().filter(|v| Some(v) != current.as_ref()) {
                 let by_formula = {
-                    let formulas = trace.graph.formulas(&trace.code, t.node);
+                    let local_densities = trace.graph.local_densities(&trace.code, t.node);
                     let mut evaluation = trace.graph.evaluation(&trace.code);
                     let mut weight = |power| {
-                        formulas
+                        local_densities
                             .as_ref()
                             .and_then(|f| evaluation.weigh(t.node, f, &dist, &value, power))
                     };
@@ -60,7 +60,7 @@ fn same_state(trace: &mut Trace, t: Target, dist: &Dist, value: &Datum) -> bool 
     updated.commit();
     trace.rollback();
     let mut assigned = trace.clone();
-    if !assigned.assign(t, dist, value) {
+    if !assigned.set_in_place(t, dist, value) {
         return false;
     }
     let state = |t: &Trace| {
