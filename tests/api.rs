@@ -45,7 +45,7 @@ const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/infer/callback.rs", &[], &["src/infer"]),
     (
         "src/infer/plan/mod.rs",
-        &["RunOptions", "Progress", "Callback", "ChainResult", "ChainError"],
+        &["RunOptions", "Progress", "ChainResult", "ChainError"],
         &["src/infer"],
     ),
     ("src/infer/plan/checkpoint.rs", &["Checkpoint"], &["src/infer"]),
