@@ -184,8 +184,8 @@ fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
 }
 
 /// Returns the groups, parents before children, and their parents. Parents follow the
-/// shortest paths from the root over contacts; a group without one attaches across the
-/// smallest gap.
+/// shortest paths from the root over contacts; groups that no contact reaches attach
+/// across the smallest gap.
 fn hang(
     groups: &[Group],
     contacts: &[Vec<Option<Contact>>],
