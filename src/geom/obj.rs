@@ -20,10 +20,10 @@ const MOST_CORNERS: usize = 1000;
 /// coordinate divides the others.
 ///
 /// # Errors
-/// [`GeomError::Invalid`], with the line number, if the file is not text, a line is
-/// malformed, a coordinate is not finite, a face uses a vertex that is not defined before
-/// it, or there are more than 65535 parts or five million triangles. Also if there are no
-/// faces, or none has positive area.
+/// [`GeomError::Invalid`] if the file is not text, has no faces, or none of them has
+/// positive area. With the line number, if a line is malformed, a coordinate is not
+/// finite, a face uses a vertex that is not defined before it, or there are more than
+/// 65535 parts or five million triangles.
 pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
     load_in(bytes, &FileFrame::default())
 }

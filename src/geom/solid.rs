@@ -135,7 +135,7 @@ fn ready<T: Send + Sync + 'static>(list: Arc<[T]>) -> Arc<Lazy<T>> {
 }
 
 impl Solid {
-    /// A solid of one mesh, at the origin.
+    /// A solid of one mesh, placed by the identity.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
         Solid::of(Arc::new([Instance {
             mesh,
