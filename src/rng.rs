@@ -253,8 +253,8 @@ mod tests {
 
     #[test]
     fn indices_below_large_numbers_are_even() {
-        // n is 3/8 of the range, so one draw in eight that is wrongly kept or rejected
-        // shows.
+        // n is 3/8 of the range, so wrongly kept or rejected draws are common enough to
+        // show.
         let n = 3usize << (usize::BITS - 3);
         let mut s = StreamKey::new(0, 0, Purpose::KERNEL).stream(2, 0, 0);
         let mut counts = [0u32; 3];

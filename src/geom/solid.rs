@@ -268,7 +268,7 @@ impl Solid {
     }
 
     /// The meshes in order, as the lists of the group's members. Each list has its own
-    /// part numbers, from 0.
+    /// part numbers.
     pub(crate) fn lists(&self) -> impl Iterator<Item = &Meshes> {
         self.group
             .as_ref()

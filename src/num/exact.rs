@@ -17,8 +17,8 @@ const SPAN: i32 = 40;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExactSum {
     fine: i128,
-    /// Limb `k` holds terms of magnitude 2^(40 k) to 2^(40 (k + 1)), in units of 2^(40 k
-    /// - 64); `None` while all terms are small.
+    /// Limb `k` holds terms of magnitude 2^(40 k) to 2^(40 (k + 1)), in units of
+    /// 2^(40 k - 64); `None` while all terms are small.
     coarse: Option<Box<[i128; LIMBS]>>,
     negative: i64,
     positive: i64,
@@ -59,8 +59,8 @@ impl ExactSum {
         self.coarse.is_none() && (self.negative | self.positive | self.nan) == 0
     }
 
-    /// Returns the [`ExactSum::difference`] of new[0] + new[1] - new[2] and old[0] +
-    /// old[1] - old[2].
+    /// Returns the [`ExactSum::difference`] of `new[0] + new[1] - new[2]` and
+    /// `old[0] + old[1] - old[2]`.
     pub fn balance(new: [&ExactSum; 3], old: [&ExactSum; 3]) -> f64 {
         if new.iter().chain(&old).all(|s| s.is_fine()) {
             let fine = (new[0].fine + new[1].fine - new[2].fine)

@@ -13,8 +13,8 @@ fn terms(a: f64) -> u32 {
     500 + (40.0 * a.sqrt()) as u32
 }
 
-/// The logarithms of the regularised incomplete gamma functions P(a, x) and Q(a, x) for a
-/// > 0: the power series for x below a + 1 (DLMF 8.7.1), and Legendre's continued
+/// The logarithms of the regularised incomplete gamma functions P(a, x) and Q(a, x) for
+/// a > 0: the power series for x below a + 1 (DLMF 8.7.1), and Legendre's continued
 /// fraction above (DLMF 8.9.2). `None` for a above 1e8, which would take too long.
 pub fn gamma_tails(a: f64, x: f64) -> Option<(f64, f64)> {
     if a.is_nan() || x.is_nan() || a <= 0.0 || a > LARGEST {

@@ -3,8 +3,9 @@
 
 use super::special::LN_SQRT_2PI;
 
-/// The error of Stirling's formula for ln Gamma(x), x > 0: ln Gamma(x) - ((x - 1/2) ln x
-/// - x + ln sqrt(2 pi)). For x = n it is also the error for ln n!.
+/// The error of Stirling's formula for ln Gamma(x), x > 0:
+/// ln Gamma(x) - ((x - 1/2) ln x - x + ln sqrt(2 pi)). For x = n it is also the error for
+/// ln n!.
 pub fn stirling_error(x: f64) -> f64 {
     if x < 10.0 {
         return libm::lgamma(x) - ((x - 0.5) * libm::log(x) - x + LN_SQRT_2PI);

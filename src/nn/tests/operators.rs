@@ -124,8 +124,8 @@ fn depthwise_convolutions() {
     }
 }
 
-/// A transposed convolution is the adjoint of the convolution with the same window: <C x,
-/// y> = <x, C' y>.
+/// A transposed convolution is the adjoint of the convolution with the same window:
+/// `<C x, y> = <x, C' y>`.
 #[test]
 fn transposed_convolutions() {
     for (size, stride) in [([2, 2], [2, 2]), ([3, 3], [2, 2]), ([4, 3], [2, 1])] {
