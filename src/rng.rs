@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use pcadlang::rng::{Purpose, Stream, StreamKey};
-//! // Seed, chain and purpose; then a step, a site, and which of several alternatives: the same place, the same numbers.
+//! // Seed, chain, purpose; then step, site, lane: equal positions give equal numbers.
 //! let key = StreamKey::new(1, 0, Purpose::KERNEL);
 //! let (mut a, mut b): (Stream, Stream) = (key.stream(7, 0, 0), key.stream(7, 0, 0));
 //! assert_eq!(a.next_u64(), b.next_u64());

@@ -2,10 +2,10 @@
 //!
 //! The outside is on the right of the path: it goes up along an outer wall, and inwards
 //! over a top. It is cut into smooth strips; between strips the surface has a crease
-//! unless a strip says otherwise. Topology depends only on the numbers of points and is
-//! shared between surfaces with the same numbers, so a new profile costs only positions
-//! and normals. Invariant: the mesh does not depend on whether its topology was in the
-//! cache.
+//! unless a strip says otherwise. Topology depends only on discrete data, such as the
+//! numbers of points, and is shared between surfaces that agree in them, so a new profile
+//! costs only positions and normals. Invariant: the mesh does not depend on whether its
+//! topology was in the cache.
 
 use super::edges::pair_edges;
 use super::real::Real;

@@ -64,7 +64,8 @@ pub(super) fn curves(grid: &Grid) -> Vec<Node> {
             cover(grid, *i, &mut covered);
         }
         // Near the tip the path leaves the middle for the surface: drop it up to the last
-        // cell whose ball contains the cap's centroid; from there the curve runs straight.
+        // cell whose ball contains the cap's centroid; from there the curve runs
+        // straight.
         let beside = way
             .iter()
             .rposition(|i| (grid.middle(*i) - cap).length() <= grid.clearance(*i) * grid.cell());
