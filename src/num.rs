@@ -1,5 +1,5 @@
-//! Arithmetic that densities rest on: exact sums, stable functions in log space, a hash.
-//! All through `libm`, so that results are the same on every platform.
+//! Numerics for densities: exact sums, functions that are stable in log space, a hash.
+//! All through `libm`, so results are the same on every platform.
 
 mod column;
 mod exact;
@@ -23,7 +23,7 @@ pub use special::{
 };
 pub use tails::{bessel_deficit, log_scaled_i0, mills_ratio};
 
-/// Adds numbers to those of a list, which becomes as long as they are.
+/// Adds `more` to `all` element by element, extending `all` with zeros if it is shorter.
 pub(crate) fn accumulate(all: &mut Vec<f64>, more: &[f64]) {
     if all.len() < more.len() {
         all.resize(more.len(), 0.0);

@@ -1,13 +1,13 @@
 //! Counter-based random streams: Philox4x64-10 (Salmon, Moraes, Dror & Shaw 2011,
 //! "Parallel random numbers: as easy as 1, 2, 3").
 //!
-//! A stream is a function of a key (seed, chain, purpose) and a place (step, site, lane).
-//! Nothing is carried from one to the next, so the order in which numbers are asked for,
-//! and the number of threads, change nothing.
+//! A stream is a function of a key (seed, chain, purpose) and a position (step, site,
+//! lane). There is no other state, so results do not depend on the order of requests or
+//! on the number of threads.
 //!
 //! ```
 //! use pcadlang::rng::{Purpose, Stream, StreamKey};
-//! // Seed, chain and purpose; then a step, a site, and which of several alternatives: the same place, the same numbers.
+//! // Seed, chain, purpose; then step, site, lane: equal positions give equal numbers.
 //! let key = StreamKey::new(1, 0, Purpose::KERNEL);
 //! let (mut a, mut b): (Stream, Stream) = (key.stream(7, 0, 0), key.stream(7, 0, 0));
 //! assert_eq!(a.next_u64(), b.next_u64());
@@ -19,30 +19,30 @@
 use rand::TryRng;
 use std::convert::Infallible;
 
-/// What a stream's numbers are for; streams of different purposes are independent.
+/// The purpose of a stream's numbers; streams of different purposes are independent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Purpose(pub u32);
 
 impl Purpose {
     /// Values of choices inside a trace.
     pub const VALUES: Purpose = Purpose(1);
-    /// A kernel's own decisions.
+    /// Decisions of kernels.
     pub const KERNEL: Purpose = Purpose(2);
     /// Starts of chains.
     pub const START: Purpose = Purpose(3);
-    /// Predictions and whatever else is drawn only to be looked at.
+    /// Predictions, and other draws that do not affect a chain.
     pub const PREDICT: Purpose = Purpose(4);
-    /// Which kernel of a mixture is next.
+    /// The selection of kernels in a mixture.
     pub const MIX: Purpose = Purpose(5);
-    /// Which members of a population go on.
+    /// Resampling of a population.
     pub const POPULATION: Purpose = Purpose(6);
-    /// States drawn from the prior to simulate data from.
+    /// Draws from the prior as ground truth for simulated data.
     pub const TRUTH: Purpose = Purpose(7);
-    /// Observations drawn anew.
+    /// Replicated observations.
     pub const REPLICATE: Purpose = Purpose(8);
 }
 
-/// The part of a stream's identity that stays the same through a run.
+/// The part of a stream's identity that is constant during a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct StreamKey {
     seed: u64,
@@ -50,13 +50,13 @@ pub struct StreamKey {
 }
 
 impl StreamKey {
-    /// The key of a chain's streams for a purpose.
+    /// Makes the key of a chain's streams for a purpose.
     pub fn new(seed: u64, chain: u32, purpose: Purpose) -> Self {
         StreamKey { seed, chain_and_purpose: u64::from(chain) << 32 | u64::from(purpose.0) }
     }
 
-    /// The stream of a place: a step, a site (the hash of an address), and a lane to tell
-    /// alternatives apart. Costs nothing until the first number is asked for.
+    /// Returns the stream of a step, a site (the hash of an address), and a lane that
+    /// distinguishes alternatives. No numbers are generated until the first request.
     pub fn stream(&self, step: u64, site: u64, substream: u64) -> Stream {
         Stream {
             key: [self.seed, self.chain_and_purpose],
@@ -98,7 +98,7 @@ fn philox(mut counter: [u64; 4], mut key: [u64; 2]) -> [u64; 4] {
 }
 
 impl Stream {
-    /// The next 64 bits.
+    /// Returns the next 64 bits.
     #[inline]
     pub fn next_u64(&mut self) -> u64 {
         if self.used == 4 {
@@ -111,25 +111,25 @@ impl Stream {
         x
     }
 
-    /// A number in [0, 1), a multiple of 2^-53.
+    /// Samples a number in [0, 1), a multiple of 2^-53.
     #[inline]
     pub fn uniform(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// A number in (0, 1).
+    /// Samples a number in (0, 1).
     #[inline]
     pub fn open_uniform(&mut self) -> f64 {
         ((self.next_u64() >> 12) as f64 + 0.5) * (1.0 / (1u64 << 52) as f64)
     }
 
-    /// A standard normal number.
+    /// Samples a standard normal number.
     #[inline]
     pub fn standard_normal(&mut self) -> f64 {
         self.sample(rand_distr::StandardNormal)
     }
 
-    /// An index below `n` without bias (Lemire 2019); 0 for n = 0.
+    /// Samples an index below `n` without bias (Lemire 2019); 0 for n = 0.
     #[inline]
     pub fn index(&mut self, n: usize) -> usize {
         let n = n as u64;
@@ -143,9 +143,9 @@ impl Stream {
         (product >> 64) as usize
     }
 
-    /// The place of one of these weights, with probability in proportion to it; `total`
-    /// is their sum, and weights of 0 are never chosen but for the last where there is
-    /// nothing else.
+    /// Samples an index with probability proportional to its weight; `total` is the sum
+    /// of the weights. An index of weight 0 is never chosen, except the last one if all
+    /// weights are 0.
     #[inline]
     pub fn weighted(&mut self, weights: &[f64], total: f64) -> usize {
         let (mut u, mut last) = (self.uniform() * total, weights.len().saturating_sub(1));
@@ -159,7 +159,7 @@ impl Stream {
         last
     }
 
-    /// A draw from one of `rand_distr`'s distributions.
+    /// Samples from one of `rand_distr`'s distributions.
     pub fn sample<T>(&mut self, d: impl rand_distr::Distribution<T>) -> T {
         d.sample(self)
     }
@@ -253,7 +253,8 @@ mod tests {
 
     #[test]
     fn indices_below_large_numbers_are_even() {
-        // Of 3/8 of all numbers: every eighth draw that is wrongly kept or dropped shows.
+        // n is 3/8 of the range, so wrongly kept or rejected draws are common enough to
+        // show.
         let n = 3usize << (usize::BITS - 3);
         let mut s = StreamKey::new(0, 0, Purpose::KERNEL).stream(2, 0, 0);
         let mut counts = [0u32; 3];
@@ -263,7 +264,7 @@ mod tests {
 
     #[test]
     fn weights_of_zero_are_never_chosen() {
-        // Half of the products with the least of all doubles are rounded up to it: past
+        // Half of the products with the smallest positive double round up to it, beyond
         // every weight.
         let (tiny, mut s) =
             (f64::from_bits(1), StreamKey::new(0, 0, Purpose::KERNEL).stream(1, 0, 0));
@@ -284,7 +285,7 @@ mod tests {
 
     #[test]
     fn normal_draws_are_golden() {
-        // A change of rand_distr that changes draws must be noticed.
+        // Detects changes of `rand_distr` that change draws.
         let mut s = StreamKey::new(42, 0, Purpose::VALUES).stream(0, 0, 0);
         let bits: Vec<u64> = (0..4).map(|_| s.standard_normal().to_bits()).collect();
         assert_eq!(bits, GOLDEN, "{bits:#x?}");

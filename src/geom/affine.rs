@@ -1,22 +1,21 @@
-//! Placements: affine maps of the world. They neither check their numbers nor know what
-//! they place.
+//! Affine maps that place solids in the world. Arguments are not checked.
 //!
 //! Invariant: the same arguments give the same bits on every machine (sines and cosines
-//! are `libm`'s).
+//! come from `libm`).
 
 use glam::{DAffine3, DMat3, DVec3};
 use std::ops::Mul;
 
-/// An affine map p' = T Rz Ry Rx S p (Kulkarni et al. 2014, section 2.1.1, in that
-/// order).
+/// An affine map p' = T Rz Ry Rx S p, in the order of Kulkarni et al. 2014, section
+/// 2.1.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine(pub DAffine3);
 
 impl Affine {
-    /// The map that changes nothing.
+    /// The identity.
     pub const IDENTITY: Affine = Affine(DAffine3::IDENTITY);
 
-    /// Scales along the axes, then turns round x, y and z (radians), then shifts.
+    /// Scales along the axes, then rotates about x, y and z (radians), then translates.
     pub fn new(translate: DVec3, rotate: DVec3, scale: DVec3) -> Affine {
         let axis = |angle: f64| (libm::sin(angle), libm::cos(angle));
         let ((sx, cx), (sy, cy), (sz, cz)) = (axis(rotate.x), axis(rotate.y), axis(rotate.z));
@@ -30,15 +29,15 @@ impl Affine {
         })
     }
 
-    /// The image of a point.
+    /// Returns the image of a point.
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.0.matrix3 * p + self.0.translation
     }
 
-    /// What takes normals along: the cofactor matrix times the sign of the determinant,
-    /// which is the inverse transpose times the size of the determinant. Outward normals
-    /// stay outward also when the map mirrors, and it exists when the map is singular.
-    /// Its results are not unit vectors.
+    /// Returns the matrix that transforms normals: the cofactor matrix times the sign of
+    /// the determinant, which is the inverse transpose times the absolute determinant.
+    /// Outward normals stay outward even if the map mirrors, and the matrix exists even
+    /// if the map is singular. The resulting normals are not unit vectors.
     pub fn normal_matrix(&self) -> DMat3 {
         let m = self.0.matrix3;
         let cofactor = DMat3::from_cols(
@@ -49,14 +48,14 @@ impl Affine {
         if self.is_mirrored() { -1.0 * cofactor } else { cofactor }
     }
 
-    /// Whether it turns left hands into right ones.
+    /// Whether the map changes handedness.
     pub fn is_mirrored(&self) -> bool {
         self.0.matrix3.determinant() < 0.0
     }
 
-    /// No line gets longer than by this factor: the greatest stretch, exact where the
-    /// axes of a scale stay at right angles, else an upper bound (Gershgorin's, for the
-    /// square of the linear part).
+    /// Returns an upper bound on the factor by which the map lengthens any line. It is
+    /// exact where a scale's axes stay perpendicular; otherwise it is Gershgorin's bound
+    /// on the squared linear part.
     pub fn stretch(&self) -> f64 {
         let m = self.0.matrix3;
         let square = (m.transpose() * m).to_cols_array_2d();
@@ -67,13 +66,13 @@ impl Affine {
             .sqrt()
     }
 
-    /// The map that undoes it, if there is one.
+    /// Returns the inverse map, if it exists.
     pub fn inverse(&self) -> Option<Affine> {
         let d = self.0.matrix3.determinant();
         (d != 0.0 && d.is_finite()).then(|| Affine(self.0.inverse())).filter(Affine::is_finite)
     }
 
-    /// Whether all its numbers are finite.
+    /// Whether all components are finite.
     pub fn is_finite(&self) -> bool {
         self.0.is_finite()
     }
@@ -82,7 +81,7 @@ impl Affine {
 impl Mul for Affine {
     type Output = Affine;
 
-    /// First the right one, then the left one.
+    /// Composes two maps; the right one applies first.
     fn mul(self, other: Affine) -> Affine {
         Affine(self.0 * other.0)
     }
@@ -113,8 +112,8 @@ mod tests {
             DVec3::new(quarter, 0.0, quarter),
             DVec3::new(2.0, 3.0, 4.0),
         );
-        // (1, 1, 1) is scaled to (2, 3, 4), turned round x to (2, -4, 3), round z to (4,
-        // 2, 3), shifted to (5, 4, 6).
+        // (1, 1, 1) is scaled to (2, 3, 4), rotated about x to (2, -4, 3), about z to (4,
+        // 2, 3), and translated to (5, 4, 6).
         assert!((a.point(DVec3::ONE) - DVec3::new(5.0, 4.0, 6.0)).length() < 1e-14);
         let rotation = DVec3::new(0.3, -0.7, 1.1);
         let m = Affine::new(DVec3::ZERO, rotation, DVec3::ONE).0.matrix3;
@@ -182,7 +181,7 @@ mod tests {
             let expected = a.0.matrix3.determinant().abs() * a.0.matrix3.inverse().transpose();
             assert!((a.normal_matrix() - expected).to_cols_array().iter().all(|x| x.abs() < 1e-14));
         }
-        // Squashed into the plane y = 0, whose normal remains.
+        // Flattened into the plane y = 0, whose normal remains.
         let flat = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(2.0, 0.0, 3.0));
         assert_eq!(flat.normal_matrix() * DVec3::Y, DVec3::Y * 6.0);
         assert_eq!(flat.normal_matrix() * DVec3::X, DVec3::ZERO);

@@ -5,14 +5,14 @@ use glam::DVec3;
 /// An axis-aligned box, both corners included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// The corner with the least coordinates.
+    /// The corner with the smallest coordinates.
     pub min: DVec3,
-    /// The corner with the greatest.
+    /// The corner with the largest coordinates.
     pub max: DVec3,
 }
 
 impl Bounds {
-    /// The smallest box around some points; `None` without any.
+    /// Returns the smallest box around some points; `None` if there are no points.
     pub fn around(points: impl IntoIterator<Item = DVec3>) -> Option<Bounds> {
         points.into_iter().fold(None, |b: Option<Bounds>, p| {
             Some(match b {

@@ -1,13 +1,13 @@
-//! Boxes with sides along the axes: one part, a crease at every edge.
+//! Axis-aligned boxes: one part, with a crease at every edge.
 
 use super::lathe::SMALLEST;
 use super::{GeomError, Mesh};
 use glam::{DVec3, Vec3};
 
-/// A box round the origin with these edge lengths.
+/// Returns a box centred at the origin with these edge lengths.
 ///
 /// # Errors
-/// Unless all are from 1e-30 to 1e6.
+/// An edge length outside 1e-30 to 1e6.
 pub fn cuboid(size: DVec3) -> Result<Mesh, GeomError> {
     if !size.to_array().iter().all(|x| (SMALLEST..=1e6).contains(x)) {
         return Err(GeomError::domain(format!(
@@ -27,8 +27,8 @@ pub fn cuboid(size: DVec3) -> Result<Mesh, GeomError> {
     Mesh::new(positions, triangles, vec![0; 12])
 }
 
-/// From the derivatives of something by the vertices of a box of this size to those by
-/// its edge lengths.
+/// Pulls derivatives with respect to the vertices of a box of this size back to its edge
+/// lengths.
 pub fn vjp_cuboid(size: DVec3, mesh: &Mesh, by_vertex: &[DVec3]) -> DVec3 {
     mesh.positions.iter().zip(by_vertex).map(|(p, g)| p.as_dvec3() * *g).sum::<DVec3>() / size
 }

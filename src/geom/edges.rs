@@ -1,8 +1,8 @@
-//! From loose triangles to a mesh: welding, the table of edges, creases, smooth normals.
+//! From a triangle soup to a mesh: welding, the edge table, creases, smooth normals.
 //!
-//! Does not check its input ([`Mesh::new`] does). Invariant: the result depends on the
-//! order of the faces alone, never on that of a hash table; every edge of every face is
-//! in the table once.
+//! The input is not checked ([`Mesh::new`] does that). Invariant: the result depends only
+//! on the order of the faces, never on that of a hash table; every edge of every face is
+//! in the table exactly once.
 
 use super::mesh::CREASE_DEGREES;
 use super::{Edge, Mesh, NO_FACE, Topology};
@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// Builds a mesh; `None` if no triangle has an area.
+/// Builds a mesh; `None` if no triangle has positive area.
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -> Option<Mesh> {
     let weld = weld(positions);
     let mut faces = Vec::new();
@@ -37,7 +37,7 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
     });
     let groups = smoothing_groups(&faces, &edges);
 
-    // One vertex for each point and smoothing group around it.
+    // One vertex for each point and each smoothing group around it.
     let mut index: FxHashMap<(u32, u32), u32> = FxHashMap::default();
     let (mut out_positions, mut sums) = (Vec::new(), Vec::<DVec3>::new());
     let mut out = Vec::with_capacity(faces.len());
@@ -77,8 +77,8 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
     Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
 }
 
-/// A normal for each vertex of a surface without creases: the mean over the faces around
-/// it, weighted by area, which needs no angles and so is quick enough to be done for
+/// Returns a normal for each vertex of a surface without creases: the area-weighted mean
+/// over the adjacent faces. Unlike angle weights, this is cheap enough to compute for
 /// every shape of a body.
 pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; positions.len()];
@@ -92,15 +92,16 @@ pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<
     sums.iter().map(|n| n.normalize_or(DVec3::Y).as_vec3()).collect()
 }
 
-/// For each vertex the first one at the same position.
+/// Returns, for each vertex, the first vertex at the same position.
 pub(super) fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first: FxHashMap<[u32; 3], u32> = FxHashMap::default();
     let key = |p: &Vec3| [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
     positions.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()
 }
 
-/// Every edge once: its first face and corner there, its second face, and whether it is a
-/// crease. More than two faces at an edge make pairs; one left over makes a boundary.
+/// Returns every edge once: its first face and the corner there, its second face, and
+/// whether it is a crease. More than two faces at an edge form pairs; one left over makes
+/// a boundary.
 pub(super) fn pair_edges(
     faces: &[[u32; 3]],
     is_crease: impl Fn(usize, usize) -> bool,
@@ -127,8 +128,8 @@ pub(super) fn pair_edges(
     edges
 }
 
-/// For each corner of each face the number of its smoothing group: corners at one point
-/// belong together if a way round the point joins their faces without crossing a crease.
+/// Returns the smoothing group of each corner of each face: corners at one point are in
+/// one group if their faces are connected around the point without crossing a crease.
 fn smoothing_groups(faces: &[[u32; 3]], edges: &[(usize, usize, u32, bool)]) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..faces.len() as u32 * 3).collect();
     fn root(parent: &mut [u32], mut x: u32) -> u32 {
@@ -160,8 +161,8 @@ fn smoothing_groups(faces: &[[u32; 3]], edges: &[(usize, usize, u32, bool)]) -> 
 mod tests {
     use super::*;
 
-    /// Two unit squares' halves that share the z axis' edge, the second turned up by an
-    /// angle.
+    /// Two halves of unit squares that share an edge on the z axis; the second is rotated
+    /// up by an angle.
     fn hinge(degrees: f32) -> Mesh {
         let (s, c) = degrees.to_radians().sin_cos();
         let p = vec![
@@ -193,7 +194,7 @@ mod tests {
             assert_eq!((m.topology.parts.as_slice(), m.topology.part_count), (&[0, 3][..], 4));
         }
         // Smooth: both faces have the same angle at the origin, so the normal there
-        // halves the 39 degrees.
+        // bisects the 39 degrees.
         let m = hinge(39.0);
         let (s, c) = 19.5f32.to_radians().sin_cos();
         assert!(
@@ -203,8 +204,8 @@ mod tests {
 
     #[test]
     fn normals_are_weighted_by_angle() {
-        // A right angle made of one face on one side of the crease-free ridge and of two
-        // on the other counts the same.
+        // A right angle counts the same whether one face or two cover it, on either side
+        // of the crease-free ridge.
         let up = Vec3::new(0.0, 0.2, 0.0);
         let p = vec![up, Vec3::new(0.0, 0.2, 1.0), Vec3::X, Vec3::new(1.0, 0.0, 1.0), -Vec3::X];
         let one = Mesh::new(p.clone(), vec![[0, 1, 2], [0, 4, 1]], vec![0; 2]).unwrap();

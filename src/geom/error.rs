@@ -1,12 +1,12 @@
-//! What can be wrong with a shape.
+//! Errors of building shapes.
 
-/// A shape that cannot be made.
+/// The reason why a shape cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GeomError {
-    /// A number outside its domain: a scene that is impossible.
+    /// A number outside its domain: the scene is impossible.
     #[error("{0}")]
     Domain(String),
-    /// A mesh that makes no sense, or a file that cannot be read as one.
+    /// An invalid mesh, or a file that cannot be read as one.
     #[error("{0}")]
     Invalid(String),
 }

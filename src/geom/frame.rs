@@ -1,7 +1,6 @@
-//! What a mesh file's axes and numbers mean: which axis points up, and how long its unit
-//! is.
+//! The coordinate frame of a mesh file: which axis points up, and the length of its unit.
 //!
-//! Only turns and scales; no mirrors. Invariant: the unit is positive and finite.
+//! Only rotations and scales, no mirrors. Invariant: the unit is positive and finite.
 
 use super::GeomError;
 use glam::DVec3;
@@ -11,14 +10,14 @@ use glam::DVec3;
 pub enum UpAxis {
     /// +x.
     X,
-    /// +y, as here.
+    /// +y, as in scenes.
     #[default]
     Y,
     /// +z.
     Z,
 }
 
-/// How the coordinates of a file become the scene's.
+/// The map from a file's coordinates to the scene's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FileFrame {
     up: UpAxis,
@@ -32,10 +31,10 @@ impl Default for FileFrame {
 }
 
 impl FileFrame {
-    /// With this axis up, and a unit of so many scene units (metres).
+    /// Makes a frame with this axis up and a unit of this many scene units (metres).
     ///
     /// # Errors
-    /// A unit that is not a positive, finite number.
+    /// A unit that is not positive and finite.
     pub fn new(up: UpAxis, unit: f64) -> Result<FileFrame, GeomError> {
         if unit > 0.0 && unit.is_finite() {
             Ok(FileFrame { up, unit })
@@ -46,8 +45,8 @@ impl FileFrame {
         }
     }
 
-    /// A file's point in the scene. With z up, x stays and y points away from the
-    /// viewer's +z; with x up, z stays.
+    /// Maps a file's point to the scene. With z up, x stays and the file's +y becomes -z;
+    /// with x up, z stays.
     pub fn apply(&self, p: DVec3) -> DVec3 {
         let turned = match self.up {
             UpAxis::X => DVec3::new(-p.y, p.x, p.z),

@@ -1,13 +1,13 @@
-//! glTF 2.0 in one binary file (Khronos, glTF 2.0 specification, section 4.4): positions,
-//! normals, triangles.
+//! Writes binary glTF 2.0 files (Khronos, glTF 2.0 specification, section 4.4):
+//! positions, normals, triangles.
 //!
-//! One mesh, one node, no materials and no parts. Invariant: both chunks are whole and
+//! One mesh, one node, no materials and no parts. Invariant: both chunks are complete and
 //! aligned to four bytes.
 
 use super::Mesh;
 use serde_json::json;
 
-/// The bytes of a `.glb` file.
+/// Returns the bytes of a `.glb` file.
 pub fn write(mesh: &Mesh) -> Vec<u8> {
     let mut bin =
         Vec::with_capacity(mesh.positions.len() * 24 + mesh.topology.triangles.len() * 12);

@@ -1,24 +1,24 @@
 //! Landmarks: named points of a solid, such as the joints of a body.
 //!
-//! Not geometry: they are not drawn and have no part in bounds. Invariant of a list made
-//! by [`unique`]: no two have the same name.
+//! Landmarks are not geometry: they are not drawn and do not count in bounds. Invariant
+//! of a list made by [`unique`]: all names differ.
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// A named point that goes where its solid goes.
+/// A named point that moves with its solid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landmark {
-    /// Its name; one that occurs again in a group gets `#2`, `#3`, … appended.
+    /// The name; repeated names in a group get `#2`, `#3`, … appended.
     pub name: Arc<str>,
-    /// Where it is, in world coordinates (scene units).
+    /// The position, in world coordinates (scene units).
     pub position: DVec3,
 }
 
-/// The same points in the same order with names of their own: the second `hand` is
-/// `hand#2`, the third `hand#3`. Numbers that earlier lists gave are given anew, so that
-/// it does not matter how groups nest.
+/// Makes the names of a list unique, in order: the second `hand` becomes `hand#2`, the
+/// third `hand#3`. Numbers from earlier calls are replaced, so the nesting of groups does
+/// not matter.
 pub(super) fn unique(all: impl IntoIterator<Item = Landmark>) -> Arc<[Landmark]> {
     let mut seen: FxHashMap<Arc<str>, u32> = FxHashMap::default();
     let named = all.into_iter().map(|l| {
@@ -33,7 +33,7 @@ pub(super) fn unique(all: impl IntoIterator<Item = Landmark>) -> Arc<[Landmark]>
     named.collect()
 }
 
-/// A name without the number that [`unique`] appends.
+/// Returns a name without the number that [`unique`] appends.
 fn base(name: &str) -> &str {
     match name.rsplit_once('#') {
         Some((base, n))

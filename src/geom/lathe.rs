@@ -1,9 +1,9 @@
-//! The lathe: profiles swept round the y axis into an object of revolution (Kulkarni et
+//! The lathe: profiles swept around the y axis into an object of revolution (Kulkarni et
 //! al. 2014, section 2.1.1).
 //!
-//! Checks what is asked for and lays out the surface as strips; `profile_path` cuts
-//! profiles into strips, `revolve` turns them. Invariant: the faces look outward, and
-//! wherever both ends are closed the mesh is watertight.
+//! Checks the arguments and lays out the surface as strips; `profile_path` cuts profiles
+//! into strips, and `revolve` sweeps them. Invariant: faces are oriented outward, and the
+//! mesh is watertight if both ends are closed.
 
 use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
@@ -13,22 +13,22 @@ use super::revolve::{Strip, revolve, vjp_rings};
 use super::{GeomError, Mesh, Solid};
 use glam::DVec3;
 
-/// A profile: radii at heights, upwards. Lengths in scene units.
+/// A profile: radii at heights, from bottom to top, in scene units.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Profile {
-    /// Heights, not decreasing.
+    /// Heights, non-decreasing.
     pub y: Vec<f64>,
-    /// Radii, not negative.
+    /// Radii, non-negative.
     pub r: Vec<f64>,
 }
 
-/// The inside of a vessel. From a number, a wall of that thickness with a floor as thick.
+/// The wall of a vessel. A number converts to a wall and floor of that thickness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wall<T = f64> {
-    /// The thickness of the wall, scene units; 0 for a full body.
+    /// The thickness of the wall, in scene units; 0 for a solid body.
     pub thickness: T,
-    /// How high above the lower end the floor is, scene units; as the wall is thick at
-    /// least. What fills a vessel raises it.
+    /// The height of the floor above the lower end, in scene units; at least the
+    /// thickness of the wall. The contents of a vessel raise it.
     pub floor: T,
 }
 
@@ -51,40 +51,41 @@ pub enum Caps {
     Both,
 }
 
-/// The most points of all profiles together.
+/// The maximum number of points of all profiles together.
 const MOST_POINTS: usize = 4096;
-/// The most profiles.
+/// The maximum number of profiles.
 const MOST_PROFILES: usize = 1000;
-/// The largest height or radius, in scene units.
+/// The maximum height or radius, in scene units.
 const LARGEST: f64 = 1e6;
-/// The smallest object, in scene units: below it vertex data in single precision
+/// The minimum size of an object, in scene units; below it, single-precision vertex data
 /// degenerate.
 pub(super) const SMALLEST: f64 = 1e-30;
 
-/// Sweeps profiles, stacked in the order given, round the y axis. A step from one to the
-/// next is closed by a ring. With a wall that has a thickness it is a vessel open at the
-/// top: an outer wall, a rim, an inner wall so much further in (at 2 % of the radius at
-/// least, measured along the radius only), and where `caps` closes the bottom a floor: as
-/// high as the wall is thick (half the height at most), or higher as `wall` says (95 % of
-/// the height at most). Without, `caps` says which ends get a disc.
+/// Sweeps profiles, stacked in the given order, around the y axis. A step from one to the
+/// next is closed by a ring. A wall of positive thickness makes a vessel that is open at
+/// the top, with an outer wall, a rim and an inner wall. The inner radius is smaller by
+/// the thickness, measured horizontally, and at least 2 % of the outer one. If `caps`
+/// closes the bottom, there is also a floor, as high as the wall is thick (at most half
+/// the height) or as `wall` raises it (at most 95 % of the height). Without a wall,
+/// `caps` says which ends get a disc.
 ///
 /// A profile that begins or ends at the axis (below 1e-6 of the object's size) is closed
-/// there whatever `caps` says, except at the top of a vessel, which keeps a mouth. Radii
-/// at the axis between the ends make a thin neck.
+/// there regardless of `caps`, except at the top of a vessel, which stays open. Radii at
+/// the axis between the ends make a thin neck.
 ///
-/// Parts are numbered: the `n` profiles in order from 0, then `n` rings at steps, `n + 1`
-/// the bottom disc, `n + 2` the top disc or the rim, `n + 3` the inner wall, `n + 4` the
-/// floor inside. The count is `n + 5` also where some are absent.
+/// Part numbers: the `n` profiles in order from 0, then `n` for rings at steps, `n + 1`
+/// for the bottom disc, `n + 2` for the top disc or the rim, `n + 3` for the inner wall,
+/// `n + 4` for the floor inside. The count is `n + 5` even if some are absent.
 ///
 /// Normals come from the slope of the profile (central differences). Creases run along
-/// discs, rings and rims and where one profile meets the next at more than 40 degrees,
-/// never within a profile.
+/// discs, rings and rims, and between profiles that meet at more than 40 degrees, never
+/// within a profile.
 ///
 /// # Errors
 /// [`GeomError::Domain`] if a profile has fewer than 2 points, unequal numbers of heights
-/// and radii, numbers that are not finite or above 1e6, heights that decrease, negative
+/// and radii, numbers that are not finite or above 1e6, decreasing heights or negative
 /// radii; if there are no profiles or more than 1000, more than 4096 points, fewer than 3
-/// or more than 1024 sides, more than five million triangles; if the object has no
+/// or more than 1024 sides, or more than five million triangles; if the object has no
 /// extent.
 pub fn lathe(
     parts: &[Profile],
@@ -95,7 +96,7 @@ pub fn lathe(
     turned(parts, sides, wall.into(), caps).map(|(mesh, _)| mesh)
 }
 
-/// The mesh, and what it was made of.
+/// Returns the mesh, and the data that it was made from.
 fn turned(
     parts: &[Profile],
     sides: u32,
@@ -109,7 +110,7 @@ fn turned(
 }
 
 impl Solid {
-    /// A [`lathe`] that knows coarser versions of itself.
+    /// Returns a [`lathe`] with coarser versions.
     ///
     /// # Errors
     /// As [`lathe`].
@@ -124,18 +125,17 @@ impl Solid {
     }
 }
 
-/// The derivatives of something by what a lathe is made from.
+/// Derivatives with respect to the inputs of [`lathe`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatheGradient {
-    /// By the heights and radii of each profile.
+    /// With respect to the heights and radii of each profile.
     pub profiles: Vec<Profile>,
-    /// By the thickness of the wall and the height of the floor.
+    /// With respect to the thickness of the wall and the height of the floor.
     pub wall: Wall,
 }
 
-/// The vector-Jacobian product of [`lathe`]: from the derivatives of something by the
-/// mesh's vertices, in order. Which points count as one, and which ends as closed, is
-/// taken as it is.
+/// The vector-Jacobian product of [`lathe`], given derivatives with respect to the mesh's
+/// vertices, in order. Which points are merged and which ends are closed is held fixed.
 ///
 /// # Errors
 /// As [`lathe`].
@@ -175,14 +175,14 @@ pub fn vjp_lathe(
     Ok(LatheGradient { profiles: parts.iter().map(one).collect(), wall })
 }
 
-/// The path of a lathe.
+/// The path that a lathe sweeps.
 struct Layout<T> {
     strips: Vec<Strip<T>>,
-    /// Whether it ends where it begins.
+    /// Whether the path ends where it starts.
     closed: bool,
 }
 
-/// Lays out checked profiles; `number` is asked for each radius and height in turn.
+/// Lays out checked profiles; `number` is called with each radius and height in turn.
 fn layout<T: Real>(
     parts: &[Profile],
     caps: Caps,

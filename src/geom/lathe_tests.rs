@@ -1,5 +1,5 @@
-//! Tests of the lathe: closed, outward, with the volumes of cylinders, cones, spheres and
-//! vessels; every refusal.
+//! Tests of the lathe: closed and outward surfaces, the volumes of cylinders, cones,
+//! spheres and vessels, and every error.
 
 use super::*;
 use crate::geom::NO_FACE;
@@ -10,7 +10,7 @@ fn profile(points: &[(f64, f64)]) -> Profile {
     Profile { y: points.iter().map(|p| p.1).collect(), r: points.iter().map(|p| p.0).collect() }
 }
 
-/// Signed volume; outward orientation makes it positive.
+/// Returns the signed volume, which is positive for outward orientation.
 fn volume(m: &Mesh) -> f64 {
     let t = |t: &[u32; 3]| {
         let p = t.map(|v| m.positions[v as usize].as_dvec3());
@@ -19,8 +19,8 @@ fn volume(m: &Mesh) -> f64 {
     m.topology.triangles.iter().map(t).sum()
 }
 
-/// Each edge has two faces that run through it in opposite directions, and the surface is
-/// one sphere or torus.
+/// Asserts that each edge has two faces that run along it in opposite directions, and
+/// that the surface is a single sphere or torus.
 fn assert_closed(m: &Mesh, euler: i64) {
     let key = |v: u32| m.positions[v as usize].to_array().map(|x| (x + 0.0).to_bits());
     let mut directed: HashMap<_, i32> = HashMap::new();
@@ -56,7 +56,8 @@ fn assert_outward(m: &Mesh) {
     assert!(m.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-5));
 }
 
-/// The volume of a prism with this many sides against its circle's.
+/// The ratio of the volumes of a prism with this many sides and its circumscribed
+/// cylinder.
 fn polygon(sides: f64) -> f64 {
     sides / std::f64::consts::TAU * (std::f64::consts::TAU / sides).sin()
 }
@@ -158,7 +159,7 @@ fn impossible_profiles_are_errors() {
 
 #[test]
 fn profiles_that_end_at_the_axis_are_closed_there() {
-    // A cone: its tip has no normal, so that a disc of no visible size closes it.
+    // A cone: its tip has no normal, so a disc of invisible size closes it.
     for caps in [Caps::Bottom, Caps::Both] {
         let cone = lathe(&[profile(&[(1.0, 0.0), (0.0, 2.0)])], 64, 0.0, caps).unwrap();
         assert_closed(&cone, 2);
@@ -170,7 +171,7 @@ fn profiles_that_end_at_the_axis_are_closed_there() {
         );
         assert!((volume(&cone) - std::f64::consts::PI * 2.0 / 3.0 * polygon(64.0)).abs() < 1e-5);
     }
-    // A ball: poles.
+    // A ball, with poles.
     let n = 33;
     let angle = |i: i32| std::f64::consts::PI * f64::from(i) / f64::from(n - 1);
     let ball = profile(&(0..n).map(|i| (angle(i).sin(), -angle(i).cos())).collect::<Vec<_>>());
@@ -181,7 +182,7 @@ fn profiles_that_end_at_the_axis_are_closed_there() {
         assert_eq!(m.positions.len(), 31 * 64 + 2);
         assert!(m.topology.edges.iter().all(|e| !e.crease));
         assert!(m.topology.parts.iter().all(|p| *p == 0));
-        // Slopes by differences of equal steps are exact on a circle.
+        // Central differences with equal steps give exact slopes on a circle.
         assert!(
             m.positions.iter().zip(&m.normals).all(|(p, n)| (p.normalize() - *n).length() < 1e-6)
         );
@@ -224,7 +225,8 @@ fn inner_walls_keep_the_creases_and_the_floor_its_height() {
     let square = |r: f64| r * r;
     let expected = square(0.5) - square(0.4) * 0.9 + square(0.8) - square(0.7);
     assert!((volume(&m) - std::f64::consts::PI * expected * polygon(40.0)).abs() < 1e-5);
-    // Outside: base, two at the step; rim: two; inside: two at the step, the floor.
+    // Outside: the base, two at the step; the rim: two; inside: two at the step, the
+    // floor.
     assert_eq!(m.topology.edges.iter().filter(|e| e.crease).count(), 8 * 40);
     let parts: std::collections::BTreeSet<u16> = m.topology.parts.iter().copied().collect();
     assert_eq!(parts.into_iter().collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
@@ -234,7 +236,8 @@ fn inner_walls_keep_the_creases_and_the_floor_its_height() {
         .flat_map(|f| m.topology.triangles[f].map(|v| m.positions[v as usize].y))
         .collect();
     assert!(floor.len() == 3 * 40 && floor.iter().all(|y| (y - 0.1).abs() < 1e-6));
-    // A wall thicker than the body leaves a bore, a floor higher than it half the height.
+    // With a wall thicker than the body, a bore remains, and the floor is at half the
+    // height.
     let thick = lathe(&[profile(&[(0.5, 0.0), (0.5, 2.0)])], 40, 9.0, Caps::Both).unwrap();
     let expected = std::f64::consts::PI * (square(0.5) * 2.0 - square(0.01)) * polygon(40.0);
     assert!((volume(&thick) - expected).abs() < 1e-5);
@@ -268,8 +271,8 @@ fn flat_and_repeated_points_make_no_collapsed_triangles() {
     ];
     for (points, thickness) in shapes {
         let m = lathe(&[profile(points)], 24, thickness, Caps::Both).unwrap();
-        // Discs that lie on each other share places but not points, so that places cannot
-        // be compared here.
+        // Coincident discs share positions but not points, so positions cannot be
+        // compared here.
         assert!(m.topology.edges.iter().all(|e| e.faces[1] != NO_FACE), "{points:?}");
         assert!(m.positions.iter().chain(&m.normals).all(|p| p.is_finite()));
         for t in &m.topology.triangles {
@@ -329,7 +332,7 @@ proptest::proptest! {
         thickness in proptest::option::of(0.001..0.5f64),
         caps in proptest::sample::select(vec![Caps::None, Caps::Bottom, Caps::Top, Caps::Both]),
     ) {
-        // Small numbers become 0, so that poles, repeated heights and repeated radii are
+        // Small numbers become 0, to make poles, repeated heights and repeated radii
         // common.
         let snap = |x: f64| if x < 0.25 { 0.0 } else { x };
         let mut y = 0.0;

@@ -1,8 +1,8 @@
 //! Triangle meshes with smooth normals, part numbers and a table of edges.
 //!
-//! Immutable, shared by `Arc`. Vertices are split where a crease runs, so that each has
-//! one normal; edges know the faces on both sides across such splits. Meshes of one shape
-//! share their [`Topology`].
+//! Meshes are immutable and shared by `Arc`. Vertices are split along creases, so that
+//! each has one normal; edges know the faces on both sides across such splits. Meshes of
+//! one shape share their [`Topology`].
 
 use super::edges;
 use super::{Bounds, GeomError, Patches};
@@ -10,49 +10,49 @@ use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// In [`Edge::faces`]: there is no second face.
+/// Marks a missing second face in [`Edge::faces`].
 pub const NO_FACE: u32 = u32::MAX;
 
 /// An edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Edge {
-    /// Its ends, vertices of the first face.
+    /// The end vertices, as numbered in the first face.
     pub vertices: [u32; 2],
-    /// The faces beside it; the second is [`NO_FACE`] on a boundary.
+    /// The adjacent faces; the second is [`NO_FACE`] on a boundary.
     pub faces: [u32; 2],
-    /// Whether the surface turns sharply here.
+    /// Whether the surface bends sharply here.
     pub crease: bool,
 }
 
 impl Edge {
-    /// Whether there is a face on one side only.
+    /// Whether only one side has a face.
     pub fn is_boundary(&self) -> bool {
         self.faces[1] == NO_FACE
     }
 
-    /// Whether it shows as a line however the mesh is turned: a crease or a boundary.
+    /// Whether it shows as a line from every viewpoint: a crease or a boundary.
     pub fn is_sharp(&self) -> bool {
         self.crease || self.is_boundary()
     }
 }
 
-/// The edges of a mesh, each once: a slice of them, those first that show as lines
-/// however the mesh is turned.
+/// The edges of a mesh, each once, as a slice. Sharp edges, which show as lines from
+/// every viewpoint, come first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edges {
     list: Vec<Edge>,
-    /// Where each run of connected creases or boundaries ends.
+    /// The end index of each run of connected creases or boundaries.
     runs: Vec<usize>,
     open: bool,
 }
 
 impl Edges {
-    /// Puts edges in order: boundaries and creases that hang together, one such line
+    /// Sorts edges: first the sharp ones, one connected line of creases or boundaries
     /// after another, then the others.
     pub fn new(list: Vec<Edge>) -> Edges {
         let (sharp, smooth): (Vec<Edge>, Vec<Edge>) = list.into_iter().partition(Edge::is_sharp);
-        // A line for each edge by itself, boundaries and creases apart; where two meet,
-        // the shorter joins the longer.
+        // Each edge starts as a line of its own, with boundaries and creases apart; where
+        // two lines meet, the shorter is merged into the longer.
         let mut lines: Vec<Vec<Edge>> = Vec::new();
         let mut line_at: FxHashMap<(u32, bool), usize> = FxHashMap::default();
         for edge in sharp {
@@ -86,13 +86,13 @@ impl Edges {
         Edges { list, runs, open }
     }
 
-    /// The creases and boundaries, those that hang together at a time.
+    /// The lines of connected creases or boundaries, one slice each.
     pub fn lines(&self) -> impl Iterator<Item = &[Edge]> {
         let firsts = std::iter::once(0).chain(self.runs.iter().copied());
         firsts.zip(&self.runs).map(|(first, past)| &self.list[first..*past])
     }
 
-    /// Whether there is a boundary.
+    /// Whether there are boundary edges.
     pub fn open(&self) -> bool {
         self.open
     }
@@ -112,7 +112,7 @@ impl FromIterator<Edge> for Edges {
     }
 }
 
-/// What stays the same when a mesh's vertices move.
+/// The properties of a mesh that do not change when its vertices move.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Topology {
     /// The triangles, counter-clockwise seen from outside.
@@ -121,16 +121,16 @@ pub struct Topology {
     pub parts: Vec<u16>,
     /// The number of parts.
     pub part_count: u16,
-    /// The names of parts by number, where they have some: empty strings and those beyond
-    /// the end have none.
+    /// The names of parts by number. An empty string, or an index beyond the end, means
+    /// that the part has no name.
     pub part_names: Vec<Arc<str>>,
-    /// Its edges.
+    /// The edges.
     pub edges: Edges,
-    /// Whether the faces are known to enclose a body without crossing each other: seen
-    /// from outside, those that are turned away are hidden by others and need not be
-    /// drawn. Meshes from files make no such promise.
+    /// Whether the faces are known to enclose a body without crossing each other. Seen
+    /// from outside, faces that point away from the camera are then hidden by others and
+    /// need not be drawn. Meshes from files do not promise this.
     pub encloses: bool,
-    /// The triangles by small groups.
+    /// The triangles in small groups.
     pub patches: Patches,
 }
 
@@ -141,26 +141,26 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// A unit normal for each vertex.
     pub normals: Vec<Vec3>,
-    /// How they are joined.
+    /// The triangles, parts and edges.
     pub topology: Arc<Topology>,
 }
 
-/// Faces that meet at a greater angle than this do not blend into each other.
+/// The angle between faces, in degrees, above which an edge is a crease.
 pub const CREASE_DEGREES: f64 = 40.0;
-/// The largest mesh, in triangles.
+/// The maximum number of triangles of a mesh.
 pub const MOST_TRIANGLES: usize = 5_000_000;
-/// The most parts of a mesh; `u16::MAX` is not the number of one.
+/// The maximum number of parts of a mesh; `u16::MAX` is not a part number.
 pub const MOST_PARTS: usize = u16::MAX as usize;
 
 impl Mesh {
-    /// A mesh from positions and triangles, with the part of each triangle. Equal
-    /// positions are one point; triangles without area are dropped; normals are means
-    /// over the faces around a point, weighted by angle, within creases.
+    /// Makes a mesh from positions and triangles, with the part of each triangle. Equal
+    /// positions are merged into one point, and triangles without area are dropped.
+    /// Normals are angle-weighted means over the faces around a point, up to creases.
     ///
     /// # Errors
-    /// If a position is not finite, an index out of range, a part number 65535, nothing
-    /// is left, there is not one part number for each triangle, or there are more than
-    /// five million triangles.
+    /// A position that is not finite; an index out of range; a part number of 65535; a
+    /// number of parts that differs from that of triangles; more than five million
+    /// triangles; no triangle with positive area.
     pub fn new(
         positions: Vec<Vec3>,
         triangles: Vec<[u32; 3]>,
@@ -200,7 +200,7 @@ impl Mesh {
             .ok_or_else(|| GeomError::invalid("all triangles of the mesh have zero area"))
     }
 
-    /// The smallest box around it.
+    /// Returns the bounding box.
     pub fn bounds(&self) -> Option<Bounds> {
         Bounds::around(self.positions.iter().map(|p| p.as_dvec3()))
     }
@@ -243,8 +243,8 @@ mod tests {
 
     #[test]
     fn lines_of_edges_hang_together() {
-        // Two loops of four boundary edges, told in an order that joins them late, a
-        // crease apart, and one smooth edge.
+        // Two loops of four boundary edges, in an order that connects them late, a
+        // separate crease, and one smooth edge.
         let edge = |a: u32, b: u32, crease: bool, other: u32| Edge {
             vertices: [a, b],
             faces: [0, other],

@@ -1,7 +1,7 @@
 //! Shapes: triangle meshes made in code or read from files, placed in the world.
 //!
-//! World: right-handed, y up; lengths in scene units, angles in radians. Knows nothing of
-//! cameras or programs.
+//! World frame: right-handed, y up; lengths in scene units, angles in radians.
+//! Independent of cameras and programs.
 
 mod affine;
 pub mod armature;
@@ -39,7 +39,7 @@ pub(crate) use solid::MeshesMark;
 pub use solid::{Instance, PlacedGradient, Solid};
 pub use sphere::{sphere, vjp_sphere};
 
-/// The matrix a b'.
+/// Returns the matrix a b'.
 pub(crate) fn outer(a: glam::DVec3, b: glam::DVec3) -> glam::DMat3 {
     glam::DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }

@@ -1,9 +1,9 @@
-//! Wavefront OBJ: reading through `tobj`, after a look at the text that says which line
-//! is wrong; writing.
+//! Wavefront OBJ: reading, and writing. `tobj` parses the text, after a check that
+//! reports errors by line.
 //!
-//! Materials, colours, texture coordinates and the file's own normals are not read:
-//! normals are made anew by [`Mesh::new`]. Invariant: `tobj` sees only finite vertices
-//! and faces whose corners are there, so no bytes can make it stumble.
+//! Materials, colours, texture coordinates and the file's own normals are ignored;
+//! [`Mesh::new`] computes normals. Invariant: `tobj` sees only finite vertices and faces
+//! whose corners exist, so no input can cause a panic.
 
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{FileFrame, GeomError, Mesh};
@@ -12,26 +12,26 @@ use rustc_hash::FxHashMap;
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// The most corners of a polygon.
+/// The maximum number of corners of a polygon.
 const MOST_CORNERS: usize = 1000;
 
-/// Reads a mesh; each object or group of the file is a part with its name, numbered by
-/// first use, and one opened again goes on. Polygons are cut into triangles as fans. A
-/// fourth coordinate divides the others.
+/// Reads a mesh. Each object or group of the file is a part with its name, numbered by
+/// first use; reopening one continues it. Polygons are cut into triangle fans. A fourth
+/// coordinate divides the others.
 ///
 /// # Errors
-/// [`GeomError::Invalid`] if it is not text, a line is malformed, a coordinate is not
-/// finite, a face uses a vertex that is not there before it, there are more than 65535
-/// parts or five million triangles: with the number of the line. If there are no faces or
-/// none has an area.
+/// [`GeomError::Invalid`] if the file is not text, has no faces, or none of them has
+/// positive area. With the line number, if a line is malformed, a coordinate is not
+/// finite, a face uses a vertex that is not defined before it, or there are more than
+/// 65535 parts or five million triangles.
 pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
     load_in(bytes, &FileFrame::default())
 }
 
-/// Reads a mesh whose axes and unit are not the scene's; see [`load`].
+/// Reads a mesh with another up axis or unit than the scene's; see [`load`].
 ///
 /// # Errors
-/// As [`load`], and if a coordinate is not finite in the scene's unit.
+/// As [`load`], and if a coordinate is not finite in scene units.
 pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     let (plain, names) = plain(text(bytes)?)?;
     let options = tobj::LoadOptions {
@@ -68,30 +68,31 @@ pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     Ok(mesh)
 }
 
-/// Vertices and triangles as the file numbers them, with the name of each triangle's
-/// object or group.
+/// Vertices and triangles with the file's own numbering, and the object or group of each
+/// triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Indexed {
-    /// The vertices, in the file's order, used or not.
+    /// The vertices in the file's order, whether used or not.
     pub positions: Vec<Vec3>,
-    /// The triangles; polygons are cut as fans.
+    /// The triangles; polygons are cut into fans.
     pub triangles: Vec<[u32; 3]>,
-    /// The number of each triangle's object or group, by first use.
+    /// The number of each triangle's object or group, in order of first use.
     pub parts: Vec<u16>,
-    /// Their names by number; empty where faces come before any object or group.
+    /// The names of objects and groups by number; empty for faces before the first of
+    /// them.
     pub part_names: Vec<Arc<str>>,
 }
 
-/// Reads a mesh with the file's own numbers of vertices, which skin weights go by.
+/// Reads a mesh with the file's own vertex indices, which skin weights refer to.
 ///
 /// # Errors
-/// As [`load`], but for triangles without area, which stay.
+/// As [`load`], except that triangles without area are kept.
 pub fn indexed(bytes: &[u8]) -> Result<Indexed, GeomError> {
     let (plain, names) = plain(text(bytes)?)?;
     let (mut out, mut part) = (Indexed { part_names: names, ..Indexed::default() }, 0u16);
     for line in plain.lines() {
         let mut words = line.split(' ');
-        // Only what `plain` wrote is here, so every word reads as a number.
+        // The lines are the output of `plain`, so every word parses as a number.
         match words.next() {
             Some("v") => {
                 let mut number = || words.next().and_then(|w| w.parse().ok()).unwrap_or(0.0f32);
@@ -121,8 +122,8 @@ fn text(bytes: &[u8]) -> Result<&str, GeomError> {
     })
 }
 
-/// Checks a file, line by line, and keeps the vertices, the faces' vertex numbers counted
-/// from the start, and the parts, as `g` with a number; and the names of the parts.
+/// Checks a file line by line. Returns its vertices, its faces with absolute vertex
+/// indices, and its parts as `g` with a number, and the names of the parts.
 fn plain(text: &str) -> Result<(String, Vec<Arc<str>>), GeomError> {
     let mut out = String::with_capacity(text.len());
     let (mut vertices, mut triangles) = (0i64, 0usize);
@@ -165,7 +166,7 @@ fn plain(text: &str) -> Result<(String, Vec<Arc<str>>), GeomError> {
             _ => {}
         }
     }
-    // By number, which is the order of insertion whatever that of the table is.
+    // Sort by number: the hash table's order is arbitrary.
     let mut by_number = vec![Arc::from(""); names.len()];
     for (name, number) in names {
         by_number[number] = Arc::from(name);
@@ -173,7 +174,7 @@ fn plain(text: &str) -> Result<(String, Vec<Arc<str>>), GeomError> {
     Ok((out, by_number))
 }
 
-/// The numbers after `v`: three coordinates, or four, or three and three of a colour.
+/// Parses the numbers after `v`: three coordinates, four, or three and an RGB colour.
 fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> {
     let mut x = [0.0f32; 7];
     let mut count = 0;
@@ -199,7 +200,7 @@ fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> 
     }
 }
 
-/// The numbers after `f`: corners, counted from 1.
+/// Parses the corners after `f`, counted from 1.
 fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i64>, String> {
     let mut corners = Vec::with_capacity(4);
     for w in words {
@@ -223,7 +224,7 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i
     }
 }
 
-/// The text of an OBJ file with positions, normals and one group for each part.
+/// Returns the text of an OBJ file with positions, normals and one group for each part.
 pub fn write(mesh: &Mesh) -> String {
     let mut s =
         String::with_capacity(mesh.positions.len() * 64 + mesh.topology.triangles.len() * 32);

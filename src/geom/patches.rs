@@ -1,48 +1,48 @@
-//! Small groups of a mesh's faces, so that many can be passed over at once.
+//! Small groups of a mesh's faces, so that many faces can be skipped at once.
 
 use std::sync::OnceLock;
 
-/// Groups of [`Patches::FACES`] faces that follow one another, with the vertices of each.
-/// Made when first asked for; equal to any other, since faces alone decide what they are.
+/// Groups of [`Patches::FACES`] consecutive faces, with the vertices of each group.
+/// Computed on first use from the faces alone, so all values compare equal.
 #[derive(Debug, Default)]
 pub struct Patches(OnceLock<Lists>);
 
-/// Some vertices that follow one another: in most meshes a patch has few such runs.
+/// A run of consecutive vertices; in most meshes a patch has few runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Run {
-    /// The first one.
+    /// The first vertex.
     pub first: usize,
-    /// How many, 1 to [`Run::MOST`].
+    /// The number of vertices, 1 to [`Run::MOST`].
     pub count: usize,
 }
 
 #[derive(Debug, Default)]
 struct Lists {
-    /// The vertices of one patch after the other, and where the runs of each end.
+    /// The runs of all patches in order, and the index where each patch's runs end.
     runs: Vec<Run>,
     ends: Vec<usize>,
 }
 
 impl Run {
-    /// The most vertices in a run.
+    /// The maximum number of vertices in a run.
     pub const MOST: usize = 16;
 
-    /// Its vertices.
+    /// The vertices' indices.
     pub fn range(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.count
     }
 }
 
-/// A run goes on over so many vertices that the patch does not have: looking at them,
-/// too, is cheaper than another run.
+/// The maximum gap that a run bridges: processing a few vertices that the patch lacks is
+/// cheaper than another run.
 const GAP: usize = 2;
 
 impl Patches {
-    /// Faces in a patch; the last one may have fewer.
+    /// The number of faces in a patch; the last one may have fewer.
     pub const FACES: usize = 16;
 
-    /// The vertices of each patch of these faces, which are always the same ones; a few
-    /// more may be among them.
+    /// Returns the vertices of each patch, possibly with a few more. Every call must pass
+    /// the same faces.
     pub(crate) fn of<'a>(&'a self, triangles: &[[u32; 3]]) -> impl Iterator<Item = &'a [Run]> {
         let Lists { runs, ends } = self.0.get_or_init(|| Lists::new(triangles));
         let firsts = std::iter::once(0).chain(ends.iter().copied());
@@ -73,7 +73,7 @@ impl Lists {
     }
 }
 
-/// Made anew when asked for: a copy may get other faces.
+/// A clone is recomputed on first use, since it may get other faces.
 impl Clone for Patches {
     fn clone(&self) -> Patches {
         Patches::default()

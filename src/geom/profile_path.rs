@@ -1,29 +1,29 @@
-//! From profiles to the strips of a vessel's outer and inner wall.
+//! The strips of a vessel's outer and inner wall, from profiles.
 //!
-//! Works in the half plane (r, y), knows nothing of triangles. Generic in its numbers, so
-//! that a tape gives derivatives. Invariant: neighbouring points differ by more than the
-//! tolerance, so that no triangle collapses in single precision, and each strip begins
-//! where the one before ends.
+//! Works in the half plane (r, y). Generic in the number type, so that a tape can give
+//! derivatives. Invariant: neighbouring points differ by more than the tolerance, so that
+//! no triangle collapses in single precision, and each strip starts where the previous
+//! one ends.
 
 use super::lathe::{Profile, SMALLEST, Wall};
 use super::real::Real;
 use super::revolve::Strip;
 
-/// Profiles that meet within this angle go on smoothly: the cosine of 40 degrees.
+/// The cosine of 40 degrees: profiles that meet at a smaller angle join smoothly.
 const SMOOTH_COS: f64 = 0.766_044_443_118_978;
-/// An end at the axis is a smooth dome if its slope there is at most this (the surface
-/// then turns by less than 40 degrees across the axis), else a tip: the tangent of 20
-/// degrees.
+/// The tangent of 20 degrees: an end at the axis is a smooth dome if its slope there is
+/// at most this (the surface then bends by less than 40 degrees across the axis), and a
+/// tip otherwise.
 const DOME_SLOPE: f64 = 0.363_970_234_266_202;
-/// Radii below this share of the size count as at the axis and are drawn as if they were
-/// it.
+/// Radii below this fraction of the size count as on the axis, and are drawn with this
+/// radius.
 const TIP: f64 = 1e-6;
-/// An inner wall keeps at least this share of the outer radius.
+/// The minimum inner radius, as a fraction of the outer radius.
 const LEAST_BORE: f64 = 0.02;
-/// The share of the height that a floor reaches at most.
+/// The maximum height of the floor, as a fraction of the height.
 const MOST_FILLED: f64 = 0.95;
 
-/// How near points may come, from the size of an object.
+/// Tolerances for merging points, in proportion to the size of an object.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolerance {
     tip: f64,
@@ -32,17 +32,17 @@ pub(super) struct Tolerance {
 }
 
 impl Tolerance {
-    /// For checked profiles; `None` if they have no extent.
+    /// Returns the tolerances for checked profiles; `None` if they have no extent.
     pub fn of(parts: &[Profile]) -> Option<Tolerance> {
         let widest = parts.iter().flat_map(|p| &p.r).fold(0.0, |a: f64, r| a.max(*r));
         let (bottom, top) = (*parts.first()?.y.first()?, *parts.last()?.y.last()?);
         let size = widest.max(top - bottom);
-        // Heights may lie far from 0, where single precision is coarser.
+        // Heights can be far from 0, where single precision is coarser.
         let y = 1e-6 * size + 2.0 * f64::from(f32::EPSILON) * bottom.abs().max(top.abs());
         (size > SMALLEST).then_some(Tolerance { tip: TIP * size, r: 1e-6 * size, y })
     }
 
-    /// Whether a radius, not below the least one, is at the axis.
+    /// Whether a radius counts as on the axis; radii have been raised to `tip` at least.
     pub fn is_tip(&self, r: f64) -> bool {
         r <= self.tip
     }
@@ -59,16 +59,16 @@ fn values<T: Real>(p: (T, T)) -> (f64, f64) {
 
 /// The outer wall.
 pub(super) struct OuterPath<T> {
-    /// Its lowest point.
+    /// The lowest point.
     pub first: (T, T),
-    /// Its highest.
+    /// The highest point.
     pub last: (T, T),
-    /// Its strips, rings at steps included; none if it is a single circle.
+    /// The strips, including rings at steps; empty if the wall is a single circle.
     pub strips: Vec<Strip<T>>,
 }
 
 impl<T: Real> OuterPath<T> {
-    /// Stacks checked profiles; steps get the part number `ring`. `number` is asked for
+    /// Stacks checked profiles; steps get the part number `ring`. `number` is called with
     /// each radius and height in turn.
     pub fn new(
         parts: &[Profile],
@@ -114,7 +114,7 @@ impl<T: Real> OuterPath<T> {
     }
 }
 
-/// Whether the path a, b, c turns by less than a crease does.
+/// Whether the path a, b, c bends by less than the crease angle.
 fn is_smooth<T: Real>(a: (T, T), b: (T, T), c: (T, T)) -> bool {
     let (a, b, c) = (values(a), values(b), values(c));
     let (u, v) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
@@ -122,15 +122,15 @@ fn is_smooth<T: Real>(a: (T, T), b: (T, T), c: (T, T)) -> bool {
     dot >= SMOOTH_COS * libm::hypot(u.0, u.1) * libm::hypot(v.0, v.1)
 }
 
-/// Whether a path that ends at the axis arrives there nearly at a right angle.
+/// Whether a path that ends at the axis is nearly perpendicular to it there.
 fn is_dome<T: Real>(tip: (T, T), next: (T, T)) -> bool {
     let (tip, next) = (values(tip), values(next));
     (next.1 - tip.1).abs() <= DOME_SLOPE * (next.0 - tip.0).abs()
 }
 
 impl<T: Real> Strip<T> {
-    /// Closes the lower end, which is at the axis: a dome by a pole; a tip, which has no
-    /// normal of its own, by a disc that is returned and goes before the strip.
+    /// Closes the lower end, which is at the axis. A dome gets a pole. A tip has no
+    /// well-defined normal and gets a disc, which is returned and goes before the strip.
     pub fn close_start(&mut self) -> Option<Strip<T>> {
         let tip = self.points[0];
         if is_dome(tip, self.points[1]) {
@@ -145,7 +145,7 @@ impl<T: Real> Strip<T> {
         })
     }
 
-    /// Closes the upper end likewise; the disc goes after the strip.
+    /// Closes the upper end in the same way; the disc goes after the strip.
     pub fn close_end(&mut self) -> Option<Strip<T>> {
         let k = self.points.len() - 1;
         let tip = self.points[k];
@@ -161,7 +161,8 @@ impl<T: Real> Strip<T> {
     }
 }
 
-/// The height of the floor inside: what it is raised to, or as the wall is thick.
+/// Returns the height of the floor inside: the raised height or the wall's thickness,
+/// whichever is higher.
 pub(super) fn floor_height<T: Real>(bottom: T, top: T, wall: Wall<T>) -> T {
     let share = |s: f64| (top - bottom) * top.constant(s);
     let least = |a: T, b: T| if a.value() < b.value() { a } else { b };
@@ -170,8 +171,8 @@ pub(super) fn floor_height<T: Real>(bottom: T, top: T, wall: Wall<T>) -> T {
     bottom + if thick.value() < raised.value() { raised } else { thick }
 }
 
-/// The inner wall from the rim, inside `last`, down to a height: its strips, its first
-/// and its last point. It has creases where the outer wall has them.
+/// Returns the inner wall from the rim, inside `last`, down to a height: its strips, and
+/// its first and last point. It has creases where the outer wall has them.
 pub(super) fn inner_wall<T: Real>(
     outer: &[Strip<T>],
     last: (T, T),
@@ -194,7 +195,7 @@ pub(super) fn inner_wall<T: Real>(
                 break;
             }
             let q = if y.value() < down_to.value() {
-                // The last piece ends at the floor.
+                // The last segment ends at the floor.
                 let t = (down_to - *y).over(above.1 - *y);
                 (bore(*r + t * (above.0 - *r)), down_to)
             } else {

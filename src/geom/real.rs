@@ -1,28 +1,28 @@
-//! Numbers that kinematics and profiles are written for: plain doubles, and variables of
-//! a tape that gives the derivatives of the same computation in reverse. So values and
-//! gradients come from one text.
+//! Numbers for kinematics and profiles: plain doubles, or variables of a tape that
+//! differentiates the same computation in reverse mode. So values and gradients come from
+//! the same code.
 
 use std::cell::RefCell;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// What is needed of a number.
+/// The operations on numbers.
 pub(super) trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// The same as a double.
+    /// The value as a double.
     fn value(self) -> f64;
-    /// A constant beside this number.
+    /// A constant of the same type, on the same tape.
     fn constant(self, x: f64) -> Self;
-    /// A function of it, by its value and derivative there.
+    /// A function of this number, given by its value and derivative there.
     fn map(self, value: f64, slope: f64) -> Self;
 
-    /// Square root; of 0 it has the derivative 0.
+    /// The square root, with derivative 0 at 0.
     fn sqrt(self) -> Self {
         let r = self.value().sqrt();
         self.map(r, if r > 0.0 { 0.5 / r } else { 0.0 })
     }
 
-    /// Its inverse.
+    /// The reciprocal.
     fn recip(self) -> Self {
         let r = 1.0 / self.value();
         self.map(r, -r * r)
@@ -30,7 +30,7 @@ pub(super) trait Real:
 
     /// The angle of the direction (x, self), from -pi to pi.
     fn atan2(self, x: Self) -> Self;
-    /// The quotient.
+    /// The quotient self / o.
     fn over(self, o: Self) -> Self;
 }
 
@@ -56,8 +56,8 @@ impl Real for f64 {
     }
 }
 
-/// The record of a computation: for each variable, the two it came from and its
-/// derivatives by them.
+/// The record of a computation: for each variable, its two operands and the partial
+/// derivatives with respect to them.
 #[derive(Default)]
 pub(super) struct Tape(RefCell<Vec<[(u32, f64); 2]>>);
 
@@ -70,7 +70,7 @@ pub(super) struct Var<'t> {
 }
 
 impl Tape {
-    /// A new independent variable.
+    /// Adds an independent variable.
     pub fn variable(&self, value: f64) -> Var<'_> {
         self.push(value, [(0, 0.0); 2])
     }
@@ -81,8 +81,8 @@ impl Tape {
         Var { tape: self, index: records.len() as u32 - 1, value }
     }
 
-    /// The derivatives of the sum of `outputs`, each times its factor, by every variable
-    /// of the tape.
+    /// Returns the derivatives of the weighted sum of `outputs` with respect to every
+    /// variable of the tape.
     pub fn reverse<'t>(&'t self, outputs: impl Iterator<Item = (Var<'t>, f64)>) -> Vec<f64> {
         let records = self.0.borrow();
         let mut slopes = vec![0.0; records.len()];
@@ -102,7 +102,7 @@ impl Tape {
 }
 
 impl Var<'_> {
-    /// Its place in what [`Tape::reverse`] gives.
+    /// The index in the result of [`Tape::reverse`].
     pub fn index(&self) -> usize {
         self.index as usize
     }
@@ -162,11 +162,11 @@ impl Real for Var<'_> {
     }
 }
 
-/// A vector of such numbers.
+/// A 3-vector of numbers.
 #[derive(Clone, Copy)]
 pub(super) struct V3<T>(pub [T; 3]);
 
-/// A matrix of such numbers, by rows.
+/// A 3 x 3 matrix of numbers, by rows.
 #[derive(Clone, Copy)]
 pub(super) struct M3<T>(pub [[T; 3]; 3]);
 
@@ -217,13 +217,13 @@ impl<T: Real> M3<T> {
         M3([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.0[j][i])))
     }
 
-    /// Columns times the numbers of a vector.
+    /// Scales each column by a component of a vector.
     pub fn scaled(self, s: V3<T>) -> Self {
         M3(self.0.map(|row| [0, 1, 2].map(|j| row[j] * s.0[j])))
     }
 
-    /// The rotation by a rotation vector, its axis times its angle (Rodrigues' formula);
-    /// smooth also at 0.
+    /// The rotation by a rotation vector, axis times angle (Rodrigues' formula); smooth
+    /// also at 0.
     pub fn from_rotation_vector(v: V3<T>) -> Self {
         let square = v.dot(v);
         let q = square.value();
@@ -248,7 +248,7 @@ impl<T: Real> M3<T> {
         ])
     }
 
-    /// Rz Ry Rx.
+    /// The rotation Rz Ry Rx.
     pub fn from_angles(angles: V3<T>) -> Self {
         let [x, y, z] = angles.0.map(|a| {
             let (s, c) = (libm::sin(a.value()), libm::cos(a.value()));

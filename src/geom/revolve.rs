@@ -1,11 +1,11 @@
-//! Surfaces of revolution round the y axis, from a path in the half plane (r, y).
+//! Surfaces of revolution around the y axis, from a path in the half plane (r, y).
 //!
-//! The path runs with the outside on its right: up along an outer wall, inwards over a
-//! top. It is cut into strips that are smooth in themselves; between strips the surface
-//! has a crease unless a strip says otherwise. Topology depends on the numbers of points
-//! only and is shared between surfaces of the same numbers: positions and normals are all
-//! that a new profile costs. Invariant: the mesh is the same whether its topology was
-//! found in the cache or not.
+//! The outside is on the right of the path: it goes up along an outer wall, and inwards
+//! over a top. It is cut into smooth strips; between strips the surface has a crease
+//! unless a strip says otherwise. Topology depends only on discrete data, such as the
+//! numbers of points, and is shared between surfaces that agree in them, so a new profile
+//! costs only positions and normals. Invariant: the mesh does not depend on whether its
+//! topology was in the cache.
 
 use super::edges::pair_edges;
 use super::real::Real;
@@ -17,29 +17,30 @@ use std::sync::Arc;
 /// A smooth piece of the path.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Strip<T = f64> {
-    /// Points (r, y); consecutive ones differ. Radius 0 is a pole and allowed at the very
-    /// ends of the strip only.
+    /// Points (r, y); consecutive ones differ. Radius 0 is a pole, and allowed only at
+    /// the ends of the strip.
     pub points: Vec<(T, T)>,
     /// The part of each segment.
     pub parts: Vec<u16>,
-    /// Whether the seam to the strip before is no crease although its normals differ.
+    /// Whether the seam to the previous strip is smooth although its normals differ.
     pub blend: bool,
 }
 
-/// What the topology of a surface depends on.
+/// The data that determine the topology of a surface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Signature {
     sides: u32,
     closed: bool,
     part_count: u16,
-    /// Whether the path never turns down: it cannot cross itself then.
+    /// Whether the path never goes down, and so cannot cross itself.
     rising: bool,
-    /// For each strip: points, poles and blend; then the parts of its segments.
+    /// For each strip: the number of points, flags for poles and blend, then the parts of
+    /// its segments.
     strips: Vec<u32>,
 }
 
-/// Sweeps strips, each beginning where the one before ends; `closed` joins the last to
-/// the first.
+/// Sweeps strips, each of which starts where the previous one ends; `closed` joins the
+/// last to the first.
 pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Mesh {
     let Shared { topology, circle } = shared(strips, sides, closed, part_count);
     let n = sides as usize;
@@ -67,7 +68,7 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
     Mesh { positions, normals, topology }
 }
 
-/// The topology of [`revolve`].
+/// Returns the topology of [`revolve`]'s mesh.
 pub(super) fn topology_of(
     strips: &[Strip],
     sides: u32,
@@ -86,8 +87,8 @@ fn shared(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Shared
     })
 }
 
-/// From the derivatives of something by the vertices of [`revolve`] to those by each
-/// point (r, y) of the path in turn.
+/// Pulls derivatives with respect to the vertices of [`revolve`]'s mesh back to each
+/// point (r, y) of the path, in order.
 pub(super) fn vjp_rings<T: Real>(
     strips: &[Strip<T>],
     sides: u32,
@@ -135,26 +136,26 @@ fn signature(
     Signature { sides, closed, part_count, rising, strips: numbers }
 }
 
-/// What surfaces of one signature have in common.
+/// The data that surfaces of one signature share.
 #[derive(Clone)]
 struct Shared {
     topology: Arc<Topology>,
     circle: Arc<[(f64, f64)]>,
 }
 
-/// The number of topologies kept, those used last.
+/// The number of topologies in the cache, which keeps the most recently used.
 const KEPT: usize = 16;
-/// Larger ones, in triangles, are not kept.
+/// The maximum size of a cached topology, in triangles.
 const KEPT_TRIANGLES: usize = 200_000;
 thread_local! {
     static CACHE: RefCell<Vec<(Signature, Shared)>> = const { RefCell::new(Vec::new()) };
 }
 
-/// What was made for this signature before on this thread, or is made now.
+/// Returns the shared data from this thread's cache, or makes it.
 fn cached(signature: Signature, make: impl FnOnce() -> Shared) -> Shared {
     let found = CACHE.with_borrow_mut(|cache| {
         let i = cache.iter().position(|(s, _)| *s == signature)?;
-        // The one used last stands last.
+        // The most recently used is last.
         cache[i..].rotate_left(1);
         cache.last().map(|(_, shared)| shared.clone())
     });
@@ -175,7 +176,7 @@ fn cached(signature: Signature, make: impl FnOnce() -> Shared) -> Shared {
 fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topology {
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     let mut parts = Vec::new();
-    // For each vertex the point of the surface it stands for, and the strip of each face.
+    // The surface point of each vertex, and the strip of each face.
     let mut weld: Vec<u32> = Vec::new();
     let mut strip_of = Vec::new();
     let mut end: Option<Vec<u32>> = None;
@@ -190,7 +191,7 @@ fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topo
                 (first, count)
             })
             .collect();
-        // The first ring lies on the last one of the strip before.
+        // The first ring coincides with the last one of the previous strip.
         if let (Some(end), Some((first, count))) = (&end, rings.first())
             && end.len() == *count as usize
         {
@@ -221,8 +222,8 @@ fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topo
             .map(|(first, count)| (*first..first + count).map(|v| weld[v as usize]).collect());
     }
     if closed && let Some(end) = end {
-        // The last ring is the first one: its points, numbered one after another, take
-        // their names wherever used.
+        // The last ring coincides with the first one: its points, which have consecutive
+        // numbers, are renumbered to the first ring's.
         let from = end.first().copied().unwrap_or(0);
         let names = from..from + end.len() as u32;
         weld.iter_mut().filter(|w| names.contains(w)).for_each(|w| *w -= from);

@@ -1,9 +1,9 @@
-//! Solids: meshes placed in the world, alone or in groups, and their named points. Cheap
-//! to clone and to move: meshes are shared.
+//! Solids: meshes placed in the world, alone or in groups, and their landmarks. Meshes
+//! are shared, so solids are cheap to clone and move.
 //!
-//! Not a volume: members may overlap, nothing is cut or merged. Invariants: a member's
-//! parts are numbered after those of the members before it (numbers beyond 65534 are all
-//! drawn as that one); no two landmarks have the same name.
+//! A solid is not a volume: members may overlap, and nothing is cut or merged.
+//! Invariants: a member's parts are numbered after those of the members before it
+//! (numbers beyond 65534 are all drawn as that one); all landmarks have different names.
 
 use super::detail::{Coarse, Detail};
 use super::landmark::{Landmark, unique};
@@ -19,69 +19,69 @@ use std::sync::{Arc, LazyLock, Weak};
 pub struct Instance {
     /// The mesh.
     pub mesh: Arc<Mesh>,
-    /// Where it is.
+    /// The placement.
     pub affine: Affine,
-    /// What is added to its part numbers.
+    /// The offset added to its part numbers.
     pub first_part: u16,
-    /// Coarser versions of the mesh, where there are some.
+    /// Coarser versions of the mesh, if it has any.
     pub detail: Option<Arc<Detail>>,
 }
 
 impl Instance {
-    /// The coarsest version of its mesh that is at most `error` (the mesh's units) from
-    /// every vertex it leaves out; `None` if that is the mesh itself.
+    /// Returns the coarsest version of the mesh that is within `error` (in the mesh's
+    /// units) of every vertex it omits; `None` if that is the mesh itself.
     pub fn coarse(&self, error: f64) -> Option<Arc<Coarse>> {
         self.detail.as_ref()?.within(&self.mesh, error)
     }
 
-    /// The centre and radius of a ball around it, in world coordinates, where it has
-    /// coarser versions.
+    /// Returns the centre and radius of a ball around the mesh, in world coordinates;
+    /// `None` if it has no coarser versions.
     pub fn ball(&self) -> Option<(DVec3, f64)> {
         let (centre, radius) = self.detail.as_ref()?.ball(&self.mesh);
         Some((self.affine.point(centre), radius * self.affine.stretch()))
     }
 }
 
-/// A list that is made when somebody first looks.
+/// A list that is computed on first use.
 type Lazy<T> = LazyLock<Arc<[T]>, Box<dyn FnOnce() -> Arc<[T]> + Send>>;
 
 /// Placed meshes.
 #[derive(Clone)]
 pub struct Solid {
     instances: Meshes,
-    /// What it was put together from, if it was.
+    /// The members, if the solid is a group.
     group: Option<Arc<Group>>,
     landmarks: Arc<Lazy<Landmark>>,
-    /// How many lists within each other wait for somebody to look.
+    /// The depth of nested lists that have not been computed yet.
     waiting: u32,
 }
 
 /// The members of a group.
 struct Group {
     lists: Box<[Meshes]>,
-    /// How many meshes they have.
+    /// The number of meshes in all lists.
     count: usize,
 }
 
-/// Placed meshes that do not change; solids that have a list in common share it.
+/// An immutable list of placed meshes, shared by the solids that contain it.
 #[derive(Clone)]
 pub(crate) struct Meshes(Arc<Lazy<Instance>>);
 
-/// Tells a list of meshes from all others, also when it is gone.
+/// Identifies a list of meshes, even after it has been dropped.
 pub(crate) struct MeshesMark(Weak<Lazy<Instance>>);
 
 impl Meshes {
-    /// What it is told by.
+    /// Returns a mark that identifies this list.
     pub fn mark(&self) -> MeshesMark {
         MeshesMark(Arc::downgrade(&self.0))
     }
 
-    /// Whether it is the list that the mark is of.
+    /// Whether the mark identifies this list.
     pub fn is(&self, mark: &MeshesMark) -> bool {
         std::ptr::eq(mark.0.as_ptr(), Arc::as_ptr(&self.0))
     }
 
-    /// How many part numbers they need.
+    /// The number of part numbers in use.
     fn part_count(&self) -> u16 {
         let after = |i: &Instance| i.first_part.saturating_add(i.mesh.topology.part_count);
         self.iter().map(after).max().unwrap_or(0)
@@ -96,7 +96,8 @@ impl Deref for Meshes {
     }
 }
 
-/// The most that wait: each is a call within a call when somebody looks.
+/// The maximum depth of uncomputed lists, which bounds the recursion when they are
+/// computed.
 const MOST_WAITING: u32 = 64;
 
 impl fmt::Debug for Solid {
@@ -108,25 +109,25 @@ impl fmt::Debug for Solid {
     }
 }
 
-/// The derivatives of something by what a placed solid is made from.
+/// Derivatives with respect to the inputs of [`Solid::placed`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedGradient {
-    /// By the placement's linear part.
+    /// With respect to the placement's linear part.
     pub linear: DMat3,
-    /// By its shift.
+    /// With respect to its translation.
     pub shift: DVec3,
-    /// By the vertices before they were placed.
+    /// With respect to the vertices before placement.
     pub vertices: Vec<DVec3>,
-    /// By the landmarks before they were placed.
+    /// With respect to the landmarks before placement.
     pub landmarks: Vec<DVec3>,
 }
 
-/// A list for when somebody looks.
+/// Returns a list that is computed on first use.
 fn later<T: 'static>(make: impl FnOnce() -> Arc<[T]> + Send + 'static) -> Arc<Lazy<T>> {
     Arc::new(LazyLock::new(Box::new(make)))
 }
 
-/// A list that is there already.
+/// Returns a list that is already computed.
 fn ready<T: Send + Sync + 'static>(list: Arc<[T]>) -> Arc<Lazy<T>> {
     let lazy = later(|| list);
     LazyLock::force(&lazy);
@@ -134,7 +135,7 @@ fn ready<T: Send + Sync + 'static>(list: Arc<[T]>) -> Arc<Lazy<T>> {
 }
 
 impl Solid {
-    /// A mesh as it is.
+    /// A solid of one mesh, placed by the identity.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
         Solid::of(Arc::new([Instance {
             mesh,
@@ -144,20 +145,20 @@ impl Solid {
         }]))
     }
 
-    /// A mesh that will be seen many times, such as a file's: coarser versions of it are
-    /// worked out when a view first wants one, once for all placements of the solid
-    /// (about a second for 100,000 triangles).
+    /// A mesh that will be drawn many times, such as a file's. Its coarser versions are
+    /// computed when a view first needs one, once for all placements of the solid (in
+    /// about a second for 100,000 triangles).
     pub fn lasting(mesh: Mesh) -> Solid {
         Solid::detailed(mesh, Detail::rigid())
     }
 
-    /// A mesh with coarser versions.
+    /// A solid of one mesh with coarser versions.
     pub(super) fn detailed(mesh: Mesh, detail: Detail) -> Solid {
         let (mesh, detail) = (Arc::new(mesh), Some(Arc::new(detail)));
         Solid::of(Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0, detail }]))
     }
 
-    /// Placed meshes, without named points.
+    /// A solid of placed meshes, without landmarks.
     pub fn of(instances: Arc<[Instance]>) -> Solid {
         Solid {
             instances: Meshes(ready(instances)),
@@ -167,14 +168,14 @@ impl Solid {
         }
     }
 
-    /// The same with these named points in place of its own (world coordinates); a name
-    /// that occurs again gets `#2`, `#3`, … appended.
+    /// Replaces the landmarks (in world coordinates); repeated names get `#2`, `#3`, …
+    /// appended.
     #[must_use]
     pub fn with_landmarks(self, landmarks: impl Into<Arc<[Landmark]>>) -> Solid {
         Solid { landmarks: ready(unique(landmarks.into().iter().cloned())), ..self }
     }
 
-    /// As [`Solid::with_landmarks`], made when somebody first looks.
+    /// As [`Solid::with_landmarks`], with landmarks computed on first use.
     #[must_use]
     pub fn with_landmarks_of<L>(self, make: impl FnOnce() -> L + Send + 'static) -> Solid
     where
@@ -183,12 +184,12 @@ impl Solid {
         Solid { landmarks: later(move || unique(make())), ..self }
     }
 
-    /// Its named points, in world coordinates.
+    /// The landmarks, in world coordinates.
     pub fn landmarks(&self) -> &[Landmark] {
         &self.landmarks
     }
 
-    /// Placed meshes that are made when somebody first looks, which costs nothing where
+    /// A solid of placed meshes that are computed on first use, which saves the work if
     /// only landmarks matter.
     pub fn of_parts<M>(make: impl FnOnce() -> M + Send + 'static) -> Solid
     where
@@ -198,12 +199,12 @@ impl Solid {
         Solid { instances, group: None, landmarks: ready(Arc::default()), waiting: 1 }
     }
 
-    /// Its meshes.
+    /// The placed meshes.
     pub fn instances(&self) -> &[Instance] {
         &self.instances
     }
 
-    /// Moved by an affine map.
+    /// Returns the solid moved by an affine map.
     pub fn placed(&self, by: Affine) -> Solid {
         let of = self.instances.clone();
         let placed =
@@ -216,7 +217,7 @@ impl Solid {
         Solid { instances, group: None, landmarks, waiting: self.waiting + 1 }.looked_at_in_time()
     }
 
-    /// The same, made at once where too much waits.
+    /// Computes the lists now if they are nested too deeply.
     fn looked_at_in_time(mut self) -> Solid {
         if self.waiting >= MOST_WAITING {
             LazyLock::force(&self.instances.0);
@@ -226,7 +227,8 @@ impl Solid {
         self
     }
 
-    /// About how many numbers there are in meshes that it alone has.
+    /// Estimates the count of numbers in meshes that no other solid shares; 0 if they are
+    /// not computed yet.
     pub fn own_numbers(&self) -> usize {
         if self.waiting > 0 {
             return 0;
@@ -235,7 +237,8 @@ impl Solid {
         own.map(|i| 3 * i.mesh.positions.len() + 5 * i.mesh.topology.triangles.len()).sum()
     }
 
-    /// Several together; part numbers follow one another, and so do landmarks.
+    /// Groups solids. Their parts are numbered consecutively, and their landmarks are
+    /// concatenated.
     pub fn group(solids: &[Solid]) -> Solid {
         let lists: Box<[Meshes]> = solids.iter().map(|s| s.instances.clone()).collect();
         let group = Arc::new(Group { lists, count: solids.iter().map(Solid::mesh_count).sum() });
@@ -264,8 +267,8 @@ impl Solid {
         self.group.as_ref().map_or_else(|| self.instances().len(), |group| group.count)
     }
 
-    /// Its meshes in turn, in the lists of the members that it was put together from.
-    /// They have part numbers of their own.
+    /// The meshes in order, as the lists of the group's members. Each list has its own
+    /// part numbers.
     pub(crate) fn lists(&self) -> impl Iterator<Item = &Meshes> {
         self.group
             .as_ref()
@@ -278,14 +281,14 @@ impl Solid {
         self.instances.part_count()
     }
 
-    /// The smallest box around all vertices; `None` if there are none.
+    /// Returns the bounding box of all vertices; `None` if there are none.
     pub fn bounds(&self) -> Option<Bounds> {
         Bounds::around(self.vertices())
     }
 
-    /// Moved so that the centre of its box is the origin; with `fit` also scaled so that
-    /// half the box's longest edge is 1. Left as it is where no finite placement does
-    /// that.
+    /// Returns the solid translated so that the centre of its bounding box is the origin;
+    /// with `fit`, also scaled so that half the box's longest edge is 1. If that
+    /// placement is not finite, the solid is unchanged.
     pub fn centred(&self, fit: bool) -> Solid {
         let Some(b) = self.bounds() else { return self.clone() };
         let half = 0.5 * b.size().max_element();
@@ -299,16 +302,16 @@ impl Solid {
         self.instances.iter().map(|i| i.mesh.positions.len()).sum()
     }
 
-    /// The vertices of all its meshes in turn, in world coordinates.
+    /// The vertices of all its meshes in order, in world coordinates.
     pub fn vertices(&self) -> impl Iterator<Item = DVec3> {
         self.instances
             .iter()
             .flat_map(|i| i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3())))
     }
 
-    /// The vector-Jacobian product of [`Solid::placed`]: from the derivatives of
-    /// something by the vertices and landmarks of the placed solid, in world coordinates.
-    /// No vertices: nothing depends on them.
+    /// The vector-Jacobian product of [`Solid::placed`], given derivatives with respect
+    /// to the vertices and landmarks of the placed solid, in world coordinates.
+    /// `by_vertex` is empty if nothing depends on the vertices.
     pub fn vjp_placed(
         &self,
         by: Affine,
@@ -318,7 +321,7 @@ impl Solid {
         let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
         let back = by.0.matrix3.transpose();
         let mut pull = |p: DVec3, by: &DVec3| {
-            // Most vertices make no contour.
+            // Most vertices are not on a contour.
             if *by == DVec3::ZERO {
                 return DVec3::ZERO;
             }
@@ -336,8 +339,9 @@ impl Solid {
         PlacedGradient { linear, shift, vertices, landmarks }
     }
 
-    /// The vector-Jacobian product of [`Solid::centred`], like that of
-    /// [`Solid::vjp_placed`]: by vertices and landmarks.
+    /// The vector-Jacobian product of [`Solid::centred`], with arguments as in
+    /// [`Solid::pull_placed`]. Returns the derivatives with respect to vertices and
+    /// landmarks.
     pub fn vjp_centred(
         &self,
         fit: bool,
@@ -356,7 +360,7 @@ impl Solid {
             self.vjp_placed(by, by_vertex, by_landmark);
         vertices.resize(self.vertex_count(), DVec3::ZERO);
         let by_centre = shift * -scale;
-        // By half the longest edge, through the scale.
+        // The derivative with respect to half the longest edge, through the scale.
         let trace = linear.x_axis.x + linear.y_axis.y + linear.z_axis.z;
         let by_half = if scale == 1.0 / half && fit {
             (shift.dot(centre) - trace) * scale * scale
@@ -368,7 +372,7 @@ impl Solid {
                 size[axis] == size.max_element() && (0..axis).all(|a| size[a] < size[axis]);
             let by_half = if longest { 0.5 * by_half } else { 0.0 };
             for (end, sign) in [(b.max[axis], 1.0), (b.min[axis], -1.0)] {
-                // The first vertex at that side of the box.
+                // The first vertex on that side of the box.
                 if let Some(v) = self.vertices().position(|p| p[axis] == end) {
                     vertices[v][axis] += 0.5 * by_centre[axis] + sign * by_half;
                 }
@@ -377,9 +381,9 @@ impl Solid {
         (vertices, landmarks)
     }
 
-    /// One mesh in world coordinates, for export: the same faces, normals and creases as
-    /// its members, in order. Where a placement squashes faces flat, the mesh is built
-    /// anew from what is left.
+    /// Returns one mesh in world coordinates, for export: the faces, normals and creases
+    /// of all members, in order. If a placement flattens faces, the mesh is rebuilt from
+    /// the remaining ones.
     ///
     /// # Errors
     /// As [`Mesh::new`].
@@ -395,7 +399,8 @@ impl Solid {
         for i in self.instances.iter() {
             let (first, first_face) = (positions.len() as u32, t.triangles.len() as u32);
             let turn = i.affine.normal_matrix();
-            // Squashed onto a point along a line, normals have no image; any one will do.
+            // If the mesh is squashed to a line or point, normals have no image; any one
+            // will do.
             let normal = |n: &glam::Vec3| (turn * n.as_dvec3()).normalize_or(DVec3::Y).as_vec3();
             positions
                 .extend(i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3()).as_vec3()));
@@ -431,7 +436,7 @@ impl Solid {
             let p = face.map(|v| positions[v as usize].as_dvec3());
             (p[1] - p[0]).cross(p[2] - p[0]).length_squared() > 0.0
         };
-        // Also false where a coordinate is not finite, which `Mesh::new` then names.
+        // Also false if a coordinate is not finite, which `Mesh::new` then reports.
         if t.triangles.is_empty()
             || !t.triangles.iter().all(whole)
             || !positions.iter().all(|p| p.is_finite())

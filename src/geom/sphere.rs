@@ -1,5 +1,5 @@
-//! Spheres, as meridians and rings; not subdivided solids. Invariant: every normal is the
-//! exact one of the sphere.
+//! Spheres made of meridians and rings. Invariant: normals are exactly those of the
+//! sphere.
 
 use super::detail::{Detail, Turned};
 use super::lathe::SMALLEST;
@@ -7,16 +7,16 @@ use super::revolve::{Strip, revolve};
 use super::{GeomError, Mesh, Solid};
 use glam::DVec3;
 
-/// A sphere round the origin with `sides` meridians and half as many rings.
+/// Returns a sphere around the origin with `sides` meridians and half as many rings.
 ///
 /// # Errors
-/// Unless the radius is from 1e-30 to 1e6, and there are 4 to 1024 sides.
+/// A radius outside 1e-30 to 1e6; fewer than 4 or more than 1024 sides.
 pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
     turned(radius, sides).map(|(mesh, _)| mesh)
 }
 
 impl Solid {
-    /// A [`sphere`] that knows coarser versions of itself.
+    /// Returns a [`sphere`] with coarser versions.
     ///
     /// # Errors
     /// As [`sphere`].
@@ -25,7 +25,7 @@ impl Solid {
     }
 }
 
-/// The mesh, and what it was made of.
+/// Returns the mesh, and the data that it was made from.
 fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
     if !(SMALLEST..=1e6).contains(&radius) {
         return Err(GeomError::domain(format!(
@@ -50,8 +50,8 @@ fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
     Ok((mesh, Turned::new(strips, sides, false, 1)))
 }
 
-/// From the derivatives of something by the vertices of a sphere of this radius to that
-/// by the radius.
+/// Pulls derivatives with respect to the vertices of a sphere of this radius back to the
+/// radius.
 pub fn vjp_sphere(radius: f64, mesh: &Mesh, by_vertex: &[DVec3]) -> f64 {
     mesh.positions.iter().zip(by_vertex).map(|(p, g)| p.as_dvec3().dot(*g)).sum::<f64>() / radius
 }

@@ -1,5 +1,5 @@
-//! Operators from the entries of a file, checked against their tensors: what is taken up
-//! here cannot fail when it runs.
+//! Builds operators from the entries of a file and checks them against their tensors, so
+//! that running them cannot fail.
 
 use super::NetworkError;
 use super::convolution::{Convolution, Depthwise, Transposed};
@@ -10,10 +10,10 @@ use super::resampling::Alignment;
 use super::schema::{TRANSPOSED, code};
 use super::shape::{Clip, Size, Window};
 
-/// The longest side of a window, and of a step.
+/// The maximum side of a window, and the maximum stride.
 const LONGEST: usize = 64;
 
-/// An operator of the file: its options, and what it reads and fills.
+/// An operator in the file: its options, inputs and output.
 pub(super) struct Entry<'a> {
     pub code: i32,
     pub custom: &'a [u8],
@@ -24,7 +24,7 @@ pub(super) struct Entry<'a> {
 
 type Fit<T> = Result<T, Unfit>;
 
-/// Why an operator cannot be taken up.
+/// The reason why an operator is rejected.
 pub(super) enum Unfit {
     File(NetworkError),
     Operator(String),
@@ -58,8 +58,8 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A window of this size; options have the padding first, then the steps along
-    /// columns and rows.
+    /// Returns a window of this size. The options start with the padding, then the
+    /// strides along columns and rows.
     fn window(&self, size: [usize; 2]) -> Fit<Window> {
         if size.iter().any(|s| !(1..=LONGEST).contains(s)) {
             return Err("a window has an invalid size".into());
@@ -83,7 +83,7 @@ impl<'a> Entry<'a> {
 }
 
 impl File<'_> {
-    /// The operator of an entry, and which of its inputs it reads when it runs.
+    /// Returns the operator of an entry, and the inputs that it reads when it runs.
     pub fn operator(&mut self, e: &Entry) -> Fit<(Operator, Vec<usize>)> {
         let first = *e.inputs.first().ok_or("it has no input")?;
         let (input, output) = (self.shapes[first].clone(), self.shapes[e.output].clone());
@@ -225,7 +225,7 @@ impl File<'_> {
                     } else {
                         (b_shape, a_shape)
                     };
-                // The same shape, or a number for each channel, or one number.
+                // The same shape, one number per channel, or a single number.
                 let channels =
                     short.iter().rposition(|n| *n != 1).map_or(&[][..], |last| &short[last..]);
                 let broadcast = short.iter().filter(|n| **n != 1).count() <= 1
@@ -258,7 +258,7 @@ impl File<'_> {
         }
     }
 
-    /// The third input, a number for each channel; zeros if there is none.
+    /// Returns the third input, with a number for each channel; zeros if it is missing.
     fn biases(&mut self, e: &Entry, channels: usize) -> Fit<Vec<f32>> {
         let Some(t) = e.inputs.get(2) else { return Ok(vec![0.0; channels]) };
         let biases = self.numbers(*t)?;

@@ -1,16 +1,16 @@
-//! Convolutions as products of matrices: a row for each pixel of the output, a column for
-//! each channel.
+//! Convolutions as matrix products: a row for each output pixel, a column for each
+//! channel.
 //!
-//! Every sum is taken in the order of the weights, multiplied and added in two roundings,
-//! so that it has the same bits whatever the width of the processor's instructions.
+//! Sums are taken in the order of the weights, with multiplication and addition rounded
+//! separately, so the bits do not depend on the width of the processor's instructions.
 
 use super::shape::{Clip, Size, Window};
 use crate::num::simd::vectorised;
 
-/// Columns of a panel of weights, which are summed together.
+/// The number of columns in a panel of weights, which are summed together.
 const PANEL: usize = 16;
 
-/// Rows that are summed together.
+/// The number of rows summed together.
 const ROWS: usize = 4;
 
 /// A convolution with its weights and biases.
@@ -18,18 +18,18 @@ const ROWS: usize = 4;
 pub(super) struct Convolution {
     pub window: Window,
     channels: usize,
-    /// Weights of a channel: window rows, window columns, channels of the input.
+    /// The number of weights per channel: window rows x window columns x input channels.
     depth: usize,
-    /// By panel: a row of [`PANEL`] weights for each of `depth`; and the biases. Both
-    /// padded with zeros.
+    /// By panel: a row of [`PANEL`] weights for each of `depth`. Like the biases, padded
+    /// with zeros.
     panels: Vec<f32>,
     biases: Vec<f32>,
     clip: Clip,
 }
 
 impl Convolution {
-    /// `weights` by channel of the output, row and column of the window, channel of the
-    /// input; a bias for each channel.
+    /// Takes `weights` by output channel, window row, window column and input channel,
+    /// and a bias for each output channel.
     pub fn new(window: Window, weights: &[f32], biases: &[f32], clip: Clip) -> Convolution {
         let channels = biases.len();
         let depth = weights.len() / channels.max(1);
@@ -50,7 +50,7 @@ impl Convolution {
         }
         let before = self.window.before(from, to);
         let [_, width] = self.window.size;
-        // A row of output pixels at a time.
+        // One row of output pixels at a time.
         let mut patches = vec![0.0; to.width * self.depth];
         for row in 0..to.height {
             patches.fill(0.0);
@@ -65,7 +65,7 @@ impl Convolution {
         }
     }
 
-    /// Rows of `depth` values, each times the weights of all channels.
+    /// Multiplies rows of `depth` values with the weights of all channels.
     fn product(&self, rows: &[f32], out: &mut [f32]) {
         vectorised(
             #[inline(always)]
@@ -111,11 +111,11 @@ impl Convolution {
     }
 }
 
-/// A convolution of each channel by itself.
+/// A convolution that treats each channel separately.
 #[derive(Debug)]
 pub(super) struct Depthwise {
     pub window: Window,
-    /// By row and column of the window: a weight for each channel.
+    /// By row and column of the window, a weight for each channel.
     pub weights: Vec<f32>,
     pub biases: Vec<f32>,
     pub clip: Clip,
@@ -156,19 +156,18 @@ impl Depthwise {
     }
 }
 
-/// A convolution transposed, with biases: each pixel of the input adds a window to the
-/// output (MediaPipe's own operator).
+/// A transposed convolution with biases: each input pixel adds a window to the output
+/// (MediaPipe's own operator).
 #[derive(Debug)]
 pub(super) struct Transposed {
     pub window: Window,
-    /// By channel of the output, row and column of the window: a weight for each channel
-    /// of the input.
+    /// By output channel, row and column of the window, a weight for each input channel.
     pub weights: Vec<f32>,
     pub biases: Vec<f32>,
 }
 
 impl Transposed {
-    /// The size of the output: a step for each pixel.
+    /// Returns the size of the output, which has one stride per input pixel.
     pub fn output(&self, from: Size) -> Size {
         let [sy, sx] = self.window.stride;
         Size { height: from.height * sy, width: from.width * sx, channels: self.biases.len() }

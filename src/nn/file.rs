@@ -1,5 +1,5 @@
 //! From the bytes of a TFLite file to a network: constants, operators with their weights,
-//! and a check that all of them fit together.
+//! and checks that they fit together.
 
 use super::NetworkError;
 use super::assemble::{Entry, Unfit};
@@ -12,22 +12,21 @@ use std::collections::{HashMap, HashSet};
 
 type Result<T> = core::result::Result<T, NetworkError>;
 
-/// The most numbers in one tensor, and in all constants together.
+/// The maximum number of elements in one tensor, and in all constants together.
 const MOST_NUMBERS: usize = 1 << 26;
-/// The most numbers in all tensors that are computed, and multiplications: some ten times
-/// those of the largest network of a person.
+/// The maximum number of elements in all computed tensors, and of multiplications: about
+/// ten times those of the largest person detector.
 const MOST_COMPUTED: usize = 1 << 29;
 const MOST_WORK: usize = 1 << 36;
 
-/// What a file consists of, before its operators are taken up.
+/// The contents of a file, before its operators are built.
 pub(super) struct File<'a> {
     tensors: Vec<Table<'a>>,
     buffers: Vec<Table<'a>>,
     pub shapes: Vec<Vec<usize>>,
-    /// Tensors that are others in another form: those that are not sparse any more, or of
-    /// more bits.
+    /// Tensors that are other tensors in another form: made dense, or with more bits.
     same: HashMap<usize, usize>,
-    /// How many constants may still be read.
+    /// The number of constant elements that may still be read.
     left: usize,
 }
 
@@ -52,7 +51,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
         let entry = file.entry(&codes, table)?;
         let wrong =
             |why: &str| NetworkError::Operator { index, name: name(&entry), why: why.into() };
-        // Constants in another form are constants.
+        // A constant in another form is still a constant.
         if matches!(entry.code, code::DEQUANTIZE | code::DENSIFY) {
             let from = *entry.inputs.first().ok_or_else(|| wrong("it has no input"))?;
             if filled.contains(&from)
@@ -118,11 +117,11 @@ impl File<'_> {
     fn entry<'t>(&self, codes: &[Table<'t>], table: &Table<'t>) -> Result<Entry<'t>> {
         let absent = || format("an operator has an undefined code");
         let kind = codes.get(table.index(field::operator::CODE)?).ok_or_else(absent)?;
-        // Files that are older have the number in a byte.
+        // Older files have the code in a byte.
         let code =
             kind.i32(field::code::LONG, 0)?.max(i32::from(kind.u8(field::code::SHORT)? as i8));
         let inputs = table.i32s(field::operator::INPUTS)?.into_iter();
-        // An input that is left out is -1.
+        // An omitted input is -1.
         let inputs: Vec<usize> = inputs.filter_map(|i| usize::try_from(i).ok()).collect();
         let outputs = table.indices(field::operator::OUTPUTS)?;
         let [output] = outputs[..] else {
@@ -137,7 +136,7 @@ impl File<'_> {
         if tensor < self.shapes.len() { Ok(()) } else { Err(format("a tensor is missing")) }
     }
 
-    /// The bytes of a constant and its tensor, in the form that the file has it in.
+    /// Returns a constant's stored tensor, and its bytes in the file's form.
     fn constant(&self, mut tensor: usize) -> Result<(usize, &[u8])> {
         for _ in 0..=self.same.len() {
             match self.same.get(&tensor) {
@@ -153,7 +152,7 @@ impl File<'_> {
         Err(format("a constant is stored indirectly"))
     }
 
-    /// The numbers of a constant.
+    /// Returns a constant's elements.
     pub fn numbers(&mut self, tensor: usize) -> Result<Vec<f32>> {
         let (from, bytes) = self.constant(tensor)?;
         let (table, shape) = (self.tensors[from], &self.shapes[from]);
@@ -189,7 +188,7 @@ impl File<'_> {
         Ok(values)
     }
 
-    /// The whole numbers of a constant.
+    /// Returns a constant's integer elements.
     pub fn integers(&self, tensor: usize) -> Result<Vec<i32>> {
         let (from, bytes) = self.constant(tensor)?;
         match self.tensors[from].u8(field::tensor::KIND)? {

@@ -1,16 +1,16 @@
-//! FlatBuffers, as far as TFLite files need them: tables, vectors, numbers. Every offset
-//! is checked against the file.
+//! The subset of FlatBuffers that TFLite files need: tables, vectors, numbers. Every
+//! offset is checked against the file.
 
 use super::NetworkError;
 
 type Result<T> = core::result::Result<T, NetworkError>;
 
-/// A table within a file.
+/// A table in a file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Table<'a> {
     file: &'a [u8],
     at: usize,
-    /// Where its vtable is, which says where its fields are, and how long that is.
+    /// The position of the vtable, which has the offsets of the fields, and its length.
     vtable: usize,
     vtable_len: usize,
 }
@@ -32,14 +32,14 @@ fn i32_at(file: &[u8], at: usize) -> Result<i32> {
     Ok(i32::from_le_bytes(bytes_at(file, at)?))
 }
 
-/// Follows the offset that is there.
+/// Follows the offset stored at a position.
 fn follow(file: &[u8], at: usize) -> Result<usize> {
     let offset = u32::from_le_bytes(bytes_at(file, at)?) as usize;
     at.checked_add(offset).ok_or_else(cut)
 }
 
 impl<'a> Table<'a> {
-    /// The table that a file begins with, which must have this identifier.
+    /// Returns the root table of a file, which must have this identifier.
     pub fn root(file: &'a [u8], identifier: [u8; 4]) -> Result<Table<'a>> {
         if bytes_at(file, 4).ok() != Some(identifier) {
             let name = String::from_utf8_lossy(&identifier);
@@ -56,7 +56,7 @@ impl<'a> Table<'a> {
         Ok(Table { file, at, vtable, vtable_len: u16_at(file, vtable)? })
     }
 
-    /// Where a field is; `None` if it has its default.
+    /// Returns the position of a field; `None` if it has its default.
     fn field(&self, i: usize) -> Result<Option<usize>> {
         let at = 4 + 2 * i;
         if at + 2 > self.vtable_len {
@@ -75,7 +75,7 @@ impl<'a> Table<'a> {
         self.field(i)?.map_or(Ok(default), |at| i32_at(self.file, at))
     }
 
-    /// A number that says how many, or which one.
+    /// Reads a count or index.
     pub fn index(&self, i: usize) -> Result<usize> {
         usize::try_from(self.i32(i, 0)?).map_err(|_| cut())
     }
@@ -84,7 +84,7 @@ impl<'a> Table<'a> {
         self.field(i)?.map(|at| Table::new(self.file, follow(self.file, at)?)).transpose()
     }
 
-    /// Where the elements of a vector are, each of so many bytes, and those bytes.
+    /// Returns the position and bytes of a vector's elements, each of `size` bytes.
     fn vector(&self, i: usize, size: usize) -> Result<(usize, &'a [u8])> {
         let Some(at) = self.field(i)? else { return Ok((0, &[])) };
         let start = follow(self.file, at)?;
@@ -110,7 +110,7 @@ impl<'a> Table<'a> {
             .collect())
     }
 
-    /// Numbers that say how many, or which ones.
+    /// Reads counts or indices.
     pub fn indices(&self, i: usize) -> Result<Vec<usize>> {
         self.i32s(i)?.into_iter().map(|n| usize::try_from(n).map_err(|_| cut())).collect()
     }

@@ -1,9 +1,9 @@
 //! Neural networks: reads TFLite files of convolutional networks and runs them, on one
-//! thread and with the same bits everywhere.
+//! thread and with the same bits on every machine.
 //!
-//! As much of the format as networks that find people need: pictures one at a time,
-//! numbers of 32 or 16 bits, sparse weights. What a file may contain is checked when it
-//! is read, so that running what was read cannot fail, and takes bounded time and memory.
+//! Supports as much of the format as person detectors need: one image at a time, 32- or
+//! 16-bit floats, sparse weights. A file is checked when it is read, so running a network
+//! cannot fail, and takes bounded time and memory.
 
 mod assemble;
 mod convolution;
@@ -21,32 +21,31 @@ mod tests;
 pub use network::Network;
 pub use operator::sigmoid;
 
-/// Why a file is no network that can be run, or an input none for it.
+/// The reason why a file cannot be run as a network, or why an input does not fit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NetworkError {
-    /// The file is cut short, or not of the format.
+    /// The file is truncated or not of the format.
     #[error("not a readable TFLite file: {0}")]
     Format(String),
-    /// An operator, by its place in the file, is not one of those that are known, or does
-    /// not fit its tensors.
+    /// An operator is unknown or does not match its tensors.
     #[error("operator {index} of the network, {name}: {why}")]
     Operator {
-        /// Its place in the file, from 0.
+        /// Its index in the file.
         index: usize,
-        /// What it is called.
+        /// Its name.
         name: String,
-        /// What is wrong.
+        /// The reason.
         why: String,
     },
-    /// The network is larger than any that finds people.
+    /// The network exceeds the limits, which allow for any person detector.
     #[error("the network is too large: {0}")]
     TooLarge(String),
-    /// An input of the wrong length.
+    /// An input has the wrong length.
     #[error("the network takes {expected} numbers, got {got}")]
     Input {
-        /// How many numbers it takes.
+        /// The number of inputs that the network takes.
         expected: usize,
-        /// How many there were.
+        /// The number of inputs given.
         got: usize,
     },
 }

@@ -1,24 +1,24 @@
-//! A network: operators in order, and the tensors between them.
+//! Networks: operators in execution order, and the tensors between them.
 
 use super::operator::{Operator, Tensor};
 use super::{NetworkError, file};
 use std::collections::HashMap;
 
-/// A network that was read from a file.
+/// A network read from a file.
 #[derive(Debug)]
 pub struct Network {
     pub(super) layers: Vec<Layer>,
-    /// By tensor.
+    /// The shape of each tensor.
     pub(super) shapes: Vec<Vec<usize>>,
     pub(super) constants: HashMap<usize, Vec<f32>>,
     pub(super) input: usize,
     pub(super) outputs: Vec<usize>,
-    /// By tensor: the last step that reads it; `usize::MAX` for outputs.
+    /// For each tensor, the last step that reads it; `usize::MAX` for outputs.
     pub(super) last: Vec<usize>,
     pub(super) work: usize,
 }
 
-/// An operator with the tensors that it reads and the one that it fills.
+/// An operator with the tensors it reads and the one it writes.
 #[derive(Debug)]
 pub(super) struct Layer {
     pub operator: Operator,
@@ -27,11 +27,11 @@ pub(super) struct Layer {
 }
 
 impl Network {
-    /// The network of a `.tflite` file.
+    /// Reads the network in a `.tflite` file.
     ///
     /// # Errors
-    /// If the file is not of the format, if the network has operators that are not known
-    /// here, or if it is too large.
+    /// If the file is not of the format, or the network has unsupported operators or is
+    /// too large.
     pub fn read(bytes: &[u8]) -> Result<Network, NetworkError> {
         file::read(bytes)
     }
@@ -46,16 +46,16 @@ impl Network {
         self.outputs.iter().map(|o| &self.shapes[*o][..])
     }
 
-    /// About how many multiplications a run takes.
+    /// The approximate number of multiplications of a run.
     pub fn work(&self) -> usize {
         self.work
     }
 
-    /// The outputs for an input, in the file's order. Rows of pixels from the top,
-    /// channels together.
+    /// Returns the outputs for an input, in the file's order. Tensors are laid out by
+    /// rows of pixels from the top, with a pixel's channels together.
     ///
     /// # Errors
-    /// If the input is of another length than its shape says.
+    /// If the input's length does not match its shape.
     pub fn run(&self, input: Vec<f32>) -> Result<Vec<Vec<f32>>, NetworkError> {
         let expected = self.input_shape().iter().product();
         if input.len() != expected {
@@ -63,7 +63,7 @@ impl Network {
         }
         let mut values: Vec<Option<Vec<f32>>> = vec![None; self.shapes.len()];
         values[self.input] = Some(input);
-        // Memory that no tensor needs any more.
+        // Buffers of tensors that are no longer needed.
         let mut free: Vec<Vec<f32>> = Vec::new();
         for (i, layer) in self.layers.iter().enumerate() {
             let shape = &self.shapes[layer.output];
@@ -83,7 +83,8 @@ impl Network {
     }
 }
 
-/// A list of so many numbers, of any values, out of the smallest that is long enough.
+/// Returns a list of this length with arbitrary values, reusing the smallest buffer that
+/// is large enough.
 fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
     let fits = free
         .iter()

@@ -1,16 +1,17 @@
-//! What a network is made of: operators on tensors.
+//! The operators of a network, on tensors.
 
 use super::convolution::{Convolution, Depthwise, Transposed};
 use super::resampling::{self, Alignment};
 use super::shape::{Clip, Size, Window};
 
-/// An operator with all that it needs besides its inputs.
+/// An operator with its parameters.
 #[derive(Debug)]
 pub(super) enum Operator {
     Convolution(Convolution),
     Depthwise(Depthwise),
     Transposed(Transposed),
-    /// Zeros around a picture: above, left, and before the first channel.
+    /// Zeros around an image: the numbers above, to the left, and before the first
+    /// channel.
     Pad([usize; 3]),
     Pool {
         window: Window,
@@ -20,11 +21,11 @@ pub(super) enum Operator {
     Mean,
     Resize(Alignment),
     DepthToSpace(usize),
-    /// Joins tensors along this dimension.
+    /// Concatenates tensors along this dimension.
     Concatenate(usize),
-    /// The same numbers in another shape.
+    /// Reinterprets the numbers in another shape.
     Reshape,
-    /// Element by element; the second one may be one number for each channel.
+    /// Element-wise; the shorter operand is repeated, e.g. one number per channel.
     Add(Clip),
     Multiply(Clip),
     Sigmoid,
@@ -32,7 +33,7 @@ pub(super) enum Operator {
     HardSwish,
 }
 
-/// A tensor in a run.
+/// A tensor during a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tensor<'a> {
     pub shape: &'a [usize],
@@ -45,8 +46,8 @@ pub fn sigmoid(x: f32) -> f32 {
 }
 
 impl Operator {
-    /// Fills `out`, of this shape, from the inputs. Shapes are those that were checked
-    /// when the network was read.
+    /// Fills `out`, of this shape, from the inputs. Shapes were checked when the network
+    /// was read.
     pub fn run(&self, inputs: &[Tensor], shape: &[usize], out: &mut [f32]) {
         let Some(first) = inputs.first() else { return };
         let pictures = Size::of(first.shape).zip(Size::of(shape));
@@ -87,12 +88,12 @@ impl Operator {
             (Operator::HardSwish, _) => {
                 each(first.values, out, |x| x * (x + 3.0).clamp(0.0, 6.0) / 6.0)
             }
-            // Refused when the network was read.
+            // Rejected when the network was read.
             (_, None) => {}
         }
     }
 
-    /// How many multiplications it takes to fill so many numbers.
+    /// The number of multiplications to fill `out` numbers.
     pub fn work(&self, inputs: &[&[usize]], out: usize) -> usize {
         let channels = inputs.first().and_then(|s| s.last()).copied().unwrap_or(1);
         let window = |w: &Window| w.size[0] * w.size[1];
@@ -111,7 +112,7 @@ fn each(values: &[f32], out: &mut [f32], f: impl Fn(f32) -> f32) {
     out.iter_mut().zip(values).for_each(|(o, v)| *o = f(*v));
 }
 
-/// Element by element; the shorter one is repeated.
+/// Applies `f` element by element; the shorter operand is repeated.
 fn combine(inputs: &[Tensor], out: &mut [f32], f: impl Fn(f32, f32) -> f32) {
     let [a, b] = inputs else { return };
     let (long, short) = if a.values.len() >= b.values.len() { (a, b) } else { (b, a) };

@@ -1,10 +1,10 @@
-//! Operators that change a picture's size without weights: padding, pooling,
-//! interpolation, channels that become pixels.
+//! Operators that resize images without weights: padding, pooling, interpolation, depth
+//! to space.
 
 use super::shape::{Size, Window};
 
-/// Copies a picture into a larger one, so many rows and columns from its corner; the rest
-/// is zero.
+/// Copies an image into a larger one, offset by `before` rows, columns and channels; the
+/// rest is zero.
 pub(super) fn pad(input: &[f32], from: Size, to: Size, before: [usize; 3], out: &mut [f32]) {
     out.fill(0.0);
     for row in 0..from.height {
@@ -16,7 +16,7 @@ pub(super) fn pad(input: &[f32], from: Size, to: Size, before: [usize; 3], out: 
     }
 }
 
-/// The largest value in each window, or the mean of those within the picture.
+/// Computes the maximum in each window, or the mean of the values inside the image.
 pub(super) fn pool(
     input: &[f32],
     from: Size,
@@ -42,7 +42,7 @@ pub(super) fn pool(
     }
 }
 
-/// The mean of each channel.
+/// Computes the mean of each channel.
 pub(super) fn mean(input: &[f32], from: Size, out: &mut [f32]) {
     out.fill(0.0);
     for pixel in input.chunks_exact(from.channels) {
@@ -52,19 +52,19 @@ pub(super) fn mean(input: &[f32], from: Size, out: &mut [f32]) {
     out.iter_mut().for_each(|o| *o /= count);
 }
 
-/// Where pixels of the output lie in the input.
+/// The alignment of output pixels with input pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Alignment {
-    /// The first pixels lie on each other.
+    /// The centres of the first pixels coincide.
     First,
-    /// So do the last ones.
+    /// The centres of the first and of the last pixels coincide.
     Corners,
-    /// The pixels' outlines do.
+    /// The outlines of the images coincide.
     HalfPixels,
 }
 
 impl Alignment {
-    /// The two pixels that one of the output lies between, and how far it is from the
+    /// Returns the two input pixels around an output pixel, and its distance from the
     /// first.
     fn between(self, i: usize, from: usize, to: usize) -> (usize, usize, f32) {
         let scale = match self {
@@ -80,7 +80,7 @@ impl Alignment {
     }
 }
 
-/// Interpolates linearly.
+/// Interpolates bilinearly.
 pub(super) fn resize(input: &[f32], from: Size, to: Size, alignment: Alignment, out: &mut [f32]) {
     for row in 0..to.height {
         let (top, bottom, fy) = alignment.between(row, from.height, to.height);

@@ -1,6 +1,6 @@
-//! Numbers of fields and operators in TFLite's files (schema.fbs, version 3).
+//! Indices of fields and codes of operators in TFLite files (schema.fbs, version 3).
 
-/// Fields of tables.
+/// Fields of tables, by index.
 pub mod field {
     pub const CODES: usize = 1;
     pub const GRAPHS: usize = 2;
@@ -30,7 +30,7 @@ pub mod field {
     }
 }
 
-/// Numbers of operators (TFLite's `BuiltinOperator`).
+/// Operator codes (TFLite's `BuiltinOperator`).
 pub mod code {
     pub const ADD: i32 = 0;
     pub const AVERAGE_POOL: i32 = 1;

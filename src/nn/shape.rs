@@ -1,6 +1,6 @@
-//! Shapes of operators on pictures: sizes, windows and strides.
+//! Geometry of operators on images: sizes, windows and strides.
 
-/// Height, width and channels of a picture.
+/// The height, width and number of channels of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Size {
     pub height: usize,
@@ -9,7 +9,7 @@ pub(super) struct Size {
 }
 
 impl Size {
-    /// That of a tensor with one picture in it: 1 x height x width x channels.
+    /// Returns the size of a tensor that holds one image: 1 x height x width x channels.
     pub fn of(shape: &[usize]) -> Option<Size> {
         match *shape {
             [1, height, width, channels] if height > 0 && width > 0 && channels > 0 => {
@@ -24,7 +24,7 @@ impl Size {
         self.height * self.width * self.channels
     }
 
-    /// The channels of a pixel.
+    /// Returns the channels of a pixel.
     pub fn pixel(self, values: &[f32], row: usize, column: usize) -> &[f32] {
         &values[(row * self.width + column) * self.channels..][..self.channels]
     }
@@ -34,25 +34,25 @@ impl Size {
     }
 }
 
-/// How a window moves over a picture.
+/// The window of a convolution or pooling, and how it moves over an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Window {
-    /// Rows and columns of the window, and of a step.
+    /// Rows and columns of the window, and of the stride.
     pub size: [usize; 2],
     pub stride: [usize; 2],
-    /// Whether the picture is padded, so that there is a window for each step (`SAME`),
-    /// or not (`VALID`).
+    /// Whether the image is padded so that there is a window for each stride (`SAME`), or
+    /// not padded (`VALID`).
     pub same: bool,
 }
 
 impl Window {
-    /// How many windows there are along rows or columns; `None` if there is none.
+    /// Returns the number of windows along rows or columns; `None` if none fits.
     fn count(&self, along: usize, n: usize) -> Option<usize> {
         let (k, s) = (self.size[along], self.stride[along]);
         if self.same { Some(n.div_ceil(s)) } else { Some(n.checked_sub(k)? / s + 1) }
     }
 
-    /// The picture's size with one value for each window and channel.
+    /// Returns the size of the output, with one value for each window and channel.
     pub fn output(&self, from: Size, channels: usize) -> Option<Size> {
         Some(Size {
             height: self.count(0, from.height)?,
@@ -61,7 +61,8 @@ impl Window {
         })
     }
 
-    /// How many rows and columns are padded above and left of the picture.
+    /// Returns the number of rows and columns of padding above and to the left of the
+    /// image.
     pub fn before(&self, from: Size, to: Size) -> [usize; 2] {
         let pad = |n: usize, m: usize, i: usize| {
             ((m - 1) * self.stride[i] + self.size[i]).saturating_sub(n) / 2
@@ -73,8 +74,8 @@ impl Window {
         }
     }
 
-    /// Calls `f` with each row and column of the window, and where in the picture it
-    /// lies, of those that do.
+    /// Calls `f` with each row and column of the window that lies inside the image, and
+    /// its position there.
     pub fn each(
         &self,
         from: Size,
@@ -100,8 +101,7 @@ impl Window {
     }
 }
 
-/// What is done to the values of an operator in the end: they are kept within these
-/// bounds.
+/// The bounds to which an operator's results are clipped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Clip {
     pub lo: f32,

@@ -1,14 +1,14 @@
-//! Sparse tensors of TFLite files, laid out densely.
+//! Converts sparse tensors of TFLite files to dense ones.
 //!
-//! A tensor of rank n may be cut into blocks; its n outer and the inner dimensions of the
-//! blocks are traversed in some order, each densely or by a list of the indices that
-//! there are (compressed sparse rows), down to values (TFLite's `SparsityParameters`).
+//! A tensor of rank n may be cut into blocks. Its n outer dimensions and the blocks'
+//! inner ones are traversed in some order, each densely or by a list of the indices
+//! present (compressed sparse rows), down to the values (TFLite's `SparsityParameters`).
 
 use super::NetworkError;
 use super::flatbuffer::Table;
 
-/// The dimensions of the table `SparsityParameters`, of `DimensionMetadata`, and where a
-/// vector of indices has its kind.
+/// Field indices of `SparsityParameters` and `DimensionMetadata`. For vectors of indices,
+/// the field of their type; the vector is the next field.
 const ORDER: usize = 0;
 const BLOCK_MAP: usize = 1;
 const DIMENSIONS: usize = 2;
@@ -23,7 +23,7 @@ fn bad(what: &str) -> NetworkError {
 
 enum Level {
     Dense(usize),
-    /// The indices of row r are those from `segments[r]` to `segments[r + 1]`.
+    /// The indices of row r are `indices[segments[r]..segments[r + 1]]`.
     Rows {
         segments: Vec<usize>,
         indices: Vec<usize>,
@@ -32,12 +32,12 @@ enum Level {
 
 struct Layout<'a> {
     shape: &'a [usize],
-    /// By level: the dimension that it walks along, and how far a step leads there.
+    /// For each level, the dimension it traverses and the step along it.
     along: Vec<(usize, usize)>,
     levels: Vec<Level>,
 }
 
-/// The values of a sparse tensor in a dense one of this shape.
+/// Returns the values of a sparse tensor as a dense one of this shape.
 pub(super) fn dense(
     shape: &[usize],
     sparsity: &Table,
@@ -105,7 +105,7 @@ impl<'a> Layout<'a> {
         Ok(Layout { shape, along, levels })
     }
 
-    /// Walks the levels from this one on, in row `row` of it.
+    /// Traverses the levels from this one on, in its row `row`.
     fn walk(
         &self,
         level: usize,
@@ -139,7 +139,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Indices as numbers of 32, 16 or 8 bits.
+/// Reads indices of 32, 16 or 8 bits.
 fn numbers(table: &Table, field: usize) -> Result<Vec<usize>, NetworkError> {
     let vector = table.table(field + 1)?.ok_or_else(|| bad("has missing indices"))?;
     match table.u8(field)? {

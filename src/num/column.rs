@@ -1,13 +1,13 @@
-//! Where numbers are in a buffer. It does not hold them.
+//! Views of numbers in a buffer that is held elsewhere.
 
-/// Numbers of a buffer: one after the other, or one that stands for each of any number.
+/// A view of a buffer: consecutive numbers, or one number that is repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// The place of the first.
+    /// The index of the first number.
     pub at: usize,
-    /// 1, or 0 for one that stands for all.
+    /// The stride: 1, or 0 for a repeated number.
     pub step: usize,
-    /// Whether derivatives by them are wanted.
+    /// Whether derivatives with respect to the numbers are needed.
     pub live: bool,
 }
 

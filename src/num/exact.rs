@@ -1,34 +1,35 @@
 //! An exact, order-independent accumulator of log densities.
 //!
-//! A term is quantised once: to a multiple of 2^-64 below 2^40 in size, to a multiple of
-//! 2^(e-64) in coarser limbs above. After that everything is integer addition, so any
-//! order of additions and subtractions gives the same bits, and a sum kept up by
-//! differences equals one made from scratch. Infinities and NaN are counted, not added.
+//! A term is quantised once: to a multiple of 2^-64 if its magnitude is below 2^40, and
+//! otherwise to a multiple of 2^(40 k - 64) in a coarser limb k. Everything after that is
+//! integer addition, so additions and subtractions in any order give the same bits, and
+//! an incrementally updated sum equals one computed from scratch. Infinities and NaN are
+//! counted, not added.
 
 /// 2^64, the inverse of the finest quantum.
 const SCALE: f64 = 18_446_744_073_709_551_616.0;
-/// Terms at or above this size go to coarser limbs.
+/// Terms of this magnitude or above go to coarser limbs.
 const LARGE: f64 = 1_099_511_627_776.0; // 2^40
-/// The exponents a coarse limb spans.
+/// The number of exponents per coarse limb.
 const SPAN: i32 = 40;
 
 /// An exact sum of doubles.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExactSum {
     fine: i128,
-    /// Limb `k` holds terms of size 2^(40 k) to 2^(40 (k + 1)), in units of 2^(40 k -
-    /// 64); none while all terms are small.
+    /// Limb `k` holds terms of magnitude 2^(40 k) to 2^(40 (k + 1)), in units of
+    /// 2^(40 k - 64); `None` while all terms are small.
     coarse: Option<Box<[i128; LIMBS]>>,
     negative: i64,
     positive: i64,
     nan: i64,
 }
 
-/// Limbs for exponents up to 1024.
+/// The number of limbs, for exponents up to 1024.
 const LIMBS: usize = 26;
 
-/// x 2^64 towards zero, for |x| < 2^40: `(x * SCALE) as i128` in three pieces that are
-/// machine words, each exact.
+/// Returns x 2^64 rounded towards zero, for |x| < 2^40: `(x * SCALE) as i128` in three
+/// exact pieces, each a machine word.
 #[inline]
 fn quantised(x: f64) -> i128 {
     const HALF: f64 = 4_294_967_296.0; // 2^32
@@ -46,7 +47,7 @@ impl ExactSum {
         if x.abs() < LARGE { self.fine += quantised(x) } else { self.put(x, 1) }
     }
 
-    /// Takes a term out again: the exact inverse of [`ExactSum::add`].
+    /// Removes a term: the exact inverse of [`ExactSum::add`].
     #[inline]
     pub fn sub(&mut self, x: f64) {
         if x.abs() < LARGE { self.fine -= quantised(x) } else { self.put(x, -1) }
@@ -58,8 +59,8 @@ impl ExactSum {
         self.coarse.is_none() && (self.negative | self.positive | self.nan) == 0
     }
 
-    /// [`ExactSum::difference`] between two sums of sums: `new[0] + new[1] - …` above
-    /// `old[0] + old[1] - …`, where the last of each is taken out.
+    /// Returns the [`ExactSum::difference`] of `new[0] + new[1] - new[2]` and
+    /// `old[0] + old[1] - old[2]`.
     pub fn balance(new: [&ExactSum; 3], old: [&ExactSum; 3]) -> f64 {
         if new.iter().chain(&old).all(|s| s.is_fine()) {
             let fine = (new[0].fine + new[1].fine - new[2].fine)
@@ -75,7 +76,7 @@ impl ExactSum {
         ExactSum::difference(&total(new), &total(old))
     }
 
-    /// [`ExactSum::difference`] to an empty sum.
+    /// Returns the [`ExactSum::difference`] to an empty sum.
     pub fn above_nothing(&self) -> f64 {
         if self.is_fine() {
             self.fine as f64 / SCALE
@@ -84,7 +85,7 @@ impl ExactSum {
         }
     }
 
-    /// [`ExactSum::above_nothing`] of two sums together.
+    /// Returns [`ExactSum::above_nothing`] of the sum of two sums.
     pub fn of_both(a: &ExactSum, b: &ExactSum) -> f64 {
         if a.is_fine() && b.is_fine() {
             return (a.fine + b.fine) as f64 / SCALE;
@@ -104,7 +105,7 @@ impl ExactSum {
         } else {
             let exponent = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1023;
             let limb = (exponent / SPAN).clamp(1, LIMBS as i32 - 1);
-            // Scaling by a power of two is exact; the quotient has at most 53 significant
+            // Scaling by a power of two is exact; the result has at most 53 significant
             // bits above the unit.
             let scaled = libm::ldexp(x, 64 - SPAN * limb) as i128;
             let limbs = self.coarse.get_or_insert_with(|| Box::new([0; LIMBS]));
@@ -120,7 +121,7 @@ impl ExactSum {
         self.combine(other, 1);
     }
 
-    /// Takes all terms of another sum out.
+    /// Removes all terms of another sum.
     pub fn unmerge(&mut self, other: &ExactSum) {
         self.combine(other, -1);
     }
@@ -139,8 +140,8 @@ impl ExactSum {
         }
     }
 
-    /// The sum, rounded: -inf if a term is, NaN if a term is or if both infinities are
-    /// among them.
+    /// Returns the rounded sum. It is -inf if a term is, and NaN if a term is, or if the
+    /// terms include both infinities.
     pub fn value(&self) -> f64 {
         if self.nan != 0 || (self.negative != 0 && self.positive != 0) {
             f64::NAN
@@ -153,7 +154,7 @@ impl ExactSum {
         }
     }
 
-    /// The sum of the finite terms.
+    /// Returns the sum of the finite terms.
     fn finite(&self) -> f64 {
         let mut sum = 0.0;
         if let Some(limbs) = &self.coarse {
@@ -164,11 +165,11 @@ impl ExactSum {
         sum + self.fine as f64 / SCALE
     }
 
-    /// How much `new` is above `old`: what an accept test compares.
+    /// Returns new - old, as compared by an accept test.
     ///
-    /// Anything above an impossible `old` is +inf, an impossible `new` is -inf (also from
-    /// an impossible `old`: a chain does not wander among impossible states); a NaN in
-    /// `new` counts as impossible.
+    /// It is -inf if `new` is impossible (-inf or NaN), even if `old` is too, so that a
+    /// chain does not wander among impossible states. It is +inf if only `old` is
+    /// impossible.
     pub fn difference(new: &ExactSum, old: &ExactSum) -> f64 {
         if new.is_fine() && old.is_fine() {
             return (new.fine - old.fine) as f64 / SCALE;

@@ -1,5 +1,5 @@
-//! Hashing of bytes: tells texts apart, keeps no secrets. Not here: the hashes of
-//! addresses, which go key by key.
+//! A hash of bytes to distinguish texts; not cryptographic. Addresses are hashed
+//! elsewhere, key by key.
 
 /// The 64-bit FNV-1a hash (Fowler, Noll & Vo; IETF draft-eastlake-fnv).
 pub fn fnv1a(bytes: &[u8]) -> u64 {

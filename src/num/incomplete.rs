@@ -1,13 +1,13 @@
-//! The incomplete gamma function, and what tests of fit ask of it. Not the inverse.
+//! The incomplete gamma function, and the tail probabilities of goodness-of-fit tests.
 
 use super::special::ln_gamma;
 
-/// Terms of the series and of the continued fraction before they are taken as they are.
+/// The maximum number of terms of the series and of the continued fraction.
 const TERMS: u32 = 500;
 
-/// The regularised upper incomplete gamma function Q(a, x) for a > 0, x >= 0: by the
-/// power series below a + 1 (DLMF 8.7.1), by Legendre's continued fraction above (DLMF
-/// 8.9.2, evaluated after Lentz). NaN outside.
+/// The regularised upper incomplete gamma function Q(a, x) for a > 0, x >= 0: the power
+/// series for x below a + 1 (DLMF 8.7.1), and Legendre's continued fraction above (DLMF
+/// 8.9.2, by Lentz's method). NaN for other arguments.
 pub fn upper_gamma(a: f64, x: f64) -> f64 {
     if a.is_nan() || x.is_nan() || a <= 0.0 || x < 0.0 {
         return f64::NAN;
@@ -33,8 +33,8 @@ pub fn upper_gamma(a: f64, x: f64) -> f64 {
     (scale * upper_fraction(a, x, TERMS)).clamp(0.0, 1.0)
 }
 
-/// Legendre's continued fraction for Gamma(a, x) over x^a e^-x (DLMF 8.9.2), evaluated
-/// after Lentz up to so many terms.
+/// Legendre's continued fraction for Gamma(a, x) / (x^a e^-x) (DLMF 8.9.2), by Lentz's
+/// method with at most `terms` terms.
 pub(super) fn upper_fraction(a: f64, x: f64, terms: u32) -> f64 {
     let mut b = x + 1.0 - a;
     let (mut c, mut d) = (1.0 / TINY, 1.0 / b);
@@ -54,15 +54,15 @@ pub(super) fn upper_fraction(a: f64, x: f64, terms: u32) -> f64 {
     h
 }
 
-/// Stands in for zero in Lentz's method.
+/// The stand-in for zero in Lentz's method.
 const TINY: f64 = 1e-300;
 
 pub(super) fn not_zero(x: f64) -> f64 {
     if x.abs() < TINY { TINY } else { x }
 }
 
-/// The probability that a chi-square variable of so many degrees of freedom is at least
-/// `x`; NaN for none.
+/// The probability that a chi-square variable with `freedom` degrees of freedom is at
+/// least `x`; NaN if `freedom` is not positive.
 pub fn chi_square_tail(x: f64, freedom: f64) -> f64 {
     upper_gamma(0.5 * freedom, 0.5 * x)
 }
@@ -81,7 +81,7 @@ mod tests {
                 assert!((p - q).abs() < 1e-12 + 1e-9 * q, "{freedom} {x}: {p} {q}");
             }
         }
-        // Two degrees of freedom are an exponential; one is the square of a normal.
+        // Two degrees of freedom give an exponential; one gives the square of a normal.
         assert!((chi_square_tail(80.0, 2.0) - libm::exp(-40.0)).abs() < 1e-28);
         assert!((chi_square_tail(9.0, 1.0) - 2.0 * crate::num::normal_cdf(-3.0)).abs() < 1e-14);
         assert_eq!((chi_square_tail(0.0, 4.0), chi_square_tail(f64::INFINITY, 4.0)), (1.0, 0.0));

@@ -1,21 +1,21 @@
-//! The incomplete gamma and beta functions, both sides of each in logarithms, so that
-//! neither underflows.
+//! Both tails of the incomplete gamma and beta functions, as logarithms so that neither
+//! underflows.
 
 use super::incomplete::{not_zero, upper_fraction};
 use super::saddle::{deviance, stirling_error};
 use super::special::{LN_SQRT_2PI, ln_beta, ln_gamma, log_diff_exp};
 
-/// The largest parameter: the number of terms grows as its square root.
+/// The maximum parameter: the number of terms grows as its square root.
 const LARGEST: f64 = 1e8;
 
-/// Terms before a sum is taken as it is.
+/// The maximum number of terms.
 fn terms(a: f64) -> u32 {
     500 + (40.0 * a.sqrt()) as u32
 }
 
-/// The logarithms of the regularised incomplete gamma functions P(a, x) and Q(a, x) for a >
-/// 0: the power series below a + 1 (DLMF 8.7.1), Legendre's continued fraction above
-/// (DLMF 8.9.2). `None` for a above 1e8, where they would take long.
+/// The logarithms of the regularised incomplete gamma functions P(a, x) and Q(a, x) for
+/// a > 0: the power series for x below a + 1 (DLMF 8.7.1), and Legendre's continued
+/// fraction above (DLMF 8.9.2). `None` for a above 1e8, which would take too long.
 pub fn gamma_tails(a: f64, x: f64) -> Option<(f64, f64)> {
     if a.is_nan() || x.is_nan() || a <= 0.0 || a > LARGEST {
         return None;
@@ -48,8 +48,8 @@ pub fn gamma_tails(a: f64, x: f64) -> Option<(f64, f64)> {
 }
 
 /// The logarithms of the regularised incomplete beta function I_x(a, b) and of 1 - I_x(a,
-/// b) for a, b > 0, with y = 1 - x given beside x: by the continued fraction DLMF
-/// 8.17.22, evaluated after Lentz. `None` for a or b above 1e8.
+/// b) for a, b > 0, given x and y = 1 - x: by the continued fraction DLMF 8.17.22 and
+/// Lentz's method. `None` for a or b above 1e8.
 pub fn beta_tails(a: f64, b: f64, x: f64, y: f64) -> Option<(f64, f64)> {
     if !(a > 0.0 && b > 0.0 && a <= LARGEST && b <= LARGEST) || x.is_nan() || y.is_nan() {
         return None;
@@ -146,7 +146,7 @@ mod tests {
         close(beta_tails(1.0, 700.0, 0.9, 0.1).unwrap().1, 700.0 * libm::log(0.1));
         assert_eq!(gamma_tails(3.0, 0.0), Some((f64::NEG_INFINITY, 0.0)));
         assert!(gamma_tails(1e9, 1.0).is_none() && beta_tails(1.0, f64::NAN, 0.5, 0.5).is_none());
-        // The median of a large gamma is a - 1/3 and of a large symmetric beta 1/2.
+        // The median of a large gamma is about a - 1/3, that of a symmetric beta 1/2.
         assert!((gamma_tails(1e7, 1e7 - 1.0 / 3.0).unwrap().0.exp() - 0.5).abs() < 1e-10);
         assert!((beta_tails(1e6, 1e6, 0.5, 0.5).unwrap().0.exp() - 0.5).abs() < 1e-10);
     }

@@ -1,10 +1,11 @@
-//! The pieces of Loader's saddle-point form of densities (2000, "Fast and accurate
+//! The terms of Loader's saddle-point form of densities (2000, "Fast and accurate
 //! computation of binomial probabilities"), in which large terms do not cancel.
 
 use super::special::LN_SQRT_2PI;
 
-/// What Stirling's formula leaves of ln Gamma(x) for x > 0: ln Gamma(x) - ((x - 1/2) ln x -
-/// x + ln sqrt(2 pi)). The same number for x = n is what it leaves of ln n!.
+/// The error of Stirling's formula for ln Gamma(x), x > 0:
+/// ln Gamma(x) - ((x - 1/2) ln x - x + ln sqrt(2 pi)). For x = n it is also the error for
+/// ln n!.
 pub fn stirling_error(x: f64) -> f64 {
     if x < 10.0 {
         return libm::lgamma(x) - ((x - 0.5) * libm::log(x) - x + LN_SQRT_2PI);
@@ -15,7 +16,7 @@ pub fn stirling_error(x: f64) -> f64 {
     (1.0 / 12.0 - t * (1.0 / 360.0 - t * series)) / x
 }
 
-/// The deviance x ln(x / m) + m - x for x >= 0, m > 0; without cancellation near x = m.
+/// The deviance x ln(x / m) + m - x for x >= 0, m > 0, without cancellation near x = m.
 pub fn deviance(x: f64, m: f64) -> f64 {
     if x == 0.0 {
         return m;

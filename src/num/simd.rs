@@ -1,9 +1,9 @@
-//! Loops over many numbers, with the widest instructions that the processor has.
+//! Loops over many numbers, vectorised with the widest instructions of the processor.
 //!
-//! The same code is compiled twice, plainly and for AVX2, and chosen at run time. Nothing
-//! is fused or reordered, so both give the same bits.
+//! The same code is compiled twice, for the baseline and for AVX2, and selected at run
+//! time. Nothing is fused or reordered, so both give the same bits.
 
-/// Runs `work`, compiled for the processor's widest instructions as far as it is inlined.
+/// Runs `work`, compiled for the processor's widest instructions where it is inlined.
 #[inline]
 pub(crate) fn vectorised<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(test)]

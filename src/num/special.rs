@@ -1,4 +1,4 @@
-//! Special functions, stable in log space and in the tails.
+//! Special functions that are stable in log space and in the tails.
 
 use super::saddle::stirling_error;
 
@@ -21,8 +21,8 @@ pub fn ln_beta(a: f64, b: f64) -> f64 {
     if large < 10.0 {
         return ln_gamma(a) + ln_gamma(b) - ln_gamma(a + b);
     }
-    // ln Gamma(large) - ln Gamma(large + small) by Stirling's formula, where the plain
-    // difference would cancel.
+    // Stirling's formula for ln Gamma(large) - ln Gamma(large + small), which would
+    // otherwise cancel.
     let sum = small + large;
     let errors = stirling_error(large) - stirling_error(sum);
     let ratio = if small < 10.0 {
@@ -35,7 +35,7 @@ pub fn ln_beta(a: f64, b: f64) -> f64 {
     ratio - (large - 0.5) * libm::log1p(small / large) + errors
 }
 
-/// ln of the binomial coefficient n over k.
+/// ln of the binomial coefficient n choose k.
 pub fn ln_choose(n: f64, k: f64) -> f64 {
     if k == 0.0 || k == n {
         return 0.0;
@@ -43,7 +43,7 @@ pub fn ln_choose(n: f64, k: f64) -> f64 {
     -libm::log(n + 1.0) - ln_beta(k + 1.0, n - k + 1.0)
 }
 
-/// ln sum exp x; -inf for no terms or all of them -inf.
+/// ln sum exp x; -inf if there are no terms, or if all are -inf.
 pub fn log_sum_exp(xs: &[f64]) -> f64 {
     let max = xs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if max.is_infinite() {
@@ -85,13 +85,13 @@ pub fn expit(x: f64) -> f64 {
     }
 }
 
-/// The standard normal distribution function.
+/// The standard normal cumulative distribution function.
 pub fn normal_cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x * core::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Its logarithm, also far in the tails (an asymptotic series below -37, where the
-/// function itself underflows).
+/// The logarithm of [`normal_cdf`], accurate far in the tails: below -37, where the
+/// function itself underflows, by an asymptotic series.
 pub fn log_normal_cdf(x: f64) -> f64 {
     if x > 0.0 {
         return libm::log1p(-normal_cdf(-x));
@@ -104,8 +104,8 @@ pub fn log_normal_cdf(x: f64) -> f64 {
     -0.5 * x * x - LN_SQRT_2PI - libm::log(-x) + libm::log(series)
 }
 
-/// The standard normal quantile: Acklam's rational approximation, refined by one step of
-/// Halley's method.
+/// The standard normal quantile: Acklam's rational approximation, refined by one Halley
+/// step.
 pub fn inv_normal_cdf(p: f64) -> f64 {
     if p.is_nan() || !(0.0..=1.0).contains(&p) {
         return f64::NAN;

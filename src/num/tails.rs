@@ -1,10 +1,10 @@
-//! What truncated normal and circular densities rest on: Mills' ratio and the modified
-//! Bessel functions, without overflow or cancellation anywhere. Not special functions in
-//! general: only those of order 0 and 1, for arguments that are not negative.
+//! Special functions for truncated normal and circular densities: Mills' ratio and the
+//! modified Bessel functions of order 0 and 1, for non-negative arguments, without
+//! overflow or cancellation.
 
 use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, TAU};
 
-/// Mills' ratio of the standard normal, (1 - Phi(x)) / phi(x), for x >= 0: Laplace's
+/// Mills' ratio of the standard normal, (1 - Phi(x)) / phi(x), for x >= 0; Laplace's
 /// continued fraction from 4 on.
 pub fn mills_ratio(x: f64) -> f64 {
     if x < 4.0 {
@@ -13,7 +13,7 @@ pub fn mills_ratio(x: f64) -> f64 {
     1.0 / (1..=40).rev().fold(x, |tail, k| x + f64::from(k) / tail)
 }
 
-/// From here on the Bessel functions are summed as series in 1 / x.
+/// From here on, the Bessel functions are summed as series in 1 / x.
 const LARGE: f64 = 30.0;
 
 /// ln(I0(x) e^-x) for x >= 0.
@@ -24,7 +24,7 @@ pub fn log_scaled_i0(x: f64) -> f64 {
     libm::log(inverse_series(x).0) - 0.5 * (libm::log(TAU) + libm::log(x))
 }
 
-/// 1 - I1(x) / I0(x) for x >= 0: from 1 at 0 down to 1 / (2 x).
+/// 1 - I1(x) / I0(x) for x >= 0, which falls from 1 at 0 towards 1 / (2 x).
 pub fn bessel_deficit(x: f64) -> f64 {
     if x < LARGE {
         let (i0, i1) = power_series(x);
@@ -34,7 +34,8 @@ pub fn bessel_deficit(x: f64) -> f64 {
     difference / i0
 }
 
-/// I0 and I1: all terms are positive (Abramowitz & Stegun 9.6.10).
+/// I0 and I1 by their power series, whose terms are all positive (Abramowitz & Stegun
+/// 9.6.10).
 fn power_series(x: f64) -> (f64, f64) {
     let q = 0.25 * x * x;
     let (mut term, mut i0, mut i1) = (1.0, 1.0, 1.0);
@@ -50,8 +51,8 @@ fn power_series(x: f64) -> (f64, f64) {
     (i0, 0.5 * x * i1)
 }
 
-/// sqrt(2 pi x) e^-x times I0, and times I0 - I1 term by term (Abramowitz & Stegun
-/// 9.7.1).
+/// sqrt(2 pi x) e^-x times I0, and times I0 - I1, subtracted term by term (Abramowitz &
+/// Stegun 9.7.1).
 fn inverse_series(x: f64) -> (f64, f64) {
     let (mut zero, mut one) = (1.0, 1.0);
     let (mut i0, mut difference) = (1.0, 0.0);

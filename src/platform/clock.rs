@@ -1,4 +1,4 @@
-//! The clock. Bare WebAssembly has none: there time stands still, and runs are bounded by
+//! The clock. Bare WebAssembly has none: time is constant there, and runs are bounded by
 //! steps.
 
 #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
@@ -13,7 +13,7 @@ mod running {
 mod running {
     use std::time::Duration;
 
-    /// The one moment there is.
+    /// The only instant.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Instant;
 

@@ -1,4 +1,4 @@
-//! What differs between platforms and builds: the clock and threads.
+//! The parts that differ between platforms and builds: the clock and threads.
 
 pub(crate) mod clock;
 pub(crate) mod threads;

@@ -1,8 +1,8 @@
-//! Work shared among threads, or done in turn where there are none. Invariant: what comes
-//! out does not depend on how many there are.
+//! Parallel maps, which run sequentially if there are no threads. Invariant: results do
+//! not depend on the number of threads.
 
-/// Threads that wait for work; none in a build without the feature `threads`, or where
-/// none can be had.
+/// A pool of threads. It has none in a build without the feature `threads`, or if they
+/// cannot be created.
 pub(crate) struct Pool {
     #[cfg(feature = "threads")]
     pool: Option<rayon::ThreadPool>,
@@ -10,12 +10,12 @@ pub(crate) struct Pool {
 
 #[cfg(feature = "threads")]
 impl Pool {
-    /// So many threads (0: as many as there are cores), which stay until this is dropped.
+    /// Starts this many threads (0: one per core), which live until the pool is dropped.
     pub fn new(threads: usize) -> Pool {
         Pool { pool: rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok() }
     }
 
-    /// Does the same with each of some things; results in order.
+    /// Applies `one` to each item; results are in order.
     pub fn map<I: Send, T: Send>(
         &self,
         items: Vec<I>,
@@ -31,12 +31,12 @@ impl Pool {
 
 #[cfg(not(feature = "threads"))]
 impl Pool {
-    /// No threads, whatever is asked for.
+    /// Makes a pool without threads.
     pub fn new(_threads: usize) -> Pool {
         Pool {}
     }
 
-    /// Does the same with each of some things, one after the other.
+    /// Applies `one` to each item in turn.
     pub fn map<I: Send, T: Send>(
         &self,
         items: Vec<I>,
@@ -46,8 +46,8 @@ impl Pool {
     }
 }
 
-/// Does the same with each of some things, on so many threads (0: as many as there are
-/// cores); results in order.
+/// Applies `one` to each item on this many threads (0: one per core); results are in
+/// order.
 pub(crate) fn in_parallel<I: Send, T: Send>(
     threads: usize,
     items: Vec<I>,
@@ -56,9 +56,9 @@ pub(crate) fn in_parallel<I: Send, T: Send>(
     Pool::new(threads).map(items, one)
 }
 
-/// Does `work` for every part, each on a thread of its own, and waits for all. Not the
-/// threads of a [`Pool`]: whoever waits here may hold a lock that a task of theirs, which
-/// they would take up meanwhile, waits for.
+/// Runs `work` for every part, each on its own thread, and waits for all. It does not use
+/// a [`Pool`]: a pool's waiting thread takes up other tasks, which could need a lock that
+/// the caller holds.
 pub(crate) fn side_by_side<T: Send>(
     parts: impl IntoIterator<Item = T>,
     work: impl Fn(usize, T) + Sync,

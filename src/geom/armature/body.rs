@@ -1,10 +1,10 @@
-//! Bodies: a rig with a mesh skinned to it, cut into parts by bone, so that a pose that
-//! differs in one joint shares the meshes of the parts it does not move.
+//! Bodies: a rig with a skinned mesh, cut into one part per bone, so that poses that
+//! differ in one joint share the meshes of the parts that do not move.
 //!
 //! Linear blend skinning: vertex' = sum of w_k M[k] vertex. A triangle belongs to the
-//! part of the joint that weighs most in it. The surface is taken as smooth and closed:
-//! it has silhouettes, no creases, and no contour where parts meet. Single precision for
-//! vertices. Invariant: the meshes of a pose do not depend on the poses asked for before.
+//! joint with the largest weight in it. The surface is taken to be smooth and closed: it
+//! has silhouettes, but no creases, and no contours between parts. Vertices are single
+//! precision. Invariant: the meshes of a pose do not depend on earlier poses.
 
 use super::morph::{Anchor, Morph};
 use super::recent;
@@ -14,27 +14,27 @@ use crate::geom::{Affine, GeomError, Instance, Landmark, Mesh, Solid, Topology, 
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock, OnceLock};
 
-/// The most joints that move one vertex.
+/// The maximum number of joints that move a vertex.
 pub const MOST_WEIGHTS: usize = 4;
 
-/// The joints that move a vertex, in rig order's numbers, with weights that sum to 1;
-/// those beyond have weight 0.
+/// The joints that move a vertex, by index in rig order, with weights that sum to 1.
+/// Unused entries have weight 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Influence {
-    /// The joints.
+    /// The joints' indices.
     pub joints: [u16; MOST_WEIGHTS],
     /// Their weights.
     pub weights: [f32; MOST_WEIGHTS],
 }
 
 impl Influence {
-    /// The joints that do move the vertex, with their weights.
+    /// The joints of positive weight, with their weights.
     pub fn joints(&self) -> impl Iterator<Item = (usize, f64)> {
         let all = self.joints.into_iter().zip(self.weights).filter(|(_, w)| *w > 0.0);
         all.map(|(j, w)| (usize::from(j), f64::from(w)))
     }
 
-    /// Where these transforms of the joints together take a point.
+    /// Returns the image of a point under the weighted sum of the joints' transforms.
     pub fn blend(&self, transforms: &[DAffine3], at: DVec3) -> DVec3 {
         self.joints().map(|(j, w)| transforms[j].transform_point3(at) * w).sum()
     }
@@ -45,31 +45,31 @@ impl Influence {
 pub(super) struct Part {
     /// The joint.
     joint: u16,
-    /// The triangles, by the part's own vertices.
+    /// The triangles, with indices into the part's own vertices.
     topology: Arc<Topology>,
-    /// The body's vertex of each of its own.
+    /// For each of the part's vertices, its index in the body.
     vertices: Vec<u32>,
-    /// The joints that move any of them, in rising order.
+    /// The joints that move any of the vertices, in increasing order.
     pub joints: Vec<u16>,
 }
 
-/// What shapes of one body share.
+/// Data shared by all shapes of a body.
 #[derive(Debug)]
 pub(super) struct Skin {
     triangles: Vec<[u32; 3]>,
     pub influences: Vec<Influence>,
     parts: Vec<Part>,
     morphs: Vec<Morph>,
-    /// What each keypoint follows.
+    /// For each keypoint, what it follows when the shape changes.
     anchors: Vec<Anchor>,
-    /// The vertices before any change of shape, and coarser versions of the parts they
-    /// make, by part.
+    /// The surface before any change of shape, and the coarser levels of detail made from
+    /// it, by part.
     rest: Arc<LazySurface>,
     levels: OnceLock<Vec<Vec<Level>>>,
 }
 
 impl Levels for Skin {
-    /// Made of the whole body when first asked for, so that parts meet in the same
+    /// Computed from the whole body on first use, so that the parts' boundaries share
     /// vertices.
     fn levels(&self, part: usize) -> &[Level] {
         let all = self.levels.get_or_init(|| {
@@ -93,7 +93,7 @@ impl Surface {
     }
 }
 
-/// Made when someone looks: where only the rig's keypoints are compared, nobody does.
+/// Computed on first use: a comparison of the rig's keypoints alone does not need it.
 type LazySurface = LazyLock<Surface, Box<dyn FnOnce() -> Surface + Send>>;
 
 /// A rig and its mesh.
@@ -105,20 +105,20 @@ pub struct Armature {
 }
 
 impl Armature {
-    /// A mesh on a rig: for each vertex the joints that move it, as numbers in rig order
-    /// with weights.
+    /// Skins a mesh to a rig. `influences` gives the joints that move each vertex, by
+    /// index in rig order, with weights.
     ///
     /// # Errors
-    /// A count of influences other than the mesh's of vertices, a weight that is negative
-    /// or not finite, weights that do not sum to 1 (to a thousandth), a joint that is not
-    /// there, a mesh without area.
+    /// A number of influences that differs from the number of vertices; a weight that is
+    /// negative or not finite; weights that do not sum to 1 (within a thousandth); a
+    /// joint that does not exist; a mesh without area.
     pub fn new(
         rig: Rig,
         positions: Vec<Vec3>,
         triangles: Vec<[u32; 3]>,
         influences: Vec<Influence>,
     ) -> Result<Armature, GeomError> {
-        // Checks the indices and positions, too.
+        // This also checks the indices and positions.
         Mesh::new(positions.clone(), triangles.clone(), vec![0; triangles.len()])?;
         if influences.len() != positions.len() {
             return Err(GeomError::invalid(format!(
@@ -163,10 +163,10 @@ impl Armature {
         Ok(Armature { rig, surface, skin: Arc::new(skin) })
     }
 
-    /// With offsets for its shape.
+    /// Adds morphs.
     ///
     /// # Errors
-    /// A morph of another number of vertices or joints, or two of one name.
+    /// A morph with another number of vertices or joints; two morphs of one name.
     pub fn with_morphs(self, morphs: Vec<Morph>) -> Result<Armature, GeomError> {
         for (i, m) in morphs.iter().enumerate() {
             m.check(self.positions().len(), self.rig.joints().len())?;
@@ -201,25 +201,25 @@ impl Armature {
         &self.skin.influences
     }
 
-    /// The names of its morphs.
+    /// The names of the morphs.
     pub fn morphs(&self) -> impl Iterator<Item = &str> + Clone {
         self.skin.morphs.iter().map(|m| &*m.name)
     }
 
-    /// The same body in another shape: each morph's offsets added so many times.
+    /// Returns the body in another shape: adds each morph's offsets, times its amount.
     ///
     /// # Errors
-    /// A morph it does not have, an amount that is not finite.
+    /// An unknown morph, or an amount that is not finite.
     pub fn shaped(&self, amounts: &[(&str, f64)]) -> Result<Armature, GeomError> {
         self.clothed(amounts, 0.0)
     }
 
-    /// As [`Armature::shaped`], with the surface so far off along its normals, those at
-    /// rest before any change of shape; in the mesh's units. Joints and keypoints stay
-    /// where they are.
+    /// As [`Armature::shaped`], and offsets the surface by `cloth` along the normals of
+    /// the undeformed rest shape, in the mesh's units. Joints and keypoints stay in
+    /// place.
     ///
     /// # Errors
-    /// As [`Armature::shaped`]; cloth that is not finite.
+    /// As [`Armature::shaped`]; a `cloth` that is not finite.
     pub fn clothed(&self, amounts: &[(&str, f64)], cloth: f64) -> Result<Armature, GeomError> {
         if !cloth.is_finite() {
             return Err(GeomError::domain("the cloth must be finite"));
@@ -260,8 +260,8 @@ impl Armature {
         }))
     }
 
-    /// With joints and keypoints moved at rest by so much, and the vertices by a function
-    /// of their places.
+    /// Returns the body with the given offsets added to joints and keypoints at rest, and
+    /// the rest vertices changed by a function.
     pub(super) fn reshaped(
         &self,
         heads: &[DVec3],
@@ -282,12 +282,13 @@ impl Armature {
         }
     }
 
-    /// The body in a pose: one instance a part, numbered by joint, and its keypoints as
-    /// landmarks. Parts that the last poses of this thread moved in the same way are
-    /// shared with them.
+    /// Returns the body in a pose: one instance per part, numbered by joint, and the
+    /// keypoints as landmarks. Parts that one of this thread's last poses moved in the
+    /// same way share its meshes.
     ///
     /// # Errors
-    /// A pose that is not finite, or takes vertices too far to be numbers.
+    /// A pose that is not finite, or that moves vertices beyond the range of single
+    /// precision.
     pub fn posed(self: &Arc<Self>, pose: &[JointPose], rules: &Rules) -> Result<Solid, GeomError> {
         let transforms = self.rig.transforms(pose, rules)?;
         let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
@@ -307,8 +308,8 @@ impl Armature {
         }))
     }
 
-    /// From the derivatives by the body at rest to that by the amount of a morph; `None`
-    /// if it has no such morph.
+    /// Pulls derivatives with respect to the body at rest back to the amount of a morph;
+    /// `None` if there is no morph of that name.
     pub fn vjp_morph(&self, name: &str, by: &RestGradient) -> Option<f64> {
         let m = self.skin.morphs.iter().find(|m| *m.name == *name)?;
         let dot = |offsets: &[DVec3], by: &[DVec3]| {
@@ -325,14 +326,15 @@ impl Armature {
         )
     }
 
-    /// From the derivatives by the body at rest to that by its cloth; see
+    /// Pulls derivatives with respect to the body at rest back to the cloth offset; see
     /// [`Armature::clothed`].
     pub fn vjp_cloth(&self, by: &RestGradient) -> f64 {
         self.skin.rest.normals.iter().zip(&by.vertices).map(|(n, g)| n.as_dvec3().dot(*g)).sum()
     }
 
-    /// From derivatives by the vertices of a posed body's meshes in turn to those by the
-    /// body's own; the parts share some.
+    /// Pulls derivatives with respect to the vertices of a posed body's meshes, in order,
+    /// back to the body's vertices. Adjacent parts share vertices, whose derivatives are
+    /// summed.
     pub fn vjp_parts(&self, by_vertex: &[DVec3]) -> Vec<DVec3> {
         let mut all = vec![DVec3::ZERO; self.skin.influences.len()];
         for (v, g) in self.skin.parts.iter().flat_map(|p| &p.vertices).zip(by_vertex) {
@@ -349,7 +351,7 @@ impl Armature {
         &self.skin.parts
     }
 
-    /// A part under the transforms of all joints.
+    /// Returns a part deformed by the transforms of all joints.
     pub(super) fn skinned(&self, number: usize, transforms: &[Affine3A]) -> Instance {
         let (rest, part): (&Surface, &Part) = (&self.surface, &self.skin.parts[number]);
         let (mut positions, mut normals) = (Vec::with_capacity(part.vertices.len()), Vec::new());
@@ -377,9 +379,10 @@ impl Armature {
         }
     }
 
-    /// The vector-Jacobian product of posing, from the derivatives of something by the
-    /// body's posed vertices (in the order of [`Armature::positions`]) and by its
-    /// keypoints, to those by the joints' transforms; for [`Rig::transforms_vjp`].
+    /// The vector-Jacobian product of posing with respect to the joints' transforms,
+    /// given the derivatives with respect to the posed vertices (in the order of
+    /// [`Armature::positions`]) and keypoints. The result is an input of
+    /// [`Rig::transforms_vjp`].
     pub fn transforms_gradient(&self, by_vertex: &[DVec3], by_keypoint: &[DVec3]) -> Vec<DAffine3> {
         let zero = DAffine3 { matrix3: glam::DMat3::ZERO, translation: DVec3::ZERO };
         let mut out = vec![zero; self.rig.joints().len()];
@@ -398,8 +401,8 @@ impl Armature {
         out
     }
 
-    /// The posed vertices, in the order of [`Armature::positions`]: what
-    /// [`Armature::posed`] draws, whole.
+    /// Returns the posed vertices of the whole body, in the order of
+    /// [`Armature::positions`]; [`Armature::posed`] draws the same surface, by part.
     ///
     /// # Errors
     /// A pose that is not finite.
@@ -428,14 +431,14 @@ fn blend(
     m
 }
 
-/// What takes normals along: see [`crate::geom::Affine::normal_matrix`]; here without
-/// mirrors.
+/// Returns the matrix that transforms normals, as [`crate::geom::Affine::normal_matrix`]
+/// but without its sign for mirrored maps.
 fn cofactor(m: &Mat3A) -> Mat3A {
     Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// The parts by the joint that weighs most in each triangle; of equals, the first in rig
-/// order.
+/// Cuts the triangles into parts by the joint with the largest weight in each; the first
+/// in rig order on ties.
 fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Part> {
     let mut by_joint: Vec<Vec<[u32; 3]>> = vec![Vec::new(); joints];
     let mut sums = vec![0.0f64; joints];

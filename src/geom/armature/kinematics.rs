@@ -1,15 +1,15 @@
-//! From a pose to where each joint takes the points it carries.
+//! Forward kinematics: from a pose to the transform of each joint.
 //!
-//! M[j] = M[parent] T(head + d) R S T(-head), as transforms of points at rest. R turns
-//! the whole subtree; S acts on the bone's own region, and on the subtree only if asked.
-//! A location t is a *handle*: in rig order, for a joint b with t != 0, one sweep over
-//! its ancestors a, from its parent to the nearest stop (included) or the root, turns
-//! each, with its subtree, by 1 / (number of those ancestors) of the shortest arc from
-//! (p_b - p_a) to (p_b + t - p_a); what is left becomes d, so that the head of b ends at
-//! p_b + t. Positions p are those of the pose so far.
+//! M[j] = M[parent] T(head + d) R S T(-head), as transforms of points at rest. R rotates
+//! the whole subtree; S acts on the bone's own region, and on the subtree only if
+//! [`Rules`] say so. A location t is a *handle*: in rig order, for a joint b with t != 0,
+//! one sweep goes over its ancestors a, from its parent to the nearest stop (included) or
+//! the root. It rotates each, with its subtree, by 1 / (number of those ancestors) of the
+//! shortest arc from (p_b - p_a) to (p_b + t - p_a). The remainder becomes d, so that the
+//! head of b ends at p_b + t. Positions p are those of the pose so far.
 //!
-//! A pure function of the pose: never iterated to convergence, and t = 0 changes nothing.
-//! It is smooth, except where a handle is pulled straight through an ancestor.
+//! A pure function of the pose: it is never iterated to convergence, and t = 0 changes
+//! nothing. It is smooth, except where a handle is pulled straight through an ancestor.
 
 use super::pose::Motion;
 use super::{JointPose, Rig, Rules};
@@ -17,7 +17,7 @@ use crate::geom::GeomError;
 use crate::geom::real::{M3, Real, Tape, V3, Var};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Where a joint takes points: p' = linear p + shift.
+/// The transform of a joint: p' = linear p + shift.
 #[derive(Clone, Copy)]
 pub(super) struct Place<T> {
     pub linear: M3<T>,
@@ -30,21 +30,21 @@ impl<T: Real> Place<T> {
     }
 }
 
-/// The derivatives of something by what one joint does.
+/// Derivatives with respect to one joint's pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointGradient {
-    /// By the location.
+    /// With respect to the location.
     pub location: DVec3,
-    /// By the rotation vector, or the angles; for a matrix, by a small rotation vector
-    /// applied after it.
+    /// With respect to the rotation vector or the angles; for a matrix, to a small
+    /// rotation vector applied after it.
     pub turn: DVec3,
-    /// By the scale.
+    /// With respect to the scale.
     pub scale: DVec3,
 }
 
 impl Rig {
-    /// Where each joint takes points at rest, by joint in rig order. Joints beyond the
-    /// end of `pose` rest.
+    /// Returns the transform of points at rest for each joint, in rig order. Joints
+    /// beyond the end of `pose` are at rest.
     ///
     /// # Errors
     /// A pose that is not finite.
@@ -62,8 +62,8 @@ impl Rig {
         Ok(places.iter().map(affine).collect())
     }
 
-    /// The vector-Jacobian product of [`Rig::transforms`]: from the derivatives of
-    /// something by each transform (matrix and translation) to those by the pose.
+    /// The vector-Jacobian product of [`Rig::transforms`]: pulls derivatives with respect
+    /// to each transform (matrix and translation) back to the pose.
     ///
     /// # Errors
     /// A pose that is not finite.
@@ -108,7 +108,8 @@ impl Rig {
     }
 }
 
-/// The transforms; `all` also runs handles that do not pull, for their derivatives.
+/// Returns the transforms. With `all`, handles with t = 0 are run too, for their
+/// derivatives.
 fn places<T: Real>(
     rig: &Rig,
     mut motions: Vec<Motion<T>>,
@@ -142,7 +143,8 @@ fn places<T: Real>(
             let pivot = now[*a].point(heads[*a]);
             let q = part_of_arc(p - pivot, target - pivot, 1.0 / chain.len() as f64);
             p = pivot + q.apply(p - pivot);
-            // The turn in the frame of the parent, which this sweep has not moved yet.
+            // The rotation in the frame of the parent, which this sweep has not moved
+            // yet.
             let local = rig.joints()[*a].parent.map_or(q, |up| {
                 let w = now[up].linear;
                 w.transposed().times(q).times(w)
@@ -167,7 +169,7 @@ fn places<T: Real>(
     places
 }
 
-/// The transforms along the tree, with each joint's own linear map.
+/// Composes the transforms along the tree, given each joint's own linear map.
 fn forward<T: Real>(
     rig: &Rig,
     heads: &[V3<T>],
@@ -188,10 +190,11 @@ fn forward<T: Real>(
     places
 }
 
-/// The rotation by a share of the shortest arc from the direction of u to that of v.
+/// Returns the rotation by a fraction of the shortest arc from the direction of u to that
+/// of v.
 fn part_of_arc<T: Real>(u: V3<T>, v: V3<T>, share: f64) -> M3<T> {
-    // Only directions matter: lengths near 1 keep squares from overflowing, and their
-    // derivatives are 0.
+    // Only directions matter: lengths near 1 keep squares from overflowing. The scaling
+    // does not change the derivatives.
     let unit = |v: V3<T>| {
         let longest = v.0.iter().fold(0.0, |m: f64, x| m.max(x.value().abs()));
         if longest > 0.0 && longest.is_finite() {
@@ -211,7 +214,7 @@ fn part_of_arc<T: Real>(u: V3<T>, v: V3<T>, share: f64) -> M3<T> {
         // angle / sin -> 1 / cos.
         w.scale(c.recip() * c.constant(share))
     } else if cv < 0.0 {
-        // Straight back: about a fixed axis at right angles to u.
+        // Opposite directions: rotate about a fixed axis perpendicular to u.
         let axis = DVec3::from_array(u.0.map(Real::value)).any_orthonormal_vector()
             * (std::f64::consts::PI * share);
         V3(axis.to_array().map(|x| c.constant(x)))

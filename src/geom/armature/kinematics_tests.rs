@@ -1,4 +1,5 @@
-//! Tests of kinematics: exact cases, continuity, and derivatives against differences.
+//! Tests of kinematics: exact cases, continuity, and derivatives against finite
+//! differences.
 
 use super::super::rig::NamedJoint;
 use super::super::{Turn, rig::Rig};
@@ -53,7 +54,7 @@ fn the_rest_is_the_identity() {
         assert!((t.matrix3 - DMat3::IDENTITY).to_cols_array().iter().all(|x| *x == 0.0));
         assert!(t.translation.length() < 1e-15);
     }
-    // Without locations, handles play no part whatever stops there are.
+    // Without locations, handles have no effect, whatever the stops.
     let still: Vec<JointPose> =
         some_pose(0.4).iter().map(|p| JointPose { location: DVec3::ZERO, ..*p }).collect();
     let all = Rules { stops: vec![true; 7], ..Rules::default() };
@@ -125,8 +126,8 @@ fn one_handle_ends_where_it_is_pulled_and_stops_stop() {
         let t = rig.transforms(&pose, &rules).unwrap();
         let now = heads(&rig, &t);
         assert!((now[b] - rest[b] - pose[b].location).length() < 1e-12, "{b} {stop}");
-        // The stop turns, but does not move; nothing above it does either, nor does the
-        // other chain.
+        // The stop rotates but does not move. The joints above it and the other chain do
+        // neither.
         assert!((now[stop] - rest[stop]).length() < 1e-12);
         let turned = |j: usize| {
             (t[j].matrix3 - DMat3::IDENTITY).to_cols_array().iter().any(|x| x.abs() > 1e-6)
@@ -168,7 +169,7 @@ fn gradients_agree_with_differences() {
     for (k, inherit_scale) in [(0.3, false), (1.9, true), (4.0, false)] {
         let rules = Rules { stops: vec![false, true, false, false, true], inherit_scale };
         let mut pose = some_pose(k);
-        // One handle that does not pull, one turn given as a matrix.
+        // One handle that does not pull, and one rotation given as a matrix.
         pose[5].location = DVec3::ZERO;
         pose[2].turn = Turn::Matrix(DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7));
         let wave = |a: usize| libm::cos(0.37 * a as f64 + k);
@@ -215,7 +216,7 @@ fn poses_that_are_not_finite_are_refused() {
     pose[3].scale.y = f64::NAN;
     let e = rig().transforms(&pose, &Rules::default()).unwrap_err().to_string();
     assert_eq!(e, "the pose of the joint `head` must be finite");
-    // Straight through the parent, onto it, and far away: finite all the same.
+    // Straight through the parent, onto it, and far away: the transforms stay finite.
     for t in [DVec3::new(0.0, -1.0, 0.0), DVec3::new(-0.02, -0.3, -0.1), DVec3::splat(1e100)] {
         let mut pose = [JointPose::REST; 7];
         pose[3].location = t;

@@ -1,22 +1,20 @@
-//! Morphs: linear offsets of a body's shape at rest, added up before it is posed (a blend
-//! shape).
+//! Morphs (blend shapes): linear offsets of a body's rest shape, summed before posing.
 
 use super::rig::{Keypoint, Rig};
 use crate::geom::GeomError;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Offsets for every vertex and joint at rest, in the mesh's units; an amount of 1 adds
-/// them once.
+/// Offsets of every vertex and joint at rest, in the mesh's units, for an amount of 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Morph {
-    /// Its name.
+    /// The name.
     pub name: Arc<str>,
-    /// By vertex.
+    /// Offsets of the vertices.
     pub vertices: Vec<Vec3>,
-    /// By joint in rig order: the head's.
+    /// Offsets of the joints' heads, in rig order.
     pub heads: Vec<DVec3>,
-    /// By joint in rig order: the tail's.
+    /// Offsets of the joints' tails, in rig order.
     pub tails: Vec<DVec3>,
 }
 
@@ -50,7 +48,7 @@ impl Morph {
         }
     }
 
-    /// The offset of a keypoint.
+    /// Returns the offset of a keypoint.
     pub(super) fn at(&self, anchor: Anchor) -> DVec3 {
         match anchor {
             Anchor::Head(j) => self.heads.get(j).copied().unwrap_or_default(),
@@ -62,7 +60,7 @@ impl Morph {
 /// What a keypoint follows when the shape changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Anchor {
-    /// The head of its joint, where it sits there.
+    /// The head of its joint, if the keypoint is there.
     Head(usize),
     /// The nearest vertex.
     Vertex(usize),

@@ -1,38 +1,38 @@
-//! Poses: what each joint of a rig does. Plain numbers; how they move a body is the
-//! business of `kinematics`.
+//! Poses: the motion of each joint of a rig, as plain numbers. `kinematics` turns them
+//! into transforms.
 
 use crate::geom::GeomError;
 use crate::geom::real::{M3, Real, V3};
 use glam::{DMat3, DVec3};
 
-/// How a joint turns, about the world's axes through its rest head.
+/// The rotation of a joint, about the world's axes through its rest head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turn {
     /// A rotation vector: the axis times the angle in radians.
     Vector(DVec3),
-    /// Angles in radians round x, then y, then z: Rz Ry Rx.
+    /// Angles in radians about x, then y, then z: Rz Ry Rx.
     Angles(DVec3),
     /// A rotation matrix.
     Matrix(DMat3),
 }
 
-/// What one joint does.
+/// The pose of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointPose {
-    /// How far its head is pulled, in the mesh's units: a handle, see [`Rules`].
+    /// How far a handle pulls the joint's head, in the mesh's units; see [`Rules`].
     pub location: DVec3,
-    /// How it turns; its descendants turn along.
+    /// The rotation, which also rotates the joint's descendants.
     pub turn: Turn,
-    /// How its bone is scaled along the axes before it turns.
+    /// The scale of the bone along the axes, applied before the rotation.
     pub scale: DVec3,
 }
 
 impl JointPose {
-    /// The rest.
+    /// The rest pose.
     pub const REST: JointPose =
         JointPose { location: DVec3::ZERO, turn: Turn::Vector(DVec3::ZERO), scale: DVec3::ONE };
 
-    /// A turn by a rotation vector.
+    /// A rotation by a rotation vector.
     pub fn turned(v: DVec3) -> JointPose {
         JointPose { turn: Turn::Vector(v), ..JointPose::REST }
     }
@@ -52,14 +52,14 @@ impl JointPose {
 /// How poses move a body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rules {
-    /// By joint: whether it stops the pull of location handles below it. Joints beyond
-    /// the end do not.
+    /// For each joint, whether it stops the pull of location handles below it. Joints
+    /// beyond the end of the list do not.
     pub stops: Vec<bool>,
-    /// Whether a joint's scale acts on its descendants too.
+    /// Whether a joint's scale also acts on its descendants.
     pub inherit_scale: bool,
 }
 
-/// What a joint does, in numbers of a kind.
+/// The motion of a joint, in numbers of type `T`.
 #[derive(Clone, Copy)]
 pub(super) struct Motion<T> {
     pub location: V3<T>,
@@ -68,8 +68,9 @@ pub(super) struct Motion<T> {
 }
 
 impl JointPose {
-    /// With a maker of numbers: first the location, then the turn's three (for a matrix,
-    /// a small rotation vector applied after it), then the scale.
+    /// Returns the motion, with components made by `number` in this order: the location,
+    /// the three of the rotation (for a matrix, a small rotation vector applied after
+    /// it), the scale.
     pub(super) fn motion<T: Real>(&self, mut number: impl FnMut(f64) -> T) -> Motion<T> {
         let mut vector = |v: DVec3| V3(v.to_array().map(&mut number));
         let location = vector(self.location);

@@ -1,8 +1,8 @@
-//! The meshes of the last poses of each thread, by part: a pose that moves a part as one
-//! of them did shares its mesh.
+//! Cached meshes of each thread's last poses, by part: poses that move a part in the same
+//! way share its mesh.
 //!
-//! Only saves work: what it gives equals what would be made. Sharing matters to
-//! renderers, which keep what they drew of a mesh.
+//! The cache only saves work: results do not depend on it. Renderers benefit from shared
+//! meshes, because they cache what they draw of a mesh.
 
 use super::Armature;
 use crate::geom::Instance;
@@ -10,17 +10,17 @@ use glam::Affine3A;
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
 
-/// Bodies remembered, and poses of each part: the present one and what a few proposals
-/// tried.
+/// The number of bodies remembered, and of poses of each part: the current pose, and a
+/// few from recent proposals.
 const BODIES: usize = 4;
 const POSES: usize = 4;
 
-/// What moved a part, and what it made.
+/// The transforms that moved a part, and the resulting instance.
 type Moved = (Vec<Affine3A>, Instance);
 
 struct Known {
     body: Weak<Armature>,
-    /// By part, the latest first.
+    /// By part, the most recent first.
     parts: Vec<Vec<Moved>>,
 }
 
@@ -28,13 +28,13 @@ thread_local! {
     static KNOWN: RefCell<Vec<Known>> = const { RefCell::new(Vec::new()) };
 }
 
-/// What transforms are told by: equal numbers are not enough, 0 and -0 may make other
-/// zeros.
+/// The bits that identify a transform. Equal numbers do not suffice: 0 and -0 can produce
+/// results that differ in the sign of zeros.
 fn bits(t: &Affine3A) -> [u32; 12] {
     t.to_cols_array().map(f32::to_bits)
 }
 
-/// The mesh of each part under the transforms of all joints.
+/// Returns the mesh of each part under the transforms of all joints.
 pub(super) fn parts(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Instance> {
     KNOWN.with_borrow_mut(|known| {
         match known.iter().position(|k| std::ptr::eq(k.body.as_ptr(), Arc::as_ptr(body))) {

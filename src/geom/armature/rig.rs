@@ -1,70 +1,69 @@
-//! Rigs: a tree of joints, and named points that ride on them. It has no mesh and no
-//! pose.
+//! Rigs: a tree of joints, and named points attached to them, without a mesh or a pose.
 //!
-//! Rest frames are aligned with the world, so a joint's rotation turns about the world's
-//! axes through its rest head. Invariant: joints are in rig order, parents before
-//! children, and there is at least one.
+//! Rest frames are aligned with the world, so a joint rotates about the world's axes
+//! through its rest head. Invariant: joints are in rig order, parents before children,
+//! and there is at least one.
 
 use crate::geom::GeomError;
 use glam::DVec3;
 use std::sync::Arc;
 
-/// The most joints of a rig.
+/// The maximum number of joints of a rig.
 pub const MOST_JOINTS: usize = 4096;
 
 /// One joint, with the bone that starts there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Its name.
+    /// The name.
     pub name: Arc<str>,
-    /// The index of its parent, which is less than its own; `None` for a root.
+    /// The index of the parent, which is less than the joint's own; `None` for a root.
     pub parent: Option<usize>,
-    /// Where it turns, at rest, in the mesh's units.
+    /// The pivot at rest, in the mesh's units.
     pub head: DVec3,
-    /// Where its bone ends, at rest.
+    /// The end of the bone at rest.
     pub tail: DVec3,
 }
 
-/// A named point that a joint carries.
+/// A named point that moves with a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keypoint {
-    /// Its name.
+    /// The name.
     pub name: Arc<str>,
     /// The joint's index.
     pub joint: usize,
-    /// Where it is at rest.
+    /// The position at rest.
     pub rest: DVec3,
 }
 
-/// A tree (or several) of joints.
+/// A tree of joints, or several trees.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     joints: Vec<Joint>,
     keypoints: Vec<Keypoint>,
-    /// By joint as given: its place in rig order.
+    /// For each joint as given, its index in rig order.
     order: Vec<usize>,
 }
 
-/// A joint before its parent is looked up.
+/// A joint whose parent is given by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedJoint {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// The name of its parent; `None` for a root.
+    /// The name of the parent; `None` for a root.
     pub parent: Option<String>,
-    /// Where it turns, at rest.
+    /// The pivot at rest.
     pub head: DVec3,
-    /// Where its bone ends, at rest.
+    /// The end of the bone at rest.
     pub tail: DVec3,
 }
 
 impl Rig {
-    /// A rig from joints in any order; they keep it as far as parents can come before
-    /// children.
+    /// Makes a rig from joints in any order. The order is kept as far as parents can come
+    /// before children.
     ///
     /// # Errors
-    /// No joint or more than 4096, two of one name, a parent that is not there, a joint
-    /// that is its own ancestor, a position that is not finite.
+    /// No joints, or more than 4096; two joints of one name; a parent that does not
+    /// exist; a joint that is its own ancestor; a position that is not finite.
     pub fn new(given: Vec<NamedJoint>) -> Result<Rig, GeomError> {
         if given.is_empty() || given.len() > MOST_JOINTS {
             return Err(GeomError::invalid(format!(
@@ -99,7 +98,8 @@ impl Rig {
                 })?),
             });
         }
-        // Passes over what is left; each takes the joints whose parents are placed.
+        // Each pass over the remaining joints places those whose parents have been
+        // placed.
         let mut order = vec![usize::MAX; given.len()];
         let mut placed = Vec::with_capacity(given.len());
         while placed.len() < given.len() {
@@ -128,10 +128,10 @@ impl Rig {
         Ok(Rig { joints: joints.collect(), keypoints: Vec::new(), order })
     }
 
-    /// With named points: name, joint, place at rest.
+    /// Adds named points, given by name, joint and position at rest.
     ///
     /// # Errors
-    /// A joint that the rig does not have, two points of one name, a place that is not
+    /// A joint that does not exist; two points of one name; a position that is not
     /// finite.
     pub fn with_keypoints(
         mut self,
@@ -168,17 +168,18 @@ impl Rig {
         &self.keypoints
     }
 
-    /// The index of a joint.
+    /// Returns the index of a joint.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|j| *j.name == *name)
     }
 
-    /// The place in rig order of the joint that was given as number `i`.
+    /// Returns the index in rig order of the joint that was given as number `i`.
     pub fn placed(&self, i: usize) -> Option<usize> {
         self.order.get(i).copied()
     }
 
-    /// The same tree with heads, tails and keypoints moved: by joint, and by keypoint.
+    /// Returns the same tree with the given offsets added to heads and tails (by joint)
+    /// and to keypoints.
     pub(super) fn moved(&self, heads: &[DVec3], tails: &[DVec3], points: &[DVec3]) -> Rig {
         let mut rig = self.clone();
         for ((j, h), t) in rig.joints.iter_mut().zip(heads).zip(tails) {
@@ -191,10 +192,10 @@ impl Rig {
     }
 }
 
-/// A cycle among the joints that could not be placed, as text.
+/// Returns a cycle among the joints that could not be placed, as text.
 fn cycle(given: &[NamedJoint], parents: &[Option<usize>], order: &[usize]) -> String {
     let Some(mut at) = order.iter().position(|o| *o == usize::MAX) else { return String::new() };
-    // After as many steps as there are joints one is on the cycle.
+    // After that many steps up, `at` is on the cycle.
     for _ in 0..given.len() {
         at = parents[at].unwrap_or(at);
     }

@@ -1,8 +1,8 @@
 //! Rig and morph files: JSON beside an OBJ mesh.
 //!
 //! `{"mesh": "body.obj", "morphs": "body.morphs.json", "joints": [{"name", "parent", "head", "tail"}], "weights": [[[joint, weight], …] by vertex], "keypoints": {name: {"joint", "rest"}}}`;
-//! `morphs` and `keypoints` may be left out, and so may `tail`. Joints are given by
-//! number in `weights`, in the order of `joints`. Other fields are not read.
+//! `morphs`, `keypoints` and `tail` are optional. `weights` refer to joints by index, in
+//! the order of `joints`. Other fields are ignored.
 
 use super::{Influence, MOST_WEIGHTS, Morph, NamedJoint, Rig};
 use crate::geom::GeomError;
@@ -10,16 +10,16 @@ use glam::{DVec3, Vec3};
 use indexmap::IndexMap;
 use serde::Deserialize;
 
-/// A rig file, checked, without its mesh.
+/// The contents of a rig file, checked, without the mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigFile {
     /// The rig.
     pub rig: Rig,
-    /// The mesh's file, relative to the rig's.
+    /// The path of the mesh's file, relative to the rig's.
     pub mesh: String,
-    /// The morphs' file, relative to the rig's.
+    /// The path of the morphs' file, relative to the rig's.
     pub morphs: Option<String>,
-    /// What moves each vertex.
+    /// The joints that move each vertex.
     pub influences: Vec<Influence>,
 }
 
@@ -68,8 +68,8 @@ fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8], what: &str) -> Result<T, GeomEr
 /// Reads a rig file.
 ///
 /// # Errors
-/// JSON of another layout, a rig that [`Rig::new`] refuses, a vertex without weights or
-/// with more than [`MOST_WEIGHTS`], a joint number that is not there.
+/// Invalid JSON or fields; a rig that [`Rig::new`] refuses; a vertex without weights, or
+/// with more than [`MOST_WEIGHTS`]; a joint index that does not exist.
 pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
     let file: JsonRig = read(bytes, "rig")?;
     let count = file.joints.len();
@@ -95,7 +95,7 @@ pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
                 "vertex {v} has {n} skin weights; at most {MOST_WEIGHTS} are supported"
             )));
         }
-        // The heaviest first, so that those without weight come last.
+        // Heaviest first, so that joints with weight 0 come last.
         let mut weights = weights.clone();
         weights.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (k, (joint, weight)) in weights.iter().enumerate() {
@@ -114,11 +114,11 @@ pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
     Ok(RigFile { rig, mesh: file.mesh, morphs: file.morphs, influences })
 }
 
-/// Reads a file of morphs for a rig, whose joints it gives in the order of the rig's
+/// Reads a file of morphs for a rig. The file lists joints in the order of the rig's
 /// file.
 ///
 /// # Errors
-/// JSON of another layout, or fewer or more joints than the rig has.
+/// Invalid JSON or fields; a number of joints that differs from the rig's.
 pub fn morphs_from_json(bytes: &[u8], rig: &Rig) -> Result<Vec<Morph>, GeomError> {
     let file: JsonMorphs = read(bytes, "morphs")?;
     let count = rig.joints().len();

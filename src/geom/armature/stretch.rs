@@ -1,21 +1,21 @@
-//! Other proportions: bones made longer or shorter at rest, with what hangs on them moved
-//! along.
+//! Body proportions: bones lengthened or shortened at rest, with everything attached to
+//! them moved along.
 
 use super::{Armature, Influence, RestGradient, Rig};
 use crate::geom::{GeomError, outer};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-/// How a bone's surroundings are stretched about its head.
+/// A stretch of a bone's surroundings about its head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stretch {
     /// By a factor along the bone.
     Along(f64),
-    /// By factors along the axes at rest.
+    /// By factors along the axes, at rest.
     Axes(DVec3),
 }
 
 impl Stretch {
-    /// About the origin, for a bone in direction `tail - head`.
+    /// Returns the linear map about the origin, for a bone with direction `tail - head`.
     fn linear(self, bone: DVec3) -> DMat3 {
         match self {
             Stretch::Along(f) => {
@@ -36,12 +36,12 @@ impl Stretch {
 }
 
 impl Armature {
-    /// The same body with some bones longer or shorter, by joint in rig order. A joint's
-    /// parent takes its head along; a vertex goes where the joints that move it take it,
-    /// by their weights; a keypoint where its joint does.
+    /// Returns the same body with some bones stretched, by joint in rig order. A parent's
+    /// stretch moves the heads of its children, a joint's stretch moves its keypoints,
+    /// and vertices move by the weighted stretches of their joints.
     ///
     /// # Errors
-    /// A joint that is not there, a factor that is not positive and finite.
+    /// A joint that does not exist; a factor that is not positive and finite.
     pub fn stretched(&self, by_joint: &[(usize, Stretch)]) -> Result<Armature, GeomError> {
         let maps = maps(self.rig(), by_joint)?;
         let offset = |j: usize, at: DVec3| maps[j].transform_point3(at) - at;
@@ -60,9 +60,10 @@ impl Armature {
 }
 
 impl Armature {
-    /// The vector-Jacobian product of [`Armature::stretched`], from the derivatives of
-    /// something by the stretched body at rest: by each factor, or those along the axes
-    /// (of a factor along the bone the first counts), and by this body at rest.
+    /// The vector-Jacobian product of [`Armature::stretched`], given derivatives with
+    /// respect to the stretched body at rest. Returns the derivatives with respect to
+    /// each stretch (its three factors; the first component counts for
+    /// [`Stretch::Along`]) and to this body at rest.
     ///
     /// # Errors
     /// As [`Armature::stretched`].
@@ -139,7 +140,7 @@ impl Armature {
     }
 }
 
-/// By joint: how it stretches.
+/// Returns the stretch of each joint.
 fn stretches(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<Stretch>, GeomError> {
     let mut stretches = vec![Stretch::Along(1.0); rig.joints().len()];
     for (j, stretch) in by_joint {
@@ -157,7 +158,7 @@ fn stretches(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<Stretch>, G
     Ok(stretches)
 }
 
-/// By joint: where it takes the points at rest.
+/// Returns the affine map of points at rest for each joint.
 fn maps(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<DAffine3>, GeomError> {
     let stretches = stretches(rig, by_joint)?;
     let mut maps: Vec<DAffine3> = Vec::with_capacity(stretches.len());

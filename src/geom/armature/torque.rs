@@ -1,38 +1,38 @@
-//! The vector-Jacobian product of posing by rotation vectors, from forces on points to
-//! torques about joints: as much work as there are joints. [`Rig::transforms_vjp`] is the
-//! plain way, for any pose.
+//! The vector-Jacobian product of posing by rotation vectors: accumulates forces on
+//! points into torques about joints, in time linear in the number of joints.
+//! [`Rig::transforms_vjp`] is the general method, for any pose.
 
 use super::{Armature, Influence, JointPose, Rules, Turn};
 use crate::geom::GeomError;
 use glam::{DMat3, DVec3, Vec3};
 
-/// Derivatives of something by a body at rest.
+/// Derivatives with respect to a body at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RestGradient {
-    /// By each joint's head.
+    /// With respect to each joint's head.
     pub heads: Vec<DVec3>,
-    /// By each joint's tail.
+    /// With respect to each joint's tail.
     pub tails: Vec<DVec3>,
-    /// By each keypoint.
+    /// With respect to each keypoint.
     pub keypoints: Vec<DVec3>,
-    /// By each vertex; an empty list stands for zeros.
+    /// With respect to each vertex; an empty list stands for zeros.
     pub vertices: Vec<DVec3>,
 }
 
-/// Derivatives of something by what a body is posed from.
+/// Derivatives with respect to the inputs of posing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyGradient {
-    /// By each joint's rotation vector.
+    /// With respect to each joint's rotation vector.
     pub turns: Vec<DVec3>,
-    /// By the body at rest.
+    /// With respect to the body at rest.
     pub rest: RestGradient,
 }
 
 impl Armature {
-    /// The vector-Jacobian product of [`Armature::posed`] by rotation vectors: from the
-    /// derivatives of something by the posed keypoints and vertices (in the order of
-    /// [`Armature::positions`]; none: nothing depends on them). `None` for a pose with
-    /// anything but rotation vectors, or scales that are inherited.
+    /// The vector-Jacobian product of [`Armature::posed`] for rotation vectors, given the
+    /// derivatives with respect to the posed keypoints and vertices (in the order of
+    /// [`Armature::positions`]; empty if nothing depends on them). `None` if the pose has
+    /// anything but rotation vectors, or if scales are inherited.
     ///
     /// # Errors
     /// A pose that is not finite.
@@ -52,8 +52,8 @@ impl Armature {
         }
         let transforms = rig.transforms(pose, rules)?;
         let count = rig.joints().len();
-        // Of everything that hangs on a joint: the sum of the derivatives (forces), and
-        // of p x g (torques about the origin).
+        // For each joint, sums over everything attached to it: the derivatives (forces),
+        // and p x g (torques about the origin).
         let (mut force, mut torque) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
         let mut hang = |joint: usize, rest: DVec3, g: DVec3| {
             let t = &transforms[joint];
@@ -76,7 +76,8 @@ impl Armature {
             let joint = &rig.joints()[j];
             let (f, t) = (force[j], torque[j]);
             let up = joint.parent.map_or(DMat3::IDENTITY, |p| transforms[p].matrix3);
-            // The head is where its parent puts it, and its own turn leaves it there.
+            // The parent determines the head's position; the joint's own rotation leaves
+            // it fixed.
             let pivot = transforms[j].transform_point3(joint.head);
             let local = up.transpose() * (t - pivot.cross(f));
             turns[j] = transposed_left_jacobian(
@@ -102,13 +103,13 @@ fn vector(p: &JointPose) -> Option<DVec3> {
     }
 }
 
-/// J' t with exp(w + dw) = exp(J dw) exp(w): J = I + a [w]x + b [w]x^2 with a = (1 - cos
-/// |w|) / |w|^2, b = (|w| - sin |w|) / |w|^3.
+/// Returns J' t, where exp(w + dw) = exp(J dw) exp(w): J = I + a [w]x + b [w]x^2 with a =
+/// (1 - cos |w|) / |w|^2, b = (|w| - sin |w|) / |w|^3.
 fn transposed_left_jacobian(w: DVec3, t: DVec3) -> DVec3 {
     let square = w.length_squared();
     let angle = square.sqrt();
     let (a, b) = if angle < 1e-3 {
-        // Series: what is left out is below the rounding of doubles.
+        // Taylor series; the omitted terms are below double precision.
         (
             0.5 - square / 24.0 + square * square / 720.0,
             1.0 / 6.0 - square / 120.0 + square * square / 5040.0,

@@ -1,12 +1,12 @@
-//! Fewer and fewer triangles through some of a mesh's own vertices: half-edge collapses
-//! in the order of quadric errors (Garland and Heckbert 1997, *Surface simplification
-//! using quadric error metrics*).
+//! Mesh simplification by half-edge collapses in the order of quadric errors (Garland and
+//! Heckbert 1997, *Surface simplification using quadric error metrics*). The result uses
+//! the mesh's own vertices.
 //!
-//! Points that lie on a line (a crease, a boundary, where parts meet, a seam between
-//! normals) move along that line alone, ends and crossings of lines not at all. No face
-//! turns over, and by the link condition no collapse changes what kind of surface it is:
-//! what was closed stays closed. Invariant: the result depends on the mesh alone, ties go
-//! to lower numbers.
+//! Points on feature lines (creases, boundaries, borders between parts, seams between
+//! normals) move only along their line; ends and crossings of lines are fixed. No face
+//! flips, and by the link condition no collapse changes the topology: closed surfaces
+//! stay closed. Invariant: the result depends on the mesh alone, and ties go to lower
+//! indices.
 
 use super::quadric::Quadric;
 use crate::geom::NO_FACE;
@@ -17,54 +17,54 @@ use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// No level has fewer triangles than about this.
+/// The approximate minimum number of triangles of a level.
 const FEWEST: usize = 100;
-/// Above this many triangles levels halve them, below they leave seven in ten.
+/// Above this number of triangles each level halves them; below it each keeps 70%.
 const MANY: usize = 10_000;
-/// What an edge's squared length adds to the squared distances: among equals the shortest
-/// goes first.
+/// The weight of an edge's squared length in the cost, so that among equal errors the
+/// shortest edge collapses first.
 const BY_LENGTH: f64 = 1e-3;
-/// A face turns by at most 60 degrees in one step: the cosine.
+/// The cosine of the largest rotation of a face in one collapse, 60 degrees.
 const LEAST_TURN_COS: f64 = 0.5;
-/// The least quality that a face may come to: 1 for an equilateral one, 0 for one without
-/// area.
+/// The minimum quality of a face that a collapse may create: 1 for an equilateral
+/// triangle, 0 for one without area.
 const LEAST_QUALITY: f64 = 0.08;
 
-/// Edges that show or mean something, in bits. One can be several.
+/// The kinds of feature lines, as bits: an edge can be of several.
 const CREASE: u8 = 1;
 const BOUNDARY: u8 = 2;
 const BORDER: u8 = 4;
 const SEAM: u8 = 8;
 
-/// Two points, the lower first.
+/// Two points, the lower index first.
 type Pair = (u32, u32);
 
 fn pair(a: u32, b: u32) -> Pair {
     (a.min(b), a.max(b))
 }
 
-/// What is to be made coarser.
+/// The surface to simplify.
 pub(super) struct Fine<'a> {
     pub positions: &'a [Vec3],
     pub triangles: &'a [[u32; 3]],
     /// The part of each triangle.
     pub parts: &'a [u16],
-    /// The ends of creases.
+    /// The end vertices of each crease edge.
     pub creases: &'a [[u32; 2]],
 }
 
-/// A coarser surface, by the vertices of the fine one.
+/// A coarser surface, in terms of the fine one's vertices.
 pub(super) struct Coarsened {
     pub triangles: Vec<[u32; 3]>,
     /// The part of each triangle.
     pub parts: Vec<u16>,
-    /// The ends of creases, as points: see [`weld`].
+    /// The ends of crease edges, as points: see [`weld`].
     pub creases: FxHashSet<Pair>,
-    /// Where each vertex went: itself, if it is still there.
+    /// The vertex that each vertex was merged into: itself, if it remains.
     pub merged: Vec<u32>,
 }
 
-/// Ever coarser surfaces, down to some hundred triangles.
+/// Returns ever coarser surfaces, down to about a hundred triangles.
 pub(super) fn decimate(fine: &Fine) -> Vec<Coarsened> {
     let mut steps = Vec::new();
     if fine.triangles.len() < 2 * FEWEST {
@@ -78,8 +78,8 @@ pub(super) fn decimate(fine: &Fine) -> Vec<Coarsened> {
     while let Some(Reverse((_, from))) = queue.pop() {
         let Plan { to, stale, .. } = surface.plans[from as usize];
         surface.plans[from as usize].queued = false;
-        // What lies around may have changed meanwhile; costs mostly rise, so few go in
-        // too late.
+        // The surroundings may have changed since the point was queued. Costs mostly
+        // rise, so few collapses happen later than they should.
         let collapse =
             if stale { None } else { surface.collapse(from, to, &surface.neighbours(from)) };
         let Some(collapse) = collapse else {
@@ -104,19 +104,20 @@ pub(super) fn decimate(fine: &Fine) -> Vec<Coarsened> {
     steps
 }
 
-/// A surface on its way.
+/// A surface during simplification.
 struct Surface<'a> {
     parts: &'a [u16],
-    /// The point of each vertex, and where points are.
+    /// The point of each vertex, and the points' positions.
     point: Vec<u32>,
     at: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
-    /// The triangles that are left around each point, and whether each is left.
+    /// The remaining triangles around each point, and whether each triangle remains.
     around: Vec<SmallVec<[u32; 8]>>,
     left: Vec<bool>,
-    /// How many are.
+    /// The number of remaining triangles.
     live: usize,
-    /// What the edges that are lines are, and how many each point has.
+    /// The kinds of the edges on feature lines, and the number of such edges at each
+    /// point.
     lines: FxHashMap<Pair, u8>,
     lines_at: Vec<u8>,
     quadrics: Vec<Quadric>,
@@ -124,25 +125,25 @@ struct Surface<'a> {
     plans: Vec<Plan>,
 }
 
-/// What a point would do next.
+/// The next collapse of a point.
 #[derive(Clone, Copy, Default)]
 struct Plan {
-    /// Where it would go.
+    /// The point to collapse into.
     to: u32,
-    /// Whether it waits in the queue.
+    /// Whether the point is in the queue.
     queued: bool,
-    /// Whether its surroundings have changed since.
+    /// Whether the surroundings have changed since it was queued.
     stale: bool,
 }
 
-/// Cost (bits of a number that is not negative) and point; the least first.
+/// The cost (bits of a non-negative number) and the point; the least cost comes first.
 type Queue = BinaryHeap<Reverse<(u64, u32)>>;
 
-/// A collapse that may be done.
+/// A valid collapse.
 struct Collapse {
     from: u32,
     to: u32,
-    /// What becomes of the vertices of the point.
+    /// The vertices of the collapsing point, and those that replace them.
     vertices: SmallVec<[(u32, u32); 2]>,
 }
 
@@ -214,7 +215,7 @@ impl<'a> Surface<'a> {
             if kind & (CREASE | BOUNDARY) != 0 {
                 self.keep_line(a, b, faces[f]);
             }
-            // Where more than two faces meet, nothing moves.
+            // Points where more than two faces meet at an edge are fixed.
             let odd = !seen.insert(key);
             for p in [a, b] {
                 let many = if odd { u8::MAX } else { u8::from(kind != 0) };
@@ -226,8 +227,8 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// A plane through an edge at right angles to a face beside it keeps collapses from
-    /// moving the line sideways.
+    /// Adds to both ends of an edge the plane through it perpendicular to an adjacent
+    /// face, so that collapses do not move the line sideways.
     fn keep_line(&mut self, a: u32, b: u32, face: u32) {
         let [p, q] = [a, b].map(|p| self.at[p as usize]);
         let across = (q - p).cross(normal(self.points(face).map(|p| self.at[p as usize])));
@@ -242,12 +243,13 @@ impl<'a> Surface<'a> {
         self.triangles[face as usize].map(|v| self.point[v as usize])
     }
 
-    /// The vertex that a face has at a point.
+    /// Returns the vertex that a face has at a point.
     fn corner(&self, face: u32, point: u32) -> Option<u32> {
         self.triangles[face as usize].into_iter().find(|v| self.point[*v as usize] == point)
     }
 
-    /// The points that share an edge with a point, each once, in rising order.
+    /// Returns the points that share an edge with a point, each once, in increasing
+    /// order.
     fn neighbours(&self, point: u32) -> SmallVec<[u32; 16]> {
         let faces = self.around[point as usize].iter();
         let mut all: SmallVec<[u32; 16]> =
@@ -257,8 +259,7 @@ impl<'a> Surface<'a> {
         all
     }
 
-    /// Puts a point into the queue with the best collapse that it may do, if there is
-    /// one.
+    /// Queues a point with its cheapest valid collapse, if there is one.
     fn enqueue(&mut self, from: u32, queue: &mut Queue) {
         let lines = self.lines_at[from as usize];
         if lines != 0 && lines != 2 {
@@ -282,7 +283,7 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// The collapse of a point into one of its neighbours, if it may be done.
+    /// Returns the collapse of a point into one of its neighbours, if it is valid.
     fn collapse(&self, from: u32, to: u32, ours: &[u32]) -> Option<Collapse> {
         let around = &self.around[from as usize];
         let kind = |p: u32| self.lines.get(&pair(from, p)).copied().unwrap_or(0);
@@ -295,14 +296,15 @@ impl<'a> Surface<'a> {
             }
             let change = (self.corner(*f, from)?, self.corner(*f, to)?);
             match vertices.iter().find(|(old, _)| *old == change.0) {
-                // One vertex cannot become two.
+                // One vertex cannot be replaced by two.
                 Some(before) if *before != change => return None,
                 Some(_) => {}
                 None => vertices.push(change),
             }
             apexes.extend(points.into_iter().find(|p| *p != from && *p != to));
         }
-        // The link condition: neighbours in common are those of the faces that go.
+        // The link condition: the only common neighbours are the apexes of the removed
+        // faces.
         let theirs = self.neighbours(to);
         let common = ours.iter().filter(|p| theirs.binary_search(p).is_ok()).count();
         let faces = if kind(to) & BOUNDARY != 0 { 1 } else { 2 };
@@ -313,7 +315,7 @@ impl<'a> Surface<'a> {
             return None;
         }
         if self.lines_at[from as usize] != 0 {
-            // Along a line of one kind, and not onto another line.
+            // Only along a line of one kind, and not onto another line.
             let other = ours.iter().copied().find(|p| *p != to && kind(*p) != 0)?;
             if kind(to) == 0 || kind(other) != kind(to) || self.lines.contains_key(&pair(other, to))
             {
@@ -338,7 +340,7 @@ impl<'a> Surface<'a> {
                 a.dot(b),
                 LEAST_TURN_COS * LEAST_TURN_COS * a.length_squared() * b.length_squared(),
             );
-            // Written so that NaN is refused.
+            // Written so that NaN is rejected.
             if !(dot > 0.0 && dot * dot >= least) || (is_sliver(after) && !is_sliver(before)) {
                 return None;
             }
@@ -374,11 +376,12 @@ impl<'a> Surface<'a> {
         self.lines_at[*from as usize] = u8::MAX;
     }
 
-    /// A line's point is gone: the edge behind it now ends where it went.
+    /// Updates a line after one of its points collapsed: the edge behind it now ends at
+    /// `to`.
     fn shorten_line(&mut self, from: u32, to: u32) {
         self.lines.remove(&pair(from, to));
         let near: SmallVec<[u32; 16]> = self.neighbours(to);
-        // Neighbours of the point that went are now those of the other.
+        // The neighbours of the removed point are now those of `to`.
         if let Some((other, kind)) =
             near.iter().find_map(|p| self.lines.remove(&pair(from, *p)).map(|kind| (*p, kind)))
         {
@@ -387,7 +390,7 @@ impl<'a> Surface<'a> {
     }
 
     fn step(&mut self) -> Coarsened {
-        // A vertex that went to one that went on goes to the last of them.
+        // Follow chains of merges to the vertex that remains.
         for v in 0..self.merged.len() {
             let mut end = self.merged[v];
             while self.merged[end as usize] != end {
@@ -410,13 +413,13 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// At right angles to a triangle, as long as twice its area.
+/// The normal of a triangle, with a length of twice its area.
 fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Whether a triangle's quality, its area to that of an equilateral one with the same
-/// squares of edges, is too low.
+/// Whether a triangle's quality is too low: the ratio of its area to that of an
+/// equilateral triangle with the same sum of squared edges.
 fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
     let around =
         LEAST_QUALITY * (a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a));

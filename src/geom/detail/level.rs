@@ -1,9 +1,11 @@
-//! One coarser version of meshes of a topology: which vertices it keeps, and for each it
-//! leaves out the point of the coarse surface that was nearest when it was made.
+//! One level of detail for the meshes of a topology: the vertices it keeps, and for each
+//! omitted vertex the point of the coarse surface that was nearest when the level was
+//! made.
 //!
-//! That point is told by shares of three kept vertices, so it moves with them, and its
-//! distance from the vertex left out bounds how far the vertex is from the coarse surface
-//! in any other pose. Invariant: indices fit the mesh that the level was made of.
+//! That point is given by barycentric coordinates in three kept vertices, so it moves
+//! with them. In any other pose, its distance to the omitted vertex bounds the distance
+//! from that vertex to the coarse surface. Invariant: indices fit the mesh that the level
+//! was made from.
 
 use super::Coarse;
 use super::decimate::Coarsened;
@@ -12,7 +14,8 @@ use crate::geom::{Edge, Edges, Mesh, NO_FACE, Topology};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// A vertex that is left out, and the point of the coarse surface that stands for it.
+/// An omitted vertex, and the barycentric coordinates of the surface point that stands
+/// for it.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
     vertex: u32,
@@ -20,15 +23,15 @@ struct Bound {
     shares: [f32; 3],
 }
 
-/// See the module's head.
+/// A level of detail; see the module's documentation.
 #[derive(Clone, Debug)]
 pub(in crate::geom) struct Level {
     topology: Arc<Topology>,
-    /// The fine vertex of each of its own.
+    /// For each of its vertices, the index in the fine mesh.
     pub vertices: Arc<[u32]>,
-    /// The farthest first, in the shape that it was made for.
+    /// The omitted vertices, by decreasing distance in the shape the level was made from.
     bounds: Vec<Bound>,
-    /// How far that one is, in the mesh's units.
+    /// The largest distance of an omitted vertex, in the mesh's units.
     pub deviation: f64,
 }
 
@@ -70,13 +73,13 @@ impl Level {
         }
     }
 
-    /// Without what tells of other positions: those of a rigid mesh stay as they are.
+    /// Drops the bounds, which only matter for other positions: a rigid mesh's are fixed.
     pub(super) fn rigid(self) -> Level {
         Level { bounds: Vec::new(), ..self }
     }
 
-    /// Whether a vertex left out may be farther than `most` from this level of a mesh
-    /// with other positions. A position that is not a number is.
+    /// Whether an omitted vertex may be farther than `most` from this level of a mesh
+    /// with other positions. Positions that are NaN count as farther.
     pub fn strays(&self, positions: &[Vec3], most: f64) -> bool {
         let most = (most * most) as f32;
         let at = |v: u32| positions.get(v as usize).copied().unwrap_or(Vec3::NAN);
@@ -87,7 +90,7 @@ impl Level {
         })
     }
 
-    /// The level of a mesh.
+    /// Returns this level of a mesh.
     pub fn of(&self, mesh: &Mesh) -> Coarse {
         Coarse::of(mesh, Arc::clone(&self.vertices), Arc::clone(&self.topology))
     }
@@ -108,7 +111,7 @@ fn edges(point: &[u32], triangles: &[[u32; 3]], step: &Coarsened) -> Edges {
     all.collect()
 }
 
-/// Finds points of a surface near others.
+/// Nearest-point queries on a surface.
 struct Near<'a> {
     positions: &'a [Vec3],
     point: &'a [u32],
@@ -140,9 +143,9 @@ impl<'a> Near<'a> {
         &self.list[self.first[p] as usize..self.first[p + 1] as usize]
     }
 
-    /// The nearest point to a vertex on the triangles around another, and from there on
-    /// to neighbours as long as it is on the rim of one and they are nearer; its
-    /// distance, infinite where there are no triangles.
+    /// Returns the point nearest to a vertex on the triangles around `merged`, then moves
+    /// to adjacent triangles while it lies on the rim of one and gets nearer. Also
+    /// returns its distance, which is infinite if there are no triangles.
     fn bound(&self, vertex: u32, merged: u32) -> (f64, Bound) {
         let p = self.at(vertex);
         let mut best =
@@ -160,7 +163,8 @@ impl<'a> Near<'a> {
         (best.0.sqrt(), best.1)
     }
 
-    /// The nearer to a point of what was found and a triangle, with the squared distance.
+    /// Returns the nearer of the best point so far and a triangle's nearest point, with
+    /// its squared distance.
     fn nearer(&self, p: DVec3, face: u32, best: (f64, Bound)) -> (f64, Bound) {
         let corners = self.triangles[face as usize];
         let shares = nearest(p, corners.map(|v| self.at(v)));
@@ -178,8 +182,8 @@ impl<'a> Near<'a> {
     }
 }
 
-/// The shares of a triangle's corners in its point nearest to `p` (Ericson 2005,
-/// *Real-time collision detection*, 5.1.5).
+/// Returns the barycentric coordinates of a triangle's point nearest to `p` (Ericson
+/// 2005, *Real-time collision detection*, 5.1.5).
 fn nearest(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let (d1, d2) = (ab.dot(p - a), ac.dot(p - a));

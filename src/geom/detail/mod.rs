@@ -1,10 +1,10 @@
-//! Coarser versions of meshes that keep some of their vertices, for pictures in which the
-//! difference cannot be seen.
+//! Levels of detail: coarser versions of meshes that keep a subset of the vertices, for
+//! pictures in which the difference is invisible.
 //!
-//! Not other shapes: a coarser version has positions and normals of the mesh itself, so
-//! what depends on its vertices is known by the mesh's. It knows how far the vertices it
-//! leaves out are from it. Invariant: which versions there are depends on how a mesh was
-//! made (a lathe's points, a file, a body at rest), never on what was asked for before.
+//! A coarse version has positions and normals of the original mesh, so derivatives with
+//! respect to its vertices are derivatives with respect to the mesh's. It also bounds the
+//! distance to the vertices it omits. Invariant: which versions exist depends on how a
+//! mesh was made (a lathe's points, a file, a body at rest), never on earlier queries.
 
 mod decimate;
 mod level;
@@ -24,14 +24,14 @@ pub(super) use turned::Turned;
 /// A coarser version of a mesh.
 #[derive(Debug)]
 pub struct Coarse {
-    /// It.
+    /// The mesh.
     pub mesh: Arc<Mesh>,
-    /// The mesh's own vertex of each of its.
+    /// For each of its vertices, the index in the original mesh.
     pub vertices: Arc<[u32]>,
 }
 
 impl Coarse {
-    /// Of some of a mesh's vertices, joined like this.
+    /// Makes a coarse mesh of the given vertices and topology.
     fn of(mesh: &Mesh, vertices: Arc<[u32]>, topology: Arc<Topology>) -> Coarse {
         let pick = |list: &[Vec3]| {
             vertices.iter().filter_map(|v| list.get(*v as usize)).copied().collect()
@@ -41,31 +41,32 @@ impl Coarse {
     }
 }
 
-/// Whoever has levels for meshes of one topology, or for the parts of a whole.
+/// A source of levels for meshes of one topology, or for the parts of a whole.
 pub(super) trait Levels: fmt::Debug + Send + Sync {
-    /// Those of a part, ever coarser.
+    /// Returns the levels of a part, each coarser than the one before.
     fn levels(&self, part: usize) -> &[Level];
 }
 
 #[derive(Debug)]
 enum Source {
-    /// A mesh that stays as it is.
+    /// A mesh of fixed shape.
     Rigid(OnceLock<Vec<Level>>),
-    /// A part in a pose.
+    /// A part of a posed body.
     Posed(Arc<dyn Levels>, usize),
     Turned(Turned),
 }
 
-/// Which version: 0 and the number of a level, or steps between meridians and rings.
+/// Identifies a version: 0 and the index of a level, or the steps between meridians and
+/// rings.
 type Key = (u32, usize);
 
-/// The coarser versions of one mesh, each made when first asked for.
+/// The coarser versions of one mesh, each made on first use.
 #[derive(Debug)]
 pub struct Detail {
     source: Source,
-    /// A ball around the mesh.
+    /// The centre and radius of a ball around the mesh.
     ball: OnceLock<(DVec3, f64)>,
-    /// Those made.
+    /// The versions made so far.
     made: Mutex<Vec<(Key, Arc<Coarse>)>>,
 }
 
@@ -74,24 +75,24 @@ impl Detail {
         Detail { source, ball: OnceLock::new(), made: Mutex::default() }
     }
 
-    /// Of a mesh that will be seen many times: coarser versions are worked out once, in
-    /// about a second for 100,000 triangles.
+    /// For a mesh that will be drawn many times: its levels are computed once, in about a
+    /// second for 100,000 triangles.
     pub(super) fn rigid() -> Detail {
         Detail::new(Source::Rigid(OnceLock::new()))
     }
 
-    /// Of a part in a pose.
+    /// For a part of a posed body.
     pub(super) fn posed(levels: Arc<dyn Levels>, part: usize) -> Detail {
         Detail::new(Source::Posed(levels, part))
     }
 
-    /// Of a surface of revolution.
+    /// For a surface of revolution.
     pub(super) fn turned(turned: Turned) -> Detail {
         Detail::new(Source::Turned(turned))
     }
 
-    /// The coarsest version of the mesh it belongs to that is at most `error` (the mesh's
-    /// units) from every vertex it leaves out; `None` if that is the mesh itself.
+    /// Returns the coarsest version of the mesh that is within `error` (in the mesh's
+    /// units) of every vertex it omits; `None` if that is the mesh itself.
     pub(super) fn within(&self, mesh: &Mesh, error: f64) -> Option<Arc<Coarse>> {
         let last = |levels: &[Level], fits: &dyn Fn(&Level) -> bool| {
             levels.iter().rposition(fits).map(|i| (0, i))
@@ -120,7 +121,7 @@ impl Detail {
         Some(coarse)
     }
 
-    /// The centre and radius of a ball around the mesh it belongs to.
+    /// Returns the centre and radius of a ball around the mesh.
     pub(super) fn ball(&self, mesh: &Mesh) -> (DVec3, f64) {
         *self.ball.get_or_init(|| {
             let centre = mesh.bounds().map_or(DVec3::ZERO, |b| b.centre());
@@ -136,9 +137,9 @@ fn rigid_levels<'a>(levels: &'a OnceLock<Vec<Level>>, mesh: &Mesh) -> &'a [Level
     })
 }
 
-/// The levels of the parts of a smooth body, each with its own list of the body's
-/// vertices: the body is made coarser as a whole, so that parts of one level meet where
-/// they did.
+/// Returns the levels of the parts of a smooth body; each part has its own list of the
+/// body's vertices. The body is simplified as a whole, so that parts still meet at every
+/// level.
 pub(super) fn levels_of_parts(
     positions: &[Vec3],
     parts: &[(&[u32], &Topology)],
@@ -153,8 +154,8 @@ pub(super) fn levels_of_parts(
     let one = |((own, topology), number): (&(&[u32], &Topology), u16)| {
         let at: Vec<Vec3> = own.iter().map(|v| positions[*v as usize]).collect();
         own.iter().zip(0..).for_each(|(v, i)| of_part[*v as usize] = i);
-        // Where a point joins parts that share no edge, one of them may get a vertex that
-        // it does not have: no levels from there on.
+        // Where parts meet at a point but share no edge, a collapse can give one of them
+        // a vertex of another; its levels end there.
         let mine = |v: u32| Some(of_part[v as usize]).filter(|i| *i != u32::MAX);
         let part = |step: &Coarsened| {
             let theirs =
@@ -177,7 +178,7 @@ pub(super) fn levels_of_parts(
     parts.iter().zip(0u16..).map(one).collect()
 }
 
-/// The levels of a mesh, ever coarser.
+/// Returns the levels of a mesh, each coarser than the one before.
 fn levels_of(positions: &[Vec3], topology: &Topology) -> Vec<Level> {
     let creases: Vec<[u32; 2]> =
         topology.edges.iter().filter(|e| e.crease).map(|e| e.vertices).collect();

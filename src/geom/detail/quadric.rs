@@ -1,5 +1,5 @@
-//! Sums of squared distances to planes (Garland and Heckbert 1997): how far a point is
-//! from all the faces it stands for.
+//! Quadric error metrics (Garland and Heckbert 1997): sums of squared distances from a
+//! point to the planes of the faces it stands for.
 
 use glam::DVec3;
 
@@ -16,14 +16,14 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
-    /// Of the plane through a point at right angles to a unit vector.
+    /// The quadric of the plane through a point with this unit normal.
     pub fn plane(normal: DVec3, through: DVec3) -> Quadric {
         let (n, d) = (normal, -normal.dot(through));
         let mixed = DVec3::new(n.y * n.z, n.z * n.x, n.x * n.y);
         Quadric { diagonal: n * n, mixed, b: n * d, c: d * d }
     }
 
-    /// The sum at a point, not negative.
+    /// The sum at a point, never negative.
     pub fn at(&self, p: DVec3) -> f64 {
         let mixed = DVec3::new(p.y * p.z, p.z * p.x, p.x * p.y);
         (self.diagonal.dot(p * p) + 2.0 * (self.mixed.dot(mixed) + self.b.dot(p)) + self.c).max(0.0)

@@ -1,11 +1,11 @@
-//! Coarser meshes are closed where the mesh was, keep their lines, and are as near as
-//! they say.
+//! Tests that coarser meshes stay closed, keep their feature lines, and are within their
+//! stated distances.
 
 use super::*;
 use crate::geom::edges::{pair_edges, smooth_normals, weld};
 use crate::geom::{Caps, NO_FACE, Profile, Solid, lathe, obj, sphere};
 
-/// A ball with lumps.
+/// A ball with bumps.
 fn lumpy(sides: u32) -> Mesh {
     let ball = sphere(1.0, sides).unwrap();
     let lump = |p: &Vec3| {
@@ -22,7 +22,7 @@ fn lumpy(sides: u32) -> Mesh {
     .unwrap()
 }
 
-/// A cup: a crease round its bottom, a boundary round its mouth, two parts.
+/// A cup: a crease around its bottom, a boundary around its mouth, two parts.
 fn cup() -> Mesh {
     let y: Vec<f64> = (0..24).map(|i| f64::from(i) / 12.0).collect();
     let r = y.iter().map(|y| 0.5 + 0.1 * libm::sin(4.0 * y)).collect();
@@ -42,13 +42,13 @@ fn volume(mesh: &Mesh) -> f64 {
         .sum()
 }
 
-/// How far the farthest of some points is from a mesh: every triangle is looked at.
+/// Returns the largest distance of the points to a mesh, by exhaustive search.
 fn farthest(points: &[Vec3], mesh: &Mesh) -> f64 {
     let distance = |p: &Vec3| {
         let p = p.as_dvec3();
         let to = |t: &[u32; 3]| {
             let [a, b, c] = corners(mesh, t);
-            // The plane where the foot is inside, else the edges.
+            // The plane if the foot of the perpendicular is inside, else the edges.
             let n = (b - a).cross(c - a);
             let foot = p - n * (p - a).dot(n) / n.length_squared();
             let inside = [(a, b), (b, c), (c, a)]
@@ -80,7 +80,7 @@ fn a_closed_mesh_stays_closed_and_outward() {
         let coarse = level.of(&mesh).mesh;
         let t = &coarse.topology;
         assert!(t.edges.iter().all(|e| e.faces[1] != NO_FACE && !e.crease));
-        // One sphere, its faces turned alike.
+        // A single sphere with consistently oriented faces.
         let (v, e, f) = (coarse.positions.len(), t.edges.len(), t.triangles.len());
         assert_eq!(v + f, e + 2);
         for edge in t.edges.iter() {
@@ -124,7 +124,7 @@ fn creases_boundaries_and_parts_stay_where_they_are() {
             let up = |f: u32| t.triangles[f as usize].iter().any(|v| at(*v).y > 0.0);
             assert!(up(e.faces[0]) != up(e.faces[1]), "between bottom and wall");
         }
-        // Each closes to one ring, and the bottom keeps its part and its normals.
+        // Each forms one closed ring, and the bottom keeps its part and its normals.
         for ring in [&open, &creases] {
             let points = weld(&coarse.positions);
             let mut ends: Vec<u32> =
@@ -158,7 +158,7 @@ fn no_vertex_is_farther_than_the_deviation() {
             assert!(far > 0.3 * level.deviation, "a loose bound: {far} {}", level.deviation);
             assert!(!level.strays(&mesh.positions, level.deviation + 1e-6));
             assert!(level.strays(&mesh.positions, 0.9 * level.deviation));
-            // The same vertices of another shape, which it was not made for.
+            // The same vertices in another shape, for which the level was not made.
             let other = Mesh { positions: bent.clone(), ..mesh.clone() };
             let far = farthest(&bent, &level.of(&other).mesh);
             for most in [0.5, 0.8, 1.0, 1.2, 2.0, 4.0].map(|share| share * level.deviation) {
@@ -201,7 +201,7 @@ fn lathes_leave_out_meridians_and_rings() {
 #[test]
 fn parts_of_a_body_still_meet() {
     let mesh = obj::indexed(include_bytes!("../../../programs/std/human/human.lod1.obj")).unwrap();
-    // Cut by height into slices, each with vertices of its own.
+    // Slices by height, each with its own vertices.
     let slice = |t: &[u32; 3]| ((mesh.positions[t[0] as usize].y * 5.0) as usize).min(8);
     let mut parts: Vec<(Vec<u32>, Topology)> = vec![Default::default(); 9];
     for t in &mesh.triangles {

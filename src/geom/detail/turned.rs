@@ -1,32 +1,32 @@
-//! Coarser surfaces of revolution: every so many meridians, every so many rings of each
+//! Coarser surfaces of revolution: every n-th meridian, and every m-th ring of each
 //! strip.
 //!
-//! Ends of strips stay, and with them poles and creases; so do rings where parts meet.
-//! Invariant: which rings a step keeps depends on the numbers of points and parts alone,
-//! so few topologies serve a profile that moves.
+//! Ends of strips are kept, and with them poles and creases, as are rings where parts
+//! meet. Invariant: the rings that a step keeps depend only on the numbers of points and
+//! the parts, so a few topologies serve a profile that changes shape.
 
 use super::Coarse;
 use crate::geom::Mesh;
 use crate::geom::revolve::{Strip, topology_of};
 use std::sync::OnceLock;
 
-/// The fewest meridians of a coarser surface, as long as the fine one has more.
+/// The minimum number of meridians of a coarser surface, unless the fine one has fewer.
 const FEWEST_SIDES: u32 = 6;
 
-/// What a surface of revolution was made of.
+/// The data that a surface of revolution was made from.
 #[derive(Debug)]
 pub(in crate::geom) struct Turned {
     pub strips: Vec<Strip>,
     pub sides: u32,
-    /// Whether the path ends where it begins.
+    /// Whether the path ends where it starts.
     pub closed: bool,
     pub part_count: u16,
-    /// For each step between rings (1, 2, 4, …) how far points of the path left out are
-    /// from it; found when asked for.
+    /// For each step between rings (1, 2, 4, …), the largest distance of the path's
+    /// omitted points to the coarser path; computed on first use.
     strays: OnceLock<Vec<f64>>,
 }
 
-/// How much coarser: a meridian of so many, and a ring of so many.
+/// The steps: every `sides`-th meridian and every `rings`-th ring are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Steps {
     pub sides: u32,
@@ -38,9 +38,9 @@ impl Turned {
         Turned { strips, sides, closed, part_count, strays: OnceLock::new() }
     }
 
-    /// The steps with the fewest triangles whose surface is nowhere farther than `most`
-    /// from the vertices left out, if not every vertex is kept. The distance is at most
-    /// that of the path's points from the coarser path, and the sagitta r (1 - cos(pi /
+    /// Returns the steps with the fewest triangles whose surface is within `most` of
+    /// every omitted vertex; `None` if all vertices are kept. The distance is bounded by
+    /// that of the path's points from the coarser path, plus the sagitta r (1 - cos(pi /
     /// sides)).
     pub(super) fn steps(&self, most: f64) -> Option<Steps> {
         let radius = self.strips.iter().flat_map(|s| &s.points).fold(0.0, |r: f64, p| r.max(p.0));
@@ -76,7 +76,7 @@ impl Turned {
         })
     }
 
-    /// The coarser version of its mesh.
+    /// Returns the coarser version of a mesh of this surface.
     pub(super) fn coarse(&self, mesh: &Mesh, steps: Steps) -> Coarse {
         let sides = self.sides / steps.sides;
         let mut strips = Vec::with_capacity(self.strips.len());
@@ -84,7 +84,7 @@ impl Turned {
         let mut first = 0;
         for s in &self.strips {
             let rings = kept(s, steps.rings);
-            // Where each ring of the fine mesh begins; poles are one vertex.
+            // The first vertex of each ring of the fine mesh; a pole is a single vertex.
             let begin = |p: &(f64, f64)| {
                 let past = first + if p.0 == 0.0 { 1 } else { self.sides };
                 std::mem::replace(&mut first, past)
@@ -105,14 +105,14 @@ impl Turned {
     }
 }
 
-/// The rings of a strip that are kept: its ends, where parts meet, and one of so many
-/// between.
+/// Returns the rings of a strip that are kept: its ends, those where parts meet, and
+/// every `step`-th in between.
 fn kept(s: &Strip, step: usize) -> Vec<usize> {
     let last = s.points.len() - 1;
     (0..=last).filter(|i| *i == last || *i % step == 0 || s.parts[*i - 1] != s.parts[*i]).collect()
 }
 
-/// How far points left out are from the segments between those kept, at most.
+/// Returns the largest distance of omitted points to the segments between the kept ones.
 fn stray(s: &Strip, kept: &[usize]) -> f64 {
     let between = |ends: &[usize]| {
         let [(r0, y0), (r1, y1)] = [s.points[ends[0]], s.points[ends[1]]];

@@ -1,4 +1,4 @@
-//! Accessors: typed views into buffers. Invariant: an [`Elements`] lies whole within its
+//! Accessors: typed views into buffers. Invariant: [`Elements`] lie entirely within their
 //! buffer.
 
 use super::container::{self, Read};
@@ -7,7 +7,7 @@ use crate::geom::GeomError;
 use crate::geom::mesh::MOST_TRIANGLES;
 use std::borrow::Cow;
 
-/// Component types, by glTF's numbers.
+/// Component types, by glTF's codes.
 pub(super) const I8: u32 = 5120;
 pub(super) const U8: u32 = 5121;
 pub(super) const I16: u32 = 5122;
@@ -15,7 +15,7 @@ pub(super) const U16: u32 = 5123;
 pub(super) const U32: u32 = 5125;
 pub(super) const F32: u32 = 5126;
 
-/// The most elements of an accessor.
+/// The maximum number of elements of an accessor.
 pub(super) const MOST_ELEMENTS: usize = 3 * MOST_TRIANGLES;
 
 /// A document with its buffers.
@@ -31,7 +31,7 @@ pub(super) struct Elements<'a> {
     component: u32,
     size: usize,
     normalized: bool,
-    /// How many there are.
+    /// The number of elements.
     pub count: usize,
 }
 
@@ -44,8 +44,8 @@ impl<'a> Data<'a> {
         Ok(Data { document, buffers: container::buffers(document, bin, read)? })
     }
 
-    /// The elements of an accessor that must be of this shape (`SCALAR`, `VEC3`, …) and
-    /// of one of these types.
+    /// Returns the elements of an accessor, which must have this shape (`SCALAR`, `VEC3`,
+    /// …) and one of these component types.
     pub fn elements(
         &self,
         index: usize,
@@ -110,8 +110,8 @@ impl<'a> Data<'a> {
 }
 
 impl Elements<'_> {
-    /// Component `k` of element `i` as stored; fractions of the largest integer where the
-    /// accessor is normalised.
+    /// Returns component `k` of element `i`, scaled to [-1, 1] if the accessor is
+    /// normalised.
     pub fn get(&self, i: usize, k: usize) -> f64 {
         let at = i * self.stride + k * self.size;
         let byte = |k: usize| self.bytes.get(at + k).copied().unwrap_or_default();
@@ -128,7 +128,8 @@ impl Elements<'_> {
         if self.normalized { (x / most).max(-1.0) } else { x }
     }
 
-    /// Component `k` of element `i` of a type without sign, which is not normalised.
+    /// Returns component `k` of element `i` as an unsigned integer, without
+    /// normalisation.
     pub fn whole(&self, i: usize, k: usize) -> usize {
         let plain = Elements { normalized: false, ..*self };
         plain.get(i, k) as usize

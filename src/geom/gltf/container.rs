@@ -1,16 +1,16 @@
-//! The outside of a glTF file: the chunks of a GLB, and buffers within it, beside it, or
-//! in `data:` addresses.
+//! The container of a glTF file: the chunks of a GLB, and buffers within the file, in
+//! other files, or in `data:` URIs.
 
 use super::json::{Document, Node};
 use crate::geom::GeomError;
 use std::borrow::Cow;
 
-/// Reads a file named relative to the glTF file, or says why not.
+/// Reads a file named relative to the glTF file; the error is a message.
 pub type Read<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
-/// The most buffers of a file.
+/// The maximum number of buffers of a file.
 const MOST_BUFFERS: usize = 1024;
-/// Extensions that a file may require without their changing its triangles.
+/// Prefixes of required extensions that do not affect a file's triangles.
 const HARMLESS: [&str; 7] = [
     "KHR_materials",
     "KHR_texture",
@@ -25,8 +25,8 @@ fn invalid(message: impl Into<String>) -> GeomError {
     GeomError::invalid(message)
 }
 
-/// Whether bytes are those of a glTF file: a GLB, or JSON with the key `asset`, or what
-/// is called `.gltf` or `.glb`.
+/// Whether a file is glTF: a GLB, JSON with the key `asset`, or a name that ends in
+/// `.gltf` or `.glb`.
 pub fn is_gltf(file: &str, bytes: &[u8]) -> bool {
     #[derive(serde::Deserialize)]
     struct Head {
@@ -43,7 +43,7 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
     usize::try_from(u32::from_le_bytes(four)).ok()
 }
 
-/// The document, and the chunk of bytes that follows it in a GLB.
+/// Returns the document, and the binary chunk that follows it in a GLB.
 pub(super) fn open(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), GeomError> {
     let (text, bin) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
@@ -86,7 +86,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), GeomError> {
     Ok((text, (kind == b"BIN\0").then_some(bin)))
 }
 
-/// The contents of every buffer, each as long as it says.
+/// Returns the contents of every buffer, each at least as long as it declares.
 pub(super) fn buffers<'a>(
     document: &Document,
     bin: Option<&'a [u8]>,
@@ -125,13 +125,13 @@ pub(super) fn buffers<'a>(
     Ok(all)
 }
 
-/// What follows `data:`.
+/// Decodes the part of a URI after `data:`.
 fn data(rest: &str) -> Option<Vec<u8>> {
     let (kind, text) = rest.split_once(',')?;
     if kind.ends_with(";base64") { base64(text) } else { None }
 }
 
-/// RFC 4648, section 4; padding may be left out.
+/// Decodes base64 (RFC 4648, section 4); padding is optional.
 fn base64(text: &str) -> Option<Vec<u8>> {
     let text = text.trim_end_matches('=');
     let mut out = Vec::with_capacity(text.len() / 4 * 3 + 3);
@@ -155,7 +155,7 @@ fn base64(text: &str) -> Option<Vec<u8>> {
     (text.len() % 4 != 1).then_some(out)
 }
 
-/// A path without `%20` and the like.
+/// Decodes percent escapes such as `%20` in a path.
 fn unescaped(uri: &str) -> String {
     let (bytes, mut out, mut i) = (uri.as_bytes(), Vec::with_capacity(uri.len()), 0);
     while let Some(c) = bytes.get(i) {
@@ -174,7 +174,7 @@ fn unescaped(uri: &str) -> String {
     String::from_utf8(out).unwrap_or_else(|_| uri.to_owned())
 }
 
-/// What messages call a node.
+/// Returns the name of a node in messages.
 pub(super) fn name_of(node: &Node, number: usize) -> String {
     match &node.name {
         Some(name) if !name.is_empty() => name.clone(),

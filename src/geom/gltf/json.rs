@@ -1,4 +1,4 @@
-//! The parts of a glTF document that are read; other fields are passed over.
+//! The parts of a glTF document that are read; other fields are ignored.
 
 use indexmap::IndexMap;
 use serde::Deserialize;

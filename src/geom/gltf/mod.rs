@@ -1,10 +1,10 @@
-//! Reading glTF 2.0 (Khronos, glTF 2.0 specification): the triangles of the default
-//! scene, and skins as a rig.
+//! Reads glTF 2.0 (Khronos, glTF 2.0 specification): the triangles of the default scene,
+//! and skins as a rig.
 //!
-//! `.glb` and `.gltf`, with buffers inside, beside, or in `data:` addresses. Materials,
-//! the file's own normals, cameras, animations and morph targets are not read; sparse
-//! accessors and compressed meshes are refused. Invariant: every index is checked before
-//! it is used, so no bytes can make it stumble.
+//! Supports `.glb` and `.gltf`, with buffers in the file, in other files, or in `data:`
+//! URIs. Materials, the file's own normals, cameras, animations and morph targets are
+//! ignored; sparse accessors and compressed meshes are refused. Invariant: every index is
+//! checked before it is used, so no input can cause a panic.
 
 mod access;
 mod container;
@@ -20,10 +20,11 @@ use super::{FileFrame, GeomError, Mesh};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 
-/// The bits of a vertex's place and weights.
+/// The bits of a vertex's position and weights, with the joints.
 type Same = ([u32; 3], [u16; 4], [u32; 4]);
 
-/// What a glTF file's scene holds, in scene units, +y up; bodies are in their bind pose.
+/// The contents of a glTF file's scene, in scene units, +y up; bodies are in their bind
+/// pose.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loaded {
     /// The vertices.
@@ -32,22 +33,22 @@ pub struct Loaded {
     pub triangles: Vec<[u32; 3]>,
     /// The part of each triangle.
     pub parts: Vec<u16>,
-    /// The names of the parts: of their nodes, or else their meshes.
+    /// The names of the parts: those of their nodes, or else of their meshes.
     pub names: Vec<String>,
-    /// The joints, if a mesh has a skin, each with a keypoint of its name at its head.
+    /// The joints, if a mesh has a skin; each has a keypoint of its name at its head.
     pub rig: Option<Rig>,
-    /// By vertex: what moves it. A vertex of a mesh that neither has a skin nor hangs on
-    /// a joint has none.
+    /// The joints that move each vertex; `None` if its mesh has no skin and is not
+    /// attached to a joint.
     pub influences: Vec<Option<Influence>>,
 }
 
-/// Reads a file; `read` reads those that it names, by paths relative to it.
+/// Reads a file. `read` reads the files that it refers to, by paths relative to it.
 ///
 /// # Errors
-/// [`GeomError::Invalid`]: bytes that are not glTF 2.0, or less than they say; what cannot be read (see above); nodes that
-/// form no tree; references and vertex numbers to what is not there; places that are not
-/// finite; a skin without weights; more than five million triangles, 65535 meshes or 4096
-/// joints; no triangles.
+/// [`GeomError::Invalid`]: bytes that are not glTF 2.0 or are truncated; unsupported
+/// features (see the module's documentation); nodes that do not form a tree; references
+/// to missing items or vertices; positions that are not finite; a skin without weights;
+/// more than five million triangles, 65535 meshes or 4096 joints; no triangles.
 pub fn load(bytes: &[u8], frame: &FileFrame, read: &Read) -> Result<Loaded, GeomError> {
     let (document, bin) = container::open(bytes)?;
     let data = access::Data::new(&document, bin, read)?;
@@ -58,19 +59,19 @@ pub fn load(bytes: &[u8], frame: &FileFrame, read: &Read) -> Result<Loaded, Geom
 }
 
 impl Loaded {
-    /// All of it as a mesh, as it stands.
+    /// Returns everything as one mesh, in the bind pose.
     ///
     /// # Errors
-    /// As [`Mesh::new`]: no triangle with an area.
+    /// As [`Mesh::new`]: no triangle with positive area.
     pub fn mesh(self) -> Result<Mesh, GeomError> {
         Mesh::new(self.positions, self.triangles, self.parts)
     }
 
-    /// What the joints move, as a body; other meshes are left out. Vertices that differ
-    /// in nothing that is read, but in their texture or normal, are one.
+    /// Returns the meshes that joints move as a body; other meshes are omitted. Vertices
+    /// that differ only in their texture coordinates or normals are merged.
     ///
     /// # Errors
-    /// No skin, and as [`Armature::new`]: weights that do not sum to 1.
+    /// No skin; as [`Armature::new`]: weights that do not sum to 1.
     pub fn armature(self) -> Result<Armature, GeomError> {
         let Some(rig) = self.rig else {
             return Err(GeomError::invalid(
@@ -82,7 +83,7 @@ impl Loaded {
         let mut number = vec![None; self.positions.len()];
         for ((p, i), n) in self.positions.iter().zip(&self.influences).zip(&mut number) {
             let Some(i) = i else { continue };
-            // Zeros of either sign are one place.
+            // Adding zero maps -0 to 0, so that the two are the same position.
             let place = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
             let key = (place, i.joints, i.weights.map(f32::to_bits));
             *n = Some(*known.entry(key).or_insert_with(|| {

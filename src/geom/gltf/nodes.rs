@@ -1,18 +1,18 @@
-//! The tree of nodes, with where each is in the scene's space.
+//! The tree of nodes, with their transforms to the scene.
 
 use super::container::name_of;
 use super::json::{Document, Node};
 use crate::geom::GeomError;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 
-/// By node.
+/// The nodes of a document; lists without another order are by node.
 pub(super) struct Nodes {
     /// The nodes, parents before children.
     pub order: Vec<usize>,
     pub parents: Vec<Option<usize>>,
-    /// From its own space to the scene's.
+    /// The transforms from the nodes' spaces to the scene.
     pub global: Vec<DAffine3>,
-    /// Whether it belongs to the default scene.
+    /// Whether each node belongs to the default scene.
     pub drawn: Vec<bool>,
 }
 
@@ -80,7 +80,7 @@ impl Nodes {
     }
 }
 
-/// From a node's space to its parent's.
+/// Returns the transform from a node's space to its parent's.
 fn local(n: &Node) -> DAffine3 {
     if let Some(m) = &n.matrix {
         return DAffine3::from_mat4(DMat4::from_cols_array(m));
@@ -98,12 +98,12 @@ fn local(n: &Node) -> DAffine3 {
     )
 }
 
-/// A cycle among the nodes that have no place in the order, as text.
+/// Returns a cycle among the nodes that are not in `order`, as text.
 fn cycle(parents: &[Option<usize>], order: &[usize], name: impl Fn(usize) -> String) -> String {
     let mut placed = vec![false; parents.len()];
     order.iter().for_each(|i| placed[*i] = true);
     let mut at = placed.iter().position(|p| !p).unwrap_or_default();
-    // After as many steps as there are nodes one is on the cycle.
+    // After that many steps up, `at` is on the cycle.
     for _ in 0..parents.len() {
         at = parents[at].unwrap_or(at);
     }

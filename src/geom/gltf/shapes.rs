@@ -1,4 +1,4 @@
-//! The triangles of a scene: those of every node's mesh, brought to the scene's space; a
+//! The triangles of a scene: those of every node's mesh, transformed to the scene, with a
 //! part for each node.
 
 use super::access::{Data, F32, I8, I16, MOST_ELEMENTS, U8, U16, U32};
@@ -12,7 +12,7 @@ use crate::geom::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use crate::geom::{FileFrame, GeomError};
 use glam::{DAffine3, DVec3};
 
-/// Everything that is drawn.
+/// Collects the triangles of all nodes in the default scene.
 pub(super) fn collect(
     data: &Data,
     nodes: &Nodes,
@@ -74,8 +74,8 @@ pub(super) fn collect(
     Ok(out)
 }
 
-/// Adds a primitive's vertices; gives its triangles, numbered among all, or none where it
-/// has points or lines.
+/// Adds a primitive's vertices and returns its triangles, with indices into all vertices;
+/// `None` for points or lines.
 fn add(
     data: &Data,
     p: &Primitive,

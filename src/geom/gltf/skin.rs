@@ -1,10 +1,12 @@
-//! Skins: which nodes are joints, where they are at rest, and what moves each vertex.
+//! Skins: which nodes are joints, where they are at rest, and which joints move each
+//! vertex.
 //!
-//! Rest is the bind pose. A skin's vertices and joints are brought to the scene by its
-//! root joint: global transform times inverse bind matrix, which is the same for all
-//! joints of a file whose nodes stand in the bind pose, and most often the identity. glTF
-//! moves a vertex by the sum of `w_j G_j B_j`; with `G_j` at rest `A B_j^-1` that is
-//! [`Rig`]'s own rule about the heads `A B_j^-1 0`, so rest frames can be the world's.
+//! The rest pose is the bind pose. The matrix A from a skin's vertices and joints to the
+//! scene is its root joint's global transform times inverse bind matrix. It is the same
+//! for all joints if the file's nodes are in the bind pose, and usually the identity.
+//! glTF moves a vertex by the sum of `w_j G_j B_j`. With `G_j` at rest equal to
+//! `A B_j^-1`, this is [`Rig`]'s own rule for heads `A B_j^-1 0`, so rest frames can be
+//! aligned with the world.
 
 use super::access::{Data, F32, U8, U16};
 use super::container::name_of;
@@ -15,28 +17,28 @@ use crate::geom::{FileFrame, GeomError};
 use glam::{DAffine3, DMat4, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How near to the identity a skin's placement is taken for it: what single precision
-/// leaves of the product.
+/// A skin's matrix closer than this to the identity is taken as the identity: the product
+/// is only accurate to single precision.
 const SAME: f64 = 1e-5;
 
-/// One skin that the scene uses.
+/// A skin that the scene uses.
 pub(super) struct Placed {
-    /// From the space of its vertices to the scene's.
+    /// The transform from its vertices to the scene.
     pub to_scene: DAffine3,
-    /// Its joints, by number in the skeleton.
+    /// Its joints, as indices into the skeleton.
     joints: Vec<usize>,
 }
 
 /// The joints of all skins that the scene uses.
 #[derive(Default)]
 pub(super) struct Skeleton {
-    /// Their nodes.
+    /// The joints' nodes.
     nodes: Vec<usize>,
-    /// From each joint's space to the scene's, at rest.
+    /// The transform from each joint's space to the scene, at rest.
     rest: Vec<DAffine3>,
-    /// By number in the file.
+    /// The skins, by index in the file.
     pub skins: BTreeMap<usize, Placed>,
-    /// By node: the joint that carries it, itself or the nearest above.
+    /// For each node, the joint that it moves with: itself or the nearest ancestor.
     pub carrier: Vec<Option<usize>>,
 }
 
@@ -117,8 +119,8 @@ impl Skeleton {
         Ok(out)
     }
 
-    /// Where a mesh without a skin is at rest: with the joint that carries it, or where
-    /// its node is.
+    /// Returns the rest transform of a mesh without a skin: attached to its carrier
+    /// joint, or else its node's transform.
     pub fn place(&self, data: &Data, nodes: &Nodes, node: usize) -> Result<DAffine3, GeomError> {
         let global = nodes.global[node];
         let Some(j) = self.carrier[node] else { return Ok(global) };
@@ -128,7 +130,8 @@ impl Skeleton {
         Ok(self.rest[j] * (inverse(nodes.global[joint], name)? * global))
     }
 
-    /// The rig, with a keypoint at each joint's head; none without joints.
+    /// Returns the rig, with a keypoint at each joint's head; `None` if there are no
+    /// joints.
     pub fn rig(
         &self,
         data: &Data,
@@ -150,7 +153,7 @@ impl Skeleton {
         }
         let tail = |j: usize| match (below[j], parent[j]) {
             ((sum, n @ 1..), _) => sum / f64::from(n),
-            // A bone that nothing hangs on goes on as its parent's does, half as long.
+            // A leaf bone continues its parent's direction, at half the length.
             (_, Some(p)) => heads[j] + (heads[j] - heads[p]) * 0.5,
             _ => heads[j],
         };
@@ -165,7 +168,7 @@ impl Skeleton {
         rig.with_keypoints(points.collect()).map(Some)
     }
 
-    /// Names without two of a kind.
+    /// Returns unique names of the joints.
     fn names(&self, data: &Data) -> Vec<String> {
         let given = |n: usize| data.document.nodes[n].name.clone().filter(|s| !s.is_empty());
         let mut taken: BTreeSet<String> = self.nodes.iter().filter_map(|n| given(*n)).collect();
@@ -190,8 +193,8 @@ impl Skeleton {
     }
 }
 
-/// What moves each vertex of a primitive: the four that weigh most of `JOINTS_0` and
-/// `JOINTS_1`, in the rig's numbers.
+/// Returns the joints that move each vertex of a primitive, in rig order: the four
+/// heaviest of `JOINTS_0` and `JOINTS_1`.
 pub(super) fn influences(
     data: &Data,
     primitive: &Primitive,

@@ -1,5 +1,5 @@
-//! Operators against their definitions, files that are written here, and files that are
-//! broken.
+//! Tests of operators against their definitions, of small generated files, and of broken
+//! files.
 
 mod operators;
 mod writer;
@@ -13,7 +13,7 @@ fn a_file_is_read_and_run() {
     let network = Network::read(&file(b"TFL3", &small())).unwrap();
     assert_eq!(network.input_shape(), [1, 1, 3, 1]);
     assert_eq!(network.output_shapes().collect::<Vec<_>>(), [[1, 1, 2, 1]]);
-    // 3 - 2 * 1 + 0.5, and 1 - 2 * 4 + 0.5, of which nothing is left.
+    // 3 - 2 * 1 + 0.5, and 1 - 2 * 4 + 0.5, which the ReLU clips to 0.
     assert_eq!(network.run(vec![3.0, 1.0, 4.0]).unwrap(), [[1.5, 0.0]]);
     let short = network.run(vec![3.0]).unwrap_err();
     assert_eq!(short, NetworkError::Input { expected: 3, got: 1 });
@@ -23,7 +23,7 @@ fn a_file_is_read_and_run() {
 fn broken_files_are_errors_or_other_networks() {
     let good = file(b"TFL3", &small());
     for n in 0..good.len() {
-        // What is cut off may be what nothing refers to.
+        // May succeed: the part cut off may be unreferenced.
         let _ = Network::read(&good[..n]);
     }
     let mut read = 0;
@@ -68,8 +68,8 @@ fn operators_that_do_not_fit_are_named() {
     assert!(with(&|g| g[1] = Field::I32s(vec![9])).contains("a tensor is missing"));
 }
 
-/// The dense form of a tensor of these values, with dimensions of a table
-/// `DimensionMetadata` each.
+/// Returns the dense form of a sparse tensor with these values; each dimension is a
+/// `DimensionMetadata` table.
 fn dense(
     shape: &[usize],
     order: &[i32],
@@ -113,8 +113,8 @@ fn sparse_tensors_are_laid_out() {
         &[1.0, 3.0, 2.0],
     );
     assert_eq!(by_columns.unwrap(), [1.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0]);
-    // Blocks of two columns: of the two in each row, the second of the first row and the
-    // first of the second.
+    // Blocks of two columns, two per row: the second block of the first row, and the
+    // first block of the second row.
     let blocks = vec![all_of(2), rows(&[0, 1, 2], &[1, 0]), all_of(2)];
     let by_blocks = dense(&[2, 4], &[0, 1, 2], &[1], blocks, &[1.0, 2.0, 3.0, 4.0]);
     assert_eq!(by_blocks.unwrap(), [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 0.0, 0.0]);

@@ -1,4 +1,4 @@
-//! Operators against their definitions.
+//! Tests of operators against their definitions.
 
 use crate::nn::convolution::{Convolution, Depthwise, Transposed};
 use crate::nn::resampling::{Alignment, depth_to_space, mean, pad, pool, resize};
@@ -7,7 +7,7 @@ use crate::num::simd::portable;
 
 const FREE: Clip = Clip { lo: f32::NEG_INFINITY, hi: f32::INFINITY };
 
-/// Numbers from -1 to 1 without a pattern.
+/// Returns pseudo-random numbers from -1 to 1.
 fn numbers(n: usize, seed: u32) -> Vec<f32> {
     let mut s = seed.wrapping_mul(2_654_435_761) | 1;
     let mut next = || {
@@ -17,7 +17,7 @@ fn numbers(n: usize, seed: u32) -> Vec<f32> {
     (0..n).map(|_| next()).collect()
 }
 
-/// The value of a picture at a place that may lie outside, where it is 0.
+/// Returns the value at a position that may lie outside the image, where it is 0.
 fn value(x: &[f32], s: Size, [row, column]: [isize; 2], channel: usize) -> f64 {
     let inside = (0..s.height as isize).contains(&row) && (0..s.width as isize).contains(&column);
     if inside { f64::from(s.pixel(x, row as usize, column as usize)[channel]) } else { 0.0 }
@@ -30,7 +30,7 @@ fn near(got: &[f32], expected: &[f64]) {
     }
 }
 
-/// Windows of all kinds, over pictures of sizes that are no multiples of anything.
+/// Windows of all kinds, over images whose sizes are not multiples of anything.
 fn cases() -> Vec<(Window, Size)> {
     let mut all = Vec::new();
     for (size, stride) in
@@ -45,7 +45,7 @@ fn cases() -> Vec<(Window, Size)> {
     all
 }
 
-/// How many rows and columns the definition of `SAME` pads before the picture.
+/// The numbers of rows and columns that `SAME` pads before the image, by definition.
 fn before(w: &Window, from: Size, to: Size) -> [isize; 2] {
     let one = |n: usize, m: usize, i: usize| {
         let all = ((m - 1) * w.stride[i] + w.size[i]) as isize - n as isize;
@@ -124,8 +124,8 @@ fn depthwise_convolutions() {
     }
 }
 
-/// A transposed convolution is the transpose of the convolution with the same window: <C
-/// x, y> = <x, C' y>.
+/// A transposed convolution is the adjoint of the convolution with the same window:
+/// `<C x, y> = <x, C' y>`.
 #[test]
 fn transposed_convolutions() {
     for (size, stride) in [([2, 2], [2, 2]), ([3, 3], [2, 2]), ([4, 3], [2, 1])] {
@@ -135,8 +135,8 @@ fn transposed_convolutions() {
         let weights = numbers(channels * taps * from.channels, 11);
         let t = Transposed { window, weights: weights.clone(), biases: vec![0.0; channels] };
         let to = t.output(from);
-        // Of the convolution, inputs and outputs exchange places: weights by its output
-        // channel, tap, input channel.
+        // The convolution's inputs and outputs are swapped: weights by its output
+        // channel, tap, and input channel.
         let mut back = vec![0.0; weights.len()];
         for (o, tap, i) in
             (0..channels).flat_map(|o| (0..taps).flat_map(move |t| (0..3).map(move |i| (o, t, i))))
@@ -195,7 +195,7 @@ fn pictures_of_other_sizes() {
     );
     assert_eq!(out, [1.0, 2.0, 3.0, 4.0]);
 
-    // The last window hangs over the border: its mean is over what is inside.
+    // The last window extends beyond the border: its mean is over the values inside.
     let window = Window { size: [1, 2], stride: [1, 2], same: true };
     let (x, to) = ([1.0, -5.0, 7.0], window.output(row(3), 1).unwrap());
     let mut out = [0.0; 2];

@@ -1,6 +1,6 @@
-//! Writes FlatBuffers and a small network in one, for tests.
+//! Writes FlatBuffers for tests, and a small network as one.
 
-/// What a field of a table holds.
+/// The contents of a table's field.
 #[derive(Clone)]
 pub enum Field {
     Absent,
@@ -13,7 +13,7 @@ pub enum Field {
     Tables(Vec<Vec<Field>>),
 }
 
-/// A file with this identifier and root table.
+/// Returns a file with this identifier and root table.
 pub fn file(identifier: &[u8; 4], root: &[Field]) -> Vec<u8> {
     let mut out = vec![0; 4];
     out.extend(identifier);
@@ -22,9 +22,9 @@ pub fn file(identifier: &[u8; 4], root: &[Field]) -> Vec<u8> {
     out
 }
 
-/// Appends a table and all it refers to; where it is.
+/// Appends a table and everything it refers to; returns its position.
 fn table(out: &mut Vec<u8>, fields: &[Field]) -> usize {
-    // The vtable, then the table: each field in eight bytes.
+    // The vtable, then the table with eight bytes per field.
     let vtable = out.len();
     out.extend((4 + 2 * fields.len() as u16).to_le_bytes());
     out.extend((4 + 8 * fields.len() as u16).to_le_bytes());
@@ -81,7 +81,8 @@ fn refer(out: &mut [u8], from: usize, to: usize) {
     out[from..from + 4].copy_from_slice(&((to - from) as u32).to_le_bytes());
 }
 
-/// A tensor of a file: shape, kind (0: 32 bits, 1: 16 bits, 2: whole numbers), buffer.
+/// A tensor of a file: shape, type (0: 32-bit float, 1: 16-bit float, 2: integer),
+/// buffer.
 fn tensor(shape: &[i32], kind: u8, buffer: i32) -> Vec<Field> {
     vec![Field::I32s(shape.to_vec()), Field::U8(kind), Field::I32(buffer)]
 }
@@ -92,8 +93,8 @@ fn operator(code: i32, inputs: &[i32], output: i32, options: Vec<Field>) -> Vec<
     vec![Field::I32(code), i, o, Field::U8(0), Field::Table(options)]
 }
 
-/// A convolution of one row of three pixels with the 16 bit weights 1 and -2, then its
-/// positive part.
+/// A convolution of one row of three pixels with the 16-bit weights 1 and -2, then a
+/// ReLU.
 pub fn small() -> Vec<Field> {
     let bytes = |v: &[f32]| v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let halves: Vec<u8> =

@@ -1,4 +1,4 @@
-//! From the groups of a mesh to joints: which touch, where, and what hangs on what.
+//! Joints from the groups of a mesh: which groups touch, where, and the tree they form.
 
 use super::near::Surface;
 use super::skin::Mix;
@@ -8,13 +8,13 @@ use crate::geom::{Bounds, GeomError, Mesh};
 use glam::{DVec3, Vec3};
 use std::collections::BTreeSet;
 
-/// Groups no farther apart than this share of the diagonal of the mesh's box are
-/// neighbours.
+/// Groups are neighbours if they are no farther apart than this fraction of the diagonal
+/// of the mesh's bounding box.
 const NEAR: f64 = 0.01;
-/// Beyond the contact a neighbour's influence ends at so many times its radius.
+/// A neighbour's influence ends at this multiple of the contact's radius.
 const REACH: f64 = 1.5;
 
-/// Joints and what they move.
+/// Joints, and the skin weights of the vertices.
 pub(super) struct Grouped {
     pub joints: Vec<Bone>,
     pub influences: Vec<Influence>,
@@ -23,14 +23,14 @@ pub(super) struct Grouped {
 struct Group {
     name: String,
     surface: Surface,
-    /// Its vertices, in rising order.
+    /// The indices of its vertices, in increasing order.
     vertices: Vec<u32>,
-    /// Twice its area, and the mean over it.
+    /// Twice the surface area. `centre` is the mean over the surface.
     area: f64,
     centre: DVec3,
 }
 
-/// Where two groups meet.
+/// The place where two groups meet, or come closest.
 #[derive(Clone, Copy)]
 struct Contact {
     gap: f64,
@@ -106,7 +106,8 @@ pub(super) fn rig(
     Ok(Grouped { joints, influences: mixes.iter().map(Mix::influence).collect() })
 }
 
-/// 1 up to the contact's radius, 0 from [`REACH`] of them, smooth between.
+/// A weight that is 1 up to the contact's radius, 0 from [`REACH`] radii on, and smooth
+/// in between.
 fn fade(far: f64, radius: f64) -> f64 {
     if far >= REACH * radius {
         return 0.0;
@@ -158,8 +159,9 @@ fn groups(
     Ok(groups)
 }
 
-/// Half-way between either's vertices and the other, for those that are as near as any,
-/// give or take `near`; vertices inside the other are there.
+/// Returns the contact of two groups: the midpoints between vertices of one and the
+/// nearest points of the other, for all vertices within `near` of the smallest gap. A
+/// vertex inside the other group is its own midpoint.
 fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
     let (mut gap, mut found) = (f64::INFINITY, Vec::new());
     for (one, other) in [(a, b), (b, a)] {
@@ -173,7 +175,7 @@ fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
         }
     }
     found.retain(|(_, d, _)| *d <= gap + near);
-    // A vertex of both counts once.
+    // A vertex that belongs to both groups counts once.
     found.sort_by_key(|(v, ..)| *v);
     found.dedup_by_key(|(v, ..)| *v);
     let at = found.iter().map(|f| f.2).sum::<DVec3>() / found.len().max(1) as f64;
@@ -181,8 +183,9 @@ fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
     Contact { gap, at, radius }
 }
 
-/// The groups, parents before children, and their parents: shortest paths from the root
-/// over contacts; where there are none left, across the smallest gap.
+/// Returns the groups, parents before children, and their parents. Parents follow the
+/// shortest paths from the root over contacts; groups that no contact reaches attach
+/// across the smallest gap.
 fn hang(
     groups: &[Group],
     contacts: &[Vec<Option<Contact>>],
@@ -234,7 +237,7 @@ fn hang(
     (order, parents)
 }
 
-/// From centre to centre by their contact.
+/// The length of the path from centre to centre through the contact.
 fn way(a: &Group, c: &Contact, b: &Group) -> f64 {
     (a.centre - c.at).length() + (c.at - b.centre).length()
 }

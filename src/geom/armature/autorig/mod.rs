@@ -1,11 +1,10 @@
-//! Armatures made from a mesh that has none: a joint for each of its groups, or a
-//! skeleton of its inside.
+//! Automatic rigging: armatures for meshes that have none, with a joint per group or
+//! along a curve skeleton of the interior.
 //!
 //! Kulkarni et al. 2014, section 2.1.2, make one for a compositional mesh, "a tree with
-//! the root node centered around the center of the mesh". Points at one place are one
-//! vertex of the result, which is smooth as every armature is. There are no limits to
-//! what a joint may do: those are a prior's business. Invariant: the result depends on
-//! the mesh alone.
+//! the root node centered around the center of the mesh". Coincident points are merged
+//! into one vertex of the result, which is smooth, as every armature is. Joints have no
+//! limits; those belong to a prior. Invariant: the result depends on the mesh alone.
 
 mod groups;
 mod near;
@@ -20,23 +19,23 @@ use super::{Armature, Influence, NamedJoint, Rig};
 use crate::geom::{GeomError, Mesh, edges};
 use glam::{DVec3, Vec3};
 
-/// The most groups that [`by_groups`] takes.
+/// The maximum number of groups for [`by_groups`].
 pub const MOST_GROUPS: usize = 256;
-/// The most triangles that [`by_groups`] takes: it compares groups with one another.
+/// The maximum number of triangles for [`by_groups`], which compares groups pairwise.
 pub const MOST_GROUPED_TRIANGLES: usize = 20_000;
-/// The most joints that [`by_skeleton`] makes.
+/// The maximum number of joints of [`by_skeleton`].
 pub const MOST_BONES: usize = 256;
 
-/// An armature with a joint for each part of the mesh (an OBJ file's object or group),
-/// called as the part is, or else `part_1`, `part_2`, ….
+/// Returns an armature with a joint for each part of the mesh (an OBJ file's object or
+/// group). A joint has its part's name, or else `part_1`, `part_2`, ….
 ///
-/// Parts are neighbours where they touch, overlap, or are nearer than a hundredth of the
-/// diagonal of the mesh's box; their joint is the mean of the vertices in contact,
-/// half-way across a gap. The part whose centre (the mean over its area) is nearest to
-/// the mesh's is the root; the others hang on it by the shortest paths over centres and
-/// joints, and what touches nothing by its nearest part. A vertex goes with its part, and
-/// within the contact, up to half as far again, with the neighbours' joints too.
-/// Keypoints: each joint's head.
+/// Parts are neighbours if they touch, overlap, or are closer than a hundredth of the
+/// diagonal of the mesh's bounding box. Their joint is the mean of the vertices in
+/// contact, half-way across any gap. The part whose centre (its area-weighted mean) is
+/// nearest to the mesh's centre is the root. The others attach to it by the shortest
+/// paths through centres and joints; a part that touches nothing attaches to its nearest
+/// part. A vertex follows its own part, and within the contact, and up to half as far
+/// again, also the neighbours' joints. Keypoints are the joints' heads.
 ///
 /// # Errors
 /// Fewer than two parts, or more than [`MOST_GROUPS`]; more than
@@ -47,19 +46,19 @@ pub fn by_groups(mesh: &Mesh) -> Result<Armature, GeomError> {
     finish(rig.joints, positions, triangles, rig.influences)
 }
 
-/// An armature on a curve skeleton of what a closed mesh encloses: `root` and `bone_1`,
-/// `bone_2`, …, at most `most` joints.
+/// Returns an armature on a curve skeleton of a closed mesh's interior: `root` and
+/// `bone_1`, `bone_2`, …, at most `most` joints.
 ///
-/// The inside is sampled on a grid of 48 cells along the longest side. From the cell that
-/// is central and far from the surface run paths that keep to the middle, to the farthest
-/// cell first and then to the farthest of those that no path is near (after Sato et al.
-/// 2000, "TEASAR: tree-structure extraction algorithm for accurate and robust
-/// skeletons"). Joints are where paths part and where they bend. A vertex goes with the
-/// bones near it: the nearest one, its parent, children and siblings, by squares of
-/// inverse distances. Keypoints: each joint's head.
+/// The interior is sampled on a grid with 48 cells along the longest side. Paths that
+/// keep to the middle start from a central cell far from the surface. The first goes to
+/// the farthest cell, and each later one to the farthest cell that is not near a path
+/// (after Sato et al. 2000, "TEASAR: tree-structure extraction algorithm for accurate and
+/// robust skeletons"). Joints are where paths branch and where they bend. A vertex
+/// follows its nearest bone and that bone's parent, children and siblings, by squares of
+/// inverse distances. Keypoints are the joints' heads.
 ///
 /// # Errors
-/// A mesh that is not closed, or so thin that no cell is inside; `most` not from 1 to
+/// A mesh that is not closed, or is so thin that no cell is inside; `most` outside 1 to
 /// [`MOST_BONES`].
 pub fn by_skeleton(mesh: &Mesh, most: usize) -> Result<Armature, GeomError> {
     if !(1..=MOST_BONES).contains(&most) {
@@ -82,7 +81,7 @@ pub fn by_skeleton(mesh: &Mesh, most: usize) -> Result<Armature, GeomError> {
     finish(bones, positions, triangles, influences)
 }
 
-/// The mesh with each point once, in the order of first use.
+/// Merges coincident points; vertices are in order of first use.
 fn welded(mesh: &Mesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let first = edges::weld(&mesh.positions);
     let mut number = vec![u32::MAX; mesh.positions.len()];
@@ -99,7 +98,7 @@ fn welded(mesh: &Mesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (positions, triangles)
 }
 
-/// A joint, parents by number and before their children.
+/// A joint. Parents are given by index and come before their children.
 #[derive(Clone, Debug)]
 struct Bone {
     name: String,

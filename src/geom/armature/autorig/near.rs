@@ -1,19 +1,19 @@
-//! How far a point is from a surface, and whether it is inside.
+//! Distances from points to a surface, and an inside test.
 
 use crate::geom::Bounds;
 use glam::DVec3;
 
 /// The triangles of one part.
 pub(super) struct Surface {
-    /// Corners.
+    /// The corners of each triangle.
     pub faces: Vec<[DVec3; 3]>,
-    /// The box around them.
+    /// The bounding box of the triangles.
     pub bounds: Bounds,
 }
 
 impl Surface {
-    /// The distance from a point and the nearest point of it; inside the distance is 0
-    /// and the point itself is nearest.
+    /// Returns the distance to the nearest point of the surface, and that point. For a
+    /// point inside they are 0 and the point itself.
     pub fn nearest(&self, p: DVec3) -> (f64, DVec3) {
         if self.to_box(p) == 0.0 && self.winding(p) > 0.5 {
             return (0.0, p);
@@ -27,14 +27,14 @@ impl Surface {
         (square.sqrt(), at)
     }
 
-    /// The distance from its box, 0 within: never more than that from the surface.
+    /// Returns the distance to the bounding box, 0 within it: a lower bound on `nearest`.
     pub fn to_box(&self, p: DVec3) -> f64 {
         (self.bounds.min - p).max(p - self.bounds.max).max(DVec3::ZERO).length()
     }
 
-    /// The generalized winding number (Jacobson et al. 2013), in magnitude: how often it
-    /// goes round the point. The solid angle of a triangle is van Oosterom and Strackee's
-    /// (1983).
+    /// Returns the absolute generalized winding number of the surface around a point
+    /// (Jacobson et al. 2013), with triangles' solid angles after van Oosterom and
+    /// Strackee (1983).
     fn winding(&self, p: DVec3) -> f64 {
         let angle = |t: &[DVec3; 3]| {
             let [a, b, c] = t.map(|v| v - p);
@@ -47,7 +47,7 @@ impl Surface {
     }
 }
 
-/// The point of a triangle that is nearest to `p` (Ericson 2005, "Real-Time Collision
+/// Returns the point of a triangle nearest to `p` (Ericson 2005, "Real-Time Collision
 /// Detection", section 5.1.5).
 fn closest(p: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
     let (ab, ac, ap) = (*b - *a, *c - *a, p - *a);
@@ -81,7 +81,7 @@ fn closest(p: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
     *a + ab * (vb / whole) + ac * (vc / whole)
 }
 
-/// The distance of a point from a segment.
+/// Returns the distance from a point to a segment.
 pub(super) fn to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     let along = b - a;
     let square = along.length_squared();

@@ -1,33 +1,33 @@
-//! Curves through the middle of a grid's inside, as a tree of points.
+//! Curves through the middle of a grid's interior, as a tree of points.
 //!
-//! All ways come from one tree of cheapest ways to the root, so that they join and never
-//! part again.
+//! All paths come from one tree of cheapest paths to the root, so paths that join never
+//! separate again.
 
 use super::voxels::Grid;
 use glam::DVec3;
 
-/// A way's surroundings, up to so many times its distance from the surface and a few
-/// cells, need no way of their own.
+/// A path covers the cells within this multiple of its clearance plus a few cells;
+/// covered cells need no path of their own.
 const COVERED: f64 = 1.5;
 const COVERED_CELLS: f64 = 2.0;
-/// Cells no more than so much nearer to the root than a tip are its end, whose middle the
-/// curve runs to.
+/// The cap of a curve: the cells at most this much nearer to the root than the tip, in
+/// cells. The curve ends at the cap's centroid.
 const CAP_CELLS: f64 = 2.0;
-/// No more curves than these are looked for.
+/// The maximum number of curves.
 const MOST_CURVES: usize = 256;
 
 /// A point of the curves.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     pub at: DVec3,
-    /// The point before it on the way from the root, which has a lesser number; `None`
-    /// for the root, the first.
+    /// The previous point on the path from the root, which has a smaller index; `None`
+    /// for the root, which comes first.
     pub parent: Option<usize>,
-    /// The distance from the surface, in the mesh's units.
+    /// The distance to the surface, in the mesh's units.
     pub clearance: f64,
 }
 
-/// The tree of curves, the longest first.
+/// Returns the tree of curves, the longest first.
 pub(super) fn curves(grid: &Grid) -> Vec<Node> {
     let root = centre(grid);
     let (far, _) = grid.ways(root, |_| 1.0);
@@ -63,8 +63,9 @@ pub(super) fn curves(grid: &Grid) -> Vec<Node> {
         for i in end.iter().chain(&way) {
             cover(grid, *i, &mut covered);
         }
-        // What the end's ball reaches is at the surface, beside the middle: the curve
-        // goes straight on there.
+        // Near the tip the path leaves the middle for the surface: drop it up to the last
+        // cell whose ball contains the cap's centroid; from there the curve runs
+        // straight.
         let beside = way
             .iter()
             .rposition(|i| (grid.middle(*i) - cap).length() <= grid.clearance(*i) * grid.cell());
@@ -88,8 +89,8 @@ fn cover(grid: &Grid, i: usize, covered: &mut [bool]) {
     }
 }
 
-/// The cell with the least (distance to the centre of mass)^2 - (distance to the
-/// surface)^2; of equals the first.
+/// Returns the cell that minimises (distance to the centre of mass)^2 - (distance to the
+/// surface)^2; the first, if several do.
 fn centre(grid: &Grid) -> usize {
     let (sum, count) =
         grid.cells().fold((DVec3::ZERO, 0.0), |(s, n), i| (s + grid.middle(i), n + 1.0));

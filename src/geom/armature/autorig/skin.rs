@@ -1,16 +1,16 @@
-//! Skin weights: mixtures of joints, and those by distance to bones.
+//! Skin weights: mixtures of joints, and weights by distance to bones.
 
 use super::Bone;
 use super::near::to_segment;
 use crate::geom::armature::{Influence, MOST_WEIGHTS};
 use glam::Vec3;
 
-/// Joints with amounts, not yet normalised.
+/// Joints with unnormalised weights.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mix(Vec<(usize, f64)>);
 
 impl Mix {
-    /// Adds to what a joint has; nothing where the amount is not positive.
+    /// Adds to a joint's weight; ignores amounts that are not positive.
     pub fn add(&mut self, joint: usize, amount: f64) {
         match self.0.iter_mut().find(|(j, _)| *j == joint) {
             Some((_, a)) => *a += amount.max(0.0),
@@ -19,7 +19,8 @@ impl Mix {
         }
     }
 
-    /// The heaviest four, of equals the first joints, with sum 1.
+    /// Returns the four heaviest joints, the lower indices on ties, with weights that sum
+    /// to 1.
     pub fn influence(&self) -> Influence {
         let mut most = self.0.clone();
         most.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
@@ -36,8 +37,8 @@ impl Mix {
     }
 }
 
-/// For each vertex the nearest bone, its parent, children and siblings, with weight
-/// ((least / distance)^2 - 1/4)^2: none from twice the least distance on.
+/// Weights each vertex's nearest bone and that bone's parent, children and siblings by
+/// ((least / distance)^2 - 1/4)^2, which is 0 from twice the least distance on.
 pub(super) fn by_distance(positions: &[Vec3], bones: &[Bone]) -> Vec<Influence> {
     let one = |p: &Vec3| {
         let p = p.as_dvec3();
@@ -48,7 +49,8 @@ pub(super) fn by_distance(positions: &[Vec3], bones: &[Bone]) -> Vec<Influence> 
         for (i, b) in bones.iter().enumerate().filter(|(i, _)| *i != nearest) {
             let up = bones[nearest].parent;
             if b.parent == Some(nearest) || up == Some(i) || (up.is_some() && b.parent == up) {
-                // On a bone itself only those that pass there count, as much as it does.
+                // On a bone itself (least = 0), only bones through the same point count,
+                // with the same weight.
                 let ratio = if far[i] > 0.0 { least / far[i] } else { 1.0 };
                 let over = (ratio * ratio - 0.25).max(0.0);
                 mix.add(i, over * over);

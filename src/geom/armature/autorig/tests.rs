@@ -1,4 +1,4 @@
-//! Armatures of boxes in a row, and of bodies with arms.
+//! Tests of armatures for boxes in a row and for bodies with arms.
 
 use super::*;
 use crate::geom::armature::{JointPose, Rules};
@@ -6,7 +6,7 @@ use crate::geom::{Affine, Solid, cuboid, obj, sphere};
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// Boxes as OBJ groups: name, centre, size.
+/// Boxes as OBJ groups, given by name, centre and size.
 fn boxes(all: &[(&str, DVec3, DVec3)]) -> Mesh {
     let mut text = String::new();
     for (k, (name, at, size)) in all.iter().enumerate() {
@@ -69,7 +69,8 @@ fn three_boxes_in_a_row_are_three_bones() {
     near(joint(&a, "hand").head, 3.0);
     near(joint(&a, "upper").head, 1.0);
     assert!((joint(&a, "hand").tail.x - 5.0).abs() < 1e-6);
-    // Shared vertices go half with either; all others with their own.
+    // Shared vertices get half their weight from either group; all others follow their
+    // own.
     let fore = a.rig().find("fore").unwrap() as u16;
     for (p, i) in a.positions().iter().zip(a.influences()) {
         let on_fore = i
@@ -115,7 +116,7 @@ fn what_touches_nothing_hangs_on_the_nearest() {
 #[test]
 fn names_given_twice_are_numbered() {
     let arm = Solid::new(Arc::new(chain()));
-    // Upright, with its upper end over the middle of the other.
+    // Upright, with its upper end over the middle of the other one.
     let turn = DVec3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2);
     let upright = arm.placed(Affine::new(DVec3::new(2.0, 3.0, 0.0), turn, DVec3::ONE));
     let a = by_groups(&Solid::group(&[arm, upright]).to_mesh().unwrap()).unwrap();
@@ -174,7 +175,7 @@ fn a_star_has_a_branch_for_each_tip() {
         for most in [1, 2, 3] {
             assert!(by_skeleton(&mesh, most).unwrap().rig().joints().len() <= most);
         }
-        // The bone that ends in a tip moves what is there and nothing at the others.
+        // The bone that ends at a tip moves that tip and not the others.
         let last = (0..joints.len()).find(|i| (joints[*i].tail - tips[0]).length() < 0.25).unwrap();
         let mut pose = vec![JointPose::REST; joints.len()];
         pose[last] = JointPose::turned(DVec3::new(0.0, 0.0, 0.5));
@@ -192,7 +193,7 @@ fn a_star_has_a_branch_for_each_tip() {
 
 #[test]
 fn a_bend_is_a_joint_and_a_ball_has_none() {
-    // An L of two boxes, one within the other where they meet.
+    // An L of two boxes that overlap at the corner.
     let l = boxes(&[
         ("a", DVec3::new(0.0, 2.0, 0.0), DVec3::new(0.8, 4.8, 0.8)),
         ("b", DVec3::new(2.4, 0.0, 0.0), DVec3::new(5.6, 0.8, 0.8)),

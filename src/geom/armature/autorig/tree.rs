@@ -1,28 +1,29 @@
-//! From curves to bones: smoothed, cut where they part and where they bend, and no more
-//! than are wanted.
+//! Bones from curves: the curves are smoothed, split at branches and bends, and
+//! simplified to the allowed number of bones.
 
 use super::Bone;
 use super::skeleton::Node;
 use glam::DVec3;
 
-/// Curves are smoothed so many times by the mean of each point and its neighbours'.
+/// The number of smoothing passes; each replaces a point by the mean of it and its
+/// neighbours.
 const SMOOTHING: usize = 4;
-/// The first tolerance for straightness, in cells, and how it grows while there are too
-/// many bones.
+/// The initial tolerance for straightness, in cells, and its growth factor while there
+/// are too many bones.
 const TOLERANCE: f64 = 1.5;
 const GROWTH: f64 = 1.3;
-/// Tolerances tried before bones at the ends are dropped.
+/// The number of tolerances tried before terminal bones are dropped.
 const TRIES: usize = 16;
 
-/// A stretch of curve between two places where curves part or end.
+/// A piece of curve between two branch points or ends.
 struct Chain {
-    /// The chain it goes on from; `None` at the root.
+    /// The chain that this one continues; `None` at the root.
     parent: Option<usize>,
-    /// From where it starts to where it ends.
+    /// The points from start to end.
     points: Vec<DVec3>,
-    /// How far its end is from the surface.
+    /// The distance from its end to the surface.
     clearance: f64,
-    /// Whether no curve goes on from it.
+    /// Whether no chain continues it.
     ends: bool,
 }
 
@@ -32,7 +33,7 @@ impl Chain {
     }
 }
 
-/// At most `most` joints, the root with them.
+/// Returns at most `most` joints, including the root.
 pub(super) fn bones(nodes: Vec<Node>, cell: f64, most: usize) -> Vec<Bone> {
     let Some(root) = nodes.first().copied() else { return Vec::new() };
     let mut chains = chains(&nodes);
@@ -46,7 +47,8 @@ pub(super) fn bones(nodes: Vec<Node>, cell: f64, most: usize) -> Vec<Bone> {
     }
     let mut cut: Vec<Vec<DVec3>> =
         chains.iter().map(|c| simplified(&c.points, tolerance)).collect();
-    // Straighter than straight there is nothing: then the shortest ends go.
+    // Chains that are straight cannot be simplified further; drop the shortest terminal
+    // ones.
     let mut dropped = vec![false; chains.len()];
     let count = |cut: &[Vec<DVec3>], dropped: &[bool]| -> usize {
         1 + cut.iter().zip(dropped).filter(|(_, d)| !**d).map(|(c, _)| c.len() - 1).sum::<usize>()
@@ -85,7 +87,7 @@ pub(super) fn bones(nodes: Vec<Node>, cell: f64, most: usize) -> Vec<Bone> {
     bones
 }
 
-/// The stretches, parents before children.
+/// Returns the chains, parents before children.
 fn chains(nodes: &[Node]) -> Vec<Chain> {
     let mut below: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (i, n) in nodes.iter().enumerate() {
@@ -94,7 +96,8 @@ fn chains(nodes: &[Node]) -> Vec<Chain> {
         }
     }
     let mut out: Vec<Chain> = Vec::new();
-    // Each start: the node, the chain that ends there, the first node after it.
+    // Chains yet to be traced: the start node, the chain that ends there, the first node
+    // after it.
     let mut open: Vec<(usize, Option<usize>, usize)> =
         below[0].iter().rev().map(|c| (0, None, *c)).collect();
     while let Some((start, parent, first)) = open.pop() {
@@ -122,8 +125,8 @@ fn chains(nodes: &[Node]) -> Vec<Chain> {
     out
 }
 
-/// Short stretches between two partings, within the body's thickness, become one place:
-/// their end moves to their start.
+/// Merges nearby branch points: removes chains between two branch points that are shorter
+/// than the body's thickness there. The end moves to the start.
 fn contract(chains: &mut Vec<Chain>, cell: f64) {
     while let Some(k) =
         chains.iter().position(|c| !c.ends && c.length() < c.clearance.max(2.0 * cell))
@@ -140,8 +143,8 @@ fn contract(chains: &mut Vec<Chain>, cell: f64) {
     }
 }
 
-/// Ramer, Douglas and Peucker: the ends, and where the curve is farther than the
-/// tolerance from what is left of it.
+/// Ramer-Douglas-Peucker simplification: keeps the ends, and the points where the curve
+/// is farther than the tolerance from the simplified one.
 fn simplified(points: &[DVec3], tolerance: f64) -> Vec<DVec3> {
     let mut keep = vec![false; points.len()];
     let mut open = vec![(0, points.len() - 1)];

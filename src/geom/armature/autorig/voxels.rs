@@ -1,33 +1,34 @@
-//! The inside of a closed mesh on a grid of cells, with each cell's distance to the
-//! outside, and shortest ways through it.
+//! The interior of a closed mesh on a grid of cells, with each cell's distance to the
+//! outside, and shortest paths through the interior.
 //!
-//! A cell is inside if at least two of three rays along the axes, from a point near its
-//! middle, say so; overlapping bodies make one. Only the largest connected piece is kept.
+//! A cell is inside if at least two of three axis-parallel rays through a point near its
+//! centre say so; overlapping bodies form one interior. Only the largest connected
+//! component is kept.
 
 use glam::{DVec3, IVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The cells along the longest side of the mesh's box.
+/// The number of cells along the longest side of the mesh's bounding box.
 const LONGEST: f64 = 48.0;
-/// Where in a cell rays pass, off its middle: on no symmetry plane or edge of a mesh that
-/// people would make.
+/// Where rays pass through a cell. The offset from the centre avoids the symmetry planes
+/// and edges that meshes tend to have.
 const OFF: [f64; 2] = [0.5137, 0.4871];
 
-/// The cells.
+/// A grid of cells.
 pub(super) struct Grid {
-    /// How many along each axis, an empty one at either end.
+    /// The number of cells along each axis, including an empty one at either end.
     size: [usize; 3],
-    /// The corner of the first.
+    /// The minimum corner of the grid.
     origin: DVec3,
     cell: f64,
-    /// By cell: the distance of its middle to that of the nearest cell outside, in cells;
-    /// 0 outside.
+    /// For each cell, the distance from its centre to that of the nearest outside cell,
+    /// in cells; 0 outside.
     clearance: Vec<f64>,
 }
 
 impl Grid {
-    /// The inside of a mesh; `None` if there is none.
+    /// Samples the interior of a mesh; `None` if no cell is inside.
     pub fn inside(positions: &[Vec3], triangles: &[[u32; 3]]) -> Option<Grid> {
         let bounds = crate::geom::Bounds::around(positions.iter().map(|p| p.as_dvec3()))?;
         let cell = bounds.size().max_element() / LONGEST;
@@ -49,27 +50,27 @@ impl Grid {
         Some(Grid { clearance, ..grid })
     }
 
-    /// The edge of a cell.
+    /// The edge length of a cell.
     pub fn cell(&self) -> f64 {
         self.cell
     }
 
-    /// The distance from a cell's middle to the outside, in cells; 0 outside.
+    /// The distance from a cell's centre to the outside, in cells; 0 outside.
     pub fn clearance(&self, i: usize) -> f64 {
         self.clearance[i]
     }
 
-    /// The cells inside, in order.
+    /// The inside cells, in increasing order.
     pub fn cells(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.clearance.len()).filter(|i| self.clearance[*i] > 0.0)
     }
 
-    /// The number of all cells.
+    /// The number of cells, inside or not.
     pub fn len(&self) -> usize {
         self.clearance.len()
     }
 
-    /// The middle of a cell.
+    /// The centre of a cell.
     pub fn middle(&self, i: usize) -> DVec3 {
         self.origin + (self.place(i).as_dvec3() + DVec3::splat(0.5)) * self.cell
     }
@@ -85,7 +86,7 @@ impl Grid {
         within.then(|| (p.z as usize * self.size[1] + p.y as usize) * self.size[0] + p.x as usize)
     }
 
-    /// The cells around one, with the distances of their middles in cells.
+    /// The neighbours of a cell, with centre-to-centre distances in cells.
     fn around(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let p = self.place(i);
         let steps =
@@ -93,7 +94,7 @@ impl Grid {
         steps.filter_map(move |d| self.at(p + d).map(|j| (j, f64::from(d.length_squared()).sqrt())))
     }
 
-    /// The cells within a distance of one, in cells.
+    /// The cells within a radius of a cell, in cells.
     pub fn ball(&self, i: usize, radius: f64) -> impl Iterator<Item = usize> + '_ {
         let (p, r) = (self.place(i), radius.floor() as i32);
         let line = move |z| (-r..=r).flat_map(move |y| (-r..=r).map(move |x| IVec3::new(x, y, z)));
@@ -103,7 +104,7 @@ impl Grid {
         all.filter_map(move |d| self.at(p + d))
     }
 
-    /// The cells inside that are joined with one by cells that `keep`.
+    /// Returns the inside cells connected to `from` through cells for which `keep` holds.
     pub fn flood(&self, from: usize, keep: impl Fn(usize) -> bool) -> Vec<usize> {
         let (mut seen, mut found) = (vec![false; self.len()], vec![from]);
         seen[from] = true;
@@ -120,11 +121,12 @@ impl Grid {
         found
     }
 
-    /// The cheapest ways from a cell to all others inside: their costs, and the cell
-    /// before. A step costs its length in cells times the mean of `cost` at its ends.
+    /// Returns the cheapest paths from a cell to all other inside cells: the cost to
+    /// each, and the previous cell. A step costs its length in cells times the mean of
+    /// `cost` at its ends.
     pub fn ways(&self, from: usize, cost: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<usize>) {
         let (mut far, mut before) = (vec![f64::INFINITY; self.len()], vec![from; self.len()]);
-        // Costs are not negative, so that their bits are ordered as they are.
+        // Costs are non-negative, so their bits sort in the same order.
         let mut heap = BinaryHeap::from([Reverse((0u64, from))]);
         far[from] = 0.0;
         while let Some(Reverse((bits, i))) = heap.pop() {
@@ -145,8 +147,8 @@ impl Grid {
         (far, before)
     }
 
-    /// One vote for every cell that a ray along an axis finds inside: where the faces
-    /// before it do not cancel.
+    /// Adds a vote to every cell that rays along an axis find inside: where the signed
+    /// crossings before the cell do not cancel.
     fn vote(&self, axis: usize, positions: &[Vec3], triangles: &[[u32; 3]], votes: &mut [u8]) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut crossings: Vec<Vec<(f64, i32)>> = vec![Vec::new(); self.size[u] * self.size[v]];
@@ -160,7 +162,7 @@ impl Grid {
                 ((lo - off).ceil().max(0.0) as usize)
                     ..((hi - off).floor() + 1.0).clamp(0.0, self.size[k] as f64) as usize
             };
-            // Twice the signed area left of an edge, seen along the axis.
+            // Twice the signed area to the left of an edge, seen along the axis.
             let side = |a: &[f64; 3], b: &[f64; 3], x: f64, y: f64| {
                 (b[u] - a[u]) * (y - a[v]) - (b[v] - a[v]) * (x - a[u])
             };
@@ -206,7 +208,8 @@ impl Grid {
         }
     }
 
-    /// Only the largest piece that is joined through faces; of equals the first.
+    /// Keeps only the largest component connected through faces; the first, if several
+    /// are.
     fn largest(&self, inside: &[bool]) -> Vec<bool> {
         let (mut seen, mut best) = (vec![false; inside.len()], Vec::new());
         for start in 0..inside.len() {
@@ -235,8 +238,8 @@ impl Grid {
         out
     }
 
-    /// The exact Euclidean distance transform, axis after axis: the least of squared
-    /// steps and what the axes before found.
+    /// The exact Euclidean distance transform, one axis at a time: minimises the squared
+    /// step along the axis plus the result of the previous axes.
     fn distances(&self, inside: &[bool]) -> Vec<f64> {
         let mut square: Vec<f64> =
             inside.iter().map(|i| if *i { f64::INFINITY } else { 0.0 }).collect();
@@ -280,11 +283,12 @@ mod tests {
             assert!(d.abs() < 1.0 || (d > 0.0) == (g.clearance(i) > 0.0), "{}", g.middle(i));
             cells += usize::from(g.clearance(i) > 0.0);
         }
-        // Two balls less the lens they share: of height 0.4 on either side, pi h^2 (3 -
-        // h) / 3 each.
+        // The volume of two balls less that of their common lens: two caps of height h =
+        // 0.4 with volume pi h^2 (3 - h) / 3 each.
         let volume = std::f64::consts::PI * (8.0 / 3.0 - 2.0 * 0.16 * 2.6 / 3.0);
         assert!((cells as f64 * g.cell().powi(3) / volume - 1.0).abs() < 0.03);
-        // Clearance is the distance to the nearest cell outside, looked up one by one.
+        // Clearance is the distance to the nearest outside cell, found here by exhaustive
+        // search.
         for i in g.cells().step_by(997) {
             let near = (0..g.len())
                 .filter(|j| g.clearance(*j) == 0.0)
