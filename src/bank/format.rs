@@ -13,7 +13,7 @@
 //! | 56..64 | 0 |
 //! | 64.. | features: N rows of M f32 |
 //! | … | latents of each entry (see `record.rs`) |
-//! | … | the table: the offsets of the entries' latents, and the end of the last, N + 1 u64 |
+//! | … | the table: offsets of the entries' latents and the end of the last, N + 1 u64 |
 //! | … | the header, JSON |
 
 use super::{BankError, Features};

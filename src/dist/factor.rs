@@ -3,8 +3,8 @@
 
 use nalgebra::DMatrix;
 
-/// A lower triangular matrix L with a positive diagonal. Entry (i, j) is at index i (i + 1)
-/// / 2 + j.
+/// A lower triangular matrix L with a positive diagonal. The index of entry (i, j) is i
+/// (i + 1) / 2 + j.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Factor {
     n: usize,

@@ -1,4 +1,5 @@
-//! Tests that densities integrate to 1 over unconstrained space and probabilities sum to 1.
+//! Tests that densities integrate to 1 over unconstrained space and that probabilities
+//! sum to 1.
 
 use super::*;
 
