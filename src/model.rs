@@ -33,9 +33,9 @@ use crate::syntax::parse;
 use crate::trace::{Draws, Limits, Trace};
 use std::sync::Arc;
 
-/// How many draws from the prior show what choices a default plan is for.
+/// The number of draws from the prior from which a default plan is made.
 const DRAWS_FOR_PLAN: u64 = 10;
-/// How many are tried until one has a value.
+/// The number of draws that are tried if all of those fail.
 const ATTEMPTS_FOR_PLAN: u64 = 1000;
 
 /// A compiled program with its data.
@@ -51,69 +51,68 @@ pub struct Model {
 }
 
 impl Model {
-    /// Compiles a program given as text, with its defaults.
+    /// Compiles a program from its text, with default parameters and data.
     ///
     /// # Errors
-    /// Everything that is wrong with it.
+    /// All errors in the program.
     pub fn from_text(text: &str) -> Result<Model, Error> {
         Program::parse(text)?.compile()
     }
 
-    /// The lowered program, for work on [traces](crate::trace).
+    /// Returns the lowered program, for work on [traces](crate::trace).
     pub fn code(&self) -> &Arc<Code> {
         &self.compiled.code
     }
 
-    /// A hash of the program's text and settings.
+    /// Returns a hash of the program's text and settings.
     pub fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// A hash of the files that the program reads by itself: the defaults of its `data`
-    /// items.
+    /// Returns a hash of the files that the program itself reads: the defaults of its
+    /// `data` items.
     pub fn data_hash(&self) -> &str {
         &self.data_hash
     }
 
-    /// The text of the main file.
+    /// Returns the text of the main file.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// What it may read while it runs.
+    /// Returns the folders that the program may read while it runs.
     #[doc(hidden)]
     pub fn reach(&self) -> &Reach {
         &self.reach
     }
 
-    /// Bounds on what it may build when it is not run but looked at.
+    /// Returns the limits for evaluations outside of runs.
     #[doc(hidden)]
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// The texts that errors point into.
+    /// Returns the source texts that errors refer to.
     pub fn sources(&self) -> &SourceMap {
         &self.sources
     }
 
-    /// The program's exports.
+    /// Returns the program's exports.
     #[doc(hidden)]
     pub fn exports(&self) -> &[Export] {
         &self.compiled.exports
     }
 
-    /// The program's reports.
+    /// Returns the program's reports.
     #[doc(hidden)]
     pub fn reports(&self) -> &[Report] {
         &self.compiled.reports
     }
 
-    /// One draw from the prior, conditioned on nothing: observations are scored, not
-    /// simulated.
+    /// Draws once from the prior; observations are scored, but do not condition the draw.
     ///
     /// # Errors
-    /// What the program does wrong.
+    /// If the program fails.
     pub fn simulate(&self, seed: u64, index: u64) -> Result<Trace, Error> {
         let draws =
             Draws { key: StreamKey::new(seed, 0, Purpose::START), step: index, substream: 0 };
@@ -121,12 +120,12 @@ impl Model {
             .map_err(|e| self.run_error(*e))
     }
 
-    /// Turns a failure while running into messages.
+    /// Converts a failure at run time to diagnostics.
     pub fn run_error(&self, e: RunError) -> Error {
         Error { diagnostics: vec![e.into_diagnostic()], sources: self.sources.clone() }
     }
 
-    /// Turns the failure of a chain into messages.
+    /// Converts the failure of a chain to diagnostics.
     pub fn chain_error(&self, e: ChainError) -> Error {
         use crate::infer::StartError;
         let plain = |message: String| Diagnostic::new(Severity::Error, message);
@@ -164,11 +163,11 @@ impl Model {
         Error { diagnostics: vec![d], sources: self.sources.clone() }
     }
 
-    /// The plan of inference: the program's first `infer` block, or the default plan; the
-    /// second part is the text of the default plan where that is used.
+    /// Returns the inference plan: the program's first `infer` block, or the default
+    /// plan. The second part is the text of the default plan, if that is used.
     ///
     /// # Errors
-    /// If the program cannot be run once, to see what choices it makes.
+    /// If no draw from the prior succeeds, so that the program's choices are unknown.
     #[doc(hidden)]
     pub fn plan(&self) -> Result<(Arc<[KStmt]>, Option<String>), Error> {
         if let Some(p) = self.compiled.plans.first() {
@@ -180,8 +179,8 @@ impl Model {
         };
         let mut draws: Vec<Trace> = (0..DRAWS_FOR_PLAN).filter_map(|i| drawn(i).ok()).collect();
         if draws.is_empty() {
-            // Draws may lead where the program has no value, such as a negative spread:
-            // the plan is of those that do not.
+            // Draws may fail, e.g. because a standard deviation is negative; the plan is
+            // then made from the first draw that succeeds.
             draws.push(attempts(ATTEMPTS_FOR_PLAN, drawn).map_err(|e| self.run_error(*e))?);
         }
         let text = default_plan(&mut draws);
@@ -195,8 +194,8 @@ impl Model {
         Ok((body.unwrap_or_default().into(), Some(text)))
     }
 
-    /// Runs chains and keeps their draws in memory. Draws depend on the seed, never on
-    /// the number of threads.
+    /// Runs chains and keeps their draws in memory. The draws depend on the seed, but not
+    /// on the number of threads.
     ///
     /// # Errors
     /// If a chain cannot start or the program fails.
@@ -214,10 +213,10 @@ impl Model {
         Ok(Posterior { draws: memories.iter().map(Memory::draws).collect(), chains: results })
     }
 
-    /// Runs one chain a sink. A chain that fails does not stop the others.
+    /// Runs one chain per sink. A chain that fails does not stop the others.
     ///
     /// # Errors
-    /// As [`Model::plan`].
+    /// As [`Model::plan`], and if there is a time limit but the platform has no clock.
     pub fn run_into(
         &self,
         options: &RunOptions,
@@ -245,22 +244,23 @@ impl Model {
 pub struct Posterior {
     /// The draws of each chain.
     pub draws: Vec<ChainDraws>,
-    /// The last state of each chain, its kernels, its counts.
+    /// The last state of each chain, its kernels and its statistics.
     pub chains: Vec<ChainResult>,
 }
 
 impl Posterior {
-    /// Every scalar quantity with its summary; elements of vectors are `name[i]`.
+    /// Returns every scalar quantity with its summary; elements of vectors are named
+    /// `name[i]`.
     pub fn quantities(&self) -> Vec<Quantity> {
         quantities(&self.draws)
     }
 
-    /// One of them.
+    /// Returns the quantity with this name.
     pub fn quantity(&self, name: &str) -> Option<Quantity> {
         self.quantities().into_iter().find(|q| q.name == name)
     }
 
-    /// The draws of every scalar quantity, all chains one after the other.
+    /// Returns the draws of every scalar quantity, with those of all chains concatenated.
     pub fn scalars(&self) -> Vec<(String, Vec<f64>)> {
         self.quantities().into_iter().map(|q| (q.name, q.chains.concat())).collect()
     }

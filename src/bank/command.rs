@@ -1,4 +1,4 @@
-//! Features from a detector of the user's own: a command that reads a picture and prints
+//! Features from a user's own detector: a command that reads a picture and prints
 //! numbers.
 
 use super::BankError;
@@ -8,27 +8,27 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What stands for the file of the picture.
+/// The placeholder for the picture's file.
 const PICTURE: &str = "{png}";
-/// Tells the files of one process apart.
+/// Numbers the temporary files of this process, so that their names are unique.
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
-/// A file that goes when this does.
+/// A file that is removed on drop.
 struct Temporary(PathBuf);
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        // One that cannot be removed is the system's to clear.
+        // A failure to remove it is ignored: it lies in the system's temporary folder.
         let _ = std::fs::remove_file(&self.0);
     }
 }
 
-/// Runs a command on a picture and reads the numbers it prints, separated by white space
-/// or commas. The words of the command are its program and arguments (no shell reads
-/// them); in each, `{png}` stands for the picture's file.
+/// Runs a command on a picture and reads the numbers that it prints, separated by white
+/// space or commas. The words of the command are its program and arguments; no shell is
+/// involved. In each word, `{png}` is replaced by the path of the picture's file.
 ///
 /// # Errors
-/// If it cannot be run, fails, or prints anything but finite numbers.
+/// If the command cannot be run, fails, or prints anything but finite numbers.
 pub(super) fn features(command: &str, picture: &RgbImage) -> Result<Vec<f32>, BankError> {
     let wrong = |what: String| BankError::Command(format!("`{command}`: {what}"));
     if !command.contains(PICTURE) {
@@ -76,7 +76,7 @@ mod tests {
     fn numbers_are_read_and_anything_else_is_an_error() {
         let picture = RgbImage::new(3, 2);
         let said = |c: &str| features(c, &picture).map_err(|e| e.to_string());
-        // The bytes of a picture are no numbers.
+        // The bytes of a picture are not numbers.
         assert!(said("cat {png}").unwrap_err().contains("must print finite numbers"));
         assert!(said("false {png}").unwrap_err().contains("it failed"));
         assert!(said("true {png}").unwrap_err().contains("no numbers"));

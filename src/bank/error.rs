@@ -1,18 +1,18 @@
-//! What is wrong with a bank, or with making one.
+//! Errors in making, reading or using a bank.
 
 use crate::lang::error::RunError;
 use std::io;
 
-/// Why a bank cannot be made, read or used.
+/// The reason why a bank cannot be made, read or used.
 #[derive(Debug, thiserror::Error)]
 pub enum BankError {
     /// The file cannot be read or written.
     #[error("{0}")]
     Io(#[from] io::Error),
-    /// The file is something else.
+    /// The file is not a bank.
     #[error("it is not a bank; `pcadlang learn` makes one")]
     NoBank,
-    /// It was written by another version.
+    /// The file has another format version.
     #[error(
         "it has format version {found}, but this program reads version {expected}; rebuild it \
          with `pcadlang learn`"
@@ -23,29 +23,29 @@ pub enum BankError {
         /// The version this program reads and writes.
         expected: u32,
     },
-    /// Its end is missing, or its parts do not fit.
+    /// The file is truncated, or its parts are inconsistent.
     #[error("it is damaged: {0}")]
     Damaged(String),
-    /// It was learnt from another program.
+    /// The bank was made from another program.
     #[error(
         "it was made from another program, or from another version or other parameters of this \
          one ({name}, hash {found}; this one has {expected}); rebuild it with `pcadlang learn`"
     )]
     Program {
-        /// The program's file, as it was called.
+        /// The file name of that program.
         name: String,
-        /// The hash in the bank.
+        /// The program hash in the bank.
         found: String,
-        /// The hash of the program that is run.
+        /// The hash of the current program.
         expected: String,
     },
-    /// The run does not observe what the features are of.
+    /// The observations that the features need are missing.
     #[error("{0}")]
     Observed(String),
-    /// The program fails.
+    /// The program failed.
     #[error("{0}")]
     Run(Box<RunError>),
-    /// A detector fails.
+    /// A detector failed.
     #[error("{0}")]
     Command(String),
 }

@@ -1,4 +1,4 @@
-//! Which features a bank has, of a rendered scene and of what a run observes.
+//! The features of a bank, computed from a rendered scene or from a run's observations.
 
 use super::{BankError, command};
 use crate::Model;
@@ -12,23 +12,24 @@ use crate::vision::features::{self, Query};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// How features of a picture are found.
+/// The way in which features of a picture are computed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Features {
-    /// Pooled distances to contours, and oriented histograms of them.
+    /// Pooled distances to contours, and oriented histograms of contours.
     Contours {
         /// The longer side of the rendered picture, in pixels.
         size: u32,
     },
     /// The positions of landmarks.
     Keypoints {
-        /// Their names, in the order of the features; empty before anything is learnt.
+        /// The names of the landmarks, in the order of the features; empty until a bank
+        /// is made.
         names: Vec<String>,
     },
     /// Numbers that a command prints.
     Command {
-        /// The command; `{png}` stands for the picture's file.
+        /// The command; `{png}` is replaced by the path of the picture's file.
         command: String,
         /// The longer side of the rendered picture, in pixels.
         size: u32,
@@ -36,7 +37,7 @@ pub enum Features {
 }
 
 impl Features {
-    /// The features of a scene's picture.
+    /// Computes the features of a scene's picture.
     ///
     /// # Errors
     /// If a command fails, or the scene has no landmarks.
@@ -73,7 +74,8 @@ impl Features {
         }
     }
 
-    /// The features of many scenes' pictures in turn; their contours are drawn together.
+    /// Computes the features of the pictures of many scenes, in order; contours are
+    /// rendered as one batch.
     ///
     /// # Errors
     /// As [`Features::of`].
@@ -95,7 +97,7 @@ impl Features {
         })
     }
 
-    /// These features, knowing the landmarks of a scene.
+    /// Returns the same features with the names of the scene's landmarks filled in.
     pub(super) fn named(self, view: &View) -> Features {
         match self {
             Features::Keypoints { .. } => {
@@ -119,7 +121,7 @@ fn elements(c: &Contours) -> Elements<'_> {
     }
 }
 
-/// What a run observes that features can be found of.
+/// The observations of a run from which features can be computed.
 #[derive(Clone, Debug, Default)]
 pub struct Observed {
     image: Option<Value>,
@@ -127,10 +129,10 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// What a program is given: the first of its pictures, and the first of its sets of
-    /// keypoints that has any.
+    /// Takes the first picture among the program's data, and the first set of keypoints
+    /// that is not empty.
     pub fn of(model: &Model) -> Observed {
-        // What is given is a constant of the program.
+        // Data are constants of the program.
         let first =
             |fits: fn(&Value) -> bool| model.code().consts.iter().find(|v| fits(v)).cloned();
         Observed {
@@ -139,11 +141,11 @@ impl Observed {
         }
     }
 
-    /// The observed picture's features; `detector` is the command that the user trusts to
-    /// find them, where one is needed.
+    /// Computes the features of the observed picture. `detector` is the command that the
+    /// user allows to run, for banks whose features come from a command.
     ///
     /// # Errors
-    /// If what they are of is not observed, or a command fails.
+    /// If the observations that the features need are missing, or a command fails.
     pub fn query(&self, features: &Features, detector: Option<&str>) -> Result<Query, BankError> {
         let image = self.image.as_ref().and_then(|v| v.downcast::<ImageValue>());
         let missing = |what: &str| {

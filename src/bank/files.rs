@@ -1,4 +1,4 @@
-//! The banks of a run: files, found and searched once.
+//! The bank files of a run, each opened and searched once.
 
 use super::{Bank, BankError, Observed};
 use crate::Model;
@@ -11,8 +11,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 type Found = Result<Arc<Neighbours>, String>;
 
-/// Answers the kernels of a run from bank files: a path is looked for as it is, then
-/// beside the program, where the program may read.
+/// Provides a run's kernels with neighbours from bank files. A path is resolved as given,
+/// then relative to the program's folder, in both cases only where the program may read.
 #[derive(Debug)]
 pub struct BankFiles {
     program: String,
@@ -24,9 +24,9 @@ pub struct BankFiles {
 }
 
 impl BankFiles {
-    /// For runs of a program with its data. `folder` is where the program is; `detector`
-    /// the command that banks with features from outside may run: none is run that the
-    /// user has not named.
+    /// Creates the banks for runs of a program with its data. `folder` is the program's
+    /// folder. `detector` is the command that may be run for banks whose features come
+    /// from a command; commands that the user has not named are never run.
     pub fn new(model: &Model, folder: &Path, detector: Option<String>) -> BankFiles {
         BankFiles {
             program: model.hash().to_owned(),

@@ -1,56 +1,56 @@
 //! The layout of a bank file. All numbers are little-endian:
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! | --- | --- |
 //! | 0..8 | `PCADBANK` |
-//! | 8..12 | the version of the format, u32 |
+//! | 8..12 | the format version, u32 |
 //! | 12..16 | 0 |
 //! | 16..24 | N, the number of entries, u64 |
-//! | 24..32 | M, the number of features of each, u64 |
-//! | 32..40 | where the table of places is, u64 |
-//! | 40..48 | where the header is, u64; it ends with the file |
+//! | 24..32 | M, the number of features per entry, u64 |
+//! | 32..40 | the offset of the table, u64 |
+//! | 40..48 | the offset of the header, which extends to the end of the file, u64 |
 //! | 48..56 | the FNV-1a hash of the header, u64 |
 //! | 56..64 | 0 |
 //! | 64.. | features: N rows of M f32 |
 //! | … | latents of each entry (see `record.rs`) |
-//! | … | the table: where each entry's latents begin, and where the last end, N + 1 u64 |
+//! | … | the table: offsets of the entries' latents and the end of the last, N + 1 u64 |
 //! | … | the header, JSON |
 
 use super::{BankError, Features};
 use serde::{Deserialize, Serialize};
 
-/// What a bank begins with.
+/// The first bytes of every bank.
 pub(super) const MAGIC: &[u8; 8] = b"PCADBANK";
-/// The version this code writes, and the only one it reads.
+/// The format version that is written, and the only one that can be read.
 pub(super) const VERSION: u32 = 1;
-/// Where the features begin.
+/// The offset of the features.
 pub(super) const START: u64 = 64;
 
-/// What a bank is of.
+/// Metadata of a bank.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
-    /// The program's file, as it was called.
+    /// The program's file name.
     pub name: String,
     /// The hash of the program's text, includes and parameters.
     pub program: String,
-    /// The seed the entries were drawn with.
+    /// The seed with which the entries were drawn.
     pub seed: u64,
-    /// How features are found.
+    /// How the features are computed.
     pub features: Features,
-    /// Every address that occurs: its hash, in hexadecimal, and its text.
+    /// Every address that occurs: its hash in hexadecimal, and its text.
     pub addresses: Vec<(String, String)>,
 }
 
-/// The first bytes of a file.
+/// The fixed-size start of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Preamble {
-    /// Entries.
+    /// The number of entries.
     pub count: u64,
-    /// Features of each.
+    /// The number of features per entry.
     pub width: u64,
-    /// Where the table is.
+    /// The offset of the table.
     pub table: u64,
-    /// Where the header is.
+    /// The offset of the header.
     pub header: u64,
     /// The hash of the header.
     pub hash: u64,
@@ -69,10 +69,10 @@ impl Preamble {
         b
     }
 
-    /// Reads it, and checks it against the length of the file.
+    /// Reads the preamble and checks it against the length of the file.
     ///
     /// # Errors
-    /// If it is not that of a whole bank of this version.
+    /// If it does not belong to a complete bank of this version.
     pub fn decode(b: &[u8], length: u64) -> Result<Preamble, BankError> {
         let word = |i: usize| {
             b.get(i..i + 8).and_then(|w| w.try_into().ok()).map_or(0, u64::from_le_bytes)

@@ -1,5 +1,5 @@
-//! Making a bank: scenes from the prior, on several threads, each a function of the seed
-//! and its number alone.
+//! Making a bank: scenes from the prior, drawn on several threads. Each scene depends
+//! only on the seed and its index.
 
 use super::write::BankWriter;
 use super::{BankError, Entry, Features, Named, as_view, picture};
@@ -14,30 +14,30 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Entries that are drawn before they are written.
+/// The number of entries that are drawn before they are written.
 const BLOCK: u64 = 256;
-/// How often a draw may fail because the program has no value there before that is an
-/// error.
+/// The number of draws per entry that may fail because a value is undefined; after that,
+/// the failure is an error.
 const RETRIES: u64 = 100;
 
-/// What a bank is made of.
+/// The options for making a bank.
 #[derive(Clone, Debug)]
 pub struct Learn<'a> {
-    /// The program as errors of later runs should call it.
+    /// The program's name, for the error messages of later runs.
     pub name: &'a str,
-    /// How many entries.
+    /// The number of entries.
     pub count: u64,
-    /// The seed: same seed, same bank.
+    /// The seed, which determines the bank.
     pub seed: u64,
     /// The number of threads.
     pub threads: usize,
-    /// Which features.
+    /// The features to compute.
     pub features: Features,
 }
 
 /// Draws scenes from the prior and writes their latents and features to a file; `done`
-/// counts them as they come. The program may lack its data: what is observed is not
-/// asked.
+/// counts the drawn scenes. The program's data may be missing, because observations are
+/// not evaluated.
 ///
 /// # Errors
 /// If the program fails or has no picture, a detector fails, or the file cannot be
@@ -80,7 +80,7 @@ fn draws(seed: u64, i: u64, attempt: u64) -> Draws {
     Draws { key: StreamKey::new(seed, u32::MAX, Purpose::START), step: i, substream: attempt }
 }
 
-/// The latents of entry `i`, and its scene.
+/// Draws the latents and the scene of entry `i`.
 fn one(
     prior: &Trace,
     operand: Operand,
@@ -99,7 +99,7 @@ fn one(
     Ok((latents, view))
 }
 
-/// The choices of a trace by address hash, and the value it was asked for.
+/// Returns the choices of a trace with their address hashes, and the value of the query.
 fn drawn(trace: &Trace, mut values: Vec<Value>) -> (Vec<Named>, Option<Value>) {
     let named = |t: &crate::trace::Target| {
         let free = trace.free(*t).map(|(y, _)| y).filter(|y| !y.is_empty());

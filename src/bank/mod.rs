@@ -1,10 +1,11 @@
-//! Banks: scenes drawn from a program's prior, each with its latents and with features of
-//! its picture, in a file. They tell the kernel `knn` which scenes look like the observed
-//! picture (Kulkarni et al. 2014, section 3: q_data).
+//! Banks: files of scenes drawn from a program's prior, each with its latents and with
+//! features of its picture. The kernel `knn` uses them to find scenes that look like the
+//! observed picture (Kulkarni et al. 2014, section 3: q_data).
 //!
-//! `learn` makes a bank, `Bank` reads one, `BankFiles` answers a run. Features are
-//! `vision`'s, proposals `infer`'s; here is what joins them. Invariants: entry `i` is a
-//! function of program, seed and `i`; a file is whole or absent.
+//! `learn` makes a bank, `Bank` reads one, and `BankFiles` serves the banks of a run.
+//! This module joins the features of `vision` with the proposals of `infer`. Invariants:
+//! entry `i` is a function of the program, the seed and `i`; a file is either complete or
+//! absent.
 
 mod command;
 mod error;

@@ -1,5 +1,5 @@
-//! Reading a bank: features block by block, latents of chosen entries only, so that it
-//! need not fit into memory.
+//! Reading a bank. Features are read block by block and latents of selected entries only,
+//! so a bank need not fit into memory.
 
 use super::format::{Header, Preamble, START};
 use super::record::{decode, latents};
@@ -12,14 +12,15 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// Bytes of features read at a time, about.
+/// The approximate number of bytes of features that are read at a time.
 const BLOCK: u64 = 1 << 20;
-/// The longest entry, table of addresses or row of features that is believed, in bytes.
+/// The largest accepted size of an entry, a header or a row of features, in bytes.
 const LONGEST: u64 = 1 << 28;
-/// Entries whose latents tell the spread of each coordinate.
+/// The approximate number of entries from which the scale of each coordinate is
+/// estimated.
 const SAMPLE: u64 = 256;
 
-/// A bank in a file.
+/// A bank file, open for reading.
 #[derive(Debug)]
 pub struct Bank {
     file: Mutex<File>,
@@ -32,7 +33,7 @@ impl Bank {
     /// Opens a bank and reads its header.
     ///
     /// # Errors
-    /// If it cannot be read, or is no whole bank of this version.
+    /// If it cannot be read, or is not a complete bank of this version.
     pub fn open(path: &Path) -> Result<Bank, BankError> {
         let mut file = File::open(path)?;
         let length = file.metadata()?.len();
@@ -56,25 +57,26 @@ impl Bank {
         Ok(Bank { file: Mutex::new(file), preamble, header, addresses })
     }
 
-    /// What it is of.
+    /// Returns the metadata.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// The number of entries.
+    /// Returns the number of entries.
     pub fn len(&self) -> usize {
         self.preamble.count as usize
     }
 
-    /// Whether it has none: never, for a bank that opens.
+    /// Returns whether there are no entries, which is never true of a bank that opens.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Checks that the bank is of this program.
+    /// Checks that the bank was made from this program.
     ///
     /// # Errors
-    /// If it is of another, of another version of it, or of other parameters.
+    /// If it was made from another program, another version of it, or with other
+    /// parameters.
     pub fn check(&self, program: &str) -> Result<(), BankError> {
         if self.header.program == program {
             return Ok(());
@@ -87,23 +89,23 @@ impl Bank {
         Ok(bytes(&mut self.file.lock().unwrap_or_else(PoisonError::into_inner), at, length)?)
     }
 
-    /// Features of `count` entries from entry `i` on, one after the other.
+    /// Reads the features of `count` entries from entry `i` on, concatenated.
     fn rows(&self, i: u64, count: u64) -> Result<Vec<f32>, BankError> {
         let width = 4 * self.preamble.width;
         let bytes = self.read(START + i * width, count * width)?;
         Ok(bytes.chunks_exact(4).map(|b| b.try_into().map_or(0.0, f32::from_le_bytes)).collect())
     }
 
-    /// The features of an entry.
+    /// Reads the features of an entry.
     ///
     /// # Errors
-    /// If there is no such entry, or it cannot be read.
+    /// If the entry does not exist or cannot be read.
     pub fn features(&self, i: usize) -> Result<Vec<f32>, BankError> {
         self.place(i)?;
         self.rows(i as u64, 1)
     }
 
-    /// Where the latents of an entry begin and end.
+    /// Returns the offsets of the start and the end of an entry's latents.
     fn place(&self, i: usize) -> Result<(u64, u64), BankError> {
         if i >= self.len() {
             return Err(BankError::Damaged(format!("no entry {i} among {}", self.len())));
@@ -119,7 +121,7 @@ impl Bank {
         Ok((from, to))
     }
 
-    /// The choices of an entry.
+    /// Reads the choices of an entry.
     ///
     /// # Errors
     /// As [`Bank::features`].
@@ -130,11 +132,11 @@ impl Bank {
             .ok_or_else(|| BankError::Damaged(format!("entry {i} cannot be read")))
     }
 
-    /// The `k` entries whose pictures are most like a picture, the nearest first, each
-    /// with its squared distance.
+    /// Returns the `k` entries whose pictures are most similar to the query, nearest
+    /// first, each with its squared distance.
     ///
     /// # Errors
-    /// If the picture has another number of features, or the file cannot be read.
+    /// If the query has another number of features, or the file cannot be read.
     pub fn nearest(&self, query: &Query, k: usize) -> Result<Vec<(usize, f32)>, BankError> {
         let (width, count) = (self.preamble.width, self.preamble.count);
         if query.len() as u64 != width {
@@ -152,7 +154,7 @@ impl Bank {
             let block = self.rows(first, n)?;
             for (j, features) in block.chunks_exact(width.max(1) as usize).enumerate() {
                 let d = query.distance(features);
-                // Of equals the earlier goes first.
+                // Among equals, the earlier entry comes first.
                 let at = best.partition_point(|(_, b)| *b <= d);
                 if at < k {
                     best.insert(at, (first as usize + j, d));
@@ -164,7 +166,7 @@ impl Bank {
         Ok(best)
     }
 
-    /// The latents of the `k` nearest entries, ready for proposals.
+    /// Reads the latents of the `k` nearest entries, for proposals.
     ///
     /// # Errors
     /// As [`Bank::nearest`].

@@ -1,44 +1,45 @@
-//! The latents of one entry, and their bytes in a file (little-endian):
+//! The latents of one entry, and their encoding in a file (little-endian).
 //!
-//! the number of choices (u32), then for each the index of its address in the header's
-//! table (u32), its stored value, and its unconstrained coordinates: their number (u32;
-//! the largest: they are the stored numbers) and the numbers (f64). A value is a tag
-//! (u8), then: 0 a truth value (u8); 1 a number (f64); 2 numbers (u32, f64 each); 3
-//! values (u32, each a value).
+//! The number of choices (u32) is followed, for each choice, by the index of its address
+//! in the header's table (u32), its stored value, and its unconstrained coordinates:
+//! their number (u32; the largest u32 means that they equal the stored numbers) and the
+//! numbers (f64). A value is a tag (u8) followed by its content: 0, a truth value (u8);
+//! 1, a number (f64); 2, numbers (their count, u32, then f64 each); 3, values (their
+//! count, u32, then each value).
 
 use crate::dist::Datum;
 use crate::infer::{Latent, Latents};
 use std::sync::Arc;
 
-/// In place of a number of coordinates: they are the stored numbers themselves.
+/// Stands for the number of coordinates if they equal the stored numbers.
 const SAME: u32 = u32::MAX;
-/// Values within values in a file that is read: more are no value that a distribution
-/// draws.
+/// The deepest nesting of values that is accepted: no distribution draws more deeply
+/// nested values.
 const DEEPEST: u32 = 8;
 
-/// A choice of a scene.
+/// A choice of a scene, with its address.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
     /// The hash of its address.
     pub hash: u64,
-    /// Its address, for people.
+    /// Its address as text.
     pub address: String,
     /// Its stored value.
     pub stored: Datum,
-    /// Its unconstrained coordinates, of a continuous one.
+    /// Its unconstrained coordinates, if it is continuous.
     pub free: Option<Vec<f64>>,
 }
 
-/// A scene of a bank.
+/// A scene in a bank.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Entry {
-    /// The choices its picture asks for.
+    /// The choices on which its picture depends.
     pub latents: Vec<Named>,
     /// The features of its picture.
     pub features: Vec<f32>,
 }
 
-/// What a proposal needs of the choices.
+/// Converts choices to the form that proposals use.
 pub(super) fn latents(choices: &[Named]) -> Latents {
     let latent = |c: &Named| match &c.free {
         Some(y) => Latent::Free(y.clone()),
@@ -47,7 +48,7 @@ pub(super) fn latents(choices: &[Named]) -> Latents {
     choices.iter().map(|c| (c.hash, latent(c))).collect()
 }
 
-/// Appends the bytes of the choices; `index` tells where an address is in the table.
+/// Appends the encoded choices; `index` returns the position of an address in the table.
 pub(super) fn encode(choices: &[Named], mut index: impl FnMut(&Named) -> u32, out: &mut Vec<u8>) {
     out.extend((choices.len() as u32).to_le_bytes());
     for c in choices {
@@ -94,8 +95,8 @@ fn encode_datum(d: &Datum, out: &mut Vec<u8>) {
     }
 }
 
-/// Reads the choices back; `None` if these are no bytes of an entry. Addresses of the
-/// table come with their hashes.
+/// Decodes choices; `None` if the bytes are not a valid entry. `addresses` holds the
+/// hashes and texts of the header's table.
 pub(super) fn decode(mut bytes: &[u8], addresses: &[(u64, String)]) -> Option<Vec<Named>> {
     let b = &mut bytes;
     let count = u32(b)?;

@@ -1,4 +1,4 @@
-//! The picture of a scene: where a program keeps its view.
+//! The picture of a scene: finding the view in a program.
 
 use crate::lang::builtins::scene::{SolidValue, ViewValue};
 use crate::lang::code::Operand;
@@ -7,8 +7,8 @@ use crate::render::{Camera, View};
 use crate::trace::{Draws, Trace};
 use std::sync::Arc;
 
-/// Where a program keeps its picture: the last top-level name that is a view, or else the
-/// last that is a solid.
+/// Returns the operand of a program's picture: the last top-level name that is a view,
+/// otherwise the last that is a solid.
 pub fn picture(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
     let mut solid = None;
@@ -25,7 +25,8 @@ pub fn picture(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     solid
 }
 
-/// A view, or a solid before a camera (the default one, if there is none).
+/// Converts a value to a view: a view itself, or a solid seen from `camera` (by default,
+/// the default camera at 256 x 256).
 pub fn as_view(value: &Value, camera: Option<Camera>) -> Option<Arc<View>> {
     if let Some(v) = value.downcast::<ViewValue>() {
         return Some(Arc::clone(&v.0));

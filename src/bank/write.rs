@@ -1,4 +1,5 @@
-//! Writing a bank, entry by entry: memory holds one place a entry, and the addresses.
+//! Writing a bank block by block. Memory holds only an offset for each entry, and the
+//! addresses.
 
 use super::format::{Header, Preamble, START};
 use super::record::{Entry, encode};
@@ -9,8 +10,8 @@ use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A bank on its way to its file. Dropped before [`BankWriter::finish`], it leaves
-/// nothing.
+/// A bank that is being written. If it is dropped before [`BankWriter::finish`], the
+/// partial file is removed.
 pub(super) struct BankWriter {
     file: File,
     partial: PathBuf,
@@ -18,7 +19,7 @@ pub(super) struct BankWriter {
     count: u64,
     width: u64,
     written: u64,
-    /// Where the next latents go.
+    /// The offset of the next latents.
     end: u64,
     places: Vec<u64>,
     addresses: Vec<(String, String)>,
@@ -27,11 +28,11 @@ pub(super) struct BankWriter {
 }
 
 impl BankWriter {
-    /// Begins a bank of so many entries with so many features each, under another name
-    /// beside its own.
+    /// Starts a bank of `count` entries with `width` features each, in a temporary file
+    /// beside its final path.
     ///
     /// # Errors
-    /// If the file cannot be made.
+    /// If the file cannot be created.
     pub fn create(path: &Path, count: u64, width: usize) -> Result<BankWriter, BankError> {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let partial = path.with_file_name(format!(".{name}.partial"));
@@ -51,10 +52,10 @@ impl BankWriter {
         })
     }
 
-    /// Adds entries, in their order.
+    /// Adds entries, in order.
     ///
     /// # Errors
-    /// If one has another number of features, or they cannot be written.
+    /// If an entry has another number of features, or the file cannot be written.
     pub fn add(&mut self, entries: &[Entry]) -> Result<(), BankError> {
         let (mut features, mut latents) = (Vec::new(), Vec::new());
         let from = self.end;
@@ -89,7 +90,7 @@ impl BankWriter {
         self.file.write_all(bytes)
     }
 
-    /// Ends the bank and gives it its name.
+    /// Completes the bank and moves it to its final path.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -131,7 +132,7 @@ impl BankWriter {
 impl Drop for BankWriter {
     fn drop(&mut self) {
         if !self.done {
-            // The error that is told is the first one.
+            // A failure to remove it is ignored: the original error is reported.
             let _ = std::fs::remove_file(&self.partial);
         }
     }

@@ -1,50 +1,50 @@
-//! The diagnostic itself: data, without any rendering.
+//! The data of a diagnostic, without its rendering.
 //!
-//! Invariant of a good one: it has at least one primary label, its message makes sense
-//! without the source beside it, and a hint says what to type.
+//! A good diagnostic has at least one primary label, a message that makes sense without
+//! the source, and hints that say what to type.
 
 use crate::syntax::span::Span;
 
-/// How bad it is.
+/// The severity of a diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
-    /// Worth knowing.
+    /// For information.
     Note,
-    /// Suspicious, but it runs.
+    /// Suspicious, but the program runs.
     Warning,
-    /// It does not run.
+    /// The program does not run.
     Error,
 }
 
-/// A place in the source and what is to be said about it.
+/// A span of the source with a text about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Label {
-    /// The place.
+    /// The span.
     pub span: Span,
-    /// What to say there; may be empty.
+    /// The text; may be empty.
     pub text: String,
-    /// Whether this is the place of the error itself (underlined by `^`), or one that
-    /// explains it (`-`).
+    /// Whether the span is the location of the error itself (underlined with `^`) or
+    /// helps to explain it (`-`).
     pub primary: bool,
 }
 
-/// One message to the user.
+/// A message to the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// How bad it is.
+    /// The severity.
     pub severity: Severity,
-    /// One line: what is wrong.
+    /// What is wrong, in one line.
     pub message: String,
-    /// Where.
+    /// The relevant spans of the source.
     pub labels: Vec<Label>,
-    /// What to do about it.
+    /// Suggestions for a fix.
     pub hints: Vec<String>,
-    /// What else there is to know, e.g. the address being executed and the call path.
+    /// Further information, e.g. the address being executed and the call path.
     pub notes: Vec<String>,
 }
 
 impl Diagnostic {
-    /// A message of the given severity, without labels.
+    /// Creates a message of the given severity, without labels.
     pub fn new(severity: Severity, message: impl Into<String>) -> Self {
         Diagnostic {
             severity,
@@ -55,19 +55,19 @@ impl Diagnostic {
         }
     }
 
-    /// An error at `span`, whose label says `text`.
+    /// Creates an error with a primary label at `span`.
     pub fn error(message: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
         Diagnostic::new(Severity::Error, message).primary(span, text)
     }
 
-    /// Adds a label at the place of the error.
+    /// Adds a label at the location of the error.
     #[must_use]
     pub fn primary(mut self, span: Span, text: impl Into<String>) -> Self {
         self.labels.push(Label { span, text: text.into(), primary: true });
         self
     }
 
-    /// Adds a label at a place that explains the error.
+    /// Adds a label at a span that helps to explain the error.
     #[must_use]
     pub fn secondary(mut self, span: Span, text: impl Into<String>) -> Self {
         self.labels.push(Label { span, text: text.into(), primary: false });
@@ -91,7 +91,7 @@ impl Diagnostic {
 
 /// An error that can be shown to the user.
 pub trait IntoDiagnostic {
-    /// The message for it.
+    /// Converts the error to a diagnostic.
     fn into_diagnostic(self) -> Diagnostic;
 }
 

@@ -1,10 +1,10 @@
-//! The lines of the source that one diagnostic shows, made fit for a terminal, as
-//! codespan-reporting wants them.
+//! The source lines that one diagnostic shows, sanitised for a terminal, in the form that
+//! codespan-reporting needs.
 //!
 //! A line longer than [`MAX_COLUMNS`] is cut to a window around its first label (a
-//! generated program may hold megabytes in a line), and control characters are replaced,
-//! so that a source cannot send escape sequences to the terminal. Line and column numbers
-//! stay those of the source.
+//! generated program may have megabytes in one line), and control characters are
+//! replaced, so that a source cannot send escape sequences to the terminal. Line and
+//! column numbers remain those of the source.
 
 use super::diagnostic::Diagnostic;
 use super::source::{SourceFile, SourceMap};
@@ -13,13 +13,13 @@ use codespan_reporting::files::{Error, Files, column_index};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Longer lines are cut to this many characters.
+/// The number of characters to which longer lines are cut.
 const MAX_COLUMNS: usize = 200;
-/// How many of them stand before the first label.
+/// The number of characters kept before the first label in a cut line.
 const COLUMNS_BEFORE: usize = 60;
 const ELLIPSIS: &str = "…";
 
-/// The shown lines of all files of a diagnostic.
+/// The shown lines of every file in a diagnostic.
 pub(super) struct Excerpts(BTreeMap<FileId, Excerpt>);
 
 /// The shown lines of one file.
@@ -27,18 +27,18 @@ struct Excerpt {
     name: String,
     text: String,
     lines: Vec<Line>,
-    /// The index of the first of them in the source.
+    /// The index in the source of the first shown line.
     first: usize,
 }
 
 /// One shown line.
 struct Line {
-    /// The bytes of the source it stands for, without its line break.
+    /// The byte range of the source that is shown, without its line break.
     source: Range<usize>,
-    /// Where it starts in the excerpt's text, where the text of the source starts, and
-    /// where that ends.
+    /// Byte offsets in the excerpt's text: the start of the line, the start of the
+    /// source's text in it (after a possible ellipsis), and the end of that text.
     shown: [usize; 3],
-    /// How many columns were cut at the left.
+    /// The number of columns cut off on the left.
     cut: usize,
 }
 
@@ -55,7 +55,8 @@ impl Excerpts {
         Excerpts(spans.into_iter().filter_map(shown).collect())
     }
 
-    /// Where a span lies in the excerpt of its file; `None` if there is no such file.
+    /// Returns the range of a span in the excerpt of its file; `None` if the file does
+    /// not exist.
     pub(super) fn range(&self, span: Span) -> Option<Range<usize>> {
         let excerpt = self.0.get(&span.file)?;
         let start = excerpt.shown_at(span.start as usize);
@@ -84,8 +85,8 @@ impl Excerpt {
         excerpt
     }
 
-    /// Adds a line that starts at `start` in the source and holds a label at its byte
-    /// `label`.
+    /// Adds a line that starts at byte `start` of the source and has its first label at
+    /// its byte `label`.
     fn push(&mut self, line: &str, start: usize, label: Option<usize>) {
         let begin = self.text.len();
         let long = line.chars().nth(MAX_COLUMNS).is_some();
@@ -102,7 +103,7 @@ impl Excerpt {
         let shown = [begin, self.text.len(), self.text.len() + kept.len()];
         for c in line[kept.clone()].chars() {
             if unprintable(c) {
-                // One `?` for each byte keeps the offsets.
+                // One `?` per byte keeps the offsets.
                 self.text.extend(std::iter::repeat_n('?', c.len_utf8()));
             } else {
                 self.text.push(c);
@@ -115,12 +116,13 @@ impl Excerpt {
         self.lines.push(Line { source: start + kept.start..start + kept.end, shown, cut });
     }
 
-    /// The byte of the excerpt that shows a byte of the source, or the nearest to it.
+    /// Returns the byte of the excerpt that shows a byte of the source, or the nearest
+    /// one.
     fn shown_at(&self, byte: usize) -> usize {
         let index = self.lines.partition_point(|line| line.source.start <= byte).saturating_sub(1);
         let Some(line) = self.lines.get(index) else { return 0 };
-        // The next line may be cut at its left: then a byte in the cut is beyond the end
-        // of this one.
+        // If the next line is cut on the left, a byte in the part cut off is beyond the
+        // end of this line.
         let inside = byte.clamp(line.source.start, line.source.end) - line.source.start;
         let mut at = line.shown[1] + inside;
         while !self.text.is_char_boundary(at) {

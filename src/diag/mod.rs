@@ -1,9 +1,8 @@
-//! What the user is told when something is wrong: diagnostics, the source text they point
-//! into, and their rendering.
+//! Diagnostics: messages to the user, the source text they refer to, and their rendering.
 //!
-//! Every phase (syntax, names, types, run time) has its own error type and turns it into
-//! a [`Diagnostic`] in one place, by [`IntoDiagnostic`]. Nothing here prints or reads
-//! files: [`render`] returns text.
+//! Every phase (syntax, names, types, run time) has its own error type and converts it to
+//! a [`Diagnostic`] in one place, by [`IntoDiagnostic`]. Nothing in this module prints or
+//! reads files: [`render`] returns text.
 
 #![doc = include_str!("guide.md")]
 

@@ -1,12 +1,13 @@
-//! "Did you mean …?": the known name nearest to one that is not known.
+//! "Did you mean …?": the known name most similar to an unknown one.
 
-/// The candidate nearest to `name`, if it is near enough to be a likely slip of the pen.
+/// Returns the candidate most similar to `name`, if it is similar enough to be a likely
+/// typo.
 ///
-/// Distance is Damerau–Levenshtein in its restricted form (optimal string alignment):
-/// insertions, deletions, substitutions and swaps of neighbours, each costing 1; letters
-/// that differ only in case cost nothing. Near enough is at most a third of the longer
-/// name's length, and at least 1 of three letters or more. Ties go to the earlier
-/// candidate.
+/// The distance is the restricted Damerau–Levenshtein distance (optimal string
+/// alignment): insertions, deletions, substitutions and swaps of neighbours cost 1 each;
+/// differences in case are free. It may be at most a third of the longer name's length,
+/// rounded down, so names of up to two letters must match except for case. Ties go to the
+/// earlier candidate.
 pub fn nearest<'a, I>(name: &str, candidates: I) -> Option<&'a str>
 where
     I: IntoIterator<Item = &'a str>,
@@ -28,12 +29,12 @@ where
 }
 
 fn letters(name: &str) -> Vec<char> {
-    // Names are short; a longer one cannot be a slip of a known name.
+    // Bounds the cost; names that are longer than this are not typos of known ones.
     name.chars().take(128).flat_map(char::to_lowercase).collect()
 }
 
 fn distance(a: &[char], b: &[char]) -> usize {
-    // Three rows of the dynamic programme: i - 2, i - 1 and i.
+    // Three rows of the dynamic programming table: i - 2, i - 1 and i.
     let mut before: Vec<usize> = vec![0; b.len() + 1];
     let mut last: Vec<usize> = (0..=b.len()).collect();
     let mut row = last.clone();

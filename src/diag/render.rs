@@ -1,4 +1,4 @@
-//! Diagnostics as text, by codespan-reporting.
+//! Rendering of diagnostics as text, with codespan-reporting.
 
 use super::diagnostic::{Diagnostic, Severity};
 use super::excerpt::Excerpts;
@@ -9,17 +9,17 @@ use codespan_reporting::term::{self, Config};
 
 type Shown = codespan::Diagnostic<crate::syntax::span::FileId>;
 
-/// The diagnostics as the user sees them, in order, a blank line after each; with ANSI
-/// colours if `color`.
+/// Renders diagnostics as the user sees them, in order, each followed by a blank line;
+/// with ANSI colours if `color`.
 ///
-/// Labels in files that `map` does not know are left out.
+/// Labels in files that `map` does not contain are omitted.
 pub fn render(map: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> String {
     let mut out = Vec::new();
     for diagnostic in diagnostics {
         let files = Excerpts::new(map, diagnostic);
         let shown = to_codespan(&files, diagnostic);
         let config = Config { tab_width: 2, ..Config::default() };
-        // Writing to memory does not fail, and every label was found in `files`.
+        // Writing to memory cannot fail, and all labels are in `files`.
         if write(&mut out, &config, &files, &shown, color).is_err() {
             out.extend_from_slice(format!("error: {}\n", diagnostic.message).as_bytes());
         }
@@ -43,7 +43,7 @@ fn write(
     }
 }
 
-/// A build without the command has no colours.
+/// Builds without the `cli` feature have no colours.
 #[cfg(not(feature = "cli"))]
 fn write(
     out: &mut Vec<u8>,

@@ -1,5 +1,5 @@
-//! The source files of a run: names, texts, and where their lines start. Reading files is
-//! not done here.
+//! The source files of a run: names, texts and line starts. This module does not read
+//! files.
 
 use super::diagnostic::Diagnostic;
 use crate::syntax::span::{FileId, Span};
@@ -13,7 +13,7 @@ pub const MAX_SOURCE_BYTES: usize = 4 << 20;
 pub struct SourceFile {
     name: Arc<str>,
     text: Arc<str>,
-    /// The byte each line starts at; the first is 0.
+    /// The byte offset of the start of each line; the first is 0.
     line_starts: Vec<usize>,
 }
 
@@ -24,38 +24,38 @@ impl SourceFile {
         SourceFile { name: name.into(), text: text.into(), line_starts }
     }
 
-    /// The name shown to the user: a path, or `<repl>` and the like.
+    /// Returns the name shown to the user: a path, or `<repl>` and the like.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The whole text.
+    /// Returns the whole text.
     pub fn text(&self) -> &Arc<str> {
         &self.text
     }
 
-    /// The number of lines, at least 1.
+    /// Returns the number of lines, at least 1.
     #[doc(hidden)]
     pub fn line_count(&self) -> usize {
         self.line_starts.len()
     }
 
-    /// The index (from 0) of the line that holds a byte; the last line for a byte past
-    /// the end.
+    /// Returns the index (from 0) of the line that contains a byte; the last line for a
+    /// byte past the end.
     #[doc(hidden)]
     pub fn line_index(&self, byte: usize) -> usize {
         self.line_starts.partition_point(|&start| start <= byte).saturating_sub(1)
     }
 
-    /// The byte range of a line, with its line break; empty at the end of the text for a
-    /// line past the last.
+    /// Returns the byte range of a line, including its line break; an empty range at the
+    /// end of the text for a line past the last.
     #[doc(hidden)]
     pub fn line_range(&self, index: usize) -> std::ops::Range<usize> {
         let at = |i: usize| self.line_starts.get(i).copied().unwrap_or(self.text.len());
         at(index)..at(index.saturating_add(1))
     }
 
-    /// Line and column of a byte, both from 1; columns count characters.
+    /// Returns the line and column of a byte, both from 1; columns count characters.
     pub fn location(&self, byte: usize) -> (usize, usize) {
         let line = self.line_index(byte);
         let start = self.line_range(line).start;
@@ -72,12 +72,12 @@ pub struct SourceMap {
 }
 
 impl SourceMap {
-    /// No files.
+    /// Creates an empty map.
     pub fn new() -> Self {
         SourceMap::default()
     }
 
-    /// Adds a text.
+    /// Adds a text and returns its number.
     pub fn add(&mut self, name: &str, text: &str) -> FileId {
         self.files.push(SourceFile::new(name, text));
         FileId((self.files.len() - 1) as u32)
@@ -100,8 +100,8 @@ impl SourceMap {
             Ok(text) => return Ok(self.add(name, text)),
             Err(error) => error,
         };
-        // The text before the error keeps its length under lossy decoding, so the offset
-        // stays right.
+        // Lossy decoding does not change the text before the error, so the offset stays
+        // right.
         let id = self.add(name, &String::from_utf8_lossy(bytes));
         let at = error.valid_up_to();
         let byte = bytes.get(at).copied().unwrap_or_default();
@@ -120,19 +120,19 @@ impl SourceMap {
         .hint(hint))
     }
 
-    /// A file; `None` for a number this map did not give out.
+    /// Returns a file; `None` if the number is not from this map.
     pub fn get(&self, id: FileId) -> Option<&SourceFile> {
         self.files.get(id.0 as usize)
     }
 
-    /// The source text of a span; empty if it lies outside.
+    /// Returns the source text of a span; empty if the span is outside the text.
     pub fn slice(&self, span: Span) -> &str {
         self.get(span.file)
             .and_then(|f| f.text.get(span.start as usize..span.end as usize))
             .unwrap_or("")
     }
 
-    /// `file:line:column` of the start of a span.
+    /// Returns `file:line:column` of the start of a span.
     pub fn locate(&self, span: Span) -> String {
         match self.get(span.file) {
             Some(file) => {
@@ -144,7 +144,7 @@ impl SourceMap {
     }
 }
 
-/// The message for a file over the limit.
+/// Creates the diagnostic for a file over the size limit.
 pub(crate) fn too_large(bytes: usize, span: Span) -> Diagnostic {
     let mib = |b: usize| b as f64 / f64::from(1 << 20);
     let message = format!(

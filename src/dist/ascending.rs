@@ -1,14 +1,12 @@
-//! The map between ascending numbers and unconstrained space: the first coordinate, then
-//! the logarithms of the gaps.
+//! The map between ascending sequences of numbers and unconstrained space: the first
+//! coordinate, then the logarithms of the gaps.
 //!
-//! For numbers of a bounded space, gaps are those of the numbers' own coordinates, in
-//! which the space has no bounds.
+//! In a bounded space, the gaps are those between the numbers' unconstrained coordinates.
 
 use super::Support;
 use super::transform::{FAR, near};
 
-/// The space whose coordinates are told apart by their order: angles are taken as an
-/// interval.
+/// Returns the space in which coordinates are ordered: angles count as an interval.
 fn line(one: &Support) -> Support {
     match one {
         Support::Circle => {
@@ -23,14 +21,15 @@ pub(super) fn to_free(one: &Support, xs: &[f64], out: &mut Vec<f64>) {
     let mut last = None;
     for x in xs {
         let u = one.to_free_scalar(*x);
-        // What is out of order has no gap.
+        // Numbers out of order have no gap.
         let gap = |last: f64| if u > last { libm::log(u - last).clamp(-FAR, FAR) } else { -FAR };
         out.push(last.map_or(u, gap));
         last = Some(u);
     }
 }
 
-/// The numbers' own coordinates, and the sum of the logarithms of the gaps.
+/// Returns the numbers' unconstrained coordinates and the sum of the logarithms of the
+/// gaps.
 fn coordinates(n: usize, at: impl Fn(usize) -> f64) -> (Vec<f64>, f64) {
     let (mut u, mut jacobian) = (0.0, 0.0);
     let mut next = |k: usize| {
@@ -70,7 +69,7 @@ pub(super) fn free_gradient(
     let (us, _) = coordinates(n, &at);
     let start = out.len();
     us.iter().enumerate().for_each(|(k, u)| one.free_gradient(&[*u], &[by(k)], out));
-    // A coordinate moves its own number and all after it.
+    // A coordinate moves its own number and all numbers after it.
     let mut after = 0.0;
     for (k, g) in out[start..].iter_mut().enumerate().rev() {
         after += *g;

@@ -1,17 +1,18 @@
-//! Many numbers under distributions of one family, whose parameters lie in a buffer: the
-//! same densities and slopes as one at a time, without an allocation, and without working
-//! out again what a parameter that stays has already given.
+//! Log densities and their derivatives for many numbers under distributions of one
+//! family, whose parameters lie in a buffer. The results equal those of evaluating one
+//! number at a time, but there are no allocations, and work that depends only on
+//! unchanged parameters is not repeated.
 
 use super::*;
 use crate::num::{Column, ExactSum};
 use std::fmt;
 
 /// Numbers under distributions of one family. Columns of parameters are in the order of
-/// the constructor; with none of them the parameters stay as they were when the batch was
+/// the constructor; without columns, the parameters stay as they were when the batch was
 /// made.
 pub trait Batch: fmt::Debug + Send + Sync {
-    /// Adds the log densities of `n` numbers to a sum. False, with an unknown part of it
-    /// added, if a number is NaN or a parameter outside its domain.
+    /// Adds the log densities of `n` numbers to a sum. Returns false, with part of them
+    /// added, if a number is NaN or a parameter is outside its domain.
     fn score(
         &mut self,
         buffer: &[f64],
@@ -21,8 +22,8 @@ pub trait Batch: fmt::Debug + Send + Sync {
         sum: &mut ExactSum,
     ) -> bool;
 
-    /// Adds `weight` times the derivatives of the log densities scored last to adjoints
-    /// in the same places.
+    /// Adds `weight` times the derivatives of the log densities of the last `score` to
+    /// the adjoints, which are laid out like the buffer.
     fn vjp(
         &self,
         buffer: &[f64],
@@ -34,38 +35,41 @@ pub trait Batch: fmt::Debug + Send + Sync {
     );
 }
 
-/// A batch of one family: one that knows the density and slopes of its first
-/// distribution, too.
+/// A batch of one family that also gives the density and derivatives of its first
+/// distribution.
 pub(super) trait Family: Batch {
-    /// Makes the distributions anew where parameters have moved; false if one is outside
-    /// its domain.
+    /// Rebuilds the distributions whose parameters have changed. Returns false if a
+    /// parameter is outside its domain.
     fn refresh(&mut self, buffer: &[f64], params: &[Column]) -> bool;
 
-    /// The log density of a number under the first of them.
+    /// Returns the log density of a number under the first distribution.
     fn log_density_num(&self, x: f64) -> f64;
 
-    /// Its derivative by the number, and those by the parameters.
+    /// Returns its derivative with respect to the number, and writes those with respect
+    /// to the parameters.
     fn slopes_num(&self, x: f64, params: &mut [f64; 3]) -> f64;
 }
 
 /// A distribution of one number with `N` parameters.
 trait Member<const N: usize>: Clone + fmt::Debug + Send + Sync {
-    /// With these parameters, if they are in its domain.
+    /// Creates the distribution with these parameters; `None` if they are outside its
+    /// domain.
     fn with(params: [f64; N]) -> Option<Self>;
 
-    /// The same; what depends on parameters that `self` has too need not be worked out
-    /// again.
+    /// Like `with`, but may reuse results from `self` that depend only on parameters that
+    /// are the same.
     fn moved(&self, params: [f64; N]) -> Option<Self> {
         Self::with(params)
     }
 
     fn log_density(&self, x: f64) -> f64;
 
-    /// The derivatives by the number (0 if it is discrete) and by the parameters.
+    /// Returns the derivatives with respect to the number (0 if it is discrete) and to
+    /// the parameters.
     fn slopes(&self, x: f64) -> (f64, [f64; N]);
 }
 
-/// Families whose `Scalar` says all.
+/// Implements `Member` for families through their `Scalar` implementation.
 macro_rules! members {
     ($($family:ident: $n:literal, $with:expr;)*) => {$(
         impl Member<$n> for $family {
@@ -136,7 +140,7 @@ impl Member<2> for Normal {
     }
 }
 
-/// Truth values count 1 and 0.
+/// Truth values count as 1 and 0.
 impl Member<1> for Flip {
     fn with([p]: [f64; 1]) -> Option<Self> {
         Flip::new(p).ok()
@@ -153,15 +157,15 @@ impl Member<1> for Flip {
     }
 }
 
-/// Distributions, one for all numbers or one for each, and the parameters they were made
-/// with.
+/// Distributions, one for all numbers or one for each, with the parameters they were made
+/// from.
 #[derive(Debug)]
 struct Members<T, const N: usize>(Vec<(Option<[f64; N]>, T)>);
 
 impl<T: Member<N>, const N: usize> Family for Members<T, N> {
     fn refresh(&mut self, buffer: &[f64], params: &[Column]) -> bool {
         let Ok(columns) = <&[Column; N]>::try_from(params) else { return true };
-        // Where all but the first parameter are shared, so is most of the work.
+        // If all but the first parameter are shared, most of the work is shared too.
         let alike = columns.iter().skip(1).all(|c| c.step == 0);
         for i in 0..self.0.len() {
             let p = columns.map(|c| c.get(buffer, i));
@@ -241,14 +245,14 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
     }
 }
 
-/// The batch of a distribution over a number, or of one with elements that are all of one
-/// family; its parameters lie in these columns, or stay. `None` for other distributions,
-/// and where columns do not fit the family.
+/// Creates the batch of a scalar distribution, or of a distribution whose elements are
+/// all of one family. Its parameters lie in these columns, or are fixed. `None` for other
+/// distributions, and if the columns do not fit the family.
 pub fn batch(dist: &Dist, params: &[Column]) -> Option<Box<dyn Batch>> {
     Some(family(dist, params)?)
 }
 
-/// The same, as one of one family.
+/// Like `batch`, but returns the batch as a [`Family`].
 pub(super) fn family(dist: &Dist, params: &[Column]) -> Option<Box<dyn Family>> {
     let parts = match dist {
         Dist::Iid(d) => std::slice::from_ref(d.one()),
@@ -279,7 +283,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    /// Parameters that stay near the middle of every family's domain.
+    /// Creates a distribution from parameters near the middle of the family's domain.
     fn made(family: &str, p: &[f64]) -> Option<Dist> {
         Some(match (family, p) {
             ("normal", [a, b]) => Dist::Normal(Normal::new(*a, *b).ok()?),
@@ -300,9 +304,9 @@ mod tests {
             ("poisson", 1, [0.0, 2.0, 3.0]),
             ("flip", 1, [0.0, 1.0, 1.0]),
         ] {
-            // Which parameters have a number for each element.
+            // Bit k of `shape` says whether parameter k has a value for each element.
             for shape in 0..1 << width {
-                // The numbers, one column a parameter, then what is seen.
+                // The buffer holds one column per parameter, then the observed values.
                 let at = |shift: f64, k: usize, i: usize| {
                     0.4 + 0.1 * k as f64
                         + shift

@@ -8,11 +8,11 @@ use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, expit, ln_beta, sti
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// From here on for both parameters, the saddle-point form is used.
+/// The value of both parameters from which the saddle-point form is used.
 const LARGE: f64 = 64.0;
 
-/// `beta(a, b)`. At 0 and 1 the density is its limit: a pole (+inf) for a parameter below
-/// 1, 0 for one above.
+/// `beta(a, b)`. At 0 and 1 the density is its limit: a pole (+inf) if the parameter is
+/// below 1, and 0 if it is above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beta {
     a: f64,
@@ -21,7 +21,8 @@ pub struct Beta {
 }
 
 impl Beta {
-    /// With these shapes; fails unless both are positive and finite.
+    /// Creates the distribution with these shapes; fails unless both are positive and
+    /// finite.
     pub fn new(a: f64, b: f64) -> Result<Beta, ParamError> {
         let (a, b) = (positive(Self::NAME, "a", a)?, positive(Self::NAME, "b", b)?);
         let log_norm = if a.min(b) < LARGE {
@@ -69,7 +70,8 @@ impl Scalar for Beta {
         let all = digamma(a + b);
         let left = if a == 1.0 { 0.0 } else { (a - 1.0) / x };
         let right = if b == 1.0 { 0.0 } else { (b - 1.0) / (1.0 - x) };
-        // At a pole of the derivative, that at the least double.
+        // Where the derivative has a pole, its value at the smallest positive double is
+        // used.
         let floor = f64::from_bits(1);
         let by_a = libm::log(x.max(floor)) + all - digamma(a);
         Slope::new(left - right, [by_a, libm::log1p(-x).max(f64::MIN) + all - digamma(b)])

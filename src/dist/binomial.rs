@@ -1,5 +1,5 @@
-//! The binomial distribution. Probabilities by Loader's saddle-point form; draws by
-//! inversion for few expected successes, else by transformed rejection (Hörmann 1993,
+//! The binomial distribution. Probabilities use Loader's saddle-point form. Draws use
+//! inversion for few expected successes, otherwise transformed rejection (Hörmann 1993,
 //! "The generation of binomial random variates", BTRS).
 
 use super::param::{integer, probability};
@@ -18,8 +18,9 @@ pub struct Binomial {
 }
 
 impl Binomial {
-    /// So many trials with this probability of success; fails unless `n` is an integer in
-    /// 0 to 2^53 and `p` is in [0, 1].
+    /// Creates the distribution of successes in `n` trials that each succeed with
+    /// probability `p`; fails unless `n` is an integer between 0 and 2^53 and `p` is in
+    /// [0, 1].
     pub fn new(n: f64, p: f64) -> Result<Binomial, ParamError> {
         let (n, p) = (integer(Self::NAME, "n", n)?, probability(Self::NAME, "p", p)?);
         if n < 0.0 {
@@ -28,7 +29,7 @@ impl Binomial {
         Ok(Binomial { n, p, error: if n > 0.0 { stirling_error(n) } else { 0.0 } })
     }
 
-    /// Draws for p <= 1/2.
+    /// Draws a number of successes, for p <= 1/2.
     fn draw_few(&self, p: f64, rng: &mut Stream) -> f64 {
         let n = self.n;
         if n * p < 10.0 {
@@ -91,7 +92,7 @@ impl Scalar for Binomial {
         if !((0.0..=n).contains(&k) && k == libm::trunc(k)) {
             return f64::NEG_INFINITY;
         }
-        // A certain number of successes: p = 0 or 1, or no trials.
+        // The number of successes is certain: p = 0 or 1, or no trials.
         if p == 0.0 || n == 0.0 {
             return if k == 0.0 { 0.0 } else { f64::NEG_INFINITY };
         }

@@ -1,4 +1,4 @@
-//! An index drawn in proportion to weights.
+//! The categorical distribution: an index drawn in proportion to weights.
 
 use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
@@ -13,34 +13,34 @@ pub struct Categorical {
 }
 
 impl Categorical {
-    /// With these weights; fails unless all are finite and not negative, and their sum is
-    /// positive and finite.
+    /// Creates the distribution; fails unless all weights are finite and not negative,
+    /// and their sum is positive and finite.
     pub fn new(weights: impl Into<Arc<[f64]>>) -> Result<Categorical, ParamError> {
         let weights = weights.into();
         let total = total(&weights)?;
         Ok(Categorical { weights, total })
     }
 
-    /// The log probability of a number under weights that are only borrowed.
+    /// Returns the log probability of a number under borrowed weights.
     pub(crate) fn log_probability(weights: &[f64], x: f64) -> Result<f64, ParamError> {
         total(weights).map(|total| log_probability(weights, total, x))
     }
 
-    /// The weights.
+    /// Returns the weights.
     pub(super) fn weights(&self) -> &[f64] {
         &self.weights
     }
 
-    /// The probability of index `i`.
+    /// Returns the probability of index `i`.
     pub fn probability(&self, i: usize) -> f64 {
         self.weights.get(i).map_or(0.0, |w| w / self.total)
     }
 }
 
-/// The sum of valid weights.
+/// Returns the sum of the weights, if they are valid.
 fn total(weights: &[f64]) -> Result<f64, ParamError> {
     let total: f64 = weights.iter().sum();
-    // What is not finite leaves no finite sum.
+    // A weight that is not finite makes the sum infinite or NaN.
     if total > 0.0 && total.is_finite() && weights.iter().all(|w| *w >= 0.0) {
         return Ok(total);
     }

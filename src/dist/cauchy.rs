@@ -7,7 +7,7 @@ use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// `cauchy(location, scale)`. It has no mean.
+/// `cauchy(location, scale)`. Its mean is undefined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cauchy {
     location: f64,
@@ -16,8 +16,9 @@ pub struct Cauchy {
 }
 
 impl Cauchy {
-    /// Around this location, with this median distance from it; fails unless the location
-    /// is finite and the scale positive and finite.
+    /// Creates the distribution around this location, where the scale is the median
+    /// distance from it; fails unless the location is finite and the scale positive and
+    /// finite.
     pub fn new(location: f64, scale: f64) -> Result<Cauchy, ParamError> {
         let (location, scale) =
             (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
@@ -29,10 +30,10 @@ impl Cauchy {
     }
 }
 
-/// The derivatives at x; the same for one half of the distribution.
+/// Returns the derivatives at `x`, which are the same for the half-Cauchy distribution.
 pub(super) fn cauchy_slope(x: f64, location: f64, scale: f64) -> Slope {
     let z = standard(x, location, scale);
-    // 2 z / (1 + z^2) and z times it, with no overflow.
+    // 2 z / (1 + z^2), and z times that, without overflow.
     let (once, twice) = if z.abs() < 1.0 {
         (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
     } else {
@@ -50,8 +51,8 @@ impl Scalar for Cauchy {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        // The tangent of a small angle is as exact as the angle, so far draws are not of
-        // a few values only.
+        // Small angles keep full relative precision, so draws in the tails take many
+        // different values.
         let size = 1.0 / libm::tan(core::f64::consts::FRAC_PI_2 * rng.open_uniform());
         let sign = if rng.next_u64() & 1 == 0 { 1.0 } else { -1.0 };
         (self.location + self.scale * (sign * size)).clamp(f64::MIN, f64::MAX)

@@ -1,5 +1,5 @@
 //! Covariance functions of one variable: the usual stationary ones, their sums and
-//! products. Not a distribution.
+//! products. These are not distributions.
 
 use super::ParamError;
 use super::param::positive;
@@ -8,55 +8,57 @@ use std::fmt;
 use std::ops::{Add, Mul};
 use std::sync::Arc;
 
-/// A positive semi-definite function of two points, with variance `sd^2` at one.
+/// A positive semi-definite function of two points. The variance at a point is `sd^2`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Covariance {
     /// sd^2 exp(-d^2 / (2 length^2)).
     SqExp {
-        /// Over which values stay alike, in units of the points.
+        /// The length scale, in units of the points.
         length: f64,
         /// The standard deviation.
         sd: f64,
     },
     /// sd^2 (1 + r) exp(-r), r = sqrt(3) d / length.
     Matern32 {
-        /// Over which values stay alike, in units of the points.
+        /// The length scale, in units of the points.
         length: f64,
         /// The standard deviation.
         sd: f64,
     },
     /// sd^2 (1 + r + r^2 / 3) exp(-r), r = sqrt(5) d / length.
     Matern52 {
-        /// Over which values stay alike, in units of the points.
+        /// The length scale, in units of the points.
         length: f64,
         /// The standard deviation.
         sd: f64,
     },
     /// sd^2 exp(-2 sin^2(pi d / period) / length^2).
     Periodic {
-        /// After which values repeat, in units of the points.
+        /// The period, in units of the points.
         period: f64,
-        /// Over which values stay alike, as a fraction of about a period.
+        /// The dimensionless length scale: values stay similar over about length period /
+        /// (2 pi).
         length: f64,
         /// The standard deviation.
         sd: f64,
     },
-    /// sd^2 at one and the same point of a list, 0 between two, even if they coincide.
+    /// sd^2 for a point of a list and itself; 0 for two points, even if they coincide.
     White {
         /// The standard deviation.
         sd: f64,
     },
-    /// The sum of two.
+    /// The sum of two covariance functions.
     Sum(Arc<(Covariance, Covariance)>),
-    /// The product of two.
+    /// The product of two covariance functions.
     Product(Arc<(Covariance, Covariance)>),
 }
 
 use Covariance::*;
 
 impl Covariance {
-    /// The squared exponential; fails unless both are positive and finite.
+    /// Creates the squared exponential; fails unless both parameters are positive and
+    /// finite.
     pub fn sq_exp(length: f64, sd: f64) -> Result<Covariance, ParamError> {
         Ok(SqExp {
             length: positive("sq_exp", "length", length)?,
@@ -64,7 +66,8 @@ impl Covariance {
         })
     }
 
-    /// Matérn's with nu = 3/2; fails unless both are positive and finite.
+    /// Creates Matérn's function with nu = 3/2; fails unless both parameters are positive
+    /// and finite.
     pub fn matern32(length: f64, sd: f64) -> Result<Covariance, ParamError> {
         Ok(Matern32 {
             length: positive("matern32", "length", length)?,
@@ -72,7 +75,8 @@ impl Covariance {
         })
     }
 
-    /// Matérn's with nu = 5/2; fails unless both are positive and finite.
+    /// Creates Matérn's function with nu = 5/2; fails unless both parameters are positive
+    /// and finite.
     pub fn matern52(length: f64, sd: f64) -> Result<Covariance, ParamError> {
         Ok(Matern52 {
             length: positive("matern52", "length", length)?,
@@ -80,7 +84,8 @@ impl Covariance {
         })
     }
 
-    /// The periodic one (MacKay 1998); fails unless all are positive and finite.
+    /// Creates the periodic function (MacKay 1998); fails unless all parameters are
+    /// positive and finite.
     pub fn periodic(period: f64, length: f64, sd: f64) -> Result<Covariance, ParamError> {
         let period = positive("periodic", "period", period)?;
         Ok(Periodic {
@@ -90,12 +95,12 @@ impl Covariance {
         })
     }
 
-    /// Independent noise; fails unless the deviation is positive and finite.
+    /// Creates white noise; fails unless the standard deviation is positive and finite.
     pub fn white(sd: f64) -> Result<Covariance, ParamError> {
         Ok(White { sd: positive("white", "sd", sd)? })
     }
 
-    /// The variance at a point.
+    /// Returns the variance at a point.
     pub fn variance(&self) -> f64 {
         match self {
             SqExp { sd, .. }
@@ -108,7 +113,7 @@ impl Covariance {
         }
     }
 
-    /// The covariance of two different points of a list, at this distance.
+    /// Returns the covariance of two different points of a list, at distance `d`.
     pub fn at_distance(&self, d: f64) -> f64 {
         match self {
             SqExp { length, sd } => {
@@ -124,9 +129,9 @@ impl Covariance {
                 sd * sd * (1.0 + r * (1.0 + r / 3.0)) * libm::exp(-r)
             }
             Periodic { period, length, sd } => {
-                // The remainder is exact, so that far points keep their phase; the one
-                // nearest to 0, so that points whole periods apart are as exact as near
-                // ones.
+                // The remainder is exact, so distant points keep their phase. It is the
+                // one nearest to 0, so points that are whole periods apart are as
+                // accurate as near ones.
                 let s = libm::sin(core::f64::consts::PI * (libm::remainder(d, *period) / period))
                     / length;
                 sd * sd * libm::exp(-2.0 * s * s)
@@ -137,8 +142,8 @@ impl Covariance {
         }
     }
 
-    /// How many parameters it has: of a sum or product those of the left side, then of
-    /// the right.
+    /// Returns the number of parameters: for a sum or product, those of the left side,
+    /// then those of the right.
     pub fn param_count(&self) -> usize {
         match self {
             SqExp { .. } | Matern32 { .. } | Matern52 { .. } => 2,
@@ -148,11 +153,12 @@ impl Covariance {
         }
     }
 
-    /// Adds the derivatives of `by` times the covariance of two points at this distance,
-    /// or of a point with itself, by the parameters in the order of the constructors.
+    /// Adds the derivatives of `by` times the covariance of two points at distance `d`,
+    /// or of a point with itself (`None`), with respect to the parameters in the order of
+    /// the constructors.
     pub fn vjp(&self, d: Option<f64>, by: f64, out: &mut [f64]) {
         let k = d.map_or_else(|| self.variance(), |d| self.at_distance(d));
-        // By the standard deviation; and by the length, of r with dk/dr = -slope.
+        // Adds the derivative `g` of the covariance with respect to parameter `i`.
         let mut add = |i: usize, g: f64| {
             if let Some(o) = out.get_mut(i) {
                 *o += by * g;
@@ -178,7 +184,8 @@ impl Covariance {
             Periodic { period, length, sd } => {
                 let angle = core::f64::consts::PI * (libm::remainder(far, *period) / period);
                 let s = libm::sin(angle) / length;
-                // The distance in periods, whole ones too, moves with the period.
+                // The phase is proportional to the whole distance, so its derivative with
+                // respect to the period depends on all of it.
                 add(
                     0,
                     4.0 * k * s * libm::cos(angle) / length * core::f64::consts::PI * far
@@ -206,7 +213,7 @@ impl Covariance {
         }
     }
 
-    /// The covariance matrix of values at these points.
+    /// Returns the covariance matrix of values at these points.
     pub fn matrix(&self, at: &[f64]) -> DMatrix<f64> {
         let packed = self.packed(at, 0.0);
         DMatrix::from_fn(at.len(), at.len(), |i, j| {
@@ -215,9 +222,9 @@ impl Covariance {
         })
     }
 
-    /// Its lower triangle by rows, with so much more on the diagonal. A distance that
-    /// occurs between the first point and another is evaluated once: on a regular grid
-    /// nearly all do.
+    /// Returns the lower triangle of the covariance matrix, packed by rows, with `jitter`
+    /// added to the diagonal. Distances from the first point are evaluated once and
+    /// reused: on a regular grid these are nearly all distances.
     pub(super) fn packed(&self, at: &[f64], jitter: f64) -> Vec<f64> {
         let n = at.len();
         let mut packed = Vec::with_capacity(n * (n + 1) / 2);

@@ -1,24 +1,24 @@
-//! A drawn value, in the few forms distributions know. It is not a value of the language,
-//! which has more.
+//! A drawn value, in the few forms that distributions use. The language has its own,
+//! richer type of values.
 
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// What a distribution draws and scores.
+/// A value that a distribution draws and scores.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Datum {
     /// A number; integers are numbers with an integral value.
     Num(f64),
     /// A truth value.
     Bool(bool),
-    /// Numbers.
+    /// A vector of numbers.
     Vec(Arc<[f64]>),
-    /// Values of any form.
+    /// A list of values of any form.
     List(Arc<[Datum]>),
 }
 
 impl Datum {
-    /// The value with these elements: a vector if all are numbers.
+    /// Collects elements into a value: a vector if all are numbers, otherwise a list.
     pub fn from_elements(elements: Vec<Datum>) -> Datum {
         let numbers: Option<Vec<f64>> = elements.iter().map(Datum::num).collect();
         match numbers {
@@ -27,7 +27,7 @@ impl Datum {
         }
     }
 
-    /// The number, if it is one.
+    /// Returns the number, if the value is one.
     pub fn num(&self) -> Option<f64> {
         match self {
             Datum::Num(x) => Some(*x),
@@ -35,7 +35,7 @@ impl Datum {
         }
     }
 
-    /// How many elements it has, if it is a collection.
+    /// Returns the number of elements, if the value is a collection.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> Option<usize> {
         match self {
@@ -45,7 +45,7 @@ impl Datum {
         }
     }
 
-    /// Element `i`, if there is one.
+    /// Returns element `i`, if it exists.
     pub fn element(&self, i: usize) -> Option<Datum> {
         match self {
             Datum::Vec(xs) => xs.get(i).map(|x| Datum::Num(*x)),
@@ -54,7 +54,7 @@ impl Datum {
         }
     }
 
-    /// The numbers of a vector of length `n`; a list of numbers will do.
+    /// Calls `f` with the numbers of a vector, or list of numbers, of length `n`.
     pub(super) fn with_numbers<T>(&self, n: usize, f: impl FnOnce(&[f64]) -> T) -> Option<T> {
         match self {
             Datum::Vec(xs) if xs.len() == n => Some(f(xs)),

@@ -1,4 +1,4 @@
-//! The Dirichlet distribution: shares of 1.
+//! The Dirichlet distribution: proportions that sum to 1.
 
 use super::draw::{ln_gamma_draw, x_log_y};
 use super::param::positive;
@@ -7,8 +7,9 @@ use super::{Datum, Distribution, Gradient, ParamError, Support};
 use crate::num::{digamma, ln_gamma, log_sum_exp};
 use crate::rng::Stream;
 
-/// `dirichlet(alpha)`; the density is by all shares but the last. A share of 0 is a pole
-/// (+inf) if its concentration is below 1 and impossible if it is above; impossible wins.
+/// `dirichlet(alpha)`. The density is with respect to all proportions but the last. A
+/// proportion of 0 is a pole (+inf) if its concentration is below 1 and impossible (-inf)
+/// if it is above; -inf takes precedence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dirichlet {
     alpha: Box<[f64]>,
@@ -16,8 +17,8 @@ pub struct Dirichlet {
 }
 
 impl Dirichlet {
-    /// With these concentrations; fails unless there is one, and all are positive and
-    /// have a finite sum.
+    /// Creates the distribution with these concentrations; fails if there are none, and
+    /// unless all are positive and have a finite sum.
     pub fn new(alpha: &[f64]) -> Result<Dirichlet, ParamError> {
         if alpha.is_empty() {
             return Err(ParamError::new(

@@ -1,4 +1,4 @@
-//! Any distribution, by value: the scalar families without allocation, the others behind
+//! Any distribution, by value: most scalar families are stored inline, the others behind
 //! a pointer.
 
 use super::*;
@@ -43,13 +43,13 @@ pub enum Dist {
     Gp(Arc<Gp>),
     Iid(Arc<Iid>),
     Product(Arc<Product>),
-    /// One that a host program brings along.
+    /// A distribution provided by a host program.
     Custom(Arc<dyn Distribution>),
 }
 
 const _: () = assert!(size_of::<Dist>() <= 48);
 
-/// Calls the same expression for whichever family it is.
+/// Evaluates the same expression for every family.
 macro_rules! each {
     ($dist:expr, $d:ident => $body:expr) => {
         match $dist {
@@ -92,7 +92,7 @@ macro_rules! each {
     };
 }
 
-/// Inherent methods that forward to [`Distribution`].
+/// Defines inherent methods that forward to [`Distribution`].
 macro_rules! forward {
     ($($(#[$doc:meta])* $name:ident($($arg:ident: $ty:ty),*) -> $out:ty;)*) => {
         $($(#[$doc])* pub fn $name(&self, $($arg: $ty),*) -> $out { each!(self, d => d.$name($($arg),*)) })*
@@ -143,13 +143,13 @@ impl Dist {
         sd() -> Option<f64>;
     }
 
-    /// The log density of a number.
+    /// Returns the log density of a number.
     #[inline]
     pub fn log_density_num(&self, x: f64) -> f64 {
         self.log_density(&Datum::Num(x))
     }
 
-    /// The log probability of a truth value.
+    /// Returns the log probability of a truth value.
     #[inline]
     pub fn log_density_bool(&self, x: bool) -> f64 {
         match self {
@@ -158,8 +158,8 @@ impl Dist {
         }
     }
 
-    /// How many independent elements it has, each a choice of its own; `None` if it is
-    /// one choice.
+    /// Returns the number of independent elements, each of which is a separate choice;
+    /// `None` if the distribution is a single choice.
     pub fn elements(&self) -> Option<usize> {
         match self {
             Dist::Iid(d) => Some(d.len()),
@@ -168,8 +168,7 @@ impl Dist {
         }
     }
 
-    /// The distribution of element `i`; the distribution itself if it has no elements or
-    /// not as many.
+    /// Returns the distribution of element `i`, or `self` if that element does not exist.
     pub fn element(&self, i: usize) -> Dist {
         match self {
             Dist::Iid(d) => d.one().clone(),
@@ -178,8 +177,8 @@ impl Dist {
         }
     }
 
-    /// How many distributions it is made of, counted as often as they occur; `None` if
-    /// they are within each other deeper than so many. May stop counting above `most`.
+    /// Returns how many distributions it is made of, including repeats; `None` if they
+    /// are nested deeper than `depth`. May stop counting above `most`.
     pub fn parts(&self, depth: u32, most: usize) -> Option<usize> {
         let inside = |parts: &[Dist]| {
             let mut sum = 0usize;
@@ -201,7 +200,7 @@ impl Dist {
         }
     }
 
-    /// Whether it is made of others.
+    /// Returns whether it is made of other distributions.
     fn is_compound(&self) -> bool {
         matches!(
             self,
@@ -213,7 +212,7 @@ impl Dist {
         )
     }
 
-    /// The log density of element `i`; -inf if there is none.
+    /// Returns the log density of element `i`; -inf if it does not exist.
     #[inline]
     pub fn element_log_density(&self, i: usize, x: &Datum) -> f64 {
         match self {
@@ -223,8 +222,8 @@ impl Dist {
         }
     }
 
-    /// The same distribution with values as its stored form: what elements of a product
-    /// are.
+    /// Returns the same distribution in centred form, which stores values, as elements of
+    /// a product do.
     pub(crate) fn centred(self) -> Dist {
         match self {
             Dist::Gp(d) if d.is_stored_whitened() => Dist::Gp(Arc::new(d.to_centred())),

@@ -1,16 +1,16 @@
-//! Draws that several families share. All through `libm`, so that they are the same on
-//! every platform.
+//! Draws and formulas that several families share. All use `libm`, so results are the
+//! same on every platform.
 
 use crate::rng::Stream;
 
-/// Brings a draw back into the doubles above 0.
+/// Clamps a draw to the positive, finite, normal doubles.
 #[inline]
 pub(super) fn representable(x: f64) -> f64 {
     x.clamp(f64::MIN_POSITIVE, f64::MAX)
 }
 
-/// The logarithm of a gamma draw with rate 1 (Marsaglia & Tsang 2000): for small shapes
-/// the draw itself would underflow.
+/// Draws the logarithm of a gamma number with rate 1 (Marsaglia & Tsang 2000): for small
+/// shapes the number itself would underflow.
 pub(super) fn ln_gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
     if shape < 1.0 {
         let above = libm::log(gamma_draw(shape + 1.0, rng));
@@ -19,7 +19,7 @@ pub(super) fn ln_gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
     libm::log(gamma_draw(shape, rng))
 }
 
-/// A gamma draw with rate 1, for shape >= 1.
+/// Draws a gamma number with rate 1, for shape >= 1.
 pub(super) fn gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
     let d = shape - 1.0 / 3.0;
     let c = 1.0 / (9.0 * d).sqrt();
@@ -37,35 +37,36 @@ pub(super) fn gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
     }
 }
 
-/// (x - location) / scale, also where the difference would overflow.
+/// Returns (x - location) / scale, also where the difference would overflow.
 #[inline]
 pub(super) fn standard(x: f64, location: f64, scale: f64) -> f64 {
     let d = x - location;
     if d.is_finite() { d / scale } else { x / scale - location / scale }
 }
 
-/// x ln y, and 0 for x = 0 whatever y.
+/// Returns x ln y, which is 0 if x = 0, for any y.
 #[inline]
 pub(super) fn x_log_y(x: f64, y: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x * libm::log(y) }
 }
 
-/// x ln(1 + y), and 0 for x = 0 whatever y.
+/// Returns x ln(1 + y), which is 0 if x = 0, for any y.
 #[inline]
 pub(super) fn x_log1p_y(x: f64, y: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x * libm::log1p(y) }
 }
 
-/// ln(1 + z^2) for z = (x - location) / scale, also where z or its square would overflow.
+/// Returns ln(1 + z^2) for z = (x - location) / scale, also where z or its square would
+/// overflow.
 #[inline]
 pub(super) fn log1p_square(x: f64, location: f64, scale: f64) -> f64 {
     let z = standard(x, location, scale);
     if z.abs() < 1e150 { libm::log1p(z * z) } else { far_square(x, location, scale) }
 }
 
-/// The same of a z so large that it is ln(z^2).
+/// Returns the same for a z so large that it equals ln(z^2).
 #[cold]
 pub(super) fn far_square(x: f64, location: f64, scale: f64) -> f64 {
-    // Halves, whose difference is a number.
+    // Halves, so that the difference does not overflow.
     2.0 * (libm::log((0.5 * x - 0.5 * location).abs()) - libm::log(scale) + core::f64::consts::LN_2)
 }

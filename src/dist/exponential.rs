@@ -14,7 +14,8 @@ pub struct Exponential {
 }
 
 impl Exponential {
-    /// With this rate (the inverse of the mean); fails unless it is positive and finite.
+    /// Creates the distribution with this rate (the inverse of the mean); fails unless it
+    /// is positive and finite.
     pub fn new(rate: f64) -> Result<Exponential, ParamError> {
         let rate = positive(Self::NAME, "rate", rate)?;
         Ok(Exponential { rate, log_rate: libm::log(rate) })

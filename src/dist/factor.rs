@@ -1,10 +1,10 @@
-//! Cholesky factors: the lower triangle, packed by rows, and the few operations Gaussian
-//! vectors need. Not a matrix library.
+//! Cholesky factors: the lower triangle, packed by rows, with only the operations that
+//! Gaussian vectors need.
 
 use nalgebra::DMatrix;
 
-/// A lower triangular matrix L with a positive diagonal; entry (i, j) at i (i + 1) / 2 +
-/// j.
+/// A lower triangular matrix L with a positive diagonal. The index of entry (i, j) is i
+/// (i + 1) / 2 + j.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Factor {
     n: usize,
@@ -12,18 +12,18 @@ pub(crate) struct Factor {
     log_diagonal: f64,
 }
 
-/// Where row `i` begins.
+/// Returns the index at which row `i` begins.
 #[inline]
 fn row(i: usize) -> usize {
     i * (i + 1) / 2
 }
 
 impl Factor {
-    /// The factor of the symmetric matrix with this packed lower triangle.
+    /// Factors the symmetric matrix with this packed lower triangle.
     ///
     /// # Errors
-    /// If it is not positive definite: the number of rows of the least leading block that
-    /// is not.
+    /// If it is not positive definite: the order of the smallest leading block that is
+    /// not.
     pub fn new(n: usize, mut packed: Vec<f64>) -> Result<Factor, usize> {
         debug_assert_eq!(packed.len(), row(n));
         for i in 0..n {
@@ -43,8 +43,8 @@ impl Factor {
         Ok(Factor::with_sum(n, packed))
     }
 
-    /// A matrix that is already a factor; `None` unless it is square and finite with a
-    /// positive diagonal. What is above the diagonal is not looked at.
+    /// Takes a matrix that is already a factor; `None` unless it is square and finite
+    /// with a positive diagonal. Entries above the diagonal are ignored.
     pub fn from_lower(m: &DMatrix<f64>) -> Option<Factor> {
         let packed = lower(m)?;
         let n = m.nrows();
@@ -61,27 +61,27 @@ impl Factor {
         self.n
     }
 
-    /// Row i, up to the diagonal.
+    /// Returns row i, up to the diagonal.
     pub fn row(&self, i: usize) -> &[f64] {
         &self.packed[row(i)..=row(i) + i]
     }
 
-    /// Entry (i, i).
+    /// Returns entry (i, i).
     pub fn diagonal(&self, i: usize) -> f64 {
         self.packed[row(i) + i]
     }
 
-    /// ln det L.
+    /// Returns ln det L.
     pub fn log_det(&self) -> f64 {
         self.log_diagonal
     }
 
-    /// mean + L z.
+    /// Returns mean + L z.
     pub fn colour(&self, mean: &[f64], z: &[f64]) -> Vec<f64> {
         (0..self.n).map(|i| mean[i] + dot(&self.packed[row(i)..=row(i) + i], &z[..=i])).collect()
     }
 
-    /// L' g.
+    /// Returns L' g.
     pub fn transposed_times(&self, g: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.n];
         for (i, g) in g.iter().enumerate().take(self.n) {
@@ -91,13 +91,14 @@ impl Factor {
         out
     }
 
-    /// From the derivatives by the packed entries of L to those by the entries of the
-    /// symmetric matrix K = L L', its lower triangle packed: what lies off the diagonal
-    /// stands for both of its places (Giles 2008; Murray 2016).
+    /// Converts derivatives with respect to the packed entries of L to those with respect
+    /// to the entries of the symmetric matrix K = L L', its lower triangle packed. An
+    /// entry off the diagonal stands for both of its positions (Giles 2008; Murray 2016).
     pub fn vjp_cholesky(&self, by: &[f64]) -> Vec<f64> {
         let n = self.n;
         let entry = |m: &[f64], i: usize, j: usize| m[row(i) + j];
-        // Columns of P = the lower triangle of L' by, its diagonal halved.
+        // The columns of P, the lower triangle of L' times `by`, with its diagonal
+        // halved.
         let mut columns: Vec<Vec<f64>> = vec![vec![0.0; n]; n];
         for (j, column) in columns.iter_mut().enumerate() {
             for (i, p) in column.iter_mut().enumerate().skip(j) {
@@ -116,7 +117,7 @@ impl Factor {
             .collect()
     }
 
-    /// L^-1 (x - mean).
+    /// Returns L^-1 (x - mean).
     pub fn whiten(&self, mean: &[f64], x: &[f64]) -> Vec<f64> {
         let mut z: Vec<f64> = Vec::with_capacity(self.n);
         for i in 0..self.n {
@@ -126,12 +127,12 @@ impl Factor {
         z
     }
 
-    /// (L L')^-1 b.
+    /// Returns (L L')^-1 b.
     pub fn solve(&self, b: &[f64]) -> Vec<f64> {
         self.solve_transposed(self.whiten(&vec![0.0; self.n], b))
     }
 
-    /// L^-T z.
+    /// Returns L^-T z.
     pub fn solve_transposed(&self, mut z: Vec<f64>) -> Vec<f64> {
         for i in (0..self.n).rev() {
             let this = &self.packed[row(i)..=row(i) + i];
@@ -143,14 +144,14 @@ impl Factor {
     }
 }
 
-/// The packed lower triangle of a square matrix.
+/// Returns the packed lower triangle of a square matrix.
 pub(super) fn lower(m: &DMatrix<f64>) -> Option<Vec<f64>> {
     let n = m.nrows();
     (m.ncols() == n).then(|| (0..n).flat_map(|i| (0..=i).map(move |j| m[(i, j)])).collect())
 }
 
-/// The sum of products in a fixed order with four running sums, which the compiler can do
-/// at once.
+/// Returns the dot product, in a fixed order with four running sums, which the compiler
+/// can vectorise.
 #[inline]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());

@@ -1,27 +1,27 @@
-//! The families' reference: names, parameters, densities. Constant data, from which the
-//! language makes its table of built-ins.
+//! Reference data of the families: names, parameters and densities, from which the
+//! language builds its table of built-ins.
 
 /// A parameter of a family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParamDoc {
-    /// Its name in the language.
+    /// The name in the language.
     pub name: &'static str,
-    /// What it is, in one sentence.
+    /// A description in one sentence.
     pub doc: &'static str,
 }
 
 /// A family of distributions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Family {
-    /// Its name in the language.
+    /// The name in the language.
     pub name: &'static str,
-    /// What it is, in one sentence.
+    /// A description in one sentence.
     pub doc: &'static str,
-    /// Its parameters, in order.
+    /// The parameters, in order.
     pub params: &'static [ParamDoc],
-    /// Where its values lie.
+    /// The support, in words.
     pub support: &'static str,
-    /// Its density or probability.
+    /// The density or probability.
     pub formula: &'static str,
 }
 
@@ -39,7 +39,7 @@ const fn p(name: &'static str, doc: &'static str) -> ParamDoc {
     ParamDoc { name, doc }
 }
 
-/// All families, but for products of others.
+/// All families, except products of distributions.
 pub const FAMILIES: &[Family] = &[
     family(
         "normal",

@@ -1,11 +1,10 @@
-//! The improper flat prior: density 1 between its bounds, so not a distribution that
-//! could be drawn from.
+//! The improper flat prior: its density is 1 between its bounds, so it cannot be sampled.
 
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 
 /// `flat(lo, hi)`: all numbers, or those on one side of a bound. Its log density is 0
-/// there. What it "draws" is a start for a chain only: as in Stan, uniform(-2, 2) in the
+/// there. Its `sample` only gives a start for a chain: as in Stan, uniform(-2, 2) in the
 /// unconstrained space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flat {
@@ -20,11 +19,11 @@ impl Default for Flat {
 }
 
 impl Flat {
-    /// Over all numbers.
+    /// The flat prior over all numbers.
     pub const EVERYWHERE: Flat = Flat { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
-    /// Between these bounds, at least one of them infinite; fails for others, and for
-    /// bounds that leave nothing.
+    /// Creates the flat prior between these bounds, at least one of which must be
+    /// infinite. Fails otherwise, and if no number lies between the bounds.
     pub fn new(lo: f64, hi: f64) -> Result<Flat, ParamError> {
         let bad =
             |rule| Err(ParamError::new(Self::NAME, "lo to hi", format!("{lo} and {hi}"), rule));
@@ -40,7 +39,7 @@ impl Flat {
         }
     }
 
-    /// Whether it has a bound.
+    /// Returns whether one of the bounds is finite.
     pub(super) fn is_bounded(&self) -> bool {
         self.lo.is_finite() || self.hi.is_finite()
     }
@@ -58,7 +57,7 @@ impl Scalar for Flat {
         }
     }
 
-    /// A place to start from, uniform on (-2, 2) in the unconstrained space.
+    /// Draws a starting point, uniform on (-2, 2) in the unconstrained space.
     fn draw(&self, rng: &mut Stream) -> f64 {
         self.number_support().from_free_scalar(4.0 * rng.open_uniform() - 2.0).0
     }

@@ -1,28 +1,31 @@
-//! A truth value.
+//! The Bernoulli distribution.
 
 use super::param::probability;
 use super::{Datum, Distribution, Gradient, ParamError, Support};
 use crate::rng::Stream;
 
-/// `flip(p)`: true with probability `p`. Scores 1 and 0 as true and false.
+/// `flip(p)`: true with probability `p`. Observed numbers 1 and 0 count as true and
+/// false.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flip {
     p: f64,
 }
 
 impl Flip {
-    /// With this probability of true; fails unless it is in [0, 1].
+    /// Creates the distribution with this probability of true; fails unless it is in [0,
+    /// 1].
     pub fn new(p: f64) -> Result<Flip, ParamError> {
         Ok(Flip { p: probability("flip", "p", p)? })
     }
 
-    /// The log probability of a truth value.
+    /// Returns the log probability of a truth value.
     #[inline]
     pub fn log_probability(&self, x: bool) -> f64 {
         if x { libm::log(self.p) } else { libm::log1p(-self.p) }
     }
 
-    /// The truth value that is observed: data often have 1 and 0 for true and false.
+    /// Converts an observed value to a truth value: data often use 1 and 0 for true and
+    /// false.
     fn truth(x: &Datum) -> Option<bool> {
         match x {
             Datum::Bool(x) => Some(*x),
@@ -32,7 +35,8 @@ impl Flip {
         }
     }
 
-    /// Its derivative by the probability, where it is finite.
+    /// Returns the derivative of the log probability with respect to `p`, where it is
+    /// finite.
     #[inline]
     pub(super) fn slope(&self, x: bool) -> f64 {
         if x { 1.0 / self.p } else { -1.0 / (1.0 - self.p) }

@@ -8,7 +8,7 @@ use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// From this shape on, the saddle-point form is used.
+/// The shape from which the saddle-point form is used.
 const LARGE: f64 = 64.0;
 
 /// `gamma(shape, rate)`.
@@ -20,8 +20,8 @@ pub struct Gamma {
 }
 
 impl Gamma {
-    /// With this shape and rate (the inverse of the scale); fails unless both are
-    /// positive and finite.
+    /// Creates the distribution with this shape and rate (the inverse of the scale);
+    /// fails unless both are positive and finite.
     pub fn new(shape: f64, rate: f64) -> Result<Gamma, ParamError> {
         let (shape, rate) =
             (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "rate", rate)?);

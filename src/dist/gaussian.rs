@@ -1,8 +1,8 @@
-//! What all Gaussian vectors share: a mean, a Cholesky factor, and how the choice is
+//! The common part of Gaussian vectors: a mean, a Cholesky factor, and how the choice is
 //! stored. `mv_normal` and `gp` differ only in where these come from.
 //!
-//! A whitened one stores white noise z ~ N(0, I) with value = mean + L z, so that the
-//! value follows when mean and L move; a centred one stores the value.
+//! A whitened vector stores white noise z ~ N(0, I) with value = mean + L z, so the value
+//! follows when the mean and L change. A centred vector stores the value.
 
 use super::factor::Factor;
 use super::{Datum, Gradient};
@@ -17,7 +17,7 @@ pub(super) struct Gaussian {
     pub whitened: bool,
 }
 
-/// The log density of standard normal noise.
+/// Returns the log density of standard normal noise.
 fn standard_score(z: &[f64]) -> f64 {
     let square: f64 = z.iter().map(|z| z * z).sum();
     -0.5 * square - LN_SQRT_2PI * z.len() as f64
@@ -50,7 +50,7 @@ impl Gaussian {
         score.filter(|s| !s.is_nan()).unwrap_or(f64::NEG_INFINITY)
     }
 
-    /// By the value and by the mean.
+    /// Returns the derivatives of the log density with respect to the value and the mean.
     pub fn gradient(&self, x: &Datum) -> Option<Gradient> {
         if !self.log_density(x).is_finite() {
             return None;
@@ -60,9 +60,9 @@ impl Gaussian {
         Some(Gradient { x: by_mean.iter().map(|g| -g).collect(), params: by_mean })
     }
 
-    /// The derivatives by the packed entries of L: of the log density of a value that is
-    /// stored as such; of one stored as noise, of what has these derivatives by the
-    /// value.
+    /// Returns derivatives with respect to the packed entries of L. For a centred vector,
+    /// they are those of the log density; for a whitened one, those of a function of the
+    /// value whose derivatives with respect to the value are `by_value`.
     pub fn factor_gradient(&self, stored: &Datum, by_value: &[f64]) -> Option<Vec<f64>> {
         let outer = |a: &[f64], z: &[f64]| -> Vec<f64> {
             a.iter().enumerate().flat_map(|(i, a)| z[..=i].iter().map(move |z| a * z)).collect()
@@ -78,7 +78,7 @@ impl Gaussian {
         Some(by)
     }
 
-    /// The noise behind a finite vector.
+    /// Returns the white noise that gives a value; `None` if it is not finite.
     pub fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
         x.with_numbers(self.size(), |x| self.factor.whiten(&self.mean, x))
             .filter(|z| z.iter().all(|z| z.is_finite()))
@@ -111,7 +111,8 @@ impl Gaussian {
         Some(Gradient { x, params: vec![0.0; self.size()] })
     }
 
-    /// Noise of another length has no value: what there is of it is taken, the rest is 0.
+    /// Returns the value of a stored form. Noise of the wrong length is cut, or padded
+    /// with zeros.
     pub fn from_noncentred(&self, s: &Datum) -> Datum {
         if !self.whitened {
             return s.clone();
@@ -131,7 +132,7 @@ impl Gaussian {
     }
 }
 
-/// [`super::Distribution`] for a family that is a struct around a [`Gaussian`].
+/// Implements [`super::Distribution`] for a family that wraps a [`Gaussian`].
 macro_rules! gaussian_family {
     ($family:ident, $name:literal) => {
         impl $crate::dist::Distribution for $family {

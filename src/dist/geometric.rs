@@ -6,15 +6,15 @@ use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// `geometric(p)`, from 0.
+/// `geometric(p)`, which starts at 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometric {
     p: f64,
 }
 
 impl Geometric {
-    /// With this probability of success in each trial; fails unless it is above 0 and at
-    /// most 1.
+    /// Creates the distribution with this probability of success in each trial; fails
+    /// unless it is above 0 and at most 1.
     pub fn new(p: f64) -> Result<Geometric, ParamError> {
         Ok(Geometric { p: success(Self::NAME, p)? })
     }

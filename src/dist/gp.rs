@@ -5,26 +5,25 @@ use super::gaussian::{Gaussian, gaussian_family};
 use super::param::finite;
 use super::{Covariance, ParamError};
 
-/// The most points: the time to factor their covariance grows as the cube of their
-/// number.
+/// The largest number of points: the time to factor their covariance grows with its cube.
 const MOST_POINTS: usize = 4000;
 
-/// What is added to the diagonal of the covariance matrix, as a share of the variance,
-/// unless said otherwise: part of the model.
+/// The default jitter, which is added to the diagonal of the covariance matrix as a
+/// fraction of the variance. It is part of the model.
 pub const JITTER: f64 = 1e-6;
 
-/// `gp(mean, cov, at)`, with a jitter of [`JITTER`] unless there is another.
+/// `gp(mean, cov, at)`, with a jitter of [`JITTER`] by default.
 ///
 /// Its choice is stored as white noise z ~ N(0, I), with value = mean + chol(K + jitter
-/// variance I) z, so that the values follow when a parameter of the covariance moves; a
-/// centred one stores the values. Gradients are by the mean only.
+/// variance I) z, so the values follow when a parameter of the covariance changes. A
+/// centred process stores the values. Gradients are with respect to the mean only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gp(Gaussian, f64);
 
 impl Gp {
-    /// With these means and this covariance function at these points; fails unless there
-    /// are as many means as points, all finite, and the covariance matrix has a Cholesky
-    /// factor.
+    /// Creates the process with these means and this covariance function at these points;
+    /// fails unless there are as many means as points, all finite, and the covariance
+    /// matrix has a Cholesky factor.
     pub fn new(
         mean: Vec<f64>,
         cov: &Covariance,
@@ -34,8 +33,8 @@ impl Gp {
         Gp::with_jitter(mean, cov, at, centred, JITTER)
     }
 
-    /// The same with another share of the variance added to the diagonal; fails unless it
-    /// is finite and not negative, too.
+    /// Like [`Gp::new`], with another fraction of the variance added to the diagonal;
+    /// fails also if it is negative or not finite.
     pub fn with_jitter(
         mean: Vec<f64>,
         cov: &Covariance,
@@ -69,20 +68,21 @@ impl Gp {
         Ok(Gp(Gaussian { mean: mean.into(), factor, whitened: !centred }, jitter))
     }
 
-    /// The same process, storing values.
+    /// Returns the same process in centred form, which stores values.
     pub fn to_centred(&self) -> Gp {
         Gp(self.0.centred(), self.1)
     }
 
-    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log
-    /// density of a stored value; of one stored as noise, of what has these derivatives
-    /// by the value.
+    /// Returns derivatives with respect to the Cholesky factor, its lower triangle by
+    /// rows. For a centred process, they are those of the log density; for a whitened
+    /// one, those of a function of the value whose derivatives with respect to the value
+    /// are `by_value`.
     pub fn factor_gradient(&self, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<f64>> {
         self.0.factor_gradient(stored, by_value)
     }
 
-    /// From those by the factor to those by the parameters of its covariance function,
-    /// made at these points.
+    /// Converts derivatives with respect to the factor to those with respect to the
+    /// parameters of the covariance function `cov` at these points.
     pub fn vjp_covariance(
         &self,
         cov: &Covariance,
@@ -101,7 +101,8 @@ impl Gp {
         Some(out)
     }
 
-    /// The derivatives by the white noise behind a value, from those by the value.
+    /// Converts derivatives with respect to the value to those with respect to the white
+    /// noise.
     pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
         self.0.factor.transposed_times(by)
     }

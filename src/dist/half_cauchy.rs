@@ -17,8 +17,9 @@ pub struct HalfCauchy {
 }
 
 impl HalfCauchy {
-    /// From this location on, with this median distance from it; fails unless the
-    /// location is finite and the scale positive and finite.
+    /// Creates the distribution that starts at this location, where the scale is the
+    /// median distance from it; fails unless the location is finite and the scale
+    /// positive and finite.
     pub fn new(location: f64, scale: f64) -> Result<HalfCauchy, ParamError> {
         let (location, scale) =
             (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);

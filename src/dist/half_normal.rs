@@ -1,4 +1,4 @@
-//! The half-normal distribution: the size of a centred normal number.
+//! The half-normal distribution: the absolute value of a normal number with mean 0.
 
 use super::param::positive;
 use super::tails::{Speeds, Tails};
@@ -15,8 +15,8 @@ pub struct HalfNormal {
 }
 
 impl HalfNormal {
-    /// With this standard deviation of the normal number; fails unless it is positive and
-    /// finite.
+    /// Creates the distribution with this standard deviation of the normal number; fails
+    /// unless it is positive and finite.
     pub fn new(sd: f64) -> Result<HalfNormal, ParamError> {
         let sd = positive(Self::NAME, "sd", sd)?;
         Ok(HalfNormal { sd, log_norm: core::f64::consts::LN_2 - libm::log(sd) - LN_SQRT_2PI })

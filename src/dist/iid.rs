@@ -4,10 +4,10 @@ use super::{Datum, Dist, Distribution, Gradient, ParamError, Support, product};
 use crate::num::accumulate;
 use crate::rng::Stream;
 
-/// `iid(d, n)`. In the language its elements are choices with addresses of their own.
+/// `iid(d, n)`. In the language, its elements are choices with their own addresses.
 ///
-/// Elements are stored as values: a Gaussian process becomes a centred one. Gradients by
-/// parameters are summed over elements.
+/// Elements are stored as values: a Gaussian process becomes a centred one. Parameter
+/// gradients are summed over the elements.
 #[derive(Clone, Debug)]
 pub struct Iid {
     one: Dist,
@@ -15,8 +15,8 @@ pub struct Iid {
 }
 
 impl Iid {
-    /// So many elements of a distribution; fails for more than 2^32 - 2, which have no
-    /// addresses.
+    /// Creates the distribution of `n` elements; fails if `n` is above 2^32 - 2, because
+    /// further elements have no addresses.
     pub fn new(one: Dist, n: usize) -> Result<Iid, ParamError> {
         if n >= u32::MAX as usize {
             return Err(ParamError::new("iid", "n", n, "must be below 2^32 - 1"));
@@ -24,17 +24,17 @@ impl Iid {
         Ok(Iid { one: one.centred(), n })
     }
 
-    /// How many elements there are.
+    /// Returns the number of elements.
     pub fn len(&self) -> usize {
         self.n
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.n == 0
     }
 
-    /// An element's distribution.
+    /// Returns the distribution of an element.
     pub fn one(&self) -> &Dist {
         &self.one
     }

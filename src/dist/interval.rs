@@ -1,10 +1,10 @@
 //! Intervals of numbers: their ends, the part of a space between two bounds, integrals
-//! over them, the doubles in order.
+//! over them, and the order of doubles.
 
 use super::Support;
 use super::param::MAX_INTEGER;
 
-/// Nodes in (0, 1) and weights of the Gauss-Legendre rule with 10 points on (-1, 1).
+/// Positive nodes and weights of the Gauss-Legendre rule with 10 points on (-1, 1).
 const RULE: [(f64, f64); 5] = [
     (0.148_874_338_981_631_21, 0.295_524_224_714_752_87),
     (0.433_395_394_129_247_19, 0.269_266_719_309_996_36),
@@ -13,7 +13,7 @@ const RULE: [(f64, f64); 5] = [
     (0.973_906_528_517_171_72, 0.066_671_344_308_688_14),
 ];
 
-/// The ends of a space of numbers.
+/// Returns the ends of a space of numbers.
 pub(super) fn ends(s: &Support) -> Option<(f64, f64)> {
     Some(match s {
         Support::Real => (f64::NEG_INFINITY, f64::INFINITY),
@@ -26,7 +26,7 @@ pub(super) fn ends(s: &Support) -> Option<(f64, f64)> {
     })
 }
 
-/// The part of a space between two bounds; `None` if nothing is left.
+/// Returns the part of a space between two bounds; `None` if it is empty.
 pub(super) fn within(s: &Support, lo: f64, hi: f64) -> Option<Support> {
     let (least, most) = ends(s)?;
     let (from, to) = (least.max(lo), most.min(hi));
@@ -50,19 +50,19 @@ pub(super) fn within(s: &Support, lo: f64, hi: f64) -> Option<Support> {
     })
 }
 
-/// A double's place among all doubles in order.
+/// Returns the rank of a double among all doubles.
 pub(super) fn order(x: f64) -> i128 {
     let bits = x.to_bits();
     i128::from(if bits >> 63 == 0 { bits as i64 } else { -((bits & !(1 << 63)) as i64) })
 }
 
-/// The double at a place.
+/// Returns the double with this rank.
 pub(super) fn from_order(k: i128) -> f64 {
     let size = f64::from_bits(k.unsigned_abs() as u64);
     if k < 0 { -size } else { size }
 }
 
-/// Calls `f` with the nodes and weights of the rule between two numbers.
+/// Calls `f` with the nodes and weights of the rule on an interval.
 pub(super) fn each_node(from: f64, to: f64, mut f: impl FnMut(f64, f64)) {
     let (centre, half) = (0.5 * from + 0.5 * to, 0.5 * (to - from));
     for (x, w) in RULE {
@@ -71,7 +71,7 @@ pub(super) fn each_node(from: f64, to: f64, mut f: impl FnMut(f64, f64)) {
     }
 }
 
-/// The integral by the rule.
+/// Integrates over an interval by the rule.
 pub(super) fn integral(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (centre, half) = (0.5 * from + 0.5 * to, 0.5 * (to - from));
     half * RULE.iter().map(|(x, w)| w * (f(centre - half * x) + f(centre + half * x))).sum::<f64>()

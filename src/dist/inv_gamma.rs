@@ -1,4 +1,4 @@
-//! The inverse gamma distribution: the inverse of a gamma number.
+//! The inverse gamma distribution: the reciprocal of a gamma number.
 
 use super::draw::{ln_gamma_draw, representable};
 use super::param::positive;
@@ -8,7 +8,7 @@ use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// From this shape on, the saddle-point form is used.
+/// The shape from which the saddle-point form is used.
 const LARGE: f64 = 64.0;
 
 /// `inv_gamma(shape, scale)`: 1 / x is gamma(shape, rate = scale).
@@ -20,7 +20,8 @@ pub struct InvGamma {
 }
 
 impl InvGamma {
-    /// With this shape and scale; fails unless both are positive and finite.
+    /// Creates the distribution with this shape and scale; fails unless both are positive
+    /// and finite.
     pub fn new(shape: f64, scale: f64) -> Result<InvGamma, ParamError> {
         let (shape, scale) =
             (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
@@ -33,7 +34,7 @@ impl InvGamma {
         Ok(InvGamma { shape, scale, log_norm })
     }
 
-    /// ln(scale / x), also where the ratio is no double.
+    /// Returns ln(scale / x), also where the ratio underflows.
     fn log_ratio(&self, x: f64) -> f64 {
         let t = self.scale / x;
         if t >= f64::MIN_POSITIVE { libm::log(t) } else { libm::log(self.scale) - libm::log(x) }

@@ -1,4 +1,4 @@
-//! The Laplace distribution: exponential on both sides.
+//! The Laplace distribution: exponential on both sides of its location.
 
 use super::draw::standard;
 use super::param::{finite, positive};
@@ -17,8 +17,9 @@ pub struct Laplace {
 }
 
 impl Laplace {
-    /// Around this location, with this mean distance from it; fails unless the location
-    /// is finite and the scale positive and finite.
+    /// Creates the distribution around this location, where the scale is the mean
+    /// distance from it; fails unless the location is finite and the scale positive and
+    /// finite.
     pub fn new(location: f64, scale: f64) -> Result<Laplace, ParamError> {
         let (location, scale) =
             (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);

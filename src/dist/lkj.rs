@@ -1,5 +1,5 @@
-//! The distribution of Lewandowski, Kurowicka & Joe (2009) over correlation matrices, as
-//! one over their Cholesky factors.
+//! The distribution of Lewandowski, Kurowicka & Joe (2009) over correlation matrices, in
+//! terms of their Cholesky factors.
 
 use super::draw::{ln_gamma_draw, x_log_y};
 use super::param::{integer, positive};
@@ -9,15 +9,15 @@ use crate::num::{digamma, expit, ln_beta, ln_gamma};
 use crate::rng::Stream;
 use core::f64::consts::PI;
 
-/// The most rows.
+/// The largest number of rows.
 const MOST: f64 = 1000.0;
 
 /// `lkj(n, eta)`: the lower triangular Cholesky factor L, as n rows, of a random n x n
 /// correlation matrix L L' with density proportional to det(L L')^(eta - 1). The density
-/// is by the numbers below the diagonal, as in Stan's `lkj_corr_cholesky`.
+/// is with respect to the numbers below the diagonal, as in Stan's `lkj_corr_cholesky`.
 ///
-/// A gradient by the value has a number for each of the n x n entries; only those by the
-/// diagonal, on which the density depends, are not 0.
+/// A gradient with respect to the value has a number for each of the n x n entries. Only
+/// those of the diagonal, on which the density depends, are not 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lkj {
     n: usize,
@@ -26,8 +26,8 @@ pub struct Lkj {
 }
 
 impl Lkj {
-    /// With so many rows and this shape; fails unless `n` is an integer in 1 to 1000 and
-    /// `eta` positive and finite.
+    /// Creates the distribution with `n` rows and this shape; fails unless `n` is an
+    /// integer between 1 and 1000 and `eta` is positive and finite.
     pub fn new(n: f64, eta: f64) -> Result<Lkj, ParamError> {
         let (n, eta) = (rows("lkj", n)?, positive("lkj", "eta", eta)?);
         let mut d = Lkj { n, eta, log_norm: 0.0 };
@@ -39,13 +39,14 @@ impl Lkj {
         Ok(d)
     }
 
-    /// Row i's squared diagonal is beta(shape, i / 2).
+    /// Returns the first parameter of the beta(shape, i / 2) distribution of row i's
+    /// squared diagonal.
     fn shape(&self, i: usize) -> f64 {
         self.eta + 0.5 * (self.n - 1 - i) as f64
     }
 }
 
-/// The number of rows of a matrix.
+/// Checks a number of rows.
 pub(super) fn rows(distribution: &'static str, n: f64) -> Result<usize, ParamError> {
     match integer(distribution, "n", n)? {
         n if (1.0..=MOST).contains(&n) => Ok(n as usize),
@@ -62,8 +63,8 @@ impl Distribution for Lkj {
         Support::CorrelationFactor(self.n)
     }
 
-    /// Row by row: a uniform direction, and a squared length that leaves a beta number
-    /// for the diagonal.
+    /// Draws row by row: a uniform direction, and a length that leaves a beta-distributed
+    /// squared diagonal.
     fn sample(&self, rng: &mut Stream) -> Datum {
         let n = self.n;
         let mut xs = vec![0.0; n * n];
@@ -92,7 +93,7 @@ impl Distribution for Lkj {
         let mut sum = self.log_norm;
         for i in 1..self.n {
             let term = x_log_y(2.0 * (self.shape(i) - 1.0), xs[i * self.n + i]);
-            // A row that is impossible outweighs poles of others.
+            // An impossible row (-inf) takes precedence over poles (+inf) of other rows.
             if term == f64::NEG_INFINITY || sum == f64::NEG_INFINITY {
                 sum = f64::NEG_INFINITY;
             } else {

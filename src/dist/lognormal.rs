@@ -17,8 +17,8 @@ pub struct LogNormal {
 }
 
 impl LogNormal {
-    /// With this mean and standard deviation of the logarithm; fails unless mu is finite
-    /// and sigma positive and finite.
+    /// Creates the distribution with this mean and standard deviation of the logarithm;
+    /// fails unless mu is finite and sigma positive and finite.
     pub fn new(mu: f64, sigma: f64) -> Result<LogNormal, ParamError> {
         let (mu, sigma) = (finite(Self::NAME, "mu", mu)?, positive(Self::NAME, "sigma", sigma)?);
         Ok(LogNormal { mu, sigma, log_norm: -libm::log(sigma) - LN_SQRT_2PI })

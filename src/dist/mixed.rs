@@ -1,18 +1,18 @@
-//! Many numbers under one mixture whose weights and components have their parameters in a
-//! buffer: as [`super::batch`].
+//! Batches for one mixture whose weights and component parameters lie in a buffer, as in
+//! [`super::batch`].
 
 use super::batch::{Family, family};
 use super::{Batch, Categorical, Dist, Mixture};
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
 
-/// A component: its family, and where its parameters are.
+/// A component's family and the columns of its parameters.
 type Part = (Box<dyn Family>, SmallVec<[Column; 3]>);
 
-/// A mixture of components over numbers.
+/// A batch of numbers under one mixture.
 #[derive(Debug)]
 struct Mixed {
-    /// Where the weights are; without a place they stay.
+    /// The column of the weights; `None` if they are fixed.
     place: Option<Column>,
     weights: Vec<f64>,
     log_shares: Vec<f64>,
@@ -20,9 +20,9 @@ struct Mixed {
     parts: Vec<Part>,
 }
 
-/// The batch of a mixture whose weights, and the parameters of whose components, lie in
-/// these columns or stay. `None` where a component is no distribution of a number that
-/// `batch` knows.
+/// Creates the batch of a mixture whose weights and component parameters lie in these
+/// columns, or are fixed. `None` if a component is not a scalar distribution that `batch`
+/// supports, or has a separate parameter for each number.
 pub fn batch_of_mixture(
     dist: &Mixture,
     weights: Option<Column>,
@@ -56,7 +56,7 @@ impl Mixed {
         self.parts.iter_mut().all(|(p, columns)| p.refresh(buffer, columns))
     }
 
-    /// The components' log densities of a number, and the mixture's.
+    /// Returns the components' log densities of a number, and that of the mixture.
     #[inline]
     fn scores(&self, x: f64) -> (SmallVec<[f64; 8]>, f64) {
         let scores: SmallVec<[f64; 8]> =

@@ -1,4 +1,4 @@
-//! Mixtures: a value of one of several distributions, it is not known which.
+//! Mixtures: a value from one of several distributions, with the component summed out.
 
 use super::interval::ends;
 use super::{Categorical, Datum, Dist, Distribution, Gradient, ParamError, Scalar, Support};
@@ -9,9 +9,10 @@ use smallvec::SmallVec;
 /// `mixture(weights, components)`. The density is the weighted mean of the components'
 /// densities.
 ///
-/// Its support is that of the components if they agree; for numbers, else the least
-/// interval around theirs. Components store values: white noise behind a Gaussian one is
-/// not kept. Gradients by parameters are by the weights, then by those of each component.
+/// Its support is that of the components if they agree; otherwise, for numbers, the
+/// smallest interval that contains theirs. Components are in centred form: they store
+/// values, not white noise. Parameter gradients are with respect to the weights, then to
+/// the parameters of each component.
 #[derive(Clone, Debug)]
 pub struct Mixture {
     weights: Categorical,
@@ -22,9 +23,9 @@ pub struct Mixture {
 }
 
 impl Mixture {
-    /// Fails unless there is a component, a weight for each, the weights are finite and
-    /// not negative with a positive, finite sum, and the components are proper and have
-    /// the same kind of values.
+    /// Creates the mixture. Fails unless there is a component, there is a weight for
+    /// each, the weights are finite and not negative with a positive, finite sum, and the
+    /// components are proper and have the same kind of values.
     pub fn new(weights: &[f64], components: Vec<Dist>) -> Result<Mixture, ParamError> {
         let bad =
             |parameter, value: String, rule| ParamError::new("mixture", parameter, value, rule);
@@ -49,13 +50,13 @@ impl Mixture {
         Ok(Mixture { weights: choice, log_shares: log_shares.into(), total, components, support })
     }
 
-    /// The components' log densities, weights not counted.
+    /// Returns the components' log densities, without their weights.
     fn scores(&self, x: &Datum) -> Vec<f64> {
         self.components.iter().map(|c| c.log_density(x)).collect()
     }
 
-    /// The probability that a value is of each component; nothing where the density is
-    /// not positive and finite.
+    /// Returns the posterior probability of each component given a value; `None` where
+    /// the density is not positive and finite.
     pub fn responsibilities(&self, x: &Datum) -> Option<Vec<f64>> {
         let scores = self.scores(x);
         let all = Self::total(&self.log_shares, &scores);
@@ -63,39 +64,41 @@ impl Mixture {
         all.is_finite().then(|| self.log_shares.iter().zip(&scores).map(share).collect())
     }
 
-    /// The distributions it mixes.
+    /// Returns the component distributions.
     pub(super) fn components(&self) -> &[Dist] {
         &self.components
     }
 
-    /// The weights, the log of each one's share of their sum, and the sum.
+    /// Returns the weights, the logarithms of the normalised weights, and the sum of the
+    /// weights.
     pub(super) fn shares(&self) -> (&[f64], &[f64], f64) {
         (self.weights.weights(), &self.log_shares, self.total)
     }
 }
 
 impl Mixture {
-    /// The log density from the components' log densities: a component without weight
-    /// counts for nothing, not even at its poles.
+    /// Computes the log density from the components' log densities. A component with zero
+    /// weight is ignored, even at its poles.
     #[inline]
     pub(super) fn total(log_shares: &[f64], scores: &[f64]) -> f64 {
         let weighted = log_shares.iter().zip(scores).filter(|(w, _)| **w > f64::NEG_INFINITY);
         log_sum_exp(&weighted.map(|(w, s)| w + s).collect::<SmallVec<[f64; 8]>>())
     }
 
-    /// The probability of a component.
+    /// Returns the posterior probability of a component.
     #[inline]
     pub(super) fn share(log_share: f64, score: f64, all: f64) -> f64 {
         if log_share > f64::NEG_INFINITY { libm::exp(log_share + score - all) } else { 0.0 }
     }
 
-    /// The derivative of the log density by a weight.
+    /// Returns the derivative of the log density with respect to a weight.
     #[inline]
     pub(super) fn by_weight(score: f64, all: f64, total: f64) -> f64 {
         (libm::exp(score - all).min(f64::MAX) - 1.0) / total
     }
 
-    /// The sum of the weights, and the log of each one's share of it, put into a list.
+    /// Returns the sum of the weights and the logarithms of the normalised weights, using
+    /// `into` as storage.
     pub(super) fn log_shares(weights: &[f64], mut into: Vec<f64>) -> (f64, Vec<f64>) {
         let total: f64 = weights.iter().sum();
         into.clear();
@@ -104,7 +107,7 @@ impl Mixture {
     }
 }
 
-/// Vectors of any numbers under one name.
+/// Converts products of real numbers to `Vector`, so that equal spaces compare equal.
 fn plain(s: Support) -> Support {
     match s {
         Support::Product(one, n) if *one == Support::Real => Support::Vector(n),
@@ -113,7 +116,7 @@ fn plain(s: Support) -> Support {
     }
 }
 
-/// The bounds of an interval of numbers.
+/// Returns the bounds of a space of continuous numbers; `None` for other spaces.
 fn bounds(s: &Support) -> Option<(f64, f64)> {
     match s {
         Support::Circle => Some((-core::f64::consts::PI, core::f64::consts::PI)),
@@ -122,7 +125,8 @@ fn bounds(s: &Support) -> Option<(f64, f64)> {
     }
 }
 
-/// The least space around two; `None` if their values are of different kinds.
+/// Returns the smallest space that contains both; `None` if their values are of different
+/// kinds.
 pub(super) fn union(a: Support, b: Support) -> Option<Support> {
     if a == b {
         return Some(a);
@@ -184,7 +188,7 @@ impl Distribution for Mixture {
         Some(means.iter().zip(&self.log_shares).map(|(m, w)| m * libm::exp(*w)).sum())
     }
 
-    /// From the spread within and between components.
+    /// Combines the variances within and between components.
     fn sd(&self) -> Option<f64> {
         let mean = self.mean()?;
         let mut variance = 0.0;

@@ -1,9 +1,8 @@
-//! Probability distributions: what they draw, how they score it, the spaces their values
-//! live in.
+//! Probability distributions: sampling, log densities, and the supports of their values.
 //!
-//! Nothing here knows of programs, traces or images. Parameters are checked when a
-//! distribution is made, so that everything after that is total: a log density is -inf
-//! off the support (a value of the wrong kind included) and never NaN.
+//! This module is independent of programs, traces and images. Parameters are checked when
+//! a distribution is made, so that everything after that is total: a log density is -inf
+//! off the support (including values of the wrong kind) and never NaN.
 
 mod ascending;
 mod batch;

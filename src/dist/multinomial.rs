@@ -1,5 +1,5 @@
-//! The multinomial distribution. Probabilities by Loader's saddle-point form; draws one
-//! kind after the other.
+//! The multinomial distribution. Probabilities use Loader's saddle-point form; counts are
+//! drawn one category after the other.
 
 use super::param::integer;
 use super::support::are_counts;
@@ -7,8 +7,8 @@ use super::{Binomial, Categorical, Datum, Distribution, Gradient, ParamError, Sc
 use crate::num::{LN_SQRT_2PI, deviance, stirling_error};
 use crate::rng::Stream;
 
-/// `multinomial(n, weights)`: how many of n draws are of each kind; weights need not sum
-/// to 1.
+/// `multinomial(n, weights)`: how many of n draws fall into each category. The weights
+/// need not sum to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multinomial {
     n: f64,
@@ -17,8 +17,9 @@ pub struct Multinomial {
 }
 
 impl Multinomial {
-    /// So many draws with these weights; fails unless `n` is an integer in 0 to 2^53, and
-    /// all weights are finite and not negative with a positive, finite sum.
+    /// Creates the distribution of `n` draws with these weights; fails unless `n` is an
+    /// integer between 0 and 2^53, and all weights are finite and not negative with a
+    /// positive, finite sum.
     pub fn new(n: f64, weights: &[f64]) -> Result<Multinomial, ParamError> {
         let n = integer("multinomial", "n", n)?;
         if n < 0.0 {
@@ -36,7 +37,8 @@ impl Multinomial {
         if self.n == 0.0 {
             return 0.0;
         }
-        // ln k! less its Stirling formula's k ln k - k, which the deviances have.
+        // ln k! minus the terms k ln k - k of Stirling's formula, which the deviances
+        // contain.
         let rest = |k: f64| 0.5 * libm::log(k) + LN_SQRT_2PI + stirling_error(k);
         let mut sum = rest(self.n);
         for (k, w) in xs.iter().zip(&self.weights) {
@@ -44,7 +46,8 @@ impl Multinomial {
             if *k > 0.0 {
                 sum -= rest(*k);
             }
-            // A share that no double holds has a logarithm, unless it is 0.
+            // If the expected count underflows, its logarithm is still finite unless the
+            // weight is 0.
             sum -= if *k > 0.0 && expected < f64::MIN_POSITIVE {
                 *k * (libm::log(*k) - libm::log(self.n) - libm::log(*w) + libm::log(self.total)
                     - 1.0)
@@ -65,7 +68,7 @@ impl Distribution for Multinomial {
         Support::Counts { total: self.n as i64, kinds: self.weights.len() }
     }
 
-    /// Each kind's count is binomial given those before it.
+    /// Draws each category's count, which is binomial given those before it.
     fn sample(&self, rng: &mut Stream) -> Datum {
         let mut after: Vec<f64> = Vec::with_capacity(self.weights.len());
         let mut sum = 0.0;

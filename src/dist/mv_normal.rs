@@ -6,16 +6,18 @@ use super::gaussian::{Gaussian, gaussian_family};
 use super::param::finite;
 use nalgebra::DMatrix;
 
-/// `mv_normal(mean, cov)` or `mv_normal(mean, chol)`. Gradients are by the mean only.
+/// `mv_normal(mean, cov)` or `mv_normal(mean, chol)`. Gradients are with respect to the
+/// mean only.
 ///
-/// Its choice is stored as its value; a whitened one stores the white noise z of mean +
-/// chol z, so that the value follows when the mean and the covariance move.
+/// Its choice is stored as its value. A whitened one stores the white noise z of mean +
+/// chol z, so the value follows when the mean and the covariance change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MvNormal(Gaussian);
 
 impl MvNormal {
-    /// With this mean and covariance; fails unless the mean is finite and the covariance
-    /// as large, symmetric (to 1e-9 of its largest entry) and positive definite.
+    /// Creates the distribution with this mean and covariance; fails unless the mean is
+    /// finite and the covariance is of matching size, finite, symmetric (to 1e-9 of its
+    /// largest entry) and positive definite.
     pub fn from_cov(mean: &[f64], cov: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
         let size = || {
             ParamError::new(
@@ -46,9 +48,9 @@ impl MvNormal {
         Self::make(mean, Factor::new(n, packed).map_err(|_| definite())?)
     }
 
-    /// With this mean and the lower triangular Cholesky factor of the covariance; fails
-    /// unless the mean is finite and the factor as large and finite, with a positive
-    /// diagonal and zeros above it.
+    /// Creates the distribution with this mean and lower triangular Cholesky factor of
+    /// the covariance; fails unless the mean is finite and the factor is of matching size
+    /// and finite, with a positive diagonal and zeros above it.
     pub fn from_chol(mean: &[f64], chol: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
         if chol.nrows() != mean.len() || chol.ncols() != mean.len() {
             return Err(ParamError::new(
@@ -85,30 +87,33 @@ impl MvNormal {
         Ok(MvNormal(Gaussian { mean: mean.into(), factor, whitened: false }))
     }
 
-    /// The same distribution, storing white noise.
+    /// Returns the same distribution in whitened form, which stores white noise.
     pub fn to_whitened(&self) -> MvNormal {
         MvNormal(Gaussian { whitened: true, ..self.0.clone() })
     }
 
-    /// The same distribution, storing values.
+    /// Returns the same distribution in centred form, which stores values.
     pub fn to_centred(&self) -> MvNormal {
         MvNormal(self.0.centred())
     }
 
-    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log
-    /// density of a stored value; of one stored as noise, of what has these derivatives
-    /// by the value.
+    /// Returns derivatives with respect to the Cholesky factor, its lower triangle by
+    /// rows. For a centred distribution, they are those of the log density; for a
+    /// whitened one, those of a function of the value whose derivatives with respect to
+    /// the value are `by_value`.
     pub fn factor_gradient(&self, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<f64>> {
         self.0.factor_gradient(stored, by_value)
     }
 
-    /// From those by the factor to those by the entries of the covariance, its lower
-    /// triangle by rows: what lies off the diagonal stands for both of its places.
+    /// Converts derivatives with respect to the factor to those with respect to the
+    /// entries of the covariance, its lower triangle by rows. An entry off the diagonal
+    /// stands for both of its positions.
     pub fn vjp_covariance(&self, by_factor: &[f64]) -> Vec<f64> {
         self.0.factor.vjp_cholesky(by_factor)
     }
 
-    /// The derivatives by the white noise behind a value, from those by the value.
+    /// Converts derivatives with respect to the value to those with respect to the white
+    /// noise.
     pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
         self.0.factor.transposed_times(by)
     }

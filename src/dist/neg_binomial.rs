@@ -1,5 +1,5 @@
-//! The negative binomial distribution. Probabilities by Loader's saddle-point form; draws
-//! as a Poisson number with a gamma rate.
+//! The negative binomial distribution. Probabilities use Loader's saddle-point form;
+//! draws are Poisson with a gamma-distributed rate.
 
 use super::draw::ln_gamma_draw;
 use super::param::{MAX_INTEGER, positive};
@@ -9,9 +9,9 @@ use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, ln_gamma, stirling_
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// `neg_binomial(r, p)`: failures before the `r`-th success, as scipy's `nbinom(r, p)`;
-/// `r` may be any positive number. Stan's `neg_binomial(alpha, beta)` has r = alpha, p =
-/// beta / (1 + beta).
+/// `neg_binomial(r, p)`: the number of failures before the `r`-th success, as in scipy's
+/// `nbinom(r, p)`; `r` may be any positive number. Stan's `neg_binomial(alpha, beta)` has
+/// r = alpha, p = beta / (1 + beta).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NegBinomial {
     r: f64,
@@ -20,15 +20,15 @@ pub struct NegBinomial {
 }
 
 impl NegBinomial {
-    /// Up to so many successes of this probability each; fails unless `r` is positive and
-    /// finite and `p` above 0 and at most 1.
+    /// Creates the distribution for `r` successes that each have probability `p`; fails
+    /// unless `r` is positive and finite and `p` above 0 and at most 1.
     pub fn new(r: f64, p: f64) -> Result<NegBinomial, ParamError> {
         let (r, p) = (positive(Self::NAME, "r", r)?, success(Self::NAME, p)?);
         Ok(NegBinomial { r, p, error: stirling_error(r) })
     }
 }
 
-/// The probability of a success that happens at last.
+/// Checks a probability of success, which must not be 0: a success must occur eventually.
 pub(super) fn success(distribution: &'static str, p: f64) -> Result<f64, ParamError> {
     if p > 0.0 && p <= 1.0 {
         Ok(p)
@@ -44,7 +44,7 @@ impl Scalar for NegBinomial {
         Support::Integers { lo: 0, hi: None }
     }
 
-    /// Numbers of failures are at most about 2^53.
+    /// Draws a number of failures of at most about 2^53.
     fn draw(&self, rng: &mut Stream) -> f64 {
         let log_rate = ln_gamma_draw(self.r, rng) + libm::log1p(-self.p) - libm::log(self.p);
         let rate = libm::exp(log_rate).min(MAX_INTEGER);
@@ -64,8 +64,7 @@ impl Scalar for NegBinomial {
         }
         let n = r + k;
         if n == k && r < 1.0 {
-            // Too few successes to show in the sum: Gamma(k + r) / Gamma(k + 1) is k^(r -
-            // 1).
+            // `r` is lost in the sum n, and Gamma(k + r) / Gamma(k + 1) is k^(r - 1).
             return (r - 1.0) * libm::log(k) - ln_gamma(r) + r * libm::log(p) + k * libm::log1p(-p);
         }
         let errors = stirling_error(n) - self.error - stirling_error(k);

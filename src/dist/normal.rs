@@ -17,15 +17,15 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// With this mean and standard deviation; fails unless the mean is finite and the
-    /// deviation positive and finite.
+    /// Creates the distribution with this mean and standard deviation; fails unless the
+    /// mean is finite and the standard deviation positive and finite.
     pub fn new(mean: f64, sd: f64) -> Result<Normal, ParamError> {
         let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
         Ok(Normal { mean, sd, log_norm: -libm::log(sd) - LN_SQRT_2PI })
     }
 
-    /// The same as [`Normal::new`]; the logarithm is not taken again if the deviation is
-    /// that of `self`.
+    /// Like [`Normal::new`], but reuses the normalising constant of `self` if the
+    /// standard deviation is the same.
     #[inline]
     pub fn near(&self, mean: f64, sd: f64) -> Result<Normal, ParamError> {
         if sd.to_bits() != self.sd.to_bits() {

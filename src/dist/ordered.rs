@@ -1,4 +1,5 @@
-//! Sorted values of one distribution: mixture components in an order, cut points.
+//! Independent numbers in ascending order, such as ordered mixture components or cut
+//! points.
 
 use super::mixture::union;
 use super::support::is_ascending;
@@ -6,18 +7,18 @@ use super::{Datum, Dist, Distribution, Gradient, ParamError, Support, product};
 use crate::num::{accumulate, ln_gamma};
 use crate::rng::Stream;
 
-/// How often draws of unlike parts are tried for one in order.
+/// The number of draws that are tried for one in ascending order, if the parts differ.
 const TRIES: u32 = 10_000;
 
-/// `ordered(d, n)`: n independent numbers of `d` in ascending order, one choice. The
-/// density is n! times the product of those of `d`. Gradients by parameters are those of
-/// `d`, summed.
+/// `ordered(d, n)`: n independent numbers from `d` in ascending order, as one choice. The
+/// density is n! times the product of the densities under `d`. Parameter gradients are
+/// those of `d`, summed.
 ///
-/// `ordered([d1, d2, …])`: a number of each, in ascending order. The density is the
-/// product of theirs, not divided by the probability of that order, which is known for
-/// parts that are alike only: so it counts as improper, and its `sample` gives a place to
-/// start from (draws that came out in order; after 10000 tries sorted ones). Gradients by
-/// parameters are those of each in turn.
+/// `ordered([d1, d2, …])`: one number from each, in ascending order. The density is the
+/// product of theirs. It is not divided by the probability of that order, which is known
+/// only if all parts are the same; the distribution therefore counts as improper, and its
+/// `sample` only gives a starting point (a draw in ascending order or, after 10000 tries,
+/// a sorted one). Parameter gradients are those of each part in turn.
 #[derive(Clone, Debug)]
 pub struct Ordered {
     parts: Parts,
@@ -31,8 +32,8 @@ enum Parts {
 }
 
 impl Ordered {
-    /// So many numbers of a distribution; fails unless it is one of continuous numbers,
-    /// and for more than 2^32 - 2.
+    /// Creates the distribution of n ordered numbers from one distribution; fails unless
+    /// it is over continuous numbers, and if n is above 2^32 - 2.
     pub fn new(one: Dist, n: usize) -> Result<Ordered, ParamError> {
         if !is_continuous(&one) {
             return Err(ParamError::new(
@@ -48,8 +49,8 @@ impl Ordered {
         Ok(Ordered { parts: Parts::Alike(one), n })
     }
 
-    /// A number of each of these; fails unless they are distributions of continuous
-    /// numbers.
+    /// Creates the distribution of one number from each part, in ascending order; fails
+    /// unless all parts are over continuous numbers.
     pub fn of(parts: Vec<Dist>) -> Result<Ordered, ParamError> {
         let rule = "must hold distributions of continuous numbers";
         if let Some(d) = parts.iter().find(|d| !is_continuous(d)) {
@@ -63,17 +64,18 @@ impl Ordered {
         Ok(Ordered { n: parts.len(), parts: Parts::Unlike(parts.into(), support) })
     }
 
-    /// How many numbers there are.
+    /// Returns the number of values.
     pub fn len(&self) -> usize {
         self.n
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.n == 0
     }
 
-    /// The distributions of the numbers: one that all of them have, or one for each.
+    /// Returns the distributions of the numbers: a single one if all are the same,
+    /// otherwise one for each number.
     pub fn distinct(&self) -> &[Dist] {
         match &self.parts {
             Parts::Alike(one) => std::slice::from_ref(one),
@@ -81,12 +83,12 @@ impl Ordered {
         }
     }
 
-    /// How often each of them occurs.
+    /// Returns how often each of [`Ordered::distinct`] occurs.
     pub(super) fn repeats(&self) -> usize {
         if self.is_alike() { self.n } else { 1 }
     }
 
-    /// Whether all numbers have one distribution.
+    /// Returns whether all numbers have the same distribution.
     fn is_alike(&self) -> bool {
         matches!(self.parts, Parts::Alike(_))
     }

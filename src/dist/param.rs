@@ -1,19 +1,20 @@
-//! Parameters outside their domain: an error value, never a panic and never a NaN later
-//! on.
+//! Parameters outside their domain: reported as an error value, so that they cause
+//! neither a panic nor a NaN later.
 
 use thiserror::Error;
 
-/// A parameter that a distribution or covariance cannot have.
+/// A parameter outside the domain of a distribution or covariance function.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{distribution}: {parameter} {rule}, got {value}")]
 pub struct ParamError {
-    /// The family, or the covariance function.
+    /// The family or covariance function.
     pub distribution: &'static str,
-    /// Which parameter.
+    /// The name of the parameter.
     pub parameter: &'static str,
-    /// What it was.
+    /// Its value.
     pub value: String,
-    /// What it must be, as the end of a sentence that begins with the parameter.
+    /// The condition it violates, as the end of a sentence that begins with the
+    /// parameter.
     pub rule: &'static str,
 }
 
@@ -28,7 +29,7 @@ impl ParamError {
     }
 }
 
-/// The number, if it is finite.
+/// Returns the number if it is finite.
 #[inline]
 pub(super) fn finite(
     distribution: &'static str,
@@ -42,7 +43,7 @@ pub(super) fn finite(
     }
 }
 
-/// The number, if it is positive and finite.
+/// Returns the number if it is positive and finite.
 #[inline]
 pub(super) fn positive(
     distribution: &'static str,
@@ -56,7 +57,7 @@ pub(super) fn positive(
     }
 }
 
-/// The number, if it is in [0, 1].
+/// Returns the number if it is in [0, 1].
 #[inline]
 pub(super) fn probability(
     distribution: &'static str,
@@ -70,10 +71,10 @@ pub(super) fn probability(
     }
 }
 
-/// The largest integer up to which all are doubles.
+/// 2^53: all integers up to this one are doubles.
 pub(super) const MAX_INTEGER: f64 = 9_007_199_254_740_992.0;
 
-/// The number, if it is integral and every integer up to it is a double.
+/// Returns the number if it is an integer of at most 2^53 in magnitude.
 #[inline]
 pub(super) fn integer(
     distribution: &'static str,

@@ -1,5 +1,5 @@
-//! The Poisson distribution. Probabilities by Loader's saddle-point form; draws by
-//! inversion for small rates, else by transformed rejection (Hörmann 1993, "The
+//! The Poisson distribution. Probabilities use Loader's saddle-point form. Draws use
+//! inversion for small rates, otherwise transformed rejection (Hörmann 1993, "The
 //! transformed rejection method for generating Poisson random variables", PTRS).
 
 use super::param::MAX_INTEGER;
@@ -9,14 +9,14 @@ use crate::num::{LN_SQRT_2PI, deviance, gamma_tails, stirling_error};
 use crate::rng::Stream;
 use smallvec::smallvec;
 
-/// `poisson(rate)`; with rate 0 it is always 0.
+/// `poisson(rate)`; always 0 if the rate is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poisson {
     rate: f64,
 }
 
 impl Poisson {
-    /// With this mean; fails unless it is in 0 to 2^53.
+    /// Creates the distribution with this mean; fails unless it is between 0 and 2^53.
     pub fn new(rate: f64) -> Result<Poisson, ParamError> {
         if (0.0..=MAX_INTEGER).contains(&rate) {
             Ok(Poisson { rate })

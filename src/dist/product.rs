@@ -1,11 +1,10 @@
-//! Independent elements, each with a distribution of its own: what `normal([0, 1], 1)`
-//! means.
+//! Independent elements, each with its own distribution, such as `normal([0, 1], 1)`.
 
 use super::{Datum, Dist, Distribution, Gradient, ParamError, Support};
 use crate::rng::Stream;
 
-/// A product of distributions. In the language its elements are choices with addresses of
-/// their own.
+/// A product of distributions. In the language, its elements are choices with their own
+/// addresses.
 ///
 /// Elements are stored as values: a Gaussian process among them becomes a centred one.
 #[derive(Clone, Debug)]
@@ -14,29 +13,29 @@ pub struct Product {
 }
 
 impl Product {
-    /// Of these distributions, also none.
+    /// Creates the product of these distributions; the list may be empty.
     pub fn new(parts: Vec<Dist>) -> Result<Product, ParamError> {
         Ok(Product { parts: parts.into_iter().map(Dist::centred).collect() })
     }
 
-    /// How many elements there are.
+    /// Returns the number of elements.
     pub fn len(&self) -> usize {
         self.parts.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
 
-    /// The elements' distributions.
+    /// Returns the elements' distributions.
     pub fn parts(&self) -> &[Dist] {
         &self.parts
     }
 }
 
 impl Distribution for Product {
-    /// That of its elements if they are of one family.
+    /// The family of the elements if they are all of one family.
     fn name(&self) -> &str {
         let first = self.parts.first().map_or("product", Dist::name);
         if self.parts.iter().all(|p| p.name() == first) { first } else { "product" }
@@ -79,7 +78,7 @@ impl Distribution for Product {
     }
 }
 
-/// The sum of log densities: impossible if one element is.
+/// Sums the log densities of the elements; -inf if an element is impossible.
 pub(super) fn score<'a>(parts: impl IntoIterator<Item = &'a Dist>, n: usize, x: &Datum) -> f64 {
     if x.len() != Some(n) {
         return f64::NEG_INFINITY;
@@ -95,8 +94,8 @@ pub(super) fn score<'a>(parts: impl IntoIterator<Item = &'a Dist>, n: usize, x: 
     sum
 }
 
-/// The elements' derivatives by value one after the other; those by parameters as `join`
-/// puts them together.
+/// Concatenates the elements' derivatives with respect to the value; `join` combines
+/// those with respect to the parameters.
 pub(super) fn slopes<'a>(
     parts: impl IntoIterator<Item = &'a Dist>,
     n: usize,
@@ -115,7 +114,7 @@ pub(super) fn slopes<'a>(
     Some(all)
 }
 
-/// The noise behind all elements.
+/// Returns the white noise of all elements.
 pub(super) fn whiten<'a>(
     parts: impl IntoIterator<Item = &'a Dist>,
     n: usize,
@@ -131,7 +130,7 @@ pub(super) fn whiten<'a>(
     Some(z)
 }
 
-/// The elements made from noise.
+/// Returns the elements that correspond to this white noise.
 pub(super) fn colour<'a>(
     parts: impl IntoIterator<Item = &'a Dist>,
     n: usize,

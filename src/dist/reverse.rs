@@ -1,13 +1,12 @@
-//! What gradients through a trace need of distributions besides the gradient of the
-//! density: how values move with the parameters while the coordinates they are stored in
-//! stay.
+//! Derivatives of values with respect to parameters while the stored coordinates are
+//! fixed. Gradients through a trace need them in addition to those of the densities.
 
 use super::{Datum, Dist, Support};
 use crate::rng::{Purpose, StreamKey};
 
 impl Dist {
-    /// How many derivatives by parameters [`Dist::gradient`] has: those at a draw, the
-    /// same number always.
+    /// Returns the number of parameter derivatives in [`Dist::gradient`]. It is the same
+    /// for all values, so it is counted at one draw.
     pub fn param_count(&self) -> usize {
         match self {
             Dist::Iid(d) => d.one().param_count(),
@@ -19,7 +18,7 @@ impl Dist {
         }
     }
 
-    /// Whether the support of its continuous values moves with its parameters.
+    /// Returns whether the support of the continuous values depends on the parameters.
     pub fn has_moving_support(&self) -> bool {
         match self {
             Dist::Uniform(_) | Dist::TruncatedNormal(_) | Dist::HalfCauchy(_) => true,
@@ -34,12 +33,12 @@ impl Dist {
         }
     }
 
-    /// For a number stored as the image x(y) of an unconstrained coordinate: the
-    /// derivatives by the parameters, while y stays, of a function of x with slope `by`,
-    /// plus those of log |dx/dy|. `None` where they are not known.
+    /// For a number x(y) that is stored as an unconstrained coordinate y: returns the
+    /// derivatives with respect to the parameters, with y fixed, of f(x(y)) + log
+    /// |dx/dy|, where `by` is df/dx. `None` if they are not known.
     pub fn by_bounds(&self, x: &Datum, by: f64) -> Option<Vec<f64>> {
         let x = x.num()?;
-        // By the lower and the upper bound.
+        // With respect to the lower and the upper bound.
         let (lo, hi) = match self.support() {
             // x = lo + (hi - lo) p, log |dx/dy| = log (hi - lo) + log p + log (1 - p).
             Support::Interval { lo, hi } => {
@@ -69,8 +68,8 @@ impl Dist {
         }
     }
 
-    /// For a value made from white noise, mean + L z: the derivatives by z of a function
-    /// with these derivatives by the value.
+    /// For a value mean + L z made from white noise z: returns the derivatives with
+    /// respect to z of a function whose derivatives with respect to the value are `by`.
     pub fn from_noncentred_vjp(&self, by: &[f64]) -> Option<Vec<f64>> {
         match self {
             Dist::MvNormal(d) => Some(d.vjp_noise(by)),
@@ -88,7 +87,7 @@ mod tests {
     #[test]
     fn bounds_move_values_as_differences_say() {
         let (y, slope) = (0.7, 1.3);
-        // F(x) = slope x, plus the log Jacobian.
+        // f(x) = slope x, plus the log Jacobian.
         let f = |d: &Dist| {
             let (x, jacobian) = d.support().from_free(&[y]);
             slope * x.num().unwrap() + jacobian

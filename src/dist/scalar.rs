@@ -1,5 +1,5 @@
-//! Distributions of one number: a smaller interface that allocates nothing, and
-//! [`Distribution`] built on it.
+//! Distributions of one number: a smaller interface that does not allocate, and an
+//! implementation of [`Distribution`] on top of it.
 
 use super::tails::{Speeds, Tails};
 use super::{Datum, Distribution, Gradient, Support};
@@ -10,19 +10,20 @@ use std::fmt;
 /// The derivatives of the log density of a number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slope {
-    /// By the number; `None` if it is discrete.
+    /// With respect to the number; `None` if it is discrete.
     pub x: Option<f64>,
-    /// By the parameters, in the order of the constructor; 0 for integer ones.
+    /// With respect to the parameters, in the order of the constructor; 0 for integer
+    /// parameters.
     pub params: SmallVec<[f64; 3]>,
 }
 
 impl Slope {
-    /// Derivatives of a continuous density.
+    /// Creates the derivatives of a continuous density.
     pub fn new<const N: usize>(x: f64, params: [f64; N]) -> Self {
         Slope { x: Some(x), params: SmallVec::from_slice(&params) }
     }
 
-    /// Derivatives of a probability of an integer.
+    /// Creates the derivatives of the probability of an integer.
     pub fn discrete<const N: usize>(params: [f64; N]) -> Self {
         Slope { x: None, params: SmallVec::from_slice(&params) }
     }
@@ -33,44 +34,45 @@ pub trait Scalar: fmt::Debug + Send + Sync {
     /// The name in the language.
     const NAME: &'static str;
 
-    /// Whether it has no integral, see [`Distribution::is_improper`].
+    /// Whether it is not normalised, see [`Distribution::is_improper`].
     const IMPROPER: bool = false;
 
-    /// The space of its values: one of numbers.
+    /// Returns the space of the values, which are numbers.
     fn number_support(&self) -> Support;
 
-    /// Draws a number of the support.
+    /// Draws a number from the support.
     fn draw(&self, rng: &mut Stream) -> f64;
 
-    /// The log density: -inf off the support, never NaN.
+    /// Returns the log density: -inf off the support, never NaN.
     fn log_density_num(&self, x: f64) -> f64;
 
-    /// Its derivatives at a point where it is finite.
+    /// Returns the derivatives of the log density at a point where it is finite.
     fn slope(&self, x: f64) -> Slope;
 
-    /// How much lies to each side of a number, if the family knows.
+    /// Returns the log probabilities on both sides of a number, if the family can compute
+    /// them.
     fn tails(&self, _x: f64) -> Option<Tails> {
         None
     }
 
-    /// dP(X <= x)/da over the density at x, for each parameter a, where the density is
-    /// positive and finite; of an integer parameter 0.
+    /// Returns dP(X <= x)/da divided by the density at x, for each parameter a, where the
+    /// density is positive and finite; 0 for an integer parameter.
     fn speeds(&self, _x: f64) -> Option<Speeds> {
         None
     }
 
-    /// The mean, if it exists.
+    /// Returns the mean, if it exists.
     fn number_mean(&self) -> Option<f64>;
 
-    /// The standard deviation, if it exists.
+    /// Returns the standard deviation, if it exists.
     fn number_sd(&self) -> Option<f64>;
 
-    /// The number's image on the standard normal's scale, for normal distributions.
+    /// Maps a number to the scale of the standard normal, for normal distributions.
     fn standardised(&self, _x: f64) -> Option<f64> {
         None
     }
 
-    /// The number with this image on the standard normal's scale.
+    /// Maps a number from the scale of the standard normal, for normal distributions.
     fn unstandardised(&self, _z: f64) -> Option<f64> {
         None
     }

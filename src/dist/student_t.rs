@@ -18,8 +18,8 @@ pub struct StudentT {
 }
 
 impl StudentT {
-    /// With these degrees of freedom, location and scale; fails unless the location is
-    /// finite and the others positive and finite.
+    /// Creates the distribution with these degrees of freedom, location and scale; fails
+    /// unless the location is finite and the others positive and finite.
     pub fn new(df: f64, location: f64, scale: f64) -> Result<StudentT, ParamError> {
         let df = positive(Self::NAME, "df", df)?;
         let (location, scale) =
@@ -30,7 +30,8 @@ impl StudentT {
 }
 
 impl StudentT {
-    /// ln(1 + z^2 / df), z scales from the location.
+    /// Returns ln(1 + z^2 / df), where z is the distance from the location in units of
+    /// the scale.
     #[inline]
     fn log_tail(&self, x: f64) -> f64 {
         let t = standard(x, self.location, self.scale) / self.df.sqrt();
@@ -67,7 +68,7 @@ impl Scalar for StudentT {
     fn slope(&self, x: f64) -> Slope {
         let (df, z) = (self.df, standard(x, self.location, self.scale));
         let t = z / df.sqrt();
-        // (df + 1) z / (df + z^2), and z times it.
+        // (df + 1) z / (df + z^2), and z times that.
         let (once, twice) = if t.abs() < 1.0 {
             let weight = (df + 1.0) / (df * (1.0 + t * t));
             (weight * z, weight * z * z)
@@ -100,8 +101,8 @@ impl Scalar for StudentT {
     }
 }
 
-/// The tails of the standard distribution, by the incomplete beta function of df / (df +
-/// z^2) (Abramowitz & Stegun 26.7.1).
+/// Returns the tails of the standard distribution, by the incomplete beta function of df
+/// / (df + z^2) (Abramowitz & Stegun 26.7.1).
 fn student_tails(df: f64, z: f64) -> Option<Tails> {
     let square = z * z;
     let (x, y) = (1.0 / (1.0 + square / df), 1.0 / (1.0 + df / square));

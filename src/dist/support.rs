@@ -1,15 +1,14 @@
-//! The spaces that values live in. How they map to unconstrained space is in
-//! `transform.rs`.
+//! The spaces of values. Their maps to unconstrained space are in `transform.rs`.
 
 use super::{Datum, triangle};
 use core::f64::consts::{PI, TAU};
 use std::fmt;
 use std::sync::Arc;
 
-/// Up to this many values are enumerated; a larger set counts as infinite.
+/// The largest number of values that are enumerated; a larger set counts as infinite.
 pub const MAX_ENUMERATED: i64 = 10_000;
 
-/// How far from 1 the sum of the shares of a simplex may be.
+/// The largest distance from 1 of the sum of a simplex's proportions.
 const SIMPLEX_TOLERANCE: f64 = 1e-8;
 
 /// The space of a distribution's values.
@@ -17,65 +16,64 @@ const SIMPLEX_TOLERANCE: f64 = 1e-8;
 pub enum Support {
     /// All finite numbers.
     Real,
-    /// Above 0.
+    /// Numbers above 0.
     Positive,
-    /// At or above a bound.
+    /// Numbers at or above a bound.
     AtLeast {
         /// The bound.
         lo: f64,
     },
-    /// Between two bounds, both included.
+    /// Numbers between two bounds, both included.
     Interval {
         /// The lower bound.
         lo: f64,
         /// The upper bound.
         hi: f64,
     },
-    /// At or below a bound.
+    /// Numbers at or below a bound.
     AtMost {
         /// The bound.
         hi: f64,
     },
-    /// Angles in radians, in (-pi, pi]. The unconstrained coordinate is the angle, over
-    /// which the density goes on periodically.
+    /// Angles in radians, in (-pi, pi]. The unconstrained coordinate is the angle, in
+    /// which the density is periodic.
     Circle,
     /// Truth values.
     Boolean,
-    /// Integers from `lo`, up to `hi` if there is one.
+    /// Integers from `lo` to `hi`, or without an upper bound.
     Integers {
-        /// The least.
+        /// The smallest integer.
         lo: i64,
-        /// The greatest.
+        /// The largest integer.
         hi: Option<i64>,
     },
-    /// Shares that sum to 1.
+    /// This many proportions that sum to 1.
     Simplex(usize),
-    /// Vectors of so many finite numbers.
+    /// Vectors of this many finite numbers.
     Vector(usize),
-    /// So many numbers of one continuous space in ascending order; equal neighbours are
-    /// its boundary.
+    /// This many numbers of one continuous space in ascending order. Sequences with equal
+    /// neighbours are its boundary.
     Ascending(Box<Support>, usize),
-    /// Cholesky factors of correlation matrices with so many rows: n rows of n numbers,
-    /// zeros above a diagonal that is not negative, every row of length 1.
+    /// Cholesky factors of n x n correlation matrices: n rows of n numbers, with zeros
+    /// above a non-negative diagonal and rows of length 1.
     CorrelationFactor(usize),
-    /// Cholesky factors of covariance matrices with so many rows: zeros above a positive
-    /// diagonal.
+    /// Cholesky factors of n x n covariance matrices: zeros above a positive diagonal.
     CovarianceFactor(usize),
-    /// Counts for so many kinds that sum to a total.
+    /// Counts per category that sum to a total.
     Counts {
         /// The total.
         total: i64,
-        /// How many kinds.
+        /// The number of categories.
         kinds: usize,
     },
-    /// So many values of one space.
+    /// This many values of one space.
     Product(Box<Support>, usize),
-    /// One value of each of these spaces.
+    /// One value from each of these spaces.
     Each(Arc<[Support]>),
 }
 
 impl Support {
-    /// Whether its values are single numbers.
+    /// Returns whether values are single numbers.
     pub fn is_number(&self) -> bool {
         use Support::*;
         matches!(
@@ -89,7 +87,8 @@ impl Support {
         )
     }
 
-    /// Whether its values can be counted. A product is discrete if all of its parts are.
+    /// Returns whether values are discrete. A product is discrete if all of its parts
+    /// are.
     pub fn is_discrete(&self) -> bool {
         match self {
             Support::Boolean | Support::Integers { .. } | Support::Counts { .. } => true,
@@ -99,7 +98,7 @@ impl Support {
         }
     }
 
-    /// Whether some part of a value is discrete.
+    /// Returns whether some part of a value is discrete.
     pub(crate) fn has_discrete_part(&self) -> bool {
         match self {
             Support::Product(one, _) => one.has_discrete_part(),
@@ -108,7 +107,7 @@ impl Support {
         }
     }
 
-    /// Whether [`Support::finite_values`] has an answer.
+    /// Returns whether [`Support::finite_values`] returns a list.
     pub fn is_finite(&self) -> bool {
         match self {
             Support::Boolean => true,
@@ -117,15 +116,15 @@ impl Support {
         }
     }
 
-    /// All values in ascending order, if they are truth values or at most
+    /// Returns all values in ascending order, if they are truth values or at most
     /// [`MAX_ENUMERATED`] integers.
     pub fn finite_values(&self) -> Option<Vec<Datum>> {
         let mut values = Vec::new();
         self.list_values(&mut values).then_some(values)
     }
 
-    /// The same into a list that is used again; false, and the list empty, if the support
-    /// is not finite.
+    /// Like [`Support::finite_values`], but reuses a list. Returns false, with an empty
+    /// list, if the support is not finite.
     #[doc(hidden)]
     pub fn list_values(&self, values: &mut Vec<Datum>) -> bool {
         values.clear();
@@ -139,7 +138,8 @@ impl Support {
         true
     }
 
-    /// Whether a value is of the right kind and size, be it inside or not.
+    /// Returns whether a value is of the right kind and size, whether or not it is
+    /// inside.
     pub fn fits(&self, x: &Datum) -> bool {
         match self {
             Support::Boolean => matches!(x, Datum::Bool(_)),
@@ -166,7 +166,7 @@ impl Support {
         }
     }
 
-    /// Whether a number is inside.
+    /// Returns whether a number is inside.
     #[inline]
     #[doc(hidden)]
     pub fn contains_num(&self, x: f64) -> bool {
@@ -187,7 +187,7 @@ impl Support {
         }
     }
 
-    /// Whether a value is inside.
+    /// Returns whether a value is inside.
     pub fn contains(&self, x: &Datum) -> bool {
         match (self, x) {
             (_, Datum::Num(x)) => self.contains_num(*x),
@@ -227,7 +227,7 @@ impl Support {
     }
 }
 
-/// In words, after "the support is".
+/// Describes the space, as in "the support is …".
 impl fmt::Display for Support {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -256,25 +256,25 @@ impl fmt::Display for Support {
     }
 }
 
-/// Whether these are shares of 1, but for rounding.
+/// Returns whether these are proportions that sum to 1, up to rounding.
 pub(super) fn is_simplex(xs: &[f64]) -> bool {
     xs.iter().all(|x| (0.0..=1.0).contains(x))
         && (xs.iter().sum::<f64>() - 1.0).abs() <= SIMPLEX_TOLERANCE
 }
 
-/// Whether every number is at least the one before it.
+/// Returns whether every number is at least the previous one.
 pub(super) fn is_ascending(xs: &[f64]) -> bool {
     xs.windows(2).all(|w| w[0] <= w[1])
 }
 
-/// Whether these are whole numbers from 0 with this sum.
+/// Returns whether these are non-negative integers with this sum.
 pub(super) fn are_counts(xs: &[f64], total: i64) -> bool {
     let count = |x: &f64| *x >= 0.0 && *x <= total as f64 && *x == libm::trunc(*x);
     xs.iter().all(count)
         && xs.iter().map(|x| i128::from(*x as i64)).sum::<i128>() == i128::from(total)
 }
 
-/// The same direction in (-pi, pi]; 0 for what is not a finite number.
+/// Returns the same angle in (-pi, pi]; 0 if it is infinite or NaN.
 pub(super) fn wrap_angle(x: f64) -> f64 {
     let x = if x.abs() <= PI { x } else { libm::remainder(x, TAU) };
     if x.is_nan() {

@@ -1,5 +1,4 @@
-//! How much of a distribution of numbers lies to each side of a number, in logarithms:
-//! what truncation rests on.
+//! The log probabilities on both sides of a number, which truncation is based on.
 
 use super::Dist;
 use crate::num::{log_diff_exp, log_sum_exp};
@@ -15,32 +14,33 @@ pub struct Tails {
     pub above: f64,
 }
 
-/// A derivative for each parameter.
+/// One derivative per parameter.
 pub type Speeds = SmallVec<[f64; 3]>;
 
 impl Tails {
-    /// All of the probability is below.
+    /// All of the probability lies below.
     pub const ALL_BELOW: Tails = Tails { below: 0.0, above: f64::NEG_INFINITY };
-    /// None of the probability is below.
+    /// None of the probability lies below.
     pub const NONE_BELOW: Tails = Tails { below: f64::NEG_INFINITY, above: 0.0 };
 
-    /// From the logarithm of the part below.
+    /// Computes both from the logarithm of the probability below.
     pub fn from_below(below: f64) -> Tails {
         let below = below.min(0.0);
         Tails { below, above: log_diff_exp(0.0, below) }
     }
 
-    /// From the logarithm of the part above.
+    /// Computes both from the logarithm of the probability above.
     pub fn from_above(above: f64) -> Tails {
         Tails::from_below(above).swapped()
     }
 
-    /// The other way round.
+    /// Exchanges the two sides.
     pub fn swapped(self) -> Tails {
         Tails { below: self.above, above: self.below }
     }
 
-    /// Of a mixture: the sums of these, by the logarithms of the shares.
+    /// Returns the tails of a mixture from the logarithms of the normalised weights and
+    /// the components' tails.
     fn mixed(all: &[(f64, Tails)]) -> Tails {
         let sum = |of: fn(&Tails) -> f64| {
             log_sum_exp(&all.iter().map(|(share, t)| share + of(t)).collect::<SmallVec<[f64; 8]>>())
@@ -50,9 +50,9 @@ impl Tails {
     }
 }
 
-/// dP(X <= x)/da over the density at x, where only differences know it: by a central
-/// difference of the fourth order of the smaller tail's logarithm. `tails` is of the
-/// parameter, `log_density` at x.
+/// Returns dP(X <= x)/da divided by the density at x, by a central difference of fourth
+/// order of the logarithm of the smaller tail. `tails` takes the parameter; `log_density`
+/// is that at x.
 pub(super) fn speed_by_differences(
     a: f64,
     log_density: f64,
@@ -69,7 +69,8 @@ pub(super) fn speed_by_differences(
 }
 
 impl Dist {
-    /// How much of it lies to each side of a number; `None` where that is not known.
+    /// Returns the log probabilities on both sides of a number; `None` if they are not
+    /// known.
     pub(super) fn tails(&self, x: f64) -> Option<Tails> {
         use super::Scalar;
         if x == f64::INFINITY {
@@ -110,8 +111,8 @@ impl Dist {
         }
     }
 
-    /// dP(X <= x)/da over the density at x, for each parameter a, where the density is
-    /// positive and finite.
+    /// Returns dP(X <= x)/da divided by the density at x, for each parameter a, where the
+    /// density is positive and finite.
     pub(super) fn speeds(&self, x: f64) -> Option<Speeds> {
         use super::Scalar;
         match self {

@@ -2,25 +2,25 @@
 //! stick-breaking, as in the Stan reference manual ("Constraint transforms"). Those of
 //! matrices are in `triangle.rs`, those of sorted numbers in `ascending.rs`.
 //!
-//! Points on a boundary, and points that left a support whose bounds moved, map as the
-//! nearest points inside: coordinates are always finite. Whatever comes back is strictly
-//! inside.
+//! Points on the boundary, and points outside a support whose bounds have moved, map like
+//! the nearest points inside, so coordinates are always finite. Mapping back always gives
+//! a point strictly inside.
 
 use super::support::wrap_angle;
 use super::{Datum, Support, ascending, triangle};
 use crate::num::log1p_exp;
 
-/// Coordinates beyond this are no longer told apart: e^-700 is near the smallest double.
+/// Coordinates are clamped to this magnitude: e^-700 is near the smallest normal double.
 pub(super) const FAR: f64 = 700.0;
 
-/// The coordinate within those told apart; 0 for NaN.
+/// Clamps a coordinate to magnitude [`FAR`]; 0 for NaN.
 #[inline]
 pub(super) fn near(y: f64) -> f64 {
     if y.is_nan() { 0.0 } else { y.clamp(-FAR, FAR) }
 }
 
 impl Support {
-    /// The dimension of the unconstrained space; 0 for discrete values.
+    /// Returns the dimension of the unconstrained space; 0 for discrete values.
     pub fn free_dim(&self) -> usize {
         match self {
             Support::Boolean | Support::Integers { .. } | Support::Counts { .. } => 0,
@@ -34,8 +34,8 @@ impl Support {
         }
     }
 
-    /// How many numbers a gradient by the value has: those of the continuous parts, of a
-    /// matrix row by row.
+    /// Returns how many numbers a gradient with respect to the value has: those of the
+    /// continuous parts, and all entries of a matrix, row by row.
     pub fn gradient_dim(&self) -> usize {
         match self {
             Support::CorrelationFactor(n) | Support::CovarianceFactor(n) => n * n,
@@ -46,7 +46,7 @@ impl Support {
         }
     }
 
-    /// The coordinate of a number; 0 for supports that are not continuous numbers.
+    /// Returns the coordinate of a number; 0 for supports other than continuous numbers.
     #[inline]
     pub fn to_free_scalar(&self, x: f64) -> f64 {
         let y = match self {
@@ -67,8 +67,8 @@ impl Support {
         }
     }
 
-    /// The number at a coordinate, and log |dx/dy| there; (0, 0) for supports that are
-    /// not continuous numbers.
+    /// Returns the number at a coordinate, and log |dx/dy| there; (0, 0) for supports
+    /// other than continuous numbers.
     #[inline]
     pub fn from_free_scalar(&self, y: f64) -> (f64, f64) {
         match self {
@@ -98,8 +98,8 @@ impl Support {
         }
     }
 
-    /// Appends the coordinates of a value: as many as [`Support::free_dim`], whatever the
-    /// value.
+    /// Appends the coordinates of a value. For any value there are [`Support::free_dim`]
+    /// of them.
     pub fn to_free(&self, x: &Datum, out: &mut Vec<f64>) {
         let end = out.len() + self.free_dim();
         match (self, x) {
@@ -144,10 +144,10 @@ impl Support {
         out.resize(end, 0.0);
     }
 
-    /// The value at a point of unconstrained space, and log |dx/dy| there (for a simplex,
-    /// of all shares but the last; for a Cholesky factor, of its lower triangle, of a
-    /// correlation matrix without the diagonal). Missing coordinates count as 0. A
-    /// discrete part is at its least value.
+    /// Returns the value at a point of unconstrained space, and log |dx/dy| there. For a
+    /// simplex, x is all proportions but the last; for a Cholesky factor, its lower
+    /// triangle, for a correlation matrix without the diagonal. Missing coordinates count
+    /// as 0. Discrete parts take their smallest value.
     pub fn from_free(&self, y: &[f64]) -> (Datum, f64) {
         let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
         match self {
@@ -191,9 +191,10 @@ impl Support {
         }
     }
 
-    /// Appends the derivative by the coordinates of log p(x(y)) + log |dx/dy|, from that
-    /// of log p by the value (as in [`super::Gradient`], so without numbers for discrete
-    /// parts): what gradient-based moves need.
+    /// Appends the derivatives with respect to the coordinates of log p(x(y)) + log
+    /// |dx/dy|, given those of log p with respect to the value (as in
+    /// [`super::Gradient`], so without numbers for discrete parts). Gradient-based
+    /// kernels use it.
     pub fn free_gradient(&self, y: &[f64], by_x: &[f64], out: &mut Vec<f64>) {
         let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
         let by = |i: usize| by_x.get(i).copied().unwrap_or(0.0);
@@ -248,13 +249,14 @@ fn join<'a>(parts: impl Iterator<Item = &'a Support>, y: &[f64]) -> (Datum, f64)
     (Datum::from_elements(xs), jacobian)
 }
 
-/// The offset that puts equal shares at 0: minus the log odds of 1 among those left.
+/// Returns the offset that maps equal proportions to 0: minus the log odds of one among
+/// those left.
 fn offset(n: usize, k: usize) -> f64 {
     libm::log((n - 1 - k) as f64)
 }
 
-/// The coordinates of shares. What is left is summed from the end, where the small terms
-/// of a long stick are.
+/// Appends the coordinates of proportions. The remaining length is summed from the end,
+/// where the small terms of a long stick are.
 fn stick_lengths(xs: &[f64], out: &mut Vec<f64>) {
     let n = xs.len();
     let start = out.len();
@@ -269,7 +271,8 @@ fn stick_lengths(xs: &[f64], out: &mut Vec<f64>) {
     out[start..].reverse();
 }
 
-/// The shares at a point, and the log Jacobian. The length left is kept as a logarithm.
+/// Returns the proportions at a point, and the log Jacobian. The remaining length is kept
+/// as a logarithm.
 fn break_stick(n: usize, at: impl Fn(usize) -> f64) -> (Vec<f64>, f64) {
     let mut xs = Vec::with_capacity(n);
     let (mut log_rest, mut jacobian) = (0.0, 0.0);
@@ -286,8 +289,8 @@ fn break_stick(n: usize, at: impl Fn(usize) -> f64) -> (Vec<f64>, f64) {
     (xs, jacobian)
 }
 
-/// With z the share taken of what is left, x_k = rest_k z_k: the derivatives by y_k of
-/// x_k and of all shares after it.
+/// Appends the derivatives with respect to y. With z_k the proportion that is taken of
+/// the remaining length, x_k = rest_k z_k, so y_k moves x_k and all proportions after it.
 fn stick_gradient(
     n: usize,
     at: impl Fn(usize) -> f64,
@@ -299,13 +302,13 @@ fn stick_gradient(
     }
     let start = out.len();
     let (xs, _) = break_stick(n, &at);
-    // The sum of x_j dlogp/dx_j over the shares after k.
+    // The sum of x_j dlogp/dx_j over the proportions after k.
     let mut after = xs[n - 1] * by(n - 1);
     for k in (0..n - 1).rev() {
         let z = crate::num::expit(near(at(k)) - offset(n, k));
         let own = xs[k] * by(k);
-        // d log x_k = 1 - z; d log x_j = -z for j > k; the Jacobian has log z_k + log (1 -
-        // z_k) and log rest_j for j > k.
+        // d log x_k = 1 - z; d log x_j = -z for j > k; the Jacobian contains log z_k +
+        // log (1 - z_k), and log rest_j for j > k.
         let later = (n - 2 - k) as f64;
         out.push(own * (1.0 - z) - after * z + 1.0 - 2.0 * z - later * z);
         after += own;

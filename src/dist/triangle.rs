@@ -1,20 +1,20 @@
-//! Cholesky factors as values: n rows of n numbers, zeros above the diagonal; their maps
-//! to unconstrained space.
+//! Cholesky factors as values, n rows of n numbers with zeros above the diagonal, and
+//! their maps to unconstrained space.
 //!
 //! A factor of a correlation matrix has rows of length 1; its coordinates are those of
 //! the canonical partial correlations (Lewandowski, Kurowicka & Joe 2009; "Cholesky
-//! factors of correlation matrices" in the Stan reference manual). A factor of a
-//! covariance matrix has the logarithms of its diagonal as coordinates. Both go row by
-//! row.
+//! factors of correlation matrices" in the Stan reference manual). For a factor of a
+//! covariance matrix, the diagonal is mapped to its logarithms. Coordinates are in row
+//! order.
 
 use super::Datum;
 use super::transform::{FAR, near};
 use crate::num::log1p_exp;
 
-/// How far from 1 the squared length of a row may be.
+/// The largest distance from 1 of the squared length of a row.
 const ROW_TOLERANCE: f64 = 1e-8;
 
-/// The numbers of n rows of n, one row after the other; `None` for anything else.
+/// Returns the numbers of n rows of n, one row after the other; `None` for other values.
 pub(super) fn entries(x: &Datum, n: usize) -> Option<Vec<f64>> {
     let Datum::List(rows) = x else { return None };
     if rows.len() != n {
@@ -27,12 +27,12 @@ pub(super) fn entries(x: &Datum, n: usize) -> Option<Vec<f64>> {
     Some(all)
 }
 
-/// The value with these entries.
+/// Returns the value with these entries.
 pub(super) fn value(n: usize, entries: &[f64]) -> Datum {
     Datum::List(entries.chunks(n.max(1)).map(|row| Datum::Vec(row.into())).collect())
 }
 
-/// Row `i` up to its diagonal.
+/// Returns row `i`, up to its diagonal.
 pub(super) fn row(xs: &[f64], n: usize, i: usize) -> &[f64] {
     xs.get(i * n..i * n + i + 1).unwrap_or(&[])
 }
@@ -58,8 +58,7 @@ pub(super) fn correlation_to_free(xs: &[f64], n: usize, out: &mut Vec<f64>) {
     for i in 1..n {
         let start = out.len();
         let row = row(xs, n, i);
-        // The length of what is left of the row, from the end, where the small numbers
-        // are.
+        // The remaining length of the row, from the end, where the small numbers are.
         let mut rest = row[i].abs();
         for x in row[..i].iter().rev() {
             let y = if *x == 0.0 { 0.0 } else { libm::asinh(x / rest) };
@@ -70,13 +69,13 @@ pub(super) fn correlation_to_free(xs: &[f64], n: usize, out: &mut Vec<f64>) {
     }
 }
 
-/// tanh y, and ln(1 - tanh^2 y).
+/// Returns tanh y and ln(1 - tanh^2 y).
 fn partial(y: f64) -> (f64, f64) {
     let y = near(y);
     (libm::tanh(y), 2.0 * (core::f64::consts::LN_2 - y.abs() - log1p_exp(-2.0 * y.abs())))
 }
 
-/// The rows, and the log Jacobian by the numbers below the diagonal.
+/// Returns the rows, and the log Jacobian with respect to the numbers below the diagonal.
 pub(super) fn correlation_from_free(n: usize, at: impl Fn(usize) -> f64) -> (Datum, f64) {
     let mut xs = vec![0.0; n * n];
     let (mut k, mut jacobian) = (0, 0.0);
@@ -94,8 +93,8 @@ pub(super) fn correlation_from_free(n: usize, at: impl Fn(usize) -> f64) -> (Dat
     (value(n, &xs), jacobian)
 }
 
-/// With z = tanh y and R the length left before it: x = z R; all after it go with sqrt(1 -
-/// z^2), whose derivative of the logarithm is -z.
+/// With z = tanh y and R the length that remains before an entry, x = z R. All entries
+/// after it are proportional to sqrt(1 - z^2), whose logarithm has the derivative -z.
 pub(super) fn correlation_gradient(
     n: usize,
     at: impl Fn(usize) -> f64,

@@ -1,5 +1,4 @@
-//! A distribution of one number between two bounds: any family whose distribution
-//! function is known.
+//! Truncation of any scalar distribution whose distribution function is known.
 
 use super::interval::{each_node, ends, from_order, integral, order, within};
 use super::param::MAX_INTEGER;
@@ -11,19 +10,19 @@ use crate::rng::Stream;
 use core::f64::consts::LN_2;
 use std::sync::Arc;
 
-/// Up to so many integers are summed one by one.
+/// The largest number of integers that are summed one by one.
 const FEW: f64 = 64.0;
 
-/// Draws that are tried before the distribution function is inverted.
+/// The number of draws that are tried before the distribution function is inverted.
 const TRIES: u32 = 64;
 
-/// `truncated(d, lo, hi)`: the density of `d` over the probability of the interval,
-/// within it. Integers on the bounds are inside.
+/// `truncated(d, lo, hi)`: within the interval, the density of `d` divided by the
+/// probability of the interval. Integers on the bounds are inside.
 ///
-/// ln P(lo < X <= hi) is a difference of the smaller tails in log space; of an interval
-/// in which the density hardly changes it is an integral by Gauss-Legendre's rule (of a
-/// few integers, a sum), where that difference would cancel. Gradients by parameters:
-/// those of `d`, then by `lo` and `hi`.
+/// ln P(lo < X <= hi) is a difference of the smaller tails in log space. Where that would
+/// cancel, because the density hardly changes over the interval, it is an integral by the
+/// Gauss-Legendre rule; for a few integers it is a sum. Parameter gradients are those of
+/// `d`, then with respect to `lo` and `hi`.
 #[derive(Clone, Debug)]
 pub struct Truncated {
     base: Dist,
@@ -33,12 +32,12 @@ pub struct Truncated {
     log_mass: f64,
 }
 
-/// What a distribution becomes between two bounds: a product or `iid` element by element,
-/// a normal a [`TruncatedNormal`].
+/// Truncates a distribution to an interval: a product or `iid` element by element, and a
+/// normal to a [`TruncatedNormal`].
 ///
 /// # Errors
-/// It is not a distribution of numbers whose distribution function is known, the bounds
-/// leave nothing, or no probability.
+/// It is not a distribution of numbers whose distribution function is known, or the
+/// interval does not overlap the support or has no probability.
 pub fn truncated(base: &Dist, lo: f64, hi: f64) -> Result<Dist, ParamError> {
     Ok(match base {
         Dist::Normal(d) => {
@@ -63,7 +62,7 @@ fn bad(parameter: &'static str, value: String, rule: &'static str) -> ParamError
     ParamError::new("truncated", parameter, value, rule)
 }
 
-/// Why a distribution cannot be truncated.
+/// Returns the reason why a distribution cannot be truncated.
 fn unknown(d: &Dist) -> ParamError {
     let rule = match d {
         Dist::Flat(_) => "must be proper: for a flat prior, give the bounds to `flat(lo, hi)`",
@@ -90,9 +89,9 @@ fn check_bounds(lo: f64, hi: f64, discrete: bool) -> Result<(), ParamError> {
 }
 
 impl Truncated {
-    /// The distribution between these bounds, which may be infinite; fails unless it is
-    /// one of numbers, is proper, has a known distribution function, and has probability
-    /// there.
+    /// Creates the distribution between these bounds, which may be infinite. Fails unless
+    /// `base` is over numbers, is proper, has a known distribution function, and has
+    /// probability in the interval.
     pub fn new(base: Dist, lo: f64, hi: f64) -> Result<Truncated, ParamError> {
         let support = base.support();
         check_bounds(lo, hi, matches!(support, Support::Integers { .. }))?;
@@ -112,12 +111,13 @@ impl Truncated {
         }
     }
 
-    /// The distribution before truncation.
+    /// Returns the distribution before truncation.
     pub fn base(&self) -> &Dist {
         &self.base
     }
 
-    /// Whether the lower and the upper bound of the support are its own.
+    /// Returns whether the lower and the upper bound of the support are those of the
+    /// truncation.
     pub(super) fn own_bounds(&self) -> (bool, bool) {
         match ends(&self.support) {
             Some((lo, hi)) => (lo == self.lo, hi == self.hi),
@@ -129,8 +129,8 @@ impl Truncated {
         matches!(self.support, Support::Integers { .. })
     }
 
-    /// The ends: below the least value and at the greatest one that is not above `x`. Of
-    /// integers, the first is the one before.
+    /// Returns the interval (a, b] that contains the values up to `x`. For integers, a is
+    /// one below the smallest value.
     fn ends_to(&self, x: f64) -> (f64, f64) {
         match &self.support {
             Support::Integers { lo, hi } => {
@@ -144,7 +144,7 @@ impl Truncated {
         }
     }
 
-    /// The logarithm of the probability that `d` gives to the values up to `x`.
+    /// Returns the logarithm of the probability of the values up to `x` under `d`.
     fn log_mass_to(&self, x: f64) -> Option<f64> {
         let (a, b) = self.ends_to(x);
         match self.bend(a, b) {
@@ -155,13 +155,14 @@ impl Truncated {
         }
     }
 
-    /// Where the density bends between two numbers: at the centre of `laplace`.
+    /// Returns the kink of the density between two numbers: the centre of `laplace`.
     fn bend(&self, a: f64, b: f64) -> Option<f64> {
         let Dist::Laplace(d) = &self.base else { return None };
         d.number_mean().filter(|centre| a < *centre && *centre < b)
     }
 
-    /// That it gives to the values above `a`, up to `b`.
+    /// Returns the logarithm of the probability of the values above `a` and up to `b`
+    /// under `d`.
     fn log_between(&self, a: f64, b: f64) -> Option<f64> {
         if a >= b {
             return Some(f64::NEG_INFINITY);
@@ -185,7 +186,8 @@ impl Truncated {
         Some(if mass.is_nan() { f64::NEG_INFINITY } else { mass.min(0.0) })
     }
 
-    /// The same for an interval in which the density changes little; `None` for others.
+    /// Computes the same for an interval in which the density changes little; `None` for
+    /// others.
     fn narrow(&self, a: f64, b: f64) -> Option<f64> {
         if self.is_discrete() || !(b - a).is_finite() {
             return None;
@@ -195,14 +197,15 @@ impl Truncated {
         let (least, most) =
             all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), x| (l.min(*x), m.max(*x)));
         let little = most.is_finite() && most - least < 0.5;
-        // A mixture may rise between the points looked at.
+        // A mixture may have a peak between these points.
         if !little || matches!(self.base, Dist::Mixture(_)) {
             return None;
         }
         Some(most + libm::log(integral(a, b, |x| libm::exp(self.base.log_density_num(x) - most))))
     }
 
-    /// The derivatives of the logarithm of the probability by the parameters of `d`.
+    /// Returns the derivatives of the logarithm of the interval's probability with
+    /// respect to the parameters of `d`.
     fn mass_slopes(&self) -> Option<Vec<f64>> {
         let (a, b) = self.ends_to(f64::INFINITY);
         let count = self.base.param_count();
@@ -212,7 +215,7 @@ impl Truncated {
                 sum.iter_mut().zip(&g.params).for_each(|(s, p)| *s += weight * p);
             }
         };
-        // The mean of the slopes of the log density.
+        // The mean of the derivatives of the log density.
         if self.is_discrete() && b - a <= FEW {
             for i in 1..=(b - a) as i64 {
                 let x = a + i as f64;
@@ -241,13 +244,14 @@ impl Truncated {
         Some(sum)
     }
 
-    /// Whether a number is at the end of what `d` draws: what lies beyond stays nothing.
+    /// Returns whether a number is at or outside an end of the support of `d`, so that
+    /// the probability beyond it stays 0.
     fn is_end_of_base(&self, x: f64) -> bool {
         let least = |lo: f64| if self.is_discrete() { x < lo } else { x <= lo };
         ends(&self.base.support()).is_some_and(|(lo, hi)| least(lo) || x >= hi)
     }
 
-    /// The number up to which lies a share of the probability.
+    /// Returns the smallest value up to which this proportion of the probability lies.
     fn quantile(&self, share: f64) -> f64 {
         let target = libm::log(share) + self.log_mass;
         let enough = |x: f64| self.log_mass_to(x).is_none_or(|mass| mass >= target);
@@ -282,8 +286,8 @@ impl Distribution for Truncated {
         self.support.clone()
     }
 
-    /// What was drawn and is inside, where that is likely; else by the distribution
-    /// function.
+    /// Draws by rejection if the interval is likely, otherwise by inverting the
+    /// distribution function.
     fn sample(&self, rng: &mut Stream) -> Datum {
         if self.log_mass > -LN_2 * 4.0 {
             for _ in 0..TRIES {

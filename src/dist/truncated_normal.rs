@@ -1,7 +1,7 @@
-//! The normal distribution between two bounds, however far out they are.
+//! The normal distribution between two bounds, however far from the mean.
 //!
-//! All is computed relative to the density at the *anchor*, the point of the interval
-//! nearest to the mean, in units of sd. So nothing underflows in the tails, where the
+//! Everything is relative to the density at the *anchor*, the point of the interval
+//! nearest to the mean, and in units of sd. So nothing underflows in the tails, where the
 //! interval's probability does.
 
 use super::draw::standard;
@@ -12,7 +12,8 @@ use crate::num::mills_ratio;
 use crate::rng::Stream;
 use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
-/// The farthest the interval may be from the mean, in sd: squares are still doubles.
+/// The largest distance of the interval from the mean, in units of sd: its square still
+/// fits a double.
 const FARTHEST: f64 = 1e150;
 
 /// `truncated_normal(mean, sd, lo, hi)`; bounds may be infinite.
@@ -25,14 +26,14 @@ pub struct TruncatedNormal {
     /// The bounds in units of sd from the mean.
     low: f64,
     high: f64,
-    /// The density's integral in these units, over the density at the anchor.
+    /// The integral of the density in these units, divided by the density at the anchor.
     mass: f64,
 }
 
 impl TruncatedNormal {
-    /// The normal with this mean and sd before truncation, between these bounds. Fails
-    /// unless the mean is finite, the sd positive and finite, `lo` below `hi`, and the
-    /// interval within 1e150 sd of the mean and wider than 0 in units of sd.
+    /// Creates the distribution from the mean and sd before truncation and the bounds.
+    /// Fails unless the mean is finite, the sd positive and finite, `lo` below `hi`, and
+    /// the interval within 1e150 sd of the mean and of positive width in units of sd.
     pub fn new(mean: f64, sd: f64, lo: f64, hi: f64) -> Result<TruncatedNormal, ParamError> {
         let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
         let bounds = || format!("{lo} and {hi}");
@@ -62,17 +63,18 @@ impl TruncatedNormal {
         }
     }
 
-    /// The width in units of sd.
+    /// Returns the width in units of sd.
     fn width(&self) -> f64 {
         standard(self.hi, self.lo, self.sd)
     }
 
-    /// How far the interval is from the mean, in units of sd; 0 if the mean is in it.
+    /// Returns the distance of the interval from the mean, in units of sd; 0 if the mean
+    /// is inside.
     fn distance(&self) -> f64 {
         self.low.max(-self.high).max(0.0)
     }
 
-    /// The integral of exp(-(z^2 - anchor^2) / 2).
+    /// Returns the integral of exp(-(z^2 - anchor^2) / 2).
     fn relative_mass(&self) -> f64 {
         if self.low < 0.0 && self.high > 0.0 {
             let (left, right) =
@@ -88,20 +90,21 @@ impl TruncatedNormal {
         integral(0.0, w, |t| libm::exp(-t * (a + 0.5 * t)))
     }
 
-    /// The density at a bound over the interval's probability, in units of sd.
+    /// Returns the density at a bound divided by the interval's probability, in units of
+    /// sd.
     fn edge(&self, z: f64) -> f64 {
         let a = self.distance();
         libm::exp(-0.5 * (z.abs() - a) * (z.abs() + a)) / self.mass
     }
 
-    /// The first two moments of the distance inwards from the anchor (from the mean if
-    /// that is inside).
+    /// Returns the first two moments of the distance inwards from the anchor (from the
+    /// mean if it is inside), in units of sd.
     fn moments(&self) -> (f64, f64) {
         let a = self.distance();
         let (from, to) = if self.low < 0.0 && self.high > 0.0 {
             (self.low.max(-12.0), self.high.min(12.0))
         } else {
-            // Beyond the end exp(-50) is left.
+            // Beyond this point the density is below exp(-50) of that at the anchor.
             (0.0, self.width().min(100.0 / (a + (a * a + 100.0).sqrt())))
         };
         let panels = 64;
@@ -117,15 +120,15 @@ impl TruncatedNormal {
         (sums[1] / sums[0], sums[2] / sums[0])
     }
 
-    /// A draw of the distance inwards from the anchor, for an interval on one side of the
-    /// mean: rejection from an exponential that ends where the interval does (Robert
-    /// 1995, "Simulation of truncated normal variables").
+    /// Draws the distance inwards from the anchor, for an interval on one side of the
+    /// mean: by rejection from an exponential truncated to the interval (Robert 1995,
+    /// "Simulation of truncated normal variables").
     fn tail(&self, rng: &mut Stream) -> f64 {
         let (a, w) = (self.distance(), self.width());
         let rate = 0.5 * (a + (a * a + 4.0).sqrt());
         let share = -libm::expm1(-rate * w);
-        // rate - a, without cancellation, and where the ratio of the densities is
-        // greatest.
+        // rate - a, without cancellation, and the point where the ratio of the densities
+        // is greatest.
         let excess = 2.0 / (a + (a * a + 4.0).sqrt());
         let best = excess.min(w);
         loop {
@@ -183,7 +186,8 @@ impl Scalar for TruncatedNormal {
             let z = standard(x, self.mean, self.sd);
             return norm - 0.5 * z * z;
         }
-        // From the anchor inwards: exact at the bound, however far that is.
+        // From the anchor inwards: accurate at the bound, however far from the mean it
+        // is.
         let t = if self.low >= 0.0 {
             standard(x, self.lo, self.sd)
         } else {

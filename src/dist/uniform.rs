@@ -15,8 +15,8 @@ pub struct Uniform {
 }
 
 impl Uniform {
-    /// Between these bounds; fails unless both are finite, `lo` is below `hi`, and their
-    /// distance is a double.
+    /// Creates the distribution between these bounds; fails unless both are finite, `lo`
+    /// is below `hi`, and their difference is finite.
     pub fn new(lo: f64, hi: f64) -> Result<Uniform, ParamError> {
         let (lo, hi) = (finite(Self::NAME, "lo", lo)?, finite(Self::NAME, "hi", hi)?);
         if lo >= hi {

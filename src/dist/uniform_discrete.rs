@@ -15,8 +15,8 @@ pub struct UniformDiscrete {
 }
 
 impl UniformDiscrete {
-    /// Between these integers; fails unless both are integers of at most 2^53 in size and
-    /// `lo` is not above `hi`.
+    /// Creates the distribution between these integers; fails unless both are integers of
+    /// at most 2^53 in magnitude and `lo` is not above `hi`.
     pub fn new(lo: f64, hi: f64) -> Result<UniformDiscrete, ParamError> {
         let (lo, hi) = (integer(Self::NAME, "lo", lo)?, integer(Self::NAME, "hi", hi)?);
         if lo > hi {

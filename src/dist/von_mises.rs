@@ -7,12 +7,12 @@ use crate::num::{bessel_deficit, log_scaled_i0};
 use crate::rng::Stream;
 use core::f64::consts::{PI, TAU};
 
-/// `von_mises(mean, concentration)`, an angle in radians in (-pi, pi]; uniform for
-/// concentration 0.
+/// `von_mises(mean, concentration)`: an angle in radians in (-pi, pi]; uniform if the
+/// concentration is 0.
 ///
-/// Draws by Best & Fisher 1979, "Efficient simulation of the von Mises distribution",
-/// rearranged so that nothing cancels for a large concentration. A direction has no mean
-/// as a number.
+/// Draws follow Best & Fisher 1979, "Efficient simulation of the von Mises distribution",
+/// rearranged so that nothing cancels if the concentration is large. The mean as a number
+/// is undefined for a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VonMises {
     mean: f64,
@@ -21,8 +21,8 @@ pub struct VonMises {
 }
 
 impl VonMises {
-    /// Around this angle, any finite one, with this concentration; fails unless that is
-    /// finite and not negative.
+    /// Creates the distribution around this mean direction, which may be any finite
+    /// angle; fails unless it is finite and the concentration is finite and not negative.
     pub fn new(mean: f64, concentration: f64) -> Result<VonMises, ParamError> {
         let mean = wrap_angle(finite(Self::NAME, "mean", mean)?);
         if !(concentration >= 0.0 && concentration.is_finite()) {

@@ -17,14 +17,15 @@ pub struct Weibull {
 }
 
 impl Weibull {
-    /// With this shape and scale; fails unless both are positive and finite.
+    /// Creates the distribution with this shape and scale; fails unless both are positive
+    /// and finite.
     pub fn new(shape: f64, scale: f64) -> Result<Weibull, ParamError> {
         let (shape, scale) =
             (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
         Ok(Weibull { shape, scale, log_norm: libm::log(shape) })
     }
 
-    /// ln(x / scale), also where the ratio is no double.
+    /// Returns ln(x / scale), also where the ratio overflows or underflows.
     fn log_ratio(&self, x: f64) -> f64 {
         let t = x / self.scale;
         if t >= f64::MIN_POSITIVE && t.is_finite() {
@@ -44,8 +45,8 @@ impl Scalar for Weibull {
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         let power = libm::log(-libm::log(rng.open_uniform())) / self.shape;
-        // For a large shape the factor is near 1, where a detour by the logarithm of the
-        // scale would be coarser than the spread.
+        // For a large shape the factor is near 1, where going through the logarithm of
+        // the scale would lose more precision than the standard deviation.
         let far = power.abs() > 700.0;
         representable(if far {
             libm::exp(libm::log(self.scale) + power)
@@ -96,7 +97,7 @@ impl Scalar for Weibull {
 
     fn number_sd(&self) -> Option<f64> {
         let e = 1.0 / self.shape;
-        // ln(1 + var / mean^2); by the zeta values' series where the plain difference
+        // ln(1 + var / mean^2), by a series in zeta values where the plain difference
         // would cancel.
         let log_ratio = if e < 1e-3 {
             let (two, three, four) =

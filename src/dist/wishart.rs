@@ -1,4 +1,4 @@
-//! The Wishart distribution over covariance matrices, as one over their Cholesky factors
+//! The Wishart distribution over covariance matrices, in terms of their Cholesky factors
 //! (Bartlett's decomposition).
 
 use super::draw::ln_gamma_draw;
@@ -12,13 +12,14 @@ use core::f64::consts::LN_2;
 use nalgebra::DMatrix;
 
 /// `wishart(df, scale_chol)`: the lower triangular Cholesky factor L, as n rows, of a
-/// matrix W = L L' that has the Wishart distribution with this many degrees of freedom
-/// and scale matrix S S', S = `scale_chol`. The mean of W is df S S'.
+/// matrix W = L L' that has the Wishart distribution with `df` degrees of freedom and
+/// scale matrix S S', S = `scale_chol`. The mean of W is df S S'.
 ///
 /// L = S A, where A is lower triangular with standard normal numbers below the diagonal,
-/// and A\[i\]\[i\]^2 chi-squared with df - i degrees of freedom. The density is by the
-/// lower triangle of L. Gradients are by the value (n x n numbers, 0 above the diagonal)
-/// and by df; those by S come apart ([`Wishart::scale_gradient`]).
+/// and A\[i\]\[i\]^2 is chi-squared with df - i degrees of freedom. The density is with
+/// respect to the lower triangle of L. Gradients are with respect to the value (n x n
+/// numbers, 0 above the diagonal) and df; those with respect to S are separate
+/// ([`Wishart::scale_gradient`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wishart {
     df: f64,
@@ -27,8 +28,9 @@ pub struct Wishart {
 }
 
 impl Wishart {
-    /// Fails unless the scale's factor is square, finite, lower triangular with a
-    /// positive diagonal, has a row, and `df` is finite and above the number of rows less 1.
+    /// Creates the distribution. Fails unless the scale's factor is square, finite, not
+    /// empty and lower triangular with a positive diagonal, and `df` is finite and above
+    /// the number of rows minus 1.
     pub fn new(df: f64, scale_chol: &DMatrix<f64>) -> Result<Wishart, ParamError> {
         let n = scale_chol.nrows();
         if n == 0 || scale_chol.ncols() != n {
@@ -72,9 +74,9 @@ impl Wishart {
         Ok(Wishart { df, scale, log_norm })
     }
 
-    /// The derivatives of the log density of a value by the scale's factor S, its lower
-    /// triangle by rows. With A = S^-1 L and G the derivatives by A, they are -S^-T G A'
-    /// less those of the log Jacobian.
+    /// Returns the derivatives of the log density with respect to the scale's factor S,
+    /// its lower triangle by rows. With A = S^-1 L and G the derivatives with respect to
+    /// A, they are -S^-T G A' minus those of the log Jacobian.
     pub fn scale_gradient(&self, x: &Datum) -> Option<Vec<f64>> {
         if !self.log_density(x).is_finite() {
             return None;
@@ -92,7 +94,8 @@ impl Wishart {
         by.iter().all(|g| g.is_finite()).then_some(by)
     }
 
-    /// The derivatives of the log density by column `j` of A = S^-1 L.
+    /// Returns the derivatives of the log density with respect to column `j` of A = S^-1
+    /// L.
     fn by_whitened(&self, a: &[f64], j: usize) -> Vec<f64> {
         let n = self.scale.size();
         let mut column: Vec<f64> = (0..n).map(|i| -a[i * n + j]).collect();
@@ -100,7 +103,7 @@ impl Wishart {
         column
     }
 
-    /// S^-1 L.
+    /// Returns S^-1 L.
     fn whiten(&self, xs: &[f64]) -> Vec<f64> {
         let n = self.scale.size();
         let (zeros, mut a) = (vec![0.0; n], vec![0.0; n * n]);
@@ -114,8 +117,8 @@ impl Wishart {
     }
 }
 
-/// The log density of the root of a chi-squared number; by that of a gamma number where
-/// the plain formula would cancel.
+/// Returns the log density of the square root of a chi-squared number. Uses the gamma
+/// density where the plain formula would cancel.
 fn log_chi(df: f64, x: f64) -> f64 {
     let (half, t) = (0.5 * df, 0.5 * x * x);
     match Gamma::new(half, 1.0) {

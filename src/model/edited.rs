@@ -1,5 +1,5 @@
-//! Programs made from programs: another text, more at the end, a question; and the plans
-//! of a model by name. For whoever writes a program bit by bit.
+//! Programs derived from other programs: with a new text, additional items or a query;
+//! and the plans of a model by name. Used where programs are edited step by step.
 
 use super::program::Files;
 use super::{Error, Model, Program};
@@ -11,8 +11,8 @@ use std::sync::Arc;
 
 #[doc(hidden)]
 impl Program {
-    /// The same program with another text: what it was given stays, and so do the files
-    /// that it has read.
+    /// Returns the same program with another text. It keeps its parameters and data, and
+    /// the data files that have been read.
     ///
     /// # Errors
     /// As [`Program::open`].
@@ -22,8 +22,8 @@ impl Program {
         Ok(Program { loaded, sources, text, ..self.clone() })
     }
 
-    /// The same program with more items at its end, from a text of its own that includes
-    /// nothing.
+    /// Returns the same program with more items at its end. They are parsed from a
+    /// separate text, which must not include files.
     ///
     /// # Errors
     /// If the text does not parse.
@@ -34,12 +34,12 @@ impl Program {
         })
     }
 
-    /// The same program with `sample e;` at its end, `e` being the expression of a text
-    /// of its own: its value is that of the last of
+    /// Returns the same program with `sample e;` at its end, where `e` is an expression
+    /// parsed from a separate text. Its value is the last of
     /// [`Code::samples`](crate::lang::code::Code::samples).
     ///
     /// # Errors
-    /// If the text is no expression.
+    /// If the text is not an expression.
     pub fn asking(&self, name: &str, text: &str) -> Result<Program, Error> {
         self.with_items(name, text, |text, file| {
             let expr = parse_expr(text, file)?;
@@ -72,17 +72,17 @@ impl Program {
         }
     }
 
-    /// The same program as it would be loaded from a file of its text: from there it
-    /// includes and reads.
+    /// Returns the same program as if it had been loaded from this path: included and
+    /// read files are resolved relative to it.
     ///
     /// # Errors
-    /// If it would not load from there.
+    /// If it cannot be loaded from there.
     pub fn written_as(&self, path: &str) -> Result<Program, Error> {
         Program { name: path.to_owned(), reach: self.reach.of(path), ..self.clone() }
             .edited(&self.text)
     }
 
-    /// Another program with what this one was given, as far as it asks for it.
+    /// Loads another program with the parameters and data of this one that it declares.
     ///
     /// # Errors
     /// As [`Program::open`].
@@ -107,12 +107,12 @@ impl Program {
 
 #[doc(hidden)]
 impl Model {
-    /// The names of its inference blocks that have one.
+    /// Returns the names of the `infer` blocks that have one.
     pub fn plan_names(&self) -> impl Iterator<Item = &str> {
         self.compiled.plans.iter().filter_map(|p| p.name.as_deref())
     }
 
-    /// The inference block of a name.
+    /// Returns the `infer` block with this name.
     pub fn plan_named(&self, name: &str) -> Option<Arc<[KStmt]>> {
         self.compiled
             .plans
@@ -121,7 +121,7 @@ impl Model {
             .map(|p| Arc::clone(&p.body))
     }
 
-    /// The last inference block.
+    /// Returns the last `infer` block.
     pub fn last_plan(&self) -> Option<Arc<[KStmt]>> {
         self.compiled.plans.last().map(|p| Arc::clone(&p.body))
     }

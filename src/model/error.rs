@@ -1,15 +1,16 @@
-//! What is wrong with a program or its run, as messages.
+//! Errors in a program or its run, as diagnostics.
 
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
 use crate::lang::error::{Fault, RunError};
 use std::fmt;
 
-/// What is wrong with a program, its data, or a run of it: messages with their places.
+/// An error in a program, its data or a run of it: diagnostics with the source texts they
+/// refer to.
 #[derive(Clone)]
 pub struct Error {
-    /// The messages.
+    /// The diagnostics.
     pub diagnostics: Vec<Diagnostic>,
-    /// The texts they point into.
+    /// The source texts that they refer to.
     pub sources: SourceMap,
 }
 
@@ -19,7 +20,8 @@ impl fmt::Display for Error {
     }
 }
 
-/// As it is shown: what a `main` that returns it prints is for people too.
+/// The same as `Display`, because a `main` that returns this error prints it with
+/// `Debug`.
 impl fmt::Debug for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
@@ -48,7 +50,7 @@ impl IntoDiagnostic for RunError {
     }
 }
 
-/// An error without a place in a text.
+/// Creates an error without a source location.
 pub(super) fn plain_error(f: Fault, sources: &SourceMap) -> Error {
     let mut d = Diagnostic::new(Severity::Error, f.message);
     d.hints.extend(f.hint);

@@ -1,4 +1,4 @@
-//! Programs on their way to models: loaded, given parameters and data, compiled.
+//! Programs before they become models: loading, parameters and data, compilation.
 
 use super::error::plain_error;
 use super::{Error, Model};
@@ -24,15 +24,15 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The arguments that the run's camera stands in for.
+/// The arguments that default to the run's camera.
 const CAMERAS: [(&str, &str); 2] = [("scene.render", "camera"), ("scene.candidates", "camera")];
 
-/// Files of data that a program has read, with their hashes, by kind, path and how they
-/// were read.
+/// The data files that a program has read, with their hashes, by kind, path and reading
+/// options.
 pub(super) type Files = Arc<Mutex<FxHashMap<(String, String, String), (Value, String)>>>;
 
-/// A program on its way to a [`Model`]: loaded, its inputs not yet given. A clone can go
-/// another way: both keep what they read.
+/// A loaded program, before it is compiled to a [`Model`] with its inputs. Clones are
+/// independent, except that they share the data files that were read.
 #[derive(Clone)]
 pub struct Program {
     pub(super) loaded: Loaded,
@@ -51,19 +51,19 @@ pub struct Program {
 }
 
 impl Program {
-    /// Loads a program by path; the shipped programs are found in any folder. It, and the
-    /// files that it names, may be read below its own folder and nowhere else.
+    /// Loads a program by path; the shipped programs are available in any folder. The
+    /// program and the files that it names may be read in and below its own folder only.
     ///
     /// # Errors
-    /// If a file is missing or may not be read, or does not parse.
+    /// If a file is missing, may not be read, or does not parse.
     pub fn open(path: &str) -> Result<Program, Error> {
         Program::open_allowing::<&str>(path, &[])
     }
 
-    /// As [`Program::open`], and may read below these folders, too.
+    /// Like [`Program::open`], but allows reading below these folders, too.
     ///
     /// # Errors
-    /// As [`Program::open`], and if one of them is no folder.
+    /// As [`Program::open`], and if one of them is not a folder.
     pub fn open_allowing<P: AsRef<Path>>(path: &str, folders: &[P]) -> Result<Program, Error> {
         let mut reach = Reach::default().of(path);
         for folder in folders {
@@ -80,7 +80,8 @@ impl Program {
         }
     }
 
-    /// A program from its text; it can include only what is built in, and reads no files.
+    /// Parses a program from its text. It can include only shipped programs, and cannot
+    /// read files.
     ///
     /// # Errors
     /// If it does not parse.
@@ -88,8 +89,8 @@ impl Program {
         Program::read("<program>", text, Reach::default())
     }
 
-    /// A program from its text, which stands for a file of this name: what it includes
-    /// and reads is found from there.
+    /// Parses a program from its text as if it were the file with this name: included and
+    /// read files are resolved relative to it.
     ///
     /// # Errors
     /// As [`Program::open`].
@@ -129,23 +130,23 @@ impl Program {
         }
     }
 
-    /// Its parameters and data.
+    /// Returns its parameters and data.
     pub fn interface(&self) -> Interface {
         inspect(&self.loaded)
     }
 
-    /// The name of its main file.
+    /// Returns the name of its main file.
     #[doc(hidden)]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The text of its main file.
+    /// Returns the text of its main file.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The `data` items that have no value yet.
+    /// Returns the names of the `data` items that have neither a value nor a default.
     #[doc(hidden)]
     pub fn missing_data(&self) -> Vec<String> {
         let open = self
@@ -156,19 +157,20 @@ impl Program {
         open.map(|d| d.name).collect()
     }
 
-    /// A hash of its text, that of the files it includes, and the parameters set so far:
-    /// that of the model it gives.
+    /// Returns a hash of its text, of the files that it includes, and of the parameters
+    /// set so far. The compiled model has the same hash.
     pub fn hash(&self) -> String {
         hash_of(&self.loaded, &self.sources, &self.sets)
     }
 
-    /// Names of built-in files that stood in for files of the user's own.
+    /// Returns the names of shipped files that were used because no file of that name was
+    /// found.
     #[doc(hidden)]
     pub fn embedded(&self) -> &[String] {
         &self.loaded.embedded
     }
 
-    /// Sets a `param`, its value written as in a program.
+    /// Sets a `param` to a value written as in a program.
     #[must_use]
     pub fn set(mut self, name: &str, value: &str) -> Program {
         self.sets.retain(|(n, _)| n != name);
@@ -176,21 +178,21 @@ impl Program {
         self
     }
 
-    /// Whether a `param` was set.
+    /// Returns whether a `param` was set.
     #[doc(hidden)]
     pub fn is_set(&self, name: &str) -> bool {
         self.sets.iter().any(|(n, _)| n == name)
     }
 
-    /// Gives a `data` item.
+    /// Sets the value of a `data` item.
     #[must_use]
     pub fn observe(mut self, name: &str, value: Value) -> Program {
         self.data.insert(name.into(), value);
         self
     }
 
-    /// Lets its `data` items and kernels read files below a folder; what it includes was
-    /// read when it was [opened](Program::open_allowing).
+    /// Allows its `data` items and kernels to read files below a folder. For included
+    /// files, see [`Program::open_allowing`]: they were read when the program was opened.
     ///
     /// # Errors
     /// If there is no such folder.
@@ -199,19 +201,19 @@ impl Program {
         Ok(self)
     }
 
-    /// Bounds on what the program may build when it is not run but looked at: one draw,
-    /// the plan. Runs have their own ([`crate::RunOptions::limits`]).
+    /// Sets the limits for evaluations outside of runs, such as a single draw or making
+    /// the plan. Runs have separate limits ([`crate::RunOptions::limits`]).
     #[must_use]
     pub fn limits(self, limits: Limits) -> Program {
         Program { limits, ..self }
     }
 
     /// Reads a file for a `data` item as its declared kind, with the options of its
-    /// default. What that file names is read below its own folder and where the program
-    /// may read.
+    /// default. Files that it refers to may be in or below its own folder, or wherever
+    /// the program may read.
     ///
     /// # Errors
-    /// If the program has no such item, or the file cannot be read as that.
+    /// If the program has no such item, or the file cannot be read as that kind.
     pub fn observe_file(self, name: &str, path: &str) -> Result<Program, Error> {
         let item = self.interface().data.into_iter().find(|d| d.name == name);
         let (kind, options) = item.map_or((None, Options::default()), |d| (d.ty, d.options));
@@ -233,32 +235,32 @@ impl Program {
         }
     }
 
-    /// The value of an argument wherever a program leaves it out: of a built-in by full
-    /// name, an argument by name.
+    /// Sets a default for an argument that a program omits. The built-in is given by its
+    /// full name, the argument by its name.
     #[must_use]
     pub fn default_argument(mut self, function: &str, argument: &str, value: Value) -> Program {
         self.defaults.insert((function.into(), argument.into()), value);
         self
     }
 
-    /// What the program calls may be the host's too.
+    /// Makes the host's functions available to the program.
     ///
     /// # Errors
-    /// If the host brings a name of the language without saying that it replaces it, or
-    /// something is wrong with what it brings.
+    /// If the host defines a name of the language without marking it as a replacement, or
+    /// one of its definitions is invalid.
     pub fn host(mut self, host: &Host) -> Result<Program, Error> {
         self.builtins = host.table()?;
         Ok(self)
     }
 
-    /// Compiles also when `data` items are not given, to check the rest.
+    /// Allows compilation with missing `data` items, to check the rest of the program.
     #[must_use]
     pub fn without_data(mut self) -> Program {
         self.needs_data = false;
         self
     }
 
-    /// Says what is to run although nothing asks for it.
+    /// Sets what is evaluated even if nothing depends on it.
     #[must_use]
     #[doc(hidden)]
     pub fn eager(mut self, eager: Eager) -> Program {
@@ -266,7 +268,7 @@ impl Program {
         self
     }
 
-    /// The camera of views that name none.
+    /// Sets the camera of views that do not specify one.
     #[must_use]
     pub fn camera(self, camera: Camera) -> Program {
         CAMERAS.iter().fold(self, |p, (of, name)| {
@@ -274,24 +276,24 @@ impl Program {
         })
     }
 
-    /// Contours of photographs are found by a detector wherever the program says nothing
-    /// of it: a value as of `data d = detector("file");`, `None` for the detector that is
-    /// built in.
+    /// Sets the contour detector for photographs for which the program does not specify
+    /// one: a value as from `data d = detector("file");`, or one with `None` for the
+    /// built-in detector.
     #[must_use]
     #[doc(hidden)]
     pub fn detector(self, detector: DetectorValue) -> Program {
         self.default_argument("scene.edges", "detector", Value::object(detector))
     }
 
-    /// The detector that was chosen for the program.
+    /// Returns the detector that was set by [`Program::detector`].
     fn chosen_detector(&self) -> Option<DetectorValue> {
         let chosen = self.defaults.get(&("scene.edges".to_owned(), "detector".to_owned()))?;
         chosen.downcast::<DetectorValue>().cloned()
     }
 
-    /// Without a camera, the default view in the shape of the first picture given, or of
-    /// that of keypoints. Keypoints that do not say which picture they belong to belong
-    /// to the first one.
+    /// If no camera was set, uses the default view with the size of the first picture
+    /// among the data, or else of the first keypoints that state one. Keypoints that do
+    /// not state their picture's size get that of the first picture.
     fn default_camera(&mut self) {
         let picture = self.data.values().find_map(|v| {
             let image = v.downcast::<ImageValue>().map(ImageValue::size);
@@ -324,7 +326,7 @@ impl Program {
     /// Checks and lowers the program.
     ///
     /// # Errors
-    /// Everything that is wrong with it.
+    /// All errors in the program.
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
         let detector = self.chosen_detector();
@@ -384,7 +386,7 @@ impl Program {
     }
 }
 
-/// The contents of a file named relative to another.
+/// Reads a file that is named relative to another one.
 fn sibling(loader: &dyn Loader, file: &str, other: &str) -> Result<Vec<u8>, String> {
     let folder = file.rfind(['/', '\\']).map_or("", |i| &file[..=i]);
     let path = beside(folder, other);
@@ -394,7 +396,7 @@ fn sibling(loader: &dyn Loader, file: &str, other: &str) -> Result<Vec<u8>, Stri
     })
 }
 
-/// What may be read, and below one more folder.
+/// Extends the folders that may be read by one more.
 fn widened(reach: Reach, folder: &Path, sources: &SourceMap) -> Result<Reach, Error> {
     reach.allow(folder).map_err(|e| {
         let message = format!("cannot read {}: {}", folder.display(), reason(&e));
@@ -402,7 +404,8 @@ fn widened(reach: Reach, folder: &Path, sources: &SourceMap) -> Result<Reach, Er
     })
 }
 
-/// A hash of all a program's text and settings: a saved trace belongs to it.
+/// Hashes all source texts and settings of a program, to check that a saved trace belongs
+/// to it.
 fn hash_of(loaded: &Loaded, sources: &SourceMap, sets: &[(String, String)]) -> String {
     let mut all = String::new();
     for u in &loaded.units {

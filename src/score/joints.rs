@@ -1,32 +1,34 @@
-//! Joints in a picture against labelled ones: the percentage of correct keypoints (Yang
-//! and Ramanan 2013).
+//! Detected joints in a picture against labelled ones: the percentage of correct
+//! keypoints (Yang and Ramanan 2013).
 
 use indexmap::IndexMap;
 
-/// The joints that are scored, each on both sides (`l_…`, `r_…`).
+/// The scored joints, each of which occurs on both sides (`l_…`, `r_…`).
 const PARTS: [&str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
 
-/// Labelled joints of one person.
+/// The labelled joints of one person.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointsTruth {
-    /// Where they are, in pixels of the picture, x to the right, y down.
+    /// Positions in pixels of the picture, x to the right, y down.
     pub joints: IndexMap<String, [f64; 2]>,
 }
 
-/// How far joints are from the labelled ones.
+/// The error of detected joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointsError {
     /// The number of labelled limb joints.
     pub labelled: usize,
-    /// How many of them were not found within 0.2 torso lengths (PCKt@0.2 counts the
-    /// others).
+    /// The number of those without a detection within 0.2 torso lengths (PCKt@0.2 counts
+    /// the others).
     pub missed: usize,
-    /// The mean distance of those that were found at all, in pixels; NaN if none was.
+    /// The mean distance of the detected joints from their labels, in pixels; NaN if
+    /// there are none.
     pub pixels: f64,
 }
 
 impl JointsTruth {
-    /// The mean distance from a shoulder to the opposite hip, where both are labelled.
+    /// Returns the mean distance from a shoulder to the opposite hip, over the pairs that
+    /// are labelled.
     fn torso(&self) -> Option<f64> {
         let across = |a: &str, b: &str| Some(distance(self.joints.get(a)?, self.joints.get(b)?));
         let both = [across("l_shoulder", "r_hip"), across("r_shoulder", "l_hip")];
@@ -34,13 +36,13 @@ impl JointsTruth {
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     }
 
-    /// Whether there is a limb joint to be found, and a torso to measure by.
+    /// Returns whether a limb joint is labelled, and a torso length is known.
     pub fn is_enough(&self) -> bool {
         self.torso().is_some() && limbs().any(|name| self.joints.contains_key(&name))
     }
 
-    /// How far found joints are off. A joint that was not found counts as missed; without
-    /// a torso all of them do.
+    /// Computes the error of detected joints. A joint that was not detected counts as
+    /// missed; without a torso length all joints do.
     pub fn error(&self, found: &IndexMap<String, [f64; 2]>) -> JointsError {
         let torso = self.torso();
         let (mut error, mut sum, mut seen) =
@@ -61,7 +63,7 @@ impl JointsTruth {
     }
 }
 
-/// The names of all limb joints.
+/// Returns the names of all limb joints.
 fn limbs() -> impl Iterator<Item = String> {
     PARTS.iter().flat_map(|p| ["l_", "r_"].map(|side| format!("{side}{p}")))
 }

@@ -1,8 +1,9 @@
-//! How far an answer is from a known truth: surfaces, joints, posteriors.
+//! Errors of answers with respect to the ground truth: surfaces, joints, posteriors.
 //!
-//! Numbers only: no files, no traces, nothing printed. Every error is zero for the truth
-//! itself, and known for answers that say nothing, too: that costs as much as all of it
-//! in the wrong place, so that errors can be averaged. Answers may be worse than none.
+//! This module computes with numbers only: it has no files or traces and prints nothing.
+//! Every error is zero for the ground truth. Errors that are averaged over cases are also
+//! defined for missing answers, which cost as much as an answer that is entirely in the
+//! wrong place. An answer can be worse than a missing one.
 
 mod joints;
 mod posterior;

@@ -1,4 +1,4 @@
-//! Posterior moments against those of a reference.
+//! Errors of posterior moments with respect to a reference.
 
 use indexmap::IndexMap;
 
@@ -11,22 +11,22 @@ pub struct Normal {
     pub sd: f64,
 }
 
-/// What is known of a posterior: quantities by name.
+/// Known moments of a posterior, by quantity.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reference {
-    /// Their means and standard deviations.
+    /// The means and standard deviations of the quantities.
     pub quantities: IndexMap<String, Normal>,
 }
 
 impl Reference {
-    /// What a quantity costs of which nothing is known: as much as a point mass two
-    /// standard deviations off.
+    /// The error for a quantity without an answer: that of a point mass two standard
+    /// deviations from the mean.
     pub const UNKNOWN: f64 = 2.236_067_977_499_79;
 
-    /// The root mean square, over the quantities, of the 2-Wasserstein distance between
-    /// normals of the two means and standard deviations (Givens and Shortt 1984), in
-    /// standard deviations of the reference: 0 if both agree, 1 for a point mass at the
-    /// right mean.
+    /// Returns the root mean square, over the quantities, of the 2-Wasserstein distance
+    /// between normals with the two means and standard deviations (Givens and Shortt
+    /// 1984), in standard deviations of the reference: 0 if both agree, 1 for a point
+    /// mass at the right mean.
     pub fn error(&self, found: &IndexMap<String, Normal>) -> f64 {
         let one = |(name, truth): (&String, &Normal)| {
             let found = found.get(name)?;
@@ -54,7 +54,7 @@ mod tests {
         };
         let reference = Reference { quantities: all(&[("a", 1.0, 2.0), ("b", 0.0, 1.0)]) };
         assert_eq!(reference.error(&reference.quantities), 0.0);
-        // a: mean off by one sd, sd half; b: a point mass.
+        // a: the mean is off by one sd, and the sd is half; b: a point mass.
         let e = reference.error(&all(&[("a", 3.0, 1.0), ("b", 0.0, 0.0)]));
         assert!((e - ((1.25 + 1.0) / 2.0f64).sqrt()).abs() < 1e-12);
         assert!((reference.error(&IndexMap::new()) - Reference::UNKNOWN).abs() < 1e-12);

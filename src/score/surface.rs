@@ -1,16 +1,15 @@
-//! A visible surface against the true one, in a picture of both (the measures of Kulkarni
-//! et al. 2014, section 3.1, after Barron and Malik 2013).
+//! Errors of a visible surface with respect to the true one, in a picture of both (the
+//! measures of Kulkarni et al. 2014, section 3.1, after Barron and Malik 2013).
 
-/// What is seen in each pixel, row by row from the top.
+/// The visible surface in each pixel, row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// Pixels across.
+    /// The width in pixels.
     pub width: usize,
-    /// Distance along the viewing axis in scene units; not finite, or not above 0, where
-    /// nothing is seen.
+    /// Distance along the viewing axis in scene units; background pixels have a value
+    /// that is not finite or not positive.
     pub depth: Vec<f32>,
-    /// Unit normals; x right, y up, z towards the camera. Looked at only where something
-    /// is seen.
+    /// Unit normals; x right, y up, z towards the camera. Ignored in background pixels.
     pub normal: Vec<[f32; 3]>,
 }
 
@@ -20,8 +19,8 @@ impl Surface {
         (z.is_finite() && z > 0.0).then_some(z)
     }
 
-    /// Width and height of what is seen, in scene units, at its mean depth; `pixel` is
-    /// the width of a pixel at a depth.
+    /// Returns the width and height of the visible surface, in scene units, at its mean
+    /// depth; `pixel` gives the width of a pixel at a depth.
     pub fn extent(&self, pixel: impl Fn(f64) -> f64) -> (f64, f64) {
         let w = self.width.max(1);
         let seen: Vec<(usize, f64)> =
@@ -36,39 +35,42 @@ impl Surface {
     }
 }
 
-/// A true surface.
+/// The ground truth of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceTruth {
-    /// What is to be seen.
+    /// The true surface.
     pub surface: Surface,
-    /// The object's height along its axis in scene units: the unit of depth errors.
+    /// The object's height along its axis in scene units, in which depth errors are
+    /// expressed.
     pub height: f64,
-    /// Its width in scene units; half of it is what a pixel in only one of two masks
-    /// costs.
+    /// Its width in scene units. A pixel that is in only one of the two masks costs half
+    /// of it.
     pub width: f64,
 }
 
-/// How far a surface is from the true one. "Both" are the pixels where both are, "either"
-/// those where one of them is.
+/// The error of a surface. "Both" are the pixels in both masks, "either" those in at
+/// least one of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceError {
-    /// Mean absolute difference of depth over both, up to one shift of all depths, in
-    /// object heights. NaN if there are none.
+    /// Mean absolute difference of depth over both, after the best common shift of depth,
+    /// in object heights. NaN if there are no such pixels.
     pub z_mae: f64,
-    /// The same over either, a pixel of only one at the cost of the object's half width:
-    /// a small safe answer does not win.
+    /// The same over either, where a pixel in only one mask costs half the object's
+    /// width, so that a small, safe answer has no advantage.
     pub z_mae_u: f64,
-    /// Mean squared distance of unit normals over both. NaN if there are none.
+    /// Mean squared distance of unit normals over both. NaN if there are no such pixels.
     pub n_mse: f64,
-    /// The same over either, a pixel of only one at 2, as if the normals were orthogonal.
+    /// The same over either, where a pixel in only one mask costs 2, as for orthogonal
+    /// normals.
     pub n_mse_u: f64,
-    /// Both by either.
+    /// Intersection over union: the number of pixels in both divided by that in either.
     pub iou: f64,
 }
 
 impl SurfaceTruth {
-    /// How far an answer is off; none (`None`) is as one that nowhere meets the truth. An
-    /// answer of another size is read at the nearest pixel.
+    /// Computes the error of an answer; a missing one (`None`) counts like one that does
+    /// not overlap the true surface. An answer of another size is sampled at the nearest
+    /// pixel.
     pub fn error(&self, found: Option<&Surface>) -> SurfaceError {
         let truth = &self.surface;
         let rows = |s: &Surface| s.depth.len() / s.width.max(1);
@@ -76,7 +78,7 @@ impl SurfaceTruth {
         for i in 0..truth.depth.len() {
             let there = found.filter(|f| !f.depth.is_empty()).map(|f| {
                 let (x, y) = (i % truth.width.max(1), i / truth.width.max(1));
-                // The pixel that holds the middle of this one.
+                // The pixel that contains the centre of this one.
                 let nearest = |at: usize, to: usize, of: usize| (2 * at + 1) * to / (2 * of.max(1));
                 (f, nearest(y, rows(f), rows(truth)) * f.width + nearest(x, f.width, truth.width))
             });
@@ -116,8 +118,8 @@ impl SurfaceTruth {
     }
 }
 
-/// The squared distance of two unit normals; 2, as if they were orthogonal, where one is
-/// missing.
+/// Returns the squared distance of two unit normals; 2, as for orthogonal normals, if one
+/// is missing.
 fn normal_gap(a: &Surface, i: usize, b: &Surface, j: usize) -> f64 {
     let unit = |s: &Surface, i: usize| {
         let n = s.normal.get(i)?.map(f64::from);
@@ -130,7 +132,7 @@ fn normal_gap(a: &Surface, i: usize, b: &Surface, j: usize) -> f64 {
     }
 }
 
-/// The middle number, or the mean of the middle two.
+/// Returns the median.
 fn median(xs: &mut [f64]) -> f64 {
     xs.sort_by(f64::total_cmp);
     let n = xs.len();
@@ -159,8 +161,8 @@ mod tests {
     #[test]
     fn errors_by_hand() {
         let t = truth();
-        // One pixel off by 1, one missing, one too many, one normal turned by a right
-        // angle.
+        // One pixel is off by 1, one is missing, one is extra, and one normal is rotated
+        // by a right angle.
         let mut found = t.surface.clone();
         found.depth = vec![4.0, 5.0, 7.0, f32::INFINITY, 5.0, f32::NAN];
         found.normal[1] = [2.0, 0.0, 0.0];

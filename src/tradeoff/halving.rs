@@ -1,28 +1,29 @@
-//! Successive halving (Jamieson and Talwalkar 2016): all settings on few cases, the
-//! better half of them on more, until a few are left that have been through all cases.
+//! Successive halving (Jamieson and Talwalkar 2016): all settings run on a few cases, the
+//! better half of them on more, until the remaining ones have run on all cases.
 
 use super::runs::RunRecord;
 use indexmap::IndexMap;
 
-/// Some settings on some cases.
+/// One round: some settings on some cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Round {
-    /// How many settings are in it.
+    /// The number of settings.
     pub settings: usize,
-    /// On how many cases, those of earlier rounds included.
+    /// The number of cases, including those of earlier rounds.
     pub cases: usize,
 }
 
-/// The rounds that the budget is enough for: one of everything if it is, else as few as
-/// it takes. `each` is what a setting takes on one case on average, in seconds of the
-/// whole machine.
+/// Plans the rounds for a budget: a single round of all settings on all cases if it fits,
+/// otherwise as few rounds as possible, or as many as possible if nothing fits. `each` is
+/// the mean time of one setting on one case. Times are in seconds of the whole machine.
 pub fn rounds(settings: usize, cases: usize, each: f64, budget: f64) -> Vec<Round> {
     let most = cases.max(1).ilog2() as usize + 1;
     let of = |n: usize| -> Vec<Round> {
         (0..n)
             .map(|i| Round {
                 settings: settings.div_ceil(1 << i),
-                // Not fewer than three where there are as many: one or two say little.
+                // At least three cases if there are as many: one or two are not
+                // informative enough.
                 cases: if i + 1 == n {
                     cases
                 } else {
@@ -34,24 +35,23 @@ pub fn rounds(settings: usize, cases: usize, each: f64, budget: f64) -> Vec<Roun
     (1..=most).map(of).find(|r| runs_of(r) as f64 * each <= budget).unwrap_or_else(|| of(most))
 }
 
-/// The number of runs.
+/// Returns the number of runs; those of earlier rounds are not repeated.
 fn runs_of(rounds: &[Round]) -> usize {
     let before = |i: usize| if i == 0 { 0 } else { rounds[i - 1].cases };
     rounds.iter().enumerate().map(|(i, r)| r.settings * (r.cases.saturating_sub(before(i)))).sum()
 }
 
-/// The settings that go on: those that come first at some time. A setting is as good as
-/// its best rank over all times at which it and others were looked at; of equals, the one
-/// of smaller mean rank. A run that failed is worse than any other. `runs` are of the
-/// same cases for all settings.
+/// Returns the settings for the next round: those that are best at some time. A setting
+/// is as good as its best rank over all times at which it was measured together with
+/// others; ties are broken by the mean rank. Settings with a failed run come last. `runs`
+/// must be on the same cases for all settings.
 pub fn survivors(settings: &[String], runs: &[RunRecord], keep: usize) -> Vec<String> {
     // Errors by time and setting.
     let mut errors: IndexMap<i64, IndexMap<&str, Vec<f64>>> = IndexMap::new();
     let failed = |setting: &str| runs.iter().any(|r| r.setting == setting && r.failed.is_some());
     for run in runs.iter().filter(|r| settings.contains(&r.setting) && !failed(&r.setting)) {
         for mark in &run.marks {
-            // The end of a run competes at the nearest time at which others are looked
-            // at.
+            // The end of a run counts at the nearest time at which others are measured.
             let at = mark.at.unwrap_or(mark.seconds);
             let time = (at.max(1e-3).log10() * 4.0).round() as i64;
             let errors = errors.entry(time).or_default().entry(&run.setting).or_default();
@@ -67,8 +67,8 @@ pub fn survivors(settings: &[String], runs: &[RunRecord], keep: usize) -> Vec<St
         let mut order: Vec<(&str, f64)> = at.iter().map(|(s, xs)| (*s, mean(xs))).collect();
         order.sort_by(|a, b| a.1.total_cmp(&b.1));
         for (rank, (setting, error)) in order.iter().enumerate() {
-            // Equals all come last among them: when nobody has an answer yet, nobody is
-            // first.
+            // Ties all get the last rank among them: before there are any answers, no
+            // setting is first.
             let last = order.iter().rposition(|o| o.1 == *error).unwrap_or(rank);
             if let Some(all) = ranks.get_mut(setting) {
                 all.push(last);
@@ -131,8 +131,8 @@ mod tests {
         assert_eq!(survivors(&all, &runs, 3), ["never", "early", "late"]);
         assert_eq!(survivors(&all, &[], 4), all);
 
-        // Before there is an answer all are equal, and alone one is not first; a run that
-        // failed counts against its setting.
+        // Before there are answers all settings are tied, and a setting that is measured
+        // alone is not first; a failed run counts against its setting.
         let runs = [
             run("early", &[(0.1, 1.0), (1.0, 0.5)]),
             run("late", &[(0.1, 1.0), (1.0, 0.1)]),

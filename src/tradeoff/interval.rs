@@ -1,24 +1,25 @@
-//! How sure a mean over cases is.
+//! The uncertainty of a mean over cases.
 
 use crate::rng::{Purpose, StreamKey};
 
-/// A mean and where it may be.
+/// A mean and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The mean.
     pub mean: f64,
-    /// Five in a hundred means of resampled cases are below.
+    /// The 5 % quantile of the means of resampled cases.
     pub low: f64,
-    /// Five in a hundred are above.
+    /// The 95 % quantile.
     pub high: f64,
 }
 
-/// The number of resampled sets of cases.
+/// The number of bootstrap samples.
 const RESAMPLED: u64 = 1000;
 
-/// The mean over cases, each case the mean of its runs, and its 90 % interval by
-/// resampling cases (Efron 1979; percentiles). Cases are what differs most, so the
-/// interval says what other pictures of the kind would give. NaN where there are none.
+/// Returns the mean over cases, where each case is the mean of its runs, and its 90 %
+/// interval by the bootstrap over cases (Efron 1979; percentiles). Most of the variance
+/// is between cases, so the interval estimates the results for other pictures of the same
+/// kind. NaN if there are no cases.
 pub fn mean_interval(cases: &[Vec<f64>]) -> Interval {
     let each: Vec<f64> = cases.iter().filter(|c| !c.is_empty()).map(|c| mean(c)).collect();
     if each.is_empty() {

@@ -1,8 +1,8 @@
-//! What speed costs in accuracy: settings to try, the runs of them, which are kept, the
-//! front, and the presets chosen from it.
+//! The trade-off between speed and accuracy: settings to try, their runs, selection by
+//! successive halving, the front, and the presets chosen from it.
 //!
-//! Numbers and text only: the runs themselves, and the truth they are compared with, are
-//! the command's business.
+//! This module works on numbers and text only: the command performs the runs and compares
+//! them with the ground truth.
 
 mod halving;
 mod interval;

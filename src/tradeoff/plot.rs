@@ -1,20 +1,20 @@
-//! Error against seconds as a picture.
+//! A plot of error against time.
 //!
-//! Invariant: only finite numbers are written, whatever the rows are.
+//! Invariant: only finite numbers are written, for any rows.
 
 use super::rows::Row;
 use std::fmt::Write;
 
 const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 460.0;
-/// Room for the labels at the left and the bottom, and little at the other sides.
+/// Margins: wide enough for the labels on the left and at the bottom.
 const LEFT: f64 = 58.0;
 const BOTTOM: f64 = 40.0;
 const EDGE: f64 = 16.0;
 
-/// Where numbers are in the picture.
+/// Maps times and errors to positions in the picture.
 struct Axes {
-    /// Powers of ten.
+    /// The range, as powers of ten.
     time: (f64, f64),
     top: f64,
 }
@@ -30,9 +30,9 @@ impl Axes {
     }
 }
 
-/// A plot as SVG: a thin line for each setting over time, its end as a dot with its
-/// interval, and the front in colour. `error` says what the error is; `named` are
-/// settings to label, such as presets, with their labels.
+/// Plots the rows as SVG: for each setting a thin line over time and a dot with its
+/// interval at the end, and the front in colour. `error` names the error measure; `named`
+/// are settings to label, such as presets, with their labels.
 pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
     let shown: Vec<&Row> = rows
         .iter()
@@ -106,7 +106,7 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
     for (setting, label) in named {
         if let Some(r) = ends.iter().find(|r| r.setting == *setting) {
             let (x, y) = (axes.x(r.seconds), axes.y(r.error));
-            // Labels near the right edge stand to the left of their dots.
+            // Labels near the right edge are placed to the left of their dots.
             let (x, anchor) = if x > WIDTH - 90.0 { (x - 8.0, "end") } else { (x + 8.0, "start") };
             let _ = writeln!(
                 s,
@@ -119,7 +119,7 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
     s + "</svg>\n"
 }
 
-/// Lines and labels of both axes.
+/// Draws the grid lines and labels of both axes.
 fn grid(s: &mut String, axes: &Axes, error: &str) {
     let (low, high) = axes.time;
     for power in low.floor() as i32..=high.ceil() as i32 {
@@ -144,7 +144,7 @@ fn grid(s: &mut String, axes: &Axes, error: &str) {
         let e = f64::from(i) * step;
         let y = axes.y(e);
         let _ = write!(s, "<path d=\"M{LEFT},{y:.1}H{}\" stroke=\"#eee\"/>", WIDTH - EDGE);
-        // Not 0.30000000000000004.
+        // Avoids labels such as 0.30000000000000004.
         let e = if e < 1e6 { (e * 1e9).round() / 1e9 } else { e };
         let (x, y) = (LEFT - 6.0, y + 4.0);
         let _ = writeln!(
@@ -162,7 +162,7 @@ fn grid(s: &mut String, axes: &Axes, error: &str) {
     );
 }
 
-/// A round distance of lines, of which five to ten fit.
+/// Returns a round step for the grid lines, of which about five to ten fit.
 fn step(top: f64) -> f64 {
     let rough = top / 8.0;
     let power = 10f64.powf(rough.log10().floor());

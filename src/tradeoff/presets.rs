@@ -1,28 +1,28 @@
-//! Settings chosen from a front, by name and by the time there is, with what they were
-//! chosen from.
+//! Presets: settings chosen from a front, by quality or by available time, with the
+//! measurements behind them.
 
 use super::rows::{self, Row};
 use super::setting::Setting;
 use serde::{Deserialize, Serialize};
 
-/// How much accuracy is wanted for how much time.
+/// The desired balance of accuracy and time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Quality {
-    /// The quickest on the front that has at most 1.5 times the error of the most
-    /// accurate.
+    /// The fastest setting on the front with at most 1.5 times the error of the most
+    /// accurate one.
     Fast,
-    /// The quickest that has at most 1.15 times its error.
+    /// The fastest with at most 1.15 times that error.
     Balanced,
     /// The most accurate.
     Accurate,
 }
 
 impl Quality {
-    /// All of them, the quickest first.
+    /// All qualities, fastest first.
     pub const ALL: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::Accurate];
 
-    /// Its name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Quality::Fast => "fast",
@@ -31,7 +31,7 @@ impl Quality {
         }
     }
 
-    /// How many times the least error it may have.
+    /// Returns the allowed error, as a multiple of the smallest one.
     fn factor(self) -> f64 {
         match self {
             Quality::Fast => 1.5,
@@ -41,47 +41,48 @@ impl Quality {
     }
 }
 
-/// A setting on the front, and what was measured of it.
+/// A setting on the front, with its measurements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Preset {
     /// The setting.
     #[serde(flatten)]
     pub setting: Setting,
-    /// Seconds it took, the mean over cases.
+    /// The time of a run in seconds, the mean over cases.
     pub seconds: f64,
-    /// Its error, the mean over cases.
+    /// The error, the mean over cases.
     pub error: f64,
     /// The 90 % interval of the error over cases.
     pub interval: [f64; 2],
-    /// How many cases.
+    /// The number of cases.
     pub cases: usize,
 }
 
-/// What is known of a program's settings.
+/// The measured settings of a program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Presets {
-    /// Where the evidence is: for readers.
+    /// A reference to the measurements, for readers.
     pub about: String,
-    /// What the error is.
+    /// The name of the error measure.
     pub error: String,
-    /// `data` items that must be given for this to hold.
+    /// The `data` items that must be given for the presets to apply.
     #[serde(default)]
     pub needs: Vec<String>,
-    /// The front, the quickest first.
+    /// The front, fastest first.
     pub front: Vec<Preset>,
 }
 
-/// What was chosen, and why.
+/// A chosen preset and the reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice<'a> {
-    /// The setting with its evidence.
+    /// The setting with its measurements.
     pub preset: &'a Preset,
-    /// What it was chosen for.
+    /// The option it was chosen for.
     pub wanted: String,
 }
 
 impl Preset {
-    /// The front of some settings, by a table that may have others, too.
+    /// Returns the front of the given settings. The table may contain others, which are
+    /// ignored.
     pub fn front(settings: &[Setting], rows: &[Row]) -> Vec<Preset> {
         let own = |row: &Row| settings.iter().find(|s| s.name() == row.setting);
         let (rows, settings): (Vec<Row>, Vec<&Setting>) =
@@ -100,15 +101,16 @@ impl Preset {
 }
 
 impl Presets {
-    /// The setting of a name; `None` if the front is empty.
+    /// Returns the preset for a quality; `None` if the front is empty.
     pub fn of_quality(&self, quality: Quality) -> Option<Choice<'_>> {
         let least = self.front.iter().map(|p| p.error).min_by(f64::total_cmp)?;
         let preset = self.front.iter().find(|p| p.error <= least * quality.factor())?;
         Some(Choice { preset, wanted: format!("--quality {}", quality.name()) })
     }
 
-    /// The best known setting for so many seconds: that of least error among those whose
-    /// runs were given as much or less; the quickest if none was.
+    /// Returns the best preset for a time limit in seconds: the one with the smallest
+    /// error among those whose runs had this limit or a lower one, or the fastest if
+    /// there are none.
     pub fn of_time(&self, seconds: f64) -> Option<Choice<'_>> {
         let within =
             self.front.iter().filter(|p| p.setting.time.unwrap_or(p.seconds) <= seconds * 1.001);
@@ -160,7 +162,7 @@ mod tests {
             ..RunRecord::default()
         };
         let settings = [own.clone(), other.clone()];
-        // The other one beats it, and is on the front of the table.
+        // The other one is better, and is on the front of the table.
         let table = rows::rows(&settings, &[run(&own, 0.2), run(&other, 0.1)]);
         assert_eq!(table.iter().map(|r| r.front).collect::<Vec<_>>(), [false, true]);
         let front = Preset::front(std::slice::from_ref(&own), &table);

@@ -1,5 +1,4 @@
-//! Settings at times, with their errors: the table, and the front of those that nothing
-//! beats.
+//! The table of settings at different times with their errors, and its Pareto front.
 
 use super::interval::{Interval, mean_interval};
 use super::runs::RunRecord;
@@ -7,37 +6,38 @@ use super::setting::Setting;
 use indexmap::IndexMap;
 use serde::Serialize;
 
-/// A setting at a time, over all cases it was run on.
+/// The result of a setting at one time, over all cases it was run on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// The setting, by its name.
+    /// The name of the setting.
     pub setting: String,
-    /// Whether this is the end of its runs; only ends can be had again by a run of so
-    /// many seconds, since schedules are cut to the time there is.
+    /// Whether this is the end of its runs. Only an end can be reproduced by a run with
+    /// that time limit, because schedules depend on the limit.
     pub end: bool,
-    /// Seconds from the start, the mean over its runs.
+    /// Seconds from the start, the mean over the runs.
     pub seconds: f64,
     /// The error, the mean over cases.
     pub error: f64,
-    /// The lower end of its 90 % interval over cases.
+    /// The lower end of the error's 90 % interval over cases.
     pub low: f64,
-    /// The upper end.
+    /// The upper end of that interval.
     pub high: f64,
     /// The number of cases.
     pub cases: usize,
-    /// The number of runs.
+    /// The number of runs measured at this time.
     pub runs: usize,
-    /// Runs that failed.
+    /// The number of failed runs of the setting.
     pub failed: usize,
-    /// Means of all that was measured of the last answers.
+    /// The means of all scores of the final answers.
     pub scores: IndexMap<String, f64>,
-    /// Effective draws a second, the median over runs, where it is known.
+    /// Effective sample size per second, the median over runs, if known.
     pub ess_per_second: Option<f64>,
-    /// Whether it is on the front.
+    /// Whether the row is on the front.
     pub front: bool,
 }
 
-/// The table: every setting at every time it was looked at, in the order of the settings.
+/// Returns the table: every setting at every time at which it was measured, in the order
+/// of the settings.
 pub fn rows(settings: &[Setting], runs: &[RunRecord]) -> Vec<Row> {
     let mut all = Vec::new();
     for name in settings.iter().map(Setting::name) {
@@ -97,15 +97,16 @@ fn row(name: &str, at: Option<f64>, runs: &[&RunRecord]) -> Option<Row> {
     })
 }
 
-/// The Pareto front, from the quickest to the most accurate: ends of settings that have
-/// been through as many cases as any, never failed, and that none of the others is as
-/// quick as and better.
+/// Returns the Pareto front, from the fastest to the most accurate. It contains the ends
+/// of settings that ran on the largest number of cases, never failed, and are more
+/// accurate than all faster ones.
 pub fn front(rows: &[Row]) -> Vec<usize> {
     let mut ends: Vec<usize> =
         (0..rows.len()).filter(|&i| rows[i].end && rows[i].failed == 0).collect();
     let most = ends.iter().map(|&i| rows[i].cases).max();
     ends.retain(|&i| Some(rows[i].cases) == most);
-    // Runs of one time differ by hundredths of it.
+    // Runs with the same time limit differ by a few per cent, so times are compared in
+    // steps of 5 %.
     let time = |i: usize| (rows[i].seconds.max(1e-9).ln() * 20.0).round();
     ends.sort_by(|&a, &b| {
         time(a).total_cmp(&time(b)).then(rows[a].error.total_cmp(&rows[b].error))
@@ -119,7 +120,7 @@ pub fn front(rows: &[Row]) -> Vec<usize> {
     ends
 }
 
-/// The table as comma-separated values.
+/// Returns the table as comma-separated values.
 pub fn to_csv(rows: &[Row]) -> String {
     let mut scores: Vec<&str> =
         rows.iter().flat_map(|r| r.scores.keys().map(String::as_str)).collect();
@@ -144,8 +145,7 @@ pub fn to_csv(rows: &[Row]) -> String {
         let number = |x: f64| format!("{x:.6}");
         let optional = |x: Option<f64>| x.map_or(String::new(), number);
         let mut cells = vec![
-            // The names of settings may hold commas and quotes, as values of parameters
-            // do.
+            // Names of settings may contain commas and quotes, as parameter values do.
             format!("\"{}\"", r.setting.replace('"', "\"\"")),
             r.end.to_string(),
             format!("{:.3}", r.seconds),

@@ -1,23 +1,23 @@
-//! What one run of one setting on one case gave.
+//! The results of one run of one setting on one case.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-/// How good the answer was at a time.
+/// The error of the answer at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
-    /// The time that was aimed at, in seconds from the start; none for the end of a run.
+    /// The target time, in seconds from the start; `None` for the end of a run.
     pub at: Option<f64>,
-    /// The time it was.
+    /// The actual time.
     pub seconds: f64,
-    /// The error of the answer that there was by then; none if a number could not be had.
+    /// The error of the answer at that time; `None` if it is undefined.
     pub error: Option<f64>,
 }
 
-/// One run.
+/// The results of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
-    /// The setting, by its name.
+    /// The name of the setting.
     pub setting: String,
     /// The case.
     pub case: String,
@@ -25,32 +25,32 @@ pub struct RunRecord {
     pub seed: u64,
     /// The error over time; the last is the end.
     pub marks: Vec<Mark>,
-    /// Everything that was measured of the last answer.
+    /// All scores of the final answer.
     pub scores: IndexMap<String, f64>,
-    /// Steps of all chains, warm-up included.
+    /// The steps of all chains, including warm-up.
     pub steps: u64,
-    /// The smallest effective number of draws of any quantity a second of the run, where
-    /// it is known.
+    /// The smallest effective sample size of any quantity, per second of the run, if
+    /// known.
     pub ess_per_second: Option<f64>,
-    /// Why it failed.
+    /// The reason if the run failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
 }
 
 impl RunRecord {
-    /// The error at the time that was aimed at, `None` for the end.
+    /// Returns the error at a target time, or at the end for `None`.
     pub fn error_at(&self, at: Option<f64>) -> Option<f64> {
         self.marks.iter().find(|m| m.at == at).and_then(|m| m.error)
     }
 }
 
-/// When to look at a run of so many seconds: four times in each power of ten from a tenth
-/// of a second, but not just before its end, which is looked at in any case.
+/// Returns the times at which a run with this time limit is measured: four per power of
+/// ten from a tenth of a second, but not just before the end, which is always measured.
 pub fn marks(time: Option<f64>) -> Vec<f64> {
     let last = time.unwrap_or(1000.0);
     let nice = [1.0, 1.8, 3.2, 5.6];
     let all = (-1..7).flat_map(|power| nice.map(|x| x * 10f64.powi(power)));
-    // As decimals are written, so that two runs aim at the same numbers.
+    // Rounded as decimals are written, so that different runs have the same targets.
     let rounded = all.map(|t| (t * 100.0).round() / 100.0);
     rounded.take_while(|t| *t < 0.95 * last).collect()
 }

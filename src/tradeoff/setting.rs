@@ -5,18 +5,17 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// How a program is run: everything that speed and accuracy depend on, but for the
-/// machine.
+/// The settings of a run: everything but the machine that affects speed and accuracy.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Setting {
-    /// Another program than the one on the command line.
+    /// A program that replaces the one on the command line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub program: Option<String>,
     /// The number of chains.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chains: Option<u32>,
-    /// Time in all, in seconds.
+    /// The total time, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
     /// Steps after warm-up.
@@ -25,25 +24,25 @@ pub struct Setting {
     /// Steps of warm-up.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warmup: Option<u64>,
-    /// Values of parameters, as in a program.
+    /// Parameter values, as in a program.
     #[serde(skip_serializing_if = "IndexMap::is_empty")]
     pub set: IndexMap<String, String>,
 }
 
-/// Why a file of settings cannot be used.
+/// The reason why a file of settings cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// It is not of this form.
+    /// The file does not have the required form.
     #[error("{0}")]
     Form(String),
-    /// A value of one of the settings that are not parameters.
+    /// A setting other than a parameter has an invalid value.
     #[error("`{name}` cannot be {value}: expected {expected}")]
     Value {
         /// The setting.
         name: String,
-        /// What it was given.
+        /// Its value.
         value: String,
-        /// What it may be given.
+        /// The valid values.
         expected: &'static str,
     },
 }
@@ -52,25 +51,27 @@ type Knobs = IndexMap<String, Value>;
 type Axes = IndexMap<String, Vec<Value>>;
 
 /// A file of settings. Names other than `program`, `chains`, `time`, `steps` and `warmup`
-/// are those of parameters.
+/// are names of parameters.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Plan {
-    /// What it is for; for readers.
+    /// The purpose of the file, for readers.
     pub about: String,
-    /// What all settings begin with.
+    /// The values that all settings start from.
     pub base: Knobs,
-    /// Each value of one name with each of the others, for every setting that does not
-    /// say it itself.
+    /// Names whose values are combined with each other and with every setting that does
+    /// not set them itself.
     pub cross: Axes,
-    /// One name at a time takes other values than in `base`.
+    /// Names that, one at a time, take other values than in `base`.
     pub vary: Axes,
-    /// Settings that change several at once.
+    /// Settings that change several values at once.
     pub also: Vec<Knobs>,
-    /// So many settings take every name of `vary` at random.
+    /// The number of additional settings in which every name of `vary` takes a random one
+    /// of its values or that of the base.
     pub random: usize,
-    /// These are in the table to be compared with others, and never become presets: those
-    /// that gain by the error what they lose elsewhere, say.
+    /// Whether these settings are for comparison only: they are in the table, but never
+    /// become presets. For example, they may reduce the measured error at the expense of
+    /// other qualities.
     pub compare: bool,
 }
 
@@ -78,15 +79,15 @@ impl Plan {
     /// Reads a file of settings.
     ///
     /// # Errors
-    /// If it is not of the form of [`Plan`].
+    /// If it does not have the form of a [`Plan`].
     pub fn from_json(text: &str) -> Result<Plan, PlanError> {
         serde_json::from_str(text).map_err(|e| PlanError::Form(e.to_string()))
     }
 
-    /// All settings, the base first, each once.
+    /// Returns all distinct settings, the base first.
     ///
     /// # Errors
-    /// If one has a value that cannot be.
+    /// If a value is invalid.
     pub fn settings(&self) -> Result<Vec<Setting>, PlanError> {
         let mut changes: Vec<Knobs> = vec![Knobs::new()];
         for (name, values) in &self.vary {
@@ -97,7 +98,7 @@ impl Plan {
         for _ in 0..self.random {
             let mut one = Knobs::new();
             for (name, values) in self.vary.iter().filter(|(_, values)| !values.is_empty()) {
-                // The base's own value is one of those to draw.
+                // One of the choices is to keep the value of the base.
                 match random.index(values.len() + 1) {
                     i if i < values.len() => drop(one.insert(name.clone(), values[i].clone())),
                     _ => {}
@@ -111,7 +112,8 @@ impl Plan {
                 change.entry(name.clone()).or_insert_with(|| v.clone());
                 change
             };
-            // What says so itself comes out the same each time, and counts once below.
+            // Changes that set the name themselves become duplicates, which are removed
+            // below.
             changes = changes.iter().flat_map(|c| values.iter().map(move |v| with(c, v))).collect();
         }
         let mut all: Vec<Setting> = Vec::new();
@@ -129,7 +131,8 @@ impl Plan {
 }
 
 impl Setting {
-    /// What tells it from others: all that it sets, in the order of its file.
+    /// Returns a name that identifies the setting: all values that it sets, with the
+    /// parameters last, in the order of the file.
     pub fn name(&self) -> String {
         let own = [
             self.program.clone().map(|p| format!("program={p}")),
@@ -143,10 +146,11 @@ impl Setting {
         if all.is_empty() { "defaults".into() } else { all.join(" ") }
     }
 
-    /// Whether it can be run: it may come from a file that anybody wrote.
+    /// Checks whether the setting can be run, because it may come from a hand-written
+    /// file.
     ///
     /// # Errors
-    /// If chains or time are out of range.
+    /// If the number of chains or the time is out of range.
     pub fn check(&self) -> Result<(), PlanError> {
         let mut again = Setting::default();
         let known =

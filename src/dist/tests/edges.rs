@@ -1,4 +1,5 @@
-//! The ends of supports and of parameters, and values of the wrong kind.
+//! Tests at the ends of supports and parameter domains, and with values of the wrong
+//! kind.
 
 use super::*;
 
@@ -55,7 +56,7 @@ fn poles_and_ends() {
     assert_eq!(shares(&[1.0, 1.0, 1.0], [0.3, 0.3, 0.3]), NEVER);
 }
 
-/// Distributions of every family, extreme ones among them.
+/// Returns distributions of every family, including extreme ones.
 fn zoo() -> Vec<Dist> {
     let cases: &[(&str, &[f64])] = &[
         ("normal", &[0.0, 1.0]),
@@ -214,7 +215,7 @@ fn nothing_is_ever_nan() {
     }
 }
 
-/// Whether it is a number that stands for a truth value.
+/// Returns whether `x` is a number that stands for a truth value.
 fn is_truth(d: &Dist, x: &Datum) -> bool {
     matches!(d, Dist::Flip(_)) && matches!(x, Datum::Num(0.0 | 1.0))
 }

@@ -1,5 +1,5 @@
-//! Gaussian vectors and processes: against dense linear algebra, whitening, extreme
-//! covariances.
+//! Tests of Gaussian vectors and processes: comparison with dense linear algebra,
+//! whitening, extreme covariances.
 
 use super::*;
 use nalgebra::{DMatrix, DVector};
@@ -128,13 +128,13 @@ fn values_and_noise_map_onto_each_other() {
     let normal = Normal::new(0.0, 1.0).unwrap();
     let expected: f64 = z.iter().map(|z| normal.log_density_num(*z)).sum();
     assert!((gp.log_density_stored(&Datum::Vec(Arc::clone(&z))) - expected).abs() < 1e-11);
-    // The densities of both forms differ by the log determinant of the map.
+    // The log densities of the two forms differ by the log determinant of the map.
     let slope = gp.log_density(&x) - expected;
     let packed = gp.to_centred();
     assert!((packed.log_density_stored(&x) - expected - slope).abs() < 1e-6);
     let g = gp.gradient_stored(&Datum::Vec(Arc::clone(&z))).unwrap();
     assert!(g.x.iter().zip(z.iter()).all(|(g, z)| *g == -z));
-    // The noise fits no other number of points.
+    // The noise fits this number of points only.
     assert_eq!(gp.log_density_stored(&vec![0.0; 3].into()), f64::NEG_INFINITY);
     assert!(gp.to_noncentred(&vec![0.0; 3].into()).is_none());
     // Only Gaussian families whiten.
@@ -188,6 +188,6 @@ fn jitter_is_a_share_of_the_variance() {
     }
     assert_eq!(with(JITTER).unwrap(), Gp::new(vec![0.5], &k, &[0.0], true).unwrap());
     assert!([-1e-9, f64::NAN, INF].into_iter().all(|jitter| with(jitter).is_err()));
-    // Points that are one, without any.
+    // Coincident points, without jitter.
     assert!(Gp::with_jitter(vec![0.0; 2], &k, &[0.0, 0.0], true, 0.0).is_err());
 }

@@ -1,8 +1,8 @@
-//! Gradients against central differences.
+//! Tests of gradients against central differences.
 
 use super::*;
 
-/// Central difference with Richardson's extrapolation: an error of order h^4.
+/// Returns a central difference with Richardson extrapolation: its error is of order h^4.
 fn difference(f: impl Fn(f64) -> f64, x: f64) -> f64 {
     let h = 1e-3 * x.abs().clamp(1e-2, 1e3);
     let d = |h: f64| (f(x + h) - f(x - h)) / (2.0 * h);
@@ -121,8 +121,8 @@ fn truth_values() {
 
 #[test]
 fn shares() {
-    // Off the simplex the formula goes on; the density there is taken from the
-    // definition.
+    // The formula extends off the simplex, so the derivatives with respect to x come from
+    // the definition of the density.
     let (alpha, x) = ([0.5, 2.0, 3.5], [0.2, 0.3, 0.5]);
     let g = make("dirichlet", &alpha).gradient(&x.to_vec().into()).unwrap();
     for i in 0..3 {

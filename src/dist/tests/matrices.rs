@@ -1,4 +1,5 @@
-//! Distributions of Cholesky factors: against those of the matrices they belong to.
+//! Tests of distributions of Cholesky factors, against those of the corresponding
+//! matrices.
 
 use super::*;
 use nalgebra::DMatrix;
@@ -12,7 +13,7 @@ fn wishart(df: f64, scale: &[f64]) -> Wishart {
     Wishart::new(df, &square(n, scale)).unwrap()
 }
 
-/// sqrt(n) times the Kolmogorov-Smirnov distance.
+/// Returns sqrt(n) times the Kolmogorov-Smirnov distance.
 fn distance(mut xs: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
     xs.sort_by(f64::total_cmp);
     let n = xs.len() as f64;
@@ -34,8 +35,8 @@ fn correlations_have_beta_marginals() {
                 &l * l.transpose()
             })
             .collect();
-        // Every correlation is 2 beta(a, a) - 1 with a = eta + n / 2 - 1 (Lewandowski et
-        // al. 2009).
+        // Every correlation is distributed as 2 beta(a, a) - 1 with a = eta + n / 2 - 1
+        // (Lewandowski et al. 2009).
         let a = eta + 0.5 * n as f64 - 1.0;
         let marginal = Beta::new(a, a).unwrap();
         for i in 0..n {
@@ -64,7 +65,7 @@ fn correlation_factors_integrate_to_one() {
         let total = line(&make("lkj", &[2.0, eta]), 60.0);
         assert!((total - 1.0).abs() < 1e-9, "{eta}: {total}");
     }
-    // Three rows: over a cube.
+    // Three rows: integrates over a cube.
     let d = make("lkj", &[3.0, 1.7]);
     let (s, h) = (d.support(), 0.2);
     let mut total = 0.0;
@@ -139,8 +140,8 @@ fn wishart_draws_have_their_moments() {
     assert!(k < 2.2, "{k}");
 }
 
-/// Gradients of log p(x(y)) + log |dx/dy| through the transform, and by the last
-/// parameter.
+/// Checks the gradients of log p(x(y)) + log |dx/dy| through the transform, and the
+/// derivative with respect to parameter `which`.
 fn check_gradient(
     d: &dyn Distribution,
     moved: &dyn Fn(f64) -> f64,
@@ -227,12 +228,12 @@ fn whitened_vectors_follow_their_parameters() {
     assert_eq!(d(1.0).log_density_stored(&z), d(5.0).log_density_stored(&z));
     let back = d(1.0).to_noncentred(&d(1.0).from_noncentred(&z)).unwrap();
     assert!(numbers(&back).iter().zip(numbers(&z)).all(|(a, b)| (a - b).abs() < 1e-12));
-    // The densities of the two forms differ by the map's Jacobian, the factor's
-    // determinant.
+    // The log densities of the two forms differ by the map's log Jacobian, the log
+    // determinant of the factor.
     let x = d(1.0).from_noncentred(&z);
     let jacobian = 0.5 * cov.determinant().ln();
     assert!((d(1.0).log_density_stored(&z) - d(1.0).log_density(&x) - jacobian).abs() < 1e-12);
-    // Elements of a product have no stored form.
+    // Elements of a product store values.
     let two = Dist::Iid(Arc::new(Iid::new(d(1.0), 2).unwrap()));
     assert!(!two.element(0).is_stored_whitened());
 }

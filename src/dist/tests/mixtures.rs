@@ -1,4 +1,4 @@
-//! Mixtures and improper distributions.
+//! Tests of mixtures and improper distributions.
 
 use super::*;
 
@@ -28,11 +28,11 @@ fn densities_are_weighted_means() {
         let shares = d.responsibilities(&Datum::Num(x)).unwrap();
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-14);
     }
-    // Far out, where every density underflows.
+    // In the tail, where every density underflows.
     let far = d.log_density(&Datum::Num(-100.0));
     assert!((far - (1f64 / 8.0).ln() - parts[0].log_density_num(-100.0)).abs() < 1e-9, "{far}");
     assert_eq!(d.log_density(&vec![0.0].into()), f64::NEG_INFINITY);
-    // A component without weight is not there, poles and all.
+    // A component with zero weight is ignored, including its poles.
     let none = mixed(&[0.0, 1.0], vec![make("beta", &[0.1, 0.1]), make("uniform", &[0.0, 2.0])]);
     assert_eq!(none.log_density(&Datum::Num(0.0)), -(2f64.ln()));
 }
@@ -80,7 +80,7 @@ fn draws_are_of_the_components() {
     let d = mixed(&[1.0, 3.0], vec![make("normal", &[-2.0, 0.5]), make("normal", &[1.0, 1.0])]);
     let mut rng = stream(810);
     let n = 20_000;
-    // Twenty cells of equal probability, by a fine sum.
+    // Twenty cells of equal probability, from a fine sum.
     let (from, h) = (-6.0, 1e-3);
     let mut sums = vec![0.0];
     (0..13_000).for_each(|k| {

@@ -1,5 +1,5 @@
-//! Tests of the families as a whole: samplers, gradients, transforms, normalisation,
-//! edges. Values of log densities are checked in `tests/dist_reference.rs`.
+//! Tests across families: samplers, gradients, transforms, normalisation, edges. Values
+//! of log densities are checked in `tests/dist_reference.rs`.
 
 mod edges;
 mod gaussian;
@@ -15,19 +15,19 @@ use super::*;
 use crate::rng::{Purpose, Stream, StreamKey};
 use std::sync::Arc;
 
-/// A stream of its own for each test.
+/// Returns a separate random stream for each test.
 fn stream(site: u64) -> Stream {
     StreamKey::new(20, 0, Purpose::VALUES).stream(0, site, 0)
 }
 
 const INF: f64 = f64::INFINITY;
 
-/// A square matrix by rows.
+/// Returns a square matrix from its entries by rows.
 fn square(n: usize, entries: &[f64]) -> nalgebra::DMatrix<f64> {
     nalgebra::DMatrix::from_row_slice(n, n, entries)
 }
 
-/// A distribution of numbers by name.
+/// Creates a distribution by name.
 fn make(family: &str, p: &[f64]) -> Dist {
     try_make(family, p).unwrap()
 }
@@ -69,7 +69,7 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
     })
 }
 
-/// All numbers in a value, in order.
+/// Returns all numbers in a value, in order.
 fn numbers(x: &Datum) -> Vec<f64> {
     match x {
         Datum::Num(x) => vec![*x],

@@ -1,4 +1,5 @@
-//! Densities integrate to 1 over unconstrained space, probabilities sum to 1.
+//! Tests that densities integrate to 1 over unconstrained space and that probabilities
+//! sum to 1.
 
 use super::*;
 
@@ -32,7 +33,8 @@ fn continuous_densities_integrate_to_one() {
     for (family, p) in cases {
         let d = make(family, p);
         let s = d.support();
-        // The trapezoidal rule converges fast here: everything decays at both ends.
+        // The trapezoidal rule converges fast here because everything decays at both
+        // ends.
         let (from, to) = if s == Support::Real { (-2000.0, 2000.0) } else { (-200.0, 200.0) };
         let n = 200_000;
         let h = (to - from) / f64::from(n);
@@ -94,22 +96,22 @@ fn angles_sides_and_heavy_tails_integrate_to_one() {
         let d = make("von_mises", &p);
         let n = 2000;
         let h = std::f64::consts::TAU / f64::from(n);
-        // Equal steps around the circle: exact for periodic functions as smooth as these.
+        // Equal steps around the circle: exact to rounding for smooth periodic functions.
         let total: f64 = (1..=n)
             .map(|i| d.log_density_num(-std::f64::consts::PI + h * f64::from(i)).exp())
             .sum::<f64>()
             * h;
         assert!((total - 1.0).abs() < 1e-9, "{p:?}: {total}");
     }
-    // The Laplace density has a kink, so each side by itself.
+    // The Laplace density has a kink, so each side is integrated separately.
     let d = make("laplace", &[1.0, 3.0]);
     let side = |sign: f64| {
         let at = |y: f64| (d.log_density_num(1.0 + sign * y.exp()) + y).exp();
         (-4000..1000).map(|i| at(0.01 * f64::from(i))).sum::<f64>() * 0.01
     };
     assert!((side(1.0) - 0.5).abs() < 1e-9 && (side(-1.0) - 0.5).abs() < 1e-9);
-    // The Cauchy distribution's tails are too heavy for the rule; over the angle it is
-    // uniform.
+    // The tails of the Cauchy distribution are too heavy for the rule, but it is uniform
+    // in the angle.
     let d = make("cauchy", &[1.0, 0.5]);
     for t in [-1.5f64, -0.2, 0.0, 1.4] {
         let x = 1.0 + 0.5 * t.tan();
@@ -138,7 +140,7 @@ fn counts_of_kinds_sum_to_one() {
     }
 }
 
-/// The integral over unconstrained space of two dimensions.
+/// Integrates over a two-dimensional unconstrained space.
 fn plane(d: &dyn Distribution, reach: f64, h: f64) -> f64 {
     let (s, n) = (d.support(), (reach / h) as i32);
     let mut total = 0.0;
@@ -164,7 +166,7 @@ fn vectors_integrate_to_one() {
         Dist::Product(Arc::new(Product::new(vec![make("normal", &[m, 0.7]), one.clone()]).unwrap()))
     };
     check(&Mixture::new(&[1.0, 3.0], vec![pair(-2.0), pair(1.0)]).unwrap(), 12.0, 0.05);
-    // Numbers on intervals that do not agree.
+    // Components whose supports differ.
     let mixed =
         Mixture::new(&[1.0, 1.0], vec![make("gamma", &[2.0, 1.0]), make("normal", &[0.0, 2.0])])
             .unwrap();

@@ -1,5 +1,6 @@
-//! Draws against distribution functions that do not come from here (Kolmogorov-Smirnov),
-//! or against the probabilities of the reference-checked log densities (chi-square).
+//! Tests of draws against independently computed distribution functions
+//! (Kolmogorov-Smirnov), or against the probabilities of the reference-checked log
+//! densities (chi-squared).
 
 use super::*;
 use crate::num::{log_normal_cdf, normal_cdf};
@@ -20,9 +21,9 @@ fn draws(d: &Dist, site: u64) -> Vec<f64> {
         .collect()
 }
 
-/// sqrt(n) times the greatest distance between the draws' distribution function and the
-/// given one, looked at from above so that draws piled up at the ends of the doubles are
-/// right.
+/// Returns sqrt(n) times the largest distance between the empirical distribution function
+/// and `cdf`. Of equal draws only the last counts, so draws clamped to the smallest or
+/// largest double are treated correctly.
 fn distance(mut xs: Vec<f64>, cdf: &dyn Fn(f64) -> f64) -> f64 {
     xs.sort_by(f64::total_cmp);
     let n = xs.len() as f64;
@@ -76,7 +77,7 @@ fn continuous_draws_follow_their_distribution_functions() {
         ("truncated_normal", vec![0.0, 1.0, 1.0, 4.0], between(1.0, 4.0)),
         ("truncated_normal", vec![0.0, 1.0, -6.0, -4.0], between(-6.0, -4.0)),
         ("truncated_normal", vec![0.0, 1.0, -INF, 2.0], between(-INF, 2.0)),
-        // Thirty sd out.
+        // Thirty sd from the mean.
         (
             "truncated_normal",
             vec![0.0, 1.0, 30.0, INF],
@@ -113,7 +114,7 @@ fn continuous_draws_follow_their_distribution_functions() {
         ("weibull", vec![7.0, 3.0], Box::new(|x: f64| -(-(x / 3.0).powf(7.0)).exp_m1())),
         ("von_mises", vec![0.5, 0.0], Box::new(|x: f64| 0.5 + x / TAU)),
         ("von_mises", vec![0.5, 1e8], Box::new(|x: f64| normal_cdf((x - 0.5) * 1e4))),
-        // What a chain with the improper prior starts from.
+        // The starting points of a chain with the improper prior.
         ("flat", vec![], Box::new(|x: f64| (x + 2.0) / 4.0)),
     ];
     for (i, (family, p, cdf)) in cases.iter().enumerate() {
@@ -123,7 +124,8 @@ fn continuous_draws_follow_their_distribution_functions() {
     }
 }
 
-/// Chi-square over cells of at least 10 expected draws, with its degrees of freedom.
+/// Returns the chi-squared statistic over cells of at least 10 expected draws, and its
+/// degrees of freedom.
 fn chi_square(xs: &[f64], d: &Dist, values: impl Iterator<Item = i64>) -> (f64, usize) {
     let (mut statistic, mut cells) = (0.0, 0);
     let (mut expected, mut from, mut left) = (0.0, f64::NEG_INFINITY, 1.0);
@@ -223,7 +225,7 @@ fn draws_have_the_stated_moments() {
         make("inv_gamma", &[1.0, 1.0]).mean().is_none()
             && make("inv_gamma", &[2.0, 1.0]).sd().is_none()
     );
-    // Cut at the mean: the two halves of a normal.
+    // Truncated at the mean: the two halves of a normal.
     for (lo, hi, side) in [(1.0, INF, 1.0), (-INF, 1.0, -1.0)] {
         let mean = make("truncated_normal", &[1.0, 2.0, lo, hi]).mean().unwrap();
         assert!((mean - (1.0 + side * 2.0 * (2.0 / PI).sqrt())).abs() < 1e-9, "{mean}");
@@ -282,7 +284,8 @@ fn angles_fill_cells_of_equal_probability() {
     {
         let d = make("von_mises", &p);
         let xs = draws(&d, 420 + i as u64);
-        // The distribution function by steps around the mean, from its opposite on.
+        // The distribution function by summing steps around the mean, from the opposite
+        // direction on.
         let (steps, reach) = (20_000, PI.min(12.0 / p[1].sqrt()));
         let h = 2.0 * reach / f64::from(steps);
         let at = |k: i32| {
@@ -313,7 +316,7 @@ fn counts_of_kinds_have_binomial_marginals() {
         let (statistic, freedom) = chi_square(&counts, &make("binomial", &[12.0, w / 6.0]), 0..=12);
         assert!(statistic < 15.0 + 3.0 * freedom as f64, "kind {i}: {statistic} with {freedom}");
     }
-    // Two counts together: n p q less.
+    // The covariance of two counts is -n p q.
     let (mean, n) = ([4.0, 6.0], DRAWS as f64);
     let covariance: f64 =
         xs.iter().map(|x| (numbers(x)[0] - mean[0]) * (numbers(x)[3] - mean[1])).sum::<f64>() / n;

@@ -1,5 +1,5 @@
-//! The maps to unconstrained space: round trips, Jacobians and gradients by finite
-//! differences, extreme points.
+//! Tests of the maps to unconstrained space: round trips, Jacobians and gradients by
+//! finite differences, extreme points.
 
 use super::*;
 use nalgebra::DMatrix;
@@ -43,13 +43,14 @@ fn supports() -> Vec<Support> {
 
 fn points(s: &Support) -> Vec<Vec<f64>> {
     let mut rng = stream(500);
-    // Gaps add up: far ones would leave an interval to rounding.
+    // Gaps add up: with wide ones, the last numbers of an interval would differ only by
+    // rounding.
     let spread =
         if matches!(s, Support::Ascending(one, _) if **one != Support::Real) { 0.5 } else { 2.0 };
     (0..20).map(|_| (0..s.free_dim()).map(|_| spread * rng.standard_normal()).collect()).collect()
 }
 
-/// Whether two coordinates are of the same point; those of angles go around.
+/// Returns whether two coordinates are of the same point; angles are equal modulo 2 pi.
 fn same(s: &Support, a: f64, b: f64) -> bool {
     let d = a - b;
     let d = if *s == Support::Circle { d - TAU * (d / TAU).round() } else { d };
@@ -108,8 +109,8 @@ fn products_are_made_part_by_part() {
     }
 }
 
-/// The coordinates that a density of `s` is by: all numbers, but for the last share of
-/// each simplex.
+/// Returns the numbers that a density of `s` is with respect to: all numbers, except the
+/// last proportion of each simplex and the dependent entries of Cholesky factors.
 fn independent(s: &Support, x: &Datum) -> Vec<f64> {
     match (s, x) {
         (Support::Simplex(n), x) => numbers(x)[..n - 1].to_vec(),
@@ -161,7 +162,7 @@ fn jacobians_are_those_of_finite_differences() {
 
 #[test]
 fn gradients_pull_back() {
-    // For log p = sum of sin(w_i x_i), with a weight for each number.
+    // Uses log p = sum of sin(w_i x_i), with a different weight for each number.
     let weight = |i: usize| 0.5 + i as f64;
     let log_p =
         |x: &Datum| numbers(x).iter().enumerate().map(|(i, x)| (weight(i) * x).sin()).sum::<f64>();
@@ -184,7 +185,7 @@ fn gradients_pull_back() {
                 up[j] += 1e-6;
                 down[j] -= 1e-6;
                 let expected = (total(&up) - total(&down)) / 2e-6;
-                // Where x itself is large, the phase of the sine is what limits the
+                // Where x is large, the phase of the sine limits the accuracy of the
                 // difference.
                 let scale = 1.0 + expected.abs() + by_x.iter().map(|b| b.abs()).sum::<f64>();
                 assert!(

@@ -1,5 +1,5 @@
-//! Any distribution between bounds: normalised, exact in the tails, drawn right, with its
-//! derivatives; bounds without sense.
+//! Tests of truncated distributions: normalisation, accuracy in the tails, draws,
+//! derivatives, and invalid bounds.
 
 use super::*;
 use crate::dist::truncated;
@@ -63,7 +63,7 @@ fn densities_integrate_to_one() {
             assert!((sum - 1.0).abs() < 1e-12, "{family}{p:?} {lo} {hi}: {sum}");
         }
     }
-    // Without bounds it is the distribution itself.
+    // Without bounds it equals the base distribution.
     for (family, p) in CONTINUOUS.iter().chain(DISCRETE) {
         let (one, d) = (make(family, p), cut(family, p, -INF, INF));
         close(d.log_density_num(1.0), one.log_density_num(1.0), 1e-14);
@@ -72,7 +72,7 @@ fn densities_integrate_to_one() {
 
 #[test]
 fn far_tails_are_exact() {
-    // What is left of an exponential is an exponential.
+    // The tail of an exponential is an exponential.
     for (lo, rate) in [(1e4, 1.0), (700.0, 3.0), (1e-3, 1.0), (2e9, 5.0)] {
         close(cut("exponential", &[rate], lo, INF).log_density_num(lo), rate.ln(), 1e-6);
         close(cut("laplace", &[0.0, 1.0 / rate], lo, INF).log_density_num(lo), rate.ln(), 1e-6);
@@ -93,15 +93,15 @@ fn far_tails_are_exact() {
     // The tail of a Cauchy is 1 / (pi x) (1 - 1 / (3 x^2) …).
     close(cut("cauchy", &[0.0, 1.0], 1e8, INF).log_density_num(1e8), -(1e8f64.ln()), 1e-12);
     close(cut("half_cauchy", &[0.0, 1.0], 1e8, INF).log_density_num(1e8), -(1e8f64.ln()), 1e-12);
-    // Student's t with 2 degrees of freedom: P(T > t) = (1 - t / sqrt(2 + t^2)) / 2, near
-    // 1 / (2 t^2) far out.
+    // Student's t with 2 degrees of freedom: P(T > t) = (1 - t / sqrt(2 + t^2)) / 2,
+    // about 1 / (2 t^2) in the tail.
     close(
         cut("student_t", &[2.0, 0.0, 1.0], -INF, -1e7).log_density_num(-1e7),
         (2.0 / 1e7f64).ln(),
         1e-12,
     );
-    // mpmath, 40 digits: lognormal(0, 1) above e^20; poisson(1) from 200 on;
-    // binomial(1000, 0.001) from 100 on.
+    // lognormal(0, 1) above e^20, from mpmath with 40 digits. The tails of the discrete
+    // families, from sums of ratios of successive probabilities.
     close(
         cut("lognormal", &[0.0, 1.0], 20f64.exp(), INF).log_density_num(20f64.exp()),
         -17.001_783_162_107_41,
@@ -121,7 +121,7 @@ fn far_tails_are_exact() {
     close(cut("binomial", &[1000.0, 0.001], 100.0, INF).log_density_num(100.0), binomial, 1e-12);
     let failures = ratio(500, &|k| (k + 2.0) / (k + 1.0) * 0.3);
     close(cut("neg_binomial", &[2.0, 0.7], 500.0, INF).log_density_num(500.0), failures, 1e-11);
-    // So narrow that distribution functions at both ends are one double.
+    // So narrow that the distribution function is the same double at both ends.
     for (family, p) in CONTINUOUS {
         let d = cut(family, p, 0.7, 0.7 + 1e-12);
         let width = (0.7 + 1e-12) - 0.7;
@@ -193,7 +193,7 @@ fn slopes_are_those_of_differences() {
             }
         }
     }
-    // A mixture, by its weights and by what it mixes.
+    // A mixture, with respect to its weights and its components' parameters.
     let mix = |p: [f64; 4]| {
         let parts = vec![make("normal", &[p[2], 1.0]), make("gamma", &[2.0, p[3]])];
         truncated(&Dist::Mixture(Arc::new(Mixture::new(&p[..2], parts).unwrap())), 0.4, 3.0)
@@ -222,7 +222,8 @@ fn draws_follow_the_distribution() {
             let n = 4000;
             let xs: Vec<f64> = (0..n).map(|_| d.sample(&mut rng).num().unwrap()).collect();
             assert!(xs.iter().all(|x| support.contains_num(*x)), "{family} {lo} {hi}");
-            // Of draws below a point there are as many as truncation up to it says.
+            // The fraction of draws up to a point equals the ratio of the two intervals'
+            // probabilities.
             let mut sorted = xs.clone();
             sorted.sort_by(f64::total_cmp);
             let middle = sorted[n / 3];
@@ -337,7 +338,7 @@ fn unlike_priors_in_order() {
     for _ in 0..200 {
         assert!(d.log_density(&d.sample(&mut rng)).is_finite());
     }
-    // Never in order by chance: sorted.
+    // Never in order by chance, so the draws are sorted.
     let apart =
         Ordered::of(vec![make("normal", &[50.0, 1.0]), make("normal", &[0.0, 1.0])]).unwrap();
     assert!(apart.support().contains(&apart.sample(&mut rng)));
