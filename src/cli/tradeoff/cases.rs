@@ -1,4 +1,7 @@
 //! Cases with ground truth: what a program observes, and the truth.
+//!
+//! Invariant: the truth is used for scores only; a run observes what `evaluate` would
+//! give it.
 
 use super::truth::{self, Truth};
 use crate::cli::args::Tradeoff;
