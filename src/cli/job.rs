@@ -151,8 +151,8 @@ impl Interrupt {
         self.asked.load(Ordering::SeqCst)
     }
 
-    /// Registers a run to end at its next step after an interrupt, even if the interrupt
-    /// came earlier.
+    /// Makes a run end at its next step after an interrupt, or at once if there was one
+    /// already.
     pub fn ends(&self, run: &Arc<Progress>) {
         let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         runs.retain(|r| r.strong_count() > 0);

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// If an observation has more numbers than this in total, only statistics are written.
+/// If the observations have more numbers than this in total, only statistics are written.
 const ELEMENTS: usize = 200;
 /// A tail probability below this, or above one minus this, is marked.
 const EXTREME: f64 = 0.01;

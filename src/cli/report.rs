@@ -41,7 +41,7 @@ pub fn report(a: &Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Summarises draws without the statistics of a finished run.
+/// Makes a summary from the draws alone.
 fn so_far(quantities: &[Quantity], chains: usize) -> Value {
     let modes = modes(quantities, None);
     json!({ "modes": modes, "warnings": warnings(quantities, &modes, &[], chains) })
