@@ -103,12 +103,12 @@ pub struct Allowed {
     pub limits: Vec<(String, u64)>,
 }
 
-/// `--quality`.
+/// The value of `--quality`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QualityArg {
-    /// A place on the front of speed and accuracy.
+    /// A measured preset of speed and accuracy.
     Known(Quality),
-    /// The program as it is.
+    /// The program's own settings (`own`).
     Own,
 }
 
@@ -153,10 +153,10 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// The number of chains where nobody says.
+    /// The default number of chains.
     pub const CHAINS: u32 = 4;
 
-    /// The number of chains.
+    /// Returns the number of chains.
     pub fn chains(&self) -> u32 {
         self.chains.unwrap_or(Self::CHAINS)
     }
@@ -191,7 +191,7 @@ pub struct Job {
 }
 
 impl Job {
-    /// A run that observes nothing.
+    /// Makes a job without observations.
     pub fn of(inputs: Inputs, sampling: Sampling) -> Job {
         Job {
             inputs,
@@ -272,7 +272,7 @@ pub struct Evaluate {
     pub quiet: bool,
 }
 
-/// What a dataset may look like.
+/// The help text on the layouts of a dataset.
 const LAYOUTS: &str = "\
 The dataset is either
   * one folder per case, with image.png (or .jpg) and, if the camera is known, camera.json
@@ -329,7 +329,7 @@ pub struct Tradeoff {
     pub quiet: bool,
 }
 
-/// What a known answer is.
+/// The help text on the formats of cases, ground truth and settings.
 const ANSWERS: &str = "\
 A case is a folder with image.png (or .jpg), camera.json if the camera is known, and the ground truth:
 depth.npy (and normals.npy), or gt.npz with arrays of these names; or a person in annotations.json, with
@@ -444,7 +444,7 @@ pub struct Check {
     pub allowed: Allowed,
 }
 
-/// What the two checks are.
+/// The help text on `--sbc` and `--geweke`.
 const CHECKS: &str = "\
 With --sbc or --geweke, data are simulated from the program, so every observation needs a sampler: all
 distributions have one, and scene.mask, scene.depth, scene.keypoints and scene.region (powers 1 and 0). Exit
@@ -547,7 +547,7 @@ pub struct Repl {
     pub transcript: bool,
 }
 
-/// What `repl` does with its input.
+/// The help text on terminals, scripts and keys.
 const PROMPT: &str = "\
 A terminal has line editing, history and completion (Tab). Piped input runs as a script, which stops with
 exit code 1 at the first error. Ctrl-C clears the line, ends inference and keeps its draws, or cancels

@@ -1,7 +1,7 @@
 //! The best state of a run as files: its trace, depth, normals, mask, pictures, meshes,
 //! exports.
 //!
-//! Not the run (`job`), and not what is printed.
+//! The run itself is in `job`.
 
 use super::job::write;
 use super::progress::Ending;
@@ -22,23 +22,23 @@ use pcadlang::vision::Photo;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// When the best state is written for the first time.
+/// The time until the best state is written first.
 const FIRST: Duration = Duration::from_millis(200);
 
-/// What is known of the best state once it was drawn.
+/// What is known of the best state once it has been rendered.
 #[derive(Default)]
 pub struct Shown {
-    /// What is seen.
+    /// Its view.
     pub view: Option<ViewValue>,
-    /// The share of the mesh's corners that is in the picture.
+    /// The fraction of the mesh's vertices that are in the picture.
     pub inside: Option<f64>,
-    /// How far the chains' last states cover the same pixels: those that all cover, as a
-    /// share of those that any does.
+    /// How far the chains' last states cover the same pixels: the number of pixels that
+    /// all of them cover, divided by that of pixels that any of them covers.
     pub agreement: Option<f64>,
 }
 
-/// Rebuilds the state with the highest log joint density that any chain was in, saves it,
-/// and draws it if it has a view.
+/// Rebuilds the state with the highest log joint density of all chains, saves it, and
+/// renders it if it has a view.
 pub fn show_best(
     dir: &RunDir,
     seed: u64,
@@ -65,9 +65,9 @@ pub fn show_best(
     Ok(shown)
 }
 
-/// Writes the best state so far as `best.trace.json` while the chains run, until they
-/// end: ever less often, but as often as checkpoints are kept. What cannot be written is
-/// said at the end.
+/// Writes the best state so far as `best.trace.json` while the chains run: at increasing
+/// intervals, but at least as often as checkpoints (`most`). Errors are ignored here, as
+/// they are reported at the end of the run.
 pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending, most: Duration) {
     let (begun, mut written) = (Instant::now(), f64::NEG_INFINITY);
     while !ending.within((begun.elapsed() / 2).clamp(FIRST.min(most), most)) {
@@ -81,8 +81,8 @@ pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending,
     }
 }
 
-/// Depth, normals, mask and meshes at the input's resolution; overlay, contours and mask
-/// frequency as pictures.
+/// Writes depth, normals, mask and meshes at the resolution of the input, and the
+/// overlay, contours and mask frequency as pictures.
 fn draw(
     dir: &RunDir,
     view: &Arc<View>,
@@ -121,7 +121,8 @@ fn draw(
     Ok(())
 }
 
-/// The share of a mesh's corners that is seen within the picture, in front of the camera.
+/// Returns the fraction of a mesh's vertices that are in the picture and in front of the
+/// camera.
 fn inside(mesh: &Mesh, camera: &Camera) -> Option<f64> {
     let within = |p: &glam::Vec3| {
         let (x, y, depth) = camera.project(p.as_dvec3());
@@ -132,7 +133,7 @@ fn inside(mesh: &Mesh, camera: &Camera) -> Option<f64> {
     (all > 0).then(|| mesh.positions.iter().filter(|p| within(p)).count() as f64 / all as f64)
 }
 
-/// What to say of a scene of which less than half is in the picture.
+/// Warns if less than half of the scene is in the picture.
 pub fn outside(shown: &Shown) -> Option<String> {
     let inside = shown.inside.filter(|inside| *inside < 0.5)?;
     Some(format!(
@@ -142,8 +143,8 @@ pub fn outside(shown: &Shown) -> Option<String> {
     ))
 }
 
-/// The mesh of a solid; a solid too far away or too small for single precision has none,
-/// which is no reason to lose the run.
+/// Returns the mesh of a solid. A solid too far away or too small for single precision
+/// has none, which must not fail the run.
 fn mesh(solid: &Solid) -> Option<Mesh> {
     match solid.to_mesh() {
         Ok(mesh) => Some(mesh),
@@ -154,8 +155,8 @@ fn mesh(solid: &Solid) -> Option<Mesh> {
     }
 }
 
-/// How many of the chains' last states cover each pixel, and how far several cover the
-/// same ones.
+/// Counts how many of the chains' last states cover each pixel, and returns how far
+/// several states cover the same pixels.
 fn frequency(chains: &[ChainResult], seed: u64, size: u32) -> (GrayImage, Option<f64>) {
     let mut counts: Vec<u32> = Vec::new();
     let (mut width, mut height, mut of) = (1, 1, 0);
@@ -175,12 +176,12 @@ fn frequency(chains: &[ChainResult], seed: u64, size: u32) -> (GrayImage, Option
     (pictures::frequency(width, height, &counts, of), agreement)
 }
 
-/// Chains that cover the same pixels to less than this have not all found the same thing:
-/// of 102 runs of `lathe.pcad` on pictures of known shape the object was found in 95 % of
-/// those above, in 45 % of those below (docs/objects.md).
+/// Chains that agree on less than this fraction of pixels may not all have found the
+/// object: in 102 runs of `lathe.pcad` on pictures of known shape it was found in 95 % of
+/// the runs above the threshold, and in 45 % of those below (docs/objects.md).
 const AGREE: f64 = 0.9;
 
-/// What to say of chains that do not agree on what is seen where.
+/// Warns of chains that disagree on which pixels are covered.
 pub fn disagreement(shown: &Shown) -> Option<String> {
     let agreement = shown.agreement.filter(|a| *a < AGREE)?;
     Some(format!(
@@ -190,7 +191,7 @@ pub fn disagreement(shown: &Shown) -> Option<String> {
     ))
 }
 
-/// `export best(view) to "file.obj"`.
+/// Writes the file of an export such as `export best(view) to "file.obj"`.
 fn export(
     dir: &RunDir,
     model: &Model,

@@ -1,6 +1,6 @@
-//! `pcadlang check --sbc` and `--geweke`: whether a program's plan draws from its
-//! posterior. The statistics are the library's ([`pcadlang::infer::calibration`]); here
-//! is what is run, and what is said of it.
+//! `pcadlang check --sbc` and `--geweke`: tests whether a program's plan samples from its
+//! posterior. The statistics are in the library ([`pcadlang::infer::calibration`]); this
+//! module runs them and prints the results.
 
 use super::args::{Check, Inputs, Job, Sampling};
 use super::job::{Interrupt, machine_threads};
@@ -17,10 +17,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Data sets of `--sbc`, chains of `--geweke`, where none are asked for.
+/// The default numbers of data sets for `--sbc` and of chains for `--geweke`.
 const REPLICATES: (u32, u32) = (200, 100);
 
-/// Simulates from each program and says whether its plan passes.
+/// Simulates from each program and reports whether its plan passes.
 pub fn calibrate(a: &Check) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let mut failed = Vec::new();
@@ -51,7 +51,7 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
     }
 }
 
-/// What the program is given, as `run` has it.
+/// Returns the equivalent arguments of `run`.
 fn job(a: &Check, path: &str) -> Job {
     Job {
         features_from: None,
@@ -129,7 +129,7 @@ fn failure(e: infer::calibration::CalibrationError, model: &Model) -> Failure {
     }
 }
 
-/// The table of `--sbc`.
+/// Formats the table of `--sbc`.
 fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
     let mut rows =
         vec![["quantity", "ranks", "chi2", "p", "min ess", "verdict"].map(str::to_owned).to_vec()];
@@ -171,7 +171,7 @@ fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
     s
 }
 
-/// The table of `--geweke`.
+/// Formats the table of `--geweke`.
 fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
     let head = ["quantity", "median, prior", "median, chains", "z mean", "z square", "verdict"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
@@ -204,7 +204,7 @@ fn more(left_out: usize) -> String {
     }
 }
 
-/// Counts as bars, level with the largest.
+/// Draws counts as bars, relative to the largest.
 fn bars(counts: &[u32]) -> String {
     const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let most = counts.iter().copied().max().unwrap_or(0).max(1);

@@ -5,7 +5,7 @@ use super::{Failure, has_colors};
 use pcadlang::Program;
 use pcadlang::diag::render;
 
-/// Checks each program and says what it wants from outside.
+/// Checks each program, and lists its params and the data that it needs.
 pub fn check(a: &Check) -> Result<(), Failure> {
     let mut failed = Vec::new();
     for path in &a.programs {

@@ -1,5 +1,5 @@
-//! `pcadlang compare`: two runs side by side: what was set differently, what they say of
-//! each quantity, their pictures.
+//! `pcadlang compare`: two runs side by side: their different settings, their quantities
+//! and their pictures.
 
 use super::places::sized;
 use super::show::quoted;
@@ -24,12 +24,12 @@ pub struct Compare {
     pub out: Option<PathBuf>,
 }
 
-/// Quantities listed at most: those that differ most.
+/// The maximum number of quantities listed, those that differ most.
 const LISTED: usize = 40;
-/// The longer side of each picture, pixels.
+/// The longer side of each picture, in pixels.
 const SIDE: u32 = 512;
 
-/// A run as its folder tells of it.
+/// A run as recorded in its folder.
 struct Told {
     run: Value,
     summary: Value,
@@ -43,13 +43,13 @@ impl Told {
         Ok(Told { run, summary: summary.map_err(|e| plain(format!("{}: {e}", path.display())))? })
     }
 
-    /// The arguments of its command.
+    /// Returns the arguments of its command.
     fn arguments(&self) -> Vec<String> {
         let all = self.run["arguments"].as_array();
         all.into_iter().flatten().filter_map(|a| a.as_str().map(str::to_owned)).collect()
     }
 
-    /// Options with their values, and the program.
+    /// Returns the program, and the options with their values.
     fn settings(&self) -> Vec<String> {
         let (mut all, mut arguments) = (Vec::new(), self.arguments().into_iter());
         while let Some(a) = arguments.next() {
@@ -100,8 +100,8 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
     a.out.as_ref().map_or(Ok(()), |out| pictures(a, out))
 }
 
-/// A table of what both have, the most different first: the difference of means in units
-/// of their standard deviations.
+/// Formats a table of the quantities of both runs, in decreasing order of the difference
+/// of means in units of their standard deviation.
 fn quantities(one: &Told, two: &Told) -> String {
     let names = one.summary["quantities"].as_object();
     let both = names.into_iter().flatten().map(|(name, _)| name);
@@ -137,7 +137,7 @@ fn quantities(one: &Told, two: &Told) -> String {
     text
 }
 
-/// The overlays side by side.
+/// Writes the overlays side by side.
 fn pictures(a: &Compare, out: &Path) -> Result<(), Failure> {
     let overlay = |folder: &Path| {
         let path = folder.join("overlay.png");

@@ -6,7 +6,7 @@ use pcadlang::lang::builtins::scene::DetectorValue;
 use pcadlang::report::pictures::png;
 use pcadlang::vision::{FileDetector, GradientDetector};
 
-/// Finds the contours of a photograph and writes them as a map.
+/// Detects the contours of a photograph and writes them as a map.
 pub fn contours(a: &Contours) -> Result<(), Failure> {
     let photo = files::photo(&a.image)?;
     let map = match &a.edges {

@@ -1,19 +1,19 @@
-//! The date and time of a run, as the whole world writes them.
+//! The date and time of a run in the standard form.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Now, in UTC, to the second: `2014-06-24T09:30:00Z` (RFC 3339). A clock before 1970
-/// counts as 1970.
+/// Returns the present time in UTC, to the second: `2014-06-24T09:30:00Z` (RFC 3339). A
+/// clock before 1970 counts as 1970.
 pub fn now() -> String {
     written(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs()))
 }
 
-/// Seconds since 1970 as a date of the Gregorian calendar. Years are counted from March,
-/// so that the odd day is their last; 400 of them have the same number of days, whichever
-/// they are.
+/// Formats seconds since 1970 as a date of the Gregorian calendar. Years are counted from
+/// March, so that the leap day is the last day of a year; any 400 years have the same
+/// number of days.
 fn written(seconds: u64) -> String {
     const OF_400_YEARS: u64 = 146_097;
-    // From 1 March of the year 0.
+    // Days since 1 March of the year 0.
     let days = seconds / 86_400 + 719_468;
     let (era, day) = (days / OF_400_YEARS, days % OF_400_YEARS);
     let year = (day - day / 1460 + day / 36_524 - day / (OF_400_YEARS - 1)) / 365;
@@ -25,7 +25,7 @@ fn written(seconds: u64) -> String {
     format!("{:04}-{month:02}-{of_month:02}T{h:02}:{m:02}:{s:02}Z", 400 * era + year + next)
 }
 
-/// A date as people read it, without its seconds; one of another form as it is.
+/// Formats a date for people, without its seconds; a text of another form is unchanged.
 pub fn readable(date: &str) -> String {
     match (date.split_once('T'), date.ends_with('Z')) {
         (Some((day, time)), true) if time.len() == 9 => format!("{day} {} UTC", &time[..5]),

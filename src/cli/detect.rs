@@ -48,10 +48,10 @@ pub enum PeopleFormat {
     Mediapipe,
 }
 
-/// The landmarks at its ends.
+/// The landmarks at the two ends of a bone.
 type Bone = (&'static str, &'static str);
 
-/// The left side, the right side, what joins them; and their colours.
+/// The bones of the left side, of the right side, and between them, with their colours.
 const BONES: [(&[Bone], [f32; 3]); 3] = [
     (
         &[
@@ -80,12 +80,12 @@ const BONES: [(&[Bone], [f32; 3]); 3] = [
     (&[("l_shoulder", "r_shoulder"), ("l_hip", "r_hip")], [240.0, 240.0, 240.0]),
 ];
 
-/// Landmark networks that a folder may have, the best first.
+/// Landmark networks in a folder, the best first.
 const LANDMARKS: [&str; 3] =
     ["pose_landmark_heavy.tflite", "pose_landmark_full.tflite", "pose_landmark_lite.tflite"];
 const DETECTION: &str = "pose_detection.tflite";
 
-/// Finds the people in a photograph and writes where they are.
+/// Detects the people in a photograph and writes their positions.
 pub fn detect(a: &Detect) -> Result<(), Failure> {
     let photo = files::photo(&a.image)?;
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
@@ -109,7 +109,7 @@ pub fn detect(a: &Detect) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The networks of a folder, or those that come with the program.
+/// Loads the networks of a folder, or else the built-in ones.
 fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
     let (detection, landmarks, from) = match folder {
         None => {
@@ -125,7 +125,7 @@ fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
                         LANDMARKS.join(", ")
                     ))
                 })?;
-            // Detection is the same for all of them.
+            // The detection network is the same for all landmark networks.
             let detection = match (folder.join(DETECTION), shipped()) {
                 (path, Ok((own, _))) if !path.exists() => Cow::Borrowed(own),
                 (path, _) => Cow::Owned(files::read(&path)?),
@@ -140,7 +140,7 @@ fn shipped() -> Result<(&'static [u8], &'static [u8]), Failure> {
     networks::files().map_err(plain)
 }
 
-/// Has this process find people with the networks of a folder.
+/// Makes this process detect people with the networks of a folder.
 pub fn choose(folder: Option<&Path>) -> Result<(), Failure> {
     if let Some(folder) = folder {
         networks::choose(finder(Some(folder))?);
@@ -177,7 +177,7 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
     )
 }
 
-/// People over the photograph: the left side green, the right side red.
+/// Draws people over the photograph: the left side green, the right side red.
 fn overlay(photo: &Photo, people: &[Person]) -> RgbImage {
     let size = (photo.width(), photo.height());
     let (width, height) = picture_size(size.0, size.1);

@@ -5,7 +5,7 @@ use super::{Failure, plain};
 use pcadlang::lang::builtins::search::search;
 use pcadlang::lang::builtins::{Table, doc as docs};
 
-/// Prints what the table of built-ins says.
+/// Prints documentation from the table of built-ins.
 pub fn doc(a: &Doc) -> Result<(), Failure> {
     let table = Table::default();
     if let Some(words) = &a.search {
@@ -34,10 +34,10 @@ pub fn doc(a: &Doc) -> Result<(), Failure> {
     }
 }
 
-/// At most so many are listed.
+/// The maximum number of built-ins listed.
 const LISTED: usize = 20;
 
-/// Lists what has the words, the best first.
+/// Lists the built-ins that match some words, the best first.
 fn find(table: &Table, words: &str) -> Result<(), Failure> {
     let found = search(table, words);
     for (word, near) in &found.instead {

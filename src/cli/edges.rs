@@ -1,4 +1,4 @@
-//! `--edges`: another detector of contours than the one that is built in.
+//! `--edges`: a contour detector that replaces the built-in one.
 
 use super::{Failure, files};
 use pcadlang::lang::builtins::data::{self, Options};
@@ -9,12 +9,12 @@ use pcadlang::syntax::span::FileId;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// The detector that was read last, and by what: a command that runs a program many times
-/// reads it once.
+/// The detector that was read last, with its argument, so that a command that runs a
+/// program many times reads it once.
 static LAST: Mutex<Option<(String, DetectorValue)>> = Mutex::new(None);
 
-/// The file of `FILE[, OPTION = VALUE, …]`, and its options. A file that is called so is
-/// a file.
+/// Splits `FILE[, OPTION = VALUE, …]` into the file and the options. If a file with the
+/// whole name exists, it is meant.
 fn split(spec: &str) -> (&str, &str) {
     match spec.split_once(',') {
         Some((file, options)) if !Path::new(spec).exists() => (file.trim(), options.trim()),
@@ -22,13 +22,13 @@ fn split(spec: &str) -> (&str, &str) {
     }
 }
 
-/// The file that `FILE[, OPTION = VALUE, …]` names.
+/// Returns the file of `FILE[, OPTION = VALUE, …]`.
 pub fn file_of(spec: &str) -> &Path {
     Path::new(split(spec).0)
 }
 
-/// The detector that `FILE[, OPTION = VALUE, …]` means, with the options of `detector` as
-/// a program writes them.
+/// Loads the detector of `FILE[, OPTION = VALUE, …]`; the options are those of `detector`
+/// in a program.
 pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, known)) = last.as_ref().filter(|(s, _)| s == spec) {
@@ -47,7 +47,7 @@ pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
     Ok(detector)
 }
 
-/// `colours = "bgr", white = 255`, read as the arguments of a call.
+/// Parses options such as `colours = "bgr", white = 255` as the arguments of a call.
 fn options(text: &str) -> Result<Options, Failure> {
     if text.is_empty() {
         return Ok(Options::default());
@@ -73,7 +73,8 @@ fn options(text: &str) -> Result<Options, Failure> {
     Options::parse("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
 }
 
-/// What contours depend on besides the picture: the bytes of the file and the options.
+/// Returns what contours depend on besides the picture: the bytes of the file, and the
+/// options.
 pub fn bytes(spec: Option<&str>) -> Result<Vec<u8>, Failure> {
     let Some(spec) = spec else { return Ok(Vec::new()) };
     let mut all = files::read(file_of(spec))?;

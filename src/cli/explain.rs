@@ -1,7 +1,7 @@
 //! `run --explain`: what was modelled, proposed, redrawn and skipped, and why.
 //!
-//! What is drawn is told by trying: one proposal of a choice of each group, in the last
-//! state of the first chain, which is then taken back.
+//! What one proposal draws is measured: a choice of each group is proposed in the last
+//! state of the first chain, and the proposal is then undone.
 
 use super::job::Outcome;
 use pcadlang::Model;
@@ -14,31 +14,32 @@ use pcadlang::trace::{Draws, Target, Trace};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashSet};
 
-/// Proposals that draw something that are wanted of each group: what a thread keeps of
-/// pictures is made by the first ones.
+/// How many proposals with rendering are made for each group; the first ones fill the
+/// thread's caches of pictures.
 const WANTED: u32 = 4;
 
-/// Proposals that are tried for them: a choice that comes out as it was draws nothing, so
-/// a few say little.
+/// The maximum number of proposals tried to get them: a choice that keeps its value does
+/// not render anything.
 const TRIES: u64 = 64;
 
-/// Choices whose addresses differ in keys only.
+/// Choices whose addresses differ only in keys.
 struct Group {
     name: String,
     choices: usize,
-    /// Kernels that select some of them.
+    /// The kernels that select some of the choices.
     kernels: Vec<String>,
-    /// Proposals of one of them at a time, and how many were accepted.
+    /// The number of single-site proposals of the choices, and how many were accepted.
     alone: [u64; 2],
-    /// What one proposal drew; none if it is impossible here.
+    /// The rendering work of one proposal; `None` if the proposal is impossible in this
+    /// state.
     drawn: Option<Work>,
 }
 
-/// All there is to say of a run.
+/// The explanation of a run.
 pub struct Explanation {
     groups: Vec<Group>,
     observed: Vec<String>,
-    /// Where choices are written that are not there, and how.
+    /// The locations and source lines of choices that are absent from the state.
     absent: Vec<[String; 2]>,
 }
 
@@ -107,7 +108,7 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
     Explanation { groups: groups.into_values().map(|(group, _)| group).collect(), observed, absent }
 }
 
-/// What a proposal of a choice draws, once what stays is known.
+/// Measures the rendering work of a proposal of a choice, once caches are filled.
 fn drawn_by(trace: &mut Trace, t: Target, seed: u64) -> Option<Work> {
     let (mut last, mut drawing): (Option<Work>, u32) = (None, 0);
     for step in 0..TRIES {
@@ -128,7 +129,7 @@ fn drawn_by(trace: &mut Trace, t: Target, seed: u64) -> Option<Work> {
     last
 }
 
-/// An address without the keys in it.
+/// Removes the keys from an address.
 fn without_keys(address: &str) -> String {
     let mut depth = 0;
     address
@@ -154,7 +155,7 @@ fn count(n: u64, what: &str) -> String {
 }
 
 impl Explanation {
-    /// For people.
+    /// Formats the explanation for people.
     pub fn text(&self) -> String {
         let total: usize = self.groups.iter().map(|g| g.choices).sum();
         let mut text = format!("modelled: {}, compared with ", count(total as u64, "choice"));
@@ -195,7 +196,7 @@ impl Explanation {
         text
     }
 
-    /// What was left out, and why.
+    /// Lists what was left out, and why.
     fn skipped(&self) -> Vec<String> {
         let absent = |[place, text]: &[String; 2]| {
             format!(
@@ -220,7 +221,7 @@ impl Explanation {
         all
     }
 
-    /// For programs.
+    /// Formats the explanation for programs.
     pub fn json(&self) -> Value {
         let drawn = |w: &Work| {
             json!({
@@ -243,7 +244,7 @@ impl Explanation {
     }
 }
 
-/// What one proposal drew, in words.
+/// Describes the rendering work of one proposal.
 fn redrawn(w: Option<&Work>) -> String {
     let Some(w) = w else { return "impossible in this state".into() };
     let pictures = w.whole + w.partial;
@@ -260,7 +261,7 @@ fn redrawn(w: Option<&Work>) -> String {
     s
 }
 
-/// A paragraph, indented, in lines that fit.
+/// Wraps and indents a paragraph.
 fn wrapped(text: &str) -> String {
     let (mut out, mut line) = (String::new(), String::from(" "));
     for word in text.split(' ') {

@@ -1,4 +1,4 @@
-//! Reading and writing files with messages that name them.
+//! Reads and writes files, with error messages that name them.
 
 use super::{Failure, plain};
 use pcadlang::lang::load::{embedded, reason};
@@ -6,7 +6,7 @@ use pcadlang::lang::reach::read_file;
 use pcadlang::vision::{Limits, Photo, photo};
 use std::path::Path;
 
-/// The bytes of a file.
+/// Reads a file.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     read_file(path).map_err(|e| plain(format!("cannot read {}: {}", path.display(), reason(&e))))
 }
@@ -17,14 +17,14 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|e| plain(format!("cannot write {}: {}", path.display(), reason(&e))))
 }
 
-/// A photograph.
+/// Reads a photograph.
 pub fn photo(path: &Path) -> Result<Photo, Failure> {
     let bytes = read(path)?;
     photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
-/// A program as it is named on the command line: `lathe` means `lathe.pcad`, unless there
-/// is a file of that name.
+/// Resolves the name of a program on the command line: `lathe` means `lathe.pcad`, unless
+/// a file named `lathe` exists.
 pub fn program_name(text: &str) -> Result<String, std::convert::Infallible> {
     let path = Path::new(text);
     let full = format!("{text}.pcad");

@@ -9,7 +9,7 @@ use pcadlang::syntax::format;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Formats files, or standard input. What does not parse is left as it is.
+/// Formats files, or standard input. Programs that do not parse are unchanged.
 pub fn fmt(a: &Fmt) -> Result<(), Failure> {
     if a.stdin {
         return standard_input(a.check);
@@ -68,10 +68,10 @@ fn standard_input(check: bool) -> Result<(), Failure> {
     }
 }
 
-/// The text formatted, if that changes it.
+/// Formats a program; `None` if it is formatted already.
 ///
 /// # Errors
-/// What is wrong with it, with the places.
+/// The syntax errors, with their locations.
 fn formatted(name: &str, bytes: &[u8]) -> Result<Option<String>, String> {
     let mut sources = SourceMap::new();
     let shown = |sources: &SourceMap, d: Vec<_>| render(sources, &d, has_colors());
@@ -86,8 +86,8 @@ fn formatted(name: &str, bytes: &[u8]) -> Result<Option<String>, String> {
     }
 }
 
-/// Adds a program, or those in a folder and the folders in it; names that begin with a
-/// dot are hidden.
+/// Adds a program, or the programs in a folder and its subfolders. Names that begin with
+/// a dot are hidden.
 fn find(path: &Path, inputs: bool, programs: &mut Vec<PathBuf>) -> Result<(), Failure> {
     if !path.is_dir() {
         if inputs || path.extension().is_some_and(|extension| extension == "pcad") {
@@ -100,7 +100,7 @@ fn find(path: &Path, inputs: bool, programs: &mut Vec<PathBuf>) -> Result<(), Fa
     let mut entries = Vec::new();
     for entry in std::fs::read_dir(path).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
-        // Links to folders may lead round in circles.
+        // Links to folders may form cycles.
         let link = entry.file_type().is_ok_and(|kind| kind.is_symlink()) && entry.path().is_dir();
         if !link && !entry.file_name().to_string_lossy().starts_with('.') {
             entries.push(entry.path());
@@ -110,8 +110,7 @@ fn find(path: &Path, inputs: bool, programs: &mut Vec<PathBuf>) -> Result<(), Fa
     entries.iter().try_for_each(|entry| find(entry, false, programs))
 }
 
-/// Puts a text in a file's place at once; behind a link, in the place of the file that it
-/// leads to.
+/// Replaces the contents of a file atomically; of a link, those of its target.
 fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     write_file(&path.canonicalize()?, bytes)
 }

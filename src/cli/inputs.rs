@@ -1,4 +1,4 @@
-//! From the command line to a program with its data.
+//! Makes a program with its data from the command line.
 
 use super::args::{Inputs, Job};
 use super::{Failure, files, plain};
@@ -48,8 +48,8 @@ pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
     Ok(program)
 }
 
-/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`; gives the name
-/// and the value of the photograph among them.
+/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`. Returns the
+/// name and the value of the photograph, if one is among them.
 pub fn observe(
     mut program: Program,
     job: &Job,
@@ -68,7 +68,7 @@ pub fn observe(
                 stem = Path::new(&path).file_stem().and_then(|s| s.to_str()).map(str::to_owned);
                 image = Some((name, photo));
             }
-            // Who is meant may depend on the photograph, which may come later.
+            // The entry of the file may depend on the photograph, which may come later.
             Some("keypoints") => detected.push((name, path)),
             other => {
                 program = match entry(&path) {
@@ -106,13 +106,14 @@ pub fn observe(
     Ok((program, image))
 }
 
-/// The file and entry of `FILE#ID`; a file that is called so is a file.
+/// Splits `FILE#ID` into file and entry. If a file with the whole name exists, it is
+/// meant.
 fn entry(path: &str) -> Option<(&str, &str)> {
     path.rsplit_once('#')
         .filter(|(file, id)| !file.is_empty() && !id.is_empty() && !Path::new(path).exists())
 }
 
-/// The file that `[NAME=]FILE[#ID]` names, or that a kind such as a mask means by it.
+/// Returns the file of `[NAME=]FILE[#ID]`.
 pub fn file_of(spec: &str) -> &str {
     let path = match spec.split_once('=') {
         Some((name, path)) if is_name(name) => path,
@@ -121,7 +122,7 @@ pub fn file_of(spec: &str) -> &str {
     entry(path).map_or(path, |(file, _)| file)
 }
 
-/// One entry of a JSON object, as data of a kind.
+/// Loads one entry of a JSON object as data of a kind.
 fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure> {
     let all: serde_json::Value = serde_json::from_slice(&files::read(Path::new(file))?)
         .map_err(|e| plain(format!("{file}: {e}")))?;
@@ -135,12 +136,13 @@ fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure
         .map_err(|e| Failure::Plain(e.message, e.hint))
 }
 
-/// Whether a text can be the name of a `data` item.
+/// Returns whether a text can be the name of a `data` item.
 fn is_name(text: &str) -> bool {
     !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '/')
 }
 
-/// The name and path of `NAME=FILE`, or the only item that a plain `FILE` can be for.
+/// Returns the name and path of `NAME=FILE`; the name may be omitted if only one item
+/// fits.
 fn named(program: &Program, spec: &str) -> Result<(String, String), Failure> {
     if let Some((name, path)) = spec.split_once('=')
         && is_name(name)
@@ -155,7 +157,7 @@ fn named(program: &Program, spec: &str) -> Result<(String, String), Failure> {
     only(program, "image", "--observe").map(|name| (name, spec.to_owned()))
 }
 
-/// The only `data` item of a kind, for an option that may leave out the name.
+/// Returns the only `data` item of a kind, for an option without a name.
 fn only(program: &Program, kind: &str, option: &str) -> Result<String, Failure> {
     let data = program.interface().data;
     let fit: Vec<&str> =

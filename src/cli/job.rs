@@ -1,7 +1,8 @@
-//! One run from its program to its folder, as `run` and `evaluate` do it. Nothing is
-//! printed here but the live line.
+//! One run, from its program to its folder, for `run` and `evaluate`. Only the progress
+//! line is printed here.
 //!
-//! Invariant: `run.json` says `done` only when every other file of the folder is whole.
+//! Invariant: `run.json` has the state `done` only when all other files of the folder are
+//! complete.
 
 use super::args::Job;
 use super::best::{disagreement, keep_best, outside, show_best};
@@ -14,7 +15,7 @@ use super::{Failure, date, edges, files, inputs, people, plain, seen};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
-    BestSoFar, BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress,
+    BestSoFar, BestState,  Callback , Callbacks , ChainResult, Evidence, KeptTraces, Progress  ,
     stuck_structure,
 };
 use pcadlang::lang::{self, builtins::scene::ImageValue};
@@ -30,63 +31,66 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-/// The numbers that are kept in memory for the summary, all chains together: 32 MiB.
+/// How many numbers are kept in memory for the summary, over all chains: 32 MiB.
 pub const ROOM: usize = 4 << 20;
 
-/// A program compiled with what it observes.
+/// A compiled program with its observed data.
 pub struct Ready {
     /// The program with its data.
     pub model: Model,
-    /// The photograph: its name, and its value.
+    /// The name and value of the photograph.
     image: Option<(String, lang::value::Value)>,
-    /// Whether the program is about one of the people in it.
+    /// Whether the program has a param `person`, which selects a person in the
+    /// photograph.
     chooses: bool,
     begun: Instant,
 }
 
-/// What a run gave.
+/// The results of a run.
 pub struct Outcome {
     /// Every recorded quantity.
     pub quantities: Vec<Quantity>,
-    /// What the kernels did, over all chains.
+    /// Statistics of the kernels, over all chains.
     pub kernels: Vec<KernelStats>,
-    /// What single-site kernels did, by address, over all chains.
+    /// Statistics of single-site kernels by address, over all chains.
     pub sites: Vec<SiteStats>,
-    /// The modes that chains are in, where there are several.
+    /// The modes that the chains are in, if there are several.
     pub modes: Vec<Mode>,
-    /// What has not converged, and the like.
+    /// Warnings, for example of quantities that have not converged.
     pub warnings: Vec<String>,
-    /// What is approximate, besides the rounding of doubles and the number of draws.
+    /// Approximations, apart from floating-point rounding and the finite number of draws.
     pub approximate: Vec<String>,
     /// The chains.
     pub chains: Vec<ChainResult>,
-    /// The summary is of every n-th draw: 1, unless there are more than fit the memory.
+    /// The summary uses every n-th draw; n is 1 unless there are more draws than fit in
+    /// memory.
     pub every: u64,
-    /// Wall time until everything but the page was written.
+    /// Wall time until everything except the page was written.
     pub seconds: f64,
-    /// Whether the user ended it.
+    /// Whether the user interrupted the run.
     pub interrupted: bool,
 }
 
 impl Ready {
-    /// Width and height of the photograph, if there is one.
+    /// Returns the width and height of the photograph, if there is one.
     pub fn size(&self) -> Option<(u32, u32)> {
         self.photo().map(|p| (p.width(), p.height()))
     }
 
-    /// The photograph, if there is one.
+    /// Returns the photograph, if there is one.
     pub fn photo(&self) -> Option<&Photo> {
         self.image()?.as_photo()
     }
 
-    /// The photograph with what was found in it, or its contours alone, if there are any.
+    /// Returns the photograph with its detections, or a contour map without a photograph,
+    /// if there is one.
     fn image(&self) -> Option<&ImageValue> {
         self.image.as_ref()?.1.downcast::<ImageValue>()
     }
 }
 
 impl Outcome {
-    /// The time of all kernels after warm-up, over all chains, in seconds.
+    /// Returns the time of all kernels after warm-up, over all chains, in seconds.
     pub fn kernel_seconds(&self) -> f64 {
         kernel_seconds(&self.kernels)
     }
@@ -96,8 +100,8 @@ fn kernel_seconds(kernels: &[KernelStats]) -> f64 {
     kernels.iter().map(|k| k.seconds).sum()
 }
 
-/// The summary of each quantity, with its effective draws in a second of the kernels'
-/// time.
+/// Returns the summary of each quantity, with its effective sample size per second of
+/// kernel time.
 pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
     let one = |q: &Quantity| {
         let mut s = json!(q.summary);
@@ -110,7 +114,7 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
     quantities.iter().map(one).collect()
 }
 
-/// Reads and compiles; the time of a run begins here.
+/// Reads and compiles a program; the time of a run begins here.
 pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     let begun = Instant::now();
     let (program, image) = inputs::observe(inputs::program(&job.inputs, quiet)?, job)?;
@@ -118,7 +122,7 @@ pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     Ok(Ready { model: program.compile()?, image, chooses, begun })
 }
 
-/// Ctrl-C, for all runs there are.
+/// Ctrl-C, which ends all current runs.
 #[derive(Default)]
 pub struct Interrupt {
     asked: AtomicBool,
@@ -126,12 +130,13 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Listens from now on, until the command ends.
+    /// Handles Ctrl-C from now on, until the command ends.
     pub fn listen() -> Arc<Interrupt> {
         let interrupt = Arc::new(Interrupt::default());
         let heard = Arc::clone(&interrupt);
-        // If no handler can be set, the system's own stays. Whoever asks twice does not
-        // want to wait for the step to end; what is on the disk by then is whole.
+        // If no handler can be set, the system's default stays. A second Ctrl-C exits
+        // without waiting for the end of the step; the files on the disk are complete
+        // then.
         let _ = ctrlc::set_handler(move || {
             if heard.asked.swap(true, Ordering::SeqCst) {
                 std::process::exit(130);
@@ -141,12 +146,13 @@ impl Interrupt {
         interrupt
     }
 
-    /// Whether the user has asked to end.
+    /// Returns whether the user has interrupted the command.
     pub fn asked(&self) -> bool {
         self.asked.load(Ordering::SeqCst)
     }
 
-    /// Ends this run at its next step when asked, or at once if that was before.
+    /// Makes a run end at its next step after an interrupt, or at once if there was one
+    /// already.
     pub fn ends(&self, run: &Arc<Progress>) {
         let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         runs.retain(|r| r.strong_count() > 0);
@@ -165,11 +171,10 @@ impl Interrupt {
     }
 }
 
-/// A hash of the files that the command line names, and of those that the program reads
-/// by itself.
+/// Hashes the files named on the command line, and those that the program reads itself.
 ///
 /// # Errors
-/// If one is not there any more.
+/// If a file no longer exists.
 pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
     let mut all = model.data_hash().to_owned();
     let named = job
@@ -187,27 +192,28 @@ pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
     Ok(text_hash(&all))
 }
 
-/// The folder a program is in.
+/// Returns the folder of a program.
 fn folder(program: &str) -> &Path {
     Path::new(program).parent().unwrap_or(Path::new(""))
 }
 
-/// The name of a program without folder and ending.
+/// Returns the name of a program without folder and extension.
 pub fn stem(path: &str) -> &str {
     Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or("run")
 }
 
-/// The number of threads of a run.
+/// Returns the number of threads of a run.
 pub fn threads(job: &Job) -> usize {
     job.sampling.threads.map_or_else(machine_threads, |n| n as usize)
 }
 
-/// The number of threads this machine runs at once.
+/// Returns the number of hardware threads.
 pub fn machine_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// What `run.json` says of a run before it begins: all that its draws depend on.
+/// Makes the record of a run for `run.json` before it begins, with everything that its
+/// draws depend on.
 pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value> {
     let s = &job.sampling;
     let record = json!({
@@ -235,7 +241,7 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
     }
 }
 
-/// Writes `run.json`: the record with its state, and more.
+/// Writes `run.json`: the record, the state, and more fields.
 pub fn write_record(
     dir: &RunDir,
     record: &Map<String, Value>,
@@ -245,7 +251,7 @@ pub fn write_record(
     write_run(dir, &recorded(record, state, more))
 }
 
-/// The record with its state, and more.
+/// Adds the state and more fields to a record.
 fn recorded(record: &Map<String, Value>, state: &str, more: Value) -> Value {
     let mut record = record.clone();
     record.insert("state".into(), json!(state));
@@ -264,7 +270,7 @@ pub fn write(dir: &RunDir, name: &str, bytes: &[u8]) -> Result<(), Failure> {
     dir.write(name, bytes).map_err(|e| plain(format!("{e}; earlier output is kept")))
 }
 
-/// Says in `run.json` that a run failed, and why.
+/// Records in `run.json` that a run failed, and why.
 pub fn record_failure(
     dir: &RunDir,
     record: &Map<String, Value>,
@@ -274,23 +280,23 @@ pub fn record_failure(
     write_record(dir, record, "failed", json!({ "error": failure.to_string(), "seconds": seconds }))
 }
 
-/// The time between checkpoints where nobody says.
+/// The default time between checkpoints.
 pub const CHECKPOINT: Duration = Duration::from_secs(10);
 
-/// How a run is carried out, which changes nothing of its draws.
+/// How a run is carried out; its draws do not depend on this.
 #[derive(Clone, Copy, Debug)]
 pub struct Manner {
-    /// Whether progress is shown, on a terminal.
+    /// Whether progress is shown.
     pub live: bool,
     /// The time between checkpoints.
     pub checkpoint: Duration,
-    /// Whether it goes on with what the folder has.
+    /// Whether to resume the run in the folder.
     pub resume: bool,
-    /// How many whole states are kept.
+    /// How many complete states are kept.
     pub keep: u32,
 }
 
-/// Runs the chains and fills the folder. A failure is recorded there too.
+/// Runs the chains and fills the folder. A failure is recorded in the folder, too.
 pub fn perform(
     job: &Job,
     ready: &Ready,
@@ -302,19 +308,19 @@ pub fn perform(
     write_record(dir, record, "running", json!({}))?;
     write(dir, PROGRAM, ready.model.text().as_bytes())?;
     fill(job, ready, dir, record, interrupt, manner).inspect_err(|failure| {
-        // The error that is told is the first one.
+        // An error in writing the record must not hide the first error.
         let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
     })
 }
 
-/// How the chains of a job are run, and who watches them.
+/// Returns the options of a job's chains.
 pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) -> RunOptions {
     let (s, model) = (&job.sampling, &ready.model);
     RunOptions {
         seed: s.seed,
         steps: s.steps,
         warmup: s.warmup,
-        // What is left of the time after compiling.
+        // The time left after compilation.
         time: s.time.map(|t| t.saturating_sub(ready.begun.elapsed())),
         incremental: !s.no_incremental,
         limits: model.limits().clone(),
@@ -342,12 +348,12 @@ fn fill(
     let joints = Joints::new(s.chains(), ready.size());
     let progress = Arc::new(Progress::default());
     let best = Arc::new(BestSoFar::new(s.chains(), &progress));
-    // A single chain has one mode.
+    // A single chain has one mode, which needs no evidence.
     let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
     let kept = Arc::new(KeptTraces::new(s.chains(), manner.keep as usize, model.hash()));
     let callbacks: Vec<Arc<dyn Callback>> =
         vec![Arc::new(joints.clone()), best.clone(), evidence.clone(), kept.clone()];
-    let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
+    let options = options(job, ready, Some(Arc::new(Callbacks : : from_iter(callbacks))));
     let memories: Vec<Memory> =
         (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
@@ -369,7 +375,7 @@ fn fill(
         results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
     write_traces(dir, &kept)?;
     let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
-    // A run that may go on keeps all that it has.
+    // A run that may be resumed keeps all its draws.
     let even = align(dir.path(), s.chains(), !interrupted);
     let even =
         even.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
@@ -436,7 +442,7 @@ fn fill(
     })
 }
 
-/// What is to be said of choices that decide how many others there are, and never moved.
+/// Warns of choices that determine which others exist, and hardly ever move.
 fn structure_warning(state: &pcadlang::trace::Trace, sites: &[SiteStats]) -> Option<String> {
     let stuck = stuck_structure(state, sites);
     let (address, rate) = stuck.first()?;
@@ -450,11 +456,10 @@ fn structure_warning(state: &pcadlang::trace::Trace, sites: &[SiteStats]) -> Opt
     ))
 }
 
-/// Writes the states that are kept so far, one to a line, from time to time until the
-/// chains end.
+/// Writes the states kept so far, one per line, at intervals until the chains end.
 fn keep_traces(dir: &RunDir, kept: &KeptTraces, ending: &Ending, every: Duration) {
     while !ending.within(every) {
-        // What cannot be written is said at the end.
+        // Errors are reported at the end of the run.
         let _ = write_traces(dir, kept);
     }
 }
@@ -468,7 +473,7 @@ fn write_traces(dir: &RunDir, kept: &KeptTraces) -> Result<(), Failure> {
     if lines.is_empty() { Ok(()) } else { write(dir, TRACES, lines.as_bytes()) }
 }
 
-/// What is approximate in a run: in its likelihoods, and by its limits.
+/// Lists the approximations of a run, in its likelihoods and by its time limit.
 fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
     let mut all = chains.first().map_or_else(Vec::new, |c| c.last.approximations());
     if job.sampling.time.is_some() {
@@ -477,7 +482,7 @@ fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
     all
 }
 
-/// What `run.json` says of the chains at the end.
+/// Returns the statistics of the chains for `run.json`.
 fn counts(
     chains: &[ChainResult],
     best: Option<&BestState>,
@@ -490,7 +495,8 @@ fn counts(
     let best = best.map(|b| b.log_joint);
     let r_hat =
         quantities.iter().map(|q| q.summary.r_hat).filter(|r| !r.is_nan()).max_by(f64::total_cmp);
-    // Chains at rest at different values have none, and the others' would say too little.
+    // R-hat is undefined if chains are stuck at different values, and the maximum over
+    // other quantities would be misleading.
     let stuck = quantities.iter().find(|q| q.is_stuck());
     let r_hat = if stuck.is_some() { None } else { r_hat };
     let mut all =
@@ -504,7 +510,8 @@ fn counts(
     all.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
 }
 
-/// What tells a run from others: all that the draws of its chains depend on.
+/// Returns a hash of everything that the draws of the chains depend on, which identifies
+/// a run.
 fn identity(record: &Map<String, Value>) -> String {
     let said = ["program_hash", "inputs_hash", "seed"]
         .map(|key| record.get(key).cloned().unwrap_or_default());
@@ -513,7 +520,7 @@ fn identity(record: &Map<String, Value>) -> String {
     text_hash(&json!([said, settings]).to_string())
 }
 
-/// The files of each chain, and its draws in memory for the summary.
+/// Returns sinks for each chain: its files, and its draws in memory for the summary.
 fn sinks(
     dir: &RunDir,
     job: &Job,
@@ -540,7 +547,7 @@ fn sinks(
     Ok(sinks)
 }
 
-/// What is given to observe, as `--observe` has it.
+/// Returns the observations, as arguments of `--observe`.
 fn observed(job: &Job) -> impl Iterator<Item = String> {
     job.observe.iter().cloned().chain(job.keypoints.iter().map(|k| format!("keypoints={k}")))
 }

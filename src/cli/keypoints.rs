@@ -1,8 +1,8 @@
-//! Where the landmarks of a program's view are in the photograph, over all draws:
+//! Positions of the landmarks of a program's view in the photograph, over all draws:
 //! `keypoints.json`.
 
 use super::scene::view_operand;
-use pcadlang::infer::{Callback, StateError};
+use pcadlang::infer::{ Callback , StateError };
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Located;
@@ -12,35 +12,34 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The landmarks of the chains, as their draws come. Clones share them.
+/// The landmarks over the draws of all chains so far. Clones share them.
 #[derive(Clone, Debug)]
 pub struct Joints {
-    /// Width and height of the photograph in pixels; without one, positions are in pixels
-    /// of the camera.
+    /// The width and height of the photograph in pixels; if there is none, positions are
+    /// in pixels of the camera.
     size: Option<(u32, u32)>,
     chains: Arc<[Mutex<Chain>]>,
 }
 
 #[derive(Debug, Default)]
 struct Chain {
-    /// Where the view is: looked for once.
+    /// The operand of the view, if there is one; it is searched for only once.
     view: Option<Option<Operand>>,
     seen: LandmarkMoments,
 }
 
-/// What draws say of landmarks.
+/// Moments of the positions of landmarks.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct LandmarkMoments {
-    /// Where the joints are in the picture: between the scene's and where they were
-    /// detected.
+    /// Positions in the picture given both the scene and the detected keypoints.
     joints: Moments,
-    /// Where the scene's own are in the picture, and in the scene.
+    /// Positions of the scene's landmarks in the picture, and in the scene.
     own: Moments,
     scene: Moments,
 }
 
 impl Joints {
-    /// For so many chains, over a photograph of this size.
+    /// Makes moments for a number of chains, over a photograph of this size.
     pub fn new(chains: u32, size: Option<(u32, u32)>) -> Joints {
         Joints { size, chains: (0..chains).map(|_| Mutex::default()).collect() }
     }
@@ -49,12 +48,13 @@ impl Joints {
         Some(self.chains.get(chain as usize)?.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The width and height of the picture that positions are in.
+    /// Returns the width and height of the picture that positions refer to.
     fn pixels(&self, view: &ViewValue) -> (u32, u32) {
         self.size.unwrap_or((view.0.camera().width, view.0.camera().height))
     }
 
-    /// Means and spreads of where the joints are, over all draws of all chains so far.
+    /// Returns means and standard deviations of the joints' positions, over all draws so
+    /// far.
     pub fn moments(&self) -> Moments {
         self.all().joints
     }
@@ -63,7 +63,7 @@ impl Joints {
         self.of(0..self.chains.len())
     }
 
-    /// The draws of some chains, by their numbers from 0.
+    /// Merges the draws of some chains, numbered from 0.
     fn of(&self, chains: impl Iterator<Item = usize>) -> LandmarkMoments {
         let mut all = LandmarkMoments::default();
         for chain in chains.filter_map(|c| self.chains.get(c)) {
@@ -76,7 +76,8 @@ impl Joints {
         all
     }
 
-    /// The draws of all chains, each mode by its probability if that is known.
+    /// Merges the draws of all chains, weighting the modes by their probabilities if
+    /// these are known.
     fn by_probability(&self, modes: &[Mode]) -> LandmarkMoments {
         let each = modes
             .iter()
@@ -87,22 +88,19 @@ impl Joints {
         let mixed = |part: fn(&LandmarkMoments) -> &Moments| {
             Moments::mixture(&each.iter().map(|(p, s)| (*p, part(s))).collect::<Vec<_>>())
         };
-        LandmarkMoments {
-            joints: mixed(|s| &s.joints),
-            own: mixed(|s| &s.own),
-            scene: mixed(|s| &s.scene),
-        }
+        LandmarkMoments { joints: mixed(|s| &s.joints), own: mixed(|s| &s.own), scene: mixed(|s| &s.scene)  , }
     }
 
-    /// The landmarks of a view; none before the camera.
+    /// Returns the landmarks of a view; a position is `None` if it is not in front of the
+    /// camera.
     pub fn positions(&self, view: &ViewValue) -> Vec<(Arc<str>, Option<[f64; 2]>)> {
         let (width, height) = self.pixels(view);
         view.landmarks(width, height).map(|(name, at)| (Arc::clone(name), at)).collect()
     }
 
-    /// The file: means and spreads over all draws of all chains, each of the modes they
-    /// are in by its probability, and the best state, that of `view`. None if it has no
-    /// landmarks.
+    /// Makes the contents of the file: means and standard deviations over all draws, with
+    /// modes weighted by their probabilities, and the best state, which has this `view`.
+    /// `None` if the view has no landmarks.
     pub fn report(&self, view: &ViewValue, modes: &[Mode], seconds: f64) -> Option<Value> {
         let best = self.positions(view);
         if best.is_empty() {
@@ -130,7 +128,7 @@ impl Joints {
     }
 }
 
-/// A number of pixels or seconds to a thousandth.
+/// Rounds a number of pixels or seconds to a thousandth.
 fn rounded(x: f64) -> Value {
     json!((x * 1000.0).round() / 1000.0)
 }
@@ -160,8 +158,8 @@ impl Callback for Joints {
         let seen = &mut chain.seen;
         for (landmark, (name, at)) in view.0.solid().landmarks().iter().zip(self.positions(view)) {
             seen.scene.add(&name, &landmark.position.to_array(), 0.0);
-            // Of several solids' landmarks of one name the second is called NAME#2, but
-            // observed by its name.
+            // If several solids have a landmark of the same name, the second is called
+            // NAME#2, but its observations use the plain name.
             let same = |l: &&Located| {
                 let near = |k: usize, size: f64| {
                     at.is_some_and(|at| (l.own[k] * size - at[k]).abs() < 1e-6 * size)

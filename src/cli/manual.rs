@@ -21,7 +21,7 @@ pub struct Man {
     pub out: Option<PathBuf>,
 }
 
-/// Prints what a shell reads to complete commands, options and files.
+/// Prints the completion script of a shell.
 pub fn completions(a: &Completions) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(a.shell, &mut Cli::command(), "pcadlang", &mut script);
@@ -43,7 +43,7 @@ pub fn man(a: &Man) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A manual page.
+/// Renders a manual page.
 fn page(command: &clap::Command) -> Result<Vec<u8>, Failure> {
     let mut text = Vec::new();
     let source = concat!("pcadlang ", env!("CARGO_PKG_VERSION"));
@@ -52,7 +52,7 @@ fn page(command: &clap::Command) -> Result<Vec<u8>, Failure> {
     Ok(text)
 }
 
-/// Prints a text; whoever reads it may stop early.
+/// Prints a text; a closed pipe is not an error.
 fn print(text: &[u8]) -> Result<(), Failure> {
     match std::io::stdout().write_all(text) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {

@@ -1,4 +1,4 @@
-//! The commands. Only these modules print; everything they do is the library's.
+//! The commands. Only these modules print; the library does the work.
 
 #[macro_use]
 mod print;
@@ -49,15 +49,15 @@ use term::has_colors;
 
 /// Why a command failed.
 pub enum Failure {
-    /// Messages with their places.
+    /// Diagnostics with source locations.
     Program(Box<Error>),
-    /// Anything else, as text, and a hint.
+    /// Any other error: a message and an optional hint.
     Plain(String, Option<String>),
-    /// The user ended it; what there was is kept.
+    /// The user interrupted the command; results so far are kept.
     Interrupted,
 }
 
-/// What went wrong, without colours and without a line end.
+/// The message, without colours or a final line break.
 impl Display for Failure {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -74,17 +74,17 @@ impl From<Error> for Failure {
     }
 }
 
-/// A failure that is only text.
+/// Makes a failure from a message without a hint.
 fn plain(message: impl Into<String>) -> Failure {
     Failure::Plain(message.into(), None)
 }
 
-/// What `--help` and the manual pages say of exit codes.
+/// The help text on exit codes.
 pub const EXIT_CODES: &str = "\
 Exit codes: 0 success, 1 an error in the program, its data or a file, 2 an error in the command line, \
 3 interrupted (results so far are kept), 130 interrupted twice.";
 
-/// Runs a command, and gives the exit code.
+/// Runs a command and returns its exit code.
 pub fn main(cli: Cli) -> ExitCode {
     let done = match cli.command {
         Command::Run(a) => run::run(&a),

@@ -1,8 +1,7 @@
-//! `report.html` of a run's folder: everything that the page shows is read from there,
-//! but for the draws. A run ends with it, and `pcadlang report` makes it anew.
+//! `report.html` of a run's folder. The page is made from the files there, and from the
+//! draws. It is written at the end of a run, and again by `pcadlang report`.
 //!
-//! Invariant: a file that is missing or broken is left out of the page, and is no reason
-//! to have none.
+//! Invariant: a missing or broken file is left out of the page, and does not prevent it.
 
 use super::date::readable;
 use super::job::write;
@@ -21,10 +20,11 @@ use serde_json::Value;
 pub const PAGE: &str = "report.html";
 /// The program's text, as it was run.
 pub const PROGRAM: &str = "program.pcad";
-/// Pictures on the page have no more pixels than this along their longer side.
+/// The maximum longer side of a picture on the page, in pixels.
 const LARGEST: u32 = 1024;
 
-/// The pictures of a folder: names, captions, and whether they are bright lines on black.
+/// The pictures of a folder: file name, caption, and whether it has bright lines on
+/// black.
 const PHOTO: (&str, &str, bool) = ("photo.jpg", "the photograph", false);
 const OVER: (&str, &str, bool) = ("overlay.png", "the best state over it", false);
 const JOINTS: (&str, &str, bool) = (
@@ -36,15 +36,15 @@ const EDGES: (&str, &str, bool) = ("photo_contours.png", "the contours of the ph
 const CONTOURS: (&str, &str, bool) = ("contours.png", "the contours of the best state", true);
 const COVERED: (&str, &str, bool) =
     ("uncertainty.png", "the fraction of the chains' last draws that cover each pixel", false);
-/// Those of runs that kept no picture of each mode.
+/// For runs that did not write a picture of each mode.
 const MODES: (&str, &str, bool) = (
     "modes.png",
     "the modes found by the chains: number of chains, estimated probability, log joint density of the best state",
     false,
 );
 
-/// Writes the page of a folder. `run` and `summary` are what `run.json` and
-/// `summary.json` say, or are about to.
+/// Writes the page of a folder. `run` and `summary` are the contents of `run.json` and
+/// `summary.json`, which need not be written yet.
 pub fn write_page(
     dir: &RunDir,
     run: &Value,
@@ -83,17 +83,17 @@ fn text(v: &Value) -> &str {
     v.as_str().unwrap_or_default()
 }
 
-/// What is a list of such things; what is none is empty.
+/// Parses a list; any other value gives an empty list.
 fn list<T: DeserializeOwned>(v: &Value) -> Vec<T> {
     serde_json::from_value(v.clone()).unwrap_or_default()
 }
 
-/// A number or a text as it is read.
+/// Formats a number or a text without quotes.
 fn plainly(v: &Value) -> String {
     v.as_str().map_or_else(|| v.to_string(), str::to_owned)
 }
 
-/// What to say of a run that did not come to its end.
+/// Describes the state of a run that was not completed.
 fn state(run: &Value) -> Option<String> {
     match text(&run["state"]) {
         "done" => None,
@@ -105,7 +105,7 @@ fn state(run: &Value) -> Option<String> {
     }
 }
 
-/// The command of the run; nothing if it was not kept.
+/// Returns the command of the run; empty if it was not recorded.
 fn command(run: &Value) -> String {
     let arguments: Vec<String> = list(&run["arguments"]);
     if arguments.is_empty() {
@@ -115,7 +115,7 @@ fn command(run: &Value) -> String {
     }
 }
 
-/// When it was, how long it took, with how many chains and what seed.
+/// Returns the date, duration, number of chains and seed.
 fn facts(run: &Value) -> Vec<String> {
     let mut all: Vec<String> = run["begun"].as_str().map(readable).into_iter().collect();
     all.extend(run["seconds"].as_f64().map(|s| format!("{} in all", seconds(s))));
@@ -151,7 +151,7 @@ fn settings(run: &Value) -> Vec<(&'static str, String)> {
     all
 }
 
-/// The pictures that a folder has, those that are to be compared side by side.
+/// Returns the pictures in a folder, grouped by what is to be compared side by side.
 fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
     let mut groups =
         vec![vec![PHOTO], vec![OVER], vec![JOINTS], vec![COVERED], vec![EDGES, CONTOURS]];
@@ -165,7 +165,8 @@ fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
     found.filter(|group| !group.is_empty()).collect()
 }
 
-/// A picture with no more pixels than a page can show; nothing if it is none.
+/// Scales a picture down to the maximum size of a page; `None` if the file is not a
+/// picture.
 fn sized(file: Vec<u8>) -> Option<Vec<u8>> {
     let reader = image::ImageReader::new(std::io::Cursor::new(&file)).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;

@@ -1,5 +1,4 @@
-//! Which person of a photograph a run is about, and what it says of the people found
-//! there.
+//! Selects a person of a photograph for a run, and warns about the people detected there.
 
 use clap::Args;
 use pcadlang::lang::builtins::scene::ImageValue;
@@ -24,7 +23,7 @@ pub struct Who {
     pub models: Option<PathBuf>,
 }
 
-/// `X,Y,W,H`.
+/// Parses `X,Y,W,H`.
 fn rectangle(text: &str) -> Result<[f64; 4], String> {
     let numbers: Vec<f64> = text
         .split(',')
@@ -37,7 +36,8 @@ fn rectangle(text: &str) -> Result<[f64; 4], String> {
     }
 }
 
-/// The joints of a body; landmarks of faces and hands would outnumber them.
+/// The joints of a body; landmarks of faces and hands are left out, since they would
+/// outnumber them.
 const BODY: [&str; 12] = [
     "l_shoulder",
     "r_shoulder",
@@ -53,12 +53,12 @@ const BODY: [&str; 12] = [
     "r_ankle",
 ];
 
-/// Networks are less sure than this of most things that are no people, and of few people
+/// The networks' confidence is below this for most false detections, and for few people
 /// (docs/detector.md).
 const DOUBTFUL: f64 = 0.5;
 
-/// That nobody was found, that others may be meant, that little of a body is in the
-/// picture. `person` counts from 1.
+/// Warns if no person was found, if another person may be meant, or if little of the body
+/// is in the picture. `person` counts from 1.
 pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
     let image = image.downcast::<ImageValue>();
     let Some((image, people)) = image.and_then(|i| Some((i, i.people()?))) else {
@@ -101,7 +101,7 @@ pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
     all
 }
 
-/// How many of the body's joints are inside a picture of this size.
+/// Counts the body's joints inside a picture of this size.
 fn inside(p: &Person, (width, height): (u32, u32)) -> usize {
     let within = |at: [f64; 2]| {
         (0.0..f64::from(width)).contains(&at[0]) && (0.0..f64::from(height)).contains(&at[1])

@@ -1,5 +1,5 @@
-//! A picture of each mode that chains are in, where they do not agree: the best state of
-//! its chains over the photograph.
+//! A picture of each mode, if the chains are in several: the best state of the mode's
+//! chains over the photograph.
 
 use super::job::write;
 use super::{Failure, plain, scene};
@@ -14,27 +14,27 @@ use pcadlang::vision::Photo;
 use std::io::ErrorKind;
 use std::sync::Arc;
 
-/// How many modes are shown, as many as the table has.
+/// The maximum number of modes shown, the same as in the table.
 const SHOWN: usize = 5;
-/// Pictures in a row, and the longer side of each, pixels.
+/// The number of pictures in a row, and the longer side of each in pixels.
 const COLUMNS: u32 = 3;
 const SIDE: u32 = 384;
 
-/// A mode's best state.
+/// The best state of a mode.
 pub struct Place {
-    /// Which mode, from 1.
+    /// The number of the mode, from 1.
     number: usize,
-    /// What is said below its picture.
+    /// The caption of its picture.
     said: String,
     best: Arc<BestState>,
 }
 
-/// The file of a mode's picture.
+/// Returns the file name of a mode's picture.
 pub fn name(mode: usize) -> String {
     format!("mode-{mode}.png")
 }
 
-/// Each mode's best state.
+/// Returns the best state of each mode.
 pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<Place> {
     let chains: usize = modes.iter().map(|m| m.chains.len()).sum();
     let state = |m: &Mode| {
@@ -55,7 +55,7 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<Place> {
     modes.iter().take(SHOWN).enumerate().filter_map(place).collect()
 }
 
-/// A picture with a longer side of so many pixels.
+/// Scales a picture to a longer side of `side` pixels.
 pub fn sized(picture: &RgbImage, side: u32) -> RgbImage {
     let scale = f64::from(side) / f64::from(picture.width().max(picture.height()).max(1));
     let [w, h] =
@@ -63,8 +63,8 @@ pub fn sized(picture: &RgbImage, side: u32) -> RgbImage {
     resize(picture, w, h, FilterType::Triangle)
 }
 
-/// Writes `modes.png`, and `mode-N.png` of each, if there are several modes and something
-/// is seen. Those of an earlier part of the run are removed.
+/// Writes `modes.png`, and `mode-N.png` for each mode, if there are several modes and the
+/// program has a view. Files of an earlier part of the run are removed.
 pub fn show_places(
     dir: &RunDir,
     seed: u64,

@@ -1,6 +1,6 @@
-//! `pcadlang predict`: what would be observed again, drawn from the prior or the
-//! posterior, against what is observed. The draws are the library's
-//! ([`pcadlang::infer::predictive`]); here they become a table and a file.
+//! `pcadlang predict`: replicated data, drawn from the prior or the posterior, compared
+//! with the observed data. The library draws them ([`pcadlang::infer::predictive`]); this
+//! module makes a table and a file.
 
 use super::args::{Job, Predict};
 use super::job::{self, Interrupt, Ready, write};
@@ -19,12 +19,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Beyond so many numbers in all, only statistics are written.
+/// If the observations have more numbers than this in total, only statistics are written.
 const ELEMENTS: usize = 200;
-/// A tail probability below this, or above one less it, is marked.
+/// A tail probability below this, or above one minus this, is marked.
 const EXTREME: f64 = 0.01;
 
-/// Draws, writes `predictive.csv`, prints the table.
+/// Draws, writes `predictive.csv`, and prints the table.
 pub fn predict(a: &Predict) -> Result<(), Failure> {
     let begun = Instant::now();
     let job = &quality::filled(&a.job, a.prior)?;
@@ -92,7 +92,7 @@ fn from_posterior(job: &Job, ready: &Ready) -> Result<Vec<Vec<Replication>>, Fai
     watch.draws().map_err(|e| model.run_error(*e).into())
 }
 
-/// One row a test statistic of an observation.
+/// Formats a table with one row per test statistic of each observation.
 fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String {
     let head = ["observation", "statistic", "observed", "5%", "50%", "95%", "tail"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
@@ -112,7 +112,8 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
             let mut replicated: Vec<f64> =
                 all.iter().map(|s| s[k]).filter(|x| !x.is_nan()).collect();
             replicated.sort_by(f64::total_cmp);
-            // One number has no spread, and is its own mean, least and greatest.
+            // A single number is its own mean, minimum and maximum, and has no standard
+            // deviation.
             if replicated.is_empty() || group.numbers.len() == 1 && k > 0 {
                 continue;
             }
@@ -148,8 +149,8 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
     s
 }
 
-/// Statistics of every draw, and the numbers themselves where they are few. What a draw
-/// lacks is empty.
+/// Writes statistics of every draw, and the numbers themselves if they are few. Missing
+/// values are empty.
 fn csv(now: &Replication, draws: &[Vec<Replication>]) -> String {
     let total: usize = now.groups.iter().map(|g| g.numbers.len()).sum();
     let whole = total <= ELEMENTS;
@@ -181,7 +182,7 @@ fn csv(now: &Replication, draws: &[Vec<Replication>]) -> String {
     s
 }
 
-/// A field as RFC 4180 has it.
+/// Quotes a field according to RFC 4180.
 fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n']) {
         format!("\"{}\"", name.replace('"', "\"\""))

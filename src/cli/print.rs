@@ -1,24 +1,24 @@
-//! Printing that never ends the program: who reads may go away (`pcadlang run … | head`),
-//! and the run goes on and keeps its files. The macros of the standard library panic
-//! there.
+//! Printing that never ends the program: the reader may close the pipe
+//! (`pcadlang run … | head`) while the run continues and keeps its files. The macros of
+//! the standard library panic then.
 
 use std::fmt::Arguments;
 use std::io::Write;
 
-/// Prints to standard output; what nobody reads is lost.
+/// Prints to standard output; errors are ignored.
 pub fn out(text: Arguments) {
     let _ = std::io::stdout().write_fmt(text);
 }
 
-/// Prints to standard error; what nobody reads is lost.
+/// Prints to standard error; errors are ignored.
 pub fn err(text: Arguments) {
     let _ = std::io::stderr().write_fmt(text);
 }
 
-/// Letters of a line that is read easily.
+/// The maximum width of a paragraph, in characters.
 const WIDEST: usize = 100;
 
-/// Prints a paragraph to standard output, wrapped between words where that is a terminal.
+/// Prints a paragraph to standard output, wrapped between words if that is a terminal.
 pub fn paragraph(text: &str) {
     let columns = console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
     match columns {
@@ -27,8 +27,8 @@ pub fn paragraph(text: &str) {
     }
 }
 
-/// A text in lines of at most so many letters, those after the first a little further in;
-/// a word that is longer than a line stays whole.
+/// Wraps a text to a number of columns; lines after the first are indented, and a word
+/// longer than a line stays whole.
 fn wrapped(text: &str, columns: usize) -> String {
     let (mut lines, mut length) = (String::new(), 0);
     for word in text.split(' ') {
@@ -46,22 +46,22 @@ fn wrapped(text: &str, columns: usize) -> String {
     lines
 }
 
-/// Text on standard output.
+/// Prints text to standard output.
 macro_rules! print_text {
     ($($text:tt)*) => { $crate::cli::print::out(format_args!($($text)*)) };
 }
 
-/// A line on standard output.
+/// Prints a line to standard output.
 macro_rules! print_line {
     ($($text:tt)*) => { $crate::cli::print::out(format_args!("{}\n", format_args!($($text)*))) };
 }
 
-/// Text on standard error.
+/// Prints text to standard error.
 macro_rules! error_text {
     ($($text:tt)*) => { $crate::cli::print::err(format_args!($($text)*)) };
 }
 
-/// A line on standard error.
+/// Prints a line to standard error.
 macro_rules! error_line {
     ($($text:tt)*) => { $crate::cli::print::err(format_args!("{}\n", format_args!($($text)*))) };
 }

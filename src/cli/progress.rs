@@ -1,4 +1,4 @@
-//! The live line of a run on a terminal; elsewhere a line every few seconds.
+//! The progress line of a run on a terminal; elsewhere, one line every few seconds.
 
 use super::term;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Between two looks at the chains.
+/// The polling interval.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Between two lines where nobody looks at a terminal: a file or a pipe.
+/// The interval between lines if the output is not a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
-/// The end of a run, which others wait for.
+/// The end of a run, which other threads wait for.
 #[derive(Default)]
 pub struct Ending {
     ended: Mutex<bool>,
@@ -22,8 +22,8 @@ pub struct Ending {
 }
 
 impl Ending {
-    /// Does what it is the end of. It comes even where that panics: who waits for it
-    /// would keep the process.
+    /// Runs the work whose end this is. The end is signalled even if the work panics, as
+    /// waiting threads would otherwise keep the process alive.
     pub fn of<T>(&self, work: impl FnOnce() -> T) -> T {
         struct Comes<'a>(&'a Ending);
         impl Drop for Comes<'_> {
@@ -36,7 +36,7 @@ impl Ending {
         work()
     }
 
-    /// Waits for it, but not longer than this; whether it came.
+    /// Waits for the end, at most for this time. Returns whether it has come.
     pub fn within(&self, time: Duration) -> bool {
         let ended = self.ended.lock().unwrap_or_else(PoisonError::into_inner);
         let waited = self.changed.wait_timeout_while(ended, time, |ended| !*ended);
@@ -44,8 +44,8 @@ impl Ending {
     }
 }
 
-/// Shows progress until the end; a limit of time makes it a bar. `chains`: how many there
-/// are, and what they are called.
+/// Shows progress until the end, as a bar if there is a time limit. `chains` is the
+/// number of chains (or replicates), and what they are called.
 pub fn watch(
     progress: &Progress,
     chains: (u32, &'static str),
@@ -80,14 +80,14 @@ pub fn watch(
     bar.finish_and_clear();
 }
 
-/// Has the chains hand over checkpoints at even distances of time, until the end.
+/// Asks the chains for checkpoints at regular intervals, until the end.
 pub fn ask_for_checkpoints(progress: &Progress, ending: &Ending, every: Duration) {
     while !ending.within(every) {
         progress.checkpoints.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// Shows how many of so many things are done, until `over`.
+/// Shows how many of `of` items are done, until `over`.
 pub fn count(done: &AtomicU64, of: u64, over: &AtomicBool, quiet: bool) {
     if quiet || !term::is_live() {
         return;
@@ -103,7 +103,7 @@ pub fn count(done: &AtomicU64, of: u64, over: &AtomicBool, quiet: bool) {
     bar.finish_and_clear();
 }
 
-/// What is known of a run at a moment.
+/// The state of a run at one time.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
     steps: u64,
@@ -111,14 +111,14 @@ struct Known {
     started: u32,
     warming: u32,
     ended: u32,
-    /// How many chains there are, and what they are called.
+    /// The number of chains, and what they are called.
     chains: (u32, &'static str),
 }
 
 impl Known {
     fn of(progress: &Progress, chains: (u32, &'static str)) -> Known {
         let number = |n: &AtomicU32| n.load(Ordering::Relaxed);
-        // No bits: nothing is known yet.
+        // Zero bits mean that there is no best state yet.
         let best = Some(progress.best.load(Ordering::Relaxed))
             .filter(|bits| *bits != 0)
             .map(f64::from_bits);
@@ -132,7 +132,7 @@ impl Known {
         }
     }
 
-    /// What the chains do.
+    /// Returns the phase of the chains.
     fn phase(&self) -> &'static str {
         match self {
             Known { started, ended, .. } if started == ended && *ended < self.chains.0 => "starts",
@@ -143,8 +143,9 @@ impl Known {
     }
 }
 
-/// What is said, what matters most first, as narrow terminals cut the end off: the phase,
-/// the time left (or taken, if there is no limit), the best score, steps and their rate.
+/// Formats the progress line, the most important parts first, since narrow terminals cut
+/// off the end: the phase, the time left (or elapsed, without a limit), the best score,
+/// the steps and their rate.
 fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
     let mut s = k.phase().to_owned();
     if k.ended > 0 {
@@ -168,7 +169,7 @@ fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
     s
 }
 
-/// A time in whole seconds, so that the line does not flicker.
+/// Formats a time in whole seconds, so that the line does not flicker.
 fn whole(t: Duration) -> String {
     if t.as_secs() < 120 { format!("{} s", t.as_secs()) } else { seconds(t.as_secs_f64()) }
 }
@@ -203,7 +204,7 @@ mod tests {
             ),
             "{said}"
         );
-        // The bar and the line fit a terminal of 80 columns but for the rate.
+        // The bar and the line, except for the rate, fit a terminal of 80 columns.
         assert!(said.find(" steps").is_some_and(|i| i + 6 + 11 <= 80), "{said}");
         (k.ended, k.best) = (4, Some(f64::NEG_INFINITY));
         assert_eq!(

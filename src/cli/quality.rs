@@ -1,8 +1,8 @@
-//! `--quality` and `--time`: settings that were chosen from a front of speed and
-//! accuracy, filled in where the command line leaves them open.
+//! `--quality` and `--time`: measured presets of speed and accuracy, which fill in
+//! settings that the command line leaves open.
 //!
-//! Invariant: what is filled in is as if it had been typed, and depends on the command
-//! line and the presets alone, never on the machine.
+//! Invariant: filled-in settings are equivalent to typed ones, and depend on the command
+//! line and the presets only, not on the machine.
 
 use super::args::{Job, QualityArg, Sampling};
 use super::{Failure, plain};
@@ -11,8 +11,8 @@ use pcadlang::tradeoff::{Choice, Presets, Quality};
 use std::path::Path;
 use std::time::Duration;
 
-/// What is known of a program: `NAME.quality.json` beside it; or, of a shipped program,
-/// the shipped one.
+/// Reads the presets of a program: `NAME.quality.json` beside it or, for a shipped
+/// program, the shipped file.
 pub fn presets(program: &str) -> Result<Option<(String, Presets)>, Failure> {
     let path = Path::new(program).with_extension("quality.json");
     let name = path.display().to_string();
@@ -25,8 +25,8 @@ pub fn presets(program: &str) -> Result<Option<(String, Presets)>, Failure> {
     Ok(Some((name, presets)))
 }
 
-/// Fills in what a run leaves open; what is to be said of it, if anything was.
-/// `keypoints`: whether it, or the dataset it is of, has some.
+/// Fills in the settings that a run leaves open. Returns a note for the user if there are
+/// presets. `keypoints`: whether the run, or its dataset, has keypoints.
 pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> {
     let program = &job.inputs.program;
     let wanted = match (job.sampling.quality, job.sampling.time) {
@@ -61,7 +61,7 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
     }
 }
 
-/// Whether a run is given what the presets were measured with.
+/// Returns whether a run has the data that the presets were measured with.
 fn fits(presets: &Presets, keypoints: bool) -> bool {
     presets.needs.iter().all(|kind| kind == "keypoints" && keypoints)
 }
@@ -80,7 +80,8 @@ fn fill(job: &mut Job, choice: &Choice, name: &str) -> String {
         s.chains = Some(chains);
         said.push(format!("--chains {chains}"));
     }
-    // How long is one question: whoever answers it in one way is not told another.
+    // Time and steps both determine the length of a run: if one is given, neither is
+    // filled in.
     if let (None, None) = (s.time, s.steps) {
         if let Some(time) = setting.time {
             s.time = Some(Duration::from_secs_f64(time));
@@ -105,7 +106,8 @@ fn fill(job: &mut Job, choice: &Choice, name: &str) -> String {
     )
 }
 
-/// A job with what it leaves open filled in; says so, unless it is to be quiet.
+/// Returns a job with its open settings filled in, and prints a note unless `quiet` is
+/// true.
 pub fn filled(job: &Job, quiet: bool) -> Result<Job, Failure> {
     let mut job = job.clone();
     let keypoints = job.keypoints.is_some();
@@ -115,7 +117,8 @@ pub fn filled(job: &Job, quiet: bool) -> Result<Job, Failure> {
     Ok(job)
 }
 
-/// How a run is told again: what is not in the program.
+/// Formats the options for repeating a run that differ from the defaults, except its
+/// length.
 pub fn again(job: &Job) -> String {
     let sets = job.inputs.sets.iter().map(|(k, v)| format!(" --set {k}={v}"));
     let chains =
@@ -123,7 +126,7 @@ pub fn again(job: &Job) -> String {
     sets.chain(chains).collect()
 }
 
-/// The names of qualities.
+/// Returns the values of `--quality`.
 pub fn names() -> Vec<&'static str> {
     Quality::ALL.map(Quality::name).into_iter().chain(["own"]).collect()
 }

@@ -1,5 +1,5 @@
-//! A run opened again from its folder: the command that it was begun with, all settings
-//! that it used, and its states.
+//! A run reopened from its folder: the command that began it, with all settings, and its
+//! states.
 
 use super::args::{Cli, Command, Job};
 use super::{Failure, plain};
@@ -10,19 +10,19 @@ use pcadlang::trace::{SavedTrace, Trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The file of the states that are kept: one to a line, JSON.
+/// The file of the kept states: JSON, one per line.
 pub const TRACES: &str = "traces.jsonl";
 
-/// A run's folder.
+/// The folder of a run.
 pub struct Reopened {
     folder: PathBuf,
-    /// What was run, with everything that `--time` or `--quality` filled in.
+    /// The job, including everything that `--time` or `--quality` filled in.
     pub job: Job,
-    /// The arguments of `pcadlang run`, as they are typed.
+    /// The arguments of `pcadlang run`.
     pub arguments: Vec<String>,
 }
 
-/// What is typed to run a job again, but for the name of the command: all that its draws
+/// Returns the arguments of `pcadlang run` that repeat a job: everything that its draws
 /// depend on.
 pub fn arguments(job: &Job) -> Vec<String> {
     let (g, s) = (&job.inputs, &job.sampling);
@@ -51,11 +51,12 @@ pub fn arguments(job: &Job) -> Vec<String> {
 }
 
 impl Reopened {
-    /// The run of a folder. Files that it names are where they were, seen from the folder
-    /// that the command is given in.
+    /// Opens the run in a folder. Relative paths in its command refer to the current
+    /// directory.
     ///
     /// # Errors
-    /// If the folder holds no run, or one of a version that did not keep its command.
+    /// If the folder does not contain a run, or one of a version that did not record its
+    /// command.
     pub fn open(folder: &Path) -> Result<Reopened, Failure> {
         let run = super::resume::run(folder)?;
         let told = || {
@@ -81,7 +82,7 @@ impl Reopened {
         }
     }
 
-    /// The states that were kept.
+    /// Reads the kept states.
     ///
     /// # Errors
     /// If their file cannot be read.
@@ -96,17 +97,17 @@ impl Reopened {
         text.lines().enumerate().map(one).collect()
     }
 
-    /// The best state.
+    /// Reads the best state.
     ///
     /// # Errors
-    /// If it was not written, or cannot be read.
+    /// If the state was not written, or cannot be read.
     pub fn best(&self) -> Result<SavedTrace, Failure> {
         let path = self.folder.join("best.trace.json");
         let bytes = super::files::read(&path)?;
         serde_json::from_slice(&bytes).map_err(|e| plain(format!("{}: {e}", path.display())))
     }
 
-    /// A state as a trace of the program.
+    /// Loads a state as a trace of the program.
     ///
     /// # Errors
     /// If the program, its data or its settings are no longer those of the run.

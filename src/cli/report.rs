@@ -1,4 +1,4 @@
-//! `pcadlang report`: the page of a run made anew, from what its folder holds.
+//! `pcadlang report`: rebuilds the page of a run from the contents of its folder.
 
 use super::page::{PAGE, write_page};
 use super::{Failure, files, job, plain, resume};
@@ -15,7 +15,7 @@ pub struct Report {
     pub run: PathBuf,
 }
 
-/// Makes the page of a run anew.
+/// Rebuilds the page of a run.
 pub fn report(a: &Report) -> Result<(), Failure> {
     let run = resume::run(&a.run)?;
     let dir = RunDir::open(&a.run).map_err(|e| plain(e.to_string()))?;
@@ -30,7 +30,7 @@ pub fn report(a: &Report) -> Result<(), Failure> {
             let summary = serde_json::from_slice(&files::read(&path)?);
             summary.map_err(|e| plain(format!("{}: {e}", path.display())))?
         }
-        // A run that has not ended, or was killed.
+        // The run has not ended, or was killed.
         _ => so_far(&quantities, draws.len()),
     };
     let names: Vec<&String> =
@@ -41,7 +41,7 @@ pub fn report(a: &Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What can be told of draws alone.
+/// Makes a summary from the draws alone.
 fn so_far(quantities: &[Quantity], chains: usize) -> Value {
     let modes = modes(quantities, None);
     json!({ "modes": modes, "warnings": warnings(quantities, &modes, &[], chains) })

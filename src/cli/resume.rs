@@ -1,11 +1,11 @@
-//! What an earlier run left in a folder, and whether it is of the same settings.
+//! Earlier runs in a folder, and whether their settings are the same.
 
 use super::{Failure, plain};
 use pcadlang::report::{RunDir, RunDirError, evaluation};
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// What must be the same for draws to be the same, and how it is called.
+/// The fields of `run.json` on which draws depend, and their names in messages.
 const KEYS: [(&str, &str); 7] = [
     ("version", "version"),
     ("program_hash", "program"),
@@ -16,15 +16,15 @@ const KEYS: [(&str, &str); 7] = [
     ("settings", ""),
 ];
 
-/// The `run.json` of a folder, if a run was begun there.
+/// Returns the `run.json` of a folder, or `None` if no run was begun there.
 pub fn left(folder: &Path) -> Option<Value> {
     let bytes = std::fs::read(folder.join("run.json")).ok()?;
     let run: Value = serde_json::from_slice(&bytes).unwrap_or_default();
-    // Without a program, it was cleared away for the next one.
+    // Without a program hash, the folder was cleared for another run.
     run.get("program_hash").is_some().then_some(run)
 }
 
-/// The `run.json` of a folder.
+/// Returns the `run.json` of a folder.
 ///
 /// # Errors
 /// If no run was begun there.
@@ -42,7 +42,8 @@ pub fn run(folder: &Path) -> Result<Value, Failure> {
     })
 }
 
-/// What is another there than in the record of a run; empty if its draws are the same.
+/// Returns what differs between a `run.json` and the record of a run; empty if both have
+/// the same draws.
 pub fn differences(there: &Value, record: &Map<String, Value>) -> Vec<String> {
     let mut all = Vec::new();
     for (key, called) in KEYS {
@@ -52,7 +53,7 @@ pub fn differences(there: &Value, record: &Map<String, Value>) -> Vec<String> {
                 let changed = settings.iter().filter(|(k, now)| there[key][k] != **now);
                 all.extend(changed.map(|(k, now)| said(k, &there[key][k], now)));
             }
-            // Hashes say nothing to people.
+            // Hashes are not shown, since they mean nothing to people.
             now if there[key] != *now && key.ends_with("hash") => all.push(called.to_owned()),
             now if there[key] != *now => all.push(said(called, &there[key], now)),
             _ => {}
@@ -61,8 +62,8 @@ pub fn differences(there: &Value, record: &Map<String, Value>) -> Vec<String> {
     all
 }
 
-/// The folder of a run to go on with: that of the same command, or a new one where there
-/// is none yet. How long it runs may be another than before.
+/// Opens the folder of a run to resume, which must be of the same command, or makes a new
+/// one if no run was begun there. Steps and time may differ from before.
 ///
 /// # Errors
 /// If a run with other settings was begun there, or the folder cannot be used.

@@ -1,4 +1,4 @@
-//! `pcadlang run`: one run, its folder, and what is said of it at the end.
+//! `pcadlang run`: one run, its folder, and the summary printed at the end.
 
 use super::args::{Job, Run};
 use super::explain::{Explanation, explain};
@@ -9,7 +9,7 @@ use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
 
-/// Runs a program and leaves its folder.
+/// Runs a program and writes its folder.
 pub fn run(a: &Run) -> Result<(), Failure> {
     let job = &quality::filled(&a.job, a.quiet)?;
     let ready = job::prepare(job, a.quiet)?;
@@ -49,7 +49,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
-/// The end of a run on the terminal.
+/// Prints the results at the end of a run.
 fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explanation>) {
     let seed = job.sampling.seed;
     if a.json {
@@ -124,7 +124,7 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
     print_line!("{}", dir.path().display());
 }
 
-/// A folder as it is written on a command line.
+/// Quotes a folder for the command line if necessary.
 fn shown(dir: &RunDir) -> String {
     let path = dir.path().display().to_string();
     if path.contains(char::is_whitespace) { format!("'{path}'") } else { path }

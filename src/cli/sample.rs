@@ -1,4 +1,5 @@
-//! `pcadlang sample`: draws from the prior on one sheet, as Figure 1 of Kulkarni et al. 2014.
+//! `pcadlang sample`: draws from the prior on a contact sheet, like Figure 1 of Kulkarni
+//! et al. 2014.
 
 use super::args::Sample;
 use super::{Failure, files, inputs, plain, scene};
@@ -47,7 +48,7 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A value in a few letters.
+/// Formats a value briefly.
 fn short(v: &Value) -> String {
     match v {
         Value::Num(x) => number(*x),

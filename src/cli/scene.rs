@@ -1,4 +1,4 @@
-//! From a trace to pictures: finding the view of a program and drawing it.
+//! Finds and evaluates the view of a program in a trace.
 
 use pcadlang::bank;
 use pcadlang::lang::builtins::scene::ViewValue;
@@ -10,19 +10,19 @@ use pcadlang::trace::{Constraint, Draws, Trace};
 use pcadlang::{Error, Model};
 use std::sync::Arc;
 
-/// Where values that no observation asks for are drawn.
+/// Returns the random stream for values that no observation depends on.
 pub fn predictive(seed: u64, step: u64) -> Draws {
     Draws { key: StreamKey::new(seed, u32::MAX, Purpose::PREDICT), step, substream: 0 }
 }
 
-/// The state of these choices.
+/// Rebuilds the state with the given choices.
 pub fn rebuilt(model: &Model, choices: &[(u64, Constraint)], draws: Draws) -> Result<Trace, Error> {
     let (code, limits) = (Arc::clone(model.code()), model.limits().clone());
     let built = Trace::generate(code, choices.iter().cloned(), draws, limits);
     built.map(|(trace, _)| trace).map_err(|e| model.run_error(*e))
 }
 
-/// Where a program keeps its view: the last top-level name that is one.
+/// Returns the operand of the program's view: the last top-level name that is a view.
 pub fn view_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
     let is_view =
@@ -30,8 +30,8 @@ pub fn view_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     globals.into_iter().find(|o| trace.query(&[*o], draws).is_ok_and(is_view))
 }
 
-/// The program's view: the last top-level name that is one, or the last solid before a
-/// camera.
+/// Returns the program's view: the last top-level name that is a view, or else the last
+/// solid, seen from a camera.
 pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<Arc<View>> {
     let at = bank::picture(trace, draws)?;
     let values = trace.query(&[at], draws).ok()?;

@@ -1,5 +1,5 @@
-//! What a run looked at, as files beside the best state: the photograph, its contours,
-//! and the joints that were detected in it.
+//! Observed data as files beside the best state: the photograph, its contours, and the
+//! joints detected in it.
 
 use super::job::write;
 use super::places::sized;
@@ -13,11 +13,11 @@ use pcadlang::report::RunDir;
 use pcadlang::report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, Strokes, png};
 use pcadlang::vision::ContourMap;
 
-/// The photograph has no more pixels than this along its longer side.
+/// The maximum longer side of the photograph, in pixels.
 const LARGEST: u32 = 1024;
-/// Of a photograph as JPEG.
+/// The JPEG quality of the photograph.
 const QUALITY: u8 = 90;
-/// What is shown around the joints, as a share of how far they reach.
+/// The margin around the joints, as a fraction of their extent.
 const MARGIN: f64 = 0.15;
 
 /// Writes `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were
@@ -43,8 +43,8 @@ pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Resul
     }
 }
 
-/// That nothing in what was given speaks of the scene: a photograph without contours,
-/// keypoints of which the scene has none.
+/// Warns of observed data that do not constrain the scene: a photograph without contours,
+/// or keypoints that the scene does not have.
 pub fn warnings(
     image: Option<(&str, &ImageValue)>,
     keypoints: Option<&str>,
@@ -67,17 +67,17 @@ pub fn warnings(
     all
 }
 
-/// The contours that the built-in detector finds, for the eye to compare, where the
-/// program looked at none: a person whose joints were found is fitted without them. A
-/// value of its own, so that this does not count as looked at.
+/// Detects contours with the built-in detector for visual comparison, if the program did
+/// not use any: a person with detected joints is fitted without them. The detection is
+/// made on a copy, so that the contours do not count as used.
 fn found(image: &ImageValue) -> Option<ContourMap> {
     let photo = image.as_photo()?.clone();
     ImageValue::photo(photo).map().ok().cloned()
 }
 
-/// The contours of a photograph, drawn as those of a scene are.
+/// Draws the contours of a photograph like those of a scene.
 fn lines(map: &ContourMap, (width, height): (u32, u32)) -> RgbImage {
-    // Points are about a pixel of the map apart.
+    // Points are about one pixel of the map apart.
     let length = vec![1.0; map.len()];
     let ContourMap { x, y, tx, ty, .. } = map;
     pictures::contours(
@@ -87,8 +87,8 @@ fn lines(map: &ContourMap, (width, height): (u32, u32)) -> RgbImage {
     )
 }
 
-/// The part of a photograph that has the joints, with a line from where each was detected
-/// to where the scene has it.
+/// Crops a photograph to the joints, and draws a line from each detected position to the
+/// position in the scene.
 fn joints(photo: &RgbImage, located: &[Located]) -> Option<RgbImage> {
     let (w, h) = (f64::from(photo.width()), f64::from(photo.height()));
     let ends: Vec<[[f64; 2]; 2]> =
@@ -147,7 +147,7 @@ mod tests {
             located([7.0, 0.5], [0.4, 0.4]),
         ];
         let out = joints(&photo, &all).unwrap();
-        // From 100 to 200 across with a margin of 15, from 50 to 100 down.
+        // From 100 to 200 horizontally with a margin of 15, from 50 to 100 vertically.
         assert_eq!((out.width(), out.height()), (768, 472));
         let at = |x: f64, y: f64| {
             out.get_pixel(((x - 85.0) * 768.0 / 130.0) as u32, ((y - 35.0) * 768.0 / 130.0) as u32)
@@ -158,7 +158,7 @@ mod tests {
             ([255, 220, 0], [90, 220, 255]),
             "own yellow, detected blue"
         );
-        // Lines are thin, and smooth at their sides.
+        // Lines are thin and antialiased.
         let [red, green, blue] = at(150.0, 100.0);
         assert!(
             red < 100 && green > 140 && blue > 140,

@@ -1,4 +1,4 @@
-//! `pcadlang show`: a state of a run that has ended, as a picture, a mesh or a list.
+//! `pcadlang show`: a state of a finished run as a picture, a mesh or a list.
 
 use super::reopened::Reopened;
 use super::{Failure, files, job, plain, scene};
@@ -26,7 +26,7 @@ pub struct Show {
     pub out: Option<PathBuf>,
 }
 
-/// Choices listed at most.
+/// The maximum number of choices listed.
 const LISTED: usize = 200;
 
 /// Shows a state of a run.
@@ -91,7 +91,7 @@ pub fn show(a: &Show) -> Result<(), Failure> {
     files::write(Path::new(out), &bytes)
 }
 
-/// Arguments as a shell reads them.
+/// Quotes arguments for a shell.
 pub fn quoted(arguments: &[String]) -> String {
     let plain = |a: &String| {
         !a.is_empty() && a.chars().all(|c| c.is_ascii_alphanumeric() || "_-./=:,#+@".contains(c))

@@ -1,23 +1,23 @@
-//! What the terminal can show, and errors on it.
+//! Properties of the terminal, and error messages.
 
 use super::Failure;
 use pcadlang::diag::render;
 use std::io::IsTerminal;
 
-/// Whether errors may have colours: on a terminal that has any, unless NO_COLOR is set
-/// (https://no-color.org).
+/// Returns whether errors may have colours: on a terminal that supports them, unless
+/// NO_COLOR is set (https://no-color.org).
 pub fn has_colors() -> bool {
     let set = |name| std::env::var_os(name).is_some_and(|v: std::ffi::OsString| !v.is_empty());
     let dumb = std::env::var_os("TERM").is_some_and(|v| v == "dumb");
     is_live() && !dumb && !set("NO_COLOR")
 }
 
-/// Whether somebody watches: errors and progress go to a terminal.
+/// Returns whether errors and progress go to a terminal.
 pub fn is_live() -> bool {
     std::io::stderr().is_terminal()
 }
 
-/// Prints why a command failed, and gives its exit code.
+/// Prints why a command failed, and returns its exit code.
 pub fn fail(failure: Failure) -> u8 {
     match failure {
         Failure::Program(e) => {

@@ -12,10 +12,10 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
-/// How often files are looked at.
+/// The polling interval for files.
 const EVERY: Duration = Duration::from_millis(200);
 
-/// Checks programs, and again when one of their files changes, until the user ends it.
+/// Checks programs, and again when one of their files changes, until interrupted.
 pub fn watch(a: &Check) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     loop {
@@ -43,24 +43,23 @@ fn files(n: usize) -> String {
     if n == 1 { "1 file".into() } else { format!("{n} files") }
 }
 
-/// Clears the screen, where there is one.
+/// Clears the screen if the output is a terminal.
 fn clear() {
     if io::stdout().is_terminal() {
         print_text!("\x1b[2J\x1b[3J\x1b[H");
     }
 }
 
-/// When a file was written, and how long it is; nothing if it is not there.
+/// The modification time and length of a file; `None` if the file does not exist.
 type Stamp = Option<(SystemTime, u64)>;
 
-/// The files of programs, those that are looked for and missing too, as they are at one
-/// time.
+/// The files of programs at one time, including files that are referred to but missing.
 struct FileStamps(BTreeMap<String, Stamp>);
 
 impl FileStamps {
     fn of(programs: &[String], folders: &[PathBuf]) -> FileStamps {
-        // What the text was read before is seen: a change that comes while it is checked
-        // counts.
+        // Stamps are taken before a file is read, so that changes during a check are
+        // noticed.
         let mut stamps = BTreeMap::new();
         for program in programs {
             let own = Reach::default().of(program);
@@ -73,7 +72,7 @@ impl FileStamps {
         FileStamps(stamps)
     }
 
-    /// The files that are not as they were.
+    /// Returns the files that have changed.
     fn changed(&self) -> Vec<&str> {
         self.0
             .iter()
@@ -83,7 +82,7 @@ impl FileStamps {
     }
 }
 
-/// Reads what a program may read, and remembers what it was asked for.
+/// Reads what a program may read, and records the requested files.
 struct Asked {
     reach: Reach,
     stamps: Mutex<BTreeMap<String, Stamp>>,
@@ -117,7 +116,8 @@ mod tests {
         std::fs::write(&part, "let b = ;").unwrap();
         let stamps = FileStamps::of(std::slice::from_ref(&main), &[]);
         assert!(stamps.changed().is_empty(), "{:?}", stamps.changed());
-        // A file that is included, though nothing parses, and one that is not there yet.
+        // A file that is included although nothing parses, and a file that does not exist
+        // yet.
         std::fs::write(&part, "let b = 10;").unwrap();
         assert_eq!(stamps.changed(), [part.as_str()]);
         std::fs::write(&missing, "").unwrap();

@@ -1,4 +1,4 @@
-//! Changes of the state by hand: `:flip`, `:set`, `:draw`.
+//! Manual changes of the state: `:flip`, `:set`, `:draw`.
 
 use super::look::{ROWS, addressed, more};
 use super::{Reply, Session, Trouble, shown};
@@ -7,7 +7,7 @@ use crate::report::number;
 use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Draws, Given, Trace};
 
-/// What the log joint density was made of.
+/// The log joint density and its parts.
 #[derive(Clone, Copy)]
 struct Scores {
     joint: f64,
@@ -20,7 +20,7 @@ impl Scores {
         Scores { joint: t.log_joint(), prior: t.log_prior(), likelihood: t.log_likelihood() }
     }
 
-    /// The change to another state, in a line.
+    /// Formats the change to another state in one line.
     fn to(self, other: Scores) -> String {
         let by = |a: f64, b: f64| if a == b { "+0".into() } else { signed(b - a) };
         format!(
@@ -34,14 +34,14 @@ impl Scores {
     }
 }
 
-/// A number with its sign.
+/// Formats a number with its sign.
 fn signed(x: f64) -> String {
     if x < 0.0 || x.is_nan() { number(x) } else { format!("+{}", number(x)) }
 }
 
 impl Session {
-    /// `:flip sel`: a Metropolis-Hastings step with proposals from the prior, as the
-    /// kernel `block` does it.
+    /// `:flip sel`: a Metropolis-Hastings step with proposals from the prior, like that
+    /// of the kernel `block`.
     pub(super) fn flip(&mut self, text: &str) -> Result<Reply, Trouble> {
         let found = self.select(text)?;
         let targets: Vec<_> = found.iter().map(|(_, t)| *t).collect();
@@ -127,13 +127,13 @@ impl Session {
         Ok(Reply::text(said + &self.summary()))
     }
 
-    /// Where what is proposed here is drawn.
+    /// Returns the random stream for proposed values.
     fn values(&self) -> Draws {
         Draws { key: StreamKey::new(self.seed, 0, Purpose::VALUES), step: self.clock, substream: 0 }
     }
 }
 
-/// An address and what follows it; keys of addresses may hold spaces.
+/// Splits a text after its address; keys of addresses may contain spaces.
 fn split_address(text: &str) -> (&str, &str) {
     let mut depth = 0_i64;
     let end = text.char_indices().find(|(_, c)| {

@@ -1,18 +1,18 @@
-//! The commands: what may follow a colon.
+//! The commands, which begin with a colon.
 
 use super::{Reply, Request, Session, Trouble};
 use crate::diag::nearest;
 use crate::lang::builtins::search::search;
 use crate::lang::builtins::{Builtin, Table, doc};
 
-/// A command, as `:help` has it.
+/// A command, as listed by `:help`.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
-    /// Its name, without the colon.
+    /// The name, without the colon.
     pub name: &'static str,
-    /// What it takes.
+    /// Its arguments; optional ones are in brackets.
     pub takes: &'static str,
-    /// One line about it.
+    /// A one-line description.
     pub doc: &'static str,
 }
 
@@ -68,8 +68,7 @@ pub const COMMANDS: &[Command] = &[
     command("quit", "", "Quit (also exit, Ctrl-D)"),
 ];
 
-/// Words that are no expression of the language and that people try, for the commands
-/// that they mean.
+/// Returns the command that is meant by a word that people type without the colon.
 pub(super) fn alias(word: &str) -> Option<&'static str> {
     match word {
         "help" | "?" => Some("help"),
@@ -80,7 +79,7 @@ pub(super) fn alias(word: &str) -> Option<&'static str> {
 }
 
 impl Session {
-    /// Does a command, given without its colon.
+    /// Runs a command, given without its colon.
     pub(super) fn command(&mut self, text: &str) -> Result<Reply, Trouble> {
         let (name, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let rest = rest.trim();
@@ -128,7 +127,7 @@ impl Session {
         }
     }
 
-    /// The program with numbered lines, as messages count them.
+    /// Shows the program with the line numbers that messages use.
     fn list(&self) -> Reply {
         let lines: Vec<&str> = self.text().lines().collect();
         let width = lines.len().to_string().len();
@@ -165,10 +164,10 @@ impl Session {
     }
 }
 
-/// Built-ins that are told where a name is none of them.
+/// How many built-ins are listed for a subject.
 const FOUND: usize = 8;
 
-/// The built-ins that say something about a subject, such as `kernels` or `logistic`.
+/// Lists the built-ins on a subject, such as `kernels` or `logistic`, if all words match.
 fn about(table: &Table, words: &str) -> Option<String> {
     let found = search(table, words);
     if found.entries.is_empty() || !found.instead.is_empty() || !found.unknown.is_empty() {
@@ -182,7 +181,7 @@ fn about(table: &Table, words: &str) -> Option<String> {
     Some(found.entries.iter().take(FOUND).map(line).collect::<String>() + &more)
 }
 
-/// What `:help` says.
+/// Formats the text of `:help`.
 fn help() -> String {
     let head = |c: &Command| format!(":{} {}", c.name, c.takes).trim_end().to_owned();
     let width = COMMANDS.iter().map(|c| head(c).chars().count()).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Completion: what a word under the cursor may become, from where it stands.
+//! Completion of the word at the cursor, depending on its context.
 
 use super::{COMMANDS, Session};
 use crate::lang::builtins::{Kind, Type};
@@ -6,20 +6,20 @@ use crate::lang::code::BlockKind;
 use crate::syntax::{Class, STATEMENTS, classes};
 use std::path::Path;
 
-/// What may stand in place of a piece of the line.
+/// The candidates for a piece of a line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Completion {
-    /// Where the piece begins that is replaced, in bytes.
+    /// Where the piece that is replaced begins, in bytes.
     pub start: usize,
-    /// What may stand there, in order.
+    /// The candidates, in order.
     pub words: Vec<String>,
 }
 
-/// Words of the language that begin no statement.
+/// Keywords that do not begin a statement.
 const KEYWORDS: &[&str] = &["else", "and", "or", "not", "true", "false"];
-/// The tags that choices have by their distributions.
+/// Tags that choices get from their distributions.
 const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
-/// What is read from files.
+/// Built-ins that read files.
 const READERS: &[&str] = &[
     "image",
     "csv",
@@ -34,7 +34,7 @@ const READERS: &[&str] = &[
 ];
 
 impl Session {
-    /// What the word that ends at byte `at` of a line may become.
+    /// Completes the word that ends at byte `at` of a line.
     pub fn complete(&self, line: &str, at: usize) -> Completion {
         let Some(before) = line.get(..at) else { return Completion::default() };
         if let Some(command) = before.strip_prefix(':') {
@@ -46,7 +46,7 @@ impl Session {
         self.complete_text(before)
     }
 
-    /// What a command takes: nothing else is offered.
+    /// Completes an argument of a command; only what the command accepts is offered.
     fn complete_argument(&self, command: &str, before: &str) -> Completion {
         let start = before.rfind(char::is_whitespace).map_or(0, |i| i + 1);
         let word = &before[start..];
@@ -73,9 +73,10 @@ impl Session {
         }
     }
 
-    /// A choice by its address or, without the `@`, by its name, and some other words.
+    /// Completes the address of a choice or, without the `@`, its name, and some other
+    /// words.
     fn complete_choice(&self, before: &str, others: impl Iterator<Item = String>) -> Completion {
-        // Keys of addresses may hold spaces.
+        // Keys of addresses may contain spaces.
         let start = before
             .rfind(" @")
             .map_or_else(|| before.rfind(char::is_whitespace), Some)
@@ -88,20 +89,20 @@ impl Session {
         found(start, word, choices.map(written).chain(others))
     }
 
-    /// Tags, and functions that make selections.
+    /// Returns tags, and functions that return selections.
     fn selections(&self) -> impl Iterator<Item = String> {
         let tags = self.model.code().tags.iter().map(|t| format!("${t}"));
         let all = self.model.code().builtins.iter().filter(|b| b.returns == Type::Selection);
         tags.chain(KINDS.iter().map(|k| (*k).to_owned())).chain(all.map(|b| b.full_name()))
     }
 
-    /// What `:doc` explains: statements, built-ins, commands.
+    /// Returns the topics that `:doc` explains: statements, built-ins, commands.
     pub(super) fn topics(&self) -> impl Iterator<Item = String> {
         let commands = COMMANDS.iter().flat_map(|c| [c.name.to_owned(), format!(":{}", c.name)]);
         STATEMENTS.iter().map(|s| s.name.to_owned()).chain(self.builtins()).chain(commands)
     }
 
-    /// What an expression or directive may hold.
+    /// Completes a word of an expression or directive.
     fn complete_text(&self, before: &str) -> Completion {
         if let Some(start) = open_string(before) {
             let is_program = before[..start - 1].trim_end().ends_with("include");
@@ -148,13 +149,13 @@ impl Session {
         )
     }
 
-    /// The addresses of choices and observations.
+    /// Returns the addresses of choices and observations.
     fn addresses(&self) -> impl Iterator<Item = String> {
         let choices = self.trace.choices().into_iter().map(|(a, _, _)| a.to_string());
         choices.chain(self.trace.observed().into_iter().map(|o| o.address.to_string()))
     }
 
-    /// The built-ins that are called by name.
+    /// Returns the built-ins that are called by name.
     fn builtins(&self) -> impl Iterator<Item = String> {
         let all = self
             .model
@@ -165,7 +166,7 @@ impl Session {
         all.map(|b| b.full_name())
     }
 
-    /// The arguments of a function, distribution or kernel, as one writes them.
+    /// Returns the arguments of a function, distribution or kernel, as written in a call.
     fn arguments(&self, name: &str) -> Vec<String> {
         let code = self.model.code();
         let written = |n: &str| format!("{n} = ");
@@ -184,7 +185,7 @@ impl Session {
     }
 }
 
-/// Those of some words that begin like this one, sorted, each once.
+/// Returns the words that begin with `word`, sorted and without duplicates.
 fn found(start: usize, word: &str, all: impl Iterator<Item = String>) -> Completion {
     let mut words: Vec<String> = all.filter(|w| w.starts_with(word)).collect();
     words.sort();
@@ -192,7 +193,7 @@ fn found(start: usize, word: &str, all: impl Iterator<Item = String>) -> Complet
     Completion { start, words }
 }
 
-/// Where the text of a string begins that is not closed yet.
+/// Returns where the text of an unclosed string begins.
 fn open_string(before: &str) -> Option<usize> {
     let mut open = None;
     let mut chars = before.char_indices();
@@ -208,7 +209,7 @@ fn open_string(before: &str) -> Option<usize> {
     open
 }
 
-/// The name of the function whose arguments a text ends in.
+/// Returns the name of the call whose arguments are open at the end of a text.
 fn enclosing_call(before: &str) -> Option<String> {
     let hidden: Vec<_> = classes(before)
         .into_iter()
@@ -233,15 +234,15 @@ fn enclosing_call(before: &str) -> Option<String> {
             _ => {}
         }
         if depth < 0 {
-            // Within an array or record of the call.
+            // Inside an array or record among the arguments.
             depth = 0;
         }
     }
     None
 }
 
-/// Files and folders whose path begins like this one; of files those with one of the
-/// endings, if there are any.
+/// Lists the files and subfolders in the folder of a path; files only with one of the
+/// endings, if any are given. Hidden names are left out.
 fn files(word: &str, endings: &[&str]) -> impl Iterator<Item = String> + use<> {
     let folder = word.rfind('/').map_or("", |i| &word[..=i]).to_owned();
     let endings: Vec<String> = endings.iter().map(|e| (*e).to_owned()).collect();

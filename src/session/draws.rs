@@ -1,29 +1,28 @@
-//! What is kept of the draws of a run: some of them, and counts over all.
+//! A bounded sample of a run's draws, and counts of all of them.
 
 use crate::infer::draws::{Column, DrawRow, Sink};
 use crate::report::{ChainDraws, Memory};
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Numbers kept at most.
+/// The maximum number of numbers kept.
 const NUMBERS: usize = 4_000_000;
 
-/// The draws so far. Clones share them: one goes to the chain, the other is looked into.
+/// The draws so far. Clones share them: one belongs to the chain, another to the session.
 #[derive(Clone, Debug)]
 pub(super) struct SampledDraws {
     memory: Memory,
     counts: Arc<Mutex<DrawCounts>>,
 }
 
-/// What is known of all draws so far.
+/// A summary of all draws so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct DrawCounts {
     pub draws: u64,
-    /// Draws that are another state than the one before, as far as the log joint density
-    /// tells.
+    /// Draws whose state differs from the one before, as judged by the log joint density.
     pub moved: u64,
     pub best: Option<f64>,
-    /// The step after which the last draw was recorded, warm-up not counted.
+    /// The step after which the last draw was recorded, not counting warm-up.
     pub last_step: u64,
     last: Option<f64>,
 }
@@ -35,12 +34,12 @@ impl Default for SampledDraws {
 }
 
 impl SampledDraws {
-    /// What is known of all draws so far.
+    /// Returns the summary of all draws so far.
     pub fn counts(&self) -> DrawCounts {
         *self.counts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The draws that are kept.
+    /// Returns the kept draws.
     pub fn draws(&self) -> ChainDraws {
         self.memory.draws()
     }

@@ -1,4 +1,4 @@
-//! Directives: the program grows by them, and the trace is made again with the choices
+//! Directives: they are added to the program, and the trace is rebuilt with the choices
 //! that it had.
 
 use super::redefine::{
@@ -17,27 +17,27 @@ use crate::trace::{Address, Trace};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Names that use another, as far as they are told.
+/// How many users of a replaced name are listed.
 const MOST_USERS: usize = 8;
 
-/// What a text that was typed holds.
+/// The parts of a typed text.
 #[derive(Default)]
 struct Entry {
-    /// What becomes part of the program.
+    /// The part that is added to the program.
     kept: String,
-    /// The same, item by item, with the names that they bind.
+    /// The same part, item by item, with the names that the items bind.
     items: Vec<(Option<Key>, String)>,
-    /// Names to show afterwards.
+    /// Names whose values are shown afterwards.
     names: Vec<Arc<str>>,
-    /// Expressions of `sample` to evaluate.
+    /// Expressions to evaluate: those of `sample` statements, and plain ones.
     samples: Vec<String>,
     /// Inference blocks to run, with their names.
     plans: Vec<(Option<Arc<str>>, String)>,
 }
 
 impl Session {
-    /// Adds directives to the program, runs inference blocks among them, and says what
-    /// came of it.
+    /// Adds directives to the program, runs the inference blocks among them, and
+    /// describes the results.
     pub(super) fn add(&mut self, text: &str) -> Result<Reply, Trouble> {
         if let Some(name) = forgotten(text) {
             return self.forget(name);
@@ -74,9 +74,9 @@ impl Session {
         Ok(Reply::text(said))
     }
 
-    /// Adds items of which some bind names that the program has: these take the place of
-    /// the old ones, in the text and for all that uses them. Says what that is; its
-    /// values are shown, too.
+    /// Adds items, some of which rebind names of the program. These items replace the old
+    /// ones, in the text and for everything that uses them. Returns a description of the
+    /// users; their values are shown, too.
     fn redefine(&mut self, entry: &mut Entry, again: &[Key]) -> Result<String, Trouble> {
         let text = |moved: bool| {
             entry.items.iter().fold(self.text().to_owned(), |text, (name, item)| {
@@ -92,7 +92,7 @@ impl Session {
         };
         let (in_place, moved) = (text(false), text(true));
         let impossible = self.trace.log_joint() == f64::NEG_INFINITY;
-        // Where the new one needs what was bound since, it can only stand after that.
+        // A new item that needs names bound after the old one is moved behind them.
         let (mut said, new) = match self.rewrite(self.program.edited(&in_place)?) {
             Ok(said) => (said, in_place),
             Err(first) => match self
@@ -105,7 +105,7 @@ impl Session {
                 Err(_) => return Err(first),
             },
         };
-        // What it was may not be possible any more.
+        // The old value may be impossible under the new definition.
         if self.trace.log_joint() == f64::NEG_INFINITY && !impossible && self.redraw(again)? {
             said.clear();
         }
@@ -138,8 +138,8 @@ impl Session {
         Ok(said)
     }
 
-    /// Draws the choices below some names again, if that gives a state of positive
-    /// probability; whether it did.
+    /// Resamples the choices below some names, if that gives a state of positive
+    /// probability. Returns whether it did.
     fn redraw(&mut self, names: &[Key]) -> Result<bool, Trouble> {
         let below = |a: &Address| {
             names.iter().any(|(_, n)| a.segments.first().is_some_and(|s| s.name == *n))
@@ -161,7 +161,7 @@ impl Session {
         Ok(is_possible)
     }
 
-    /// `forget name`: takes an item out of the program.
+    /// `forget name`: removes an item from the program.
     fn forget(&mut self, name: &str) -> Result<Reply, Trouble> {
         let key = to_forget(self.text(), name)?;
         let Some(text) = without_item(self.text(), &key) else {
@@ -185,10 +185,10 @@ impl Session {
         Ok(Reply::text(format!("{said}{}", self.summary())))
     }
 
-    /// Another text for the whole program, from an editor.
+    /// Replaces the text of the whole program, after editing.
     ///
     /// # Errors
-    /// What is wrong with it; everything is then as it was.
+    /// If the new text has errors; nothing has changed then.
     pub fn replace(&mut self, text: &str) -> Result<Reply, Trouble> {
         if text == self.text() {
             return Ok(Reply::text("the program is unchanged\n"));
@@ -200,8 +200,8 @@ impl Session {
         Ok(Reply::text(said + &self.summary()))
     }
 
-    /// Goes over to another version of the program, with the choices that it shares with
-    /// this one; gives what is to be said.
+    /// Switches to another version of the program, and keeps the choices that both share.
+    /// Returns notes for the user.
     pub(super) fn rewrite(&mut self, program: Program) -> Result<String, Trouble> {
         let model = program.clone().compile()?;
         let choices = self.trace.constraints();
@@ -212,7 +212,8 @@ impl Session {
         Ok(said)
     }
 
-    /// What an entry asks for once the program has grown.
+    /// Shows the values, samples, reports and exports of an entry, and runs its plans,
+    /// once the program has grown.
     fn follow(
         &mut self,
         entry: &Entry,
@@ -240,7 +241,7 @@ impl Session {
         Ok(())
     }
 
-    /// The value of an expression in this state.
+    /// Returns the value of an expression in the current state.
     pub(super) fn value_of(&mut self, text: &str) -> Result<Value, Trouble> {
         let model = self.program.asking(INPUT, text)?.compile()?;
         let mut trace = self.moved_to(&model, &self.trace)?;
@@ -251,19 +252,19 @@ impl Session {
         Ok(values.into_iter().next().unwrap_or_default())
     }
 
-    /// A trace of another model with the same choices and observed values.
+    /// Returns a trace of another model with the same choices and observed values.
     pub(super) fn moved_to(&self, model: &Model, from: &Trace) -> Result<Trace, Trouble> {
         self.restart(model, &from.constraints(), from.replacements()).map(|(t, _)| t)
     }
 
-    /// Gives a param of the main file another default.
+    /// Sets a param. The default of a param in the main file is changed in the text.
     pub(super) fn set_param(&mut self, name: &str, value: &str) -> Result<Reply, Trouble> {
         let (program, _) = parse(self.text(), SourceMap::new().add("", self.text()));
         let declared = program.items.iter().find_map(|i| match &i.kind {
             ItemKind::Param(d) if *d.name.node == *name => Some(d),
             _ => None,
         });
-        // What the command line says goes before the default.
+        // A value from the command line takes precedence over the default.
         let program = match declared.and_then(|d| d.default.as_ref()) {
             Some(e) if !self.program.is_set(name) => {
                 let (before, after) = (
@@ -282,12 +283,12 @@ impl Session {
         Ok(Reply::text(said + &self.summary()))
     }
 
-    /// Whether a name is a param of the program.
+    /// Returns whether a name is a param of the program.
     pub(super) fn is_param(&self, name: &str) -> bool {
         self.program.interface().params.iter().any(|p| p.name == name)
     }
 
-    /// Shows what the reports after the first so many report.
+    /// Shows the values of the reports after the first `known`.
     fn report(&mut self, known: usize, said: &mut String) -> Result<(), Trouble> {
         let model = Arc::clone(&self.model);
         for e in model.reports().iter().skip(known).flat_map(|r| &r.exprs) {
@@ -298,7 +299,7 @@ impl Session {
         Ok(())
     }
 
-    /// Writes what the exports after the first so many export.
+    /// Writes the files of the exports after the first `known`.
     fn export(&mut self, known: usize, said: &mut String) -> Result<(), Trouble> {
         let model = Arc::clone(&self.model);
         for x in model.exports().iter().skip(known) {
@@ -311,7 +312,7 @@ impl Session {
         Ok(())
     }
 
-    /// The value of an operand of the top level.
+    /// Returns the value of a top-level operand.
     fn asked(&mut self, operand: Operand) -> Result<Value, Trouble> {
         let draws = self.looks();
         let values =
@@ -320,8 +321,8 @@ impl Session {
     }
 }
 
-/// Sorts what was typed. What does not parse is kept whole: the compiler says what is
-/// wrong.
+/// Sorts the items of a typed text. A text that does not parse is kept whole, so that the
+/// compiler reports its errors.
 fn read(text: &str) -> Entry {
     let text = closed(text);
     let (program, errors) = parse(&text, SourceMap::new().add(INPUT, &text));
@@ -337,7 +338,7 @@ fn read(text: &str) -> Entry {
                 let e = slice.trim_start_matches("sample").trim_end_matches(';');
                 entry.samples.push(e.trim().to_owned());
             }
-            // What only has a value is looked at.
+            // A plain expression is evaluated, not added to the program.
             ItemKind::Stmt(Stmt { kind: StmtKind::Expr(e), .. })
                 if !matches!(e.kind, ExprKind::Call { .. }) =>
             {
@@ -354,7 +355,7 @@ fn read(text: &str) -> Entry {
             }
         }
     }
-    // Comments and the layout stay where nothing is taken out.
+    // Comments and layout are kept if no item is taken out.
     if entry.samples.is_empty()
         && !entry.plans.iter().any(|(name, _)| name.is_none())
         && !entry.kept.is_empty()
@@ -364,28 +365,28 @@ fn read(text: &str) -> Entry {
     entry
 }
 
-/// The text with the semicolon that one forgets at a prompt; on a line of its own where a
-/// comment ends the text.
+/// Adds the semicolon that is often omitted at a prompt; on its own line if a comment
+/// ends the text.
 fn closed(text: &str) -> String {
     let parses = |text: &str| parse(text, SourceMap::new().add(INPUT, "")).1.is_empty();
     let ways = [text.to_owned(), format!("{text};"), format!("{text}\n;")];
     ways.into_iter().find(|t| parses(t)).unwrap_or_else(|| text.to_owned())
 }
 
-/// The name that an item binds to a value worth showing: no function, and no single
-/// element of a container.
+/// Returns the name that an item binds to a value worth showing: neither a function nor a
+/// single element of a container.
 fn bound(item: &Item) -> Option<Arc<str>> {
     let (space, name) = key(item).filter(|_| !matches!(item.kind, ItemKind::Fn(_)))?;
     (space == Space::Value && !name.contains('[')).then_some(name)
 }
 
-/// A program's text with more at its end.
+/// Appends to the text of a program.
 fn grown(text: &str, more: &str) -> String {
     let gap = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
     format!("{text}{gap}{}\n", more.trim_end())
 }
 
-/// The first line of what was typed, cut, for messages.
+/// Returns the first line of a typed text, shortened, for messages.
 fn first_line(text: &str) -> String {
     let line = text.lines().next().unwrap_or("");
     if line.chars().count() > 60 || text.lines().nth(1).is_some() {

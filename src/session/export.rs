@@ -1,5 +1,5 @@
-//! What `export e to "file";` writes: a mesh of what is a solid or a view, else the value
-//! as text.
+//! Contents of the file of `export e to "file";`: a mesh for a solid or a view, otherwise
+//! the value as text.
 
 use crate::geom::{glb, obj};
 use crate::lang::builtins::scene::{SolidValue, ViewValue};
@@ -8,7 +8,8 @@ use crate::lang::lower::Export;
 use crate::lang::value::Value;
 use crate::syntax::ast::ExprKind;
 
-/// What an export is of: of `best(e)` it is `e`, in the state at hand.
+/// Returns the operand of an export; that of `best(e)` is `e`, evaluated in the current
+/// state.
 pub fn exported_operand(code: &Code, x: &Export) -> Option<Operand> {
     let inner = match &x.expr.kind {
         ExprKind::Call { args, .. } if args.len() == 1 => &args[0].value,
@@ -17,10 +18,10 @@ pub fn exported_operand(code: &Code, x: &Export) -> Option<Operand> {
     code.queries.get(&inner.span).or_else(|| code.queries.get(&x.expr.span)).copied()
 }
 
-/// The bytes of a file of this name with a value in it.
+/// Returns the contents of a file with a value; the file's name determines the format.
 ///
 /// # Errors
-/// A solid that has no mesh: too far away or too small for single precision.
+/// If a solid has no mesh, since it is too far away or too small for single precision.
 pub fn exported(value: &Value, file: &str) -> Result<Vec<u8>, String> {
     let solid = value.downcast::<ViewValue>().map(|v| v.0.solid().clone());
     let Some(solid) = solid.or_else(|| value.downcast::<SolidValue>().map(|s| s.0.clone())) else {

@@ -1,4 +1,4 @@
-//! `:save` and `:load`: the program as a `.pcad` file, the trace beside it.
+//! `:save` and `:load`: the program as a `.pcad` file, with the trace beside it.
 
 use super::{Reply, Request, Session, Trouble};
 use crate::lang::load::reason;
@@ -8,10 +8,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 impl Session {
-    /// Takes up a saved state of the program, as if the session had come to it.
+    /// Makes a saved state of the program the state of the session.
     ///
     /// # Errors
-    /// If it is of another program, or other data or settings.
+    /// If the saved state is of another program, or of other data or settings.
     pub fn take_up(&mut self, saved: &SavedTrace) -> Result<Reply, Trouble> {
         let code = Arc::clone(self.model.code());
         let loaded = Trace::load(code, self.model.hash(), saved, self.limits.clone());
@@ -19,8 +19,8 @@ impl Session {
         Ok(Reply::text(self.summary()))
     }
 
-    /// `:save NAME`; asks before it overwrites files that this session neither wrote nor
-    /// loaded, unless it was told to.
+    /// `:save NAME`. Unless `overwrites` is true, it asks before overwriting files that
+    /// this session neither wrote nor loaded.
     pub(super) fn save(&mut self, name: &str, overwrites: bool) -> Result<Reply, Trouble> {
         let name = bare(name);
         let (program, trace) = (format!("{name}.pcad"), format!("{name}.trace.json"));
@@ -41,8 +41,8 @@ impl Session {
         })?;
         let saved = self.trace.save(&written.hash());
         let bytes = serde_json::to_vec(&saved).map_err(|e| Trouble::plain(e.to_string()))?;
-        // The trace first: a program without its trace is whole, a trace beside an older
-        // program would be refused.
+        // The trace first: a program without a trace can be loaded, but a trace beside an
+        // older program would be refused.
         for (path, bytes) in [(&trace, &bytes[..]), (&program, self.text().as_bytes())] {
             write_file(Path::new(path), bytes)
                 .map_err(|e| Trouble::plain(format!("cannot write {path}: {}", reason(&e))))?;
@@ -80,7 +80,7 @@ impl Session {
     }
 }
 
-/// The saved trace in a file, if there is one.
+/// Reads the saved trace in a file; `None` if the file does not exist.
 fn saved_trace(path: &Path) -> Result<Option<SavedTrace>, Trouble> {
     let wrong = |e: String| Trouble::plain(format!("{}: {e}", path.display()));
     let bytes = match std::fs::read(path) {
@@ -91,7 +91,7 @@ fn saved_trace(path: &Path) -> Result<Option<SavedTrace>, Trouble> {
     serde_json::from_slice(&bytes).map(Some).map_err(|e| wrong(format!("not a saved trace: {e}")))
 }
 
-/// A name without the endings that are added to it.
+/// Removes quotes and the endings that `:save` adds.
 fn bare(name: &str) -> &str {
     let name = name.trim_matches('"');
     name.strip_suffix(".pcad").or_else(|| name.strip_suffix(".trace.json")).unwrap_or(name)

@@ -10,7 +10,7 @@ use crate::syntax::parse_expr;
 use crate::trace::{Address, Selector, Target, Trace};
 use std::borrow::Cow;
 
-/// Rows of a table at most.
+/// The maximum number of rows of a table.
 pub(super) const ROWS: usize = 40;
 
 impl Session {
@@ -46,7 +46,8 @@ impl Session {
         Ok(Reply::text(text))
     }
 
-    /// The choices of a selection as it was typed, by address: at least one.
+    /// Returns the choices of a typed selection, in order of address. An empty selection
+    /// is an error.
     pub(super) fn select(&mut self, text: &str) -> Result<Vec<(Address, Target)>, Trouble> {
         let text = &addressed(text);
         let mut sources = SourceMap::new();
@@ -79,7 +80,7 @@ impl Session {
         })
     }
 
-    /// The choices of a selection by address.
+    /// Returns the choices of a selection, in order of address.
     fn by_address(&mut self, selector: &Selector) -> Vec<(Address, Target)> {
         let selection = self.trace.select(selector);
         let t = &self.trace;
@@ -90,12 +91,12 @@ impl Session {
     }
 }
 
-/// What is left out of a table of so many rows.
+/// Counts the rows that are left out of a table.
 pub(super) fn more(rows: usize, what: &str) -> String {
     if rows > ROWS { format!("… and {} more {what}\n", rows - ROWS) } else { String::new() }
 }
 
-/// What is to be said of a state of probability zero.
+/// Describes a state of probability zero.
 pub(super) fn impossible(t: &Trace) -> String {
     let found = t.impossible();
     let names: Vec<String> = found.iter().take(5).map(|(a, _)| a.to_string()).collect();
@@ -107,8 +108,8 @@ pub(super) fn impossible(t: &Trace) -> String {
     )
 }
 
-/// A selection as it is written: a plain name or path, `x`, `t["x"]`, means the choice
-/// `@x`.
+/// Turns a plain name or path, such as `x` or `t["x"]`, into an address, `@x`; other
+/// selections are unchanged.
 pub(super) fn addressed(text: &str) -> Cow<'_, str> {
     let begins = text.starts_with(|c: char| c.is_alphabetic() || c == '_');
     let name = text.split(['[', '/']).next().unwrap_or(text);

@@ -1,10 +1,11 @@
-//! A session at a prompt: a program that grows line by line, one trace of it to look at
-//! and change, and inference on that, in the background too.
+//! A session at a prompt: a program that grows line by line, one trace of it to inspect
+//! and change, and inference from that trace, in the background too.
 //!
-//! It knows no terminal and prints nothing: [`Session::enter`] takes what was typed and
-//! gives a [`Reply`], which a front end shows; `complete` and [`crate::syntax::classes`]
-//! help it edit lines. Invariants: after an error program and trace are as they were; the
-//! same lines with the same seed give the same replies, but for times.
+//! A session does not depend on a terminal and prints nothing: [`Session::enter`] takes a
+//! typed text and returns a [`Reply`] for a front end to show; `complete` and
+//! [`crate::syntax::classes`] support line editing. Invariants: an error leaves program
+//! and trace unchanged; the same lines with the same seed give the same replies, except
+//! for times.
 
 mod change;
 mod command;
@@ -39,20 +40,19 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a typed text is called in messages.
+/// The name of a typed text in messages.
 const INPUT: &str = "<input>";
-/// What a program without a file is called in messages.
+/// The name of a program without a file in messages.
 const NAME: &str = "<session>";
-/// How often choices are drawn anew where they lead to no value, or to one of probability
-/// zero.
+/// How often choices are drawn if the log density is undefined or the probability zero.
 const ATTEMPTS: u64 = 20;
-/// Nodes that the trace may have, about a gigabyte of them: a slip of the pen should not
-/// take the machine's memory.
+/// The limit on the trace's nodes, about a gigabyte, so that a slip of the pen does not
+/// use up the machine's memory.
 const NODES: u32 = 4_000_000;
-/// Choices that may be remembered for `:undo`, over all that can be undone.
+/// The maximum number of choices remembered for `:undo`, over all steps.
 const REMEMBERED: usize = 4_000_000;
 
-/// Who is shown how inference comes along.
+/// A callback that is shown the progress of inference.
 type Watcher = Box<dyn FnMut(&Status)>;
 
 /// A session.
@@ -63,46 +63,46 @@ pub struct Session {
     model: Arc<Model>,
     trace: Trace,
     past: VecDeque<Past>,
-    /// What was undone since the last change, the last one at the end.
+    /// States that `:redo` can restore, the most recently undone one at the end.
     undone: Vec<Past>,
-    /// Files that this session wrote or loaded: these may be written again without a
+    /// Files that this session wrote or loaded, which it may overwrite without a
     /// question.
     own_files: BTreeSet<String>,
-    /// Counts what was entered: random streams are keyed by it.
+    /// The number of entries so far, which keys the random streams.
     clock: u64,
-    /// Chains of inference so far.
+    /// The number of inference chains so far.
     chains: u32,
     background: Option<Background>,
     last: Option<Finished>,
     watch: Option<Watcher>,
 }
 
-/// What `:undo` goes back to. Choices are enough to make a trace again, to the last bit.
+/// A state for `:undo`. Its choices are enough to rebuild the trace, to the last bit.
 struct Past {
     program: Arc<Program>,
     model: Arc<Model>,
     choices: Vec<(u64, Constraint)>,
     observed: Arc<Observed>,
-    /// What was done then.
+    /// The change that followed it.
     what: String,
 }
 
 impl Session {
-    /// A session of an empty program.
+    /// Opens a session with an empty program.
     ///
     /// # Errors
-    /// None that is known.
+    /// None are known.
     pub fn new(seed: u64, stop: Stop) -> Result<Session, Trouble> {
         Session::open(Program::named(NAME, "")?, seed, stop).map(|(s, _)| s)
     }
 
-    /// A session of a program with what it was given, and what is to be said of that.
-    /// `stop` ends evaluations from outside; whoever sets it takes it back before the
+    /// Opens a session with a program and its data, and returns it with notes for the
+    /// user. `stop` ends evaluations from outside; its owner must reset it before the
     /// next [`Session::enter`].
     ///
     /// # Errors
-    /// What is wrong with the program. Where only data are missing the session is one of
-    /// its prior.
+    /// If the program has errors. Missing data are not an error: the session is then one
+    /// of the prior.
     pub fn open(program: Program, seed: u64, stop: Stop) -> Result<(Session, Reply), Trouble> {
         let limits = Limits { nodes: NODES, stop: stop.after(Duration::ZERO), ..Limits::default() };
         let missing = program.missing_data();
@@ -141,26 +141,26 @@ impl Session {
         Ok((session, Reply::text(note.unwrap_or_default() + &said)))
     }
 
-    /// Who is shown how inference comes along while it is waited for, some times a
-    /// second.
+    /// Sets a callback that is shown the progress of inference, several times a second,
+    /// while the session waits for it.
     pub fn set_watch(&mut self, watch: impl FnMut(&Status) + 'static) {
         self.watch = Some(Box::new(watch));
     }
 
-    /// The text of the program.
+    /// Returns the text of the program.
     pub fn text(&self) -> &str {
         self.program.text()
     }
 
-    /// The trace.
+    /// Returns the trace.
     pub fn trace(&self) -> &Trace {
         &self.trace
     }
 
-    /// Does what was typed: directives, an expression, or a command such as `:trace`.
+    /// Runs an entry: directives, an expression, or a command such as `:trace`.
     ///
     /// # Errors
-    /// What is wrong with it; everything is then as it was.
+    /// If the entry has errors or was stopped; nothing has changed then.
     pub fn enter(&mut self, text: &str) -> Result<Reply, Trouble> {
         self.clock += 1;
         let text = text.trim();
@@ -171,7 +171,7 @@ impl Session {
             None if crate::syntax::is_directive(text) => self.add(text),
             None => match (self.value_of(text), command::alias(text)) {
                 (Ok(v), _) => Ok(Reply::text(shown::whole(&v) + "\n")),
-                // A name of the program comes before what else it may mean.
+                // A name of the program takes precedence over a command.
                 (Err(_), Some(command)) => self.command(command),
                 (Err(e), None) => Err(e),
             },
@@ -182,7 +182,7 @@ impl Session {
         }
     }
 
-    /// Where what is only looked at is drawn.
+    /// Returns the random stream for values that are only inspected.
     fn looks(&self) -> Draws {
         Draws {
             key: StreamKey::new(self.seed, u32::MAX, Purpose::PREDICT),
@@ -191,9 +191,9 @@ impl Session {
         }
     }
 
-    /// A trace of a model with choices and observed values taken over where it has them,
-    /// and what is to be said of that. Other choices are drawn; again, a few times, where
-    /// they lead nowhere.
+    /// Makes a trace of a model with choices and observed values taken over as far as the
+    /// model has them, and returns it with notes for the user. Other choices are drawn,
+    /// several times if the log density is undefined or the probability zero.
     fn restart(
         &self,
         model: &Model,
@@ -249,7 +249,7 @@ impl Session {
         }
     }
 
-    /// Applies the `force` statements of a model after the first so many.
+    /// Applies the `force` statements of a model after the first `known`.
     fn force(&self, model: &Model, trace: &mut Trace, known: usize) -> Result<(), Trouble> {
         let forces = model.code().forces.get(known..).unwrap_or_default();
         let draws = Draws {
@@ -260,7 +260,7 @@ impl Session {
         crate::infer::force(forces, trace, draws).map_err(|e| Trouble::run(model, *e))
     }
 
-    /// What this state is, to come back to.
+    /// Records the present state for `:undo`; `what` describes the change that follows.
     fn remember(&self, what: &str) -> Past {
         Past {
             program: Arc::clone(&self.program),
@@ -271,13 +271,13 @@ impl Session {
         }
     }
 
-    /// Keeps a past: what was undone before it cannot be done again.
+    /// Adds a state for `:undo`; undone changes can no longer be redone.
     fn keep(&mut self, past: Past) {
         self.undone.clear();
         self.push(past);
     }
 
-    /// Adds a past, and forgets the oldest where they are too many.
+    /// Adds a state for `:undo`, and drops the oldest ones beyond the limit.
     fn push(&mut self, past: Past) {
         self.past.push_back(past);
         let size = |p: &Past| p.choices.len() + 100;
@@ -287,7 +287,7 @@ impl Session {
         }
     }
 
-    /// Goes back to a past.
+    /// Restores a recorded state.
     fn go_back(&mut self, past: &Past) -> Result<(), Trouble> {
         let (trace, _) = self.restart(&past.model, &past.choices, &past.observed)?;
         (self.program, self.model) = (Arc::clone(&past.program), Arc::clone(&past.model));
@@ -325,15 +325,14 @@ impl Session {
         Ok(Reply::text(format!("redone: {}\n{}", next.what, self.summary())))
     }
 
-    /// Goes to a remembered state; gives the present one, by which the same step is taken
-    /// the other way.
+    /// Switches to a recorded state, and returns the present one for the opposite step.
     fn exchange(&mut self, other: &Past) -> Result<Past, Trouble> {
         let now = self.remember(&other.what);
         self.go_back(other)?;
         Ok(now)
     }
 
-    /// Goes on with the program and state of another session; `:undo` goes back.
+    /// Continues with the program and state of another session; `:undo` goes back.
     pub fn take_over(&mut self, other: Session, what: &str) -> Reply {
         let past = self.remember(what);
         (self.program, self.model, self.trace) = (other.program, other.model, other.trace);
@@ -341,7 +340,7 @@ impl Session {
         Reply::text(self.summary())
     }
 
-    /// The log joint density in a line.
+    /// Formats the log joint density in one line.
     fn summary(&self) -> String {
         format!("log joint {}\n", crate::report::number(self.trace.log_joint()))
     }

@@ -1,5 +1,5 @@
-//! `:render`: what the scene looks like. A picture has no pixels until a front end says
-//! how large it shall be.
+//! `:render`: a picture of the scene, which is rendered only when a front end asks for
+//! its pixels.
 
 use super::{Reply, Session, Trouble};
 use crate::bank;
@@ -13,21 +13,21 @@ use image::RgbImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A view, over the photograph if there is one.
+/// A view, drawn over the photograph if there is one.
 #[derive(Clone, Debug)]
 pub struct Picture {
     view: Arc<View>,
     photo: Option<Arc<RgbImage>>,
-    /// The file it was asked to go to.
+    /// The file that the user named, if any.
     pub file: Option<PathBuf>,
 }
 
-/// Pictures of photographs are no larger than this.
+/// The longer side of a picture is scaled down to at most this, in pixels.
 const LARGEST: u32 = 1024;
 
 impl Picture {
-    /// The pixels: the longer side has between [`pictures::LONGER_SIDE`] and 1024 of
-    /// them.
+    /// Renders the picture; its longer side has between [`pictures::LONGER_SIDE`] and
+    /// 1024 pixels.
     pub fn pixels(&self) -> RgbImage {
         let camera = self.view.camera();
         let (width, height) =
@@ -39,8 +39,8 @@ impl Picture {
     }
 }
 
-/// The surface of a view with its contours and landmarks, over a photograph if there is
-/// one: of a picture of this size, enlarged as [`pictures::picture_size`] has it.
+/// Draws the surface of a view with its contours and landmarks, over a photograph if
+/// there is one. The picture has the given size, enlarged by [`pictures::picture_size`].
 pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u32)) -> RgbImage {
     let large = pictures::picture_size(width, height);
     let (contours, picture) = (view.contours(width.max(height)), view.frame(large.0.max(large.1)));
@@ -51,8 +51,8 @@ pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u
     out
 }
 
-/// Draws where points of the scene were observed, each with a line to where the scene has
-/// it, over a picture of `width` x `height`.
+/// Draws the observed positions of points of the scene, each joined by a line to its
+/// position in the scene, over a picture of `width` x `height`.
 pub fn detected(out: &mut RgbImage, located: &[Located], (width, height): (u32, u32)) {
     let scale = |[x, y]: [f64; 2]| [x * f64::from(width), y * f64::from(height)];
     let lines: Vec<_> = located.iter().map(|l| [scale(l.own), scale(l.observed)]).collect();
@@ -61,12 +61,12 @@ pub fn detected(out: &mut RgbImage, located: &[Located], (width, height): (u32, 
     pictures::dots(out, (width, height), &seen, pictures::DETECTED);
 }
 
-/// A frame as the reports want it.
+/// Converts a frame for the reports.
 pub fn drawn(f: &Frame) -> Drawn<'_> {
     Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal, part: &f.part }
 }
 
-/// Contours as the reports want them.
+/// Converts contours for the reports.
 pub fn strokes(c: &Contours) -> Strokes<'_> {
     Strokes {
         width: c.width,
@@ -120,7 +120,7 @@ impl Session {
     }
 }
 
-/// The first photograph among a program's data.
+/// Returns the first photograph among a program's data.
 fn photo(code: &Code) -> Option<Arc<RgbImage>> {
     let of = |o: &Operand| match o {
         Operand::Const(i) => code

@@ -1,16 +1,16 @@
-//! `:plot x`: a quantity of the last inference as text.
+//! `:plot x`: a text plot of a quantity of the last inference.
 
 use super::{Reply, Session, Trouble};
 use crate::diag::nearest;
 use crate::report::{Quantity, number, quantities};
 
-/// Bars of a histogram.
+/// The number of bins of a histogram.
 const BARS: usize = 12;
-/// Letters of the longest bar, and of the course.
+/// The width of the longest bar, and of the trace plot, in characters.
 const WIDTH: usize = 50;
-/// Values that are told one by one, when there are no more than these.
+/// Up to this many distinct values are counted one by one.
 const FEW: usize = 12;
-/// Eighths of a letter, from the left and from below.
+/// Blocks in eighths of a character, from the left and from below.
 const LEFT: [&str; 8] = ["", "▏", "▎", "▍", "▌", "▋", "▊", "▉"];
 const BELOW: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
@@ -32,14 +32,14 @@ impl Session {
         })
     }
 
-    /// The quantities of the last inference.
+    /// Returns the names of the quantities of the last inference.
     pub(super) fn quantity_names(&self) -> Vec<String> {
         let all = self.latest_draws().map(|(_, d)| quantities(&[d])).unwrap_or_default();
         all.into_iter().map(|q| q.name).collect()
     }
 }
 
-/// Summary, histogram and course of a quantity.
+/// Formats the summary, histogram and trace plot of a quantity.
 fn plotted(q: &Quantity) -> String {
     let xs: Vec<f64> = q.chains.concat().into_iter().filter(|x| x.is_finite()).collect();
     let s = &q.summary;
@@ -67,7 +67,7 @@ fn plotted(q: &Quantity) -> String {
     text
 }
 
-/// How many draws are where: value by value if there are few values, else in bins of one
+/// Counts draws by value if there are few distinct values, otherwise in bins of equal
 /// width.
 fn histogram(xs: &[f64]) -> Vec<(String, usize)> {
     let mut values = xs.to_vec();
@@ -86,13 +86,13 @@ fn histogram(xs: &[f64]) -> Vec<(String, usize)> {
     counts.iter().enumerate().map(|(i, n)| (number(low + (i as f64 + 0.5) * width), *n)).collect()
 }
 
-/// A bar of so much of the width.
+/// Draws a bar with this fraction of the full width.
 fn bar(share: f64) -> String {
     let eighths = (share * (WIDTH * 8) as f64).round() as usize;
     "█".repeat(eighths / 8) + LEFT[eighths % 8]
 }
 
-/// The draws in order, each letter the mean of a stretch of them.
+/// Draws a trace plot; each character is the mean of a stretch of draws.
 fn course(xs: &[f64]) -> String {
     let n = xs.len().min(WIDTH);
     let mean = |i: usize| {

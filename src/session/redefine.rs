@@ -1,5 +1,5 @@
-//! What a program's text binds by name: to replace it when the name is bound again, and
-//! to take it out.
+//! The names that a program's items bind, for replacing items when a name is bound again,
+//! and for removing them.
 
 use super::Trouble;
 use crate::diag::{SourceMap, nearest};
@@ -8,23 +8,23 @@ use crate::syntax::{Class, classes, parse, print_expr};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What kind of name an item has: names of different kinds may be the same word.
+/// The namespace of an item's name; the same word may be used in several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Space {
-    /// Of a value or function.
+    /// Values and functions.
     Value,
-    /// Of an observation or factor.
+    /// Observations and factors.
     Label,
-    /// Of a kernel.
+    /// Kernels.
     Kernel,
-    /// Of an inference plan.
+    /// Inference plans.
     Plan,
 }
 
-/// A name with its kind.
+/// A name and its namespace.
 pub(super) type Key = (Space, Arc<str>);
 
-/// The name that an item binds.
+/// Returns the name that an item binds.
 pub(super) fn key(item: &Item) -> Option<Key> {
     let value = |n: &Arc<str>| Some((Space::Value, Arc::clone(n)));
     match &item.kind {
@@ -47,20 +47,21 @@ pub(super) fn key(item: &Item) -> Option<Key> {
     }
 }
 
-/// The items of a text with the names that they bind, and where they stand.
+/// Returns the items of a text: the names that they bind, and their ranges in bytes.
 pub(super) fn items(text: &str) -> Vec<(Option<Key>, Range<usize>)> {
     let (program, _) = parse(text, SourceMap::new().add("", text));
     let place = |i: &Item| i.span.start as usize..i.span.end as usize;
     program.items.iter().map(|i| (key(i), place(i))).collect()
 }
 
-/// The text with another item in place of the one of a name; none if it has no such name.
+/// Replaces the item that binds a name; `None` if no item does.
 pub(super) fn with_item(text: &str, name: &Key, item: &str) -> Option<String> {
     let (_, place) = items(text).into_iter().find(|(k, _)| k.as_ref() == Some(name))?;
     Some(format!("{}{}{}", &text[..place.start], item.trim_end(), &text[place.end..]))
 }
 
-/// The text without the item of a name, and without the line that it leaves empty.
+/// Removes the item that binds a name, and the line if it becomes empty; `None` if no
+/// item does.
 pub(super) fn without_item(text: &str, name: &Key) -> Option<String> {
     let (_, place) = items(text).into_iter().find(|(k, _)| k.as_ref() == Some(name))?;
     let (before, after) = (&text[..place.start], &text[place.end..]);
@@ -69,7 +70,8 @@ pub(super) fn without_item(text: &str, name: &Key) -> Option<String> {
     Some(format!("{before}{after}"))
 }
 
-/// The names that use a name, directly or through others, in the order of the text.
+/// Returns the names that use a name, directly or through others, in the order of the
+/// text.
 pub(super) fn users(text: &str, name: &str) -> Vec<Key> {
     let mut known = vec![name.to_owned()];
     let mut found = Vec::new();
@@ -86,8 +88,8 @@ pub(super) fn users(text: &str, name: &str) -> Vec<Key> {
     found
 }
 
-/// Whether a text has one of some names, other than as a field or as what it names an
-/// observation.
+/// Returns whether a text uses one of the names, other than as a field or as the name of
+/// an observation.
 fn uses(text: &str, names: &[String]) -> bool {
     classes(text).into_iter().any(|(place, class)| {
         let before = text[..place.start].trim_end();
@@ -98,7 +100,8 @@ fn uses(text: &str, names: &[String]) -> bool {
     })
 }
 
-/// The name in `forget name`, if a text is that; `@name` is understood too.
+/// Returns the name in `forget name`, or `None` if a text is something else; `@name` is
+/// accepted too.
 pub(super) fn forgotten(text: &str) -> Option<&str> {
     let rest = text.strip_prefix("forget")?;
     let name = rest.trim().trim_end_matches(';').trim_end();
@@ -106,10 +109,10 @@ pub(super) fn forgotten(text: &str) -> Option<&str> {
     (is_one && !name.contains([';', ' ', '\n'])).then(|| name.trim_start_matches('@'))
 }
 
-/// The key of a name that is to be forgotten; the hint knows the names there are.
+/// Returns the key of a name to forget; the error suggests an existing name.
 pub(super) fn to_forget(text: &str, name: &str) -> Result<Key, Trouble> {
     let all: Vec<Key> = items(text).into_iter().filter_map(|(k, _)| k).collect();
-    // The last one first: that is what was typed last.
+    // The last item is preferred, since it was typed last.
     if let Some(k) = all.iter().rev().find(|k| *k.1 == *name) {
         return Ok(k.clone());
     }

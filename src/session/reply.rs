@@ -1,4 +1,4 @@
-//! What a session says: a reply, or what was wrong.
+//! Replies of a session, and its errors.
 
 use super::Picture;
 use crate::lang::error::RunError;
@@ -7,69 +7,69 @@ use crate::syntax::span::Span;
 use std::fmt;
 use std::path::PathBuf;
 
-/// What was done.
+/// The result of an entry.
 #[derive(Debug, Default)]
 pub struct Reply {
     /// Lines to show; may be empty.
     pub text: String,
     /// A picture to show, after the text.
     pub picture: Option<Picture>,
-    /// What the front end is asked to do.
+    /// What the front end must do, if anything.
     pub request: Option<Request>,
-    /// Whether the screen is to be empty first.
+    /// Whether to clear the screen first.
     pub clears: bool,
-    /// Whether the user wants to leave.
+    /// Whether the user quits.
     pub ends: bool,
 }
 
-/// What a session cannot do by itself: it knows no terminal, editor or command line.
+/// An action for the front end, since a session has no terminal, editor or command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Ask the user a question; where the answer is yes, enter this.
+    /// Ask the user a question, and enter a text if the answer is yes.
     Confirm {
         /// The question.
         question: String,
-        /// What to enter then.
+        /// The text to enter.
         then: String,
     },
-    /// Let the user edit the program's text, and give it to
+    /// Let the user edit the program's text, and pass the result to
     /// [`Session::replace`](super::Session::replace).
     Edit,
-    /// Open a run's folder, and give the session of that to
+    /// Open the folder of a run, and pass its session to
     /// [`Session::take_over`](super::Session::take_over).
     Open(PathBuf),
 }
 
 impl Reply {
-    /// A request to the front end.
+    /// Makes a reply with a request to the front end.
     pub(super) fn request(request: Request) -> Reply {
         Reply { request: Some(request), ..Reply::default() }
     }
 
-    /// A text.
+    /// Makes a reply with a text.
     pub fn text(text: impl Into<String>) -> Reply {
         Reply { text: text.into(), ..Reply::default() }
     }
 }
 
-/// Why nothing was done.
+/// Why an entry failed.
 #[derive(Debug)]
 pub enum Trouble {
-    /// Messages with their places.
+    /// Diagnostics with source locations.
     Program(Box<Error>),
-    /// Anything else, and what to do about it.
+    /// Any other error: a message and an optional hint.
     Plain(String, Option<String>),
-    /// It was stopped from outside.
+    /// The entry was stopped from outside.
     Stopped,
 }
 
 impl Trouble {
-    /// A message without a place.
+    /// Makes an error from a message without a location.
     pub fn plain(message: impl Into<String>) -> Trouble {
         Trouble::Plain(message.into(), None)
     }
 
-    /// The same with a hint.
+    /// Adds a hint to a plain message.
     #[must_use]
     pub fn hint(self, hint: impl Into<String>) -> Trouble {
         match self {
@@ -78,7 +78,8 @@ impl Trouble {
         }
     }
 
-    /// A failure of a model; one without a place is only its message.
+    /// Makes an error from a failure of a model. Without a location, it is a plain
+    /// message.
     pub(super) fn run(model: &Model, e: RunError) -> Trouble {
         match e.span == Span::default() {
             true => Trouble::Plain(e.message, e.hint),

@@ -1,9 +1,9 @@
-//! Inference from the state at hand: in the foreground, where it is waited for, or in the
-//! background on a clone of the trace.
+//! Inference from the current state, in the foreground, or in the background on a clone
+//! of the trace.
 //!
-//! Each run is a chain of its own number, so that no stream of random numbers is used
-//! twice. What a run finds becomes the session's state when it is waited for or stopped,
-//! and can be undone.
+//! Each run is a chain with its own number, so that no stream of random numbers is used
+//! twice. The last state of a run becomes the session's state when a foreground run ends
+//! or a background run is stopped; `:undo` goes back.
 
 use super::draws::{DrawCounts, SampledDraws};
 use super::{INPUT, Reply, Session, Trouble};
@@ -22,32 +22,32 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Between two looks at a run that is waited for.
+/// The polling interval while waiting for a run.
 const PAUSE: Duration = Duration::from_millis(100);
-/// How often a kernel that is named by itself is applied.
+/// How often a kernel is applied that is given without a plan or a number of steps.
 const TIMES: u64 = 1000;
 
-/// A chain under way.
+/// A running chain.
 pub(super) struct Background {
-    /// What was asked for.
+    /// The plan, as described in messages.
     what: String,
     number: u32,
-    /// The session's model when it began: what it finds belongs to that.
+    /// The session's model at the start, to which the result belongs.
     base: Arc<Model>,
-    /// The model it runs; another one where the plan was typed.
+    /// The model that is run; it differs from `base` if the plan was typed.
     model: Arc<Model>,
     progress: Arc<Progress>,
-    /// Steps after which it ends, where that was said.
+    /// The number of steps after which the run ends, if given.
     steps: Option<u64>,
     kept: SampledDraws,
     began: Instant,
-    /// Told when it is over, and whether it is.
+    /// Receives a message when the run is over; `is_done` is then true.
     done: Receiver<()>,
     is_done: Arc<AtomicBool>,
     thread: JoinHandle<Result<ChainResult, ChainError>>,
 }
 
-/// What is remembered of the last run.
+/// The results of the last run.
 pub(super) struct Finished {
     what: String,
     steps: u64,
@@ -59,33 +59,33 @@ pub(super) struct Finished {
     pub draws: ChainDraws,
 }
 
-/// How far inference is.
+/// The progress of inference.
 #[derive(Clone, Debug)]
 pub struct Status {
     /// Kernel applications so far.
     pub steps: u64,
     /// Draws so far.
     pub draws: u64,
-    /// The best log joint density of them.
+    /// The best log joint density of the draws.
     pub best: Option<f64>,
-    /// Time so far.
+    /// The elapsed time.
     pub elapsed: Duration,
-    /// What it does: looking for a start, warm-up, sampling.
+    /// The phase: starting, warm-up or sampling.
     pub phase: &'static str,
-    /// How much of that is done, and of how much: steps where their number was given,
-    /// else passes of the plan's loop.
+    /// How much of the phase is done, and the total: steps while sampling a given number
+    /// of them, otherwise passes of the plan's loop. The total is 0 if it is unknown.
     pub done: (u64, u64),
-    /// Whether it has ended.
+    /// Whether the run has ended.
     pub is_done: bool,
 }
 
-/// What is to be run.
+/// A run to start.
 struct Job {
     what: String,
     model: Arc<Model>,
     plan: Arc<[KStmt]>,
     steps: Option<u64>,
-    /// What to say before it begins.
+    /// A note to show first.
     note: String,
 }
 
@@ -109,7 +109,7 @@ impl Session {
         self.launch(job, in_background)
     }
 
-    /// Runs an inference block that was typed.
+    /// Runs a typed inference block.
     pub(super) fn infer_block(&mut self, block: &str) -> Result<Reply, Trouble> {
         let job = self.typed(block, "infer { … }".to_owned(), None)?;
         self.launch(job, false)
@@ -142,7 +142,7 @@ impl Session {
         Ok(job)
     }
 
-    /// A block that is not part of the program.
+    /// Prepares the run of a block that is not part of the program.
     fn typed(&self, block: &str, what: String, steps: Option<u64>) -> Result<Job, Trouble> {
         let (plan, model) = self.compiled(block)?;
         Ok(Job { what, model, plan, steps, note: String::new() })
@@ -170,8 +170,8 @@ impl Session {
         }
         let stop = self.limits.stop.clone();
         let stopped = !self.wait_for(&run, &stop, true)?;
-        // The state that it came to is taken over although a stop was asked for: the
-        // question is answered.
+        // The final state is adopted although a stop was requested: the request ended the
+        // run, and must not end this.
         self.limits.stop = Stop::default();
         let adopted = self.adopt(run);
         self.limits.stop = stop;
@@ -211,7 +211,7 @@ impl Session {
             std::thread::Builder::new().name(format!("run {number}")).spawn(move || {
                 let result = run_from(&code, &plan, &options, &progress, &mut sink, number, trace);
                 ended.store(true, Ordering::SeqCst);
-                // Nobody listens if the run was dropped.
+                // Nobody receives this if the run was dropped.
                 let _ = over.send(());
                 result
             })
@@ -235,8 +235,9 @@ impl Session {
         })
     }
 
-    /// Waits until a run is over, or until that is stopped from outside; `ends` says
-    /// whether the run ends then, which is waited for. True if nobody stopped it.
+    /// Waits until a run is over. If `stop` is requested meanwhile, `ends` tells whether
+    /// that ends the run (and the wait continues until it has) or the wait, with an
+    /// error. Returns true if the run was not cancelled.
     fn wait_for(&mut self, run: &Background, stop: &Stop, ends: bool) -> Result<bool, Trouble> {
         while run.done.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
             if stop.is_asked() {
@@ -252,7 +253,7 @@ impl Session {
         Ok(!run.progress.cancelled.load(Ordering::Relaxed))
     }
 
-    /// Makes the last state of a run that is over the session's.
+    /// Makes the last state of a finished run the state of the session.
     fn adopt(&mut self, run: Background) -> Result<String, Trouble> {
         let joined = run.thread.join().map_err(|_| Trouble::plain("the run ended unexpectedly"))?;
         let result = joined.map_err(|e| run.model.chain_error(e))?;
@@ -337,17 +338,17 @@ impl Session {
             .ok_or_else(|| Trouble::plain("nothing runs in the background").hint(":infer &"))
     }
 
-    /// The number of the run in the background, and whether it is over: for a front end
-    /// to say so.
+    /// Returns the number of the background run, and whether it is over, so that a front
+    /// end can report it.
     pub fn background(&self) -> Option<(u32, bool)> {
         self.background.as_ref().map(|b| (b.number, b.status().is_done))
     }
 
-    /// The draws of the run in the background, or of the last one, and what is to be said
-    /// of them.
+    /// Returns the draws of the background run, or else of the last run, with a note on
+    /// their origin.
     ///
     /// # Errors
-    /// If there are none: nothing has run, or what runs is still in warm-up.
+    /// If there are no draws: nothing has run, or the run is still in warm-up.
     pub(super) fn latest_draws(&self) -> Result<(String, ChainDraws), Trouble> {
         match (&self.background, &self.last) {
             (Some(run), _) => match run.kept.draws() {
@@ -382,7 +383,7 @@ impl Session {
 }
 
 impl Status {
-    /// The phase and how far it is, as "warm-up, 300 of 1000".
+    /// Formats the phase and its progress, such as "warm-up, 300 of 1000".
     pub fn part(&self) -> String {
         match self.done {
             (_, 0) => self.phase.to_owned(),
@@ -413,7 +414,7 @@ impl Background {
         }
     }
 
-    /// How much of the phase is done, and of how much.
+    /// Returns how much of the phase is done, and the total.
     fn part(&self) -> (u64, u64) {
         let number = |n: &AtomicU64| n.load(Ordering::Relaxed);
         match self.steps {
@@ -422,12 +423,12 @@ impl Background {
         }
     }
 
-    /// That it has no draws yet, and why.
+    /// Explains why there are no draws yet.
     fn no_draws(&self) -> String {
         format!("run {} has no draws yet: {}\n", self.number, self.status().part())
     }
 
-    /// What is known of it, in a line.
+    /// Describes the run in one line.
     fn line(&self) -> String {
         let (s, seen) = (self.status(), self.kept.counts());
         let state = match s.is_done {
@@ -440,18 +441,19 @@ impl Background {
     }
 }
 
-/// How many draws there are, how many were new states, and the best.
+/// Formats the number of draws, the fraction of new states, and the best log joint
+/// density.
 fn drawn(seen: &DrawCounts) -> String {
     let Some(best) = seen.best.filter(|_| seen.draws > 0) else { return String::new() };
     let share = 100.0 * seen.moved as f64 / seen.draws as f64;
     format!(", {} draws ({share:.0}% new states), best log joint {}", seen.draws, number(best))
 }
 
-/// Quantities in the table after inference.
+/// The number of quantities in the table after inference.
 const MEANS: usize = 12;
 
 impl Finished {
-    /// Means and intervals of what was drawn.
+    /// Formats means and intervals of the recorded quantities.
     fn means(&self) -> String {
         if self.draws.rows.len() < 2 {
             return String::new();
@@ -466,7 +468,7 @@ impl Finished {
         table::means(&all) + &more
     }
 
-    /// What was done, in a line.
+    /// Describes the run in one line.
     fn line(&self) -> String {
         let warmup = if self.warmup > 0 {
             format!(" after {} of warm-up", self.warmup)

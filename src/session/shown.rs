@@ -1,15 +1,16 @@
-//! Values in bounded text: the largest costs no more than its first letters.
+//! Values as bounded text: even the largest value costs no more than its first
+//! characters.
 
 use crate::lang::value::Value;
 use crate::report::number;
 use std::fmt::{self, Write};
 
-/// Letters of a value that is shown by itself.
+/// The maximum length of a value shown by itself, in characters.
 const WHOLE: usize = 2000;
-/// Letters of a value in a table.
+/// The maximum length of a value in a table, in characters.
 const CELL: usize = 48;
 
-/// A text that takes no more than so many letters.
+/// A text of bounded length.
 struct Bounded {
     text: String,
     left: usize,
@@ -29,30 +30,30 @@ impl Write for Bounded {
     }
 }
 
-/// A value by itself, numbers in full.
+/// Formats a value by itself, with numbers in full precision.
 pub(super) fn whole(v: &Value) -> String {
     bounded(WHOLE, |out| write(out, v, &exact))
 }
 
-/// A value in a few letters, numbers to four digits.
+/// Formats a value briefly, with numbers to four digits.
 pub fn short(v: &Value) -> String {
     bounded(CELL, |out| write(out, v, &number))
 }
 
 fn bounded(most: usize, f: impl FnOnce(&mut Bounded) -> fmt::Result) -> String {
     let mut out = Bounded { text: String::new(), left: most };
-    // The error is that there was no room.
+    // An error means that the text was cut off.
     let _ = f(&mut out);
     out.text
 }
 
-/// All digits, and few letters for the largest and smallest.
+/// Formats all digits of a number, in scientific notation if it is very large or small.
 fn exact(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-5..1e15).contains(&x.abs());
     if plain { format!("{x}") } else { format!("{x:e}") }
 }
 
-/// At most this many elements are shown.
+/// The maximum number of elements shown.
 const ELEMENTS: usize = 8;
 
 fn write(out: &mut Bounded, v: &Value, number: &dyn Fn(f64) -> String) -> fmt::Result {
@@ -94,7 +95,7 @@ mod tests {
             ("1e300".into(), "-1e-300".into())
         );
         assert_eq!(short(&Value::array(vec![1.0 / 3.0; 3])), "[0.3333, 0.3333, 0.3333]");
-        // A list of itself, thirty deep: a billion letters if it were written out.
+        // A list of itself, nested thirty deep: a billion characters if written out.
         let mut v = Value::Str("x".into());
         for _ in 0..30 {
             v = Value::List(vec![v.clone(), v].into());

@@ -1,1 +1,1 @@
-//! Sessions as a front end has them.
+//! Tests of sessions, used as by a front end.

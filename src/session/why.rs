@@ -1,4 +1,4 @@
-//! `:why @a`: what a choice was made from, and what an update of it would reach.
+//! `:why @a`: what a choice depends on, and what depends on it.
 
 use super::look::{ROWS, more};
 use super::{Reply, Session, Trouble, shown};

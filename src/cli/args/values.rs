@@ -1,8 +1,8 @@
-//! Values of options that are no plain numbers or texts.
+//! Parsers of option values other than plain numbers and strings.
 
 use std::time::Duration;
 
-/// A name and a value.
+/// Parses `NAME=VALUE`.
 pub(super) fn pair(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() => {
@@ -12,7 +12,7 @@ pub(super) fn pair(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// A limit of what programs build.
+/// Parses a limit on evaluation, `NAME=N`.
 pub(super) fn limit(text: &str) -> Result<(String, u64), String> {
     let (name, number) = pair(text)?;
     let number = number.parse().map_err(|_| format!("expected a whole number, got {number}"))?;
@@ -20,7 +20,7 @@ pub(super) fn limit(text: &str) -> Result<(String, u64), String> {
     Ok((name, number))
 }
 
-/// A length of time.
+/// Parses a duration; without a unit, it is in seconds.
 pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let wrong = || "expected a time such as 10s, 2m, 1h or 500ms".to_owned();
     let at = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());

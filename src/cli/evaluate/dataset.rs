@@ -1,6 +1,6 @@
 //! The cases of a dataset: their names, pictures and cameras.
 //!
-//! Invariant: nothing else in a dataset is opened. A truth that lies beside the pictures,
+//! Invariant: no other files of a dataset are opened. Ground truth beside the pictures,
 //! or in other fields of `annotations.json`, cannot reach a run.
 
 use crate::cli::{Failure, files, plain};
@@ -12,15 +12,15 @@ use std::path::{Component, Path, PathBuf};
 
 /// The list of people of a dataset.
 const ANNOTATIONS: &str = "annotations.json";
-/// What the picture of a folder may be called; the first that is there is taken.
+/// Possible names of the picture in a case's folder; the first that exists is used.
 const IMAGES: [&str; 3] = ["image.png", "image.jpg", "image.jpeg"];
-/// The camera of a folder.
+/// The camera file in a case's folder.
 const CAMERA: &str = "camera.json";
 
-/// One picture to explain.
+/// One picture to run the program on.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Its name: that of its folder, or its id. A plain file name.
+    /// The name: that of the folder, or the person's id. A plain file name.
     pub name: String,
     /// The picture.
     pub image: PathBuf,
@@ -28,21 +28,21 @@ pub struct Case {
     pub camera: Option<PathBuf>,
 }
 
-/// What a dataset looks like.
+/// The layout of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// A folder for each case.
+    /// One folder per case.
     Folders,
-    /// `annotations.json`.
+    /// People listed in `annotations.json`.
     People,
 }
 
 /// The cases of a dataset.
 #[derive(Debug)]
 pub struct Dataset {
-    /// What it looks like.
+    /// Its layout.
     pub layout: Layout,
-    /// Its cases: folders by name, people as listed.
+    /// Its cases: folders in order of name, people in the order of the list.
     pub cases: Vec<Case>,
     /// Folders without a picture.
     pub skipped: Vec<String>,
@@ -88,7 +88,7 @@ impl Dataset {
     }
 }
 
-/// Whether all names of `--only` are those of cases.
+/// Checks that every name of `--only` is that of a case.
 pub fn known<'a>(
     dataset: &Path,
     only: &[String],
@@ -118,7 +118,7 @@ fn people(path: &Path) -> Result<Dataset, Failure> {
     })?;
     let mut cases = Vec::new();
     for Person { id, image } in all.people {
-        // The picture lies in the dataset.
+        // The picture must lie in the dataset's folder.
         if image.is_empty()
             || Path::new(&image).components().any(|c| !matches!(c, Component::Normal(_)))
         {
@@ -164,7 +164,7 @@ fn unknown(path: &Path) -> Failure {
     Failure::Plain(format!("{}: not a dataset", path.display()), Some(hint.into()))
 }
 
-/// Whether a folder of that name can stand among the files of an evaluation.
+/// Returns whether a folder of that name can be placed among the files of an evaluation.
 fn is_file_name(name: &str) -> bool {
     let taken = [MARK, TABLE, PREDICTIONS].iter().any(|f| f.eq_ignore_ascii_case(name));
     let odd = |c: char| c.is_control() || matches!(c, '/' | '\\' | ':');

@@ -1,7 +1,7 @@
-//! `pcadlang evaluate`: a program on every case of a dataset, and files that scorers
-//! read.
+//! `pcadlang evaluate`: runs a program on every case of a dataset, and writes files for
+//! scoring.
 //!
-//! Invariant: after every case all files are whole, and say what has been done so far; a
+//! Invariant: after each case all files are complete and describe the progress so far; a
 //! case counts as done only if its `run.json` says so, with these settings.
 
 mod dataset;
@@ -22,24 +22,24 @@ use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A case on its way.
+/// A case and the state of its run.
 struct Task {
     case: Case,
     job: Job,
     record: Map<String, Value>,
-    /// Whether it is one of `--only`.
+    /// Whether the case is selected by `--only`, or by default.
     chosen: bool,
-    /// Nothing for a case that is neither chosen nor done.
+    /// The result so far; `None` for a case that is neither selected nor done.
     row: Option<Row>,
 }
 
-/// The whole dataset on its way.
+/// The state of an evaluation.
 struct Evaluation<'a> {
     a: &'a Evaluate,
     layout: Layout,
     dir: EvaluationDir,
     tasks: Vec<Task>,
-    /// What `evaluation.json` begins with.
+    /// The fields of `evaluation.json` before `cases`.
     head: Map<String, Value>,
     interrupt: Arc<Interrupt>,
 }
@@ -82,7 +82,7 @@ pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
     }
 }
 
-/// A case in one line.
+/// Formats a result in one line.
 fn line(row: &Row) -> String {
     if row.status == "failed" {
         return row.status.clone();
@@ -101,8 +101,8 @@ fn line(row: &Row) -> String {
 }
 
 impl<'a> Evaluation<'a> {
-    /// Everything that can be wrong with program, dataset or folder is said before the
-    /// first case is run.
+    /// Prepares all cases, and reports errors in the program, dataset or folder before
+    /// the first case is run.
     fn prepare(a: &'a Evaluate) -> Result<Evaluation<'a>, Failure> {
         let Dataset { layout, cases, skipped } = Dataset::open(&a.dataset)?;
         dataset::known(&a.dataset, &a.only, cases.iter().map(|c| c.name.as_str()))?;
@@ -149,7 +149,8 @@ impl<'a> Evaluation<'a> {
         Ok(e)
     }
 
-    /// Rows of what an earlier evaluation did; one with other settings is an error.
+    /// Takes over the results of an earlier evaluation. Results with other settings are
+    /// an error without `--fresh`.
     fn take_up(&mut self) -> Result<(), Failure> {
         let mut other = None;
         for t in &mut self.tasks {
@@ -176,7 +177,7 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// What all cases have in common.
+    /// Returns the settings that all cases share.
     fn head(&self) -> Map<String, Value> {
         let a = self.a;
         let mut head: Map<String, Value> = Map::new();
@@ -196,8 +197,8 @@ impl<'a> Evaluation<'a> {
         head
     }
 
-    /// Runs a case; what there is to say of it is read off its folder, as for a case that
-    /// was done before.
+    /// Runs a case. The result is read from its folder, as for a case that was done
+    /// earlier.
     fn run(&self, i: usize) -> (Row, Option<Failure>) {
         let t = &self.tasks[i];
         let begun = Instant::now();
@@ -206,7 +207,7 @@ impl<'a> Evaluation<'a> {
                 let run = resume::left(&self.dir.file(&t.case.name)).unwrap_or_default();
                 (Row::of(&t.case.name, &run), None)
             }
-            // Its folder may be what failed.
+            // The folder itself may be the cause, so nothing is read from it.
             Err(failure) => {
                 let row = Row {
                     status: "failed".into(),
@@ -223,7 +224,7 @@ impl<'a> Evaluation<'a> {
         let dir = RunDir::create(&self.dir.file(&t.case.name)).map_err(|e| plain(e.to_string()))?;
         let begun = Instant::now();
         let ready = job::prepare(&t.job, true).inspect_err(|failure| {
-            // The error that is told is the first one.
+            // An error in writing the record must not hide the first error.
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
@@ -241,13 +242,13 @@ impl<'a> Evaluation<'a> {
         Value::Object(all)
     }
 
-    /// Writes what is known so far.
+    /// Writes all summaries of the results so far.
     fn save(&self) -> Result<(), Failure> {
         let write = |name: &str, bytes: &[u8]| {
             self.dir.write(name, bytes).map_err(|e| plain(e.to_string()))
         };
         let json = |v: &Value| serde_json::to_vec_pretty(v).unwrap_or_default();
-        // This one first: it marks the folder.
+        // Written first, since it marks the folder as an evaluation's.
         write(MARK, &json(&self.summary()))?;
         write(TABLE, markdown(&self.rows()).as_bytes())?;
         if self.layout == Layout::People {
@@ -256,8 +257,8 @@ impl<'a> Evaluation<'a> {
         Ok(())
     }
 
-    /// Where each person's joints were found: null where a run failed or its scene has
-    /// none.
+    /// Returns the predicted joints of each person whose run has ended: null where the
+    /// run failed or its scene has no joints.
     fn predictions(&self) -> Map<String, Value> {
         let ended = self
             .tasks
@@ -274,7 +275,7 @@ impl<'a> Evaluation<'a> {
         ended.map(entry).collect()
     }
 
-    /// Progress, for people.
+    /// Prints a progress message, unless `--quiet` is set.
     fn say(&self, text: &str) {
         if !self.a.quiet {
             error_line!("{text}");

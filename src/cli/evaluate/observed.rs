@@ -1,4 +1,4 @@
-//! What a case gives its program to observe.
+//! The observations of a case, as arguments of `--observe`.
 
 use super::dataset::Case;
 use crate::cli::{Failure, files, plain};
@@ -6,12 +6,12 @@ use pcadlang::Program;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
-/// The kind of `data` item that the picture is for.
+/// The kind, or else the name, of the `data` item for the picture.
 const IMAGE: &str = "image";
-/// The kind, or the name, of the `data` item that detected keypoints are for.
+/// The kind, or else the name, of the `data` item for detected keypoints.
 const KEYPOINTS: &str = "keypoints";
 
-/// Detected keypoints of a dataset, by case.
+/// The detected keypoints of a dataset, by case.
 pub struct Detections {
     path: PathBuf,
     people: Map<String, Value>,
@@ -30,17 +30,18 @@ impl Detections {
         }
     }
 
-    /// The entry of a case in which somebody was found.
+    /// Returns the entry of a case, if a person was detected in its picture.
     fn of(&self, case: &str) -> Option<&Value> {
         self.people.get(case).filter(|p| p["keypoints"].as_object().is_some_and(|k| !k.is_empty()))
     }
 }
 
-/// Something to observe: what it is, its file, and the entry of the file where it holds
-/// several.
+/// An observation: the kind of its `data` item, its file, and the entry's name in a file
+/// with several entries.
 pub type Observation = (&'static str, PathBuf, Option<String>);
 
-/// What a case gives: its picture, and its keypoints if there are any.
+/// Returns the observations of a case: its picture, and its keypoints if any were
+/// detected.
 pub fn observations_for(case: &Case, detections: Option<&Detections>) -> Vec<Observation> {
     let mut all = vec![(IMAGE, case.image.clone(), None)];
     if let Some(d) = detections.filter(|d| d.of(&case.name).is_some()) {
@@ -49,10 +50,10 @@ pub fn observations_for(case: &Case, detections: Option<&Detections>) -> Vec<Obs
     all
 }
 
-/// The bytes that the draws of a case depend on: those of its files, and of its entry
-/// among the keypoints.
+/// Returns the bytes that the draws of a case depend on: those of its files and of its
+/// keypoints.
 pub fn bytes(case: &Case, detections: Option<&Detections>) -> Vec<u8> {
-    // A file that cannot be read is an error when the case is run.
+    // A file that cannot be read is reported when the case is run.
     let mut all = std::fs::read(&case.image).unwrap_or_default();
     all.extend(case.camera.as_ref().and_then(|c| std::fs::read(c).ok()).unwrap_or_default());
     all.extend(
@@ -65,14 +66,14 @@ pub fn bytes(case: &Case, detections: Option<&Detections>) -> Vec<u8> {
     all
 }
 
-/// The `data` items of a program that observations are for.
+/// The names of a program's `data` items for the observations.
 pub struct Items {
     image: String,
     keypoints: Option<String>,
 }
 
 impl Items {
-    /// Finds them; keypoints are looked for only if there are any.
+    /// Finds the items. An item for keypoints is required only if `keypoints` is true.
     pub fn of(program: &Program, keypoints: bool) -> Result<Items, Failure> {
         let data = program.interface().data;
         let of_kind = |kind: &str| {
@@ -99,7 +100,7 @@ impl Items {
         })
     }
 
-    /// An observation as `--observe` takes it.
+    /// Formats an observation as an argument of `--observe`.
     pub fn spec(&self, (what, path, id): &Observation) -> String {
         let name = if *what == IMAGE {
             &self.image

@@ -1,10 +1,11 @@
-//! Half blocks: each letter shows two pixels, one above the other, by its two colours.
+//! Half blocks: each character shows two pixels, one above the other, by its foreground
+//! and background colours.
 
 use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
 use std::fmt::Write;
 
-/// What shows a picture in so many columns, in 24-bit colours or in the 256 of xterm.
+/// Encodes a picture in the given number of columns, in 24-bit colours or xterm's 256.
 pub fn encode(picture: &RgbImage, columns: u32, full_colors: bool) -> String {
     let (w, h) = picture.dimensions();
     if w == 0 || h == 0 || columns == 0 {
@@ -33,7 +34,7 @@ pub fn encode(picture: &RgbImage, columns: u32, full_colors: bool) -> String {
     out
 }
 
-/// A colour as the terminal reads it.
+/// Formats a colour as parameters of an escape sequence.
 fn color(Rgb([r, g, b]): Rgb<u8>, full: bool) -> String {
     if full {
         return format!("2;{r};{g};{b}");
@@ -41,7 +42,7 @@ fn color(Rgb([r, g, b]): Rgb<u8>, full: bool) -> String {
     format!("5;{}", nearest(r, g, b))
 }
 
-/// The nearest of xterm's 256 colours: of its cube of 6 steps, or of its greys.
+/// Returns the nearest of xterm's 256 colours, from the 6 x 6 x 6 cube or the greys.
 fn nearest(r: u8, g: u8, b: u8) -> u8 {
     let step = |x: u8| if x < 48 { 0 } else { ((i32::from(x) - 35) / 40).clamp(1, 5) };
     let level = |s: i32| if s == 0 { 0 } else { 55 + 40 * s };
@@ -59,7 +60,7 @@ mod tests {
     use super::super::testing::noise;
     use super::*;
 
-    /// The pixels that a terminal would paint.
+    /// Returns the pixels that a terminal would paint.
     fn decode(sent: &str) -> Vec<Vec<[u8; 3]>> {
         let mut rows = Vec::new();
         for line in sent.lines() {

@@ -4,14 +4,14 @@ use crate::cli::{Failure, plain};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The text as the user's editor leaves it.
+/// Returns a text after the user has edited it.
 ///
 /// # Errors
-/// If there is no editor, or it fails.
+/// If the draft cannot be written or read back, or the editor cannot be started or fails.
 pub fn edited(text: &str) -> Result<String, Failure> {
     let draft = Draft::new(text)?;
     let editor = editor();
-    // An editor may come with arguments: `code --wait`.
+    // The editor may include arguments: `code --wait`.
     let mut words = editor.split_whitespace();
     let program = words.next().unwrap_or("vi");
     let wrong = |why: String| {
@@ -27,15 +27,15 @@ pub fn edited(text: &str) -> Result<String, Failure> {
         .map_err(|e| plain(format!("the edited text cannot be read: {e}")))
 }
 
-/// The user's editor.
+/// Returns the command of the user's editor.
 fn editor() -> String {
     let set = |name: &str| std::env::var(name).ok().filter(|v| !v.trim().is_empty());
     let usual = if cfg!(windows) { "notepad" } else { "vi" };
     set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| usual.into())
 }
 
-/// A file for the editor, in a folder that is the user's alone; both are removed in the
-/// end.
+/// A draft for the editor, in a folder that only the user can access (on Unix); both are
+/// removed on drop.
 struct Draft(PathBuf);
 
 impl Draft {
@@ -52,7 +52,7 @@ impl Draft {
 
 impl Drop for Draft {
     fn drop(&mut self) {
-        // What cannot be removed stays in the folder for temporary files.
+        // A draft that cannot be removed stays in the folder for temporary files.
         let _ = std::fs::remove_file(&self.0);
         let _ = self.0.parent().map(std::fs::remove_dir);
     }

@@ -1,4 +1,4 @@
-//! The line editor: colours, completion, lines that go on, history.
+//! The line editor: colours, completion, continuation lines, history.
 
 use pcadlang::session::Session;
 use pcadlang::syntax::{Class, classes, goes_on};
@@ -15,10 +15,10 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// Lines of history that are kept.
+/// The number of entries kept in the history.
 const HISTORY: usize = 10_000;
 
-/// An editor with what it knows of the session.
+/// A line editor for a session.
 pub struct Lines {
     editor: Editor<Help, FileHistory>,
     history: Option<PathBuf>,
@@ -26,7 +26,7 @@ pub struct Lines {
 
 /// What the user typed.
 pub enum Typed {
-    /// A whole entry; it may have several lines.
+    /// A complete entry, of one or more lines.
     Entry(String),
     /// Ctrl-C: the line is cleared.
     Cleared,
@@ -35,7 +35,7 @@ pub enum Typed {
 }
 
 impl Lines {
-    /// An editor for a session.
+    /// Makes an editor for a session.
     pub fn new(session: Rc<RefCell<Session>>, colors: bool) -> Result<Lines, ReadlineError> {
         let config = Config::builder()
             .max_history_size(HISTORY)?
@@ -50,25 +50,25 @@ impl Lines {
         editor.set_helper(Some(Help { session, colors }));
         let history = history_file();
         if let Some(path) = &history {
-            // There is none at first.
+            // The file does not exist on first use.
             let _ = editor.load_history(path);
         }
         Ok(Lines { editor, history })
     }
 
-    /// Whether the user says yes to a question.
+    /// Asks a question, and returns whether the answer is yes.
     pub fn is_agreed(&mut self, question: &str) -> bool {
         let answer = self.editor.readline(&format!("{question} [y/N] "));
         answer.is_ok_and(|a| matches!(a.trim().to_lowercase().as_str(), "y" | "yes"))
     }
 
-    /// The next entry.
+    /// Reads the next entry.
     pub fn next(&mut self, prompt: &str) -> Result<Typed, ReadlineError> {
         match self.editor.readline(prompt) {
             Ok(text) => {
                 let _ = self.editor.add_history_entry(text.as_str());
                 if let Some(path) = &self.history {
-                    // A history that cannot be kept is no reason to stop.
+                    // A history that cannot be written is not an error.
                     let _ = path.parent().map(std::fs::create_dir_all);
                     let _ = self.editor.append_history(path);
                 }
@@ -81,14 +81,14 @@ impl Lines {
     }
 }
 
-/// Where the history is kept: in the user's folder for states of programs.
+/// Returns the history file, in the user's folder for the state of programs.
 fn history_file() -> Option<PathBuf> {
     let set = |name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let state = set("XDG_STATE_HOME").or_else(|| set("HOME").map(|h| h.join(".local/state")))?;
     Some(state.join("pcadlang/history"))
 }
 
-/// What the editor asks while a line is typed.
+/// Completion, validation and colours while a line is typed.
 struct Help {
     session: Rc<RefCell<Session>>,
     colors: bool,
@@ -142,7 +142,7 @@ impl Highlighter for Help {
     }
 }
 
-/// A line with colours.
+/// Colours a line.
 fn colored(line: &str) -> String {
     let command = if line.starts_with(':') {
         line.find(char::is_whitespace).unwrap_or(line.len())
@@ -167,7 +167,7 @@ fn colored(line: &str) -> String {
     out + &rest[at..]
 }
 
-/// Whether an entry is whole; what is typed on one line and does not go on always is.
+/// Returns whether an entry is complete; a `:` command always is.
 pub fn is_whole(text: &str) -> bool {
     text.trim_start().starts_with(':') || !goes_on(text)
 }

@@ -1,8 +1,8 @@
-//! Inline images of iTerm2, which others understand too: a file in base64.
+//! Inline images of iTerm2, which other terminals support too: a file in base64.
 
 use pcadlang::report::html::base64;
 
-/// What shows a PNG at the cursor.
+/// Encodes a PNG for display at the cursor.
 pub fn encode(png: &[u8]) -> String {
     format!(
         "\x1b]1337;File=inline=1;size={};preserveAspectRatio=1:{}\x07\n",

@@ -1,11 +1,11 @@
-//! The graphics protocol of kitty: a PNG in base64, in chunks of 4096 letters.
+//! The graphics protocol of kitty: a PNG in base64, in chunks of 4096 characters.
 
 use pcadlang::report::html::base64;
 
-/// Letters of a chunk at most; the protocol wants a multiple of 4.
+/// The maximum length of a chunk; the protocol requires a multiple of 4.
 const CHUNK: usize = 4096;
 
-/// What shows a PNG at the cursor.
+/// Encodes a PNG for display at the cursor.
 pub fn encode(png: &[u8]) -> String {
     let data = base64(png);
     let chunks: Vec<&str> =
@@ -13,7 +13,8 @@ pub fn encode(png: &[u8]) -> String {
     let mut out = String::with_capacity(data.len() + 64 * chunks.len());
     for (i, chunk) in chunks.iter().enumerate() {
         let more = u8::from(i + 1 < chunks.len());
-        // The first says what it is (PNG), what to do (show it), and to answer nothing.
+        // The first chunk has the format (PNG) and the action (display), and turns off
+        // responses.
         let head = if i == 0 { "f=100,a=T,q=2," } else { "" };
         out += &format!("\x1b_G{head}m={more};{chunk}\x1b\\");
     }

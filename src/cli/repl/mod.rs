@@ -1,4 +1,4 @@
-//! `pcadlang repl`: a session at a prompt, or a script that is piped in.
+//! `pcadlang repl`: a session at a prompt, or a piped script.
 
 mod blocks;
 mod edit;
@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// The prompt.
 const PROMPT: &str = "pcad> ";
-/// Before the lines of a recording that go on.
+/// The prompt of continuation lines in a transcript.
 const CONTINUED: &str = "    > ";
 
 /// Runs a session until its input ends.
@@ -35,11 +35,12 @@ pub fn repl(a: &Repl) -> Result<(), Failure> {
     let (session, said) = open(a, Stop::when(Arc::clone(&interrupts.asked)))?;
     let is_live =
         std::io::stdin().is_terminal() && std::io::stdout().is_terminal() && !a.transcript;
-    // If no handler can be set, the system's own stays.
+    // If no handler can be set, the system's default stays.
     let heard = Arc::clone(&interrupts);
     let _ = ctrlc::set_handler(move || {
         heard.asked.store(true, Ordering::SeqCst);
-        // A single operation, such as an array of a billion numbers, cannot be ended.
+        // A single operation, such as making an array of a billion numbers, cannot be
+        // interrupted, so the third Ctrl-C exits.
         if heard.pressed.fetch_add(1, Ordering::SeqCst) >= 2 {
             std::process::exit(3);
         }
@@ -64,7 +65,7 @@ fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
     Ok(Session::open(program, a.seed, stop)?)
 }
 
-/// The program, data and settings of a run, in its best state.
+/// Opens a session with the program, data, settings and best state of a run.
 fn reopened(folder: &Path, seed: u64, stop: Stop) -> Result<(Session, Reply), Failure> {
     let run = Reopened::open(folder)?;
     let (program, _) = inputs::observe(inputs::program(&run.job.inputs, true)?, &run.job)?;
@@ -73,7 +74,7 @@ fn reopened(folder: &Path, seed: u64, stop: Stop) -> Result<(Session, Reply), Fa
     Ok((session, said))
 }
 
-/// What the program is given, as `run` has it.
+/// Returns the equivalent arguments of `run`.
 fn job(a: &Repl, path: &str) -> Job {
     let sampling = Sampling { seed: a.seed, chains: Some(1), ..Sampling::default() };
     Job {
@@ -108,23 +109,23 @@ impl From<Trouble> for Failure {
     }
 }
 
-/// A session and how it is shown.
+/// A session and how it is displayed.
 struct Front {
     session: Rc<RefCell<Session>>,
     seed: u64,
     graphics: Graphics,
-    /// A text of the program that was edited and has errors.
+    /// An edited program with errors, from which the next `:edit` starts.
     draft: Option<String>,
-    /// Whether there is a line of progress on the terminal.
+    /// Whether a progress line is shown on the terminal.
     shown: Rc<Cell<bool>>,
     interrupts: Arc<Interrupts>,
 }
 
-/// Ctrl-C, since the last entry.
+/// Ctrl-C presses since the last entry.
 #[derive(Default)]
 struct Interrupts {
     asked: Arc<AtomicBool>,
-    /// How often.
+    /// The number of presses.
     pressed: AtomicU32,
 }
 
@@ -181,8 +182,8 @@ impl Front {
         }
     }
 
-    /// Reads entries as a script; a recording shows them too, and errors among what is
-    /// said.
+    /// Reads entries as a script. A transcript echoes them, and shows errors in its
+    /// output instead of stopping.
     fn script(&mut self, transcript: bool) -> Result<(), Failure> {
         let mut lines = std::io::stdin().lock().lines();
         while let Some(entry) = next_entry(&mut lines, transcript)? {
@@ -207,7 +208,8 @@ impl Front {
         Ok(())
     }
 
-    /// Does an entry, and asks the user what it wants to know.
+    /// Runs an entry, after asking the user to confirm if necessary. Returns whether the
+    /// session ends.
     fn answered(&mut self, text: &str, lines: &mut Lines) -> Result<bool, Failure> {
         match self.enter(text)? {
             Done::Asks { question, then } => match lines.is_agreed(&question) {
@@ -221,7 +223,7 @@ impl Front {
         }
     }
 
-    /// Does an entry and shows what came of it.
+    /// Runs an entry and shows its result.
     fn enter(&mut self, text: &str) -> Result<Done, Failure> {
         self.interrupts.asked.store(false, Ordering::SeqCst);
         self.interrupts.pressed.store(0, Ordering::SeqCst);
@@ -254,30 +256,30 @@ impl Front {
         Ok(if reply.ends { Done::Leaves } else { Done::Goes })
     }
 
-    /// Has the program edited; a text with errors is kept for the next time.
+    /// Lets the user edit the program; a text with errors is kept for the next `:edit`.
     fn edit(&mut self) -> Result<Reply, Failure> {
         let text = self.draft.clone().unwrap_or_else(|| self.session.borrow().text().to_owned());
         let edited = edit::edited(&text)?;
         let replaced = self.session.borrow_mut().replace(&edited);
         self.draft = replaced.is_err().then_some(edited);
-        // A text with errors has its messages; anything else gets the hint.
+        // Errors in the text have their own messages; any other error gets the hint.
         Ok(replaced.map_err(|t| t.hint("`:edit` goes on with the text as you left it"))?)
     }
 }
 
-/// What an entry led to.
+/// The result of an entry.
 #[derive(PartialEq, Eq)]
 enum Done {
     Goes,
     Leaves,
-    /// A question is open: what to enter if the answer is yes.
+    /// A question to the user, and the entry to run if the answer is yes.
     Asks {
         question: String,
         then: String,
     },
 }
 
-/// The next entry of a script: a line, and those that it goes on in.
+/// Reads the next entry of a script: a line and its continuation lines.
 fn next_entry(
     lines: &mut impl Iterator<Item = std::io::Result<String>>,
     transcript: bool,
@@ -298,13 +300,13 @@ fn next_entry(
     Ok(entry)
 }
 
-/// Prints at once, also without a line end.
+/// Prints a text and flushes the output.
 fn print(text: &str) {
     print_text!("{text}");
     let _ = std::io::stdout().flush();
 }
 
-/// The line of progress.
+/// Formats the progress line.
 fn progress(s: &Status) -> String {
     let best = s.best.map_or(String::new(), |b| format!(", best log joint {}", number(b)));
     format!("{}{best}, {} s; Ctrl-C ends it and keeps its draws", s.part(), s.elapsed.as_secs())

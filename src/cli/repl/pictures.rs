@@ -1,4 +1,4 @@
-//! Showing a picture: as the terminal can, or in a file.
+//! Shows pictures in the terminal, or writes them to files.
 
 use super::super::args::Graphics;
 use super::super::{Failure, files, plain};
@@ -9,12 +9,12 @@ use pcadlang::report::pictures::png;
 use pcadlang::session::Picture;
 use std::path::{Path, PathBuf};
 
-/// The longer side in pixels where the terminal shows pixels.
+/// The longer side of a picture in pixels, on terminals that show pixels.
 const LONGER_SIDE: u32 = 640;
-/// Columns of half blocks at most.
+/// The maximum width of a picture in half blocks.
 const COLUMNS: u32 = 72;
 
-/// What the environment says of the terminal; nothing is asked of the terminal itself.
+/// Chooses how to show pictures by the environment; the terminal itself is not queried.
 pub fn told_by(variable: impl Fn(&str) -> Option<String>, is_terminal: bool) -> Graphics {
     let get = |name| variable(name).unwrap_or_default();
     let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
@@ -27,7 +27,7 @@ pub fn told_by(variable: impl Fn(&str) -> Option<String>, is_terminal: bool) -> 
     if !is_terminal || term.is_empty() || term == "dumb" {
         Graphics::File
     } else if variable("TMUX").is_some() || term.starts_with("screen") || term.starts_with("tmux") {
-        // They pass pictures on only when told to.
+        // tmux and screen pass pictures on only if configured to.
         blocks
     } else if variable("KITTY_WINDOW_ID").is_some() || is(&["kitty", "ghostty"]) {
         Graphics::Kitty
@@ -40,8 +40,8 @@ pub fn told_by(variable: impl Fn(&str) -> Option<String>, is_terminal: bool) -> 
     }
 }
 
-/// The letters that show a picture; a file is written where there is no other way, or if
-/// the user named one.
+/// Returns the characters that show a picture. If the user named a file, or the terminal
+/// cannot show pictures, the picture is written to a file instead.
 pub fn shown(picture: &Picture, graphics: Graphics) -> Result<String, Failure> {
     let pixels = picture.pixels();
     let encoded = |p: &RgbImage| png(p).map_err(|e| plain(e.to_string()));
@@ -67,13 +67,13 @@ pub fn shown(picture: &Picture, graphics: Graphics) -> Result<String, Failure> {
     })
 }
 
-/// The columns that a picture may take.
+/// Returns the maximum width of a picture in columns.
 fn columns() -> u32 {
     let told = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<u32>().ok());
     told.map_or(COLUMNS, |c| c.saturating_sub(1).clamp(8, COLUMNS))
 }
 
-/// The first of `render.png`, `render-2.png`, … that does not exist yet.
+/// Returns the first of `render.png`, `render-2.png`, … that does not exist yet.
 fn unused(folder: &Path) -> PathBuf {
     let name = |n: u32| {
         folder.join(if n == 1 { "render.png".to_owned() } else { format!("render-{n}.png") })

@@ -1,17 +1,17 @@
-//! Sixels: six rows at a time, colour by colour, in a fixed palette of 252 colours with
-//! the error passed on to neighbours (Floyd and Steinberg 1976).
+//! Sixels: six rows at a time, one colour after the other, in a fixed palette of 252
+//! colours with error diffusion (Floyd and Steinberg 1976).
 
 use image::RgbImage;
 use std::fmt::Write;
 
-/// Steps of red, green and blue in the palette: the eye tells greens best.
+/// Levels of red, green and blue in the palette; the eye is most sensitive to green.
 const STEPS: [usize; 3] = [6, 7, 6];
 
-/// What shows a picture at the cursor.
+/// Encodes a picture for display at the cursor.
 pub fn encode(picture: &RgbImage) -> String {
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let indices = quantised(picture);
-    // The ratio of a pixel's sides, and the size.
+    // The pixel aspect ratio, 1:1, and the size.
     let mut out = format!("\x1bPq\"1;1;{width};{height}");
     for i in 0..STEPS.iter().product() {
         let [r, g, b] = color(i).map(|c| (c / 2.55).round() as u32);
@@ -47,7 +47,7 @@ pub fn encode(picture: &RgbImage) -> String {
     out
 }
 
-/// So many columns of the same six pixels.
+/// Writes a number of columns with the same six pixels, run-length encoded if shorter.
 fn repeated(out: &mut String, bits: u8, run: usize) {
     let letter = char::from(63 + bits);
     if run > 3 {
@@ -57,17 +57,17 @@ fn repeated(out: &mut String, bits: u8, run: usize) {
     }
 }
 
-/// The colour of an index of the palette, each part from 0 to 255.
+/// Returns the colour of a palette index; components range from 0 to 255.
 fn color(i: usize) -> [f32; 3] {
     let digits = [i / (STEPS[1] * STEPS[2]), i / STEPS[2] % STEPS[1], i % STEPS[2]];
     [0, 1, 2].map(|c| digits[c] as f32 * 255.0 / (STEPS[c] - 1) as f32)
 }
 
-/// The palette's indices of the pixels, row by row.
+/// Returns the palette index of each pixel, row by row.
 fn quantised(picture: &RgbImage) -> Vec<u8> {
     let width = picture.width() as usize;
     let mut out = Vec::with_capacity(width * picture.height() as usize);
-    // The errors passed on to this row and the next, with a place to spare on both sides.
+    // Errors diffused to this row and the next, with a spare element at each end.
     let mut rows = [vec![[0.0f32; 3]; width + 2], vec![[0.0f32; 3]; width + 2]];
     for row in picture.rows() {
         for (x, p) in row.enumerate() {
@@ -96,7 +96,7 @@ mod tests {
     use super::super::testing::noise;
     use super::*;
 
-    /// The indices that a terminal would paint.
+    /// Returns the width, the height and the palette indices that a terminal would paint.
     fn decode(sent: &str) -> (usize, usize, Vec<Option<u8>>) {
         let body =
             sent.strip_prefix("\x1bPq").and_then(|s| s.trim_end().strip_suffix("\x1b\\")).unwrap();
@@ -116,7 +116,7 @@ mod tests {
                 n
             };
             match c {
-                // With more numbers it says what the colour is.
+                // With more numbers, it defines the colour.
                 '#' => color = number().split(';').next().unwrap().parse().unwrap(),
                 '!' => run = Some(number().parse().unwrap()),
                 '$' => x = 0,

@@ -1,8 +1,8 @@
-//! What the tests of the encoders share.
+//! Helpers for tests of the encoders.
 
 use image::{Rgb, RgbImage};
 
-/// A picture whose pixels differ.
+/// Returns a picture of pseudo-random pixels.
 pub fn noise(width: u32, height: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| {
         let h = (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503).wrapping_mul(x + 7))
@@ -11,12 +11,12 @@ pub fn noise(width: u32, height: u32) -> RgbImage {
     })
 }
 
-/// A PNG of a picture.
+/// Encodes a picture as a PNG.
 pub fn png_of(picture: &RgbImage) -> Vec<u8> {
     pcadlang::report::pictures::png(picture).unwrap()
 }
 
-/// The bytes behind base64.
+/// Decodes base64.
 pub fn unbase64(text: &str) -> Vec<u8> {
     let digit = |c: u8| match c {
         b'A'..=b'Z' => c - b'A',

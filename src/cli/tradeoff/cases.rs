@@ -1,7 +1,7 @@
-//! Cases with a known answer: what a program is given of them, and the truth.
+//! Cases with ground truth: what a program observes, and the truth.
 //!
-//! Invariant: the truth reaches the scores only; what a run observes is what `evaluate`
-//! would give it.
+//! Invariant: the truth is used for scores only; a run observes what `evaluate` would
+//! give it.
 
 use super::truth::{self, Truth};
 use crate::cli::args::Tradeoff;
@@ -14,28 +14,29 @@ use std::path::{Path, PathBuf};
 pub struct Case {
     /// Its name.
     pub name: String,
-    /// What is observed, as `--observe` takes it.
+    /// The observations, as arguments of `--observe`.
     pub observe: Vec<String>,
     /// Its camera.
     pub camera: Option<PathBuf>,
-    /// The answer.
+    /// The ground truth.
     pub truth: Truth,
-    /// The files that say it.
+    /// The files that the ground truth was read from.
     said: Vec<PathBuf>,
 }
 
 impl Case {
-    /// All files that what is measured depends on.
+    /// Returns all files that the results depend on.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
         let observed = self.observe.iter().map(|spec| PathBuf::from(inputs::file_of(spec)));
         observed.chain(self.camera.clone()).chain(self.said.clone())
     }
 }
 
-/// The posterior that a case without a picture is compared with.
+/// The file with the reference posterior of a case without pictures.
 const REFERENCE: &str = "reference.json";
 
-/// All cases below a folder. What is observed is told by the interface of the program.
+/// Opens all cases below a folder that have ground truth. The program's interface
+/// determines what is observed.
 pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
     let folders = folders(&a.cases)?;
     if folders.iter().any(|f| f.join(REFERENCE).is_file()) {
@@ -87,7 +88,7 @@ pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
     }
 }
 
-/// The folders of a folder, by name.
+/// Returns the subfolders of a folder, in order of name.
 fn folders(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     let entries = std::fs::read_dir(path).map_err(|e| plain(format!("{}: {e}", path.display())))?;
     let mut all: Vec<PathBuf> =
@@ -96,14 +97,15 @@ fn folders(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(all)
 }
 
-/// A case of any program: a file for each `data` item that has one, and the posterior.
+/// Opens a case without pictures: files named after `data` items, and a reference
+/// posterior.
 fn posterior(folder: &Path, program: &Program) -> Result<Case, Failure> {
     let name = folder.file_name().and_then(|n| n.to_str()).unwrap_or("case").to_owned();
     let data = program.interface().data;
     let mut there: Vec<PathBuf> = std::fs::read_dir(folder)
         .map_err(|e| plain(format!("{}: {e}", folder.display())))?
         .filter_map(|e| Some(e.ok()?.path()))
-        // The truth is not for the program, whatever it calls its data.
+        // The program must not observe the truth, whatever its `data` items are called.
         .filter(|p| p.is_file() && !p.ends_with(REFERENCE))
         .collect();
     there.sort();

@@ -1,8 +1,7 @@
-//! The folder of a tradeoff: runs as they are done, and the table, front and plot made of
-//! them.
+//! The folder of a trade-off: a journal of finished runs, and the table, front and plot
+//! made from it.
 //!
-//! Invariant: a run that is in the journal is whole; everything else is made from it
-//! again.
+//! Invariant: every run in the journal is complete; all other files are rebuilt from it.
 
 use crate::cli::{Failure, plain};
 use pcadlang::report::write_file;
@@ -13,23 +12,24 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// What marks a folder as one of a tradeoff, and says what was run.
+/// The file that marks a folder as that of a trade-off and lists what was run.
 const MARK: &str = "tradeoff.json";
-/// One run a line.
+/// The journal: one run per line.
 const JOURNAL: &str = "runs.jsonl";
 
-/// The folder.
+/// The folder of a trade-off.
 pub struct Folder {
     path: PathBuf,
     journal: Mutex<File>,
-    /// The runs that were there.
+    /// The runs of earlier calls.
     pub before: Vec<RunRecord>,
-    /// The seconds that they took of the budget.
+    /// The time of earlier calls, in seconds of the budget.
     pub spent: f64,
 }
 
 impl Folder {
-    /// Makes a folder, or takes one up in which the same was measured: what `head` says.
+    /// Creates a folder, or reopens one if `head`, which describes the measurement, has
+    /// not changed.
     pub fn open(path: &Path, head: &Map<String, Value>, fresh: bool) -> Result<Folder, Failure> {
         let fails = |e: std::io::Error| plain(format!("{}: {e}", path.display()));
         std::fs::create_dir_all(path).map_err(fails)?;
@@ -55,8 +55,8 @@ impl Folder {
                     return Err(Failure::Plain(message, Some(hint.into())));
                 }
                 let text = std::fs::read_to_string(&journal).unwrap_or_default();
-                // A line that an interruption cut off is not whole. What failed is tried
-                // again.
+                // A line cut off by an interruption does not parse and is skipped. Failed
+                // runs are repeated.
                 let runs = text.lines().filter_map(|l| serde_json::from_str(l).ok());
                 before = runs.filter(|r: &RunRecord| r.failed.is_none()).collect();
                 whole(&journal, &before)?;
@@ -68,25 +68,26 @@ impl Folder {
         Ok(Folder { path: path.to_owned(), journal: Mutex::new(journal), before, spent })
     }
 
-    /// Keeps a run.
+    /// Appends a run to the journal.
     pub fn keep(&self, run: &RunRecord) -> Result<(), Failure> {
         let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
         let written = journal.write_all(line(run).as_bytes()).and_then(|()| journal.flush());
         written.map_err(|e| plain(format!("{}: {e}", self.path.join(JOURNAL).display())))
     }
 
-    /// Writes a file, whole or not at all.
+    /// Writes a file atomically.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
         written(&self.path.join(name), bytes)
     }
 
-    /// Writes what was run, and all that is made of it.
+    /// Writes `tradeoff.json`: what was run, and the results.
     pub fn mark(&self, head: Map<String, Value>) -> Result<(), Failure> {
         self.write(MARK, &serde_json::to_vec_pretty(&Value::Object(head)).unwrap_or_default())
     }
 }
 
-/// Whether something is as it was. Programs may be added, as settings may.
+/// Returns whether an entry of the head agrees with the earlier one. Programs may be
+/// added, since settings may be.
 fn agrees(key: &str, now: &Value, before: &Value) -> bool {
     match (now, before) {
         (Value::Object(now), Value::Object(before)) if key == "programs" => {
@@ -100,7 +101,7 @@ fn written(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_file(path, bytes).map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
-/// Writes a journal of these runs.
+/// Replaces the journal by these runs.
 fn whole(journal: &Path, runs: &[RunRecord]) -> Result<(), Failure> {
     written(journal, runs.iter().map(line).collect::<String>().as_bytes())
 }

@@ -1,9 +1,9 @@
-//! `pcadlang tradeoff`: what speed costs in accuracy, over settings and cases with known
-//! answers.
+//! `pcadlang tradeoff`: measures the trade-off of speed and accuracy over settings, on
+//! cases with ground truth.
 //!
-//! Invariant: what has been run is on the disk before anything else is; table, front,
-//! plot and presets are made of that alone, so that an interrupted sitting and one that
-//! ran through write the same.
+//! Invariant: a run is on the disk before it is used; table, front, plot and presets are
+//! made from the runs alone, so that interrupted and uninterrupted measurements write the
+//! same files.
 
 mod cases;
 mod folder;
@@ -31,17 +31,17 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 use work::Task;
 
-/// Threads of one run: the presets are for small machines.
+/// Threads per run; few, since the presets are for small machines.
 const THREADS: usize = 2;
 
-/// How much longer a run takes than its own time: compiling, scoring.
+/// The time of a run, with compilation and scoring, relative to its own time limit.
 const OVERHEAD: f64 = 1.1;
 
-/// Everything there is to measure, and what has been.
+/// What is to be measured, and the results so far.
 struct Sitting<'a> {
     a: &'a Tradeoff,
     settings: Vec<Setting>,
-    /// Those that may become presets.
+    /// The settings that may become presets.
     candidates: Vec<Setting>,
     cases: Vec<Case>,
     folder: Folder,
@@ -52,7 +52,7 @@ struct Sitting<'a> {
     threads: usize,
 }
 
-/// Measures.
+/// Measures all settings within the budget.
 pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let mut s = Sitting::prepare(a)?;
@@ -63,7 +63,7 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     let (mut names, mut out_of_time) =
         (s.settings.iter().map(Setting::name).collect::<Vec<_>>(), false);
     for (i, round) in plan.iter().enumerate() {
-        // Means over the same cases for all.
+        // Settings are compared by their means over the same cases.
         let before = i.checked_sub(1).and_then(|i| plan.get(i)).map_or(0, |r| r.cases);
         names = survivors(&names, &s.done_on(before), round.settings);
         let Round { settings, cases } = *round;
@@ -98,7 +98,7 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
 }
 
 impl<'a> Sitting<'a> {
-    /// Everything that can be wrong is said before the first run.
+    /// Prepares a measurement, and reports all errors in its input before the first run.
     fn prepare(a: &'a Tradeoff) -> Result<Sitting<'a>, Failure> {
         let program = inputs::program(&a.inputs, a.quiet)?;
         let Settings { all: settings, candidates } = settings::read(a)?;
@@ -106,12 +106,13 @@ impl<'a> Sitting<'a> {
         let mut cases = cases::open(a, &program)?;
         known(&a.cases, &a.only, cases.iter().map(|c| c.name.as_str()))?;
         cases.retain(|c| a.only.is_empty() || a.only.contains(&c.name));
-        // The first few are to be of all kinds, whatever the names say.
+        // In order of hash, so that the first few cases are of all kinds whatever their
+        // names.
         cases.sort_by_key(|c| text_hash(&c.name));
         let machine = job::machine_threads();
         let threads = a.threads.map_or(THREADS.min(machine), |n| n as usize);
         let jobs = a.jobs.map_or((machine / threads).max(1), |n| n as usize);
-        // Cases of people share files: each is read once.
+        // People share files: each file is read once.
         let files: BTreeSet<PathBuf> = cases.iter().flat_map(Case::files).collect();
         let inputs: String = files
             .iter()
@@ -130,7 +131,7 @@ impl<'a> Sitting<'a> {
         });
         let Value::Object(head) = head else { return Err(plain("no settings")) };
         let mut folder = Folder::open(&a.out, &head, a.fresh)?;
-        // What a sitting that was killed used up is not written, but its runs are.
+        // A call that was killed has not recorded its time, but its runs have.
         let ran =
             folder.before.iter().filter_map(|r| r.marks.last()).map(|m| m.seconds).sum::<f64>();
         folder.spent = folder.spent.max(ran / jobs as f64);
@@ -151,7 +152,7 @@ impl<'a> Sitting<'a> {
         Ok(s)
     }
 
-    /// All runs there are of the settings and cases of this sitting.
+    /// Returns all runs of the present settings and cases.
     fn done(&self) -> Vec<RunRecord> {
         let names: HashSet<String> = self.settings.iter().map(Setting::name).collect();
         let cases: HashSet<&str> = self.cases.iter().map(|c| c.name.as_str()).collect();
@@ -162,7 +163,7 @@ impl<'a> Sitting<'a> {
             .collect()
     }
 
-    /// Those on the first so many cases.
+    /// Returns the runs on the first `cases` cases, with the present seeds.
     fn done_on(&self, cases: usize) -> Vec<RunRecord> {
         let first: HashSet<&str> = self.cases.iter().take(cases).map(|c| c.name.as_str()).collect();
         let mut runs = self.done();
@@ -170,13 +171,14 @@ impl<'a> Sitting<'a> {
         runs
     }
 
-    /// Seconds of the budget that are used up.
+    /// Returns the used part of the budget, in seconds.
     fn spent(&self) -> f64 {
         self.folder.spent + self.begun.elapsed().as_secs_f64()
     }
 
-    /// Runs settings on the first of the cases, those that were not run before; whether
-    /// the budget was enough.
+    /// Runs settings on the first `cases` cases, unless they have been run already.
+    /// Returns whether all runs were made, rather than stopped by the budget or an
+    /// interrupt.
     fn round(
         &mut self,
         names: &[String],
@@ -229,7 +231,7 @@ impl<'a> Sitting<'a> {
         }
     }
 
-    /// The table of all that was run.
+    /// Returns the table of all runs.
     fn rows(&self) -> Vec<Row> {
         rows(&self.settings, &self.done())
     }
@@ -249,14 +251,14 @@ impl<'a> Sitting<'a> {
             if self.a.keypoints.is_some() { vec!["keypoints".to_owned()] } else { Vec::new() };
         let mut front = Preset::front(&self.candidates, rows);
         for preset in &mut front {
-            // What all runs were told is part of what was measured.
+            // Parameters that were set for all runs are part of what was measured.
             let inputs = self.a.inputs.sets.iter().cloned();
             preset.setting.set = inputs.chain(std::mem::take(&mut preset.setting.set)).collect();
         }
         Presets { about, error: self.error_name().into(), needs, front }
     }
 
-    /// Writes everything that is made of the runs.
+    /// Writes everything that is derived from the runs.
     fn write(&self) -> Result<(), Failure> {
         let (rows, mut head) = (self.rows(), self.head.clone());
         let presets = self.presets(&rows);
@@ -286,7 +288,7 @@ impl<'a> Sitting<'a> {
         Ok(())
     }
 
-    /// The front, and what was chosen from it.
+    /// Prints the front, and the presets chosen from it.
     fn show(&self) {
         if self.a.quiet {
             return;
@@ -321,7 +323,7 @@ impl<'a> Sitting<'a> {
     }
 }
 
-/// A run in one line.
+/// Formats a run in one line.
 fn told(run: &RunRecord) -> String {
     let end = match (&run.failed, run.error_at(None)) {
         (Some(failed), _) => format!("failed: {}", failed.lines().next().unwrap_or_default()),

@@ -1,4 +1,4 @@
-//! Moments of recorded quantities while a chain runs, to be looked at between draws.
+//! Moments of recorded quantities, available while a chain runs.
 
 use indexmap::IndexMap;
 use pcadlang::infer::draws::{Column, DrawRow, Shape, Sink};
@@ -6,7 +6,8 @@ use pcadlang::score::Normal;
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Numbers of draws so far, their means, and sums of squares about them (Welford 1962).
+/// The number of draws so far, their means, and sums of squared deviations (Welford
+/// 1962).
 #[derive(Clone, Debug, Default)]
 pub struct RunningSums {
     names: Vec<String>,
@@ -15,12 +16,12 @@ pub struct RunningSums {
     squares: Vec<f64>,
 }
 
-/// A sink that adds up. Clones share the sums.
+/// A sink that accumulates moments. Clones share the sums.
 #[derive(Clone, Debug, Default)]
 pub struct Running(Arc<Mutex<RunningSums>>);
 
 impl Running {
-    /// The sums so far.
+    /// Returns the sums so far.
     pub fn sums(&self) -> RunningSums {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -80,7 +81,8 @@ impl RunningSums {
         self.count = all;
     }
 
-    /// The mean and standard deviation of each quantity; nothing of fewer than two draws.
+    /// Returns the mean and standard deviation of each quantity; empty for fewer than two
+    /// draws.
     pub fn normals(&self) -> IndexMap<String, Normal> {
         if self.count < 2.0 {
             return IndexMap::new();

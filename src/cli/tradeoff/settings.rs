@@ -1,4 +1,4 @@
-//! The settings that are to be tried, and the programs they are of.
+//! The settings to try, and their programs.
 
 use crate::cli::args::{Inputs, Tradeoff};
 use crate::cli::{Failure, inputs, plain};
@@ -7,23 +7,24 @@ use pcadlang::tradeoff::{Plan, Setting};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Settings of all files.
+/// The settings of all files.
 #[derive(Default)]
 pub struct Settings {
-    /// All of them, each once.
+    /// All settings, without duplicates.
     pub all: Vec<Setting>,
-    /// Those that may become presets.
+    /// The settings that may become presets.
     pub candidates: Vec<Setting>,
 }
 
-/// Reads them.
+/// Reads the settings.
 pub fn read(a: &Tradeoff) -> Result<Settings, Failure> {
     let mut settings = Settings::default();
     for (file, text) in files(a)? {
         let read = Plan::from_json(&text).and_then(|p| Ok((p.settings()?, p.compare)));
         let (all, compare) = read.map_err(|e| plain(format!("{file}: {e}")))?;
         for setting in all {
-            // A run is of the program that it is told.
+            // A setting with a program cannot be a preset, since `run` is given its
+            // program.
             if !compare && setting.program.is_none() && !settings.candidates.contains(&setting) {
                 settings.candidates.push(setting.clone());
             }
@@ -38,7 +39,7 @@ pub fn read(a: &Tradeoff) -> Result<Settings, Failure> {
     }
 }
 
-/// The hashes of their programs by name, each of which compiles with what it is set to.
+/// Returns the hashes of the programs by name, after compiling each with its settings.
 pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>, Failure> {
     let mut hashes = Map::new();
     for setting in settings {
@@ -54,8 +55,8 @@ pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>
     Ok(hashes)
 }
 
-/// The files of settings with their names: those that are named, or the program's own,
-/// `NAME.settings.json`.
+/// Returns the names and texts of the settings files: those given, or else the program's
+/// own, `NAME.settings.json`.
 fn files(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
     let named = a.settings.iter().map(|path| {
         let text = String::from_utf8(crate::cli::files::read(path)?)

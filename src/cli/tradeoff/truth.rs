@@ -1,4 +1,4 @@
-//! Reading known answers.
+//! Reads ground truth.
 
 use crate::cli::{Failure, files, plain};
 use indexmap::IndexMap;
@@ -9,18 +9,18 @@ use serde::Deserialize;
 use std::io::{Cursor, Read};
 use std::path::Path;
 
-/// A known answer.
+/// The ground truth of a case.
 pub enum Truth {
-    /// What is to be seen of an object.
+    /// The visible surface of an object.
     Surface(SurfaceTruth),
-    /// Where the joints of a person are.
+    /// The joints of a person.
     Joints(JointsTruth),
-    /// A posterior.
+    /// A reference posterior.
     Posterior(Reference),
 }
 
 impl Truth {
-    /// What the error of an answer is, for tables and plots.
+    /// Describes the error measure, for tables and plots.
     pub fn error_name(&self) -> &'static str {
         match self {
             Truth::Surface(_) => {
@@ -34,25 +34,26 @@ impl Truth {
     }
 }
 
-/// Files that say what is to be seen of an object.
+/// The files with the ground truth of an object's surface.
 pub const SURFACE: [&str; 4] = ["gt.npz", "depth.npy", "normals.npy", "meta.json"];
-/// The file that has the labels of all people.
+/// The file with the labels of all people.
 pub const LABELS: &str = "annotations.json";
 
-/// The largest array that is read.
+/// The maximum size of an array, in bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// What a folder says of the object's size.
+/// The size of the object in `meta.json`.
 #[derive(Deserialize)]
 struct Meta {
     object_height: f64,
     object_width: f64,
 }
 
-/// The true surface of a case: `gt.npz` with `depth` and `normals`, or `depth.npy` and
-/// `normals.npy`. Depth is along the viewing axis in scene units, 0 or not finite where
-/// there is nothing. The object's size is that of `meta.json` (`object_height` along its
-/// axis, `object_width`), or else that of what is seen. None if there is no truth.
+/// Reads the true surface of a case: `gt.npz` with `depth` and `normals`, or `depth.npy`
+/// and `normals.npy`. Depth is along the viewing axis in scene units, and 0 or not finite
+/// where there is no surface. The object's size is taken from `meta.json`
+/// (`object_height` along its axis, `object_width`), or else from the visible surface.
+/// Returns `None` if there is no ground truth.
 pub fn surface(folder: &Path, camera: Option<&Path>) -> Result<Option<SurfaceTruth>, Failure> {
     let (archive, single) = (folder.join("gt.npz"), folder.join("depth.npy"));
     let (depth, normals) = if archive.is_file() {
@@ -99,7 +100,7 @@ pub fn surface(folder: &Path, camera: Option<&Path>) -> Result<Option<SurfaceTru
     Ok(Some(SurfaceTruth { surface, width: object_width, height: object_height }))
 }
 
-/// The camera of a picture of this size.
+/// Returns the camera scaled to a picture's size, or the default camera.
 fn seen_by(camera: Option<&Path>, width: u32, height: u32) -> Result<Camera, Failure> {
     let Some(path) = camera else { return Ok(Camera::default_for(width, height)) };
     let text = String::from_utf8_lossy(&files::read(path)?).into_owned();
@@ -107,7 +108,7 @@ fn seen_by(camera: Option<&Path>, width: u32, height: u32) -> Result<Camera, Fai
     Ok(camera.scaled_to(width.max(height)))
 }
 
-/// The width of a pixel at a depth, in scene units.
+/// Returns the width of a pixel at a depth, in scene units.
 fn pixel(camera: &Camera, depth: f64) -> f64 {
     match camera.projection {
         Projection::Pinhole { focal_px, .. } => depth / focal_px,
@@ -115,7 +116,7 @@ fn pixel(camera: &Camera, depth: f64) -> f64 {
     }
 }
 
-/// An array of an archive of them, if it is there.
+/// Reads an array of an archive, or `None` if the archive does not contain it.
 fn member(archive: &[u8], name: &str) -> Result<Option<NpyArray>, String> {
     let mut zip = zip::ZipArchive::new(Cursor::new(archive)).map_err(|e| e.to_string())?;
     let Some(index) = zip.index_for_name(&format!("{name}.npy")) else { return Ok(None) };
@@ -125,7 +126,7 @@ fn member(archive: &[u8], name: &str) -> Result<Option<NpyArray>, String> {
     npy::parse(&bytes).map(Some).map_err(|e| format!("{name}: {e}"))
 }
 
-/// The fields of `annotations.json` that are scores' business.
+/// The fields of `annotations.json` that scores need.
 #[derive(Deserialize)]
 struct Annotations {
     people: Vec<Person>,
@@ -138,8 +139,9 @@ struct Person {
     keypoints: IndexMap<String, Vec<f64>>,
 }
 
-/// The labelled joints of the people of a dataset: `{NAME: [x, y, v], …}`, not labelled
-/// where v is 0. People whose labels are not enough for a score are left out.
+/// Reads the labelled joints of the people of a dataset: `{NAME: [x, y, v], …}`, where v
+/// is 0 if the joint is not labelled. People with too few labels for a score are left
+/// out.
 pub fn people(dataset: &Path) -> Result<IndexMap<String, JointsTruth>, Failure> {
     let path = dataset.join(LABELS);
     let all: Annotations = serde_json::from_slice(&files::read(&path)?)
@@ -157,7 +159,7 @@ pub fn people(dataset: &Path) -> Result<IndexMap<String, JointsTruth>, Failure> 
     Ok(all.people.into_iter().filter_map(joints).collect())
 }
 
-/// A posterior: `{QUANTITY: {"mean": …, "sd": …}, …}`.
+/// Reads a reference posterior: `{QUANTITY: {"mean": …, "sd": …}, …}`.
 pub fn reference(text: &[u8]) -> Result<Reference, String> {
     #[derive(Deserialize)]
     struct Moments {

@@ -1,4 +1,4 @@
-//! One run of one setting on one case, looked at while it runs and scored afterwards.
+//! One run of one setting on one case, with snapshots while it runs, and its scores.
 
 use super::cases::Case;
 use super::running::{Running, RunningSums};
@@ -19,10 +19,10 @@ use pcadlang::tradeoff::{Mark, RunRecord, Setting, marks};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The numbers kept of the draws of a chain, for effective sample sizes.
+/// How many numbers are kept of a chain's draws, for effective sample sizes.
 const ROOM: usize = 1 << 20;
 
-/// What there was of an answer at a time.
+/// The results of a run at some time.
 struct Snapshot {
     at: Option<f64>,
     seconds: f64,
@@ -31,7 +31,7 @@ struct Snapshot {
     sums: RunningSums,
 }
 
-/// What is looked at while chains run.
+/// What is monitored while chains run.
 struct Watched {
     begun: Instant,
     best: Arc<BestSoFar>,
@@ -48,7 +48,7 @@ impl Watched {
     }
 }
 
-/// What is to be run.
+/// What to run.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
     /// The setting.
@@ -59,8 +59,8 @@ pub struct Task<'a> {
     pub seed: u64,
 }
 
-/// Runs a task on so many threads. A program that fails gives a record that says so; an
-/// interrupt gives none.
+/// Runs a task on a number of threads. A program that fails gives a record with the
+/// message; an interrupted run gives `None`.
 pub fn run(a: &Tradeoff, task: Task, threads: u32, interrupt: &Interrupt) -> Option<RunRecord> {
     let Task { setting, case, seed } = task;
     let record = RunRecord {
@@ -82,7 +82,7 @@ pub fn run(a: &Tradeoff, task: Task, threads: u32, interrupt: &Interrupt) -> Opt
     }
 }
 
-/// What `pcadlang run` would be told.
+/// Returns the equivalent arguments of `pcadlang run`.
 fn job(a: &Tradeoff, Task { setting, case, seed }: Task, threads: u32) -> Job {
     let set = setting.set.iter().map(|(k, v)| (k.clone(), v.clone()));
     let inputs = Inputs {
@@ -179,7 +179,7 @@ fn measure(
     Ok(record)
 }
 
-/// Everything that can be said of an answer, `error` first.
+/// Computes all finite scores of a snapshot, `error` first.
 fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexMap<String, f64> {
     let all: Vec<(&str, f64)> = match truth {
         Truth::Surface(truth) => {
@@ -210,7 +210,7 @@ fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexM
                 .iter()
                 .filter_map(|(name, p)| Some((name.to_owned(), *p.mean.first_chunk()?)))
                 .collect();
-            // Before the first draw the best state speaks.
+            // Before the first draw, the best state is scored.
             if let Some(view) = best_view(ready, s).filter(|_| found.is_empty()) {
                 let at = joints.positions(&ViewValue(view)).into_iter();
                 found = at.filter_map(|(name, at)| Some((name.to_string(), at?))).collect();
@@ -229,7 +229,7 @@ fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexM
     all.into_iter().filter(|(_, x)| x.is_finite()).map(|(k, x)| (k.to_owned(), x)).collect()
 }
 
-/// What the best state shows.
+/// Returns the view of the best state.
 fn best_view(ready: &Ready, s: &Snapshot) -> Option<Arc<View>> {
     let best = s.best.as_ref()?;
     let draws = scene::predictive(1, 0);
