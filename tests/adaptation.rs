@@ -1,5 +1,5 @@
 //! Kernels adapt during warm-up only: from its end on, the adapted part of each kernel's
-//! state in a checkpoint keeps the same bytes. [`Of`] says which part that is, and why
+//! state in a checkpoint keeps the same bytes. `Of` says which part that is, and why
 //! the rest of the state is not adaptation.
 
 use ciborium::Value;
