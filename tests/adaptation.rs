@@ -1,6 +1,6 @@
-//! Kernels learn in warm-up and not after it: from the end of warm-up on, what a
-//! checkpoint keeps of each kernel is the same bytes, but for what is no adaptation, and
-//! says why.
+//! Kernels adapt during warm-up only: from its end on, the adapted part of each kernel's
+//! state in a checkpoint keeps the same bytes. `Of` says which part that is, and why
+//! the rest of the state is not adaptation.
 
 use ciborium::Value;
 use pcadlang::infer::draws::{Column, DrawRow, KernelStats, Sink};
@@ -11,7 +11,8 @@ use std::io;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-/// Numbers, a truth value, a surrogate, a map, data that can be drawn.
+/// Real-valued and Boolean choices, a surrogate, kernels that are deterministic maps, and
+/// data that can be simulated.
 const MODEL: &str = "
     assume a ~ normal(0, 1); assume b ~ gamma(2, 2); assume c ~ flip(0.4);
     observe normal(a + (if c { b } else { -b }), 0.7) = 1.2 with coarse = normal(a + b, 1) as y;
@@ -19,7 +20,7 @@ const MODEL: &str = "
     kernel mirror() { propose u ~ normal(0, 1); propose @a = u - value(@a); propose u = u; }
 ";
 
-/// Choices that come and go.
+/// Choices that appear and vanish.
 const BRANCHES: &str = "
     assume c ~ flip(0.5);
     assume x = if c { n ~ normal(0, 1); n } else { m ~ normal(1, 2); w ~ normal(0, 0.1); m + w };
@@ -30,27 +31,30 @@ const BRANCHES: &str = "
 const COUNTS: &str =
     "assume p ~ beta(2, 2); observe iid(flip(p), 6) = [true, true, false, true, true, true] as y;";
 
-/// What of a kernel's state is left, and why the rest is no adaptation.
+/// The part of a kernel's state that is adaptation, and why the rest is not.
 #[derive(Clone, Copy, Debug)]
 enum Of {
-    /// All of it is what was learnt, or there is none.
+    /// All of the state, which may be empty.
     All,
-    /// `hmc`, `mala`, `nuts`: not the habits of tapes (`memory.rs`), which say how a
-    /// density is computed, not which.
+    /// `hmc`, `mala`, `nuts`: all except how often tapes are recorded
+    /// (`hamiltonian/memory.rs`), which affects how a density is computed, not which
+    /// density.
     Trajectory,
-    /// `optimize`: nothing but those habits.
+    /// `optimize`: nothing, since its state is only how often tapes are recorded.
     Nothing,
-    /// `temper`: not the replicas, which are states of the larger chain, and not the
-    /// count of steps, by which pairs take turns.
+    /// `temper`: all except the replicas, which are states of the larger chain, and the
+    /// count of steps, which determines the pairs whose turn it is.
     Ladder(&'static Of),
-    /// `smc`, `abc` with particles: not the log density and estimate of the accepted
-    /// state, which belong to it, and not the sum of estimates, which is a result.
+    /// `smc`, and `abc` with particles: all except the log density and estimate of the
+    /// accepted state, which belong to that state, and the sum of estimates, which is a
+    /// result.
     Particles(&'static Of),
-    /// `abc`: not the distance of the present state, which belongs to it.
+    /// `abc`: all except the distance of the present state, which belongs to that state.
     Distance(&'static Of),
 }
 
-/// By kernel: what it is called with, and what of its state must stay.
+/// For each kernel: its name, a model, the statements to run, and the part of its state
+/// that must not change after warm-up.
 const CASES: &[(&str, &str, &str, Of)] = &[
     ("mh", MODEL, "mh(one(@**));", Of::All),
     ("block", MODEL, "block(@**);", Of::All),
@@ -98,14 +102,14 @@ fn read(bytes: &[u8]) -> Value {
     ciborium::from_reader(bytes).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A field of a structure.
+/// Returns a field of a structure.
 fn field<'a>(v: &'a Value, name: &str) -> &'a Value {
     let fields = v.as_map().unwrap_or_else(|| panic!("no structure: {v:?}"));
     let found = fields.iter().find(|(k, _)| k.as_text() == Some(name));
     &found.unwrap_or_else(|| panic!("no field {name}: {v:?}")).1
 }
 
-/// What a state says of what was learnt.
+/// Returns the adapted parts of a kernel's state, serialised.
 fn learnt(of: Of, state: &[u8]) -> Vec<Vec<u8>> {
     let parts = |n: usize| {
         let read = read(state);
@@ -137,7 +141,7 @@ fn learnt(of: Of, state: &[u8]) -> Vec<Vec<u8>> {
     }
 }
 
-/// Keeps a checkpoint of each step.
+/// Keeps the checkpoint of every step.
 struct Keep {
     kept: Arc<Mutex<Vec<Checkpoint>>>,
     progress: Arc<Progress>,
@@ -167,14 +171,14 @@ impl Sink for Keep {
     }
 }
 
-/// Neighbours that have nothing to do with the data.
+/// Neighbours that are unrelated to the data.
 fn neighbours(model: &Model) -> Arc<dyn Banks> {
     let all: Vec<_> =
         (0..12).filter_map(|i| model.simulate(9, i).ok()).map(|t| Latent::all(&t)).collect();
     Arc::new(Neighbours::new(all.iter().take(3).cloned().collect(), &all))
 }
 
-/// By step, warm-up included: the state of each kernel.
+/// Returns the states of all kernels at each step, warm-up included.
 fn states(model: &Model, seed: u64, warmup: u64, steps: u64) -> Vec<(u64, Vec<Vec<u8>>)> {
     let (kept, progress) = (Arc::new(Mutex::default()), Arc::new(Progress::default()));
     progress.checkpoints.store(1, Ordering::Relaxed);
@@ -205,7 +209,7 @@ fn model(text: &str, kernel: &str) -> Model {
     Program::parse(&text).and_then(Program::compile).unwrap_or_else(|e| panic!("{kernel}: {e}"))
 }
 
-/// The first kernel of a case is the one that it is about.
+/// A case is about the first kernel of its statements.
 #[test]
 fn nothing_is_learnt_after_warm_up() {
     for (name, text, kernel, of) in CASES {
@@ -219,7 +223,8 @@ fn nothing_is_learnt_after_warm_up() {
         assert!(after.len() as u64 > steps / 2, "{name}: {} checkpoints", after.len());
         let other = after.iter().position(|s| *s != after[0]);
         assert_eq!(other, None, "{kernel} goes on learning after warm-up; steps until then");
-        // What does learn has learnt something: else nothing was seen here.
+        // A kernel that adapts must have changed during warm-up; otherwise this test
+        // shows nothing.
         let before: Vec<_> =
             all.iter().filter(|(_, s)| !s.is_empty()).map(|(_, s)| learnt(*of, &s[0])).collect();
         let learns = ["drift", "slice", "hmc", "mala", "nuts", "delayed", "temper", "smc", "abc"]
@@ -228,12 +233,13 @@ fn nothing_is_learnt_after_warm_up() {
     }
 }
 
-/// Without a warm-up a step size, or a ladder, is found once, and stays.
+/// Without warm-up, a step size or ladder is determined once and then fixed.
 #[test]
 fn what_was_not_warmed_up_is_found_once() {
     for (name, text, kernel, of) in CASES.iter().filter(|(_, text, _, _)| *text != BRANCHES) {
         let all = states(&model(text, kernel), 3, 0, 60);
-        // `abc` with particles finds its ladder as soon as one of them comes near enough.
+        // `abc` with particles determines its ladder once a particle is close enough to
+        // the data.
         let mut states: Vec<_> =
             all.iter().filter(|(step, _)| *step >= 1).map(|(_, s)| learnt(*of, &s[0])).collect();
         let (count, most) =
@@ -243,14 +249,14 @@ fn what_was_not_warmed_up_is_found_once() {
     }
 }
 
-/// Where choices come and go, a metric is a function of what choices there are, whatever
-/// there was in between.
+/// Where choices appear and vanish, the metric is a function of the choices that exist,
+/// regardless of the structures visited in between.
 #[test]
 fn a_metric_depends_on_nothing_but_the_choices_there_are() {
     let kernels =
         ["hmc($continuous, steps = 3); mh(@c);", "nuts($continuous, max_depth = 4); mh(@c);"];
-    // Of several seeds, since a branch may change just where a window ends, which leaves
-    // one state to tell a variance from.
+    // Over several seeds, since a branch may change exactly at the end of a window, which
+    // leaves a single state to estimate a variance from.
     for (kernel, seed) in kernels.iter().flat_map(|k| (0..6).map(move |seed| (*k, seed))) {
         let all = states(&model(BRANCHES, kernel), seed, 400, 150);
         let of = |step: u64| {
@@ -258,7 +264,8 @@ fn a_metric_depends_on_nothing_but_the_choices_there_are() {
             let adaptation = read(&states[0]).as_array().unwrap()[0].clone();
             field(&adaptation, "learnt").as_map().unwrap().len()
         };
-        // Nothing of it is lost again, by the choices that it is of.
+        // Metrics are kept by address, and are not discarded while their choices are
+        // missing.
         assert!(
             (1..550).all(|step| of(step) <= of(step + 1)) && of(400) > 1,
             "{kernel}: a metric is forgotten"
@@ -297,9 +304,9 @@ fn every_kernel_of_the_table_has_a_case() {
     }
 }
 
-/// A structure that changes every few steps: the step size is learnt over all of them.
-/// Where each change began its learning again it stayed near a first guess, a fifth of
-/// the proposals was accepted, and two in five trajectories diverged.
+/// Under a structure that changes every few steps, the step size is learnt across all
+/// structures. When every change restarted its adaptation, it stayed near the first
+/// guess, a fifth of the proposals were accepted, and two in five trajectories diverged.
 #[test]
 fn step_sizes_are_learnt_through_changes_of_structure() {
     let text = "let y = [-2.1, -1.9, -2.4, 1.8, 2.2, 2.5, 1.9, -2.2, 2.1, -1.8];

@@ -1,7 +1,7 @@
-//! A transition of fixed structure allocates nothing once the trace has warmed up.
+//! A transition of fixed structure does not allocate once the trace has warmed up.
 //!
-//! Counting allocations takes an allocator, whose trait is unsafe; it only counts and
-//! passes on to the system's.
+//! Allocations are counted by a global allocator, whose trait is unsafe; it only counts,
+//! and forwards to the system allocator.
 
 use pcadlang::Model;
 use pcadlang::infer::{Gibbs, Hmc, Kernel, Mh, Nuts, Pick, SiteSelection, StepContext};
@@ -15,7 +15,7 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: every call goes to the system's allocator as it came.
+// SAFETY: every call is forwarded unchanged to the system allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let _ = COUNT.try_with(|c| c.set(c.get() + 1));
@@ -38,7 +38,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Allocations in so many steps, after as many to warm up.
+/// Counts the allocations of `steps` steps, after the same number of warm-up steps.
 fn allocations(kernel: &mut dyn Kernel, trace: &mut Trace, steps: u64) -> u64 {
     let mut run = |first: u64| {
         for step in first..first + steps {
@@ -112,8 +112,8 @@ fn schools(kernel: &mut dyn Kernel, steps: u64) -> u64 {
 fn leapfrog_steps_allocate_nothing() {
     let all = || SiteSelection { selector: Selector::All, pick: Pick::All };
     let steps = 200;
-    // Steps so short that all are accepted: what a transition allocates is for its one
-    // proposal.
+    // The steps are so short that every proposal is accepted, so the allocations of a
+    // transition are those of its one proposal.
     let of = |leaps: u32| schools(&mut Hmc::new(all(), leaps, Some(1e-3)), steps);
     let (few, many) = (of(2), of(40));
     assert_eq!(

@@ -1,11 +1,11 @@
-//! What `docs/embedding.md` promises to hosts: every public item of it is used by a
-//! doc-test of its module, and in the page's table.
+//! The API that `docs/embedding.md` promises to hosts: every public item is used by a
+//! doc-test of its module, and is in that page's table.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The promised API: a source file, the types of it that are promised (all public items
-/// if there are none), and where its doc-tests are besides.
+/// The promised API: a source file, its promised types (all public items if the list is
+/// empty), and where else its doc-tests are.
 const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/model.rs", &[], &["src/guide.md", "src/host"]),
     ("src/model/program.rs", &[], &["src/guide.md", "src/host"]),
@@ -76,7 +76,7 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// The code of the doc-tests of a file that run.
+/// Returns the code of a file's doc-tests that run.
 fn doc_tests(text: &str, is_markdown: bool) -> String {
     let (mut code, mut inside) = (String::new(), false);
     for line in text.lines() {
@@ -107,7 +107,8 @@ fn tests_under(path: &Path) -> String {
     entries.map(|e| tests_under(&e.unwrap().path())).collect()
 }
 
-/// The public items of a file: types and functions by name, methods as `Type::name`.
+/// Returns the public items of a file: types and functions by name, methods as
+/// `Type::name`.
 fn items(text: &str, only: &[&str]) -> Vec<String> {
     let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
     let word =
@@ -126,7 +127,7 @@ fn items(text: &str, only: &[&str]) -> Vec<String> {
         if let Some(rest) = line.strip_prefix("impl") {
             let of = rest.rsplit(" for ").next().unwrap_or(rest);
             let of = if of.starts_with('<') { of.split_once("> ").map_or("", |p| p.1) } else { of };
-            // What a trait asks for is said at the trait.
+            // Items of a trait are documented at the trait, not at its implementations.
             owner = if rest.contains(" for ") { String::new() } else { word(of.trim_start()) };
             is_trait = false;
         }
@@ -152,8 +153,8 @@ fn items(text: &str, only: &[&str]) -> Vec<String> {
     found
 }
 
-/// Whether code uses an item: a type as a word, a method as `.name` or `::name` or where
-/// it is implemented.
+/// Whether code uses an item: a type as a word, a method as `.name` or `::name` or by
+/// implementing it.
 fn uses(code: &str, item: &str) -> bool {
     let name = item.rsplit("::").next().unwrap_or(item);
     let is_word = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');

@@ -1,14 +1,15 @@
-//! Choices that appear, vanish, or are asked for in some states only, where a wrong idea
-//! of what depends on what gives a wrong posterior without a sign of it. Each case was
-//! wrong once.
+//! Choices that appear, vanish, or are needed in some states only. A wrong idea of what
+//! depends on what then gives a wrong posterior without any visible sign. Each case was
+//! once wrong.
 
 mod common;
 use common::*;
 use pcadlang::infer::RunOptions;
 
-/// A condition outside decides whether the one inside is asked for; both turn with `x`.
-/// Nothing tells of `x`, so its posterior is its prior. Kernels that keep to the present
-/// structure once took going up past 0.25 for a change of structure, and going down not.
+/// An outer condition decides whether the inner one is evaluated, and both change with
+/// `x`. The data are uninformative about `x`, so its posterior is its prior. Kernels that
+/// stay within the present structure once took moving up past 0.25 for a change of
+/// structure, but not moving down.
 #[test]
 fn conditions_that_turn_together_are_no_change_of_structure() {
     for kernel in
@@ -28,8 +29,8 @@ fn conditions_that_turn_together_are_no_change_of_structure() {
     }
 }
 
-/// A value that only passes of a loop read, where a condition allows it; elsewhere it
-/// does not exist.
+/// A value that only the iterations of a loop read, under a condition; where the
+/// condition is false, the value is undefined.
 #[test]
 fn what_no_pass_asks_for_is_not_run() {
     let text = "assume k ~ categorical([1, 2, 3, 4]);
@@ -49,8 +50,8 @@ fn what_no_pass_asks_for_is_not_run() {
     }
 }
 
-/// What appears differs from what vanishes, in as many choices: the first stage of
-/// delayed acceptance has to see both.
+/// As many choices appear as vanish, but they are different ones: the first stage of
+/// delayed acceptance has to account for both.
 #[test]
 fn delayed_acceptance_sees_which_choices_appear() {
     let text = "assume c ~ flip(0.5);
@@ -63,8 +64,8 @@ fn delayed_acceptance_sees_which_choices_appear() {
     assert_mean("c", &draws["c"], a / (a + b), 0.05);
 }
 
-/// A choice that the observation alone asks for appears, and nothing vanishes: the first
-/// stage pays nothing for it, so no such move may pass.
+/// A choice that only the observation depends on appears, and nothing vanishes: the first
+/// stage cannot account for its density, so no such move may be accepted.
 #[test]
 fn delayed_acceptance_leaves_what_only_the_observation_asks_for() {
     let text = "assume c ~ flip(0.5);
@@ -76,8 +77,8 @@ fn delayed_acceptance_leaves_what_only_the_observation_asks_for() {
     assert_mean("c", &draws["c"], with / (with + without), 0.05);
 }
 
-/// The default plan moves the structure too, whatever the draw showed that the plan was
-/// made from.
+/// The default plan includes moves between structures, whatever the structure of the draw
+/// from which the plan was made.
 #[test]
 fn the_default_plan_goes_where_other_choices_are() {
     let text = "assume x ~ normal(0, 1);

@@ -1,5 +1,5 @@
-//! The layers of `docs/architecture.md`: modules depend one way, and only the command
-//! prints.
+//! The layers of `docs/architecture.md`: dependencies between modules go one way, and
+//! only the command prints.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ fn files(module: &str) -> Vec<(PathBuf, String)> {
     paths.into_iter().map(|p| (p.clone(), std::fs::read_to_string(p).unwrap())).collect()
 }
 
-/// The text of a file without its unit tests, which may use anything.
+/// Returns the text of a file without its unit tests, which may use anything.
 fn without_tests(text: &str) -> &str {
     text.split("#[cfg(test)]\nmod tests {").next().unwrap_or(text)
 }

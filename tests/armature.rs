@@ -1,5 +1,5 @@
-//! The shipped body: posed as its makers say, by every level of detail; its parts, shapes
-//! and derivatives.
+//! The shipped body: posed as in its reference implementation at every level of detail;
+//! its parts, shapes and derivatives.
 //!
 //! `data/mocap_poses.csv` holds two poses obtained from mocap.cs.cmu.edu (funded by NSF
 //! EIA-0196217), retargeted to the rig.
@@ -28,8 +28,8 @@ fn poses() -> HashMap<String, Vec<JointPose>> {
     text.lines().skip(1).map(|l| (l[..4].to_owned(), pose(l))).collect()
 }
 
-/// vertex' = sum w M v with M[j] = M[parent] T(head) R T(-head), each step written out:
-/// slow and plain.
+/// A slow, plain reference implementation that writes out each step of vertex' = sum w M
+/// v, with M[j] = M[parent] T(head) R T(-head).
 fn plain(body: &Armature, pose: &[JointPose]) -> Vec<DVec3> {
     let matrix = |j: &JointPose| match j.turn {
         Turn::Vector(v) => glam::DMat3::from_quat(glam::DQuat::from_scaled_axis(v)),
@@ -76,7 +76,7 @@ fn vertices_and_keypoints_are_where_the_makers_put_them() {
             let (fast, slow) =
                 (body.posed_vertices(pose, &Rules::default()).unwrap(), plain(&body, pose));
             assert!(fast.iter().zip(&slow).all(|(a, b)| (*a - *b).length() < 1e-12));
-            // What is drawn is the same in single precision.
+            // The drawn mesh is the same in single precision.
             let solid = body.posed(pose, &Rules::default()).unwrap();
             let mesh = solid.to_mesh().unwrap();
             for p in &mesh.positions {
@@ -106,14 +106,15 @@ fn a_pose_that_differs_in_one_joint_shares_all_other_parts() {
             .filter(|(a, b)| !Arc::ptr_eq(&a.mesh, &b.mesh))
             .count()
     };
-    // The hand, and the forearm whose last vertices follow it.
+    // The hand, and the forearm, whose last vertices follow the hand.
     assert!((1..=2).contains(&moved(&before, &after)), "{}", moved(&before, &after));
     assert_eq!(
         moved(&before, &body.posed(&pose, &rules).unwrap()),
         0,
         "the way back finds the old meshes"
     );
-    // Sharing changes nothing: another thread, which remembers nothing, makes the same.
+    // Sharing does not change results: another thread, with empty caches, makes the same
+    // meshes.
     let elsewhere = || {
         let solid = body.posed(&other, &rules).unwrap();
         assert!(!solid.instances().is_empty(), "meshes are made where somebody first looks");

@@ -1,5 +1,5 @@
-//! The shipped animal: its mesh is made here, gets an armature in both ways, and is drawn
-//! from `autorig.pcad`.
+//! The shipped animal: this test makes its mesh, gives it an armature in both ways, and
+//! checks that `autorig.pcad` draws it.
 //!
 //! `REGENERATE=1 cargo test --test autorig` rewrites `programs/data/dog.obj`.
 
@@ -15,10 +15,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 const SIDES: usize = 10;
-/// Rings from one end to the other, without the two points.
+/// Rings from one end of a limb to the other, without the two poles.
 const RINGS: usize = 8;
 
-/// A bone of flesh: from one end to the other, thick there and there.
+/// A limb: its name, then position and radius of one end, then of the other.
 struct Limb(&'static str, DVec3, f64, DVec3, f64);
 
 fn limbs() -> Vec<Limb> {
@@ -41,7 +41,7 @@ fn limbs() -> Vec<Limb> {
     all
 }
 
-/// A closed capsule round each limb, as an OBJ file.
+/// Returns an OBJ file with a closed capsule around each limb.
 fn dog() -> String {
     let mut s = String::from("# A dog of capsules, made by tests/autorig.rs. MIT OR Apache-2.0.\n");
     let mut first = 1;
@@ -54,7 +54,7 @@ fn dog() -> String {
         };
         put(a - axis * ra);
         for ring in 0..RINGS {
-            // Half of the rings round either end.
+            // Half of the rings are around each end.
             let half = RINGS / 2;
             let (at, r, angle) = if ring < half {
                 (a, ra, -90.0 + 90.0 * (ring + 1) as f64 / half as f64)

@@ -1,5 +1,5 @@
-//! Files and settings that are wrong: exit code 1, a message that says what, nothing half
-//! written.
+//! Invalid files and settings: exit code 1, a message that names the fault, and no partly
+//! written output.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -21,7 +21,7 @@ const PHOTO: &str = "include \"std/scene.pcad\" as scene; data photo: image \"th
     observe scene.contour(view, size = 32) = photo as picture;
     infer { repeat 5 { drift(one(@**)); collect r; } }";
 
-/// A program that shows a mesh.
+/// A program that renders a mesh.
 const MESH: &str = "include \"std/scene.pcad\" as scene; data m = mesh(\"x.obj\");
     assume x ~ uniform(-1, 1);
     assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.centred(m));
@@ -76,11 +76,11 @@ fn pictures_that_are_none() {
         f.refuses(&["contours", file, "-o", "out.png"], says);
     }
     f.refuses(&run(&["--observe-contours", "cut.png"]), "cut.png");
-    // Without any picture the program says what it wants.
+    // Without a picture, the program names the input that it needs.
     f.refuses(&run(&[]), "photo");
 }
 
-/// As large as is allowed in one direction: read, and explained like any other.
+/// A picture of the largest allowed width is read and explained like any other.
 #[test]
 fn a_very_wide_picture_is_read() {
     let f = Folder::new("wide");
@@ -90,7 +90,7 @@ fn a_very_wide_picture_is_read() {
     assert!(f.exists("out.png"));
     f.succeeds(&run(&["--observe", "wide.png", "--out", "out"]));
     assert!(f.read("out/run.json").contains("\"done\""));
-    // One pixel, and nothing to see in it.
+    // A single pixel, and a picture without contrast.
     f.write("one.png", png(GrayImage::new(1, 1))).write("flat.png", png(GrayImage::new(40, 30)));
     for file in ["one.png", "flat.png"] {
         f.succeeds(&["contours", file, "-o", "out.png"]);
@@ -140,8 +140,7 @@ fn meshes_that_are_none() {
     }
     f.write("x.obj", [0x76, 0x20, 0xff, 0xfe]);
     f.refuses(&run(&[]), "not text");
-    // A face may name its corners' normals that are not there; a mesh that is well
-    // renders.
+    // A face may refer to normals that are missing; a correct mesh renders.
     f.write("x.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//7 2//8 3//9\n");
     let d = f.run(&run(&["--out", "a"]));
     assert!(
@@ -154,7 +153,8 @@ fn meshes_that_are_none() {
     assert!(f.exists("b/best.obj") && f.exists("b/overlay.png"));
 }
 
-/// Objects out of view, behind the camera or as large as it: the run ends well.
+/// Objects out of view, behind the camera or as large as their distance: the run
+/// completes.
 #[test]
 fn objects_out_of_view() {
     let f = Folder::new("away");
@@ -189,7 +189,7 @@ fn programs_that_are_none() {
     f.refuses(&run(&[]), "UTF-8");
     f.write("p.pcad", png(disc(32, 32, 16.0, 16.0, 9.0)));
     f.refuses(&run(&[]), "");
-    // An included file that is a folder, the program itself, or missing.
+    // An included path that is a folder, or the program itself.
     std::fs::create_dir(f.path().join("part.pcad")).unwrap();
     f.write("p.pcad", "include \"part.pcad\" as part; assume x ~ normal(0, 1);");
     f.refuses(&run(&[]), "part.pcad");
@@ -199,7 +199,7 @@ fn programs_that_are_none() {
     f.refuses(&run(&[]), "cycle");
 }
 
-/// An empty program is no mistake; it has nothing to say.
+/// An empty program is not an error, but there is nothing to infer.
 #[test]
 fn an_empty_program_runs_or_says_why_not() {
     let f = Folder::new("empty");
@@ -241,8 +241,8 @@ fn very_large_programs() {
     }
     f.write("p.pcad", format!("assume x = {};", "(".repeat(n)));
     f.refuses(&run(&[]), "");
-    // 5 MB of source are refused; a little less than 4 MiB is read, with a mistake at the
-    // end and without.
+    // A source file of 5 MB is refused; one of slightly under 4 MiB is read, with and
+    // without an error at its end.
     let comment = "// a comment that says nothing in particular, to make the file large, again and again, line by line\n";
     f.write("p.pcad", comment.repeat(50_000));
     f.refuses(&run(&[]), "the file is too large");
@@ -259,7 +259,7 @@ fn very_large_programs() {
     f.write("p.pcad", sum);
     let d = f.run(&run(&["--out", "sum"]));
     assert!(d.code == 0 || d.code == 1 && d.err.starts_with("error"), "{}", d.err);
-    // 1 MB of definitions: done in linear time, or refused with a reason.
+    // 1 MB of definitions is either handled in linear time or refused with a reason.
     let mut big = String::new();
     while big.len() < 1_000_000 {
         big.push_str(&format!("let v{} = {};\n", big.len(), big.len()));
@@ -304,7 +304,8 @@ fn folders_that_hold_something_else() {
     f.refuses(&run(&["--out", "file"]), "file");
     f.refuses(&run(&["--out", "file/below"]), "file");
     assert_eq!(f.read("photos/me.jpg"), "x");
-    // An empty folder and a run's own are used; a run leaves no partial files.
+    // An empty folder and the folder of an earlier run are accepted as output; a run
+    // leaves no partial files.
     std::fs::create_dir(f.path().join("empty")).unwrap();
     for _ in 0..2 {
         f.succeeds(&run(&["--out", "empty"]));

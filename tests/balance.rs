@@ -4,7 +4,7 @@
 //! For a reversible chain in equilibrium the numbers of moves i to j and j to i have the
 //! same expectation, also for states lumped together, and the variance of their
 //! difference is at most that of independent moves. A mixture of reversible kernels is
-//! reversible, so a kernel that does not reach everything by itself is mixed with one
+//! reversible, so a kernel that does not reach every state by itself is mixed with one
 //! that does.
 
 mod common;
@@ -13,7 +13,8 @@ use pcadlang::Model;
 use pcadlang::infer::{Banks, RunOptions};
 use std::sync::Arc;
 
-/// A model, the cells its states are sorted into, and the posterior mass of each.
+/// A model, the function that maps its states to cells, and the posterior mass of each
+/// cell.
 struct Case {
     name: &'static str,
     text: &'static str,
@@ -28,7 +29,7 @@ fn normalised(mut w: Vec<f64>) -> Vec<f64> {
     w
 }
 
-/// Which of the intervals between edges a number is in.
+/// Returns the index of the interval between edges that contains a number.
 fn bin(x: f64, edges: &[f64]) -> usize {
     edges.iter().take_while(|e| x >= **e).count()
 }
@@ -51,7 +52,7 @@ const DISCRETE: Case = Case {
     },
 };
 
-/// One branch has a discrete choice, the other a positive one with a switch of its own.
+/// One branch has a discrete choice, the other a positive one and a flip.
 const STRUCTURE: Case = Case {
     name: "structure",
     text: "assume c ~ flip(0.4);
@@ -76,7 +77,7 @@ const STRUCTURE: Case = Case {
     },
 };
 
-/// The same with a surrogate that says something else.
+/// The same with a surrogate that disagrees with the likelihood.
 const SURROGATE: Case = Case {
     name: "surrogate",
     text: "assume c ~ flip(0.4);
@@ -86,8 +87,8 @@ const SURROGATE: Case = Case {
     ..STRUCTURE
 };
 
-/// The text of a model in which x is beta or gamma as c has it, and the masses of c and
-/// where x is.
+/// The masses of a model in which x is beta or gamma depending on c: by c, and by the
+/// interval of x.
 const BETA_OR_GAMMA: fn() -> Vec<f64> = || {
     let beta = |x: f64| if x > 0.0 && x < 1.0 { 12.0 * x * (1.0 - x) * (1.0 - x) } else { 0.0 };
     let gamma = |x: f64| x * (-x).exp();
@@ -105,8 +106,8 @@ fn beta_or_gamma(d: &Draws, i: usize) -> usize {
     d["c"][i] as usize * 3 + bin(d["x"][i], &[0.4, 0.8])
 }
 
-/// The same name in both branches: two addresses, `@x/a` and `@x/a#2`, of which there is
-/// always one.
+/// The same name in both branches: two addresses, `@x/a` and `@x/a#2`, of which exactly
+/// one exists at any time.
 const SAME_NAME: Case = Case {
     name: "same name",
     text: "assume c ~ flip(0.4);
@@ -117,8 +118,9 @@ const SAME_NAME: Case = Case {
     mass: BETA_OR_GAMMA,
 };
 
-/// The same address in both states of c, by way of two functions that are called at one
-/// place: one choice goes and another of another support comes, at `@x/f/a` both.
+/// The same address in both states of c, since two functions are called at the same
+/// place: one choice vanishes and another with a different support appears, both at
+/// `@x/f/a`.
 const SHARED: Case = Case {
     name: "shared address",
     text: "assume c ~ flip(0.4);
@@ -130,8 +132,7 @@ const SHARED: Case = Case {
     mass: BETA_OR_GAMMA,
 };
 
-/// One choice whose support moves with another: what is outside of it there has density
-/// zero.
+/// One choice whose support depends on another; outside of it the density is zero.
 const MOVING: Case = Case {
     name: "moving support",
     text: "assume c ~ flip(0.4); let d = if c { beta(2, 3) } else { gamma(2, 1) };
@@ -142,7 +143,7 @@ const MOVING: Case = Case {
     mass: BETA_OR_GAMMA,
 };
 
-/// The values that k can take depend on n; with n = 0 there is only one.
+/// The support of k depends on n; with n = 0 it is a single value.
 const FINITE_SUPPORT: Case = Case {
     name: "finite support",
     text: "assume n ~ categorical([0.3, 0.3, 0.4]); assume k ~ uniform_discrete(0, n);
@@ -193,7 +194,8 @@ const GAUSSIAN: Case = Case {
     },
 };
 
-/// Two positive numbers, moved by maps: changed over, one scaled, their sum split anew.
+/// Two positive numbers, moved by deterministic maps: swapped, one of them scaled, or
+/// their sum split in another proportion.
 const MAPS: Case = Case {
     name: "maps",
     text: "assume x ~ gamma(2, 1); assume y ~ gamma(3, 1); observe normal(x - 2 * y, 1) = -1;
@@ -219,7 +221,7 @@ const MAPS: Case = Case {
 };
 
 /// Two labels that share an observation, one with a prior that depends on a number, and a
-/// number whose prior has a label in it.
+/// number whose prior depends on a label.
 const MIXTURE: Case = Case {
     name: "mixture",
     text: "assume s ~ gamma(2, 1); assume a ~ flip(0.3); assume b ~ categorical([0.2, 0.5, 0.3]);
@@ -237,7 +239,8 @@ const MIXTURE: Case = Case {
             let inner = |s: f64| {
                 let s = s.max(1e-9);
                 let m = |m: f64| normal_pdf(m, centre, s) * normal_pdf(1.5, m + b as f64, 0.7);
-                // Nothing is left six deviations from what is observed.
+                // The integrand is negligible six standard deviations from the observed
+                // value.
                 let (near, far) = (m0.max(1.5 - b as f64 - 4.2), m1.min(1.5 - b as f64 + 4.2));
                 let narrow = (near.max(centre - 8.0 * s), far.min(centre + 8.0 * s));
                 let (low, high) = (narrow.0, narrow.1.max(narrow.0));
@@ -256,8 +259,8 @@ const MIXTURE: Case = Case {
     },
 };
 
-/// The number of elements of an array depends on a choice: with another number they are
-/// all drawn anew.
+/// The number of elements of an array depends on a choice: when it changes, all elements
+/// are drawn from the prior.
 const ELEMENTS: Case = Case {
     name: "elements",
     text: "assume n ~ categorical([0.5, 0.3, 0.2]); assume z ~ iid(gamma(1, 1), n + 1);
@@ -274,7 +277,8 @@ const ELEMENTS: Case = Case {
     },
 };
 
-/// Choices that come into being when one of two points asks for them, and may be shared.
+/// Choices that appear when one of two observations first depends on them, and may be
+/// shared.
 const SHARED_GROUPS: Case = Case {
     name: "mem",
     text: "assume centre = mem(fn(k) { m ~ gamma(2, 1); m });
@@ -299,7 +303,7 @@ const SHARED_GROUPS: Case = Case {
     },
 };
 
-/// An unbounded whole number, and a finite one whose range it is.
+/// An unbounded whole number, which is the upper bound of a finite one.
 const COUNTS: Case = Case {
     name: "counts",
     text: "assume n ~ poisson(2); assume k ~ binomial(n, 0.6); observe normal(k, 1) = 1.5;",
@@ -322,7 +326,7 @@ const COUNTS: Case = Case {
     },
 };
 
-/// Runs a kernel for long and judges it.
+/// Runs a kernel for many steps and checks its balance and its marginal.
 fn balanced(case: &Case, kernel: &str, steps: usize) {
     let what = format!("{}, {kernel}", case.name);
     let stmt = if kernel.ends_with('}') { kernel.to_owned() } else { format!("{kernel};") };
@@ -355,8 +359,8 @@ fn balanced(case: &Case, kernel: &str, steps: usize) {
         let here: Vec<f64> = states.iter().map(|s| f64::from(u8::from(*s == i))).collect();
         let (m, se) = (mean(&here), standard_error(&here));
         assert!(se < 0.03, "{what}: run longer, se {se}");
-        // A cell that is hardly ever visited has no honest standard error: a thousandth
-        // is as near as it gets.
+        // The standard error of a cell that is hardly ever visited is unreliable, so an
+        // error of a thousandth is allowed.
         assert!(
             (m - expected).abs() < 5.0 * se + 1e-3,
             "{what}: cell {i} has {m} (se {se}), expected {expected}"
@@ -446,8 +450,8 @@ fn gaussian_choices() {
     all_balanced(&GAUSSIAN, 20_000, kernels::balance::GAUSSIAN);
 }
 
-/// Neighbours that have nothing to do with the data, and few of them: the density of the
-/// proposal is in the ratio.
+/// A few neighbours that are unrelated to the data: the proposal's density is in the
+/// acceptance ratio.
 #[test]
 fn proposals_from_wrong_neighbours() {
     for case in [
@@ -468,10 +472,10 @@ fn proposals_from_wrong_neighbours() {
     all_balanced(&STRUCTURE, 20_000, kernels::balance::NEIGHBOURS_OF_SOME);
 }
 
-/// Getting it right (Geweke 2004): data drawn anew given the parameters, then the
-/// parameters moved given the data, by turns. Then parameters and data follow the joint
-/// prior, whose moments are known. Data are choices that are drawn by `block`, which
-/// takes them from their prior given the rest.
+/// Geweke's test ("Getting it right", 2004): alternately draws data given the parameters
+/// and moves the parameters given the data. Parameters and data then follow the joint
+/// prior, whose moments are known. The data are choices that `block` draws from their
+/// prior given the rest.
 #[test]
 fn parameters_and_data_by_turns() {
     for kernel in kernels::BY_TURNS {
@@ -494,8 +498,8 @@ fn parameters_and_data_by_turns() {
     }
 }
 
-/// Simulation-based calibration (Talts et al. 2018): parameters from the prior, data from
-/// them, and the rank of the parameter among posterior draws is uniform.
+/// Simulation-based calibration (Talts et al. 2018): for parameters drawn from the prior
+/// and data drawn given them, the rank of a parameter among posterior draws is uniform.
 fn calibrated(runs: usize) {
     use pcadlang::rng::{Purpose, StreamKey};
     let (bins, thinned) = (8usize, 63usize);
@@ -526,7 +530,7 @@ fn calibrated(runs: usize) {
     for (count, name) in counts.iter().zip(["m", "p"]) {
         let expected = runs as f64 / bins as f64;
         let chi: f64 = count.iter().map(|c| (c - expected) * (c - expected) / expected).sum();
-        // 7 degrees of freedom: above 35 with a chance of 1e-5.
+        // 7 degrees of freedom: the statistic is above 35 with probability 1e-5.
         assert!(chi < 35.0, "{name}: ranks {count:?}, chi-square {chi}");
     }
 }

@@ -1,4 +1,5 @@
-//! Banks end to end: learnt, read back, refused when they do not fit, and proposed from.
+//! Banks end to end: learnt, read back, refused when they do not match the program, and
+//! used for proposals.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -16,7 +17,7 @@ use pcadlang::vision::keypoints::{Keypoint, Keypoints};
 use pcadlang::{Model, Program};
 use std::sync::Arc;
 
-/// A turned thing, with a waist or without.
+/// A lathed solid, with or without a waist.
 const SMALL: &str = r#"include "std/scene.pcad" as scene;
 param sides: int = 12;
 data photo: image "the photograph";
@@ -49,13 +50,13 @@ const LEARN: [&str; 8] =
 const RUN: [&str; 8] =
     ["run", "small.pcad", "--observe", "disc.png", "--chains", "2", "--out", "out"];
 
-/// The program with these contours observed.
+/// Compiles the program with these contours observed.
 fn model(f: &Folder, contours: ContourMap) -> Model {
     let program = Program::open(f.path().join("small.pcad").to_str().unwrap()).unwrap();
     program.observe("photo", Value::object(ImageValue::contours(contours, None))).compile().unwrap()
 }
 
-/// Some contour, so that the program can be run.
+/// Returns arbitrary contours, so that the program can be run.
 fn line() -> ContourMap {
     let picture = image::GrayImage::from_fn(64, 64, |i, j| {
         image::Luma([if i == 32 && j > 8 { 255 } else { 0 }])
@@ -133,8 +134,8 @@ fn entries_come_back_and_the_nearest_picture_of_an_entry_is_its_own() {
         let features = bank.header().features.of(&view).unwrap();
         assert_eq!(features, bank.features(i).unwrap(), "entry {i}");
         assert_eq!(bank.nearest(&Query::new(features), 3).unwrap()[0], (i, 0.0));
-        // As an observed picture: contour points without lengths, and moved about a
-        // little to find a better fit.
+        // An observed picture gives contour points without lengths, and its features are
+        // moved slightly to find a better match.
         let c: Arc<Contours> = view.contours(64);
         let (tx, ty, strength) = (c.tx.clone(), c.ty.clone(), vec![1.0; c.len()]);
         let map =
@@ -159,12 +160,12 @@ fn banks_that_do_not_fit_are_refused() {
     f.succeeds(&LEARN);
     f.succeeds(&[&RUN[..], &["--quiet"]].concat());
     let whole = std::fs::read(f.path().join("small.bank")).unwrap();
-    // Another program, in text or parameters.
+    // Another program text, or other parameters.
     refused_with(&f, &["--set", "sides=13"], "made from another program");
     f.write("small.pcad", SMALL.replace("0.8, 3", "0.8, 4"));
     refused(&f, "made from another program");
     f.write("small.pcad", SMALL);
-    // Another version, a file cut short, a header that was changed.
+    // Another version, a truncated file, an altered header.
     let mut other = whole.clone();
     other[8] = 99;
     f.write("small.bank", &other);
@@ -178,7 +179,7 @@ fn banks_that_do_not_fit_are_refused() {
     other[at] ^= 1;
     f.write("small.bank", &other);
     refused(&f, "header is altered");
-    // Features of what is not observed.
+    // Features that the program does not observe.
     f.write("bare.pcad", "assume x ~ normal(0, 1); observe normal(x, 1) = 0;");
     f.refuses(&["learn", "bare.pcad", "-o", "bare.bank"], "the program has nothing to draw");
     f.refuses(&["learn", "small.pcad", "-o", "k.bank", "--features", "keypoints"], "no landmarks");
@@ -197,7 +198,7 @@ fn refused_with(f: &Folder, more: &[&str], says: &str) {
     assert!(d.code == 1 && d.err.contains(says), "{says:?} is not in {}{}", d.out, d.err);
 }
 
-/// A detector of the user's own: here, the number of bytes of the picture.
+/// A user's own feature command; here, it returns the number of bytes of the picture.
 #[cfg(unix)]
 #[test]
 fn features_may_come_from_a_command() {
@@ -223,8 +224,8 @@ fn features_may_come_from_a_command() {
     f.refuses(&[&LEARN[..], &["--features-from", command]].concat(), "it failed");
 }
 
-/// Keypoints: where the landmarks of a scene are seen, that scene is the nearest, also
-/// when half of them are missing.
+/// The nearest scene to the keypoints of a scene is that scene, also when half of them
+/// are missing.
 #[test]
 fn a_bank_of_bodies_is_searched_by_keypoints() {
     let f = Folder::new("bank_bodies");
@@ -273,7 +274,8 @@ fn a_bank_of_bodies_is_searched_by_keypoints() {
     ));
 }
 
-/// What is wrong with a kernel's arguments is said before a chain begins, with its place.
+/// Errors in a kernel's arguments are reported before a chain begins, with their
+/// position.
 #[test]
 fn a_bank_that_is_not_there_is_an_error_at_the_kernel() {
     let error = |kernel: &str, banks: Option<Arc<dyn Banks>>| {

@@ -1,9 +1,9 @@
 //! Kernels and shipped programs draw from the posterior of data simulated from the model:
 //! simulation-based calibration (Talts et al. 2018) and Geweke's joint distribution test
-//! (2004). Planted errors are found in `tests/planted_errors.rs`.
+//! (2004). `tests/planted_errors.rs` shows that the checks detect planted errors.
 //!
-//! The checks fail a right sampler once in a thousand; seeds are fixed. The slow ones:
-//! `cargo test --release -- --ignored`.
+//! The checks fail a correct sampler once in a thousand; seeds are fixed. To run the slow
+//! ones: `cargo test --release -- --ignored`.
 
 mod common;
 use common::kernels::{CALIBRATED, RANKED, RANKED_ON_COUNTS};
@@ -17,7 +17,8 @@ use pcadlang::vision::{DepthMap, Keypoints, Mask, Photo};
 use pcadlang::{Model, Program};
 use std::sync::Arc;
 
-/// Which of the two checks, over how many data sets or chains, and steps of each chain.
+/// Which of the two checks, with the number of data sets or chains, and the steps of each
+/// chain.
 #[derive(Clone, Copy)]
 enum Check {
     Ranks(usize, Option<u64>),
@@ -49,7 +50,7 @@ fn passes(name: &str, model: &Model, check: Check) {
     }
 }
 
-/// A choice of each kind: of two values, Gaussian, positive.
+/// A choice of each kind: Boolean, Gaussian, positive.
 fn small(kernel: &str) -> Model {
     let k = if kernel.ends_with([';', '}']) { kernel.to_owned() } else { format!("{kernel};") };
     Model::from_text(&format!(
@@ -60,7 +61,7 @@ fn small(kernel: &str) -> Model {
     .unwrap_or_else(|e| panic!("{kernel}: {e}"))
 }
 
-/// Counts, which simulated data can equal.
+/// Counts, which simulated data can equal exactly.
 fn counts(kernel: &str) -> Model {
     Model::from_text(&format!(
         "assume c ~ flip(0.4); assume p ~ beta(2, 3);
@@ -100,7 +101,7 @@ fn small_shipped_programs() {
     }
 }
 
-/// A shipped program with so many rows of data.
+/// A shipped program with `rows` rows of data.
 fn shipped_with(name: &str, rows: usize) -> Model {
     let path = format!("{}/calibration-{name}.csv", env!("CARGO_TARGET_TMPDIR"));
     let text: String = (0..rows).map(|i| format!("{i},{i}\n")).collect();
@@ -110,9 +111,10 @@ fn shipped_with(name: &str, rows: usize) -> Model {
     program.unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// Both checks at length of a program, with little data: a plan that is long enough for
-/// the data it comes with needs not be for whatever its prior makes of as many rows.
-/// Minutes each: `LONG=1 cargo test --release --test calibration -- --ignored`.
+/// Runs both checks of a program for many steps, with little data: a plan that is long
+/// enough for the program's own data may be too short for that many rows drawn from its
+/// prior. Takes minutes each:
+/// `LONG=1 cargo test --release --test calibration -- --ignored`.
 fn at_length(name: &str, model: &Model, steps: Option<u64>, turns: Option<u64>) {
     if std::env::var_os("LONG").is_some() {
         passes(name, model, Check::Ranks(200, steps));
@@ -145,7 +147,7 @@ fn crp_at_length() {
     at_length("crp.pcad", &shipped_with("crp.pcad", 6), Some(100_000), Some(30_000));
 }
 
-/// A sphere somewhere before the camera, compared in some way.
+/// A sphere in front of the camera, with a given observation.
 fn scene(data: &str, observe: &str, given: Value) -> Model {
     let text = format!(
         "include \"std/scene.pcad\" as scene; {data};

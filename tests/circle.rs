@@ -1,9 +1,9 @@
-//! A disc of unknown place and size, seen as contours: MCMC against integration of the
-//! same likelihood over a grid.
+//! A disc of unknown position and size, observed as contours: MCMC compared with
+//! integration of the same likelihood over a grid.
 //!
-//! The far camera makes a sphere nearly a disc. The likelihood is taken from the trace
-//! itself at every point of the grid, so that what is tested is the chain: kernels,
-//! increments and their weights with a renderer inside.
+//! The camera is so far away that a sphere is nearly a disc. The likelihood at every grid
+//! point comes from the trace itself, so the test is of the chain: kernels, increments
+//! and their weights, with a renderer inside.
 
 mod common;
 use common::*;
@@ -36,21 +36,21 @@ fn observed() -> ImageValue {
     ImageValue::contours(map, None)
 }
 
-/// Steps of random walks, for warm-up and after.
+/// Random-walk plans: the warm-up, and each step after it.
 const WALKS: [&str; 2] = ["1500 { WALK }", "repeat 3 { WALK }"];
 const WALK: &str = "mix { 0.5 => drift(one(@**)); 0.4 => drift(@**); 0.1 => mh(one(@**)); }";
 
-/// The same walks, a coarse picture deciding first.
+/// The same walks, with delayed acceptance by a coarse picture.
 const DELAYED: [&str; 2] = ["1500 { WALK }", "repeat 3 { DELAYED }"];
 const DELAYED_WALK: &str =
     "mix { 0.5 => delayed(drift(one(@**)), @picture); 0.4 => delayed(drift(@**), @picture);
     0.1 => delayed(mh(one(@**)), @picture); }";
 
-/// Steps along the slope of the picture's score, with nothing else to keep the chain
-/// right.
+/// HMC alone, by the gradient of the picture's score, so that no other kernel can mask
+/// its errors.
 const SLOPES: [&str; 2] = ["300 { hmc($continuous, steps = 4); }", "hmc($continuous, steps = 4);"];
 
-/// What decides first where anything does: a third of the pixels, another spread.
+/// The surrogate for delayed acceptance: a third of the pixels, another scale.
 const COARSE: &str = "scene.chamfer(view, sigma = 1.5, size = 16)";
 
 fn model(likelihood: &str, [warmup, step]: [&str; 2], steps: usize) -> Model {
@@ -81,7 +81,7 @@ fn model(likelihood: &str, [warmup, step]: [&str; 2], steps: usize) -> Model {
     program.observe("photo", Value::object(observed())).compile().unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Means and variances of x, y and r by the midpoint rule with n points a side.
+/// Returns means and variances of x, y and r by the midpoint rule with n points per axis.
 fn by_grid(model: &Model, n: usize) -> [(f64, f64); 3] {
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
     let targets: Vec<Target> =
@@ -115,8 +115,8 @@ fn find(trace: &pcadlang::trace::Trace, name: &str) -> Target {
 
 fn agrees(likelihood: &str, plan: [&str; 2], n: usize, steps: usize) {
     let model = model(likelihood, plan, steps);
-    // What the grid does not see is about what a grid with two thirds of its points sees
-    // differently.
+    // The error of the grid is about its difference from a grid with two thirds of the
+    // points.
     let (grid, coarse) = (by_grid(&model, n), by_grid(&model, n * 2 / 3));
     let options = RunOptions { seed: 3, ..RunOptions::default() };
     let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{e}"));
@@ -147,7 +147,7 @@ fn agrees(likelihood: &str, plan: [&str; 2], n: usize, steps: usize) {
             );
         }
     }
-    // The truth is where the mass is.
+    // The ground truth lies within the posterior's mass.
     for (d, truth) in [0.2, -0.2, 0.9].into_iter().enumerate() {
         let (m, v) = grid[d];
         assert!((m - truth).abs() < 3.0 * v.sqrt() + 0.05, "{likelihood}: {m} for {truth}");

@@ -1,15 +1,15 @@
 //! Sessions with the command, word for word, and the same draws on any number of threads.
 //!
-//! `INSTA_UPDATE=always cargo test --test cli` accepts what the command says now: read it
-//! first as a user would. Times are not in these texts: where a session prints some, they
-//! are replaced.
+//! `INSTA_UPDATE=always cargo test --test cli` accepts the current output: read it first
+//! as a user would. Snapshots do not contain times: a session that prints some has them
+//! replaced.
 
 #[path = "common/folder.rs"]
 mod folder;
 
 use folder::{Folder, disc, png};
 
-/// Everything a command shows: its exit code, its output, its messages.
+/// Returns everything a command shows: its exit code, output and messages.
 fn session(f: &Folder, args: &[&str]) -> String {
     let d = f.run(args);
     let mut s = format!("$ pcadlang {}\nexit {}\n", args.join(" "), d.code);
@@ -158,7 +158,8 @@ fn standard_input_is_formatted() {
     );
 }
 
-/// Checked again when an included file changes, until the user ends it.
+/// A watched program is checked again when an included file changes, until the user ends
+/// it.
 #[cfg(unix)]
 #[test]
 fn watched_programs_are_checked_again() {
@@ -219,7 +220,7 @@ fn completions_and_manual_pages_know_every_command() {
             "{shell}:\n{script}"
         );
     }
-    // Programs complete to files.
+    // Program arguments are completed with file names.
     let zsh = f.succeeds(&["completions", "zsh"]).out;
     assert!(
         zsh.lines().any(|line| line.contains(":program -- ") && line.contains(":_files")),
@@ -248,8 +249,8 @@ fn completions_and_manual_pages_know_every_command() {
     assert_eq!(f.files().len(), commands.len() + 2, "{:?}", f.files());
 }
 
-/// Plans on data simulated from their programs: exit code 0 where they pass, 1 where not
-/// and where nothing can be simulated.
+/// Checks plans on data simulated from their programs: exit code 0 if they pass, 1 if
+/// they fail or if the data cannot be simulated.
 #[test]
 fn checks_by_simulation() {
     let f = Folder::new("simulation");
@@ -264,7 +265,8 @@ fn checks_by_simulation() {
     ] {
         assert!(both.out.contains(says), "{says:?} is not in\n{}", both.out);
     }
-    // A plan that never moves keeps the prior: wrong for any data that say something.
+    // A plan that never moves keeps the prior, which is wrong whenever the data are
+    // informative.
     f.write(
         "stuck.pcad",
         "assume x ~ normal(0, 1); observe normal(x, 0.1) = [1, 1, 1] as y;
@@ -297,7 +299,7 @@ fn checks_by_simulation() {
     assert_eq!(f.files(), ["soft.pcad", "stuck.pcad"]);
 }
 
-/// What would be observed again: the table, the file, and the same whatever the number of
+/// Posterior predictive checks: the table, the file, and the same draws on any number of
 /// threads.
 #[test]
 fn predictive_checks() {
@@ -332,7 +334,7 @@ fn predictive_checks() {
     );
 }
 
-/// Exit code 2 is for what the command line itself gets wrong.
+/// Exit code 2 is for errors in the command line itself.
 #[test]
 fn usage() {
     sessions(
@@ -355,7 +357,7 @@ fn usage() {
     );
 }
 
-/// A summary without its times, numbers to six places.
+/// Returns a summary without its times, with numbers to six decimal places.
 fn timeless(json: &str) -> serde_json::Value {
     fn strip(v: &mut serde_json::Value) {
         match v {
@@ -395,7 +397,7 @@ fn a_run_of_the_coin() {
     assert_eq!(timeless(&f.read("a/summary.json")), timeless(&f.read("b/summary.json")));
     let chain: Vec<String> = f.read("a/chain-1.csv").lines().take(8).map(str::to_owned).collect();
     snapshot("coin_chain", &chain.join("\n"));
-    // The table ends with a line of time.
+    // The table is not a snapshot, since a line with the run time follows it.
     let plain = f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200"]);
     assert!(plain.out.contains("heads") && plain.out.contains("seed 1, 4 chains"), "{}", plain.out);
     assert!(
@@ -405,12 +407,12 @@ fn a_run_of_the_coin() {
     );
     f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--quiet"]);
     assert!(f.exists("runs/coin-2/report.html"));
-    // Another seed, other draws.
+    // Another seed gives other draws.
     f.succeeds(&["run", "coin.pcad", "--seed", "2", "--steps", "200", "--quiet", "--out", "c"]);
     assert_ne!(draws(&f, "a", 4), draws(&f, "c", 4));
 }
 
-/// The draws of each chain without comment lines.
+/// Returns the draws of each chain, without comment lines.
 fn draws(f: &Folder, dir: &str, chains: usize) -> Vec<String> {
     let chain = |i| {
         let text = f.read(&format!("{dir}/chain-{i}.csv"));
@@ -419,8 +421,8 @@ fn draws(f: &Folder, dir: &str, chains: usize) -> Vec<String> {
     (1..=chains).map(chain).collect()
 }
 
-/// The shipped program on a small picture: the same draws, bit for bit, whatever computes
-/// them.
+/// The shipped program on a small picture gives the same draws, bit for bit, on any
+/// number of threads, and with and without incremental updates.
 #[test]
 fn the_lathe_draws_the_same_on_any_number_of_threads() {
     let f = Folder::new("lathe");
@@ -440,7 +442,7 @@ fn the_lathe_draws_the_same_on_any_number_of_threads() {
     assert_eq!(one, run("two", &["--threads", "2"]));
     assert_eq!(one, run("full", &["--threads", "2", "--no-incremental"]));
     assert!(f.exists("one/best.obj") && f.exists("one/overlay.png") && f.exists("one/depth.npy"));
-    // A camera that is not known is a choice more, and moves.
+    // An unknown camera is one more choice, and it is recorded.
     run("lens", &["--set", "known=false", "--set", "steep=60"]);
     let summary: serde_json::Value = serde_json::from_str(&f.read("lens/summary.json")).unwrap();
     let choices = summary["choices"].as_array().unwrap();
@@ -450,8 +452,8 @@ fn the_lathe_draws_the_same_on_any_number_of_threads() {
     );
 }
 
-/// A wide cup seen from above in perspective: where the starts of the shipped program
-/// have its tilt, they have its height and place, too.
+/// A wide cup seen from above in perspective: those starts of the shipped program with
+/// the right tilt also have the right height and position.
 #[test]
 fn starts_of_the_lathe_are_seen_in_perspective() {
     let f = Folder::new("starts");
@@ -498,8 +500,9 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
     assert!((height - 0.9).abs() < 0.15 && (y - 0.2).abs() < 0.05, "{height} {y} {near:?}");
 }
 
-/// Chains that cannot leave their mode: each mode has the probability of its mass,
-/// however many chains fell there, and `keypoints.json` weighs it by that.
+/// Chains that cannot leave their mode: the probability of each mode is its mass,
+/// regardless of the number of chains in it, and `keypoints.json` weights the modes by
+/// it.
 #[test]
 fn modes_have_their_probabilities() {
     let f = Folder::new("probabilities");
@@ -541,8 +544,8 @@ fn modes_have_their_probabilities() {
     assert!((x - (2.0 * probability - 1.0)).abs() < 0.03, "{x} {probability}");
 }
 
-/// Chains that never move stay where they began: a picture of each mode, and a warning
-/// that they do not draw the same.
+/// Chains that never move stay where they start: a picture of each mode, and a warning
+/// that the chains disagree.
 #[test]
 fn modes_that_chains_stay_in_are_shown() {
     let f = Folder::new("modes");
@@ -590,8 +593,8 @@ fn sheets_of_the_prior() {
     assert_eq!(f.files(), ["contours.png", "disc.png"]);
 }
 
-/// People are found, written so that `--keypoints` reads them, and drawn; a network that
-/// is none is refused.
+/// People are detected, written in a form that `--keypoints` reads, and drawn; an invalid
+/// network file is refused.
 #[cfg(feature = "models")]
 #[test]
 fn people_in_photographs() {
@@ -617,7 +620,7 @@ fn people_in_photographs() {
     assert!(f.exists("skier.png"));
 }
 
-/// Ctrl-C ends a run; every draw so far is kept, and summed up.
+/// Ctrl-C ends a run; all draws so far are kept and summarised.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_keeps_its_draws() {
@@ -666,8 +669,9 @@ fn an_interrupted_run_keeps_its_draws() {
     );
 }
 
-/// What `run --explain` says of a scene with something to skip: a choice that nothing
-/// asks for, one that no kernel names, an object that is out of the picture.
+/// The output of `run --explain` for a scene in which some things can be skipped: a
+/// choice that nothing depends on, one that no kernel names, and an object outside of the
+/// picture.
 #[test]
 fn explained() {
     let f = Folder::new("explained");

@@ -1,12 +1,12 @@
-//! What levels of detail do to the score, on a lathe, the shipped body and a dense mesh,
-//! over fixed poses.
+//! The effect of levels of detail on the score, for a lathe, the shipped body and a dense
+//! mesh, over fixed poses.
 //!
-//! Two bounds. Of the contours themselves: their mean distance from those of meshes as
-//! they are is at most `detail`, in every pose. Of rho, the mean distance from the
-//! contours of another pose: at most three times `detail` in 49 of 50, where `detail` is
-//! at most half a pixel. It is a mean over what is seen, so a fold that appears or is
-//! hidden counts with its distance from the other contours, not with how far anything
-//! moved.
+//! There are two bounds. For the contours themselves, the mean distance from those of the
+//! full meshes is at most `detail`, in every pose. For rho, the mean distance from the
+//! contours of another pose, the change is at most three times `detail` in 49 of 50
+//! poses, where `detail` is at most half a pixel. Rho is a mean over the visible
+//! contours, so a fold that appears or is hidden counts with its distance from the other
+//! contours, not with the distance that anything moved.
 
 #[path = "../examples/detail_price/subjects.rs"]
 mod subjects;
@@ -26,7 +26,7 @@ fn contours(solid: &Solid, detail: f64) -> Arc<Contours> {
     View::with_detail(solid.clone(), Camera::default_for(SIZE, SIZE), detail).contours(SIZE)
 }
 
-/// Mean distances from some contours, in pixels.
+/// Returns a function for the mean distance from these contours, in pixels.
 fn to(c: &Contours) -> impl Fn(&Contours) -> f64 {
     let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
     let map =
@@ -59,8 +59,8 @@ fn the_score_is_off_by_no_more_than_the_detail_allows() {
             for i in 0..POSES {
                 let c = contours(&solids[i], detail);
                 let other = &distances[(i + 1) % POSES];
-                // Contours are kept as a grid of distances, so those of a pose from
-                // themselves are not quite 0.
+                // The observed contours are kept as a grid of distances, so the distance
+                // of a pose from itself is not exactly 0.
                 own.push(distances[i](&c) - distances[i](&exact[i]));
                 off.push((other(&c) - other(&exact[i])).abs());
             }
@@ -74,8 +74,8 @@ fn the_score_is_off_by_no_more_than_the_detail_allows() {
     println!("{report}");
 }
 
-/// Three balls and a vase in front, all by the state alone: what was drawn on the way
-/// there, and by which thread, leaves no trace.
+/// Three balls with a vase in front: the level depends on the state only, not on what was
+/// drawn before or on which thread.
 #[test]
 fn the_level_depends_on_the_state_and_not_on_the_way_there() {
     use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
@@ -100,7 +100,7 @@ fn the_level_depends_on_the_state_and_not_on_the_way_there() {
     let model = pcadlang::Program::parse(text)
         .and_then(|p| p.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile())
         .unwrap_or_else(|e| panic!("{e}"));
-    // Depth sets the level: from far away over near to the place.
+    // The depth sets the level: each path ends at `place`, from far away and from near.
     let at = |trace: &mut Trace, [x, z]: [f64; 2]| {
         for (address, value) in [("@t[x]", x), ("@t[z]", z)] {
             trace.set(address, value, Draws::default()).unwrap();

@@ -1,4 +1,4 @@
-//! Contour detectors from files: in programs, by `--edges`, and what is recorded of them.
+//! Contour detectors from files: in programs, by `--edges`, and how they are recorded.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -24,7 +24,7 @@ let by_none = scene.edges(photo, detector = none);
 let smoother = scene.edges(photo, detector = trees, smooth = 4, strength = 0.05);
 ";
 
-/// A program whose comparator looks at the photograph as it is.
+/// A program whose comparator uses the photograph without preprocessing.
 const RUN: &str = "
 include \"std/scene.pcad\" as scene;
 data photo: image;
@@ -48,7 +48,8 @@ fn open(f: &Folder, text: &str) -> Program {
     Program::open(f.path().join("p.pcad").to_str().unwrap()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The contours of a value of a program: how many points, and the sum of their places.
+/// Returns the number of contour points of a program's value, and the sum of their
+/// coordinates.
 fn contours(model: &Model, name: &str) -> (usize, f32) {
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
     let value = trace.global(name, Draws::default()).unwrap().unwrap();
@@ -76,7 +77,7 @@ fn programs_name_their_detector() {
         "{plain:?} {by_trees:?} {smoother:?}"
     );
     assert!(plain == by_none && plain != by_trees && by_trees != smoother);
-    // Another file is another input.
+    // Another file is another input, with another hash.
     let hash = model.data_hash().to_owned();
     f.write("model.yml", forests::small().yaml().replace("stride: 2", "stride: 4"));
     let other = open(&f, PROGRAM).compile().unwrap_or_else(|e| panic!("{e}"));
@@ -95,8 +96,8 @@ fn a_run_has_a_detector_where_the_program_names_none() {
     {
         assert_eq!(contours(&chosen, name), expected, "{name}");
     }
-    // The photograph itself, and one that a host gives; the value that was given stays
-    // what it was, once it was looked at.
+    // The photograph itself, and one given by a host; the given value does not change
+    // once its contours have been computed.
     assert_eq!(contours(&chosen, "photo"), by_trees);
     let grey =
         pcadlang::vision::photo::decode(&png(disc(96, 96, 48.0, 48.0, 24.0)), &Default::default())
@@ -162,7 +163,7 @@ fn the_command_takes_a_detector() {
     let record = |name: &str| {
         serde_json::from_str::<serde_json::Value>(&f.read(&format!("{name}/run.json"))).unwrap()
     };
-    // Times are in lines that begin with `#`.
+    // Times are on lines that begin with `#`.
     let draws = |name: &str| {
         let text = f.read(&format!("{name}/chain-1.csv"));
         text.lines().filter(|l| !l.starts_with('#')).map(str::to_owned).collect::<Vec<_>>()

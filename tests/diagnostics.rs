@@ -1,5 +1,5 @@
-//! The diagnostics against ArviZ's own numbers on stored draws (`data/arviz_summary.py`
-//! makes them).
+//! The diagnostics compared with ArviZ's numbers on stored draws (made by
+//! `data/arviz_summary.py`).
 
 use pcadlang::infer::diagnostics::{
     ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, r_hat, summary,
@@ -44,7 +44,7 @@ impl Case {
     }
 }
 
-/// Equal to 1e-9 of its size, with NaN equal to NaN.
+/// Checks equality to a relative error of 1e-9, with NaN equal to NaN.
 fn check(case: &str, what: &str, ours: f64, theirs: Option<f64>) {
     match theirs {
         None => assert!(ours.is_nan(), "{case}: {what} is {ours}, not NaN"),
@@ -65,7 +65,7 @@ fn summary_equals_arviz() {
         check(&c.name, "q95", s.q95, c.q95);
         check(&c.name, "mcse_mean", s.mcse_mean, c.mcse_mean);
         if c.name == "tiny scale" {
-            // ArviZ takes squares below 1e-15 for constant: ours is that of the same
+            // ArviZ treats squares below 1e-15 as constant; ours is that of the same
             // draws in another unit.
             let unit = 2f64.powi(40);
             let large: Vec<Vec<f64>> =
@@ -77,8 +77,8 @@ fn summary_equals_arviz() {
         check(&c.name, "ess_bulk", s.ess_bulk, c.ess_bulk);
         check(&c.name, "ess_tail", s.ess_tail, c.ess_tail);
         if c.name == "each chain constant" {
-            // Nothing varies within the chains: ArviZ's number is one over a rounding
-            // error, ours is none.
+            // The draws do not vary within chains: ArviZ's number is the reciprocal of a
+            // rounding error, ours is undefined.
             assert!(s.r_hat.is_nan(), "{}", s.r_hat);
         } else {
             check(&c.name, "r_hat", s.r_hat, c.r_hat);
@@ -102,8 +102,8 @@ fn single_diagnostics_equal_arviz_and_the_summary() {
         ] {
             assert_eq!(single.to_bits(), whole.to_bits(), "{}: {what}", c.name);
         }
-        // arviz.rhat splits before it folds, which is the same where no middle draw falls
-        // out.
+        // arviz.rhat splits before it folds, which is the same if no middle draw is
+        // dropped.
         if x[0].len().is_multiple_of(2) && c.name != "each chain constant" {
             check(&c.name, "r_hat", s.r_hat, c.r_hat_split);
         }

@@ -1,9 +1,9 @@
-//! Log densities and special functions against a table made with 60 digits, and against
-//! statrs.
+//! Log densities and special functions compared with a table computed with 60 digits, and
+//! with statrs.
 //!
-//! Inputs are taken as doubles, so all of the difference is this crate's. The tolerance
-//! is relative to the value, with a floor for values near 0, where terms of the size of 1
-//! to 100 have cancelled.
+//! The inputs of the table are doubles, so the whole difference is due to this crate. The
+//! tolerance is relative to the value, with a floor for values near 0, where terms of
+//! size 1 to 100 have cancelled.
 
 mod common;
 use common::families::{datum, made};
@@ -27,8 +27,8 @@ fn function(name: &str, p: &[f64]) -> f64 {
     }
 }
 
-/// Whether two values agree to a relative error with an absolute floor; infinities must
-/// be the same.
+/// Whether two values agree up to a relative error and an absolute floor; infinities must
+/// be equal.
 fn agree(got: f64, expected: f64, relative: f64, floor: f64) -> bool {
     got == expected || (got - expected).abs() <= relative * expected.abs() + floor
 }
@@ -47,7 +47,7 @@ fn the_table_agrees() {
             None => {
                 let x: Vec<f64> = point.split(' ').map(|x| x.parse().unwrap()).collect();
                 let x = datum(name, &x);
-                // Differences of logarithms.
+                // The values are differences of logarithms.
                 let floor = if name.starts_with("truncated:") { 1e-11 } else { 5e-14 };
                 (made(name, &p).log_density(&x), floor)
             }

@@ -1,5 +1,5 @@
-//! Distributions in programs: matrices, mixtures, sorted values, improper priors, stored
-//! white noise; errors a program can see.
+//! Distributions in programs: matrices, mixtures, sorted values, improper priors,
+//! whitened vectors; and the errors that programs can cause.
 
 mod common;
 use common::*;
@@ -14,7 +14,7 @@ fn error(text: &str) -> String {
     }
 }
 
-/// The mean of `x` under a kernel against quadrature of the posterior density.
+/// Compares the mean of `x` under a kernel with quadrature of the posterior density.
 fn check(
     name: &str,
     model: &str,
@@ -41,16 +41,16 @@ fn scalars_by_moves_in_unconstrained_space() {
     check("below a bound", model, "drift(@x)", truncated, [-9.0, 0.5], 0.03);
     let model = "assume x ~ truncated_normal(0, 1, -1, 0.5); observe normal(x, 2) = 3;";
     check("between bounds", model, "drift(@x)", truncated, [-1.0, 0.5], 0.02);
-    // Two modes, one on either side of the cut at pi: a walk on the circle goes from one
-    // to the other.
+    // There is a mode on either side of the cut at pi: a random walk on the circle moves
+    // between them.
     let circle = |x: f64| (2.0 * (x - 3.0).cos()).exp() * normal(x.sin(), 0.0, 0.3);
     let model = "assume x ~ von_mises(3, 2); observe normal(sin(x), 0.3) = 0;";
     let pi = std::f64::consts::PI;
     check("an angle", model, "drift(@x)", circle, [-pi, pi], 0.15);
-    // The improper prior: the likelihood alone.
+    // Under the improper prior, the posterior is the likelihood alone.
     let model = "assume x ~ flat(); observe normal(x, 0.5) = 20;";
     check("flat", model, "drift(@x)", |x| normal(x, 20.0, 0.5), [15.0, 25.0], 0.03);
-    // Redrawing is refused, which leaves the rest of the plan right.
+    // A proposal from the prior is refused, and the rest of the plan is still right.
     check(
         "flat",
         model,
@@ -74,7 +74,8 @@ fn scalars_by_moves_in_unconstrained_space() {
 
 #[test]
 fn correlations_are_learnt() {
-    // Four pairs given; by quadrature over the correlation, uniform under lkj(2, 1).
+    // Four observed pairs; the reference is quadrature over the correlation, which is
+    // uniform under lkj(2, 1).
     let pairs = [(1.0, 0.8), (-1.2, -1.0), (0.3, 0.6), (0.9, 1.1)];
     let likelihood = |r: f64| {
         let v = 1.0 - r * r;
@@ -107,8 +108,8 @@ fn whole_matrices_are_observed_and_forced() {
     assert!((log(&format!("observe lkj(2, 1) = [{one}, {one}];")) - 0.25f64.ln()).abs() < 1e-12);
     assert_eq!(log("observe lkj(2, 1) = [[1, 0], [0.6, 0.9]];"), f64::NEG_INFINITY);
     assert!((log("observe multinomial(3, [1, 1]) = [1, 2];") - 0.375f64.ln()).abs() < 1e-12);
-    // The standard Wishart distribution with two degrees of freedom at the unit matrix,
-    // times 2^2 for the factor.
+    // The standard Wishart density with two degrees of freedom at the unit matrix, times
+    // 2^2 for the factor.
     let expected = -1.0 - (4.0 * std::f64::consts::PI).ln() + 4f64.ln();
     let got = log("observe wishart(2, [[1, 0], [0, 1]]) = [[1, 0], [0, 1]];");
     assert!((got - expected).abs() < 1e-12, "{got} against {expected}");
@@ -121,8 +122,8 @@ fn whole_matrices_are_observed_and_forced() {
 
 #[test]
 fn white_noise_behind_vectors_moves_with_its_scale() {
-    // s ~ exponential(1), v = s z: with z marginalised, y = v + noise has variance s^2 +
-    // 0.25 in each of two places.
+    // s ~ exponential(1), v = s z: with z integrated out, y = v + noise has variance s^2
+    // + 0.25 in each of two components.
     let likelihood = |s: f64| {
         let sd = (s * s + 0.25).sqrt();
         (-s).exp() * normal_pdf(1.0, 0.0, sd) * normal_pdf(-2.0, 0.0, sd)
@@ -138,14 +139,14 @@ fn white_noise_behind_vectors_moves_with_its_scale() {
 
 #[test]
 fn sorted_values_stay_sorted() {
-    // Two sorted normal means, each seen once: by symmetry the mean of the greater of two
-    // independent posteriors.
+    // Two sorted normal means, each observed once: by symmetry, the mean is that of the
+    // greater of two independent posteriors.
     let text = "assume m ~ ordered(normal(0, 1), 2); assume low = m[0]; assume high = m[1];
         observe normal(low, 1) = 0; observe normal(high, 1) = 0;
         infer { warmup 2000 { drift(@m); } repeat 40000 { drift(@m); collect low, high; } }";
     let d = run(text, 41, 2);
     assert!(d["low"].iter().zip(&d["high"]).all(|(a, b)| a <= b));
-    // Posterior sd 1 / sqrt(2) each; the greater of two has mean sd / sqrt(pi).
+    // Each posterior has sd 1 / sqrt(2); the greater of two has mean sd / sqrt(pi).
     assert_mean("high", &d["high"], (0.5 / std::f64::consts::PI).sqrt(), 0.05);
 }
 
@@ -167,7 +168,7 @@ fn errors_say_what_was_expected() {
 }
 
 /// A flat choice in a branch can neither appear nor vanish in a proposal: the chain stays
-/// where it began.
+/// in its initial branch.
 #[test]
 fn improper_choices_neither_come_nor_go() {
     let text = "assume b ~ flip(0.5); assume x = if b { f ~ flat(); f } else { 0 }; observe normal(x, 1) = 0;

@@ -1,4 +1,4 @@
-//! The reference in `docs/language.md` is what the table of built-ins says, and the
+//! The reference in `docs/language.md` is generated from the table of built-ins, and the
 //! README's program runs.
 //!
 //! `REGENERATE=1 cargo test --test docs` rewrites the reference.

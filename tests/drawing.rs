@@ -1,5 +1,5 @@
-//! Contours and depth of groups of parts, some of which move: the same bits as when they
-//! were compared with an earlier, plainer implementation, and the same whatever was drawn
+//! Contours and depth of groups of parts, some of which move: bit-identical to the
+//! version that was compared with an earlier, plainer implementation, whatever was drawn
 //! before.
 
 use glam::{DVec3, Vec3};
@@ -7,7 +7,7 @@ use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
 use std::sync::Arc;
 
-/// Uniform numbers in 0..1, the same in every run.
+/// Uniform numbers in 0..1, reproducible in every run.
 struct Uniform(u64);
 
 impl Uniform {
@@ -31,8 +31,8 @@ impl Uniform {
     }
 }
 
-/// A surface of revolution about y, at times open at an end, at times with creases,
-/// somewhere about the origin.
+/// Returns a surface of revolution about y, sometimes open at an end or with creases,
+/// placed near the origin.
 fn part(random: &mut Uniform) -> Arc<Mesh> {
     let (rings, sides) = (4 + random.below(5) as u32, 5 + random.below(9) as u32);
     let (radius, half, ends) =
@@ -63,7 +63,8 @@ fn part(random: &mut Uniform) -> Arc<Mesh> {
     Arc::new(mesh)
 }
 
-/// A camera: both projections, near and far, small and large, square and not.
+/// Returns a camera of either projection, near or far, with a small or large picture,
+/// square or not.
 fn camera(random: &mut Uniform) -> Camera {
     let (width, height) = (20 + random.below(110) as u32, 20 + random.below(110) as u32);
     let mut camera = Camera::default_for(width, height);
@@ -74,7 +75,7 @@ fn camera(random: &mut Uniform) -> Camera {
             camera.projection =
                 Projection::Orthographic { units_per_pixel: random.between(0.01, 0.06), cx, cy };
         }
-        // Among the parts: the near plane cuts some.
+        // The camera is among the parts, so the near plane cuts some of them.
         1 => camera.eye.z = random.between(-0.5, 2.0),
         _ => {}
     }
@@ -92,7 +93,7 @@ fn group(meshes: &[Arc<Mesh>], by: Affine) -> Solid {
     Solid::group(&solids).placed(by)
 }
 
-/// Every bit of the contours, in order.
+/// Returns every bit of the contours, in order.
 fn bits(c: &Contours) -> Vec<u32> {
     let lists = [&c.x, &c.y, &c.tx, &c.ty, &c.length];
     [c.width, c.height]
@@ -101,7 +102,7 @@ fn bits(c: &Contours) -> Vec<u32> {
         .collect()
 }
 
-/// Fowler, Noll and Vo's hash (FNV-1a) over words.
+/// Hashes words by Fowler, Noll and Vo's FNV-1a.
 fn hash(words: impl IntoIterator<Item = u32>, from: u64) -> u64 {
     words.into_iter().fold(from, |h, w| (h ^ u64::from(w)).wrapping_mul(0x100000001b3))
 }
@@ -119,9 +120,10 @@ fn contours_and_depth_are_as_they_were() {
         let frame = Frame::render(&solid, &camera, Channels::Depth);
         depth = hash(frame.depth.iter().map(|d| d.to_bits()), depth);
     }
-    // Taken when vertices were first kept in single precision and lines of edges that are
-    // specks left out. Of the implementation before, no covered pixel differs in the mask
-    // or by more than 1e-5 in depth (of 581,404), and 5 pieces are gone (0.34 pixels).
+    // Recorded when vertices were first stored in single precision and edge lines of
+    // negligible size were dropped. Compared with the previous implementation, no covered
+    // pixel differs in the mask, or by more than 1e-5 in depth (of 581,404), and 5 pieces
+    // are missing (0.34 pixels).
     assert_eq!(
         (pieces, format!("{contours:016x}"), format!("{depth:016x}")),
         (92_683, "3d50e83d679654a9".into(), "4513baf456a94dfc".into())
@@ -150,18 +152,18 @@ fn what_was_drawn_before_changes_nothing() {
                 }
             }
             let (solid, camera) = (group(&meshes, by), cameras[eye]);
-            // By turns through a view and at once.
+            // Through a view or directly, at random.
             let here = match random.next() < 0.5 {
                 true => Contours::of(&solid, &camera),
                 false => (*View::new(solid.clone(), camera)
                     .contours(camera.width.max(camera.height)))
                 .clone(),
             };
-            // Another thread has drawn nothing before.
+            // Another thread has not drawn anything before.
             let there =
                 std::thread::scope(|s| s.spawn(|| Contours::of(&solid, &camera)).join().unwrap());
             assert_eq!(bits(&here), bits(&there));
-            // A view with a frame looks into the frame's depth.
+            // A view with a frame uses the depth of that frame.
             let view = View::new(solid, camera);
             view.frame(camera.width.max(camera.height));
             assert_eq!(bits(&here), bits(&view.contours(camera.width.max(camera.height))));
@@ -180,7 +182,7 @@ fn a_part_that_moves_there_and_back_gives_the_first_picture() {
     let first = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
     let old = std::mem::replace(&mut meshes[4], part(&mut random));
     let moved = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
-    // The same numbers at another address.
+    // The same mesh at another address.
     meshes[4] = Arc::new((*old).clone());
     let copy = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
     assert_ne!(bits(&first), bits(&moved));

@@ -1,5 +1,5 @@
-//! The examples of embedding, each run for what it promises, and what else a host relies
-//! on.
+//! The embedding examples, each checked for what it promises, and other properties that a
+//! host relies on.
 
 #![allow(dead_code)]
 
@@ -27,8 +27,9 @@ mod embed_run_dir;
 #[path = "../examples/embed_trace.rs"]
 mod embed_trace;
 
-/// A primitive of the host, under `hmc` and kernels that reject: with its state and from
-/// scratch every draw is the same to the last bit, and its state saves most of the work.
+/// A host's primitive under `hmc` and kernels that reject: with its saved state and from
+/// scratch, all draws are the same to the last bit, and the saved state avoids most of
+/// the work.
 #[test]
 fn a_primitive_with_state_gives_the_same_draws_as_without() {
     let (host, cells) = embed_function::host();
@@ -56,8 +57,8 @@ fn a_primitive_with_state_gives_the_same_draws_as_without() {
     assert!(few * 4 < many, "{few} cells of {many}");
 }
 
-/// The gradient that `hmc` follows is that of differences, and the tape's density that of
-/// the trace.
+/// The gradient that `hmc` follows agrees with finite differences, and the tape's density
+/// with the trace's.
 #[test]
 fn the_gradient_of_a_primitive_is_that_of_differences() {
     let (host, _) = embed_function::host();
@@ -90,15 +91,16 @@ fn the_gradient_of_a_primitive_is_that_of_differences() {
     assert!(place >= 44);
 }
 
-/// What is kept is that of the state: after a rejection the one before, in a fork that of
-/// the fork. Were another kept, the sum below, which trusts it, would be wrong.
+/// The saved state belongs to the trace's state: after a rejection it is the previous
+/// one, and a fork has its own. If the wrong one were kept, the sum below, which trusts
+/// it, would be wrong.
 #[test]
 fn state_goes_back_with_a_rejected_proposal_and_along_with_a_fork() {
     let trusting = Entry::incremental("trusting", |a, previous: Option<Previous<f64>>| {
         let x = a.num(0)?;
         let steps = match previous {
-            // The value before, less the argument before, plus the one now: exact for
-            // whole numbers, if both are of one state.
+            // The previous value, minus the previous argument, plus the present one:
+            // exact for whole numbers, if both belong to the same state.
             Some(p) => p.state() - p.argument(0).numbers()[0] + x,
             None => x,
         };
@@ -226,7 +228,7 @@ fn a_run_is_watched_ended_and_left_in_its_folder() {
     let folder = std::env::temp_dir().join(format!("pcadlang-embedded-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
     let draws = embed_run_dir::run(&folder, 500).unwrap();
-    // The other chain ends where it is.
+    // The other chain is stopped where it is.
     assert!((500..=1000).contains(&draws), "{draws}");
     for name in ["run.json", "summary.json", "chain-1.csv", "chain-2.csv"] {
         assert!(folder.join(name).is_file(), "{name}");
@@ -245,7 +247,7 @@ fn errors_are_values_with_places() {
     assert!(e.contains("<program>:3:"), "{e}");
 }
 
-/// Everything wrong with what a host brings is told at once, as an error.
+/// All errors in a host's entries are reported at once.
 #[test]
 fn names_that_clash_or_are_none_are_errors() {
     let one = |name: &'static str| Entry::function(name, |_| Ok(Value::Num(1.0)));
@@ -280,8 +282,8 @@ fn embedded_distribution() -> Entry {
     })
 }
 
-/// A density that is not a number is impossible, and a host's family may draw anything:
-/// no type is guessed for it.
+/// A density of NaN means an impossible value, and a host's family may sample any value:
+/// its type is not guessed.
 #[test]
 fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
     use pcadlang::host::{Datum, Distribution, Gradient, Support};
@@ -297,7 +299,7 @@ fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
         fn sample(&self, rng: &mut pcadlang::rng::Stream) -> Datum {
             vec![rng.uniform() - 0.5, rng.uniform()].into()
         }
-        /// The square root of what may be negative.
+        /// The square root of a number that may be negative.
         fn log_density(&self, x: &Datum) -> f64 {
             x.element(0).and_then(|x| x.num()).map_or(f64::NEG_INFINITY, |x| -x.sqrt())
         }
@@ -317,8 +319,8 @@ fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
     assert!(x.iter().all(|x| *x >= 0.0) && x.iter().any(|a| *a != x[0]));
 }
 
-/// A point of the unconstrained space says nothing of the discrete part of a value: `knn`
-/// draws such a value from its prior.
+/// A point in unconstrained space does not determine the discrete part of a value, so
+/// `knn` draws such a value from its prior.
 #[test]
 fn neighbours_do_not_move_what_is_in_part_discrete() {
     use pcadlang::host::{Datum, Distribution, Gradient, Support};
@@ -367,8 +369,8 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
     }
     assert!(accepted > 1000 && (1700..2300).contains(&ones), "{accepted} accepted, {ones} ones");
 
-    // Kernels that move along coordinates leave it alone: there is no way back to the
-    // part that has none.
+    // Kernels that move along unconstrained coordinates leave the value alone:
+    // coordinates do not determine its discrete part, so there is no way back.
     let x = |t: &Trace| format!("{:?}", t.value(t.all_targets()[0]));
     let is_one = |t: &Trace| {
         t.value(t.all_targets()[0]).element(1).is_some_and(|v| v.same(&Value::Num(1.0)))
@@ -385,7 +387,8 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
     }
 }
 
-/// Names made at run time cost no leak: an entry owns them, and goes with its host.
+/// Names made at run time are not leaked: an entry owns them, and is dropped with its
+/// host.
 #[test]
 fn names_made_at_run_time_are_the_entry_s_own() {
     let host = (0..3).fold(Host::new(), |h, i| {
@@ -404,7 +407,7 @@ fn names_made_at_run_time_are_the_entry_s_own() {
     assert!(host.doc("f1").unwrap().contains("Number 1."));
 }
 
-/// A host may compile on one thread, run on others, and send what comes out back.
+/// A host may compile on one thread, run on others, and send the results back.
 #[test]
 fn what_a_host_passes_between_threads_can_be() {
     fn sent<T: Send>() {}

@@ -1,13 +1,13 @@
-//! Random programs with answers by enumeration: whatever a kernel does, it leaves the
-//! posterior as it is.
+//! Random programs whose posteriors are known by enumeration: every kernel leaves the
+//! posterior invariant.
 //!
-//! A program is made at random ([`generate`]), its executions are enumerated by an
-//! interpreter of trees that shares nothing with the engine ([`execute`]), and each of a
-//! number of plans is started many times in exact draws from that posterior and must end
-//! in exact draws ([`check`]). A first look at few draws picks what seems off; only what
-//! a second look at many new draws says decides, so a right kernel fails with a chance
-//! below 1e-9 a plan. What is off by little in many programs shows where the draws of all
-//! programs are pooled.
+//! Programs are generated at random ([`generate`]), and their executions are enumerated
+//! by a tree-walking interpreter that shares nothing with the engine ([`execute`]). Each
+//! of several plans is started many times from exact draws of the posterior, and must end
+//! in exact draws ([`check`]). A first test with few draws selects suspicious plans; only
+//! a second test, with many new draws, decides, so a correct kernel fails with
+//! probability below 1e-9 per plan. Errors that are small but common to many programs
+//! show in the pooled draws of all programs.
 //!
 //! `ENUMERATED=30000 FIRST=1000 cargo test --release --test enumeration -- --ignored --nocapture`
 //! checks other programs.
@@ -44,13 +44,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use verdict::Pooled;
 
-/// Draws of a look that decides.
+/// The number of draws of the second, decisive test.
 const SECOND_LOOK: u64 = 10_000;
-/// What a first look finds suspicious, and what fails.
+/// The p-values below which a first test is suspicious, and below which a second test
+/// fails.
 const SUSPICIOUS: f64 = 1e-3;
 const WRONG: f64 = 1e-9;
 
-/// What many programs showed.
+/// Results over many programs.
 #[derive(Default)]
 struct Tally {
     programs: u64,
@@ -59,7 +60,8 @@ struct Tally {
     unsuitable: u64,
     refused: BTreeMap<String, u64>,
     wrong: Vec<String>,
-    /// By class of plans: pooled draws, how many plans, in how many the state moved.
+    /// By class of plans: the pooled draws, the number of plans, and the number of plans
+    /// that moved the state.
     classes: BTreeMap<String, (Pooled, u64, u64)>,
 }
 
@@ -86,14 +88,14 @@ impl Tally {
         };
         let (text, posterior) = (program.to_string(), Arc::new(posterior));
         let model = Model::from_text(&text).unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
-        // The pass that the default plan repeats.
+        // The statements that the default plan repeats.
         let default = match model.plan() {
             Ok((_, Some(plan))) => {
                 let from = plan.rfind("repeat 1000 {").map_or(0, |i| i + "repeat 1000 {".len());
                 let to = plan[from..].rfind("}\n}").map_or(plan.len(), |i| from + i);
                 plan[from..to].to_owned()
             }
-            // The prior draw that shows what choices there are may have no value.
+            // The prior draw that determines which choices exist may fail.
             _ => "mh(one(@**));".to_owned(),
         };
         self.programs += 1;
@@ -185,7 +187,7 @@ fn judge(all: &Tally) {
         all.wrong.iter().take(5).cloned().collect::<Vec<_>>().join("\n----\n")
     );
     for (class, (pooled, ..)) in &all.classes {
-        // Beyond 6 with a chance of 1e-9 if many tables make it normal.
+        // z exceeds 6 with probability 1e-9 if it is normal, as it is with many tables.
         assert!(
             pooled.z() < 6.0,
             "{class}: draws of all programs together are off by z = {:.1}",
@@ -194,8 +196,8 @@ fn judge(all: &Tally) {
     }
 }
 
-/// Every way in which updates take short cuts gives what running the program again from
-/// the start gives: what the update weighs, what appears and vanishes, where it fails.
+/// Every shortcut of incremental updates agrees with running the whole program again: in
+/// the weights, in the choices that appear and vanish, and in errors.
 fn updates_agree(seed: u64) -> u64 {
     let (program, integration) = generate::program(seed);
     let Some(posterior) = Posterior::of(&program, integration) else { return 0 };
@@ -218,7 +220,8 @@ fn updates_agree(seed: u64) -> u64 {
         if addresses.is_empty() {
             continue;
         }
-        // Several in a row, so that what one leaves behind is what the next begins with.
+        // Several updates in a row, so that each starts from the state that the previous
+        // one left.
         for step in 0..12 {
             let a = &addresses[rng.index(addresses.len())];
             let draws = Draws { key, step, substream: 1 + i };
@@ -250,9 +253,10 @@ fn short_cuts_of_updates_agree_with_running_everything_again() {
     assert!(compared > 10_000, "{compared}");
 }
 
-/// Geweke's joint distribution test of a random program whose observations have joint
-/// conditions, with discrete choices summed out; `None` if it has none, if there are
-/// observations by chance, or if what is to be summed out is refused.
+/// Runs Geweke's joint distribution test on a random program whose observations have
+/// joint conditions, with discrete choices summed out. Returns `None` if there are no
+/// such observations, if an observation is conditional, or if the choices cannot be
+/// summed out.
 fn joint_distribution_stays(seed: u64) -> Option<()> {
     let (program, integration) = generate::program(seed);
     let posterior = Posterior::of(&program, integration)?;
@@ -296,7 +300,7 @@ fn data_and_choices_by_turns_keep_their_joint_distribution() {
     assert_eq!(seeds.len(), 10, "{seeds:?}");
 }
 
-/// A number from the environment.
+/// Returns a number from the environment.
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(otherwise)
 }
@@ -306,7 +310,7 @@ fn random_programs_keep_their_posterior() {
     judge(&tally(0..60));
 }
 
-/// Seeds and plans that found errors.
+/// Seeds and plans that once revealed errors.
 const ONCE_WRONG: [(u64, &str); 4] = [
     (3846, "slice(one($continuous));"),
     (100_158, "hmc($continuous, steps = 2, marginal = @z10[0] + @z9[1]);"),
@@ -339,8 +343,8 @@ fn many_random_programs_keep_their_posterior() {
     judge(&tally(first..first + number("ENUMERATED", 3000)));
 }
 
-/// Not an exact test: long chains of the default plan from the prior come near the
-/// posterior, so it reaches all states. Some mix slowly.
+/// Not an exact test: long chains of the default plan, started from the prior, come close
+/// to the posterior, so the plan reaches all states. Some chains mix slowly.
 #[test]
 #[ignore = "minutes"]
 fn default_plans_reach_the_posterior() {

@@ -1,13 +1,13 @@
-//! Each program in `programs/errors/<phase>/` holds one kind of mistake; what the user is
-//! told is in `tests/snapshots`.
+//! Each program in `programs/errors/<phase>/` has one kind of mistake; its messages are
+//! in `tests/snapshots`.
 //!
-//! A new file becomes a test by itself. `INSTA_UPDATE=always cargo test --test errors`
-//! accepts the messages as they are: read them first as someone would who wrote that
-//! program.
+//! A new file becomes a test automatically.
+//! `INSTA_UPDATE=always cargo test --test errors` accepts the present messages: read them
+//! first as the author of that program would.
 //!
-//! `parse` is what the grammar refuses, `name` and `type` what compiling refuses,
-//! `runtime` what a short run of one chain meets. Programs in folders below these are
-//! there to be included.
+//! `parse` has programs that the grammar rejects, `name` and `type` those that do not
+//! compile, and `runtime` those that fail in a short run of one chain. Programs in
+//! subfolders are there to be included.
 
 use pcadlang::diag::{Diagnostic, IntoDiagnostic, SourceMap, render};
 use pcadlang::syntax::parse;
@@ -15,17 +15,18 @@ use pcadlang::syntax::parse;
 use pcadlang::{Error, Program, RunOptions};
 use std::path::Path;
 
-/// What a phase says about the program at a path.
+/// Returns the errors of the program at a path in some phase.
 type Diagnose = fn(&Path) -> Error;
 
-/// The path from the crate's root, so that no message depends on where the crate lies.
+/// Returns the path relative to the crate's root, so that messages do not depend on where
+/// the crate is.
 fn relative(path: &Path) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = root.canonicalize().unwrap();
     path.canonicalize().unwrap().strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/")
 }
 
-/// The messages of the parser alone.
+/// Returns the messages of the parser alone.
 fn parsing(path: &Path) -> Error {
     let text = std::fs::read_to_string(path).unwrap();
     let mut sources = SourceMap::new();
@@ -35,7 +36,7 @@ fn parsing(path: &Path) -> Error {
     Error { diagnostics, sources }
 }
 
-/// What loading and compiling say; data need not be given.
+/// Returns the errors of loading and compiling; data may be missing.
 fn compiling(path: &Path) -> Error {
     match Program::open(&relative(path)).and_then(|p| p.without_data().compile()) {
         Ok(_) => panic!("{} is taken for correct", path.display()),
@@ -43,7 +44,7 @@ fn compiling(path: &Path) -> Error {
     }
 }
 
-/// What a short run says of a program that compiles.
+/// Returns the error of a short run of a program that compiles.
 fn running(path: &Path) -> Error {
     let model = match Program::open(&relative(path)).and_then(|p| p.without_data().compile()) {
         Ok(model) => model,
@@ -56,7 +57,7 @@ fn running(path: &Path) -> Error {
     }
 }
 
-/// The messages for the program at a path, as shown without colours.
+/// Returns the messages for the program at a path, rendered without colours.
 fn message(path: &Path, diagnose: Diagnose) -> String {
     let Error { diagnostics, sources } = diagnose(path);
     assert!(!diagnostics.is_empty(), "{} is taken for correct", path.display());
@@ -71,7 +72,7 @@ fn message(path: &Path, diagnose: Diagnose) -> String {
     render(&sources, &diagnostics, false)
 }
 
-/// A test of the programs of one phase.
+/// Defines a test of the programs of one phase.
 macro_rules! phase {
     ($name:ident, $glob:literal, $diagnose:expr) => {
         #[test]

@@ -1,5 +1,5 @@
-//! `pcadlang evaluate` on small datasets: both layouts, resumption, cases that fail, and
-//! that the truth has no influence.
+//! `pcadlang evaluate` on small datasets: both layouts, resumption, failing cases, and
+//! that the ground truth has no influence.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -15,7 +15,7 @@ const PROGRAM: &str = "include \"std/scene.pcad\" as scene; data photo: image \"
     observe scene.contour(view, size = 32) = photo as picture;
     infer { repeat 5 { drift(one(@**)); collect r; } }";
 
-/// The same, with what a detector says.
+/// The same program with keypoints from a detector.
 const DETECTED: &str =
     "include \"std/scene.pcad\" as scene; data photo: image; data keypoints: json = { keypoints: { hip: [0, 0] } };
     assume r ~ uniform(0.3, 1.5);
@@ -31,7 +31,7 @@ fn picture(r: f64) -> Vec<u8> {
     png(disc(48, 32, 24.0, 16.0, r))
 }
 
-/// Folders `a`, `b` (with a camera) and `notes` (without a picture).
+/// Writes the folders `a`, `b` (with a camera) and `notes` (without a picture).
 fn folders(f: &Folder) {
     for name in ["data", "data/a", "data/b", "data/notes"] {
         std::fs::create_dir(f.path().join(name)).unwrap();
@@ -44,7 +44,8 @@ fn folders(f: &Folder) {
         .write("data/b/camera.json", CAMERA);
 }
 
-/// People `one` and `two`; every field beside `id` and `image` is `poison`.
+/// Writes the people `one` and `two`; every field except for `id` and `image` is
+/// `poison`.
 fn people(f: &Folder, poison: &Value) {
     std::fs::create_dir_all(f.path().join("people")).unwrap();
     f.write("p.pcad", PROGRAM).write("d.pcad", DETECTED);
@@ -123,7 +124,7 @@ fn a_folder_for_each_case() {
         }
     }
     assert!(!f.exists("out/predictions.json") && !f.exists("out/notes"));
-    // Each case is what `run` gives, its camera included.
+    // Each case equals the result of `run`, including its camera.
     let run = |camera: &[&str], out: &str| {
         let image = format!("data/{out}/image.png");
         let mut args = vec!["run", "p.pcad", "--observe", &image, "--out", out, "--quiet"];
@@ -136,8 +137,8 @@ fn a_folder_for_each_case() {
     run(&["--camera", "data/b/camera.json"], "b");
 }
 
-/// What lies beside a picture is not even opened: a reader of a pipe without a writer
-/// would wait for ever.
+/// Other files beside a picture are not even opened: reading a pipe without a writer
+/// would block forever.
 #[cfg(unix)]
 #[test]
 fn the_truth_in_a_folder_is_not_opened() {
@@ -169,7 +170,7 @@ fn people_and_their_predictions() {
     let p = json_of(&f, "out/predictions.json");
     assert_eq!((&p["one"]["keypoints"], &p["two"]["keypoints"]), (&Value::Null, &Value::Null));
     assert_eq!(p["one"]["seconds"], e["cases"][1]["seconds"]);
-    // A run that found some is reused with them.
+    // A run that has keypoints is reused with them.
     f.write(
         "out/one/keypoints.json",
         r#"{"keypoints": {"l_hip": [3.5, 4, 0.2]}, "best": {"l_hip": [0, 0]}, "seconds": 7}"#,
@@ -245,7 +246,7 @@ fn keypoints_of_a_detector() {
     assert!((x("one") - 41.5).abs() < 1e-3 && x("two").abs() < 1e-3, "{} {}", x("one"), x("two"));
     let run = json_of(&f, "out/one/run.json");
     assert_eq!(run["observe"], json!(["photo=people/one.png", "keypoints=found.json#one"]));
-    // Another person in the file changes nothing for this one.
+    // Another person in the file does not affect this one.
     f.write(
         "found.json",
         r#"{"one": {"keypoints": {"hip": [41.5, 3]}, "seconds": 1}, "three": {}}"#,
@@ -280,7 +281,7 @@ fn what_is_done_is_not_done_again() {
     );
     assert_eq!((f.read("out/evaluation.json"), f.files()), (before, files));
     assert_eq!(["out/a/run.json", "out/b/run.json"].map(|n| modified(&f, n)), times);
-    // One that is gone, and one that was stopped, are done again.
+    // A case whose folder is missing, and one that was interrupted, are run again.
     let (a, b) = (draws(&f, "out/a"), draws(&f, "out/b"));
     std::fs::remove_dir_all(f.path().join("out/a")).unwrap();
     let stopped = f.read("out/b/run.json").replace("\"done\"", "\"running\"");
@@ -288,7 +289,7 @@ fn what_is_done_is_not_done_again() {
     let d = evaluate(&f, &all);
     assert!(d.code == 0 && !d.err.contains("before"), "{}", d.err);
     assert_eq!((draws(&f, "out/a"), draws(&f, "out/b")), (a, b));
-    // One case of them anew: the other stays in the table.
+    // One case is run again: the other stays in the table.
     let d = evaluate(&f, &["data", "--out", "out", "--only", "a", "--fresh"]);
     assert!(
         !d.err.contains("before") && d.out.contains("| a ") && d.out.contains("| b "),
@@ -347,12 +348,13 @@ fn a_case_that_fails_does_not_stop_the_rest() {
     assert!(d.out.contains("| failed ") && d.out.contains("* a: data/a/image.png: "), "{}", d.out);
     assert_eq!(json_of(&f, "out/a/run.json")["state"], "failed");
     assert!(!f.exists("out/a/depth.npy") && f.exists("out/b/depth.npy"));
-    // Mended, only that one is run.
+    // After the file is repaired, only that case is run.
     f.write("data/a/image.png", picture(9.0));
     let d = evaluate(&f, &["data", "--out", "out"]);
     assert!(d.code == 0 && d.err.contains("2/2 b: already done"), "{}", d.err);
     assert!(f.exists("out/a/depth.npy"));
-    // A wrong camera is a case's own too, and takes what an earlier run left with it.
+    // An invalid camera also affects only its own case, and the earlier results of that
+    // case are removed.
     f.write("data/b/camera.json", "{}");
     let d = evaluate(&f, &["data", "--out", "out", "--fresh"]);
     assert!(d.code == 1 && d.err.contains("error: data/b/camera.json: "), "{}", d.err);
@@ -415,7 +417,7 @@ fn what_is_no_dataset_leaves_nothing() {
     }
 }
 
-/// Ctrl-C ends the case at hand, keeps its draws, and does not count it as done.
+/// Ctrl-C ends the present case, keeps its draws, and does not count it as done.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_evaluation_goes_on_later() {
@@ -423,7 +425,7 @@ fn an_interrupted_evaluation_goes_on_later() {
     use std::time::Duration;
     let f = Folder::new("evaluate_interrupted");
     folders(&f);
-    // The command of the first session would take a year.
+    // The first evaluation would take a year.
     let program = PROGRAM.replace("repeat 5", "repeat 1000000000");
     f.write("p.pcad", program);
     let mut child = Command::new(env!("CARGO_BIN_EXE_pcadlang"))
@@ -456,7 +458,7 @@ fn an_interrupted_evaluation_goes_on_later() {
     assert_eq!((status(0), status(1)), (json!("interrupted"), json!("pending")));
     assert!(f.read("out/table.md").contains("| interrupted |") && !f.exists("out/b"));
     assert!(f.exists("out/a/depth.npy") && draws(&f, "out/a").lines().count() > 10);
-    // Other settings than those of a case that was begun are an error too.
+    // Settings that differ from those of an unfinished case are an error, too.
     let d = evaluate(&f, &["data", "--out", "out"]);
     assert!(
         d.code == 1

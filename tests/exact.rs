@@ -1,5 +1,5 @@
-//! Kernels against exact answers: conjugate, enumerable, recursive, changing-structure
-//! and open-universe models.
+//! Kernels compared with exact answers: conjugate, enumerable, recursive,
+//! changing-structure and open-universe models.
 
 mod common;
 use common::*;
@@ -15,7 +15,7 @@ fn conjugate_normal(kernel: &str) {
     assert_conjugate(kernel, &text);
 }
 
-/// Draws of x have the mean and variance of that posterior.
+/// Asserts that draws of x have the mean and variance of that posterior.
 fn assert_conjugate(kernel: &str, text: &str) {
     let d = run(text, 1, 2);
     assert_mean(kernel, &d["x"], 1.6, 0.06);
@@ -28,8 +28,8 @@ fn conjugate_normal_by_every_kernel() {
     kernels::exact::CONJUGATE.iter().for_each(|k| conjugate_normal(k));
 }
 
-/// The mean of a component and the labels of three points: a mixture, and a chain in
-/// which labels follow each other.
+/// The mean of a component and the labels of three points: of a mixture, and of a Markov
+/// chain of labels.
 #[test]
 fn labels_are_summed_out() {
     let y = [0.3, 1.6, 2.4];
@@ -70,8 +70,8 @@ fn labels_are_summed_out() {
     }
 }
 
-/// Two stages of acceptance, the first by a surrogate with another mean and width; by
-/// hand and by a kernel of the program.
+/// Two-stage acceptance, first by a surrogate with another mean and width; with built-in
+/// kernels and with one declared in the program.
 #[test]
 fn surrogates_leave_the_posterior_as_it_is() {
     for kernel in kernels::exact::DELAYED {
@@ -84,7 +84,8 @@ fn surrogates_leave_the_posterior_as_it_is() {
     }
 }
 
-/// 20,000 draws by slices of two modes, one narrow, follow the distribution as a whole.
+/// 20,000 draws by slice sampling from two modes, one of them narrow, have the right
+/// distribution as a whole.
 #[test]
 fn slices_have_the_right_distribution() {
     let density = |x: f64| {
@@ -113,7 +114,7 @@ fn slices_have_the_right_distribution() {
     }
 }
 
-/// The default plan, nothing collected by hand.
+/// The default plan, without an `infer` block.
 #[test]
 fn conjugate_normal_by_the_default_plan() {
     let d = run("assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;", 3, 8);
@@ -149,7 +150,7 @@ fn support_that_depends_on_another_choice() {
     }
 }
 
-/// Geometric recursion: two calls, unbounded numbers of choices.
+/// Geometric recursion: two calls, with an unbounded number of choices.
 #[test]
 fn recursion_against_enumeration() {
     let weight = |a: f64| (a + 1.0) * 0.25 * 0.5f64.powf(a) * normal_pdf(3.0, a, 0.8);
@@ -174,7 +175,8 @@ fn recursion_against_enumeration() {
     }
 }
 
-/// Which choices exist depends on a choice, and both branches draw at the same address.
+/// Which choices exist depends on a choice, and both branches draw a choice of the same
+/// name.
 #[test]
 fn branches_with_choices_of_their_own() {
     let w1 = 0.3 * normal_pdf(3.0, 0.0, 2f64.sqrt());
@@ -194,8 +196,8 @@ fn branches_with_choices_of_their_own() {
     }
 }
 
-/// A hidden Markov chain by a loop that reads its own container, against
-/// forward-backward.
+/// A hidden Markov model as a loop that reads its own container, compared with the
+/// forward-backward algorithm.
 #[test]
 fn hidden_markov_model() {
     let obs = [0.2, 1.1, 2.3, 1.9, 0.4];
@@ -242,12 +244,12 @@ fn hidden_markov_model() {
     }
 }
 
-/// Partitions of three points under a Dirichlet process by stick-breaking and mem,
-/// against the five partitions.
+/// Partitions of three points under a Dirichlet process (stick-breaking with `mem`),
+/// compared with the enumeration of all five partitions.
 #[test]
 fn open_universe_with_mem() {
     let y = [-1.0, -0.5, 2.0];
-    // Marginal density of a group: points given a centre ~ normal(0, 2), noise 1.
+    // The marginal density of a group of points with a centre ~ normal(0, 2) and noise 1.
     let group = |points: &[f64]| {
         integrate(
             |m| {
@@ -259,7 +261,7 @@ fn open_universe_with_mem() {
             3000,
         )
     };
-    // Chinese restaurant process with alpha = 1 over 3 points: n! denominators.
+    // A Chinese restaurant process with alpha = 1 over 3 points: the denominators are n!.
     let together = group(&y) * 2.0 / 6.0;
     let first_two = group(&y[..2]) * group(&y[2..]) / 6.0;
     let outer = group(&[y[0], y[2]]) * group(&y[1..2]) / 6.0;
@@ -284,8 +286,8 @@ fn open_universe_with_mem() {
     }
 }
 
-/// Elliptical slice with a non-zero mean and full covariance, and a mean that depends on
-/// a choice of the block.
+/// Elliptical slice sampling with a non-zero mean and full covariance, and with a mean
+/// that depends on a choice of the same block.
 #[test]
 fn elliptical_slice_with_full_covariance() {
     // Prior N([1, -1], [[2, .9], [.9, 1]]), observe x0 + x1 = 1.5 with sd 0.5.
@@ -313,8 +315,8 @@ fn elliptical_slice_with_full_covariance() {
     assert_mean("a", &d["a"], 2.0 / 2.25, 0.05);
 }
 
-/// A gp over five points, its bandwidth unknown: whitened and centred forms agree with
-/// quadrature over the bandwidth.
+/// A Gaussian process over three points with unknown bandwidth: the whitened and centred
+/// forms agree with quadrature over the bandwidth.
 #[test]
 fn gaussian_process_with_unknown_bandwidth() {
     let text = |centred: bool, kernel: &str| {
@@ -361,8 +363,8 @@ fn gaussian_process_with_unknown_bandwidth() {
     assert_mean("bandwidth", &white["l"], expected, 0.1);
 }
 
-/// Predictions and what no observation asks for are drawn from the prior given the rest,
-/// and never proposed.
+/// Predictions, and choices that no observation depends on, are drawn from the prior
+/// given the rest, and never proposed.
 #[test]
 fn predictions_are_drawn_anew_and_not_proposed() {
     let d = run(
@@ -383,8 +385,8 @@ fn predictions_are_drawn_anew_and_not_proposed() {
     );
 }
 
-/// Two far modes: an annealed population ends in each as often as its mass says, which no
-/// chain of small steps does.
+/// Two distant modes: an annealed population ends in each in proportion to its mass,
+/// which a chain of small steps does not achieve.
 #[test]
 fn a_population_settles_by_mass() {
     let draws = run(
@@ -400,13 +402,13 @@ fn a_population_settles_by_mass() {
     );
     let x = &draws["x"];
     assert_eq!(x.len(), 300);
-    // Three standard errors of a share of 0.7 in 300 chains are 0.08.
+    // Three standard errors of a proportion of 0.7 in 300 chains are 0.08.
     let right = x.iter().filter(|x| **x > 0.0).count() as f64 / 300.0;
     assert!((right - 0.7).abs() < 0.08, "{right}");
 }
 
-/// Two modes far apart, 0.3 N(-4, 0.5) + 0.7 N(4, 0.5): replica exchange crosses between
-/// them, the kernel inside does not.
+/// Two distant modes, 0.3 N(-4, 0.5) + 0.7 N(4, 0.5): replica exchange moves between
+/// them, a plain chain does not.
 #[test]
 fn replica_exchange_weighs_modes_that_are_far_apart() {
     let text = |kernel: &str| {
@@ -422,7 +424,7 @@ fn replica_exchange_weighs_modes_that_are_far_apart() {
     assert!((mean(&plain["x < 0"]) - 0.3).abs() > 0.1, "a plain chain stays where it is");
 }
 
-/// A climb ends where the density is highest: of a normal posterior at its mean.
+/// Optimisation ends at the highest density; for a normal posterior, this is its mean.
 #[test]
 fn optimize_finds_the_mode() {
     let d = run(
@@ -440,9 +442,9 @@ fn optimize_finds_the_mode() {
     assert!((d["b"][0] - (p * v - q * u) / det).abs() < 1e-5, "{}", d["b"][0]);
 }
 
-/// Two modes of different weights: a search finds both, jumps between them keep the
-/// posterior, and one that goes by a surrogate which sees neither keeps it, too (it has
-/// to ask for the choice: one that nothing asks for is not there).
+/// Two modes of different weights: a search finds both, and jumps between them leave the
+/// posterior invariant. So does a search by a surrogate that sees neither mode (it has to
+/// depend on the choice, since a choice that nothing depends on does not exist).
 #[test]
 fn jumps_between_modes_keep_their_weights() {
     let density = |x: f64| normal_pdf(x, 0.5, 2.0) * normal_pdf(9.0, x * x, 1.0);
@@ -471,7 +473,7 @@ fn jumps_between_modes_keep_their_weights() {
     }
 }
 
-/// Modes that mirror each other are as high as each other, and are two all the same.
+/// Mirrored modes have equal densities, but are still recognised as two.
 #[test]
 fn modes_that_mirror_each_other_are_both_visited() {
     let d = run(
@@ -485,8 +487,8 @@ fn modes_that_mirror_each_other_are_both_visited() {
     assert_mean("mirrored modes", &positive, 0.5, 0.02);
 }
 
-/// The search goes by surrogates, whose mode is 1; the chain climbs on from there to the
-/// observation's own.
+/// The search uses surrogates, whose mode is 1; the chain then climbs to the mode of the
+/// observation itself.
 #[test]
 fn a_search_by_surrogates_ends_at_the_mode_of_the_observations() {
     let d = run(
@@ -498,8 +500,8 @@ fn a_search_by_surrogates_ends_at_the_mode_of_the_observations() {
     assert!((d["x"][0] - 200.0 / 101.0).abs() < 1e-5, "{}", d["x"][0]);
 }
 
-/// Annealed particles estimate the evidence, here known, and their states are draws from
-/// the posterior.
+/// Annealed particles estimate the evidence, which is known here, and their states are
+/// draws from the posterior.
 #[test]
 fn particles_give_the_evidence() {
     let kernel = kernels::exact::SIMULATED[0];
@@ -537,8 +539,8 @@ fn particles_find_both_modes() {
     assert_mean("c by smc", &d["c"], yes / (yes + no), 0.06);
 }
 
-/// No likelihood: a coin that shows heads in so many of ten flips, by simulating. With
-/// the number itself observed and `eps` below one the posterior is exact.
+/// Without a likelihood: a coin's number of heads in ten flips, by simulation. The count
+/// itself is observed and `eps` is below one, so the posterior is exact.
 #[test]
 fn simulated_data_stand_in_for_the_likelihood() {
     let text = "assume p ~ beta(1, 1); observe binomial(10, p) = 7;";
@@ -554,8 +556,8 @@ fn simulated_data_stand_in_for_the_likelihood() {
     }
 }
 
-/// The share of simulated data that come near enough is estimated without bias: 7 heads
-/// of 10 have a probability of 1 / 11.
+/// The fraction of simulated data that are close enough is estimated without bias: 7
+/// heads of 10 have probability 1 / 11.
 #[test]
 fn falling_tolerances_give_the_probability_of_the_data() {
     let kernel = kernels::exact::SIMULATED[3];
@@ -568,7 +570,7 @@ fn falling_tolerances_give_the_probability_of_the_data() {
     assert!((log + 11f64.ln()).abs() < 0.03, "{log}");
 }
 
-/// A choice that vanishes with the value that its own mean follows.
+/// A choice that vanishes together with the value on which its own mean depends.
 #[test]
 fn choices_vanish_with_the_density_that_they_had() {
     let there = integrate(|x| normal_pdf(x, 0.0, 1.0) * normal_pdf(1.0, x, 1.0), -12.0, 12.0, 2000);

@@ -1,5 +1,5 @@
-//! The example of every built-in runs: expressions have the value that stands beside
-//! them, programs are drawn from, scored, and their plans run.
+//! The example of every built-in runs: expressions have the value stated beside them, and
+//! programs can be simulated and scored, and their plans run.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -16,7 +16,7 @@ use pcadlang::syntax::format;
 use pcadlang::trace::Draws;
 use pcadlang::{Model, Program, RunOptions};
 
-/// The files that examples read.
+/// Writes the files that examples read.
 fn files() -> Folder {
     let f = Folder::new("examples");
     let ball = png(disc(64, 64, 32.0, 32.0, 15.0));
@@ -25,18 +25,18 @@ fn files() -> Folder {
     f.write("model.yml.gz", forests::gzip(forests::small().yaml().as_bytes()));
     f.write("person.json", include_str!("../examples/images/skier.keypoints.json"));
     f.succeeds(&["contours", "ball.png", "-o", "contours.png"]);
-    // Shipped files are found by their names alone.
+    // Files are found by their name alone.
     std::env::set_current_dir(f.path()).unwrap();
     f
 }
 
-/// The value that an example says its expression has, if it is one.
+/// Splits an example into an expression and its stated value; `None` if it is a program.
 fn expression(example: &str) -> Option<(&str, &str)> {
     let (expression, value) = example.split_once("//").unwrap_or((example, "nothing said"));
     (!expression.contains(';')).then_some((expression.trim(), value.trim()))
 }
 
-/// A program with the module of scenes.
+/// Adds the scene module to a program that needs it.
 fn whole(text: &str) -> String {
     if text.contains("scene.") { format!("{INCLUDE}\n{text}\n") } else { format!("{text}\n") }
 }
@@ -46,14 +46,14 @@ fn compiled(f: &Folder, text: &str) -> Result<Model, String> {
     Program::open("example.pcad").and_then(Program::compile).map_err(|e| e.to_string())
 }
 
-/// The names that a program gives at its top level.
+/// Returns the names that a program defines at its top level.
 fn names(text: &str) -> impl Iterator<Item = &str> {
     let named =
         text.lines().filter_map(|line| line.strip_prefix("let ").or(line.strip_prefix("assume ")));
     named.filter_map(|rest| rest.split_whitespace().next())
 }
 
-/// A value is something; a shape or view shows something.
+/// Checks that a value is not empty, and that a shape or view is visible.
 fn is_seen(value: &Value) -> Result<(), String> {
     match as_view(value, None) {
         Some(view) if view.contours(64).is_empty() => Err("nothing of it is seen".into()),
@@ -62,7 +62,7 @@ fn is_seen(value: &Value) -> Result<(), String> {
     }
 }
 
-/// An expression has the value that is said.
+/// Checks that an expression has the stated value.
 fn evaluates(f: &Folder, text: &str, value: &str) -> Result<(), String> {
     let mut trace =
         compiled(f, &format!("let shown = {text};"))?.simulate(1, 0).map_err(|e| e.to_string())?;
@@ -73,7 +73,8 @@ fn evaluates(f: &Folder, text: &str, value: &str) -> Result<(), String> {
     if shown.to_string() == value { is_seen(&shown) } else { Err(format!("{text} // {shown}")) }
 }
 
-/// A program can be drawn from and scored, its names have values, and its plan moves.
+/// Checks that a program can be simulated and scored, that its names have values, and
+/// that its plan records draws.
 fn runs(f: &Folder, b: &Builtin, text: &str) -> Result<(), String> {
     let model = compiled(f, text)?;
     let mut trace = model.simulate(1, 0).map_err(|e| e.to_string())?;
@@ -95,7 +96,7 @@ fn runs(f: &Folder, b: &Builtin, text: &str) -> Result<(), String> {
     if draws >= Some(10) { Ok(()) } else { Err(format!("it makes {draws:?} draws")) }
 }
 
-/// A bank is of one program, and the command brings it along.
+/// A bank belongs to one program, and is passed to the command.
 fn runs_with_a_bank(f: &Folder, text: &str) {
     f.write("knn.pcad", whole(text));
     f.succeeds(&[

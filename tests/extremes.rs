@@ -1,6 +1,6 @@
-//! Everything that takes numbers, through sizes and values from 1e-300 to 1e300, 0,
-//! infinities and NaN. What is driven through what, with which bounds, and the number of
-//! points by subject: `docs/extremes.md`, whose table the tests hold to.
+//! Every function of numbers, over sizes and values from 1e-300 to 1e300, 0, infinities
+//! and NaN. `docs/extremes.md` has the subjects, the bounds and the numbers of points;
+//! the tests check its table.
 
 mod common;
 

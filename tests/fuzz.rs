@@ -1,5 +1,5 @@
-//! The targets of `fuzz/` on seeds, on every input that once went wrong, and on seeds
-//! with some bytes changed; and the seeds for longer sittings.
+//! Runs the targets of `fuzz/` on seeds, on every input that once failed, and on seeds
+//! with some bytes changed; and writes the seeds for longer fuzzing.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -50,7 +50,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Every file below a folder, in order.
+/// Returns every file below a folder whose name has this ending, sorted.
 fn files(dir: &Path, ending: &str) -> Vec<PathBuf> {
     let mut all = Vec::new();
     for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
@@ -92,7 +92,7 @@ fn pictures() -> Vec<Vec<u8>> {
     ]
 }
 
-/// Made once: its folder is everyone's.
+/// Made once, since its folder is shared by all tests.
 static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let text = "include \"std/scene.pcad\" as scene; assume r ~ uniform(0.3, 1); assume w ~ iid(flip(0.5), 2);
         assume view = scene.render(scene.sphere(r, sides = 8));";
@@ -110,7 +110,8 @@ static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
     std::fs::read(path).unwrap()
 });
 
-/// A triangle on a joint, as `.glb`, and as `.gltf` with its buffer within and beside.
+/// Returns a triangle on a joint, as `.glb`, and as `.gltf` with an embedded and an
+/// external buffer.
 fn bodies() -> Vec<Vec<u8>> {
     let document = || {
         let mut w = gltf::Writer::default();
@@ -160,7 +161,7 @@ const PEOPLE: [&str; 3] = [
     "{\"nose\": [1, 2, 0.5], \"hand\": null}",
 ];
 
-/// People in every layout.
+/// Returns people in every file layout.
 fn people() -> Vec<Vec<u8>> {
     let landmarks = [r#"{"x": 0.1, "y": 0.2, "z": 0, "visibility": 0.9}"#; 33].join(", ");
     let coco = ["10, 20, 0.9"; 17].join(", ");
@@ -176,7 +177,7 @@ fn people() -> Vec<Vec<u8>> {
     PEOPLE.iter().map(|t| t.as_bytes().to_vec()).chain(made.map(String::into_bytes)).collect()
 }
 
-/// What a target starts from.
+/// Returns the seeds of a target.
 fn seeds_of(target: &str) -> Vec<Vec<u8>> {
     let texts = |all: &[&str]| all.iter().map(|t| t.as_bytes().to_vec()).collect::<Vec<_>>();
     match target {
@@ -236,7 +237,7 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
     }
 }
 
-/// A stream of numbers.
+/// Returns the next number of a stream (xorshift).
 fn next(x: &mut u64) -> usize {
     *x ^= *x << 13;
     *x ^= *x >> 7;
@@ -244,7 +245,7 @@ fn next(x: &mut u64) -> usize {
     *x as usize
 }
 
-/// Bytes with one to four of them changed, taken out, or doubled.
+/// Applies one to four mutations: bytes are changed, removed or duplicated.
 fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
     let mut bytes = seed.to_vec();
     for _ in 0..next(x) % 4 + 1 {
@@ -266,8 +267,8 @@ fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
     bytes
 }
 
-/// Each target takes its seeds, and each seed is good: what is changed of it goes further
-/// than the first check.
+/// Each target accepts its seeds, and each seed is valid, so that its mutations get
+/// beyond the first check.
 #[test]
 fn seeds() {
     use pcadlang::geom::{FileFrame, gltf::load, obj};
@@ -281,7 +282,7 @@ fn seeds() {
             let text = || std::str::from_utf8(seed).unwrap();
             let good = match name {
                 "obj" => obj::load(seed).is_ok(),
-                // One has its buffer beside it.
+                // One of them has an external buffer.
                 "gltf" => load(seed, &FileFrame::default(), &|_| Err("beside".into())).map_or_else(
                     |e| e.to_string().contains("beside"),
                     |loaded| loaded.mesh().is_ok(),
@@ -305,7 +306,7 @@ fn seeds_with_bytes_changed() {
     for (name, target) in TARGETS.into_iter().filter(|(name, _)| *name != "program") {
         let mut x = 0x9e37_79b9_7f4a_7c15;
         for seed in seeds_of(name) {
-            // A chain is run from each checkpoint.
+            // A chain is run from each checkpoint, which takes longer.
             for _ in 0..if name == "checkpoint" { 10 } else { 30 } {
                 target(&changed(&seed, &mut x));
             }
@@ -313,7 +314,7 @@ fn seeds_with_bytes_changed() {
     }
 }
 
-/// What fuzzing found, by target.
+/// Inputs that fuzzing found, by target.
 #[test]
 fn findings() {
     for (name, target) in TARGETS {
@@ -324,7 +325,7 @@ fn findings() {
     }
 }
 
-/// Writes the seeds where `fuzz/seeds.sh` wants them.
+/// Writes the seeds to the folder that `fuzz/seeds.sh` sets.
 #[test]
 #[ignore = "writes files: see fuzz/seeds.sh"]
 fn write_seeds() {

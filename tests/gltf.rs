@@ -1,5 +1,5 @@
-//! glTF files: the shipped body written with a skin and read back, scenes of every kind
-//! of primitive, and what is refused.
+//! glTF files: the shipped body written with a skin and read back, scenes with every kind
+//! of primitive, and files that are refused.
 
 #[path = "common/gltf.rs"]
 mod files;
@@ -29,13 +29,13 @@ fn body() -> Armature {
     Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences).unwrap()
 }
 
-/// Every corner of every triangle in a pose.
+/// Returns every corner of every triangle in a pose.
 fn corners(body: &Armature, pose: &[JointPose]) -> Vec<DVec3> {
     let posed = body.posed_vertices(pose, &Rules::default()).unwrap();
     body.triangles().iter().flatten().map(|v| posed[*v as usize]).collect()
 }
 
-/// Another rotation for each joint, by name.
+/// Returns a pose with a different rotation for each joint, determined by its name.
 fn pose(body: &Armature) -> Vec<JointPose> {
     let turn = |name: &str| {
         let k = name.bytes().fold(7u32, |k, b| k.wrapping_mul(31).wrapping_add(u32::from(b)));
@@ -54,8 +54,8 @@ fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
 fn the_shipped_body_comes_back_and_moves_alike() {
     let body = body();
     let identity = json!({});
-    // Files with other axes and units, and one that an exporter has put right by a node
-    // above.
+    // Files with other axes and units, and one that an exporter has corrected by a root
+    // node.
     let turned = json!({ "rotation": [-std::f64::consts::FRAC_1_SQRT_2, 0, 0, std::f64::consts::FRAC_1_SQRT_2], "scale": [0.01, 0.01, 0.01] });
     let to_z = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y);
     let to_x = DMat3::from_cols(-DVec3::Y, DVec3::X, DVec3::Z);
@@ -106,7 +106,7 @@ fn the_shipped_body_comes_back_and_moves_alike() {
     }
 }
 
-/// Triangles as corners, in no order.
+/// Returns the corners of all triangles, sorted.
 fn faces(m: &Mesh) -> Vec<[u32; 9]> {
     let corner = |v: u32| m.positions[v as usize].to_array().map(|x| (x + 0.0).to_bits());
     let face = |t: &[u32; 3]| {
@@ -131,7 +131,7 @@ fn what_is_written_here_reads_back() {
     assert_eq!(faces(&by_gltf), faces(&obj::load_in(obj::write(&m).as_bytes(), &frame).unwrap()));
 }
 
-/// A square in the plane z = 0, drawn in some way.
+/// Returns a square in the plane z = 0, as a primitive of the given mode.
 fn square(mode: u32, order: &[u8]) -> (Writer, Value) {
     let mut w = Writer::default();
     let at = w.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
@@ -163,8 +163,8 @@ fn strips_fans_and_the_rest() {
     let (w, d) = square(4, &[0, 1, 9]);
     assert_eq!(read(&glb(w, d)).unwrap_err(), "mesh `sq` uses vertex 9, but it has 4");
 
-    // Transforms of nodes add up, a mirror keeps the outside out, and what the scene
-    // leaves out is left out.
+    // Node transforms are composed, a mirrored mesh keeps its outside, and nodes outside
+    // of the scene are left out.
     let (w, mut d) = square(5, &[]);
     d["nodes"] = json!([
         { "children": [1], "translation": [0, 0, 5] },
@@ -248,7 +248,7 @@ fn what_cannot_be_read_is_said() {
     assert!(read(b"{").unwrap_err().starts_with("cannot read the glTF file: EOF"));
 }
 
-/// A square on two joints, with a hat on the second, and what its weights are.
+/// Returns a square with these weights on the joints, and a hat on the second joint.
 fn two(weights: &[[f32; 8]; 4]) -> (Vec<u8>, Value) {
     let (mut w, mut d) = square(5, &[]);
     let half =
@@ -288,7 +288,7 @@ fn skins_are_put_in_order() {
     let names: Vec<&str> = body.rig().joints().iter().map(|j| &*j.name).collect();
     assert_eq!(names, ["a", "a#3", "joint_2", "a#4", "a#2"]);
     assert_eq!(body.rig().joints()[1].parent, Some(0), "over a node that is no joint");
-    // The four heaviest, made to sum to 1.
+    // The four largest weights, normalised to sum to 1.
     assert_eq!(body.influences()[0].joints, [2, 3, 1, 4]);
     let sum = 0.3 + 0.25 + 0.2 + 0.15;
     for (w, known) in body.influences()[0].weights.iter().zip([0.3, 0.25, 0.2, 0.15]) {
@@ -373,7 +373,7 @@ fn programs_read_them_with_options() {
     let best = -f64::ln(std::f64::consts::TAU);
     let filled = |tall: &str| text.replace("HAND", &head.x.to_string()).replace("TALL", tall);
     assert!((likelihood(program(&filled("3"))) - best).abs() < 1e-9);
-    // Another file in its place is read alike.
+    // Another file in its place is read in the same way.
     let other = program(&filled("5")).observe_file("crate", &path("other.obj")).unwrap();
     assert!((likelihood(other) - best).abs() < 1e-9);
 
@@ -403,7 +403,7 @@ fn programs_read_them_with_options() {
         let said = fails(data);
         assert!(said.contains(says), "{data}: {said}");
     }
-    // Options are looked at also where another file is given.
+    // Options are checked even if another file is given.
     let wrong = program("data d = mesh(\"box.glb\", unit = -1);\nassume x ~ normal(0, 1);");
     let said = wrong.observe_file("d", &path("other.obj")).unwrap().compile().unwrap_err();
     assert!(
@@ -412,7 +412,7 @@ fn programs_read_them_with_options() {
     );
 }
 
-/// xorshift, so that the mutations are the same everywhere.
+/// Returns the next number of a xorshift stream, so that the mutations are reproducible.
 fn next(state: &mut u64) -> usize {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -434,7 +434,7 @@ fn no_bytes_make_it_stumble() {
                 0 => file[at] = next(&mut state) as u8,
                 1 => file[at] ^= 1 << (next(&mut state) % 8),
                 2 => file.truncate(at.max(1)),
-                // Numbers of the document, which stays JSON.
+                // Digits of the document are changed, which keeps it valid JSON.
                 _ => {
                     let digits: Vec<usize> =
                         (20..file.len()).filter(|i| file[*i].is_ascii_digit()).collect();

@@ -1,6 +1,5 @@
-//! Gradients through traces against central differences of the log joint density in the
-//! unconstrained space: the built-ins, the distributions and their transforms, structure,
-//! scenes.
+//! Gradients through traces compared with central differences of the log joint density in
+//! unconstrained space: built-ins, distributions and their transforms, structure, scenes.
 
 #[path = "common/tape.rs"]
 mod tape;
@@ -18,7 +17,7 @@ fn draws() -> Draws {
     Draws { key: StreamKey::new(9, 0, Purpose::VALUES), step: 0, substream: 0 }
 }
 
-/// The continuous choices, and where each is.
+/// Returns the continuous choices with their unconstrained coordinates.
 fn places(trace: &mut Trace) -> Vec<(Target, Vec<f64>)> {
     let selection = trace.select(&Selector::All);
     let all = trace.targets(selection).to_vec();
@@ -31,14 +30,14 @@ fn places(trace: &mut Trace) -> Vec<(Target, Vec<f64>)> {
     all.into_iter().filter_map(one).collect()
 }
 
-/// Compares at some draws from the prior, a little off where a draw may sit on a kink.
+/// Compares at several draws from the prior, slightly offset in case a draw is at a kink.
 fn check(text: &str) {
     let model = Program::parse(text).unwrap().compile().unwrap_or_else(|e| panic!("{text}\n{e}"));
     for seed in 0..4 {
         let mut trace = model.simulate(seed, 0).unwrap_or_else(|e| panic!("{text}\n{e}"));
         compare(&mut trace, text);
-        // White noise moves with its prior, and supports with their bounds: both stay
-        // with the trace.
+        // White noise that moves with its prior, and supports that move with their
+        // bounds, are not on the tape: these are left to the trace.
         let stays =
             ["whitened", "f ~ gp(", "uniform(a", "uniform(u", "half_cauchy(a", "a - s", "lo = a"];
         let noise =
@@ -77,7 +76,7 @@ fn compare(trace: &mut Trace, text: &str) {
             down[i] -= h;
             (at(&up) - at(&down)) / (2.0 * h)
         };
-        // Two widths: rounding spoils the small one, curvature the large one.
+        // Two step widths: rounding errors affect the small one, curvature the large one.
         let slopes = [slope(1e-5), slope(1e-4)];
         let scale = 1.0 + found[i].abs();
         let off = slopes.iter().map(|s| (s - found[i]).abs()).fold(f64::INFINITY, f64::min);
@@ -278,8 +277,8 @@ fn covariances() {
     }
 }
 
-/// Distributions that are values, drawn from and observed, by what their covariance is
-/// made of.
+/// Distributions that are values, both drawn from and observed, by the parameters of
+/// their covariance.
 #[test]
 fn covariances_of_distributions_as_values() {
     let of = "assume l ~ gamma(9, 9); assume s ~ gamma(9, 9); assume m ~ normal(0, 1); assume r ~ uniform(-0.8, 0.8);";
@@ -355,7 +354,7 @@ fn structure_passes_derivatives_through() {
     }
 }
 
-/// Several elements of the choices of a loop at once.
+/// Several elements of a loop's choices at once.
 #[test]
 fn elements_picked_by_an_array() {
     let text = "for i in 0 .. 3 { w[i] ~ normal(i, 1); } observe normal(w[[2, 0]], 0.5) = [1, -2];";
@@ -430,7 +429,7 @@ fn disc() -> ImageValue {
     ImageValue::contours(map, None)
 }
 
-/// Whether a pixel of 256 lies in the disc.
+/// Whether a pixel of a picture 256 pixels wide is in the disc.
 fn inside(i: u32) -> bool {
     let (x, y) = (f64::from(i % 256) + 0.5, f64::from(i / 256) + 0.5);
     (x / 4.0 - 34.0).hypot(y / 4.0 - 30.0) < 15.0
@@ -461,7 +460,8 @@ fn photo() -> Value {
 
 #[test]
 fn pictures_pull_where_their_score_rises() {
-    // Differences over half a pixel: sums over pieces and pixels change by small steps.
+    // Differences over half a pixel, since sums over pieces and pixels change in small
+    // steps.
     let half = 0.5 * 4.4 / 64.0;
     for (likelihood, seen) in [
         ("scene.chamfer(view, sigma = s, size = 64)", Value::object(disc())),
@@ -505,7 +505,7 @@ fn pictures_pull_where_their_score_rises() {
         };
         let mut here = [("x", 0.2), ("y", -0.1), ("t", 0.5), ("r", 0.8), ("s", 4.0)];
         at(&mut trace, &here);
-        // Without an observation that asks for it there is no s.
+        // If no observation depends on it, s does not exist.
         let targets: Vec<Target> = here.iter().filter_map(|(name, _)| find(&trace, name)).collect();
         let (mut all, mut prior) = (Vec::new(), Vec::new());
         trace
@@ -522,7 +522,8 @@ fn pictures_pull_where_their_score_rises() {
             };
             let slope = score(half) - score(-half);
             at(&mut trace, &here);
-            // By the coordinate itself, not the free one: x = lo + (hi - lo) expit(y).
+            // Differentiates by the coordinate itself, not the unconstrained one: x = lo
+            // + (hi - lo) expit(y).
             let (lo, hi) = match here[k].0 {
                 "t" => (-3.0, 3.0),
                 "r" => (0.0, 2.0),
@@ -537,7 +538,7 @@ fn pictures_pull_where_their_score_rises() {
         }
         let cosine = dot / (found * slopes).sqrt();
         let ratio = (found / slopes).sqrt();
-        // Pixels are in or out: their sums go by steps.
+        // Pixels are either inside or outside, so their sums change in steps.
         let least = if likelihood.contains("256") { 0.95 } else { 0.98 };
         assert!(
             cosine > least && (0.8..1.25).contains(&ratio),
@@ -546,7 +547,8 @@ fn pictures_pull_where_their_score_rises() {
     }
 }
 
-/// Densities as numbers, by the value and by what the distribution is made of.
+/// Densities as values, differentiated by their argument and by the distribution's
+/// parameters.
 #[test]
 fn log_densities() {
     let of = "assume a ~ normal(0.3, 1); assume s ~ gamma(9, 9); assume m ~ normal(0, 1);";
@@ -596,7 +598,7 @@ fn truncated_and_flat() {
     ] {
         check(&format!("{of} observe {d} = {seen};"));
     }
-    // Bounds that move take values along.
+    // Values move with their bounds.
     for d in [
         "truncated_normal(0.3, s, hi = a)",
         "truncated(normal(0.3, s), hi = a)",

@@ -1,10 +1,11 @@
-//! A newcomer goes through the guide: every file of its chapters is written, every
-//! command typed, in the order of the text and in one folder that holds nothing else but
-//! the lamp's picture. What the commands say must be what the guide shows.
+//! Follows the guide like a newcomer: writes every file of its chapters and types every
+//! command, in the order of the text, in a folder that initially contains only the lamp's
+//! picture. The output of each command must match the guide.
 //!
-//! In the guide, `title=NAME` after a block's language names the file it is; a `diff`
-//! block is an edit of the file `from`. Below a command is what it says: `...` stands for
-//! any lines, `[..]` for any text within one, `? N` for the exit code N.
+//! In the guide, `title=NAME` after a block's language is the name of the file that the
+//! block contains; a `diff` block is an edit of the file `from`. Below a command is its
+//! output: `...` stands for any lines, `[..]` for any text within a line, `? N` for exit
+//! code N.
 #![cfg(unix)]
 
 #[path = "common/folder.rs"]
@@ -14,7 +15,7 @@ use folder::Folder;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A block of a page: what stands after the fence, and the text.
+/// A block of a page: the text after the opening fence, and the block's own text.
 struct Block<'a> {
     info: &'a str,
     text: String,
@@ -40,7 +41,7 @@ fn blocks(page: &str) -> Vec<Block<'_>> {
     all
 }
 
-/// Whether lines are what is shown.
+/// Whether the output matches the lines shown.
 fn agree(shown: &[&str], said: &[&str]) -> bool {
     match shown.split_first() {
         None => said.is_empty(),
@@ -51,7 +52,7 @@ fn agree(shown: &[&str], said: &[&str]) -> bool {
     }
 }
 
-/// Whether a line is what is shown, with gaps.
+/// Whether a line matches the line shown, which may have gaps.
 fn fits(shown: &str, said: &str) -> bool {
     let Some((head, tail)) = shown.split_once("[..]") else { return shown == said };
     let Some(rest) = said.strip_prefix(head) else { return false };
@@ -81,7 +82,7 @@ fn type_in(block: &Block, folder: &Path, place: &str) {
             .output()
             .unwrap();
         let said = String::from_utf8(done.stdout).unwrap();
-        // On a busy machine a run may take long enough to say how far it is.
+        // On a busy machine, a run may take long enough to print its progress.
         let phases = ["starts, ", "warm-up, ", "sampling, ", "finishing, "];
         let is_progress = |l: &&str| phases.iter().any(|p| l.starts_with(p));
         let right =
@@ -91,7 +92,8 @@ fn type_in(block: &Block, folder: &Path, place: &str) {
     }
 }
 
-/// Makes an edit: lines with `-` go, lines with `+` come, the others say where.
+/// Applies an edit: lines with `-` are removed, lines with `+` inserted, the others
+/// locate the edit.
 fn edit(text: &str, diff: &str, place: &str) -> String {
     let mut text = text.to_owned();
     for hunk in diff.split("@@\n").skip(1) {
@@ -135,7 +137,7 @@ fn every_chapter() {
                     std::fs::write(at.join(title), edit(&from, &block.text, &place)).unwrap();
                 }
                 (_, Some(title)) => std::fs::write(at.join(title), &block.text).unwrap(),
-                // Every snippet is tested.
+                // All blocks are tested.
                 _ => panic!("{place}: a block that is neither a file nor a session"),
             }
         }

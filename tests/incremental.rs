@@ -1,6 +1,6 @@
-//! The same chain, bit for bit, by increments and by running everything again: every
-//! shipped program, and random ones. Programs that look at a picture do so at a few
-//! pixels and for a few steps, since running everything again draws everything anew.
+//! Incremental updates and full re-execution give bit-identical chains, for every shipped
+//! program and for random ones. Programs that compare a picture use few pixels and few
+//! steps, since full re-execution renders everything again.
 
 #[path = "common/programs.rs"]
 mod programs;
@@ -54,8 +54,8 @@ fn shipped_programs() {
     }
 }
 
-/// A shipped program that looks at a picture, at `size` pixels if it says at how many,
-/// and at what else is given.
+/// Checks a shipped program that compares a picture, at `size` pixels if it has that
+/// parameter, with the given data.
 fn same_of_picture(name: &str, size: Option<u32>, given: &[(&str, &str)], steps: u64, warmup: u64) {
     let open = || {
         let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
@@ -92,7 +92,7 @@ fn shipped_human() {
     same_of_picture("human.pcad", Some(48), &[SKIER], 60, 60);
 }
 
-/// With keypoints: joints, and kernels that follow their slopes.
+/// With keypoints: joints, and kernels that follow their gradients.
 #[test]
 fn shipped_human_with_keypoints() {
     same_of_picture("human.pcad", Some(48), &[SKIER, ("points", "skier.keypoints.json")], 60, 60);
@@ -118,8 +118,8 @@ fn shipped_animal() {
     same_of_picture("autorig.pcad", Some(48), &[SKIER], 20, 20);
 }
 
-/// A branch with choices of its own that one computation lets go of and the parameters of
-/// a choice take up.
+/// A branch with its own choices, on which one computation stops depending when the
+/// parameters of a choice start to depend on it.
 #[test]
 fn branches_that_change_hands() {
     for kernel in ["gibbs(one($finite))", "mh(one(@**))"] {
@@ -146,7 +146,8 @@ proptest! {
     }
 }
 
-/// A value read more than once by one reader, which is let go and taken up again.
+/// A value read several times by the same reader, which stops and resumes depending on
+/// it.
 #[test]
 fn values_read_more_than_once() {
     for kernel in ["gibbs(one($finite))", "mh(one(@**))"] {

@@ -1,5 +1,5 @@
-//! Kernels that keep a state, a distance or a second trace between steps: with other data
-//! they go over to those, and a surrogate saves evaluations of what it stands for.
+//! Kernels that keep a state, a distance or a second trace between steps adopt new data,
+//! and a surrogate avoids evaluations of its observation.
 
 use pcadlang::Model;
 use pcadlang::host::Datum;
@@ -14,8 +14,8 @@ fn scope() -> SiteSelection {
     SiteSelection { selector: Selector::All, pick: Pick::All }
 }
 
-/// The mean of `x` after the data have become 2, with steps before that under the
-/// program's own.
+/// Returns the mean of `x` after the data have been set to 2, following steps under the
+/// program's own data.
 fn under_new_data(kernel: &mut dyn Kernel, steps: u64) -> f64 {
     let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = -3;").unwrap();
     let mut trace: Trace = model.simulate(1, 0).unwrap();
@@ -37,8 +37,7 @@ fn under_new_data(kernel: &mut dyn Kernel, steps: u64) -> f64 {
     sum / steps as f64
 }
 
-/// Kernels that keep states or distances between steps go over to other data with the
-/// trace.
+/// Kernels that keep states or distances between steps adopt the new data of the trace.
 #[test]
 fn other_data_reach_what_is_kept() {
     let walk = || -> Box<dyn Kernel> { Box::new(Drift::new(scope(), Some(1.0))) };
@@ -48,12 +47,13 @@ fn other_data_reach_what_is_kept() {
     assert!((mean - 1.0).abs() < 0.1, "smc: {mean}");
     let mean =
         under_new_data(&mut Abc::new(Box::new(Mh::new(scope())), 0.5, Span::default()), 60_000);
-    // Data drawn within 0.5 of 2 are 2 - 1 / 12 in the mean.
+    // The mean of data simulated within 0.5 of 2 is 2 - 1 / 12; the posterior mean of `x`
+    // is half of that.
     assert!((mean - 0.96).abs() < 0.08, "abc: {mean}");
 }
 
-/// The observation runs once for what the surrogate lets through, and not at all for the
-/// rest; with and without incremental updates the chain is the same.
+/// The observation is evaluated once for each proposal that the surrogate accepts, and
+/// not at all for the others; the chain is the same with and without incremental updates.
 #[test]
 fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
     let text = "assume x ~ normal(0, 3); let far = 1000 * sin(x / 1000);
@@ -85,7 +85,7 @@ fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
     assert_eq!(states, run(false).0);
 }
 
-/// What was proposed and neither kept nor undone has no say in a step.
+/// A proposal that is neither committed nor rolled back does not affect a step.
 #[test]
 fn the_surrogate_does_not_follow_what_is_pending() {
     let text =
@@ -104,7 +104,7 @@ fn the_surrogate_does_not_follow_what_is_pending() {
     }
 }
 
-/// While the likelihood is annealed, both stages take it at its power.
+/// While the likelihood is annealed, both stages raise it to the same power.
 #[test]
 fn both_stages_take_the_likelihood_at_its_power() {
     let text =
@@ -118,7 +118,7 @@ fn both_stages_take_the_likelihood_at_its_power() {
         let Value::Num(x) = trace.value(trace.all_targets()[0]) else { panic!("no number") };
         sum += x;
     }
-    // Of precision 1 about 0 and 0.5 * 4 about 2.
+    // A product of Gaussians: precision 1 around 0, and precision 0.5 * 4 around 2.
     let mean = sum / steps as f64;
     assert!((mean - 4.0 / 3.0).abs() < 0.08, "{mean}");
 }

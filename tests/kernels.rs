@@ -1,5 +1,5 @@
-//! `docs/kernels.json` and `docs/kernels.md` say which tests run which kernels: made from
-//! the lists the tests themselves read (`tests/common/kernels.rs`).
+//! `docs/kernels.json` and `docs/kernels.md` list which tests run which kernels; they are
+//! generated from the lists that the tests read (`tests/common/kernels.rs`).
 //!
 //! `REGENERATE=1 cargo test --test kernels` rewrites both.
 
@@ -9,8 +9,8 @@ use pcadlang::lang::builtins::Table;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
-/// The kernels of the language, in the order of its reference, and whether this version
-/// runs them.
+/// Returns the kernels of the language, in the order of its reference, and whether this
+/// version implements them.
 fn kernels() -> Vec<(String, bool)> {
     let table = Table::default();
     let kernels = table.iter().filter(|b| b.section == "Kernels");
@@ -74,7 +74,7 @@ fn the_table_says_what_the_tests_run() {
 
 #[test]
 fn every_kernel_that_runs_is_proved_in_two_ways_at_least() {
-    // `optimize` is not a sampler: it has tests of its own.
+    // `optimize` is not a sampler, and has its own tests.
     let special = ["optimize"];
     for (kernel, _) in
         kernels().into_iter().filter(|(k, runs)| *runs && !special.contains(&k.as_str()))

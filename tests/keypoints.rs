@@ -1,4 +1,4 @@
-//! Detected joints from the file to the posterior, by the library and by the command.
+//! Detected joints from the file to the posterior, with the library and with the command.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -12,7 +12,7 @@ use pcadlang::vision::keypoints::{
 };
 use pcadlang::{Model, Program, RunOptions};
 
-/// A bar with two ends that can be moved in the picture plane.
+/// A bar with two landmarks at its ends, which moves in the picture plane.
 const BAR: &str = "include \"std/scene.pcad\" as scene;
 data photo: image \"the photograph\";
 data points = keypoints();
@@ -34,7 +34,7 @@ fn photo() -> Value {
     Value::object(ImageValue::photo(photo))
 }
 
-/// `BAR` with the joints of this JSON.
+/// Compiles `BAR` with the joints of this JSON text.
 fn model(joints: Option<&str>) -> Model {
     let mut p = Program::parse(BAR).unwrap().observe("photo", photo());
     if let Some(text) = joints {
@@ -130,14 +130,15 @@ fn pixels_shares_and_other_sizes_of_the_picture_agree() {
             .collect(),
     );
     assert!((likelihood(kept.unwrap()) - pixels).abs() < 1e-9);
-    // Twice the size: a density over an area four times as large, for each of two joints.
+    // A picture of twice the size: a density over four times the area, for each of two
+    // joints.
     let double = of([("nose", 500.0, 40.0), ("l_ankle", 460.0, 410.0)]).in_image(880, 440);
     assert!((likelihood(double) + 2.0 * f64::ln(4.0) - pixels).abs() < 1e-9);
 }
 
 #[test]
 fn the_posterior_is_that_of_a_normal_mean() {
-    // With a negligible share of outliers, x given two detections is normal.
+    // With a negligible proportion of outliers, x given two detections is normal.
     let m = model(Some("{\"nose\": [270, 40], \"l_ankle\": [262, 236]}"));
     let p = m.run(&RunOptions { seed: 2, ..RunOptions::default() }, 4, 2).unwrap();
     let s = 0.015 * f64::hypot(440.0, 220.0) / 100.0;
@@ -199,8 +200,8 @@ fn a_run_leaves_where_the_joints_are() {
         a.as_object().unwrap().keys().collect::<Vec<_>>(),
         ["keypoints", "body", "scene", "best", "seconds"]
     );
-    // Without an offset the joints are the scene's own; the camera shows 4.4 units over
-    // 440 pixels.
+    // Without an offset, the joints equal those of the scene; the camera shows 4.4 units
+    // over 440 pixels.
     assert_eq!(a["keypoints"], a["body"]);
     let (own, scene) = (&a["body"]["nose"], &a["scene"]["nose"]);
     assert!((number(&own[0]) - 220.0 - 100.0 * number(&scene[0])).abs() < 0.5, "{own} {scene}");
@@ -211,7 +212,7 @@ fn a_run_leaves_where_the_joints_are() {
             (number(&nose[0]) - 266.0).abs() < 6.0 && (number(&nose[1]) - 38.0).abs() < 6.0,
             "{nose}"
         );
-        // Two detections of a spread of 1.5 percent of the diagonal.
+        // Two detections with a standard deviation of 1.5 percent of the diagonal.
         let sd = 0.015 * f64::hypot(440.0, 220.0) / f64::sqrt(2.0);
         assert!((number(&nose[2]) / sd - 1.0).abs() < 0.5, "{nose} {sd}");
         let best = &of["best"]["l_ankle"];
@@ -241,8 +242,8 @@ fn a_run_leaves_where_the_joints_are() {
     assert!(!f.exists("a/keypoints.json"), "nothing of an earlier run stays");
 }
 
-/// Errors that no detection tells of: the same draws, and wider intervals of joints and
-/// of the body's own.
+/// Systematic errors, about which detections are uninformative: the draws are the same,
+/// and the intervals of the joints and of the body's own joints are wider.
 #[test]
 fn systematic_errors_widen_what_is_said_and_nothing_else() {
     let f = folder("keypoints_systematic");
@@ -287,7 +288,7 @@ fn the_means_are_those_of_the_collected_draws() {
     }
 }
 
-/// The messages of runs that are refused, word for word.
+/// The messages of refused runs, word for word.
 #[test]
 fn what_is_said_of_keypoints_that_are_wrong() {
     let f = folder("keypoints_wrong");

@@ -1,6 +1,6 @@
-//! Updates stop where a value comes out as it was, and that means to the last bit:
-//! numbers one unit in the last place apart, 0 and -0, numbers and NaN are others. Each
-//! way a value goes from a choice to a score, by increments, against running the whole
+//! Updates stop where a value is unchanged to the last bit: numbers one unit in the last
+//! place apart, 0 and -0, and a number and NaN are different. For each path of a value
+//! from a choice to a score, incremental updates are compared with running the whole
 //! program.
 
 use pcadlang::host::{Entry, Host, Previous, Type};
@@ -9,12 +9,12 @@ use pcadlang::lang::value::Value;
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::{Model, Program};
 
-/// Shows one unit in the last place at 0.3, and the sign of 0.
+/// Amplifies a unit in the last place at 0.3, and the sign of 0.
 const FAR: &str = "fn far(v) { clamp((v - 0.3) * 1e17, -40, 40) + atan2(0, v) }
     fn odd(v) { let q = log(v - 0.3); if q == q { clamp(q, -50, 50) } else { 7 } }
     assume x ~ normal(0, 5);";
 
-/// The ways: what is between `x` and the score.
+/// The paths: the computation between `x` and the score.
 const WAYS: &[(&str, &str)] = &[
     ("a number", "let o = x;"),
     ("arithmetic", "let o = (x * 4) / 4 + 0 * x;"),
@@ -53,7 +53,7 @@ const WAYS: &[(&str, &str)] = &[
     ("a factor", "factor(far(x) * 0.1); let o = 1;"),
 ];
 
-/// What `x` is in turn.
+/// The successive values of `x`.
 const VALUES: &[f64] = &[
     0.3,
     0.30000000000000004,
@@ -80,7 +80,7 @@ fn put(t: &mut Trace, address: &str, v: Value) -> String {
     }
 }
 
-/// Sets an address to values in turn, by increments, by running everything, and from
+/// Sets an address to successive values: incrementally, by full re-execution, and from
 /// scratch.
 fn compare(what: &str, model: &Model, address: &str, values: &[Value]) {
     let start = || model.simulate(1, 0).unwrap_or_else(|e| panic!("{what}: {e}"));
@@ -101,8 +101,8 @@ fn compare(what: &str, model: &Model, address: &str, values: &[Value]) {
     }
     seen.sort();
     seen.dedup();
-    // 0.3, its neighbours, 0 and -0 are told apart; -0 and the largest number below it
-    // need not be.
+    // 0.3, its neighbours, 0 and -0 must be distinguished; -0 and the largest number
+    // below it need not be.
     assert!(seen.len() >= 4, "{what}: scores do not tell the values apart: {seen:?}");
 }
 
@@ -131,7 +131,7 @@ fn elements_and_observed_values_too() {
     );
     let vectors: Vec<Value> = VALUES.iter().map(|x| Value::array(vec![1.0, *x])).collect();
     compare("a vector", &Model::from_text(&text).unwrap(), "@v", &vectors);
-    // A narrow density, so that a unit in the last place shows.
+    // The density is so narrow that a unit in the last place is visible.
     let text = "assume x ~ normal(0, 5); observe normal(0.3 + 0 * x, 1e-17) = 0.3 as y;";
     let values: Vec<Value> = VALUES.iter().filter(|x| **x > 0.2).map(|x| Value::Num(*x)).collect();
     let mut t = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
@@ -153,8 +153,8 @@ fn elements_and_observed_values_too() {
     );
 }
 
-/// Values of finite choices that lead to numbers one unit apart: weighed beside the
-/// trace, by updates, and from scratch.
+/// Values of finite choices that lead to numbers one unit apart, weighed without changing
+/// the trace, by updates, and from scratch.
 #[test]
 fn short_ways_tell_them_apart() {
     let ways = [
@@ -196,8 +196,7 @@ fn short_ways_tell_them_apart() {
     }
 }
 
-/// A host's function that goes on from its last evaluation is told of a change by the
-/// last bit.
+/// A host's incremental function is notified of changes of a single last bit.
 #[test]
 fn functions_of_a_host_see_the_last_bit() {
     let kept = Entry::incremental("kept", |a, previous: Option<Previous<f64>>| {

@@ -1,5 +1,5 @@
-//! The number of parts of a lathe is drawn from its posterior: against probabilities
-//! found by quadrature over the very pictures.
+//! The number of parts of a lathe is drawn from its posterior, compared with
+//! probabilities by quadrature over the same pictures.
 
 mod common;
 use common::{assert_mean, integrate};
@@ -13,7 +13,7 @@ use pcadlang::{Model, Program, RunOptions};
 
 const SIZE: u32 = 48;
 
-/// One radius, or two of which the second is there only with the second part.
+/// One radius or two; the second exists only if there is a second part.
 const MODEL: &str = "include \"std/scene.pcad\" as scene;
 data photo: image \"the contours\";
 assume two   ~ flip(0.3);
@@ -31,7 +31,7 @@ fn model(text: &str, map: ContourMap) -> Model {
     program.unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The contours that a state shows.
+/// Returns the contours of a state.
 fn shown(trace: &mut Trace) -> ContourMap {
     let view = trace.global("view", Draws::default()).unwrap().unwrap();
     let c = view.downcast::<ViewValue>().unwrap().0.contours(SIZE);
@@ -83,7 +83,7 @@ fn the_second_part_comes_and_goes_as_its_posterior_says() {
     }
 }
 
-/// What the shipped program does at its own prior: parts come and go, and the weights are
+/// The shipped program under its own prior: parts appear and vanish, and the scores equal
 /// those of a run from scratch.
 #[test]
 fn the_shipped_program_makes_and_removes_a_part() {
@@ -96,6 +96,6 @@ fn the_shipped_program_makes_and_removes_a_part() {
         counts.push(trace.choice_count());
         assert_eq!(trace.log_joint().to_bits(), trace.rerun().unwrap().log_joint().to_bits());
     }
-    // The cut, how much wider, and a part's bandwidth and profile.
+    // The cut, the ratio of the widths, and the bandwidth and profile of a part.
     assert_eq!(counts[0], counts[1] + 4, "{counts:?}");
 }

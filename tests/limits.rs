@@ -1,5 +1,5 @@
-//! Programs that would take more memory, stack or time than there is: an error at a
-//! place, with what to do about it.
+//! Programs that would exceed the available memory, stack or time: an error with its
+//! position and a remedy.
 
 use pcadlang::infer::Progress;
 use pcadlang::lang::value::Value;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// The error of one draw of a program.
+/// Returns the error of simulating a program once.
 fn error_within(text: &str, limits: Limits) -> String {
     let drawn = Program::parse(text)
         .and_then(|p| p.limits(limits).compile())
@@ -23,7 +23,7 @@ fn says(text: &str, part: &str) {
     assert!(e.contains(part) && e.contains("<program>:1:"), "{text}\n{part:?} is not in\n{e}");
 }
 
-/// A value made in so many steps, each from the one before.
+/// A program whose value is built in a number of steps, each from the previous one.
 fn grown(step: &str, from: &str, times: &str) -> String {
     format!(
         "let v = fold(fn(a, i) {{ {step} }}, {from}, 0 .. {times}); observe normal(0, 1) = len(v);"
@@ -48,7 +48,8 @@ fn values_that_are_nested_too_deep() {
     says(product, "more than 200 parameters");
 }
 
-/// Short programs whose values would have more elements than a memory has bytes.
+/// Short programs whose values would have more elements than a computer has bytes of
+/// memory.
 #[test]
 fn values_that_are_too_large() {
     says(&grown("[a, a, \"x\"]", "[\"x\"]", "60"), "more than 10000000 elements");
@@ -96,7 +97,7 @@ fn solids_that_are_too_large() {
         limits,
     );
     assert!(e.contains("more than 10000000 elements") && e.contains("--limit elements=N"), "{e}");
-    // Placed again and again, it is as it should be.
+    // A solid may be transformed any number of times.
     let moved = "fold(fn(s, i) { scene.affine(translate = [0.001, 0, 0]) * s }, scene.sphere(1), 0 .. 5000)";
     let text = format!(
         "{scene}let s = {moved}; assume x ~ normal(0, 1); observe normal(x, 1) = s.height;"
@@ -125,7 +126,7 @@ fn limits_can_be_set_and_say_how() {
     assert!(Limits::default().with("depth", u64::MAX).is_err());
 }
 
-/// An evaluation that takes far longer than anybody waits.
+/// An evaluation that would take far too long.
 const LONG: &str =
     "fn f(a) { sum(map(fn(i) { sum(map(fn(j) { i * j + a }, 0 .. 1000)) }, 0 .. 1000000)) }
     assume x ~ normal(0, 1); observe normal(f(x), 1) = 0; infer { repeat 100 { mh(@x); } }";
@@ -155,7 +156,7 @@ fn an_evaluation_ends_when_somebody_asks() {
     assert!(results.iter().all(Result::is_err), "it cannot have come to an end");
 }
 
-/// Steps that were made before one that takes too long are kept.
+/// Draws recorded before a step that takes too long are kept.
 #[test]
 fn draws_from_before_are_kept() {
     let text = "fn f(n) { sum(map(fn(i) { sum(map(fn(j) { i * j }, 0 .. 1000)) }, 0 .. n)) }
@@ -171,7 +172,8 @@ fn draws_from_before_are_kept() {
     assert!(begun.elapsed() > Duration::from_secs(2), "nothing was given up");
 }
 
-/// A search ends with what it found by then, so that there is time to draw.
+/// When time is up, a search ends with the modes found so far, so that there is time to
+/// sample.
 #[test]
 fn a_search_for_modes_ends_when_time_is_up() {
     let text = "assume x ~ normal(0, 1); let s = sum(map(fn(i) { i * x }, 0 .. 1000));
@@ -184,12 +186,12 @@ fn a_search_for_modes_ends_when_time_is_up() {
         posterior.chains[0].warmup == 1 && posterior.chains[0].seconds < 10.0,
         "the search took all time"
     );
-    // The likeliest draw of those that there was time for, at least.
+    // It found at least the most probable of the draws that there was time for.
     let Value::Num(x) = posterior.chains[0].last.get("@x").unwrap() else { panic!("not a number") };
     assert!((x - 200.0 / 101.0).abs() < 1.0, "{x}");
 }
 
-/// All the time there is, as libraries say it, is no overflow.
+/// An unlimited duration, as libraries express it, does not overflow.
 #[test]
 fn a_run_may_have_all_the_time_there_is() {
     let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 0;
@@ -200,7 +202,8 @@ fn a_run_may_have_all_the_time_there_is() {
     assert_eq!(model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}")).chains[0].steps, 5000);
 }
 
-/// What may draw a picture counts as many operations: it is given up sooner.
+/// An observation that may render a picture counts as many operations, so it is stopped
+/// sooner.
 #[test]
 fn observations_that_may_be_slow_are_stopped_sooner() {
     let stop = Stop::when(Arc::new(AtomicBool::new(true))).after(Duration::ZERO);
@@ -217,8 +220,8 @@ fn observations_that_may_be_slow_are_stopped_sooner() {
     assert!(e.contains("stopped in the middle of an evaluation"), "{e}");
 }
 
-/// A host has a flag of its own, which ends a run as well; what is left can be looked at
-/// although the flag is still set.
+/// A host's own flag also ends a run; the result can be inspected although the flag is
+/// still set.
 #[test]
 fn a_host_may_stop_evaluations_by_a_flag_of_its_own() {
     let text = "fn f(n) { sum(map(fn(i) { sum(map(fn(j) { i * j }, 0 .. 1000)) }, 0 .. n)) }

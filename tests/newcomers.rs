@@ -1,6 +1,6 @@
-//! What stopped or misled people in their first hour: every run opens elsewhere, data in
-//! the forms that people have them, messages that name what is wrong, names typed as
-//! people type them.
+//! Things that stopped or misled people in their first hour: every run can be opened
+//! again, data are accepted in the usual formats, messages name the fault, and names may
+//! be typed as people type them.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -9,7 +9,7 @@ use folder::Folder;
 use serde_json::Value;
 use std::process::{Command, Stdio};
 
-/// A program that sees a ball at `x` of radius `size`: what comes before, and its plan.
+/// A program with a ball of radius `size` at `x`, from its first statements and its plan.
 fn ball(before: &str, plan: &str) -> String {
     format!(
         "include \"std/scene.pcad\" as scene; {before}
@@ -22,7 +22,7 @@ fn json(f: &Folder, name: &str) -> Value {
     serde_json::from_str(&f.read(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// The names of a chain's columns and its draws.
+/// Returns the column names of a chain's file, and its draws.
 fn chain(f: &Folder, name: &str) -> (String, Vec<Vec<f64>>) {
     let text = f.read(name);
     let mut lines = text.lines().filter(|l| !l.starts_with('#'));
@@ -31,8 +31,8 @@ fn chain(f: &Folder, name: &str) -> (String, Vec<Vec<f64>>) {
     (names, lines.map(|l| l.split(',').map(number).collect()).collect())
 }
 
-/// Chains end with equally many draws and the same columns, however far each came in its
-/// time and whatever came and went in it.
+/// All chains of a run end with the same number of draws and the same columns, regardless
+/// of their speed and of the choices that appeared and vanished.
 #[test]
 fn chains_of_a_run_have_one_form() {
     let f = Folder::new("one-form");
@@ -59,12 +59,12 @@ fn chains_of_a_run_have_one_form() {
             w[..k].iter().all(|x| x.is_finite()) && w[k..].iter().all(|x| x.is_nan()),
             "{draw:?}"
         );
-        // The log density of what is observed, whatever its structure; and the joint's
-        // part.
+        // The log likelihood of the observation, whatever the structure, equals the
+        // likelihood part of the log joint density.
         assert!((draw[draw.len() - 1] - draw[4]).abs() < 1e-9, "{draw:?}");
     }
-    // In a limit of time chains come to numbers of draws of their own: the files have as
-    // many as all have, all are kept.
+    // Under a time limit, chains make different numbers of draws: all chain files have
+    // the smallest of these, and all draws are kept.
     f.succeeds(&[
         "run",
         "parts.pcad",
@@ -93,7 +93,7 @@ fn chains_of_a_run_have_one_form() {
             f.read(&kept).lines().filter(|l| !l.starts_with('#') && !l.starts_with("lp__")).count();
         assert_eq!(rows as u64, *n, "{kept}");
     }
-    // It goes on from all that it had.
+    // The run resumes from all of its draws.
     f.succeeds(&[
         "run",
         "parts.pcad",
@@ -127,7 +127,7 @@ fn who_reads_may_go_away() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Both ends are closed before anything is said.
+    // Both pipes are closed before anything is printed.
     drop((child.stdout.take(), child.stderr.take()));
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert_eq!(json(&f, "out/run.json")["state"], "done");
@@ -164,7 +164,8 @@ fn zeros_and_ones_are_truth_values() {
     );
 }
 
-/// What no choice can give is named, with its place and the support.
+/// Data outside of a distribution's support are reported, with their position and the
+/// support.
 #[test]
 fn data_outside_of_a_support_are_named() {
     let f = Folder::new("outside");
@@ -205,8 +206,8 @@ fn data_outside_of_a_support_are_named() {
     }
 }
 
-/// A spread that may be negative: the program has no value there, and samples where it
-/// has one.
+/// A standard deviation that may be negative: the log density is undefined there, and the
+/// program samples where it is defined.
 #[test]
 fn spreads_that_may_be_negative_are_sampled() {
     let f = Folder::new("negative");
@@ -265,8 +266,7 @@ fn names_are_found_as_people_type_them() {
     }
 }
 
-/// Each draw that was kept can be drawn again, and the prompt takes up where the run
-/// ended.
+/// Every kept draw can be restored, and the prompt resumes where the run ended.
 #[test]
 fn runs_are_opened_again() {
     let f = Folder::new("again");
@@ -297,7 +297,8 @@ fn runs_are_opened_again() {
         "{list}"
     );
     assert!(list.contains("\n3: chain 1, draw ") && list.contains("@x"), "{list}");
-    // The third state is the draw that it says: its choice is that of the file of draws.
+    // The third state is the draw that it names: its choice equals that in the file of
+    // draws.
     let (_, draws) = chain(&f, "out/chain-1.csv");
     let draw = kept[2]["draw"].as_u64().unwrap() as usize;
     let said = f.succeeds(&["show", "out", "--draw", "3"]).out;
@@ -368,7 +369,7 @@ fn runs_are_compared() {
     f.refuses(&["compare", "a", "."], "is not the folder of a run");
 }
 
-/// What a run finds outside of its picture, and what it replaces, are said.
+/// A run reports objects outside of its picture, and runs that it replaces.
 #[test]
 fn what_is_outside_and_what_is_replaced_is_said() {
     let f = Folder::new("outside-picture");
@@ -392,8 +393,8 @@ fn what_is_outside_and_what_is_replaced_is_said() {
     f.succeeds(&["run", "ball.pcad", "--chains", "2", "--out", "fresh"]);
 }
 
-/// What a program draws by name is in the table and the files, under the names that the
-/// program has.
+/// Choices with names are in the table and the files, under the names that they have in
+/// the program.
 #[test]
 fn what_is_drawn_by_name_is_recorded() {
     let f = Folder::new("drawn-by-name");
@@ -409,16 +410,16 @@ fn what_is_drawn_by_name_is_recorded() {
     }
     let (names, _) = chain(&f, "walk/chain-1.csv");
     assert!(names.contains("z.1,z.2,z.3,w,log_lik.1"), "{names}");
-    // One address for each element, wherever it is drawn; two draws of one element are
-    // found.
+    // Each element has one address, wherever it is drawn; an element that is drawn twice
+    // is an error.
     let all = f.read("walk/best.trace.json");
     assert!(!all.contains("z#2"), "{all}");
     f.write("twice.pcad", format!("{program} for t in 0 .. 2 {{ z[t] ~ normal(0, 1); }}"));
     f.refuses(&["run", "twice.pcad"], "is drawn twice");
 }
 
-/// A number of components with a label for each point: it samples, and the run says what
-/// keeps it from moving.
+/// An unknown number of components with a label for each point: the program samples, and
+/// the run reports why its structure does not move.
 #[test]
 fn structure_that_does_not_move_is_named() {
     let f = Folder::new("structure");
@@ -444,7 +445,7 @@ fn structure_that_does_not_move_is_named() {
     assert!(rate >= 1.0, "{k}");
 }
 
-/// A column that a file lacks is found by `check`, with those that it has.
+/// `check` reports a column that is missing from a file, with the existing columns.
 #[test]
 fn checks_look_into_files() {
     let f = Folder::new("checks");

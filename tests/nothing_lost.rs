@@ -1,5 +1,5 @@
-//! Runs that are killed, interrupted, or left without room: what is on the disk stays
-//! readable, and with `--resume` the same draws come out as without a break.
+//! Runs that are killed, interrupted, or run out of disk space: the files stay readable,
+//! and with `--resume` the draws are the same as without interruption.
 #![cfg(unix)]
 
 #[path = "common/folder.rs"]
@@ -13,7 +13,7 @@ use std::time::Duration;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_pcadlang");
 
-/// A program with kernels that adapt, sweeps, and choices that come and go.
+/// A program with kernels that adapt, sweeps, and choices that appear and vanish.
 const PROGRAM: &str = "
     let y = [1.2, -0.4, 3.1, 2.2, 0.3, 4.0, -1.1, 2.7];
     assume m ~ normal(0, 5); assume s ~ half_normal(2); assume c ~ flip(0.5);
@@ -56,13 +56,14 @@ fn done(output: &Output) {
     assert!(output.status.success(), "{}", said(output));
 }
 
-/// The lines of a chain's draws: all but comments, one of which tells the time.
+/// Returns the lines of a chain's draws, without comments, one of which contains the
+/// time.
 fn draws(folder: &Path, chain: u32) -> Vec<String> {
     let text = std::fs::read_to_string(folder.join(format!("out/chain-{chain}.csv"))).unwrap();
     text.lines().filter(|l| !l.starts_with('#')).map(str::to_owned).collect()
 }
 
-/// Asserts that what a run left at any moment can be read; gives the number of
+/// Asserts that the files of a run at any moment are readable, and returns the number of
 /// checkpoints.
 fn readable(folder: &Path) -> usize {
     let out = folder.join("out");
@@ -79,7 +80,8 @@ fn readable(folder: &Path) -> usize {
             Some("csv") => drop(csv::read(std::str::from_utf8(&bytes).unwrap()).unwrap()),
             Some("json") => drop(serde_json::from_slice::<serde_json::Value>(&bytes).unwrap()),
             Some("checkpoint") => {
-                // Whole, though of another run than the one that is asked for here.
+                // The file is complete, although it belongs to another run than the one
+                // given here.
                 let error = checkpoint::SavedChain::read(&bytes, "").unwrap_err();
                 assert!(matches!(error, checkpoint::CheckpointError::Run), "{error}");
                 checkpoints += 1;
@@ -95,8 +97,8 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.success());
 }
 
-/// Kills a run at `kills` moments, going on with it each time, and asserts that in the
-/// end it is the run without a break.
+/// Kills a run at `kills` moments, resuming it each time, and asserts that the result
+/// equals that of the uninterrupted run.
 fn killed(name: &str, kills: usize, steps: &str) {
     let whole = with_program(&format!("{name}-whole"));
     done(&run(whole.path(), &["--steps", steps]).output().unwrap());
@@ -104,8 +106,8 @@ fn killed(name: &str, kills: usize, steps: &str) {
     let (mut left, mut with_checkpoints, mut pause) = (kills, 0, 7_u64);
     while left > 0 {
         let mut child = run(broken.path(), &["--steps", steps, "--resume"]).spawn().unwrap();
-        // Moments without a pattern: the low bits of a congruential generator's high
-        // part.
+        // Moments without a pattern: the low bits of the high part of a linear
+        // congruential generator.
         pause =
             pause.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         std::thread::sleep(Duration::from_millis(pause >> 33 & 127));
@@ -159,7 +161,7 @@ fn killed_at_a_few_moments() {
     killed("killed", 10, "60000");
 }
 
-/// About a minute and a half.
+/// Takes about a minute and a half.
 #[test]
 #[ignore = "slow"]
 fn killed_at_two_hundred_moments() {
@@ -236,8 +238,8 @@ fn draws_that_are_gone_are_told() {
     assert!(said(&output).contains("chain-1.csv: it has"), "{}", said(&output));
 }
 
-/// A limit of the system on the size of files stands in for a full disk: writing fails in
-/// the middle of a line.
+/// A limit on file sizes stands in for a full disk: writing fails in the middle of a
+/// line.
 #[test]
 fn a_full_disk() {
     let whole = with_program("full-whole");
@@ -292,7 +294,7 @@ fn a_vanished_input() {
     );
 }
 
-/// The largest resident memory of a run of so many draws, in KiB.
+/// Returns the largest resident memory of a run with this number of draws, in KiB.
 #[cfg(target_os = "linux")]
 fn peak(name: &str, draws: u32) -> u64 {
     let folder = Folder::new(name);

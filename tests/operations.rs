@@ -1,5 +1,5 @@
-//! Traces by address: updates and the way back, choices that appear and vanish against
-//! enumeration, projections, errors.
+//! Traces by address: updates and their reversal, choices that appear and vanish compared
+//! with enumeration, projections, errors.
 
 mod common;
 use common::normal_pdf;
@@ -21,7 +21,7 @@ fn given(values: &[(&str, Value)]) -> Vec<(Address, Given)> {
     values.iter().map(|(a, v)| (a.parse().unwrap(), Given::Value(v.clone()))).collect()
 }
 
-/// All there is to see of a trace, to the last bit.
+/// Returns everything visible of a trace, to the last bit.
 fn bits(t: &Trace) -> Vec<String> {
     let choices = t.choices().into_iter().map(|(a, v, s)| format!("{a} {v:?} {:x}", s.to_bits()));
     let observed = t.observed().into_iter().map(|o| format!("{} {:?}", o.address, o.value));
@@ -43,8 +43,8 @@ const MANY: &str = "assume c ~ flip(0.4); assume n ~ categorical([0.2, 0.3, 0.5]
     for i in 0 .. 3 { observe normal(f[i], 0.5) = i as point; }
     observe normal(x + sum(z) + w[n], 1) = [1, 2] as y;";
 
-/// An update to what an update discarded leads back to the same trace, bit for bit,
-/// whatever appeared and vanished.
+/// An update with the values that another update discarded restores the trace, bit for
+/// bit, whatever appeared and vanished.
 #[test]
 fn what_was_discarded_leads_back() {
     let updates = [
@@ -70,7 +70,7 @@ fn what_was_discarded_leads_back() {
         let there = match t.update(update, draws(step)) {
             Ok(there) => there,
             Err(e) => {
-                // A choice or observation of the branch not taken.
+                // A choice or observation of the branch that is not taken.
                 assert!(e.to_string().contains("the trace has no choice or observation"), "{e}");
                 assert_eq!(bits(&t), before);
                 continue;
@@ -102,8 +102,8 @@ fn what_was_discarded_leads_back() {
     assert!(moved > 40);
 }
 
-/// The weight of an update is that of the new state over the old one less what was drawn,
-/// term by term.
+/// The weight of an update is the ratio of the new density to the old one, without the
+/// density of newly drawn choices, term by term.
 #[test]
 fn weights_are_those_of_enumeration() {
     let mut t = trace(
@@ -144,8 +144,8 @@ fn weights_are_those_of_enumeration() {
     }
 }
 
-/// The mean of the exponential of the weights of updates whose branch is drawn is the
-/// ratio of the evidences.
+/// If an update draws the choices of a branch, the mean of its exponentiated weight is
+/// the ratio of the evidences.
 #[test]
 fn drawn_branches_are_importance_weighted() {
     let mut t = trace(
@@ -165,7 +165,7 @@ fn drawn_branches_are_importance_weighted() {
     );
 }
 
-/// Parts add up to the whole.
+/// The projections sum to the log joint density.
 #[test]
 fn projections_sum_to_the_joint() {
     let mut t = trace(&format!("{MANY} factor(-m * m);"));
@@ -195,7 +195,7 @@ fn projections_sum_to_the_joint() {
     }
 }
 
-/// A fork goes its own way.
+/// Changes of a fork do not affect the original trace.
 #[test]
 fn forks_are_independent() {
     let mut t = trace(MANY);
@@ -209,7 +209,7 @@ fn forks_are_independent() {
     assert_eq!(bits(&t), bits(&fork));
 }
 
-/// What cannot be is told, and changes nothing.
+/// Invalid addresses and values are errors, and do not change the trace.
 #[test]
 fn wrong_addresses_and_values_are_told() {
     let mut t = trace(
@@ -238,7 +238,7 @@ fn wrong_addresses_and_values_are_told() {
     ] {
         let e = match t.set(address, value.clone(), draws(0)) {
             Err(e) => e.to_string(),
-            // A density over numbers gives what is none a density of zero.
+            // A density over numbers is zero for other values.
             Ok(_) if address == "@seen" => {
                 assert_eq!(t.log_joint(), f64::NEG_INFINITY);
                 t.set("@seen", 0.0, draws(0)).unwrap();

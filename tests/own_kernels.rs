@@ -1,10 +1,11 @@
-//! Kernels that programs declare, against exact answers: their proposals, auxiliary
+//! Kernels declared in programs, compared with exact answers: their proposals, auxiliary
 //! variables and maps.
 
 mod common;
 use common::*;
 
-/// A kernel of the program: an asymmetric proposal whose way back is found by replay.
+/// A kernel declared in the program: the reverse density of its asymmetric proposal is
+/// computed by replay.
 #[test]
 fn proposals_of_the_program_are_paid_for() {
     let d = run(
@@ -39,8 +40,8 @@ fn proposals_of_the_program_change_structure() {
     assert_mean("c", &d["c"], yes / (yes + no), 0.03);
 }
 
-/// Maps of choices by a rule: with a Jacobian that is not 1, of a switch with which
-/// choices appear, and of an element picked at random.
+/// Deterministic maps of choices: with a Jacobian that is not 1, of a switch with which
+/// choices appear, and of a randomly selected element.
 #[test]
 fn maps_of_the_program_are_paid_for() {
     let d = run(
@@ -69,8 +70,8 @@ fn maps_of_the_program_are_paid_for() {
     assert_mean("c by maps", &d["c"], yes / (yes + no), 0.03);
 }
 
-/// Choices that are proposed beside a map, a whitened vector among them, against the
-/// exact posterior of a linear model.
+/// Choices that are proposed together with a map, including a whitened vector, compared
+/// with the exact posterior of a linear model.
 #[test]
 fn proposals_beside_a_map_are_paid_for() {
     let d = run(
@@ -86,7 +87,7 @@ fn proposals_beside_a_map_are_paid_for() {
         1,
         2,
     );
-    // Prior covariance of (s, f0, f1), and two linear observations of it.
+    // The prior covariance of (s, f0, f1), and two linear observations.
     let c = (-0.5f64).exp();
     let k = [[1.0, 0.0, 0.0], [0.0, 1.0, c], [0.0, c, 1.0]];
     let (h, y) = ([[1.0, 1.0, 0.0], [1.0, 0.0, -1.0]], [2.0, 0.3]);
@@ -108,7 +109,7 @@ fn proposals_beside_a_map_are_paid_for() {
     assert_mean("variance of s", &squares, v(0), 0.06);
 }
 
-/// A map that does not lead back, or whose derivatives cannot be known, ends the run with
+/// A map that is not an involution, or whose derivatives are unknown, ends the run with
 /// the reason.
 #[test]
 fn maps_that_are_no_involutions_are_caught() {
@@ -144,8 +145,8 @@ fn maps_that_are_no_involutions_are_caught() {
     }
 }
 
-/// A vector that is stored as white noise, proposed by its value together with the scale
-/// of its prior: the noise's volume changes.
+/// A vector stored as white noise, proposed by its value together with the scale of its
+/// prior: the volume of the noise changes.
 #[test]
 fn proposals_of_whitened_vectors_are_paid_for() {
     let text = |moves: &str| {
@@ -167,7 +168,7 @@ fn proposals_of_whitened_vectors_are_paid_for() {
     let expected = |of: &dyn Fn(f64, [f64; 2]) -> f64| -> f64 {
         let at = |s: f64| {
             let cov = |a: f64, b: f64| s * s * (-0.5 * ((a - b) / 0.7).powi(2)).exp();
-            // The two observations: sum of the first two, and the third.
+            // The two observations: the sum of the first two components, and the third.
             let cross = |t: f64| [cov(t, 0.0) + cov(t, 0.5), cov(t, 1.0)];
             let v00 = cross(0.0)[0] + cross(0.5)[0] + 0.16;
             let v01 = cross(0.0)[1] + cross(0.5)[1];
@@ -191,8 +192,8 @@ fn proposals_of_whitened_vectors_are_paid_for() {
     }
 }
 
-/// An auxiliary variable whose distribution depends on the state is paid for, too: each
-/// of its values is a proposal of its own.
+/// An auxiliary variable whose distribution depends on the state is accounted for in the
+/// acceptance ratio, too: each of its values is a separate proposal.
 #[test]
 fn auxiliary_variables_of_proposals_are_paid_for() {
     let d = run(
@@ -210,8 +211,8 @@ fn auxiliary_variables_of_proposals_are_paid_for() {
     assert_mean("variance", &squares, 0.2, 0.03);
 }
 
-/// Starts that a kernel of the program proposes: the best of them, wherever the prior is;
-/// and what is no such kernel.
+/// Starts proposed by a kernel of the program: the best of them is used, wherever the
+/// prior has its mass; other kernels are refused.
 #[test]
 fn starts_are_proposed_by_a_kernel() {
     let text = |from: &str| {
@@ -239,8 +240,8 @@ fn starts_are_proposed_by_a_kernel() {
     }
 }
 
-/// A body that reads choices alone is played while the new state is pending, any other
-/// once it is taken up: the same draws.
+/// A kernel body that reads only choices is replayed while the new state is pending, any
+/// other body after the new state is in place: both give the same draws.
 #[test]
 fn ways_back_are_the_same_however_they_are_found() {
     let draws = |here: &str| {

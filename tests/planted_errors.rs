@@ -1,5 +1,5 @@
-//! The checks by simulation themselves: right kernels pass, planted errors are found,
-//! programs that cannot be simulated are refused with the reason.
+//! Tests of the checks by simulation: correct kernels pass, planted errors are detected,
+//! and programs that cannot be simulated are refused with the reason.
 
 use pcadlang::Model;
 use pcadlang::dist::Datum;
@@ -19,7 +19,7 @@ fn model(text: &str) -> Model {
     Model::from_text(text).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The test of Metropolis & Hastings.
+/// The Metropolis-Hastings acceptance test.
 fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     let accepted = libm::log(rng.open_uniform()) < log_ratio;
     if accepted {
@@ -30,7 +30,7 @@ fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     Outcome::one(accepted)
 }
 
-/// A step of a random walk of the logarithm, with the term for that or without.
+/// A random walk on the logarithm, with or without its Hastings correction.
 struct LogWalk {
     hastings: bool,
 }
@@ -53,8 +53,8 @@ impl Kernel for LogWalk {
     }
 }
 
-/// Prior resimulation that accepts too readily: the ratio at the power of a quarter, as
-/// if data said less than they do.
+/// Resimulation from the prior that accepts too often: the ratio is raised to the power
+/// of a quarter, as if the data were less informative.
 struct Eager;
 
 impl Kernel for Eager {
@@ -108,8 +108,8 @@ fn geweke_tells_right_kernels_from_planted_errors() {
     }
 }
 
-/// Structure that comes and goes, discrete choices, arrays: the plan of a program passes
-/// both.
+/// Changing structure, discrete choices, arrays: the plan of a program passes both
+/// checks.
 #[test]
 fn plans_with_changing_structure_pass() {
     let m = model(

@@ -1,5 +1,5 @@
-//! Six posteriors of posteriordb with the default plan: means and mean squares against
-//! the reference, |z| < 4 at more than 400 effective draws of each parameter.
+//! Six posteriors of posteriordb with the default plan: means and mean squares compared
+//! with the reference, |z| < 4 at more than 400 effective draws of each parameter.
 //! `cargo test --release --test posteriordb -- --include-ignored --nocapture` prints
 //! times.
 
@@ -30,7 +30,7 @@ fn read(name: &str) -> (Model, Json) {
     (program.compile().unwrap_or_else(|e| panic!("{e}")), json)
 }
 
-/// Runs the default plan and gives the largest |z| of means and mean squares.
+/// Runs the default plan and checks the z-scores of means and mean squares.
 fn passes(name: &str) {
     let (model, json) = read(name);
     let (_, plan) = model.plan().unwrap_or_else(|e| panic!("{e}"));
@@ -44,7 +44,7 @@ fn passes(name: &str) {
     let quantities = posterior.quantities();
     let (mut worst, mut least) = (0.0f64, f64::INFINITY);
     for (parameter, reference) in json["reference"].as_object().unwrap() {
-        // The reference counts from 1.
+        // The reference's indices start at 1.
         let ours = match parameter.split_once('[') {
             Some((base, index)) => {
                 format!("{base}[{}]", index.trim_end_matches(']').parse::<usize>().unwrap() - 1)
@@ -59,7 +59,7 @@ fn passes(name: &str) {
         let noise = reference["mcse_mean"].as_f64().unwrap_or(0.0);
         let squares: Vec<Vec<f64>> =
             q.chains.iter().map(|c| c.iter().map(|x| x * x).collect()).collect();
-        // The reference draws' error of a square, as if they were normal.
+        // The standard error of the reference's mean square, as if its draws were normal.
         let noise_square = noise * (4.0 * mean * mean + 2.0 * sd * sd).sqrt() / sd;
         for (chains, expected, noise, what) in [
             (&q.chains, mean, noise, "mean"),

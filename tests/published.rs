@@ -1,5 +1,6 @@
-//! What published models need, with answers known otherwise: recurrences, truncation,
-//! flat priors on half-lines, order among unlike priors, mixtures written out.
+//! Features that published models need, with independently known answers: recurrences,
+//! truncation, flat priors on half-lines, ordering with different priors, explicit
+//! mixtures.
 
 use pcadlang::infer::diagnostics::mcse_mean;
 use pcadlang::lang::value::Value;
@@ -7,7 +8,7 @@ use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::Draws;
 use pcadlang::{Model, Program, RunOptions};
 
-/// The log joint density of a program at these values.
+/// Returns the log joint density of a program at these values.
 fn log_joint(model: &Model, values: &[(&str, f64)]) -> f64 {
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
     for (address, value) in values {
@@ -16,7 +17,8 @@ fn log_joint(model: &Model, values: &[(&str, f64)]) -> f64 {
     trace.log_joint()
 }
 
-/// The mean of a quantity under the default plan is this, within four standard errors.
+/// Asserts that the means of quantities under the default plan are right, within four
+/// standard errors.
 fn has_mean(text: &str, expected: &[(&str, f64)]) {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
     let posterior = model
@@ -36,7 +38,7 @@ fn has_mean(text: &str, expected: &[(&str, f64)]) {
     }
 }
 
-/// The mean by a positive weight over a grid.
+/// Returns the mean under a positive weight, over a grid.
 fn over_a_grid(from: f64, to: f64, log_weight: impl Fn(f64) -> f64) -> f64 {
     let n = 20_000;
     let at = |i: i32| from + (to - from) * (f64::from(i) + 0.5) / f64::from(n);
@@ -46,8 +48,8 @@ fn over_a_grid(from: f64, to: f64, log_weight: impl Fn(f64) -> f64) -> f64 {
     weights.iter().enumerate().map(|(i, w)| w * at(i as i32)).sum::<f64>() / sum
 }
 
-/// An ARMA(1, 1) series with mu = 0.4, phi = 0.7, theta = -0.3, and normal errors of sd
-/// 0.5.
+/// Simulates an ARMA(1, 1) series with mu = 0.4, phi = 0.7, theta = -0.3, and normal
+/// errors of sd 0.5.
 fn series(n: usize) -> Vec<f64> {
     let mut rng = StreamKey::new(11, 0, Purpose::VALUES).stream(0, 0, 0);
     let (mut y, mut last) = (Vec::new(), 0.0);
@@ -107,8 +109,7 @@ fn a_recurrence_is_inferred_with_gradients() {
     }
 }
 
-/// What is left of an exponential is an exponential: the posterior is gamma(2 + 4, 1 +
-/// 2.6).
+/// The exponential distribution is memoryless, so the posterior is gamma(2 + 4, 1 + 2.6).
 #[test]
 fn truncated_waiting_times() {
     has_mean(
@@ -128,8 +129,8 @@ fn counts_without_zeros() {
     );
 }
 
-/// Under a flat prior of the deviation, the variance is inv_gamma((n - 1) / 2, sum of
-/// squares / 2).
+/// Under a flat prior on the standard deviation, the variance is inv_gamma((n - 1) / 2,
+/// sum of squares / 2).
 #[test]
 fn flat_priors_of_half_lines() {
     let y = [0.3, -1.2, 0.8, 1.9, -0.4, 0.1, -1.1, 0.6, 1.3];
@@ -145,7 +146,7 @@ fn flat_priors_of_half_lines() {
 #[test]
 fn unlike_priors_in_order() {
     let second = |x: f64| -0.5 * ((x - 1.0) / 2.0).powi(2) - 0.5 * (x - 0.5).powi(2);
-    // Of the first given the second, by a grid within a grid.
+    // The mass of the first value given the second, by a grid within a grid.
     let below = |x: f64| {
         let n = 400;
         let h = (x + 8.0) / f64::from(n);
@@ -174,7 +175,7 @@ fn mixtures_written_out_are_mixtures() {
     }
 }
 
-/// The programs beside this file run under their default plans, with gradients.
+/// The programs in the folder `published` run under their default plans, with gradients.
 #[test]
 fn the_programs_run() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/published");

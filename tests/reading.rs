@@ -1,5 +1,5 @@
-//! What a program may read: below its own folder, what is built in, and what the command
-//! line names.
+//! The files that a program may read: those below its own folder, embedded ones, and
+//! those named on the command line.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -11,7 +11,7 @@ use pcadlang::lang::value::Value;
 const CHECK: [&str; 2] = ["check", "own/p.pcad"];
 const OUTSIDE: &str = "it is outside the folders that the program may read";
 
-/// A folder `own` for a program, beside another of which it should know nothing.
+/// A folder `own` for a program, beside another that it must not access.
 fn two_folders(name: &str) -> Folder {
     let f = Folder::new(name);
     for dir in ["own", "own/parts", "other", "other/deep"] {
@@ -23,7 +23,7 @@ fn two_folders(name: &str) -> Folder {
     f
 }
 
-/// The program is refused, at its place in the text, with what to do about it.
+/// Asserts that the program is refused, with the position in its text and a remedy.
 fn refused(f: &Folder, text: &str, what: &str) {
     f.write("own/p.pcad", text);
     let d = f.run(&CHECK);
@@ -49,10 +49,10 @@ fn files_outside_of_the_folder_are_refused() {
     refused(&f, "data t = csv(\"parts/../../other/x.csv\");", "other");
     refused(&f, "include \"../other/part.pcad\" as part;", "other");
     refused(&f, &format!("include \"{absolute}/part.pcad\" as part;"), absolute);
-    // Nor does a program learn what is there.
+    // Nor does a program learn which files exist there.
     refused(&f, "data t = csv(\"../other/missing.csv\");", "other");
     refused(&f, "data t = csv(\"../missing/x.csv\");", "--allow-read");
-    // Below the folder a file is missing like any other.
+    // Below the program's folder, a missing file gives the usual error.
     f.write("own/p.pcad", "data t = csv(\"parts/missing.csv\");");
     f.refuses(&CHECK, "no such file");
 }
@@ -66,7 +66,7 @@ fn files_below_the_folder_are_read_by_whatever_path() {
     let absolute = f.path().join("own/y.csv").canonicalize().unwrap();
     allowed(&f, &format!("data t = csv(\"{}\");", absolute.display()), &[]);
     allowed(&f, "include \"std/scene.pcad\" as scene; data t = csv(\"../own/y.csv\");", &[]);
-    // A part in a folder of its own reaches no further than the program.
+    // An included file in a subfolder has the same limits as the program.
     f.write("own/parts/inner.pcad", "include \"../../other/part.pcad\" as p;");
     f.write("own/p.pcad", "include \"parts/inner.pcad\" as inner;");
     f.refuses(&CHECK, "cannot read own/parts/../../other/part.pcad");
@@ -110,17 +110,17 @@ fn symbolic_links_are_followed_before_they_are_judged() {
     allowed(&f, "data t = csv(\"within/z.csv\");", &[]);
     f.write("own/p.pcad", "data t = csv(\"broken/x.csv\");");
     f.refuses(&CHECK, "no such file");
-    // A file that was read becomes a link.
+    // A file that was read is replaced by a link.
     allowed(&f, "data t = csv(\"y.csv\");", &[]);
     std::fs::remove_file(at("own/y.csv")).unwrap();
     symlink("../other/x.csv", at("own/y.csv")).unwrap();
     refused(&f, "data t = csv(\"y.csv\");", "other");
-    // A program that is a link is named on the command line; its folder is where the link
-    // is.
+    // A program that is a link is named on the command line; its folder is that of the
+    // link.
     f.write("other/p2.pcad", "data t = csv(\"parts/z.csv\");");
     symlink("../other/p2.pcad", at("own/p2.pcad")).unwrap();
     f.succeeds(&["check", "own/p2.pcad"]);
-    // A pipe would wait for somebody to write.
+    // Reading a pipe would wait for a writer.
     std::process::Command::new("mkfifo").arg(at("own/pipe.csv")).status().unwrap();
     f.write("own/p.pcad", "data t = csv(\"pipe.csv\");");
     f.refuses(&CHECK, "it is not a regular file");
@@ -148,7 +148,7 @@ fn files_that_files_name_are_bounded_alike() {
     };
     f.write("own/m.gltf", gltf("..%2Fother%2Fa.obj"));
     refused(&f, "data m = mesh(\"m.gltf\");", "other");
-    // A file named on the command line may name others below its folder, and no others.
+    // A file named on the command line may name others below its own folder only.
     f.write(
         "own/p.pcad",
         "data body: armature; assume x ~ normal(0, 1); observe normal(x, 1) = 1;",
@@ -201,7 +201,7 @@ fn the_library_does_the_same() {
     assert!(Program::open(path).map_err(why).err().unwrap().contains(OUTSIDE));
     assert!(Program::open_allowing(path, &[&other]).and_then(Program::compile).is_ok());
     assert!(Program::open_allowing(path, &[other.join("none")]).is_err());
-    // What is read later may be allowed later.
+    // Reading may be allowed after opening, for files that are read later.
     f.write("own/p.pcad", "data t = csv(\"../other/x.csv\");");
     assert!(
         Program::open(path).and_then(Program::compile).map_err(why).unwrap_err().contains(OUTSIDE)
@@ -209,8 +209,8 @@ fn the_library_does_the_same() {
     assert!(
         Program::open(path).and_then(|p| p.allow_read(&other)).and_then(Program::compile).is_ok()
     );
-    // What was allowed stays allowed when the program is edited, and when another takes
-    // its place.
+    // Permissions persist when the program is edited, and when another program replaces
+    // it.
     let wider = Program::open_allowing(path, &[&other]).unwrap();
     assert!(wider.edited("include \"../other/part.pcad\" as part;").is_ok());
     f.write("own/parts/q.pcad", "include \"../../other/part.pcad\" as part;")
@@ -219,7 +219,7 @@ fn the_library_does_the_same() {
     let next = next.to_str().unwrap();
     assert!(wider.replaced(next).is_ok() && Program::open(path).unwrap().replaced(next).is_err());
     assert!(wider.written_as(next).is_ok());
-    // A program that is only text reads nothing, and observes what it is given.
+    // A program given as text cannot read files, but may observe files given to it.
     let text =
         format!("data t = csv(\"{}\"); assume x ~ normal(0, 1);", other.join("x.csv").display());
     assert!(

@@ -1,8 +1,8 @@
-//! A newcomer reads the README: its commands are typed in a folder that holds nothing but
-//! the pictures they name, its program is written and run, and the commands it lists are
-//! tried on the runs that these leave.
+//! Follows the README like a newcomer: types its commands in a folder that contains only
+//! the pictures that they name, writes and runs its program, and tries the listed
+//! commands on the resulting runs.
 //!
-//! The guide's chapters and the recorded session of docs/repl.md are played by `guide`
+//! The guide's chapters and the recorded session of docs/repl.md are replayed by `guide`
 //! and `repl`.
 
 #[path = "common/folder.rs"]
@@ -12,13 +12,14 @@ use folder::Folder;
 
 const README: &str = include_str!("../README.md");
 
-/// The indented lines of the page that begin like this, without the indent.
+/// Returns the indented lines of the page that begin with this prefix, without indent and
+/// prefix.
 fn lines_after<'a>(prefix: &str) -> Vec<&'a str> {
     let typed = README.lines().filter_map(|l| l.strip_prefix("    "));
     typed.filter_map(|l| l.strip_prefix(prefix)).collect()
 }
 
-/// What is typed, word by word; a time limit is cut to one that a test can wait for.
+/// Splits a command into words; a time limit is shortened for the test.
 fn words(line: &str) -> Vec<&str> {
     let mut cut = false;
     let word = |w| {
@@ -40,7 +41,8 @@ fn the_commands_run_as_they_are_written() {
         let done = f.succeeds(&words);
         assert!(done.out.contains("r_hat"), "{}", done.out);
     }
-    // What the page says that a run leaves, and what can be done with it later.
+    // The files that a run leaves according to the page, and the commands that use them
+    // later.
     for part in ["report.html", "chain-1.csv", "inference.zarr", "run.json", "keypoints.json"] {
         assert!(f.path().join("runs/human").join(part).exists(), "{part}: {:?}", f.files());
     }
@@ -70,13 +72,13 @@ fn the_first_program_does_what_is_shown() {
         .collect();
     f.write("line.pcad", text.join("\n"));
     let done = f.succeeds(&["run", "line.pcad", "--seed", "1"]);
-    // Means and intervals as they are printed on the page; times are the machine's.
+    // Means and intervals are as on the page; times depend on the machine.
     let shown = lines_after("slope ").into_iter().next().expect("the table of the page");
     let said = done.out.lines().find_map(|l| l.strip_prefix("slope ")).expect("a table");
     let numbers = |l: &str| l.split_whitespace().take(4).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(numbers(shown), numbers(said));
     assert!(done.err.contains("infer {"), "the plan that is used is shown: {}", done.err);
-    // The prompt takes the run up; what is typed there is in docs/repl.md.
+    // The prompt resumes the run; docs/repl.md has commands to type there.
     let prompt = f.succeeds(&["repl", "runs/line"]);
     assert!(prompt.out.contains("log joint"), "{}", prompt.out);
     for command in [

@@ -1,8 +1,8 @@
-//! The prompt: the recording in docs/repl.md word for word, scripts that are piped in,
-//! and a real pseudo-terminal.
+//! The prompt: the recording in docs/repl.md word for word, piped scripts, and a
+//! pseudo-terminal.
 //!
-//! `REGENERATE=1 cargo test --test repl` writes what the recorded session says now into
-//! the page: read it first.
+//! `REGENERATE=1 cargo test --test repl` writes the present output of the recorded
+//! session to the page: read it first.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -27,7 +27,7 @@ fn piped(f: &Folder, args: &[&str], script: &str) -> Done {
 const PROMPT: &str = "pcad> ";
 const CONTINUED: &str = "    > ";
 
-/// What was typed in a recording.
+/// Returns the lines typed in a recording.
 fn typed(recording: &str) -> String {
     let line = |l: &str| {
         let text = l
@@ -39,7 +39,7 @@ fn typed(recording: &str) -> String {
     recording.lines().filter_map(line).collect()
 }
 
-/// The page's parts: text as it is, and recordings.
+/// Splits the page into text and recordings.
 fn parts(page: &str) -> Vec<(bool, String)> {
     let mut parts = Vec::new();
     for (i, part) in page.split("```").enumerate() {
@@ -64,7 +64,7 @@ fn the_recorded_session_replays() {
         &typed(&recorded.join("\n")),
     );
     assert_eq!(d.code, 0, "{}", d.err);
-    // As many entries to each part as it had.
+    // Each part gets as many entries as it had.
     let mut said = d.out.lines().peekable();
     let mut now = Vec::new();
     for part in &recorded {
@@ -131,8 +131,8 @@ fn scripts_end_at_the_first_error() {
     assert_eq!(piped(&f, &["--set", "n=3"], "").code, 2, "nothing to set without a program");
 }
 
-/// The program goes through the user's editor, and comes back; what is in the way of a
-/// file is said.
+/// The program is edited in the user's editor and read back; obstacles to writing a file
+/// are reported.
 #[cfg(unix)]
 #[test]
 fn programs_are_edited_and_saved() {
@@ -159,8 +159,8 @@ fn programs_are_edited_and_saved() {
     );
 }
 
-/// A run is opened by its folder, at the start and from another session; `:undo` goes
-/// back.
+/// A run is opened by its folder, at the start and from another session; `:undo` reverts
+/// that.
 #[test]
 fn runs_are_loaded() {
     let f = Folder::new("repl_runs");
@@ -179,8 +179,7 @@ fn runs_are_loaded() {
     );
 }
 
-/// The photograph that is observed is what the scene is shown over; `run`'s ways to give
-/// it work.
+/// The scene is shown over the observed photograph, which can be given as to `run`.
 #[test]
 fn a_photograph_is_given_as_to_run() {
     let f = Folder::new("repl_photo");
@@ -202,8 +201,8 @@ fn a_photograph_is_given_as_to_run() {
     );
 }
 
-/// A real terminal: editing, completion, lines that go on, history, Ctrl-C in and out of
-/// an evaluation, colours, pictures.
+/// A pseudo-terminal: editing, completion, continued lines, history, Ctrl-C inside and
+/// outside of an evaluation, colours, pictures.
 #[cfg(unix)]
 #[test]
 fn on_a_terminal() {
@@ -219,20 +218,20 @@ fn on_a_terminal() {
         spawn_with_options(c, Options::new().timeout_ms(Some(60_000))).unwrap()
     };
     let mut p = start(&[]);
-    // A prompt is drawn anew with every key; a new one comes where the terminal is told
-    // to mark what is pasted. What is typed before is lost.
+    // A prompt is redrawn at every key; a new one follows the escape code that enables
+    // bracketed paste. Keys sent before that are lost.
     let ready = |p: &mut PtySession| {
         p.exp_string("\u{1b}[?2004h").unwrap();
         p.exp_string("pcad> ").unwrap();
     };
     p.exp_string(":help lists the commands").unwrap();
     ready(&mut p);
-    // A directive, in colours, and its value.
+    // A directive is coloured, and its value is printed.
     p.send_line("assume height ~ normal(0, 1)").unwrap();
     p.exp_string("\u{1b}[1;35massume\u{1b}[0m").unwrap();
     p.exp_string("height = ").unwrap();
     ready(&mut p);
-    // Tab.
+    // Completion with Tab.
     p.send("hei\t + 0 * hei\t").unwrap();
     p.send_line("").unwrap();
     p.exp_regex(r"\r\n-?[0-9.]+\r\n").unwrap();
@@ -241,7 +240,7 @@ fn on_a_terminal() {
     p.send_line("").unwrap();
     p.exp_string("accepted").unwrap();
     ready(&mut p);
-    // Several lines.
+    // An entry of several lines.
     p.send_line("fn twice(x) {").unwrap();
     p.send_line("  2 * x").unwrap();
     p.send_line("}").unwrap();
@@ -249,19 +248,20 @@ fn on_a_terminal() {
     p.send_line("twice(21)").unwrap();
     p.exp_string("\r\n42\r\n").unwrap();
     ready(&mut p);
-    // Ctrl-C clears the line; an error leaves the session.
+    // Ctrl-C clears the line; an error does not end the session.
     p.send("twice(1 + ").unwrap();
     p.send_control('c').unwrap();
     ready(&mut p);
     p.send_line("twise(1)").unwrap();
     p.exp_string("did you mean `twice`?").unwrap();
     ready(&mut p);
-    // History: the last but one.
+    // History: the last entry but one.
     p.send("\u{1b}[A\u{1b}[A").unwrap();
     p.send_line("").unwrap();
     p.exp_string("\r\n42\r\n").unwrap();
     ready(&mut p);
-    // Ctrl-C during inference ends it and keeps its draws; `:undo` goes back.
+    // Ctrl-C during inference ends it and keeps its draws; `:undo` restores the previous
+    // state.
     p.send_line(":set @height 0.25").unwrap();
     p.exp_string("log joint").unwrap();
     ready(&mut p);
@@ -278,13 +278,13 @@ fn on_a_terminal() {
     p.send_line("height").unwrap();
     p.exp_string("\r\n0.25\r\n").unwrap();
     ready(&mut p);
-    // Ctrl-C in an evaluation: nothing has changed.
+    // Ctrl-C during an evaluation leaves the session unchanged.
     p.send_line("fold(fn(a, i) { a + i }, 0, 0 .. 10000000)").unwrap();
     std::thread::sleep(Duration::from_millis(300));
     p.send_control('c').unwrap();
     p.exp_string("stopped; nothing has changed").unwrap();
     ready(&mut p);
-    // A question before somebody else's file is overwritten.
+    // The session asks before it overwrites a file that it did not write.
     f.write("mine.pcad", "let theirs = 1;\n");
     p.send_line(":save mine").unwrap();
     p.exp_string("mine.pcad exists; overwrite it? [y/N]").unwrap();
@@ -298,7 +298,7 @@ fn on_a_terminal() {
     p.exp_string("mine.trace.json").unwrap();
     ready(&mut p);
     assert!(f.read("mine.pcad").contains("assume height"));
-    // In the background.
+    // Inference in the background.
     p.send_line(":infer mh(@height) 100000000000 &").unwrap();
     p.exp_string("run 2 in the background").unwrap();
     ready(&mut p);
@@ -311,7 +311,7 @@ fn on_a_terminal() {
     p.send_line(":stop").unwrap();
     p.exp_string("run 2 is the state now").unwrap();
     ready(&mut p);
-    // A picture in half blocks.
+    // A picture in half-block characters.
     p.send_line("include \"std/scene.pcad\" as scene").unwrap();
     ready(&mut p);
     p.send_line("let ball = scene.sphere(1)").unwrap();
@@ -323,7 +323,7 @@ fn on_a_terminal() {
     p.send_control('d').unwrap();
     p.exp_eof().unwrap();
 
-    // The history is there the next time.
+    // The history is kept for the next session.
     assert!(f.read("state/pcadlang/history").contains("twice(21)"));
     let mut p = start(&["coin.pcad"]);
     ready(&mut p);

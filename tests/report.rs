@@ -1,13 +1,13 @@
-//! `report.html`: what a run puts there, and `pcadlang report`, which makes the page anew
-//! from the folder of a run.
+//! `report.html`: its contents after a run, and `pcadlang report`, which rebuilds the
+//! page from a run's folder.
 
 #[path = "common/folder.rs"]
 mod folder;
 
 use folder::{Folder, disc, png};
 
-/// A ball in the photograph of a disc, with a point in its middle that a detector saw a
-/// little beside.
+/// A ball in a photograph of a disc, with a landmark at its centre that a detector saw
+/// slightly off.
 const BALL: &str = "include \"std/scene.pcad\" as scene;
     data photo: image \"the photograph\";
     data points = keypoints();
@@ -37,7 +37,7 @@ const RUN: [&str; 8] = [
     "--chains",
 ];
 
-/// The page of a folder is removed and made anew: it is what it was, to the last byte.
+/// Removes the page of a folder and rebuilds it: it must be identical to the last byte.
 fn made_again(f: &Folder, run: &str) -> String {
     let (name, page) = (format!("{run}/report.html"), f.read(&format!("{run}/report.html")));
     std::fs::remove_file(f.path().join(&name)).unwrap();
@@ -107,8 +107,8 @@ fn a_page_is_made_again() {
     for name in ["photo.jpg", "photo_contours.png", "joints.png", "program.pcad"] {
         assert!(f.exists(&format!("ball/{name}")), "{name}");
     }
-    // What the contours of the photograph are: those of the disc, of 20 pixels around
-    // (84, 60).
+    // The contours of the photograph are those of the disc, with a radius of 20 pixels
+    // around (84, 60).
     let lines = image::open(f.path().join("ball/photo_contours.png")).unwrap().to_luma8();
     assert_eq!(
         lines.dimensions(),
@@ -122,8 +122,8 @@ fn a_page_is_made_again() {
     assert!(lit.len() > 60 && lit.iter().all(|d| *d < 3.0), "{lit:?}");
 }
 
-/// Where only joints are compared, as of people, the contours of the photograph are shown
-/// all the same, and count as looked at by nobody.
+/// If only joints are compared, as for people, the contours of the photograph are still
+/// shown, but a photograph without contours gives no warning.
 #[test]
 fn contours_are_shown_where_only_joints_are_compared() {
     let f = seen("page-joints");
@@ -146,8 +146,8 @@ fn contours_are_shown_where_only_joints_are_compared() {
     assert!(!f.read("blank/summary.json").contains("no contours were found"));
 }
 
-/// Where chains came further than others in their time, and names are none that the files
-/// of draws can bear, the page is the same.
+/// The page can be rebuilt from chains of different lengths, and from names that the
+/// files of draws cannot contain.
 #[test]
 fn pages_of_odd_draws_are_made_again() {
     let f = Folder::new("page-odd");
@@ -192,12 +192,12 @@ fn each_mode_has_its_picture() {
     let pictures: Vec<_> =
         (1..=3).map(|n| image::open(f.path().join(format!("far/mode-{n}.png"))).unwrap()).collect();
     assert!(pictures[0] != pictures[1] && pictures[1] != pictures[2]);
-    // Another run in the folder, of one mode, leaves none of them.
+    // Another run in the folder, with a single mode, removes the pictures.
     f.succeeds(&["run", "far.pcad", "--chains", "1", "--quiet", "--out", "far"]);
     assert!(!f.exists("far/mode-1.png") && !made_again(&f, "far").contains("class=\"thumb\""));
 }
 
-/// A run that was killed, or failed, or none at all.
+/// A run that was killed, one that failed, and a folder without a run.
 #[test]
 fn what_is_no_whole_run_is_said() {
     let f = seen("page-none");

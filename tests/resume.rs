@@ -1,5 +1,6 @@
-//! Chains that are broken off and go on from a checkpoint are those without a break, bit
-//! for bit: every kernel and statement, every shipped program, random programs.
+//! Chains that are interrupted and resumed from a checkpoint are bit-identical to
+//! uninterrupted ones: for every kernel and statement, every shipped program, random
+//! programs.
 
 #[path = "common/breaks.rs"]
 mod breaks;
@@ -26,8 +27,7 @@ fn of_text(text: &str) -> Model {
     Model::from_text(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Numbers, truth values and a branch with a choice of its own, some of them observed
-/// coarsely too.
+/// Numbers, Booleans and a branch with its own choice; some observations have surrogates.
 const MODEL: &str = "
     assume a ~ normal(0, 1); assume b ~ beta(2, 3); assume c ~ flip(0.4); assume k ~ categorical([1, 2, 3]);
     assume x = if c { inner ~ normal(1, 1); inner + a } else { a * 2 };
@@ -91,19 +91,19 @@ fn every_statement() {
         "for s in [0.1, 1] { for t in [\"u\", \"v\"] { drift(@a, s); mh(each(@**)); collect a; } }",
         "repeat 30 { repeat 3 { mix { 0.5 => both(1); 0.5 => gibbs(each($finite)); } stop when a > 0.5; } collect a, x; }",
         "init(best_of(12, keep = 6)); warmup 200 { anneal(50); mh(one(@**)); } repeat 10 { mh(one(@**)); }",
-        // Nothing but a warm-up: it ends as the chain does.
+        // Only a warm-up: it ends with the chain.
         "warmup 10 { mh(one(@**)); }",
     ];
     for plan in plans {
         let model = of_text(&format!("{MODEL} infer {{ {plan} }}"));
-        // As the program says how long, and for so many steps.
+        // With the program's own number of steps, and with a given one.
         let free = RunOptions { seed: 4, sites: true, ..RunOptions::default() };
         same_after_breaks(plan, &model, &free, 25);
         same_after_breaks(plan, &model, &options(37, 23), 25);
     }
 }
 
-/// A loop whose argument changes has another kernel for each of its values.
+/// A loop whose argument changes has a separate kernel for each value.
 #[test]
 fn kernels_are_told_apart_by_their_arguments() {
     let model = of_text(

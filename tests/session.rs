@@ -1,5 +1,5 @@
-//! Sessions as a front end has them: what is entered, what is said, and that nothing
-//! changes where something is wrong.
+//! Sessions as a front end uses them: entries, replies, and that an error does not change
+//! the state.
 
 use pcadlang::Program;
 use pcadlang::session::{Reply, Session, Trouble};
@@ -41,7 +41,7 @@ fn refuses(s: &mut Session, text: &str) -> String {
     }
 }
 
-/// Program, choices and log joint density, to the last bit.
+/// Returns the program, the choices and the log joint density, to the last bit.
 fn state(s: &Session) -> (String, Vec<String>, u64) {
     let choices = s
         .trace()
@@ -59,7 +59,7 @@ fn what_people_type_is_understood() {
     says(&mut s, ":set slope 1.5");
     assert_eq!(says(&mut s, "slope").trim(), "1.5");
     assert!(says(&mut s, ":flip intercept").contains("@intercept: "));
-    // Each address of the listing is one to ask for.
+    // Each listed address can be queried.
     says(&mut s, "for k in [\"a\", \"b\"] { t[k] ~ normal(0, 1); observe normal(t[k], 1) = 2; }");
     for (address, ..) in s.trace().choices() {
         assert!(says(&mut s, &format!(":why {address}")).starts_with(&format!("{address} = ")));
@@ -79,7 +79,7 @@ fn what_people_type_is_understood() {
         assert!(s.enter(word).is_ok_and(|r| r.ends), "{word}");
     }
     assert!(s.enter("clear").is_ok_and(|r| r.clears));
-    // A name of the program is that first.
+    // A name of the program takes precedence over a command.
     says(&mut s, "let q = 7");
     assert_eq!(says(&mut s, "q").trim(), "7");
 }
@@ -162,7 +162,7 @@ fn looking_changes_nothing() {
     assert_ne!(says(&mut s, "next"), says(&mut s, "next"), "a prediction is drawn each time");
 }
 
-/// What is assumed is drawn at once, although nothing is observed, and stays while the
+/// Assumed choices are drawn at once, even without an observation, and are kept while the
 /// program grows.
 #[test]
 fn a_program_grows_and_its_choices_stay() {
@@ -217,7 +217,7 @@ fn undo_restores_program_and_trace_to_the_last_bit() {
     assert!(refuses(&mut s, ":undo").contains("nothing to undo"));
 }
 
-/// What is said of a flip is what the trace knows, whether it is kept or not.
+/// The reply to a flip agrees with the trace, whether the flip is accepted or not.
 #[test]
 fn flips_say_what_they_do() {
     let mut s = line();
@@ -291,7 +291,7 @@ fn inference_in_the_background_leaves_the_state_until_it_is_asked_for() {
     says(&mut s, ":undo");
     assert_eq!(state(&s), before);
 
-    // One that would go on for ever, stopped; its draws can be looked at while it runs.
+    // An endless run is stopped; its draws can be inspected while it runs.
     says(&mut s, ":infer drift(one($continuous)) 1000000000 &");
     while !says(&mut s, ":status").contains("draws") {
         std::thread::sleep(Duration::from_millis(5));
@@ -314,7 +314,7 @@ fn what_belongs_to_another_program_is_not_taken_over() {
     let why = refuses(&mut s, ":stop");
     assert!(why.contains("the program has changed since run 1 started"), "{why}");
     assert_eq!(state(&s), before);
-    // Back at the same program it would fit.
+    // After a return to the same program, the run can be used.
     says(&mut s, ":undo");
     says(&mut s, ":infer mh(one(@**)) 50 &");
     says(&mut s, "let more = slope + 1");
@@ -322,8 +322,8 @@ fn what_belongs_to_another_program_is_not_taken_over() {
     assert!(says(&mut s, ":stop").starts_with("run 2"));
 }
 
-/// The same lines with the same seed are the same session; no stream of random numbers is
-/// used twice.
+/// The same lines with the same seed give the same session; no stream of random numbers
+/// is used twice.
 #[test]
 fn sessions_replay() {
     let lines = [
@@ -387,12 +387,12 @@ fn what_is_stopped_changes_nothing_but_inference_keeps_its_draws() {
     };
     interrupted(&mut s, "let endless = fold(fn(a, i) { a + i }, 0, 0 .. 10000000)");
     assert_eq!(state(&s), before);
-    // What runs in the background is not meant.
+    // Background runs are not affected.
     says(&mut s, ":infer mh(one(@**)) 1000000000 &");
     interrupted(&mut s, ":wait");
     assert!(says(&mut s, ":status").contains("sampling"));
     assert!(says(&mut s, ":stop").contains("run 1"));
-    // Inference in the foreground ends where it is.
+    // Inference in the foreground is stopped where it is.
     says(&mut s, ":undo");
     assert_eq!(state(&s), before);
     let later = Arc::clone(&stop);
@@ -412,7 +412,7 @@ fn what_is_stopped_changes_nothing_but_inference_keeps_its_draws() {
     assert_eq!(state(&s), before);
 }
 
-/// A name that is bound again takes the place of the old one, for all that uses it.
+/// A name that is bound again replaces the old one, for everything that uses it.
 #[test]
 fn names_are_bound_again_and_forgotten() {
     let mut s = line();
@@ -424,23 +424,23 @@ fn names_are_bound_again_and_forgotten() {
     assert_eq!(says(&mut s, "slope"), "2\n", "choices stay");
     says(&mut s, ":undo");
     assert_eq!(state(&s), before);
-    // What depends on it is shown with its new values.
+    // Values that depend on it are shown with their new values.
     says(&mut s, "let double = 2 * slope");
     says(&mut s, "fn f(a) { a + double }");
     says(&mut s, "let three = f(1)");
     let said = says(&mut s, "let double = 3 * slope");
     assert!(said.contains("double = 6\nthree = 7\n"), "{said}");
-    // Where it needs what was bound later it moves there.
+    // A definition that needs later ones is moved after them.
     says(&mut s, "let last = 1");
     says(&mut s, "let free = 1; let later = 2");
     says(&mut s, "let free = later + 1");
     assert_eq!(says(&mut s, "free"), "3\n");
-    // An old value that is not possible any more is drawn anew, the others stay.
+    // An old value that is no longer possible is resampled, the others are kept.
     says(&mut s, ":set intercept 0.25");
     says(&mut s, "assume slope ~ uniform(5, 6)");
     assert!((5.0..6.0).contains(&says(&mut s, "slope").trim().parse::<f64>().unwrap()));
     assert_eq!(says(&mut s, "intercept"), "0.25\n");
-    // Observations and kernels by their names.
+    // Observations and kernels are replaced by name.
     says(&mut s, "observe normal(slope, 1) = [1, 2] as y");
     let observed = says(&mut s, ":trace");
     assert!(
@@ -450,7 +450,7 @@ fn names_are_bound_again_and_forgotten() {
     says(&mut s, "kernel both() { drift(@slope); }");
     says(&mut s, "kernel both() { drift(@intercept); }");
     assert_eq!(s.text().matches("kernel both").count(), 1);
-    // Elements of a container are not the container.
+    // Elements of a container do not replace the container.
     says(&mut s, "z[0] ~ normal(0, 1)");
     says(&mut s, "z[1] ~ normal(0, 1)");
     assert!(s.text().contains("z[0] ~") && s.text().contains("z[1] ~"));
@@ -501,7 +501,7 @@ fn inference_says_how_far_it_is_and_what_it_found() {
         ["quantity", "mean", "sd", "5%", "95%", "ess"]
     );
     assert!(said.lines().any(|l| l.starts_with("slope ")) && said.contains("log joint "), "{said}");
-    // A warm-up without end: there are no draws, and both say why.
+    // An endless warm-up: there are no draws, and both replies give the reason.
     says(&mut s, ":infer { warmup 1000000000 { drift(@slope); } repeat 5 { drift(@slope); } } &");
     let status = |s: &mut Session| loop {
         let said = says(s, ":status");
@@ -514,7 +514,7 @@ fn inference_says_how_far_it_is_and_what_it_found() {
     let said = refuses(&mut s, ":plot slope");
     assert!(said.contains("run 2 has no draws yet: warm-up, "), "{said}");
     says(&mut s, ":drop");
-    // By steps.
+    // The progress of sampling is reported in steps.
     says(&mut s, ":infer drift(one($continuous)) 1000000000 &");
     while !says(&mut s, ":status").contains("draws") {
         std::thread::sleep(Duration::from_millis(5));
@@ -567,7 +567,7 @@ fn a_front_end_is_asked_for_what_a_session_cannot_do() {
     assert_eq!(std::fs::read_to_string(at("other.pcad")).unwrap(), "assume theirs ~ normal(0, 1);");
     assert_eq!(asked(&mut s, &then), None);
     assert!(std::fs::read_to_string(at("other.pcad")).unwrap().contains("slope"));
-    // What it wrote itself it writes again.
+    // The session overwrites its own files without asking.
     assert_eq!(asked(&mut s, &format!(":save {}", at("other"))), None);
     std::fs::write(folder.join("run/run.json"), "{}").unwrap();
     assert_eq!(
@@ -576,7 +576,7 @@ fn a_front_end_is_asked_for_what_a_session_cannot_do() {
     );
     std::fs::remove_dir_all(&folder).unwrap();
 
-    // An edited text replaces the program; choices stay.
+    // An edited text replaces the program; choices are kept.
     assert_eq!(asked(&mut s, ":edit"), Some(Request::Edit));
     says(&mut s, ":set slope 1.5");
     let before = state(&s);
@@ -586,7 +586,7 @@ fn a_front_end_is_asked_for_what_a_session_cannot_do() {
     assert!(s.replace("assume = ;").is_err() && s.text() == text);
     says(&mut s, ":undo");
     assert_eq!(state(&s), before);
-    // Another session's state is taken over.
+    // The state of another session is adopted.
     let mut other = session("assume b ~ normal(0, 1);");
     says(&mut other, ":set b 0.5");
     s.take_over(other, ":load b");
@@ -595,8 +595,8 @@ fn a_front_end_is_asked_for_what_a_session_cannot_do() {
     assert_eq!(state(&s), before);
 }
 
-/// Values without bounds on paper are a line on the screen, and what cannot be built is
-/// an error.
+/// Values that would print at any length take one line on the screen, and a value that
+/// cannot be built is an error.
 #[test]
 fn huge_values_are_no_trouble() {
     let mut s = Session::new(1, Stop::default()).unwrap();
@@ -625,7 +625,7 @@ fn huge_values_are_no_trouble() {
     assert!(says(&mut s, "1e300 * 1").contains("1e300"));
 }
 
-/// A state of probability zero is told, and does not end the session.
+/// A state of probability zero is reported, and does not end the session.
 #[test]
 fn impossible_states_are_told() {
     let mut s = session("assume p ~ uniform(0, 1);");
@@ -635,7 +635,7 @@ fn impossible_states_are_told() {
     assert!(said.contains("log joint -inf"), "{said}");
     let said = says(&mut s, ":set @p 0.05");
     assert!(said.contains("log joint -inf ->"), "{said}");
-    // Old choices that lead where the program has no value are drawn anew.
+    // If the program's density is undefined for the old choices, they are resampled.
     says(&mut s, ":set @p 0.01");
     let said = says(&mut s, "assume q ~ normal(0, log(p * 60))");
     assert!(said.contains("all were redrawn from the prior"), "{said}");
@@ -674,7 +674,7 @@ fn words_are_completed_where_they_stand() {
     };
     let has = |s: &Session, line: &str, word: &str| words(s, line).1.iter().any(|w| w == word);
     assert_eq!(words(&s, ":fl"), (":fl".into(), vec![":flip".into()]));
-    // Only what the command takes.
+    // Only valid arguments of the command are completed.
     for line in [":list ", ":status ", ":undo ", ":quit x"] {
         assert!(words(&s, line).1.is_empty(), "{line}");
     }
@@ -752,7 +752,7 @@ fn sessions_are_saved_and_loaded() {
     assert_eq!(state(&other), saved);
     says(&mut other, ":undo");
     assert_eq!(other.text(), "");
-    // A trace of another program, and one that is no trace.
+    // A trace of another program, and a file that is not a trace.
     std::fs::write(at("cup.pcad"), "assume other ~ normal(0, 1);").unwrap();
     let before = state(&s);
     let why = refuses(&mut s, &format!(":load {}", at("cup")));
@@ -766,7 +766,7 @@ fn sessions_are_saved_and_loaded() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// Data files are read once, and prepared once.
+/// Data files are read and prepared once.
 #[test]
 fn files_are_read_once() {
     let folder = std::env::temp_dir().join(format!("pcadlang-files-{}", std::process::id()));
@@ -798,8 +798,7 @@ fn scenes_are_seen() {
     assert!(refuses(&mut Session::new(1, Stop::default()).unwrap(), ":render").contains("no view"));
 }
 
-/// Names that are asked for by nobody but the session are kept up to date as observations
-/// are.
+/// Names on which only the session depends are kept up to date like observations.
 #[test]
 fn shipped_programs_are_at_home() {
     for name in [

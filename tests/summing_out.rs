@@ -1,12 +1,14 @@
-//! Choices that are summed out of what Hamiltonian kernels see, against quadrature:
-//! conditions on several of them, tables, `mem`, observations that come and go, values
-//! that the program has not, structure that depends on what moves.
+//! Choices summed out of the density of Hamiltonian kernels, compared with quadrature:
+//! conditions on several of them, tables, `mem`, observations that appear and vanish,
+//! values for which the density is undefined, structure that depends on the moving
+//! choices.
 
 mod common;
 use common::*;
 
-/// One choice and one datum of the program below; joint conditions are met off the
-/// diagonal of values only.
+/// Kernels with `%` in place of the choices that are summed out. In the program below,
+/// the joint condition of an observation holds off the diagonal only, for different
+/// values of its two choices.
 const KERNELS: [&str; 3] = [
     "nuts(@effect, marginal = %)",
     "hmc(@effect, steps = 5, marginal = %)",
@@ -23,7 +25,7 @@ fn effects(sites: usize, y: &[f64], kernel: &str) -> Draws {
     run(&text, 5, 2)
 }
 
-/// The mean and standard deviation of the effect.
+/// Returns the mean and standard deviation of the effect.
 fn expected(y: &[f64]) -> (f64, f64) {
     let density = |e: f64| {
         let one = |y: &f64| normal_pdf(*y, e, 0.5) / 9.0 + normal_pdf(*y, 0.0, 0.5) * 8.0 / 9.0;
@@ -56,7 +58,7 @@ fn joint_conditions_in_every_grouping() {
         assert_effect(&k, &draws, &y);
         assert_spread(&k, &draws, &y);
     }
-    // What is left is moved by gibbs.
+    // The other choices are moved by gibbs.
     for (summed, rest) in
         [("@a", "@b"), ("@b", "@a"), ("@a[0] + @b[0] + @a[3]", "@a + @b"), ("@a + @b[1]", "@b")]
     {
@@ -76,7 +78,7 @@ fn one_choice_and_one_datum() {
     }
 }
 
-/// Three truth values and a table: the number stands at one of eight places.
+/// Three Booleans index a table of eight, with one non-zero entry.
 #[test]
 fn three_truth_values_and_a_table() {
     for kernel in KERNELS {
@@ -95,7 +97,7 @@ fn three_truth_values_and_a_table() {
         let z = integrate(density, -14.0, 14.0, 20_000);
         let on = |e: f64| normal_pdf(e, 0.0, 2.0) * normal_pdf(2.0, e, 0.5);
         assert_mean(&k, &d["effect"], integrate(|e| e * density(e), -14.0, 14.0, 20_000) / z, 0.4);
-        // The place that matters has c[0] and c[2] but not c[1].
+        // The non-zero entry has c[0] and c[2] but not c[1].
         let there: Vec<f64> = (0..d["c[0]"].len())
             .map(|i| d["c[0]"][i] * (1.0 - d["c[1]"][i]) * d["c[2]"][i])
             .collect();
@@ -108,7 +110,7 @@ fn three_truth_values_and_a_table() {
     }
 }
 
-/// Observations in branches of the choices that are summed out.
+/// Observations in branches on the choices that are summed out.
 #[test]
 fn observations_that_come_and_go() {
     let text = |k: &str| {
@@ -131,8 +133,8 @@ fn observations_that_come_and_go() {
     }
 }
 
-/// Whether `b` is asked for depends on what moves: a move that leaves it behind could not
-/// come back.
+/// Whether `b` exists depends on the moving choice: a move that made it vanish could not
+/// be reversed.
 #[test]
 fn structure_that_depends_on_what_moves() {
     let text = "assume z ~ flip(0.4); assume x ~ normal(0, 1); assume b ~ normal(0, 1);
@@ -146,7 +148,7 @@ fn structure_that_depends_on_what_moves() {
     assert_mean("z", &d["z"], 0.4, 0.1);
 }
 
-/// Which choice a score reads depends on what moves.
+/// The choice on which a score depends is determined by the moving choice.
 #[test]
 fn what_is_read_depends_on_what_moves() {
     let text = "assume p ~ flip(0.3); assume q ~ flip(0.6); assume x ~ normal(0, 1);
@@ -172,7 +174,7 @@ fn what_is_read_depends_on_what_moves() {
         let of = |a: f64, b: f64| {
             all.map(|(p, q)| integrate(|x| g(x, p, q) * f(x, p, q), a, b, 4000)).iter().sum::<f64>()
         };
-        // Inside of the edges, where the density jumps.
+        // Just inside of the edges at which the density jumps.
         of(-8.0, 0.5 - 1e-12) + of(0.5 + 1e-12, 8.0)
     };
     let z = sum(&|_, _, _| 1.0);
@@ -182,7 +184,7 @@ fn what_is_read_depends_on_what_moves() {
     assert_mean("q", &d["q"], sum(&|_, _, q| f64::from(u8::from(q))) / z, 0.1);
 }
 
-/// Components that a function with `mem` makes when a label asks for them.
+/// Components created by a memoised function when a label first refers to them.
 #[test]
 fn components_of_a_function_with_mem() {
     let y = [1.0, 0.6, -0.4];
@@ -226,7 +228,7 @@ fn components_of_a_function_with_mem() {
     assert_mean("together", &same, together / total, 0.2);
 }
 
-/// For one value of the choice the program has no value where x is not positive.
+/// For one value of the choice, the density is undefined where x is not positive.
 #[test]
 fn values_that_the_program_has_not() {
     for k in
@@ -250,7 +252,7 @@ fn values_that_the_program_has_not() {
     }
 }
 
-/// What cannot be summed out says so.
+/// Choices that cannot be summed out give an error.
 #[test]
 fn what_cannot_be_summed_out_is_an_error() {
     for (program, says) in [

@@ -1,6 +1,6 @@
-//! Tapes of densities against the traces they were recorded from: the programs of the
-//! benchmarks and the posteriors of posteriordb, and what happens when conditions,
-//! structure or other choices change.
+//! Tapes of densities compared with the traces from which they were recorded: the
+//! programs of the benchmarks and the posteriors of posteriordb, and changes of
+//! conditions, structure or other choices.
 
 #[path = "common/tape.rs"]
 mod tape;
@@ -30,7 +30,7 @@ fn model(path: &str, data: &Json) -> Model {
     program.compile().unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Compares at draws from the prior.
+/// Compares tape and trace at draws from the prior.
 fn check(model: &Model, what: &str) {
     for seed in 0..3 {
         let mut trace = model.simulate(seed, 0).unwrap_or_else(|e| panic!("{what}\n{e}"));
@@ -92,7 +92,7 @@ fn a_condition_that_turns_out_otherwise_is_noticed() {
 #[test]
 fn a_parameter_outside_its_domain_is_for_a_proposal_to_tell() {
     let program = "assume s ~ normal(0.2, 1); observe normal(0, s) = 0.5;";
-    // A start within the domain.
+    // The start is within the domain.
     let model = text(program);
     let mut trace = (0..50).find_map(|seed| model.simulate(seed, 0).ok()).unwrap();
     let told = compare_tape(&mut trace, program);
@@ -116,7 +116,7 @@ fn a_tape_holds_until_something_else_is_committed() {
     set(&mut trace, 0, 0.75);
     trace.commit();
     assert!(!tape.holds(&trace));
-    // The kernel's own move.
+    // A move of the kernel itself.
     tape.moved(&trace);
     let mut y = Vec::new();
     assert!(tape.holds(&trace) && tape.begin(&trace, &mut y));

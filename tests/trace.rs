@@ -1,5 +1,5 @@
-//! Traces: what re-runs, equality of incremental and full updates, save and load,
-//! structure that comes and goes.
+//! Traces: what is re-executed, equality of incremental and full updates, saving and
+//! loading, changing structure.
 
 mod common;
 use common::*;
@@ -20,7 +20,7 @@ fn at(step: u64) -> Streams {
     Streams { key: StreamKey::new(99, 0, Purpose::VALUES), step, substream: 0 }
 }
 
-/// The addresses of all active choices.
+/// Returns the addresses of all active choices.
 fn addresses(t: &Trace) -> Vec<String> {
     t.choices().into_iter().map(|(a, _, _)| a.to_string()).collect()
 }
@@ -80,7 +80,7 @@ const PROGRAMS: &[(&str, &str)] = &[
     ),
 ];
 
-/// The program a fragment stands for, with an order of definition that holds.
+/// Reorders the definitions of a program so that they are valid.
 fn program(text: &str) -> String {
     text.replace(
         "assume g = make(1); assume h = if k { make(2) } else { g };\n         assume k ~ flip(0.5);",
@@ -88,7 +88,7 @@ fn program(text: &str) -> String {
     )
 }
 
-/// After any sequence of proposals, commits and roll-backs, a run from scratch with the
+/// After any sequence of proposals, commits and rollbacks, a run from scratch with the
 /// same choices has the same score to the last bit and the same set of choices.
 #[test]
 fn increments_equal_a_run_from_scratch() {
@@ -187,7 +187,8 @@ fn saved_traces_load_bit_for_bit() {
     }
 }
 
-/// A saved choice that the program does not make is refused, by its address.
+/// A saved choice that does not occur in the program is refused, and its address
+/// reported.
 #[test]
 fn saved_choices_occur_in_the_program() {
     for text in ["assume a ~ normal(0, 1); observe normal(a, 1) = 0.5;", PROGRAMS[0].1] {
@@ -205,7 +206,7 @@ fn saved_choices_occur_in_the_program() {
     }
 }
 
-/// Addresses are exactly as the language says.
+/// Addresses are exactly as the language specifies.
 #[test]
 fn addresses_are_paths() {
     let (_, t) = trace(
@@ -261,7 +262,7 @@ fn selections_are_kept_up_to_date() {
     }
 }
 
-/// A change re-runs what depends on it and nothing else.
+/// A change re-executes only what depends on it.
 #[test]
 fn a_change_reruns_only_what_depends_on_it() {
     let text = "assume a ~ normal(0, 1); assume b ~ normal(0, 1);
@@ -278,15 +279,16 @@ fn a_change_reruns_only_what_depends_on_it() {
     for expected in ["a * 2", "left > 1000", "normal(left, 1)"] {
         assert_eq!(ran.iter().filter(|r| **r == expected).count(), 1, "{expected} in {ran:?}");
     }
-    // The comparison came out equal: what depends on it did not run; nor did anything of
-    // b.
+    // The comparison gave an equal value, so its dependents were not executed; nor was
+    // anything that depends on b.
     assert!(
         !ran.iter().any(|r| r.contains("right") || r.contains("b * 3") || r.contains("gate")),
         "{ran:?}"
     );
 }
 
-/// Who watches sees what a move executes, also where the move could be made without.
+/// Watching a trace records what a move executes, even if the kernel could make the move
+/// without executing anything.
 #[test]
 fn moves_are_seen_by_who_watches() {
     use pcadlang::infer::{Gibbs, Kernel, Pick, SiteSelection, StepContext};
@@ -330,8 +332,8 @@ fn work_does_not_grow_with_the_trace() {
     assert_eq!(few, executed(1000));
 }
 
-/// What branches needed that were left is used again: a chain may change its structure as
-/// often as it likes.
+/// The storage of abandoned branches is reused: a chain may change its structure any
+/// number of times.
 #[test]
 fn storage_of_branches_is_used_again() {
     let model = Model::from_text(
@@ -355,7 +357,8 @@ fn storage_of_branches_is_used_again() {
     assert_eq!(t.choices().len(), 2);
 }
 
-/// What a map runs over goes when the map does, also if its elements changed in between.
+/// The computations of a map are dropped with the map, even if its elements changed in
+/// the meantime.
 #[test]
 fn what_a_map_ran_over_is_let_go() {
     use pcadlang::dist::Datum::{Bool, Num};
@@ -378,8 +381,8 @@ fn what_a_map_ran_over_is_let_go() {
     }
 }
 
-/// Gradients are those of the state to the last bit, whatever was built and let go on the
-/// way there.
+/// Gradients depend only on the state, to the last bit, not on what was created and
+/// dropped before.
 #[test]
 fn gradients_do_not_depend_on_the_past() {
     let (_, mut t) = trace(
@@ -402,7 +405,8 @@ fn gradients_do_not_depend_on_the_past() {
     }
 }
 
-/// The surrogate of an observation is scored on demand and is no part of the joint.
+/// The surrogate of an observation is scored on demand and is not part of the joint
+/// density.
 #[test]
 fn surrogates_are_not_part_of_the_joint() {
     let (_, mut t) = trace(
@@ -442,7 +446,7 @@ fn runaway_programs_are_stopped() {
     );
 }
 
-/// Going over to a saved state is the same as building it, whatever structure lies
+/// Restoring a saved state is equivalent to building it, whatever structures are in
 /// between.
 #[test]
 fn restored_states_are_the_saved_ones() {
@@ -469,8 +473,8 @@ fn restored_states_are_the_saved_ones() {
     }
 }
 
-/// Two functions called at one place draw at one address, `@x/f/z[0]`: whichever is there
-/// is found by it, after moves that were kept and moves that were not.
+/// Two functions called at one place draw at the same address, `@x/f/z[0]`: it always
+/// refers to the existing choice, after accepted and rejected moves.
 #[test]
 fn choices_are_found_by_their_addresses_as_branches_change() {
     use pcadlang::infer::{Kernel, Mh, Pick, SiteSelection, StepContext};
@@ -501,8 +505,8 @@ fn choices_are_found_by_their_addresses_as_branches_change() {
     }
 }
 
-/// What reads a number is not told where it turns into something else: that is an error,
-/// never an old value.
+/// The reader of a number cannot follow its change to another type: this is an error, and
+/// never a stale value.
 #[test]
 fn a_number_that_turns_into_an_array_is_an_error() {
     let text = "assume k ~ flip(0.5); assume x ~ normal(if k { [0, 1] } else { 0 }, 1);
@@ -514,7 +518,7 @@ fn a_number_that_turns_into_an_array_is_an_error() {
     let error = number.set("@k", true, Streams::default()).unwrap_err().to_string();
     assert!(error.contains("its parameters became arrays"), "{error}");
     assert!(is(&number, false) && number.log_joint() == before);
-    // The other way round all is told.
+    // A change in the opposite direction is followed.
     let mut array = (0..20).map(|i| model.simulate(1, i).unwrap()).find(|t| is(t, true)).unwrap();
     array.set("@k", false, Streams::default()).unwrap();
     assert_eq!(array.rerun().unwrap().log_joint(), array.log_joint());

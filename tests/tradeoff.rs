@@ -1,5 +1,5 @@
-//! `pcadlang tradeoff` on small cases of each kind of truth: tables, resumption, presets
-//! and what `run` makes of them.
+//! `pcadlang tradeoff` on small cases with each kind of ground truth: tables, resumption,
+//! presets, and their use by `run`.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -42,7 +42,7 @@ fn tradeoff(f: &Folder, more: &[&str]) -> folder::Done {
 fn more_draws_are_nearer_to_the_reference() {
     let f = Folder::new("tradeoff_draws");
     mean_cases(&f);
-    // One that is better still, for comparison only.
+    // A better setting, for comparison only.
     f.write("more.json", r#"{"compare": true, "base": {"chains": 4, "n": 60000}}"#);
     let done = tradeoff(
         &f,
@@ -69,7 +69,7 @@ fn more_draws_are_nearer_to_the_reference() {
     let plot = f.read("tradeoff/plot.svg");
     assert!(plot.contains("reference posterior") && plot.contains("accurate</text>"));
 
-    // What was found is used by name, and what is typed wins.
+    // The preset is used by name, and explicit settings take precedence.
     let run = |more: &[&str]| {
         let done = f.run(
             &[&["run", "mean.pcad", "--observe", "d=cases/a/d.json", "--out", "r"], more].concat(),
@@ -97,7 +97,7 @@ fn what_was_run_is_not_run_again() {
     mean_cases(&f);
     assert_eq!(tradeoff(&f, &["--only", "a"]).code, 0);
     let before = f.read("tradeoff/runs.jsonl");
-    // Half a line, as a power cut leaves it.
+    // Half a line, as left by a power failure.
     std::fs::write(f.path().join("tradeoff/runs.jsonl"), format!("{before}{{\"setting\": \"chai"))
         .unwrap();
     f.write("few.json", r#"{"base": {"chains": 2}, "vary": {"n": [2, 100, 20000, 50]}}"#);
@@ -105,20 +105,21 @@ fn what_was_run_is_not_run_again() {
     assert_eq!(again.code, 0, "{}", again.err);
     let after = f.read("tradeoff/runs.jsonl");
     assert!(after.starts_with(&before) && after.lines().count() == 5, "one more setting: {after}");
-    // What failed is tried again.
+    // Failed runs are tried again.
     let failed = after.replacen(r#""seed":1,"#, r#""seed":1,"failed":"no","#, 1);
     assert_ne!(failed, after);
     f.write("tradeoff/runs.jsonl", failed);
     assert_eq!(tradeoff(&f, &["--only", "a"]).code, 0);
     let after = f.read("tradeoff/runs.jsonl");
     assert!(after.lines().count() == 5 && !after.contains("failed"), "{after}");
-    // A program that fails does so in every run, and that is said.
+    // A program that fails does so in every run, and that is reported.
     f.write("mean.pcad", MEAN.replace("d.y", "d.z"));
     let failing = tradeoff(&f, &["--only", "a", "--out", "fails"]);
     assert!(failing.code == 1 && failing.err.contains("all 5 runs failed"), "{}", failing.err);
     f.write("mean.pcad", MEAN);
     assert_eq!(tradeoff(&f, &["--only", "a", "--out", "fails"]).code, 1, "another program");
-    // Other cases, another program, another answer: what is there is of something else.
+    // Other cases, another program or another reference: the existing results no longer
+    // apply.
     let refused = |more: &[&str], what: &str| {
         let done = tradeoff(&f, more);
         assert!(
@@ -149,8 +150,8 @@ fn a_short_budget_leaves_out_settings_and_says_so() {
     cases(&f, &[("c", 0.5), ("d", 1.0), ("e", 1.5), ("f", -2.0)]);
     let none = tradeoff(&f, &["--budget", "1ms", "--jobs", "1"]);
     assert!(none.code == 1 && none.err.contains("the budget ran out"), "{}", none.err);
-    // Twenty-four runs that are thought to take eleven seconds each; four minutes are
-    // enough for all settings on three cases, half of them on six.
+    // Twenty-four runs with an estimate of eleven seconds each: four minutes are enough
+    // for all settings on three cases, and half of the settings on six.
     let half = tradeoff(&f, &["--budget", "4m", "--jobs", "1"]);
     assert!(half.code == 0 && half.err.contains("round 2 of"), "{}", half.err);
     let ends: Vec<Value> = table(&f).into_iter().filter(|r| r["end"] == true).collect();
@@ -171,12 +172,13 @@ fn surfaces_and_joints_are_scored() {
          observe scene.chamfer(view, symmetric = true, size = size) = photo as picture;
          infer { repeat tries { drift(one(@**)); collect r; } }",
     );
-    // A disc of 14 pixels about the middle of 48 by 32, and the sphere that shows it.
+    // A disc with a radius of 14 pixels at the centre of a 48 x 32 picture, and the
+    // sphere that it shows.
     std::fs::create_dir_all(f.path().join("cases/ball")).unwrap();
     f.write("cases/ball/image.png", png(disc(48, 32, 24.0, 16.0, 14.0)));
     let pixel = |i: usize| {
         let (x, y) = ((i % 48) as f64 + 0.5 - 24.0, (i / 48) as f64 + 0.5 - 16.0);
-        // 48 pixels are 4.4 units at the distance 8 of the middle.
+        // 48 pixels are 4.4 units at the depth of the centre, 8.
         let (x, y, r) = (x * 4.4 / 48.0, y * 4.4 / 48.0, 14.0 * 4.4 / 48.0);
         let left = r * r - x * x - y * y;
         (if left > 0.0 { 8.0 - left.sqrt() } else { 0.0 }) as f32
@@ -189,14 +191,14 @@ fn surfaces_and_joints_are_scored() {
     let rows = table(&f);
     let end =
         rows.iter().find(|r| r["setting"] == "chains=2 tries=400" && r["end"] == true).unwrap();
-    // The ball seen in perspective is a little nearer than in the formula above.
+    // In perspective, the ball is slightly nearer than in the formula above.
     assert!(
         end["error"].as_f64().unwrap() < 0.05 && end["scores"]["iou"].as_f64().unwrap() > 0.85,
         "{end}"
     );
     assert_eq!(end["scores"]["n_mse"], json!(2.0), "no normals are known");
 
-    // People: a program without joints finds none.
+    // People: a program without joints does not find any.
     std::fs::create_dir_all(f.path().join("people")).unwrap();
     f.write("people/one.png", png(disc(48, 32, 24.0, 16.0, 9.0)));
     let joints = json!({ "l_shoulder": [20, 8, 2], "r_hip": [26, 20, 2], "l_knee": [0, 0, 0] });

@@ -1,8 +1,9 @@
-//! One transition from an exact draw: the end is distributed as the start, and pairs
-//! (start, end) are as frequent as (end, start). Exact tests with fixed seeds, of what
-//! only long chains would show otherwise: the acceptance of doubling in `slice`, the
-//! choice of a place within trajectories of `nuts`, the metric of Hamiltonian kernels. A
-//! right kernel fails one with a chance of 1e-6.
+//! Single transitions from exact draws: the end has the same distribution as the start,
+//! and pairs (start, end) are as frequent as (end, start). These are exact tests, with
+//! fixed seeds, of errors that would otherwise show in long chains only: in the
+//! acceptance of doubling in `slice`, in the selection of a point of the trajectory in
+//! `nuts`, in the metric of Hamiltonian kernels. A correct kernel fails a test with
+//! probability 1e-6.
 
 use ciborium::Value as Cbor;
 use pcadlang::Model;
@@ -11,10 +12,10 @@ use pcadlang::lang::value::Value;
 use pcadlang::trace::{Draws, Selector, Trace};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-/// The chance that a test of a right kernel fails.
+/// The probability that a correct kernel fails a test.
 const ALPHA: f64 = 1e-6;
 
-/// Uniform numbers in 0..1, the same in every run.
+/// Uniform numbers in 0..1, reproducible in every run.
 struct Uniform(u64);
 
 impl Uniform {
@@ -48,43 +49,45 @@ fn put(trace: &mut Trace, values: &[(&str, Value)]) {
     }
 }
 
-/// The p-value of counts in cells that are as likely.
+/// Returns the p-value of counts in equally probable cells.
 fn even(counts: &[u64]) -> f64 {
     let expected = counts.iter().sum::<u64>() as f64 / counts.len() as f64;
     let chi2: f64 = counts.iter().map(|c| (*c as f64 - expected).powi(2) / expected).sum();
     1.0 - ChiSquared::new(counts.len() as f64 - 1.0).unwrap().cdf(chi2)
 }
 
-/// Of so many moves there and back, the p-value of as many that go there.
+/// Returns the p-value of the numbers of moves in two directions that are equally
+/// probable.
 fn balanced(there: u64, back: u64) -> f64 {
     let z = (there as f64 - back as f64) / ((there + back) as f64).sqrt();
     2.0 * standard().cdf(-z.abs())
 }
 
-/// Says what was found, and fails where a right kernel would not.
+/// Prints a p-value, and fails if it is too small for a correct kernel.
 fn holds(what: &str, p: f64) {
     println!("{what}: p = {p:.2e}");
     assert!(p >= ALPHA, "{what}: p = {p:.2e}");
 }
 
-/// A density of one number: draws, and where a number lies among them.
+/// A density of one number: exact draws, and its distribution function.
 struct Density<'a> {
     text: &'a str,
     draw: fn(&mut Uniform) -> f64,
     cdf: fn(f64) -> f64,
-    /// Between the modes.
+    /// A point between the modes.
     middle: f64,
 }
 
-/// A narrow mode, and a wide one that has more.
+/// The distribution function of a narrow mode, and a wide one with more mass.
 fn modes_cdf(x: f64) -> f64 {
     0.3 * standard().cdf((x + 3.0) / 0.1) + 0.7 * standard().cdf(x - 1.5)
 }
 
-/// By segment: where it ends, and what the density of normal(0, 2) is multiplied with.
+/// By segment: its end, and the factor by which the density of normal(0, 2) is
+/// multiplied.
 const STEPS: [(f64, f64); 3] = [(-1.0, 8.0), (1.0, 0.02), (f64::INFINITY, 1.0)];
 
-/// The mass of the segments as far as x.
+/// Returns the mass of the segments up to x, without normalisation.
 fn steps_mass(x: f64) -> f64 {
     let normal = |x: f64| standard().cdf(x / 2.0);
     let mut from = f64::NEG_INFINITY;
@@ -117,8 +120,8 @@ const DENSITIES: [Density; 2] = [
     },
 ];
 
-/// Slice sampling, doubling or stepping out, over two modes of different widths and over
-/// steps.
+/// Slice sampling, by doubling or stepping out, of two modes of different widths and of a
+/// step function.
 #[test]
 fn slices_of_two_modes() {
     for (d, doubling, width) in
@@ -146,12 +149,11 @@ fn slices_of_two_modes() {
     }
 }
 
-/// Numbers of one scale and one of another, so that trajectories are long and their
-/// energy goes up and down.
+/// Numbers of two scales, so that trajectories are long and their energy oscillates.
 const GAUSSIAN: &str = "assume a ~ iid(normal(0, 1), 5); assume b ~ normal(0, 8); observe normal(0 * (sum(a) + b), 1) = 0;";
 
-/// A kernel with a step size and inverse masses put in the place of what it would learn:
-/// those of `a`, that of `b`.
+/// Returns a kernel whose adapted step size and inverse masses are replaced by these:
+/// those of `a`, and that of `b`.
 fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5], f64)) -> K {
     put(trace, &[("@a", Value::array(vec![0.1; 5])), ("@b", 0.2.into())]);
     kernel.step(trace, &StepContext::new(1, 0, 0)).unwrap();
@@ -165,7 +167,7 @@ fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5]
         .as_array()
         .unwrap()
         .clone();
-    // By address: `b` is one, the elements of `a` are the others, in order.
+    // By address: one entry is `b`, the others are the elements of `a`, in order.
     let b = trace.address_hash(trace.find(&"@b".parse().unwrap()).unwrap());
     let (mut rest, is_b) =
         (masses.0.into_iter(), |s: &Cbor| s.as_array().unwrap()[0] == Cbor::from(b));
@@ -194,8 +196,8 @@ fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5]
     kernel
 }
 
-/// From draws of the Gaussian, so many transitions: the places of all of `a`, of `b`, of
-/// the length of `a` among their distributions.
+/// Makes `count` transitions, each from a draw of the Gaussian, and tests the
+/// distributions of the elements of `a`, of `b`, and of the squared length of `a`.
 fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count: u64) {
     let mut rng = Uniform(11);
     let (mut bins, mut accepted) = ([[0; 16]; 3], 0);
@@ -220,8 +222,8 @@ fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count:
     }
 }
 
-/// A step so long that the weights of places along a trajectory differ much: the choice
-/// among them shows.
+/// The step is so long that the weights of points along a trajectory differ much, so that
+/// errors in the selection among them show.
 #[test]
 fn places_of_a_trajectory_are_chosen_by_their_weights() {
     let mut t = trace(GAUSSIAN);
@@ -231,8 +233,8 @@ fn places_of_a_trajectory_are_chosen_by_their_weights() {
     }
 }
 
-/// Inverse masses far from 1 and from each other, which leave the density as it is,
-/// whatever they are.
+/// Inverse masses far from 1 and from each other: any metric leaves the density
+/// invariant.
 #[test]
 fn metrics_leave_the_density_as_it_is() {
     let mut t = trace(GAUSSIAN);
@@ -245,7 +247,7 @@ fn metrics_leave_the_density_as_it_is() {
     gaussian_stays("nuts, uneven metric", kernel, &mut t, 2000);
 }
 
-/// What warm-up learns is the variance of each number, not its inverse and not its root.
+/// Warm-up learns the variance of each number, not its inverse or its root.
 #[test]
 fn metrics_learn_variances() {
     let text = "assume x ~ normal(0, 0.05); assume y ~ normal(0, 0.3); assume z ~ normal(0, 1.5);
@@ -265,7 +267,7 @@ fn metrics_learn_variances() {
             &adaptation.iter().find(|(k, _)| k.as_text() == Some("inverse_mass")).unwrap().1;
         let mut learnt: Vec<f64> =
             learnt.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
-        // Whatever order choices are in.
+        // In any order of the choices.
         learnt.sort_by(f64::total_cmp);
         for (found, variance) in learnt.iter().zip([0.0025, 0.09, 2.25]) {
             assert!((0.3..3.0).contains(&(found / variance)), "{}: {learnt:?}", kernel.name());

@@ -1,7 +1,7 @@
-//! Whatever is kept for later depends on all that it was made from: each input alone is
-//! changed, and what comes out with everything warm from the old input is what comes out
-//! on a thread, and for data, that has seen nothing, to the last bit. docs/reliability.md
-//! lists what is kept, by what it is told, and the test here that changes that.
+//! Every cached value depends on all of its inputs: each input is changed alone, and the
+//! result with all caches warm from the old input equals, to the last bit, the result on
+//! a fresh thread and with fresh data. docs/reliability.md lists the caches, their keys,
+//! and the test here that changes each key.
 
 mod pictures;
 mod scores;
@@ -12,7 +12,7 @@ mod shipped;
 use pcadlang::geom::Mesh;
 use pcadlang::render::{Contours, Frame};
 
-/// What a thread that has done nothing before makes of it.
+/// Runs a function on a new thread, whose caches are empty.
 pub fn afresh<T: Send>(make: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|s| s.spawn(make).join().unwrap())
 }

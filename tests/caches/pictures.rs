@@ -15,7 +15,7 @@ fn ball(at: f64, radius: f64) -> Solid {
     ))
 }
 
-/// Cameras that differ from the first in one field each, and what that is.
+/// Cameras that differ from the first in one field each, with the name of that field.
 fn cameras(projection: Projection) -> Vec<(String, Camera)> {
     let base = Camera { projection, ..Camera::default_for(72, 56) };
     let mut all = vec![("nothing".to_owned(), base)];
@@ -65,13 +65,13 @@ fn cameras(projection: Projection) -> Vec<(String, Camera)> {
     all
 }
 
-/// Contours drawn at once, of layers, and before a backdrop, through views with frames
-/// and without.
+/// Contours drawn directly, from layers, and in front of a backdrop, through views with
+/// and without frames.
 #[test]
 fn pictures_of_another_camera() {
     let members: Vec<Solid> = (0..8).map(|i| ball(0.4 * f64::from(i) - 1.4, 0.5)).collect();
     let still = Solid::group(&members);
-    // One that moves before others that stand still, which makes a backdrop.
+    // One moving member in front of fixed ones, which makes a backdrop.
     let moved = Solid::group(&[&members[..3], &[ball(-0.1, 0.8)], &members[4..]].concat());
     let solids = [("at once", &members[0], &members[1]), ("of parts", &still, &moved)];
     let (cx, cy) = (36.0, 28.0);
@@ -126,8 +126,8 @@ fn pictures_of_another_camera() {
     }
 }
 
-/// The kind of projection alone: a scene so large that one number is good as focal length
-/// and as size of a pixel.
+/// A change of the kind of projection alone: the scene is so large that the same number
+/// works as focal length and as pixel size.
 #[test]
 fn pictures_of_another_kind_of_camera() {
     let by = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(800.0));
@@ -156,8 +156,8 @@ fn pictures_of_another_kind_of_camera() {
     assert!(seen[0] != seen[3] && seen[0] != seen[1] && seen[0].len() > 100);
 }
 
-/// Another mesh at the same place, in the memory of one that is gone; another placement
-/// by one number.
+/// Another mesh in the same pose, possibly allocated at the address of a dropped one; a
+/// placement that differs in a single number.
 #[test]
 fn pictures_of_another_mesh_and_placement() {
     let camera = Camera::default_for(64, 64);
@@ -185,7 +185,7 @@ fn pictures_of_another_mesh_and_placement() {
         assert!(other != first, "number {k} of a placement is not seen");
         assert!(check("the placement again", &placed(base)) == first);
     }
-    // One field of the mesh itself.
+    // A change of one field of the mesh itself.
     let fields: [fn(&mut Mesh); 4] = [
         |m| m.positions[40].x += 0.2,
         |m| m.normals.iter_mut().for_each(|n| *n = -*n),
@@ -203,7 +203,7 @@ fn pictures_of_another_mesh_and_placement() {
     }
 }
 
-/// Coarser versions of a mesh, by how far they may be off, at any size and from anywhere.
+/// Coarser versions of a mesh, by tolerance, picture size and camera.
 #[test]
 fn meshes_at_other_details() {
     let part = Profile { y: vec![-1.0, -0.6, -0.1, 0.4, 0.9], r: vec![0.3, 0.6, 0.65, 0.5, 0.2] };

@@ -1,4 +1,4 @@
-//! Scores: comparators, what they prepare, what they remember of the last contours.
+//! Scores: comparators, their prepared data, and what they remember of the last contours.
 
 use super::afresh;
 use pcadlang::lang::builtins::scene::{DepthValue, ImageValue, MaskValue};
@@ -14,7 +14,7 @@ fn inside(i: u32, width: u32) -> bool {
 
 const SIZE: [u32; 2] = [96, 64];
 
-/// What is observed, made anew so that it has nothing prepared.
+/// Returns a new observed value, without prepared data.
 fn observed(kind: &str) -> Value {
     let [w, h] = SIZE;
     match kind {
@@ -39,8 +39,8 @@ fn observed(kind: &str) -> Value {
     }
 }
 
-/// Writes `<base,step>` as base, or base + step if p[i] is 1, `<a|b>` as one or the
-/// other; gives how many.
+/// Replaces `<base,step>` by base, or base + step if p[i] is 1, and `<a|b>` by a or b
+/// accordingly; also returns the number of replacements.
 fn written(text: &str) -> (String, usize) {
     let (mut out, mut count, mut rest) = (String::new(), 0, text);
     while let Some((before, after)) = rest.split_once('<') {
@@ -67,7 +67,7 @@ const SCENE: &str = "
         scale = <1,0.05>) * scene.group([vase, ball, rest, scene.affine(translate = [0, -1, 0]) * scene.sphere(0.2)]);
     let view = scene.render(placed, camera = eye, detail = <0,0.5>);";
 
-/// What is compared, with what, by what.
+/// The kind of observed data, and the observation with its comparator.
 const COMPARED: [(&str, &str); 6] = [
     (
         "image",
@@ -111,7 +111,7 @@ fn put(t: &mut pcadlang::trace::Trace, address: &str, v: Value) {
     t.set(address, v, Draws::default()).unwrap_or_else(|e| panic!("{address}: {e}"));
 }
 
-/// Every argument of cameras, shapes, placements, views and comparators alone.
+/// Changes each argument of cameras, shapes, placements, views and comparators alone.
 #[test]
 fn scores_of_other_arguments() {
     for (kind, compared) in COMPARED {
@@ -147,8 +147,8 @@ fn scores_of_other_arguments() {
                 "{compared}: argument {k} and back"
             );
         }
-        // A few say nothing of this picture: the depth of the point looked at, a shift
-        // along the line of sight, levels of detail.
+        // A few arguments do not change this picture's score: the depth of the look-at
+        // point, a translation along the line of sight, levels of detail.
         println!("{shows} of {count} show: {compared}");
         assert!(shows + 5 >= count, "{compared}: {shows} of {count} arguments change the score");
     }

@@ -1,4 +1,4 @@
-//! Meshes: topologies that surfaces of revolution share, parts of bodies in poses.
+//! Meshes: topologies shared by surfaces of revolution, and parts of posed bodies.
 
 use super::{afresh, mesh_bits, shipped};
 use glam::DVec3;
@@ -6,7 +6,7 @@ use pcadlang::geom::armature::{JointPose, Rules, Turn};
 use pcadlang::geom::{Caps, Profile, lathe, sphere};
 use std::sync::Arc;
 
-/// Topologies that surfaces of revolution share.
+/// Topologies shared by surfaces of revolution.
 #[test]
 fn surfaces_of_other_numbers() {
     let profile = |points: usize, top: f64| {
@@ -57,7 +57,7 @@ fn surfaces_of_other_numbers() {
             0.0,
             Caps::Both,
         ),
-        // The same strips, and a crease between the first two or none.
+        // The same strips, with and without a crease between the first two.
         ("a disc of its own", vec![flat_bottom], 12, 0.0, Caps::None),
         (
             "a tip",
@@ -78,7 +78,7 @@ fn surfaces_of_other_numbers() {
         ("radii", vec![profile(6, 0.3)], 12, 0.0, Caps::Both),
     ];
     let make = |(_, parts, sides, thickness, caps): &Asked| {
-        // A wall is of a vessel that is open.
+        // Only an open vessel can have a wall thickness.
         let caps = if *thickness > 0.0 { Caps::Bottom } else { *caps };
         lathe(parts, *sides, *thickness, caps)
             .map(|m| mesh_bits(&m))
@@ -92,7 +92,7 @@ fn surfaces_of_other_numbers() {
             assert_eq!(here == make(a), a.0 == b.0, "{} and {}", a.0, b.0);
         }
     }
-    // Of as many rings, and another number of parts.
+    // The same number of rings with a different number of parts.
     let ball = || mesh_bits(&sphere(0.7, 12).unwrap());
     for points in 3..30 {
         let egg = ("an egg", vec![round(points, 0.0)], 12, 0.0, Caps::Both);
@@ -105,7 +105,7 @@ fn surfaces_of_other_numbers() {
     }
 }
 
-/// Parts of bodies that earlier poses moved alike.
+/// Parts of bodies that earlier poses moved in the same way.
 #[test]
 fn bodies_in_other_poses() {
     let body = shipped::human("human.lod2").unwrap();
@@ -143,7 +143,7 @@ fn bodies_in_other_poses() {
         ("the scale", |p| p.scale.x += 0.01),
         ("the scale, hardly", |p| p.scale.x += f64::EPSILON),
     ];
-    // At rest a location moves one number of a transform.
+    // At rest, a location changes a single number of a transform.
     let still = vec![JointPose::REST; rest.len()];
     for joint in (0..rest.len()).step_by(3) {
         for (what, change) in changes {
@@ -168,7 +168,7 @@ fn bodies_in_other_poses() {
             );
         }
     }
-    // Where turns are about nothing, signs of 0 are all that differs.
+    // With zero rotations, only the signs of zeros differ.
     for sign in [0.0, -0.0, 0.0] {
         let pose = vec![JointPose::turned(DVec3::splat(sign)); rest.len()];
         assert!(

@@ -1,5 +1,5 @@
-//! Chains that are broken off and go on from a checkpoint, and the same chains without a
-//! break.
+//! Chains that are interrupted and resumed from a checkpoint, compared with the same
+//! chains without interruption.
 #![allow(dead_code)]
 
 use pcadlang::Model;
@@ -12,14 +12,14 @@ use std::sync::{Arc, Mutex};
 /// Draws as bits: the step, the log joint density, the values.
 pub type Rows = Vec<(u64, u64, Vec<u64>)>;
 
-/// What a chain leaves.
+/// The draws and checkpoints of a chain.
 #[derive(Default)]
 struct Kept {
     rows: Rows,
     checkpoints: Vec<Vec<u8>>,
 }
 
-/// Keeps draws, and a checkpoint at each step if it is told to.
+/// Keeps the draws, and a checkpoint at each step if `each` is set.
 struct Keep {
     kept: Arc<Mutex<Kept>>,
     progress: Arc<Progress>,
@@ -79,8 +79,8 @@ fn go(
     (kept.rows, kept.checkpoints, end)
 }
 
-/// Breaks a chain off at about so many of its steps, warm-up included, and asserts that
-/// it goes on as it would have.
+/// Interrupts a chain at about `breaks` of its steps, warm-up included, and asserts that
+/// it resumes with the same draws as without interruption.
 pub fn same_after_breaks(what: &str, model: &Model, options: &RunOptions, breaks: usize) {
     let (rows, _, end) = go(model, options, None, false);
     let (kept, checkpoints, _) = go(model, options, None, true);

@@ -4,8 +4,8 @@
 use pcadlang::dist::*;
 use std::sync::Arc;
 
-/// The distribution of a family with these parameters, as tables of reference values
-/// write them.
+/// Returns the distribution of a family, with its parameters in the order of the tables
+/// of reference values.
 pub fn made(family: &str, p: &[f64]) -> Dist {
     match (family, p) {
         ("normal", [a, b]) => Dist::Normal(Normal::new(*a, *b).unwrap()),
@@ -53,7 +53,7 @@ pub fn made(family: &str, p: &[f64]) -> Dist {
     }
 }
 
-/// The value with these numbers; of a matrix they are three rows.
+/// Returns the value with these numbers; a matrix has rows of three.
 pub fn datum(family: &str, x: &[f64]) -> Datum {
     match x {
         [x] => Datum::Num(*x),

@@ -1,4 +1,4 @@
-//! An empty folder for each test, and the command run in it.
+//! A temporary folder for each test, and the command run in it.
 #![allow(dead_code)]
 
 use assert_cmd::Command;
@@ -7,10 +7,10 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// A folder that is empty at first and goes at the end.
+/// A folder that is empty at first and is removed at the end, unless the test fails.
 pub struct Folder(PathBuf);
 
-/// What a command did.
+/// The exit code and output of a command.
 pub struct Done {
     pub code: i32,
     pub out: String,
@@ -43,7 +43,7 @@ impl Folder {
         self.0.join(name).exists()
     }
 
-    /// Every file below, sorted, folders with a trailing slash.
+    /// Returns every file and folder inside, sorted; folders have a trailing slash.
     pub fn files(&self) -> Vec<String> {
         fn walk(dir: &Path, prefix: &str, into: &mut Vec<String>) {
             for e in std::fs::read_dir(dir).unwrap() {
@@ -63,7 +63,7 @@ impl Folder {
         all
     }
 
-    /// Runs the command here; one that takes over two minutes fails.
+    /// Runs the command in this folder, with a limit of two minutes.
     pub fn run(&self, args: &[&str]) -> Done {
         let mut c = Command::cargo_bin("pcadlang").unwrap();
         c.current_dir(&self.0)
@@ -80,8 +80,8 @@ impl Folder {
         Done { code, out, err }
     }
 
-    /// Runs a command that must fail as a program or data error: exit code 1, a first
-    /// line that holds `says`, nothing new in the folder.
+    /// Runs a command that must fail with a program or data error: exit code 1, a first
+    /// line that contains `says`, and no change to the files in the folder.
     pub fn refuses(&self, args: &[&str], says: &str) {
         let before = self.files();
         let d = self.run(args);
@@ -113,14 +113,14 @@ impl Drop for Folder {
     }
 }
 
-/// A PNG of a picture.
+/// Returns a picture as a PNG file.
 pub fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
     let mut bytes = Vec::new();
     image.into().write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
     bytes
 }
 
-/// A dark disc on a bright ground, with an antialiased rim.
+/// Draws a dark disc on a bright background, with an antialiased edge.
 pub fn disc(width: u32, height: u32, x: f64, y: f64, r: f64) -> GrayImage {
     GrayImage::from_fn(width, height, |i, j| {
         let d = (f64::from(i) + 0.5 - x).hypot(f64::from(j) + 0.5 - y);

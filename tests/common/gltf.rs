@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use pcadlang::geom::armature::Armature;
 use serde_json::{Value, json};
 
-/// Bytes with their views and accessors, one view an accessor.
+/// Bytes with their buffer views and accessors, one view per accessor.
 #[derive(Default)]
 pub struct Writer {
     bytes: Vec<u8>,
@@ -31,27 +31,27 @@ impl Writer {
         number
     }
 
-    /// The number of a new accessor of floats.
+    /// Adds an accessor of floats and returns its index.
     pub fn floats(&mut self, shape: &str, values: &[f32]) -> usize {
         self.add(shape, 5126, 4, &values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())
     }
 
-    /// Of bytes.
+    /// Adds an accessor of bytes.
     pub fn bytes(&mut self, shape: &str, values: &[u8]) -> usize {
         self.add(shape, 5121, 1, values)
     }
 
-    /// Of 16-bit numbers.
+    /// Adds an accessor of 16-bit integers.
     pub fn shorts(&mut self, shape: &str, values: &[u16]) -> usize {
         self.add(shape, 5123, 2, &values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())
     }
 
-    /// Of 32-bit numbers.
+    /// Adds an accessor of 32-bit integers.
     pub fn words(&mut self, shape: &str, values: &[u32]) -> usize {
         self.add(shape, 5125, 4, &values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())
     }
 
-    /// Adds what it holds to a document; gives the buffer.
+    /// Adds the accessors and views to a document, and returns the buffer.
     pub fn document(self, document: &mut Value) -> Vec<u8> {
         document["asset"] = json!({ "version": "2.0" });
         document["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
@@ -61,13 +61,13 @@ impl Writer {
     }
 }
 
-/// A GLB of a document without its accessors, and them.
+/// Returns a GLB file of a document and the accessors of a writer.
 pub fn glb(writer: Writer, mut document: Value) -> Vec<u8> {
     let bytes = writer.document(&mut document);
     packed(&document, &bytes)
 }
 
-/// A GLB of a whole document and its buffer.
+/// Returns a GLB file of a complete document and its buffer.
 pub fn packed(document: &Value, bytes: &[u8]) -> Vec<u8> {
     let (mut text, mut bytes) = (document.to_string().into_bytes(), bytes.to_vec());
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -84,8 +84,8 @@ pub fn packed(document: &Value, bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A body as a skinned GLB: its points times a matrix, its joints below a node with these
-/// properties.
+/// Returns a body as a skinned GLB file: positions are multiplied by `to_file`, and the
+/// joints are below a node with the properties `root`.
 pub fn skinned(body: &Armature, to_file: DMat3, root: &Value) -> Vec<u8> {
     let mut w = Writer::default();
     let at = |p: DVec3| (to_file * p).to_array();
@@ -102,8 +102,8 @@ pub fn skinned(body: &Armature, to_file: DMat3, root: &Value) -> Vec<u8> {
         [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
     };
     let binds = w.floats("MAT4", &all.iter().flat_map(|j| bind(j.head)).collect::<Vec<f32>>());
-    // The joints' nodes come first, so that numbers agree; then the mesh, then the node
-    // above.
+    // The joints' nodes come first, so that their indices agree; then the mesh, then the
+    // root node.
     let children =
         |of: Option<usize>| (0..all.len()).filter(|c| all[*c].parent == of).collect::<Vec<usize>>();
     let mut nodes: Vec<Value> = (0..all.len())
@@ -131,7 +131,7 @@ pub fn skinned(body: &Armature, to_file: DMat3, root: &Value) -> Vec<u8> {
     glb(w, document)
 }
 
-/// RFC 4648, section 4.
+/// Encodes bytes in base64 (RFC 4648, section 4).
 pub fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::new();

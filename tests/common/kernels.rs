@@ -1,9 +1,9 @@
-//! Which kernels the tests of kernels run: the tests read these lists, and so does the
-//! table of `docs/kernels.md` (`tests/kernels.rs`). A kernel is added to a proof by
-//! adding a line here; a row of the table follows by itself.
+//! The kernels that the tests of kernels run. Both the tests and the table of
+//! `docs/kernels.md` (`tests/kernels.rs`) read these lists: to add a kernel to a proof,
+//! add a line here; the row of the table follows automatically.
 #![allow(dead_code)]
 
-/// A kernel and, every other time, one that reaches everything.
+/// A mixture of a kernel with one that reaches every state.
 macro_rules! with_mh {
     ($k:literal) => {
         concat!("mix { 0.6 => ", $k, "; 0.4 => mh(one(@**)); }")
@@ -13,7 +13,8 @@ macro_rules! with_mh {
 #[path = "../enumeration/kernels.rs"]
 pub mod random;
 
-/// Against exact answers (`tests/exact.rs`): statements, or several of them.
+/// Kernels compared with exact answers (`tests/exact.rs`): one or several statements
+/// each.
 pub mod exact {
     pub const CONJUGATE: &[&str] = &[
         "mh(one(@**))",
@@ -31,7 +32,7 @@ pub mod exact {
         "smc(drift(@x, scale = 1), particles = 8)",
         "mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }",
     ];
-    /// By the whole distribution: two modes of different widths.
+    /// Compared by the whole distribution, which has two modes of different widths.
     pub const SLICES: &[&str] = &[
         "slice(@x, width = 1.5)",
         "slice(@x, width = 0.1, doubling = true)",
@@ -39,7 +40,7 @@ pub mod exact {
         "slice(@x, width = 30, doubling = true)",
         "modes(@x, tries = 30, keep = 8, steps = 20)",
     ];
-    /// With a surrogate that says something else.
+    /// With a surrogate that disagrees with the likelihood.
     pub const DELAYED: &[&str] = &[
         "delayed(mh(@x), @y)",
         "delayed(drift(@x), @y)",
@@ -47,7 +48,7 @@ pub mod exact {
         "delayed(nuts(@x), @y)",
         "delayed(pull(0.8), @y)",
     ];
-    /// A mixture whose labels are summed out, and a chain of labels that depend on each
+    /// Labels summed out: of a mixture, and of a chain of labels that depend on each
     /// other.
     pub const SUMMED_OUT: &[&str] = &[
         "nuts(@m, marginal = @z)",
@@ -56,7 +57,7 @@ pub mod exact {
         "nuts(@m, marginal = @z[0] + @z[1]); gibbs(one(@z));",
     ];
     pub const BETA_BINOMIAL: &[&str] = &["mh(@p)", "drift(@p)"];
-    /// Evidence and structure with particles; likelihood-free.
+    /// Evidence and changing structure by particles; likelihood-free inference.
     pub const SIMULATED: &[&str] = &[
         "smc(drift(@x, scale = 1), particles = 40)",
         "smc(mh(one(@**)), particles = 20)",
@@ -137,14 +138,14 @@ pub mod balance {
         with_mh!("slice(@p1, width = 2)"),
         "slice(one(@**), width = 0.2, doubling = true)",
     ];
-    /// With labels summed out; by themselves these move everything.
+    /// With labels summed out; without `mh`, these move everything by themselves.
     pub const MIXTURE: &[&str] = &[
         "nuts($continuous, marginal = $finite)",
         "hmc($continuous, steps = 3, marginal = $finite)",
         "mala($continuous, marginal = $finite)",
         with_mh!("nuts(@s, marginal = @a)"),
     ];
-    /// Maps that are their own inverse, declared in the program.
+    /// Maps that are their own inverses, declared in the program.
     pub const MAPS: &[&str] = &["mix { 0.5 => scaled(); 0.5 => split(); }", with_mh!("swap()")];
     pub const FINITE_SUPPORT: &[&str] = &[
         "mix { 0.5 => mh(one(@**)); 0.5 => block(@**); }",
@@ -229,7 +230,7 @@ pub mod balance {
         "mix { 0.5 => gibbs(one($finite)); 0.5 => drift($continuous, 0.8); }",
         "mix { 0.5 => block(one($finite)); 0.5 => mh(one($continuous)); }",
     ];
-    /// With a surrogate that says something else.
+    /// With a surrogate that disagrees with the likelihood.
     pub const SURROGATE: &[&str] = &[
         "delayed(mh(one(@**)), @y)",
         "delayed(block(@**), @y)",
@@ -237,7 +238,7 @@ pub mod balance {
         with_mh!("delayed(gibbs(one($finite)), @y)"),
         with_mh!("delayed(knn($continuous, bank = \"b\"), @y)"),
     ];
-    /// Proposals from neighbours that have nothing to do with the data, and few of them.
+    /// Proposals from a few neighbours that are unrelated to the data.
     pub const NEIGHBOURS: &[&str] = &[
         "knn(@**, bank = \"b\")",
         "mix { 0.6 => knn(one(@**), bank = \"b\", k = 2); 0.4 => block(@**); }",
@@ -245,10 +246,10 @@ pub mod balance {
     ];
     pub const NEIGHBOURS_OF_SOME: &[&str] =
         &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")];
-    /// The same choices always.
+    /// Models of fixed structure.
     pub const FIXED: &[&[&str]] =
         &[DISCRETE, SUPPORT, MIXTURE, MAPS, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
-    /// Choices that appear, vanish, change form or are shared.
+    /// Models whose choices appear, vanish, change their support or are shared.
     pub const CHANGING: &[&[&str]] = &[
         STRUCTURE,
         SURROGATE,
@@ -262,8 +263,8 @@ pub mod balance {
     ];
 }
 
-/// Parameters and data by turns, data as choices (`tests/balance.rs`); `%` is the
-/// selection.
+/// Parameters and data moved alternately, with the data as choices (`tests/balance.rs`);
+/// `%` is the selection.
 pub const BY_TURNS: &[&str] = &["mh(one(%))", "block(%)", "drift(%, 0.7)", "drift(one(%), 1)"];
 
 /// Simulation-based calibration and Geweke's test (`tests/calibration.rs`).
@@ -283,21 +284,21 @@ pub const CALIBRATED: &[&str] = &[
     "knn(one(@**), bank = \"b\", k = 2); block(@**);",
 ];
 
-/// Simulation-based calibration only: `smc` and `abc` go on with an estimate made under
-/// the data of the step before, which Geweke's test replaces.
+/// Simulation-based calibration only: `smc` and `abc` keep an estimate made under the
+/// data of the previous step, which Geweke's test replaces.
 pub const RANKED: &[&str] =
     &["smc(drift(one(@**)), particles = 20)", "smc(mh(one(@**)), particles = 10)"];
-/// The same on counts, where simulated data are within `eps` only if they are equal: then
-/// `abc` is exact.
+/// The same on counts: simulated data are within `eps` only if they are equal, so `abc`
+/// is exact.
 pub const RANKED_ON_COUNTS: &[&str] =
     &["abc(mh(one(@**)), eps = 0.5)", "abc(block(@**), eps = 0.5)"];
 
-/// Chains that are the same bit for bit with and without incremental updates, on any
-/// number of threads (`tests/trace.rs`).
+/// Chains that are bit-identical with and without incremental updates, on any number of
+/// threads (`tests/trace.rs`).
 pub const INCREMENTAL: &str = "mix { 0.3 => mh(one(@**)); 0.2 => gibbs(one($finite)); 0.2 => drift(one(@**)); 0.2 => elliptical(one($gaussian)); 0.1 => block(@**); 0.1 => slice(one($continuous)); }";
 
-/// A column of the table: what it is called, what the test shows, where it is, the
-/// statements it runs.
+/// A column of the table: its name, what the test shows, its file, and the statements
+/// that it runs.
 pub struct Proof {
     pub name: &'static str,
     pub shows: &'static str,
@@ -305,7 +306,7 @@ pub struct Proof {
     pub statements: &'static [&'static [&'static str]],
 }
 
-/// The columns.
+/// The columns of the table.
 pub const PROOFS: &[Proof] = &[
     Proof {
         name: "exact answers",

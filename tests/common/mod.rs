@@ -1,4 +1,4 @@
-//! Running programs given as text, and judging their draws.
+//! Runs programs given as text, and checks their draws.
 #![allow(dead_code)]
 
 pub mod families;
@@ -8,15 +8,15 @@ use pcadlang::Model;
 use pcadlang::infer::{Latent, Neighbours, RunOptions};
 use std::collections::BTreeMap;
 
-/// Draws by column, all chains one after the other.
+/// Draws by column, with the chains concatenated.
 pub type Draws = BTreeMap<String, Vec<f64>>;
 
-/// Runs a program and gives its draws.
+/// Runs a program and returns its draws.
 pub fn run(text: &str, seed: u64, chains: usize) -> Draws {
     run_with(text, &RunOptions { seed, ..RunOptions::default() }, chains, 2)
 }
 
-/// The same with options.
+/// Does the same with options.
 pub fn run_with(text: &str, options: &RunOptions, chains: usize, threads: usize) -> Draws {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
     let posterior = model.run(options, chains, threads).unwrap_or_else(|e| panic!("{e}"));
@@ -27,7 +27,7 @@ pub fn run_with(text: &str, options: &RunOptions, chains: usize, threads: usize)
     draws
 }
 
-/// Three draws from the prior, which have nothing to do with the data: neighbours that
+/// Returns three draws from the prior as neighbours: unrelated to the data, so they
 /// mislead.
 pub fn wrong_neighbours(model: &Model) -> Neighbours {
     let draw = |i| Latent::all(&model.simulate(9, i).unwrap_or_else(|e| panic!("{e}")));
@@ -43,8 +43,8 @@ pub fn variance(xs: &[f64]) -> f64 {
     xs.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / (xs.len() as f64 - 1.0)
 }
 
-/// The Monte Carlo standard error of the mean by batch means: honest for correlated
-/// draws.
+/// Returns the Monte Carlo standard error of the mean by batch means, which is valid for
+/// correlated draws.
 pub fn standard_error(xs: &[f64]) -> f64 {
     let batches = 40;
     let size = xs.len() / batches;
@@ -53,8 +53,8 @@ pub fn standard_error(xs: &[f64]) -> f64 {
 }
 
 /// Asserts that a posterior mean is right within 5 standard errors (batch means of 40
-/// batches: a false alarm has a chance of about 1e-5), and that the error is small enough
-/// for the test to mean something.
+/// batches, with a false alarm rate of about 1e-5), and that the error is small enough
+/// for the test to be meaningful.
 pub fn assert_mean(what: &str, xs: &[f64], expected: f64, tolerance: f64) {
     let (m, se) = (mean(xs), standard_error(xs));
     assert!(
@@ -79,9 +79,9 @@ pub fn normal_pdf(x: f64, m: f64, sd: f64) -> f64 {
     (-0.5 * z * z).exp() / (sd * (2.0 * std::f64::consts::PI).sqrt())
 }
 
-/// The largest distance between the distribution of these draws and a continuous one,
-/// times the root of their number (Kolmogorov and Smirnov): for independent draws above
-/// 2.5 with a chance of 8e-6.
+/// Returns the largest distance between the empirical distribution of these draws and a
+/// continuous one, times the root of their number (Kolmogorov-Smirnov); for independent
+/// draws it is above 2.5 with probability 8e-6.
 pub fn kolmogorov_smirnov(xs: &[f64], cdf: impl Fn(f64) -> f64) -> f64 {
     let mut sorted = xs.to_vec();
     sorted.sort_by(f64::total_cmp);

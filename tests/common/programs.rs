@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 
-/// A program of a few choices that read each other through arithmetic, branches, loops
-/// and arrays.
+/// Programs of a few choices that depend on each other through arithmetic, branches,
+/// loops and arrays.
 pub fn program() -> impl Strategy<Value = String> {
     let number = |n: usize| {
         prop_oneof![

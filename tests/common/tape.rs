@@ -1,22 +1,23 @@
-//! What a tape of a trace's density says, against proposals in the trace and reverse
+//! Compares the tape of a trace's density with proposals in the trace and with reverse
 //! passes through it.
 
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Change, Draws, Target, Trace};
 
-/// How a comparison went.
+/// The outcome of a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Told {
-    /// Whether there was a tape.
+    /// Whether a tape was recorded.
     pub recorded: bool,
-    /// Points at which the tape gave a density that was compared.
+    /// The number of points at which the tape gave a density that was compared.
     pub points: u32,
-    /// Points at which only a proposal could tell.
+    /// The number of points at which the tape gave no density, so that a proposal is
+    /// needed.
     pub asked: u32,
 }
 
 /// Compares at the present state and at some points around it: densities to the last bit,
-/// gradients to rounding.
+/// gradients up to rounding.
 pub fn compare_tape(trace: &mut Trace, what: &str) -> Told {
     let mut told = Told::default();
     let mut places: Vec<(Target, Vec<f64>)> = Vec::new();

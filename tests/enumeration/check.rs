@@ -1,6 +1,6 @@
-//! One program and one plan: each pass of the plan begins in an independent exact draw
-//! from the posterior, so what it ends in is an exact draw as well if the plan leaves the
-//! posterior invariant. The draws are independent, so exact tests apply.
+//! Checks one plan on one program: each pass of the plan starts from an independent exact
+//! draw from the posterior, so if the plan leaves the posterior invariant, it ends in an
+//! exact draw as well. The draws are independent, so exact tests apply.
 
 use super::plans::Plan;
 use super::posterior::Posterior;
@@ -12,22 +12,22 @@ use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Draws, Limits, Trace};
 use std::sync::{Arc, Mutex};
 
-/// Intervals that places of continuous choices are counted in.
+/// The number of intervals in which positions of continuous choices are counted.
 const BINS: usize = 8;
 
-/// What came of it.
+/// The outcome of a check.
 pub enum Said {
-    /// How the draws fell, how they pool, and the share of passes that ended in another
-    /// state than they began in.
+    /// The counts of the draws, the same for pooling, and the fraction of passes that
+    /// changed the state.
     Counted(Counts, Pooled, f64),
-    /// The plan says that it cannot do this.
+    /// The plan is refused for this program.
     Refused(String),
-    /// It failed, or went where the posterior has nothing.
+    /// The plan failed, or reached a state outside of the posterior's support.
     Failed(String),
 }
 
-/// Puts the chain in an exact draw whenever it records one, and counts what it had made
-/// of the last.
+/// Resets the chain to an exact draw whenever it records one, after counting the state
+/// that the pass from the previous draw ended in.
 struct Restart {
     posterior: Arc<Posterior>,
     seed: u64,
@@ -45,7 +45,7 @@ struct Seen {
     begun: u64,
     ended: Vec<(usize, Vec<f64>)>,
     moved: u64,
-    /// The state that the present pass began in.
+    /// The state in which the present pass began.
     from: Option<(usize, Vec<f64>)>,
     failed: Option<String>,
 }
@@ -89,7 +89,7 @@ impl Callback for Restart {
     }
 }
 
-/// Checks a plan on a program.
+/// Checks a plan on a program, over `passes` passes.
 pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, seed: u64) -> Said {
     let Plan { statements, kernels, .. } = plan;
     let plan = format!(
@@ -107,7 +107,7 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
         Err(e) => return Said::Failed(format!("{e}")),
     };
     let banks = statements.contains("knn").then(|| {
-        // Neighbours that have nothing to do with the data, and few of them.
+        // A few neighbours that are unrelated to the data.
         let all: Vec<_> =
             (0..12).filter_map(|i| model.simulate(9, i).ok()).map(|t| Latent::all(&t)).collect();
         Arc::new(Neighbours::new(all.iter().take(3).cloned().collect(), &all)) as _
@@ -145,7 +145,7 @@ fn count(posterior: &Posterior, seen: &Seen) -> Said {
     let mut pooled = Pooled::default();
     let mut by_kind = vec![0; probabilities.len()];
     seen.ended.iter().for_each(|(k, _)| by_kind[*k] += 1);
-    // Kinds that are seldom are one.
+    // Rare kinds are merged into one.
     let (mut table, mut rest) = (Vec::new(), (0.0, 0));
     for (i, (p, c)) in probabilities.iter().zip(&by_kind).enumerate() {
         if p * draws as f64 >= 5.0 {
@@ -161,7 +161,7 @@ fn count(posterior: &Posterior, seen: &Seen) -> Said {
         _ => table.push(rest),
     }
     pooled.add(draws, &table);
-    // The places of continuous choices are uniform, whatever the kind is.
+    // The positions of continuous choices are uniform, whatever the kind of state.
     let uniform = 1.0 / BINS as f64;
     let dims = seen.ended.iter().map(|(_, u)| u.len()).max().unwrap_or(0);
     for d in 0..dims {
@@ -169,7 +169,8 @@ fn count(posterior: &Posterior, seen: &Seen) -> Said {
         let with = seen.ended.iter().filter_map(|(_, u)| u.get(d));
         with.for_each(|u| bins[((u * BINS as f64) as usize).min(BINS - 1)] += 1);
         let n: u64 = bins.iter().sum();
-        // How many have it is a matter of the kinds; where it is there it is uniform.
+        // How many states have this choice depends on their kinds; given that it exists,
+        // its position is uniform.
         if n == draws {
             counts.cells.extend(
                 bins.iter()
@@ -188,12 +189,12 @@ fn count(posterior: &Posterior, seen: &Seen) -> Said {
     Said::Counted(counts, pooled, seen.moved as f64 / draws.max(1) as f64)
 }
 
-/// The chance that a state has more than `d` continuous choices.
+/// Returns the probability that a state has more than `d` continuous choices.
 fn seen_share(posterior: &Posterior, d: usize) -> f64 {
     posterior.kinds().filter(|(_, n)| *n > d).map(|(p, _)| p).sum()
 }
 
-/// Counts the kinds of states of a chain.
+/// Counts the states of a chain by kind.
 struct Visits {
     posterior: Arc<Posterior>,
     counts: Mutex<Vec<f64>>,
@@ -214,8 +215,8 @@ impl Callback for Visits {
     }
 }
 
-/// The distance in total variation between the kinds of states of four chains of a plan
-/// and the posterior.
+/// Returns the total variation distance between the posterior and the states of four
+/// chains of a plan, by kind.
 pub fn distance(text: &str, plan: &str, posterior: &Arc<Posterior>, seed: u64) -> f64 {
     let longer = plan.replace("repeat 1000 {", "repeat 3000 { collect 1;");
     let model = Program::parse(&format!("{text}\n{longer}")).and_then(Program::compile);

@@ -1,25 +1,25 @@
-//! Running programs by need, one execution for each way that their discrete choices can
-//! come out: the posterior by enumeration.
+//! Evaluates programs lazily, with one execution for each combination of values of their
+//! discrete choices: the posterior by enumeration.
 //!
-//! It shares nothing with the engine but the language: it walks trees, and asks anew for
-//! each execution.
+//! It shares nothing with the engine except the language: it walks trees, and starts
+//! afresh for each execution.
 
 use super::gaussian::{Affine, Gaussian, MOST};
 use super::program::{Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Right};
 use std::collections::HashMap;
 
-/// Cells of the grid that a choice is integrated over. Numbers that programs compare it
-/// with are at edges.
+/// The number of cells of the grid over which a choice is integrated. The numbers that
+/// programs compare it with are at cell edges.
 pub const CELLS: usize = 240;
-/// The grid ends this far from 0, in both directions.
+/// The grid extends this far from 0, in both directions.
 pub const REACH: f64 = 5.0;
 /// The width of a cell.
 pub const WIDTH: f64 = 2.0 * REACH / CELLS as f64;
-/// Where the two points of a cell are at which densities are worked out, from its middle,
-/// in cells (Gauss and Legendre).
+/// The offsets of the two Gauss-Legendre points of a cell, where densities are evaluated,
+/// from its middle, in cells.
 pub const POINT: f64 = 0.288_675_134_594_812_9;
 
-/// Where a point is.
+/// Returns the coordinate of a grid point.
 fn point(i: usize) -> f64 {
     let away = if i.is_multiple_of(2) { -POINT } else { POINT };
     ((i / 2) as f64 + 0.5 + away) * WIDTH - REACH
@@ -28,9 +28,9 @@ fn point(i: usize) -> f64 {
 /// How continuous choices are integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integration {
-    /// Exactly, as Gaussian ones that everything is affine in.
+    /// Exactly: they are Gaussian, and everything is affine in them.
     Gaussian,
-    /// On a grid, as the one standard normal choice of the program.
+    /// On a grid: the program has a single standard normal choice.
     Grid,
 }
 
@@ -40,35 +40,37 @@ pub enum Val {
     Truth(bool),
 }
 
-/// Why an execution is none that can be enumerated.
+/// The execution cannot be enumerated.
 #[derive(Debug)]
 pub struct Unsuitable;
 
 type Result<T> = std::result::Result<T, Unsuitable>;
 
-/// One way that a program can run.
+/// One possible execution of a program.
 #[derive(Clone, Debug, Default)]
 pub struct Execution {
-    /// The discrete choices by address; truth values are 0 and 1.
+    /// The discrete choices: address, value (truth values are 0 and 1), and whether it is
+    /// Boolean.
     pub discrete: Vec<(String, f64, bool)>,
-    /// The addresses of the continuous ones.
+    /// The addresses of the continuous choices.
     pub continuous: Vec<String>,
-    /// What is normal around 0: residuals of priors and of observations.
+    /// Residuals of priors and observations, normal around 0, with their standard
+    /// deviations.
     pub residuals: Vec<(Affine, f64)>,
-    /// The point of the grid that the choice on it is at: two a cell.
+    /// The grid point of the continuous choice; there are two per cell.
     pub point: Option<usize>,
-    /// The log weight of all else.
+    /// The log weight of everything else.
     pub log_weight: f64,
 }
 
 struct Frame<'p> {
     parent: Option<usize>,
     defs: &'p [Def],
-    /// What addresses begin with; empty at the top level and in passes.
+    /// The prefix of addresses; empty at the top level and in loop iterations.
     prefix: String,
     pass: Option<usize>,
     args: Vec<(Id, &'p Expr, usize)>,
-    /// Arguments that are values.
+    /// Arguments that are already evaluated.
     keys: Vec<(Id, Val)>,
 }
 
@@ -76,21 +78,21 @@ struct Run<'p> {
     program: &'p Program,
     integration: Integration,
     top: Vec<&'p Def>,
-    /// Containers: by name, the loop and the draw.
+    /// Containers by name: the loop and the distribution of its draws.
     containers: HashMap<Id, (usize, &'p Dist)>,
     frames: Vec<Frame<'p>>,
     known: HashMap<(usize, Id), Val>,
     passes: HashMap<(usize, usize), usize>,
     entries: HashMap<(usize, u64), usize>,
-    /// The number of the value that each choice takes, in the order in which they are
-    /// asked for, and how many values it has.
+    /// For each choice, in order of first use: the index of its value, and its number of
+    /// values.
     script: Vec<(usize, usize)>,
     asked: usize,
     out: Execution,
     steps: usize,
 }
 
-/// Goes through the executions of a program that have positive probability.
+/// Enumerates the executions of a program that have positive probability.
 pub fn executions(
     program: &Program,
     integration: Integration,
@@ -213,7 +215,7 @@ impl<'p> Run<'p> {
         self.frames.len() - 1
     }
 
-    /// The address of a name that is bound in a frame.
+    /// Returns the address of a name bound in a frame.
     fn address(&self, f: usize, n: Id) -> String {
         let (frame, name) = (&self.frames[f], &self.program.names[n]);
         match frame.pass {
@@ -266,8 +268,8 @@ impl<'p> Run<'p> {
         }
     }
 
-    /// The values of a discrete distribution with their log probabilities; none where its
-    /// parameters are no parameters.
+    /// Returns the values of a discrete distribution with their log probabilities; empty
+    /// if its parameters are invalid.
     fn values(&mut self, d: &'p Dist, f: usize) -> Result<Vec<(f64, f64)>> {
         Ok(match d {
             Dist::Flip(p) => {
@@ -291,7 +293,7 @@ impl<'p> Run<'p> {
         })
     }
 
-    /// The value of a choice that is asked for for the first time.
+    /// Returns the value of a choice at its first use.
     fn choose(&mut self, d: &'p Dist, f: usize, address: String) -> Result<Val> {
         if let Dist::Normal(m, s) = d {
             let (m, s) = (self.affine(m, f)?, self.number(s, f)?);
@@ -328,7 +330,7 @@ impl<'p> Run<'p> {
         Ok(if is_truth { Val::Truth(value != 0.0) } else { Val::Num(Affine::number(value)) })
     }
 
-    /// The next number of the script.
+    /// Returns the next value index of the script.
     fn pick(&mut self, of: usize) -> usize {
         if self.asked == self.script.len() {
             self.script.push((0, of));
@@ -483,7 +485,7 @@ impl<'p> Run<'p> {
                 self.eval(taken, f)
             }
             Expr::Table(all, k) => {
-                // An array has all its elements, whichever is read.
+                // All elements of an array are evaluated, whichever is read.
                 let values = all.iter().map(|e| self.eval(e, f)).collect::<Result<Vec<Val>>>()?;
                 let k = self.number(k, f)?;
                 values
@@ -497,7 +499,7 @@ impl<'p> Run<'p> {
 }
 
 impl Execution {
-    /// The Gaussian choices given what is observed.
+    /// Returns the Gaussian choices given the observations.
     pub fn gaussian(&self) -> Gaussian {
         Gaussian::new(self.continuous.len(), &self.residuals)
     }

@@ -1,7 +1,7 @@
-//! Values that are affine in Gaussian choices, and what such choices are given
-//! observations that are.
+//! Values that are affine in Gaussian choices, and the distribution of such choices given
+//! observations that are affine in them.
 
-/// The most Gaussian choices of an execution.
+/// The largest number of Gaussian choices in an execution.
 pub const MOST: usize = 6;
 
 /// A number, or an affine function of Gaussian choices.
@@ -33,7 +33,7 @@ impl Affine {
         a
     }
 
-    /// `None` for a product of two that are not numbers.
+    /// Multiplies two values; `None` if neither is a constant.
     pub fn times(&self, o: &Affine) -> Option<Affine> {
         let (a, by) = if o.is_number() { (self, o.constant) } else { (o, self.constant) };
         (self.is_number() || o.is_number())
@@ -41,21 +41,21 @@ impl Affine {
     }
 }
 
-/// Gaussian choices given what is observed.
+/// The distribution of Gaussian choices given the observations.
 #[derive(Clone, Debug)]
 pub struct Gaussian {
     pub mean: Vec<f64>,
-    /// The Cholesky factor of the precision, by rows.
+    /// The Cholesky factor of the precision matrix, by rows.
     factor: Vec<Vec<f64>>,
-    /// The log of the integral of priors times likelihoods.
+    /// The log of the integral of prior times likelihood.
     pub log_evidence: f64,
 }
 
 const LOG_SQRT_TAU: f64 = 0.918_938_533_204_672_8;
 
 impl Gaussian {
-    /// `n` choices; every residual is normal around 0 with a standard deviation. That of
-    /// the prior of choice `i` has slope 1 by it.
+    /// Conditions `n` choices on their residuals, each normal around 0 with a standard
+    /// deviation. The prior's residual of choice `i` has slope 1 in that choice.
     pub fn new(n: usize, residuals: &[(Affine, f64)]) -> Gaussian {
         let mut precision = vec![vec![0.0; n]; n];
         let mut vjp = vec![0.0; n];
@@ -87,8 +87,8 @@ impl Gaussian {
         g
     }
 
-    /// The factor's transpose solved for white noise: where the noise takes the choices,
-    /// away from 0.
+    /// Solves with the transposed factor for white noise: returns the choices' offset
+    /// from their mean.
     fn coloured(&self, white: &[f64]) -> Vec<f64> {
         let n = white.len();
         let mut x = vec![0.0; n];
@@ -99,12 +99,12 @@ impl Gaussian {
         x
     }
 
-    /// The draw that white noise makes.
+    /// Returns the draw that corresponds to white noise.
     pub fn draw(&self, white: &[f64]) -> Vec<f64> {
         self.coloured(white).iter().zip(&self.mean).map(|(x, m)| x + m).collect()
     }
 
-    /// The log density of the draw that white noise makes.
+    /// Returns the log density of the draw that corresponds to white noise.
     pub fn log_density(&self, white: &[f64]) -> f64 {
         white
             .iter()
@@ -113,7 +113,7 @@ impl Gaussian {
             .sum()
     }
 
-    /// The white noise that a draw was made from.
+    /// Returns the white noise that corresponds to a draw.
     pub fn whitened(&self, x: &[f64]) -> Vec<f64> {
         let n = x.len();
         (0..n).map(|i| (i..n).map(|k| self.factor[k][i] * (x[k] - self.mean[k])).sum()).collect()

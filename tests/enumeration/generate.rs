@@ -1,19 +1,19 @@
-//! Random programs whose posteriors can be enumerated: a few discrete choices that
-//! conditions join, tables, loops, functions, `mem`, choices and observations that come
-//! and go, and continuous choices that all of them share.
+//! Random programs whose posteriors can be enumerated: a few discrete choices that are
+//! combined in conditions, tables, loops, functions, `mem`, choices and observations that
+//! appear and vanish, and continuous choices on which all of these may depend.
 
 use super::execute::Integration;
 use super::program::{Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Right};
 use pcadlang::rng::{Purpose, Stream, StreamKey};
 
-/// What expressions may read: discrete names with their greatest value, and numbers that
+/// The expressions in scope: discrete names with their greatest value, and numbers that
 /// may be affine in Gaussian choices.
 #[derive(Clone, Default)]
 struct SiteSelection {
     truths: Vec<Expr>,
     counts: Vec<(Expr, usize)>,
     reals: Vec<Expr>,
-    /// The choice on the grid.
+    /// The choice that is integrated on the grid.
     grid: Option<Expr>,
 }
 
@@ -33,7 +33,7 @@ struct Generator {
     memos: Vec<(Kind, Kind)>,
 }
 
-/// A random program, and how its continuous choices are integrated.
+/// Returns a random program, and how its continuous choices are integrated.
 pub fn program(seed: u64) -> (Program, Integration) {
     let mut rng = StreamKey::new(seed, 0, Purpose::VALUES).stream(0, 0, 0);
     let integration = if rng.uniform() < 0.25 { Integration::Grid } else { Integration::Gaussian };
@@ -57,7 +57,7 @@ impl Generator {
         from + self.rng.index(to - from + 1)
     }
 
-    /// A number in steps of a tenth.
+    /// Returns a random multiple of a tenth.
     fn tenths(&mut self, from: i32, to: i32) -> f64 {
         f64::from(from + self.rng.index((to - from + 1) as usize) as i32) / 10.0
     }
@@ -125,7 +125,7 @@ impl Generator {
         }
     }
 
-    /// A discrete distribution, and the greatest value if it is of numbers.
+    /// Returns a discrete distribution, with its greatest value if it is numeric.
     fn discrete(&mut self) -> (Dist, Option<usize>) {
         match self.rng.index(5) {
             0 | 1 => (Dist::Flip(self.probability(1)), None),
@@ -170,7 +170,7 @@ impl Generator {
         Expr::Num(s)
     }
 
-    /// Components that labels point at.
+    /// Adds components that labels select.
     fn components(&mut self) {
         let (n, mu) = (self.among(2, 3), self.program.name("mu"));
         let s = Expr::Num(self.tenths(5, 20));
@@ -186,7 +186,7 @@ impl Generator {
         self.scope.reals.push(Expr::Element(mu, boxed(Expr::Num(at))));
     }
 
-    /// A truth value that up to 2^depth choices decide together.
+    /// Returns a condition on up to 2^depth choices.
     fn condition(&mut self, depth: usize) -> Expr {
         if depth > 0 && self.chance(0.75) {
             let a = boxed(self.condition(depth - 1));
@@ -293,7 +293,8 @@ impl Generator {
         [Kind::Truth, Kind::Count, Kind::Real][self.rng.index(3)]
     }
 
-    /// Draws and a result of some kind, which may read what is drawn; counts are 0 or 1.
+    /// Returns draws and a result of some kind, which may depend on them; counts are 0 or
+    /// 1.
     fn body(&mut self, kind: Kind, draws: usize) -> Body {
         let outside = self.scope.clone();
         let mut defs = Vec::new();
@@ -353,7 +354,7 @@ impl Generator {
         }
     }
 
-    /// A name for something that was worked out.
+    /// Binds a name to a derived value.
     fn binding(&mut self) -> Def {
         let (right, kind) = match self.rng.index(5) {
             0 if !self.functions.is_empty() => {
@@ -391,7 +392,7 @@ impl Generator {
             let z = self.program.name("z");
             let own = Expr::Element(z, boxed(Expr::Pass));
             if self.chance(0.3) {
-                // A chain of states.
+                // A Markov chain of states.
                 let before =
                     Expr::Element(z, boxed(Expr::Add(boxed(Expr::Pass), boxed(Expr::Num(-1.0)))));
                 let (a, b, c) = (self.tenths(1, 9), self.tenths(1, 9), self.tenths(1, 9));
@@ -416,7 +417,7 @@ impl Generator {
         }
         let effects = (0..self.among(1, 2)).map(|_| self.effect(1)).collect();
         self.program.items.push(Item::Loop(passes, defs, effects));
-        // What is drawn in the loop can be read after it.
+        // Choices of the loop can be read after it.
         self.scope = outside;
         for (z, most) in drawn {
             let at = self.rng.index(passes) as f64;
@@ -456,7 +457,7 @@ impl Generator {
                 let wide = Dist::Normal(shifted, Expr::Num(s * 1.5));
                 let coarse = self.coarse(wide, Dist::Normal(Expr::Num(0.3), Expr::Num(2.0)));
                 let s = match self.scope.grid.clone() {
-                    // No value on one side, unless something holds.
+                    // Invalid on one side of a number, unless a condition holds.
                     Some(x) if self.chance(0.2) => {
                         let at = 0.25 * (self.rng.index(9) as f64 - 4.0);
                         let side = Expr::Less(boxed(x), boxed(Expr::Num(at)));

@@ -1,8 +1,8 @@
-//! The kernels that random programs run, as statements of a plan; what summing out is
-//! told to sum stands for `%`.
+//! The kernels that random programs run, as statements of a plan; `%` stands for the
+//! selection that is summed out.
 #![allow(dead_code)]
 
-/// Kernels for any choices.
+/// Kernels for all choices.
 pub const ANY: &[&str] = &[
     "mh(one(@**));",
     "mh(each(@**));",
@@ -17,7 +17,7 @@ pub const ANY: &[&str] = &[
 ];
 /// Kernels for finite choices.
 pub const DISCRETE: &[&str] = &["gibbs(one($finite));", "gibbs(each($finite));"];
-/// Kernels for numbers.
+/// Kernels for numeric choices.
 pub const CONTINUOUS: &[&str] = &[
     "slice(one($continuous));",
     "slice($continuous, width = 0.3, doubling = true);",
@@ -29,10 +29,10 @@ pub const CONTINUOUS: &[&str] = &[
     "nuts(one($continuous), max_depth = 3);",
     "modes($continuous, tries = 10, keep = 3, steps = 10);",
 ];
-/// Kernels within `delayed`, which they are all run in.
+/// Kernels that are run inside of `delayed`.
 pub const REVERSIBLE: &[&str] =
     &["mh(one(@**))", "gibbs(one($finite))", "block(@**)", "drift(one(@**), 0.7)"];
-/// Kernels that others can be summed out of.
+/// Kernels that can sum out other choices.
 pub const SUMMING: &[&str] = &[
     "hmc($continuous, steps = 2, marginal = %);",
     "mala($continuous, marginal = %);",

@@ -1,13 +1,13 @@
-//! What is run on a program: every kernel, every grouping of what is summed out, the
-//! default plan, random mixes.
+//! The plans run on a program: every kernel, groupings of the choices that are summed
+//! out, the default plan, random mixes.
 
 use super::kernels::{ANY, CONTINUOUS, DISCRETE, REVERSIBLE, SUMMING};
 use super::posterior::Posterior;
 use super::program::{Def, Dist, Effect, Item, Program};
 use pcadlang::rng::Stream;
 
-/// Statements, the kernels that they need declared, and the class that their draws are
-/// pooled in.
+/// Statements, the declarations of kernels that they need, and the class in which their
+/// draws are pooled.
 #[derive(Clone)]
 pub struct Plan {
     pub class: String,
@@ -16,8 +16,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// How many draws a first look takes: fewer of what costs most, so that more programs
-    /// are looked at.
+    /// Returns the number of draws of a first test: fewer for expensive plans, so that
+    /// more programs are tested.
     pub fn first_look(&self) -> u64 {
         if self.statements.contains("marginal") { 60 } else { 200 }
     }
@@ -27,10 +27,10 @@ impl Plan {
     }
 }
 
-/// The most joint values that are summed out.
+/// The largest number of joint values that are summed out.
 const MOST_JOINT: usize = 24;
 
-/// The names of the observations that have surrogates.
+/// Returns the names of the observations that have surrogates.
 fn with_surrogates(p: &Program) -> Vec<String> {
     fn of(p: &Program, e: &Effect, into: &mut Vec<String>) {
         match e {
@@ -50,7 +50,7 @@ fn with_surrogates(p: &Program) -> Vec<String> {
     all
 }
 
-/// What to run on a program; all of it, or a few of each sort.
+/// Returns the plans to run on a program: a random few of each sort.
 pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream) -> Vec<Plan> {
     let mut all: Vec<Plan> = Vec::new();
     let class = |s: &str| s.split_once('(').map_or(s, |(name, _)| name).to_owned();
@@ -65,8 +65,8 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
     if posterior.has_continuous {
         some(CONTINUOUS, 2, rng);
     }
-    // Every grouping where there are few choices, else some of them and the whole; a step
-    // costs as much as joint values.
+    // All groupings if there are one or two choices, otherwise the whole and a random
+    // one; the cost of a step is proportional to the number of joint values.
     let sites: Vec<(&String, usize)> =
         posterior.discrete.iter().map(|(a, values)| (a, *values)).collect();
     if posterior.has_continuous && !sites.is_empty() {
@@ -119,8 +119,8 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
     all
 }
 
-/// A kernel of the program's own: it proposes one or two top-level choices that are
-/// always there, by where they are.
+/// Returns a plan with a kernel declared in the program: it proposes one or two top-level
+/// choices that always exist, depending on their present values.
 fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
     let mut proposals = Vec::new();
     for item in &p.items {

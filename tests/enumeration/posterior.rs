@@ -1,4 +1,4 @@
-//! The posterior of a program as something to draw from, and draws sorted into its cells.
+//! The enumerated posterior of a program: draws from it, and the cells of draws.
 
 use super::execute::{CELLS, Execution, Integration, POINT, REACH, WIDTH, executions};
 use super::gaussian::Gaussian;
@@ -9,7 +9,7 @@ use pcadlang::rng::Stream;
 use pcadlang::trace::{Address, Constraint, Trace};
 use std::collections::BTreeMap;
 
-/// The values of the discrete choices that there are, by address.
+/// The values of the existing discrete choices, by address.
 pub type Key = Vec<(String, String)>;
 
 /// The continuous choices of a state given the discrete ones.
@@ -23,8 +23,8 @@ enum Continuous {
 struct Grid {
     /// The log density at the two points of each cell.
     points: Vec<[f64; 2]>,
-    /// By cell: the running sum of the probabilities, and the slope of the log density by
-    /// the cell's width.
+    /// By cell: the cumulative probability, and the slope of the log density per cell
+    /// width.
     sums: Vec<f64>,
     slopes: Vec<f64>,
 }
@@ -34,7 +34,7 @@ impl Grid {
         Grid { points: vec![[f64::NEG_INFINITY; 2]; CELLS], sums: Vec::new(), slopes: Vec::new() }
     }
 
-    /// Works out cells from points; the log of what they add up to.
+    /// Computes the cells from the points, and returns the log of the integral.
     fn add_up(&mut self) -> f64 {
         let top = self.points.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut total = 0.0;
@@ -50,14 +50,14 @@ impl Grid {
         top + total.ln()
     }
 
-    /// Whether it is over well within the grid on both sides; beyond, what a kernel does
-    /// right would look wrong.
+    /// Whether the density is negligible near both ends of the grid; otherwise, a correct
+    /// kernel would appear wrong, because it moves beyond the grid.
     fn ends_within(&self) -> bool {
         let margin = CELLS / 40;
         self.sums[margin] < 1e-5 && self.sums[CELLS - margin] > 1.0 - 1e-5
     }
 
-    /// The point below which there is a share of the probability.
+    /// Returns the point below which the probability is `u`.
     fn quantile(&self, u: f64) -> f64 {
         let cell = self.sums.partition_point(|s| *s <= u).min(CELLS - 1);
         let before = if cell == 0 { 0.0 } else { self.sums[cell - 1] };
@@ -68,7 +68,7 @@ impl Grid {
         (cell as f64 + within) * WIDTH - REACH
     }
 
-    /// The share of the probability below a point.
+    /// Returns the probability below a point.
     fn below(&self, x: f64) -> f64 {
         let at = ((x + REACH) / WIDTH).clamp(0.0, CELLS as f64);
         let cell = (at as usize).min(CELLS - 1);
@@ -80,23 +80,23 @@ impl Grid {
     }
 }
 
-/// What a state can be but for its continuous choices.
+/// A kind of state: everything about it except for the values of its continuous choices.
 struct Kind {
     probability: f64,
     discrete: Vec<(String, f64, bool)>,
     continuous: Continuous,
-    /// The log weight of all but the continuous choices and what depends on them, and
-    /// that of all.
+    /// The log weight of everything except for the continuous choices and what depends on
+    /// them, and the log weight of everything.
     log_weight: f64,
     log_total: f64,
 }
 
-/// A posterior that was enumerated.
+/// An enumerated posterior.
 pub struct Posterior {
     kinds: Vec<Kind>,
     by_key: BTreeMap<Key, usize>,
-    /// The addresses of all discrete choices that any state has, and how many values each
-    /// has at most.
+    /// The addresses of all discrete choices that occur in any state, with their largest
+    /// number of values.
     pub discrete: BTreeMap<String, usize>,
     pub has_continuous: bool,
 }
@@ -106,7 +106,7 @@ fn key(discrete: &[(String, f64, bool)]) -> Key {
 }
 
 impl Posterior {
-    /// `None` if it cannot be enumerated, or if there is nothing to it.
+    /// Enumerates a posterior; `None` if that is impossible, or if its mass is zero.
     pub fn of(program: &Program, integration: Integration) -> Option<Posterior> {
         let most = if integration == Integration::Grid { 100 } else { 400 };
         let mut p = Posterior {
@@ -162,7 +162,7 @@ impl Posterior {
         }
     }
 
-    /// Whether every state has a choice at an address.
+    /// Whether a choice with this address exists in every state.
     pub fn is_always_there(&self, address: &str) -> bool {
         self.kinds.iter().all(|k| {
             let continuous = match &k.continuous {
@@ -174,12 +174,12 @@ impl Posterior {
         })
     }
 
-    /// The chance of the likeliest kind of state.
+    /// Returns the probability of the most probable kind of state.
     pub fn likeliest(&self) -> f64 {
         self.kinds.iter().map(|k| k.probability).fold(0.0, f64::max)
     }
 
-    /// A draw, as what a trace is made of, and its log joint density if that is known
+    /// Returns a draw, as constraints for a trace, and its log joint density if known
     /// exactly.
     pub fn draw(&self, rng: &mut Stream) -> (Vec<(u64, Constraint)>, Option<f64>) {
         let weights: Vec<f64> = self.kinds.iter().map(|k| k.probability).collect();
@@ -210,9 +210,9 @@ impl Posterior {
         (state, log_joint)
     }
 
-    /// Which kind of state a trace is in, and the places of its continuous choices under
-    /// their conditional, in 0 to 1, all independent and uniform. `None` for a state that
-    /// cannot be.
+    /// Returns the kind of a trace's state, and the positions of its continuous choices
+    /// as conditional probabilities: independent and uniform in 0 to 1. `None` for an
+    /// impossible state.
     pub fn place(&self, trace: &Trace) -> Option<(usize, Vec<f64>)> {
         let (mut discrete, mut numbers) = (Key::new(), BTreeMap::new());
         for (address, value, _) in trace.choices() {
@@ -246,7 +246,8 @@ impl Posterior {
         Some((i, places))
     }
 
-    /// The chance of each kind of state, and how many continuous choices it has.
+    /// Returns the probability of each kind of state, and its number of continuous
+    /// choices.
     pub fn kinds(&self) -> impl Iterator<Item = (f64, usize)> {
         self.kinds.iter().map(|k| {
             let n = match &k.continuous {

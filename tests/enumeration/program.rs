@@ -2,16 +2,16 @@
 
 use std::fmt::{self, Display, Formatter, Write};
 
-/// A name, by its place in [`Program::names`].
+/// A name, as an index into [`Program::names`].
 pub type Id = usize;
 
-/// An expression; it draws nothing by itself.
+/// An expression; it does not contain draws.
 #[derive(Clone, Debug)]
 pub enum Expr {
     Num(f64),
     Truth(bool),
     Ref(Id),
-    /// The variable of the loop around.
+    /// The variable of the enclosing loop.
     Pass,
     /// An element of a container of choices.
     Element(Id, Box<Expr>),
@@ -23,7 +23,7 @@ pub enum Expr {
     Or(Box<Expr>, Box<Expr>),
     Not(Box<Expr>),
     If(Box<Expr>, Box<Expr>, Box<Expr>),
-    /// An element of an array that is written out.
+    /// An element of a literal array.
     Table(Vec<Expr>, Box<Expr>),
 }
 
@@ -32,21 +32,21 @@ pub enum Expr {
 pub enum Dist {
     Flip(Expr),
     Categorical(Vec<Expr>),
-    /// Whole numbers from 0 to a last one.
+    /// Uniform over the whole numbers from 0 to this one.
     Uniform(Expr),
     Normal(Expr, Expr),
     Poisson(Expr),
 }
 
-/// What a name is bound to.
+/// The right-hand side of a binding.
 #[derive(Clone, Debug)]
 pub enum Right {
     Plain(Expr),
-    /// A call of a function, by its place in [`Program::functions`].
+    /// A call of a function, as an index into [`Program::functions`].
     Call(usize, Vec<Expr>),
-    /// A call of a function with `mem`.
+    /// A call of a memoised function (`mem`).
     Memo(usize, Expr),
-    /// Branches that may draw.
+    /// A conditional whose branches may draw.
     Branch(Expr, Body, Body),
 }
 
@@ -71,7 +71,7 @@ pub struct Function {
 
 #[derive(Clone, Debug)]
 pub enum Effect {
-    /// An observation of a number (truth values are 0 and 1) under a name, maybe with a
+    /// A named observation of a number (truth values are 0 and 1), with an optional
     /// surrogate.
     Observe(Id, Dist, f64, Option<Dist>),
     Factor(Expr),
@@ -80,11 +80,11 @@ pub enum Effect {
 
 #[derive(Clone, Debug)]
 pub enum Item {
-    /// A function, or one with `mem`, by its place.
+    /// The definition of a function, or of a memoised one, by index.
     Function(usize),
     Memo(usize),
     Def(Def),
-    /// A loop of so many passes; what it draws is keyed by the pass.
+    /// A loop with a number of iterations; its draws are keyed by the iteration.
     Loop(usize, Vec<Def>, Vec<Effect>),
     Effect(Effect),
 }

@@ -1,20 +1,21 @@
-//! Whether independent draws have a distribution that is known, with the chance of a
-//! false alarm stated.
+//! Tests whether independent draws have a known distribution, with a stated false alarm
+//! rate.
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// Counts of draws in cells whose probabilities are known. Sets of cells may overlap:
-/// each cell is judged by itself.
+/// Counts of draws in cells of known probability. Cells may overlap, since each is tested
+/// by itself.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
     pub draws: u64,
-    /// What a cell is, its probability, how many draws were in it.
+    /// The name of each cell, its probability, and its number of draws.
     pub cells: Vec<(String, f64, u64)>,
 }
 
 impl Counts {
-    /// A bound on the chance that right draws are as far off as the worst cell: twice the
-    /// exact binomial tail beyond its count, times the number of cells (Bonferroni).
+    /// Returns a bound on the probability that correct draws deviate as much as the worst
+    /// cell: twice the exact binomial tail beyond its count, times the number of cells
+    /// (Bonferroni).
     pub fn p_value(&self) -> (f64, String) {
         let mut worst = (1.0, String::new());
         let cells = self.cells.len() as f64;
@@ -42,8 +43,8 @@ impl Counts {
 }
 
 /// Pearson's statistic over many tables of disjoint cells, centred and scaled by its
-/// exact mean and variance under the right distribution: small deviations that many
-/// programs share add up.
+/// exact mean and variance under the correct distribution, so that small deviations
+/// shared by many programs add up.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pooled {
     pub tables: u64,
@@ -52,10 +53,10 @@ pub struct Pooled {
 }
 
 impl Pooled {
-    /// A table of disjoint cells that make up all.
+    /// Adds a table of disjoint cells that partition the states.
     pub fn add(&mut self, draws: u64, cells: &[(f64, u64)]) {
         let n = draws as f64;
-        // Rare cells would make the distribution of the statistic lopsided.
+        // Rare cells would skew the distribution of the statistic.
         if cells.len() < 2 || cells.iter().any(|(p, _)| p * n < 3.0) {
             return;
         }
@@ -73,7 +74,8 @@ impl Pooled {
         self.variance += o.variance;
     }
 
-    /// How many standard deviations the sum is above its expectation.
+    /// Returns the number of standard deviations by which the sum exceeds its
+    /// expectation.
     pub fn z(&self) -> f64 {
         if self.variance > 0.0 { self.excess / self.variance.sqrt() } else { 0.0 }
     }

@@ -1,5 +1,5 @@
 //! Distance transforms and comparators: pictures without contours and full of them,
-//! spreads from 1e-300 to 1e300, numbers that are none.
+//! scales from 1e-300 to 1e300, values that are not numbers.
 
 use super::points::Points;
 use super::table::agree;
@@ -12,7 +12,7 @@ use pcadlang::vision::{
     MaskLikelihood, Photo, Region, RegionOptions, distance_transform,
 };
 
-/// Pieces of contour that own their lists.
+/// Contour pieces that own their lists.
 #[derive(Clone, Debug, Default)]
 struct Pieces {
     lists: [Vec<f32>; 5],
@@ -29,7 +29,7 @@ impl Pieces {
         self
     }
 
-    /// One at each pixel's middle.
+    /// Returns a piece at the middle of every pixel.
     fn full(size: (u32, u32)) -> Pieces {
         let all = (0..size.1).flat_map(|j| {
             (0..size.0).map(move |i| [i as f32 + 0.5, j as f32 + 0.5, 1.0, 0.0, 1.0])
@@ -49,7 +49,7 @@ impl Pieces {
     }
 }
 
-/// A square's outline, in the middle of a picture.
+/// Returns the outline of a square in the middle of a picture.
 fn square(size: (u32, u32)) -> Pieces {
     let (w, h) = (size.0 as f32, size.1 as f32);
     let steps = 24;
@@ -64,7 +64,8 @@ fn square(size: (u32, u32)) -> Pieces {
     })
 }
 
-/// Pictures' contours: none, one, all, ordinary ones, and such as are no numbers.
+/// Returns the contours of test pictures: none, one, all, ordinary ones, and non-finite
+/// ones.
 fn scenes(size: (u32, u32)) -> Vec<(&'static str, Pieces)> {
     let middle = [size.0 as f32 / 2.0, size.1 as f32 / 2.0];
     let one =

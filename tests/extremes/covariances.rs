@@ -1,5 +1,5 @@
-//! Covariance functions against the table; covariance matrices of any condition: a factor
-//! whose product is the matrix, or an error.
+//! Covariance functions compared with the table; covariance matrices of any condition
+//! number give a factor whose product is the matrix, or an error.
 
 use super::points::Points;
 use super::table::{agree, rows};
@@ -28,7 +28,7 @@ fn covariance_functions_agree_with_the_table() {
     points.finish();
 }
 
-/// The Cholesky factor's columns, as the images of unit vectors.
+/// Returns the Cholesky factor, whose columns are the images of unit vectors.
 fn factor(n: usize, colour: impl Fn(&[f64]) -> Option<Datum>) -> DMatrix<f64> {
     let column = |j: usize| {
         let z: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i == j))).collect();
@@ -40,10 +40,9 @@ fn factor(n: usize, colour: impl Fn(&[f64]) -> Option<Datum>) -> DMatrix<f64> {
     DMatrix::from_columns(&(0..n).map(column).map(nalgebra::DVector::from_vec).collect::<Vec<_>>())
 }
 
-/// How far the product of the factor is from the matrix, in units of the matrix's largest
-/// entry.
+/// Returns the error of the factor's product relative to the largest entry of the matrix.
 fn residual(l: &DMatrix<f64>, k: &DMatrix<f64>) -> f64 {
-    // In a unit in which squares of entries of L are numbers.
+    // In a unit in which the squares of entries of L do not overflow.
     let most = k.amax();
     let l = l / most.sqrt();
     (&l * l.transpose() - k / most).amax()
@@ -87,7 +86,7 @@ fn processes_of_any_bandwidth_have_factors() {
             }
         }
     }
-    // A variance that no double holds is an error that names the function.
+    // A variance that a double cannot hold is an error that names the function.
     for sd in [1e-300, 1e300] {
         for name in &names[..3] {
             let cov = function(name, &[1.0, sd]);
@@ -112,7 +111,7 @@ fn processes_of_any_bandwidth_have_factors() {
     points.finish();
 }
 
-/// The log density at 0 of a normal vector, or why there is none.
+/// Returns the log density at 0 of a normal vector, or the reason why it is undefined.
 fn at_zero(k: &DMatrix<f64>) -> Result<(MvNormal, f64), String> {
     let n = k.nrows();
     let d = MvNormal::from_cov(&vec![0.0; n], k).map_err(|e| e.to_string())?;
@@ -122,8 +121,9 @@ fn at_zero(k: &DMatrix<f64>) -> Result<(MvNormal, f64), String> {
 
 const LN_TAU: f64 = 1.837_877_066_409_345_6;
 
-/// A factor with a residual of rounding and the right determinant, as far as the
-/// condition lets it be known; or, from a condition of 1e15 on, an error that says so.
+/// Checks for a factor with a residual of rounding size and the right determinant, as far
+/// as the condition number allows; from a condition number of 1e15 on, an error that says
+/// so is also correct.
 fn factors(k: &DMatrix<f64>, log_det: f64, condition: f64) -> Result<(), String> {
     let n = k.nrows();
     match at_zero(k) {
@@ -148,7 +148,7 @@ fn factors(k: &DMatrix<f64>, log_det: f64, condition: f64) -> Result<(), String>
 #[test]
 fn matrices_of_any_condition_factor_or_say_so() {
     let mut points = Points::of("covariance matrices");
-    // Two numbers ever closer to being one: the condition is (2 - d) / d.
+    // Two ever more strongly correlated numbers: the condition number is (2 - d) / d.
     for power in 0..=52 {
         let d = 2f64.powi(-power);
         for unit in [1e-300, 1.0, 1e300] {
@@ -160,7 +160,7 @@ fn matrices_of_any_condition_factor_or_say_so() {
             });
         }
     }
-    // Hilbert's, the rounded ones.
+    // Hilbert matrices, as rounded to doubles.
     for r in rows("hilbert") {
         let (n, [log_det, condition]) = (r.point[0] as usize, &r.values[..]) else {
             panic!("{}", r.line)
@@ -169,7 +169,7 @@ fn matrices_of_any_condition_factor_or_say_so() {
         let end = factors(&k, *log_det, *condition);
         points.check(end.is_ok(), || format!("{}: {}", r.line, end.unwrap_err()));
     }
-    // Units that differ do not make it worse.
+    // Different units do not reduce the accuracy.
     for far in [1.0, 1e50, 1e100, 1e150] {
         let units = [1.0 / far, 1.0, far];
         let k = DMatrix::from_fn(3, 3, |i, j| units[i] * units[j] * if i == j { 1.0 } else { 0.5 });

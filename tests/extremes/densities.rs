@@ -1,5 +1,5 @@
-//! Log densities and their gradients against the table, and where there is no density to
-//! speak of.
+//! Log densities and their gradients compared with the table, and points without a
+//! density.
 
 use super::points::Points;
 use super::table::{agree, rows};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 fn log_densities_agree_with_the_table() {
     let mut points = Points::of("log densities");
     for r in rows("density") {
-        // Near its zeros the error is absolute.
+        // Near zeros of the log density, the error is absolute.
         let relative = if r.region == "body" { 1e-12 } else { 1e-9 };
         let got = made(r.name, &r.parameters).log_density(&datum(r.name, &r.point));
         let [expected] = r.values[..] else { panic!("{}", r.line) };
@@ -28,9 +28,10 @@ fn gradients_agree_with_the_table() {
         let got: Vec<f64> = got.iter().flat_map(|g| g.x.iter().chain(&g.params)).copied().collect();
         let is_discrete = got.len() == r.parameters.len();
         let by = if is_discrete { &[][..] } else { &r.point[..] }.iter().chain(&r.parameters);
-        // Or of 1e-9 in the change of the log density while the number changes by a
-        // factor of e; with terms as large as a shape, or as the square of how far a
-        // bound is in standard deviations, 1e-12 of it.
+        // A relative error of 1e-9, or an error of 1e-9 in the change of the log density
+        // when the number changes by a factor of e. If a term is larger (a shape
+        // parameter, or the squared distance of a bound in standard deviations), an error
+        // of 1e-12 of that term.
         let shapes = match r.name {
             "beta" => 2,
             "gamma" | "inv_gamma" | "student_t" => 1,
@@ -78,7 +79,7 @@ fn nothing_is_likely_that_is_not_finite() {
     points.finish();
 }
 
-/// Those whose log density is a line to write down.
+/// Distributions whose log density is a simple formula.
 #[test]
 fn log_densities_agree_with_formulas() {
     let mut points = Points::of("other log densities");

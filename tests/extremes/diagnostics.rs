@@ -1,5 +1,5 @@
-//! Diagnostics of draws of any size, of constants, infinities and NaN: the same as of
-//! draws of size 1, or the outcome that is stated.
+//! Diagnostics of draws of any scale, of constants, infinities and NaN: equal to those of
+//! draws of scale 1, or the documented result.
 
 use super::points::Points;
 use super::table::agree;
@@ -9,7 +9,7 @@ use pcadlang::infer::diagnostics::{
 };
 use pcadlang::rng::{Purpose, StreamKey};
 
-/// Autocorrelated chains of about standard normal draws.
+/// Returns autocorrelated chains of approximately standard normal draws.
 fn chains() -> Vec<Vec<f64>> {
     let chain = |c: u32| {
         let mut rng = StreamKey::new(3, c, Purpose::VALUES).stream(0, 0, 0);
@@ -27,7 +27,7 @@ fn scaled(chains: &[Vec<f64>], by: f64) -> Vec<Vec<f64>> {
     chains.iter().map(|c| c.iter().map(|x| x * by).collect()).collect()
 }
 
-/// What has the unit of the draws, and what has none.
+/// Splits a summary into numbers with the unit of the draws, and dimensionless ones.
 fn numbers(s: &Summary) -> ([f64; 7], [f64; 3]) {
     ([s.mean, s.sd, s.q05, s.q50, s.q95, s.mcse_mean, s.mcse_sd], [s.ess_bulk, s.ess_tail, s.r_hat])
 }
@@ -42,7 +42,7 @@ fn the_unit_of_draws_does_not_matter() {
     let draws = chains();
     let (lengths, plain) = numbers(&summary(&draws));
     for power in (-1000..=1020).step_by(20) {
-        // Powers of 2, so that the draws are the same but for their exponents.
+        // Powers of 2, so that only the exponents of the draws change.
         let unit = libm_ldexp(power);
         let x = scaled(&draws, unit);
         let (got, bare) = numbers(&summary(&x));
@@ -62,7 +62,7 @@ fn the_unit_of_draws_does_not_matter() {
 }
 
 fn libm_ldexp(power: i32) -> f64 {
-    // In two steps: 2^-1000 times 2^-20 and the like are exact.
+    // In two steps, so that products such as 2^-1000 times 2^-20 are exact.
     2f64.powi(power / 2) * 2f64.powi(power - power / 2)
 }
 
@@ -73,7 +73,7 @@ fn outcomes_are_stated() {
     for c in [0.0, -0.0, 5e-324, 1e-300, 1.0, -1e150, 1e300, f64::MAX] {
         for count in [1, 4] {
             let s = summary(&vec![vec![c; 50]; count]);
-            // The mean is rounded, and with it what depends on it.
+            // The mean is rounded, and so is everything that depends on it.
             let little = 4e-15 * c.abs();
             let right = agree(s.mean, c, 4e-15, 0.0)
                 && s.sd <= little
@@ -102,8 +102,8 @@ fn outcomes_are_stated() {
     let x = [vec![inf; 20], vec![-inf; 20]];
     let s = summary(&x);
     points.check(s.mean.is_nan() && s.q05 == -inf && s.q95 == inf, || format!("{s:?}"));
-    // Between two order statistics, wherever they are; between infinities of both signs
-    // there is no number.
+    // Interpolation between two order statistics of any size; between infinities of
+    // opposite sign it is undefined.
     let cases: [(&[f64], f64, f64); 12] = [
         (&[-f64::MAX, f64::MAX], 0.5, 0.0),
         (&[-f64::MAX, f64::MAX], 0.75, 0.75 * f64::MAX - 0.25 * f64::MAX),
@@ -122,7 +122,7 @@ fn outcomes_are_stated() {
         let got = quantile(x, p);
         points.check(same(got, expected), || format!("quantile {p} of {x:?}: {got:e}"));
     }
-    // Two modes that chains stay in, however far apart or near.
+    // Two modes that chains do not leave, at any distance.
     for (here, there) in [(1e-300, 2e-300), (-1e300, 1e300), (0.0, 1.0), (-f64::MAX, f64::MAX)] {
         let at = |c: f64| {
             chains()

@@ -1,6 +1,6 @@
-//! Every kernel on posteriors of scales 1e-150 to 1e150, far from the data, at ends of
-//! supports, under log weights of 1e300: the state stays finite and in its support, and
-//! the running score is that of a fresh run bit for bit.
+//! Every kernel on posteriors of scales 1e-150 to 1e150, far from the data, at the ends
+//! of supports, and with log weights of 1e300: the state stays finite and in its support,
+//! and the running score equals that of a fresh run bit for bit.
 
 use super::points::Points;
 use crate::common::{assert_mean, integrate, normal_pdf, run};
@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 
 const SCALES: [&str; 5] = ["1e-150", "1e-8", "1", "1e8", "1e150"];
 
-/// The choice is `x`; `S` is the scale.
+/// Models in which the choice is `x` and `S` is the scale.
 const POSTERIORS: &[(&str, &str)] = &[
     ("normal", "assume x ~ normal(0, S); observe normal(x, S) = S;"),
     ("40 sd away", "assume x ~ normal(0, S); observe normal(x, S) = 40 * S;"),
@@ -28,7 +28,7 @@ const POSTERIORS: &[(&str, &str)] = &[
     ("bound by the data", "assume x ~ uniform(0, S); observe uniform(0, x) = S / 4;"),
 ];
 
-/// On any of them.
+/// Kernels that apply to all of them.
 const KERNELS: &[&str] = &[
     "mh(@x)",
     "block(@x)",
@@ -46,7 +46,7 @@ const KERNELS: &[&str] = &[
     "scaled()",
 ];
 
-/// Where the prior is normal.
+/// Kernels that need a normal prior.
 const GAUSSIAN: &[&str] = &["elliptical(@x)"];
 
 fn program(posterior: &str, kernel: &str, scale: &str, counts: [u32; 2]) -> String {
@@ -62,7 +62,7 @@ fn program(posterior: &str, kernel: &str, scale: &str, counts: [u32; 2]) -> Stri
     .replace('S', scale)
 }
 
-/// What was wrong with the states of a chain.
+/// The faults of a chain's states.
 #[derive(Debug, Default)]
 struct Faults(Mutex<Vec<String>>);
 
@@ -81,7 +81,7 @@ impl Callback for Faults {
     }
 }
 
-/// The last state of a chain, and the first thing that was wrong with any.
+/// Returns the result of a chain, or the first fault of any of its states.
 fn watched(text: &str, seed: u64) -> Result<ChainResult, String> {
     let model = Model::from_text(text).map_err(|e| e.to_string())?;
     let faults = Arc::new(Faults::default());
@@ -97,7 +97,7 @@ fn watched(text: &str, seed: u64) -> Result<ChainResult, String> {
     }
 }
 
-/// The scores of a state, and those of a fresh run of its choices.
+/// Compares the scores of a state with those of a fresh run with its choices.
 fn rescored(trace: &Trace) -> Result<(), String> {
     let fresh = trace.rerun().map_err(|e| e.to_string())?;
     let scores = |t: &Trace| [t.log_joint(), t.log_prior(), t.log_likelihood()].map(f64::to_bits);
@@ -114,7 +114,8 @@ fn states_stay_valid_at_every_scale() {
         let gaussian = if posterior.contains("x ~ normal") { GAUSSIAN } else { &[] };
         for kernel in KERNELS.iter().chain(gaussian) {
             for (seed, scale) in SCALES.iter().enumerate() {
-                // Particles climb a ladder at each step.
+                // Particles run through a whole ladder at each step, so there are fewer
+                // steps.
                 let counts = if kernel.starts_with("smc") { [3, 6] } else { [100, 200] };
                 let text = program(posterior, kernel, scale, counts);
                 let end = watched(&text, seed as u64).and_then(|chain| rescored(&chain.last));
@@ -130,7 +131,7 @@ fn states_stay_valid_at_every_scale() {
 #[test]
 fn means_are_right_at_every_scale() {
     let mut points = Points::of("posterior means");
-    // In units of the scale: z ~ normal(0, 1) or lognormal(0, 1), seen at 1.
+    // In units of the scale: z ~ normal(0, 1) or lognormal(0, 1), observed as 1.
     let seen = |z: f64| normal_pdf(1.0, z, 1.0) * normal_pdf(z, 0.0, 1000.0);
     let normal = |z: f64| seen(z) * normal_pdf(z, 0.0, 1.0);
     let positive = |z: f64| seen(z) * normal_pdf(z.ln(), 0.0, 1.0) / z;
@@ -192,7 +193,7 @@ fn scales_are_learnt_from_far_away() {
 #[test]
 fn finite_choices_weigh_1e300() {
     let mut points = Points::of("finite choices");
-    // By kind of weights: which values are possible, equally so.
+    // Log weights, and the values that remain possible, with equal probabilities.
     let cases: [(&str, &[f64]); 5] = [
         ("[-1e300, 0, -1e300]", &[1.0]),
         ("[1e300, 1e300, -1e300]", &[0.0, 1.0]),
@@ -224,7 +225,7 @@ fn finite_choices_weigh_1e300() {
     points.finish();
 }
 
-/// Choices that come and go, terms of many sizes.
+/// Choices that appear and vanish, and terms of many sizes.
 const LONG: &str = "assume n ~ poisson(2);
     assume a ~ normal(0, 1e3);
     assume b = if n > 1 { c ~ normal(a, 1e-3); d ~ cauchy(c, 10); c + d } else { e ~ gamma(0.1, 1e-3); e };

@@ -1,5 +1,5 @@
-//! Counts checked points, gathers those that are wrong, and holds the counts against the
-//! table of `docs/extremes.md`.
+//! Counts the checked points, collects failures, and compares the counts with the table
+//! of `docs/extremes.md`.
 
 const DOCUMENT: &str = include_str!("../../docs/extremes.md");
 
@@ -15,7 +15,7 @@ impl Points {
         Points { subject, checked: 0, wrong: Vec::new() }
     }
 
-    /// One more point; what is said of it if it is wrong.
+    /// Adds a point; `what` describes it if it is wrong.
     pub fn check(&mut self, right: bool, what: impl FnOnce() -> String) {
         self.checked += 1;
         if !right {
@@ -23,7 +23,7 @@ impl Points {
         }
     }
 
-    /// All points are right, and as many as the document says.
+    /// Asserts that all points are right, and that their number is the documented one.
     pub fn finish(self) {
         let Points { subject, checked, wrong } = self;
         assert!(
@@ -41,7 +41,8 @@ impl Points {
     }
 }
 
-/// The rows of the document's table: a subject and, last, its number of points.
+/// Returns the rows of the document's table: a subject, and the number of points in the
+/// last column.
 fn documented() -> impl Iterator<Item = (&'static str, usize)> {
     DOCUMENT.lines().filter_map(|line| {
         let mut cells = line.strip_prefix('|')?.strip_suffix('|')?.split('|').map(str::trim);

@@ -1,5 +1,5 @@
-//! Pictures of objects of any size and place by any camera; single precision against rays
-//! in double precision.
+//! Pictures of objects of any size and position by any camera; single precision compared
+//! with rays in double precision.
 
 use super::points::Points;
 use glam::{DVec3, Vec3};
@@ -8,9 +8,9 @@ use pcadlang::render::{Camera, Channels, Contours, Frame, Projection};
 use pcadlang::rng::{Purpose, StreamKey};
 use std::sync::Arc;
 
-/// The greatest relative error of a depth where a surface is seen at less than 60 degrees
-/// from its normal; where it is seen at a slant, also where the ray hits it: so many
-/// pixels.
+/// The largest relative error of a depth, for a surface whose normal is within 60 degrees
+/// of the ray. For slanted surfaces, the position of the ray may also be off by
+/// `PLACE_ERROR` pixels.
 const DEPTH_ERROR: f64 = 1e-6;
 const PLACE_ERROR: f64 = 1e-3;
 
@@ -26,7 +26,7 @@ fn placed(solid: &Solid, translate: [f64; 3], rotate: [f64; 3], scale: f64) -> S
     solid.placed(Affine::new(translate.into(), rotate.into(), DVec3::splat(scale)))
 }
 
-/// A triangle in the world, and the ray's way to it.
+/// A triangle in world space.
 struct Face([DVec3; 3]);
 
 impl Face {
@@ -48,8 +48,9 @@ impl Face {
         faces
     }
 
-    /// How far along the ray it is hit (Möller and Trumbore 1997), and the share of the
-    /// nearest side: within 0 to 1/3 it is hit.
+    /// Intersects the plane of the triangle with a ray (Möller and Trumbore 1997).
+    /// Returns the distance along the ray, and the smallest barycentric coordinate, which
+    /// is in 0 to 1/3 if the triangle is hit.
     fn hit(&self, eye: DVec3, ray: DVec3) -> Option<(f64, f64)> {
         let Face([a, b, c]) = *self;
         let (u, v, from) = (b - a, c - a, eye - a);
@@ -65,13 +66,13 @@ impl Face {
     }
 }
 
-/// A ray through a place of the picture, by depth.
+/// Returns the ray through a point of the picture, parameterised by depth.
 fn ray(camera: &Camera, x: f64, y: f64) -> (DVec3, DVec3) {
     let (near, far) = (camera.unproject(x, y, 0.0), camera.unproject(x, y, 1.0));
     (near, far - near)
 }
 
-/// The nearest hit beyond the near plane: its depth and face.
+/// Returns the depth and the face of the nearest hit beyond the near plane.
 fn nearest<'a>(faces: &'a [Face], camera: &Camera, x: f64, y: f64) -> Option<(f64, &'a Face)> {
     let (eye, ray) = ray(camera, x, y);
     let hits = faces.iter().filter_map(|f| {
@@ -80,11 +81,11 @@ fn nearest<'a>(faces: &'a [Face], camera: &Camera, x: f64, y: f64) -> Option<(f6
     hits.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Whether a picture's depths are those of rays: everywhere, but where a ray a thousandth
-/// of a pixel away would tell something else.
+/// Checks that the depths of a picture are those of rays, except where a ray a thousandth
+/// of a pixel away would differ.
 fn as_by_rays(solid: &Solid, camera: &Camera) -> Result<f64, String> {
     let (frame, faces) = (Frame::render(solid, camera, Channels::Depth), Face::all(solid));
-    // Of parallel rays depths are as exact as the farthest one.
+    // For parallel rays, the error of a depth is relative to the farthest depth.
     let far = solid.vertices().map(|v| camera.project(v).2.abs()).fold(0.0, f64::max);
     let unit = |depth: f64| {
         if matches!(camera.projection, Projection::Pinhole { .. }) { depth } else { far }
@@ -148,7 +149,7 @@ fn single_precision_is_near_double_precision() {
     ];
     for round in 0..90 {
         let mut between = |low: f64, high: f64| low + (high - low) * random.uniform();
-        // From far away to across the near plane and around the camera.
+        // From far away to intersecting the near plane and enclosing the camera.
         let scale = 10f64.powf(between(-1.0, 1.5));
         let away = [8.0 - 4.0 * scale, 8.0 - 1.5 * scale, 8.0 - 0.5 * scale][round % 3];
         let place = [between(-0.5, 0.5) * scale, between(-0.5, 0.5) * scale, away];
@@ -159,8 +160,8 @@ fn single_precision_is_near_double_precision() {
             camera.projection =
                 Projection::Orthographic { units_per_pixel: 0.1 * scale, cx: 12.0, cy: 9.0 };
         }
-        // Of a body that hides its own, faces are seen from outside: with the eye inside
-        // there is nothing to see.
+        // Faces of a closed body are visible from outside only: with the camera inside,
+        // there would be nothing to see.
         let end = as_by_rays(&open(&solid), &camera);
         worst = worst.max(end.clone().unwrap_or(0.0));
         points.check(end.is_ok(), || {
@@ -171,7 +172,7 @@ fn single_precision_is_near_double_precision() {
     points.finish();
 }
 
-/// The same without the promise that its faces enclose a body.
+/// Returns the same solid without the flag that its faces enclose a body.
 fn open(solid: &Solid) -> Solid {
     let instance = |i: &pcadlang::geom::Instance| {
         let topology = Topology { encloses: false, ..(*i.mesh.topology).clone() };
@@ -181,7 +182,8 @@ fn open(solid: &Solid) -> Solid {
     Solid::group(&solid.instances().iter().map(instance).collect::<Vec<_>>())
 }
 
-/// Depths are above 0, contours finite, and both channels agree; what is seen, in pixels.
+/// Checks that depths are positive, contours finite and both channels consistent; returns
+/// the number of covered pixels.
 fn sound(solid: &Solid, camera: &Camera) -> Result<usize, String> {
     let (frame, all) = (
         Frame::render(solid, camera, Channels::Depth),
@@ -231,14 +233,14 @@ fn objects_of_any_size_and_place_are_drawn() {
         for thing in [ball(16), block()] {
             for m in magnitudes() {
                 let small = sound(&placed(&thing, [0.0; 3], [0.1, 0.2, 0.3], m), camera);
-                // Less than a pixel is at most that; what is before the camera and larger
-                // than the picture fills it.
+                // An object smaller than a pixel covers at most one.
                 let right = small
                     .as_ref()
                     .is_ok_and(|seen| if m < 0.01 { *seen <= 1 } else { m != 1.0 || *seen > 20 });
                 points.check(right, || format!("scaled by {m:e}: {small:?}"));
                 let wall = sound(&placed(&thing, [0.0, 0.0, -2.0 * m], [0.0; 3], m), camera);
-                // What is a thousand million units away is out of sight.
+                // A wall in front of the camera that is larger than the picture fills it;
+                // one that is a thousand million units away is out of sight.
                 let right = wall.as_ref().is_ok_and(|seen| match m {
                     1e3..1e8 => *seen == camera.pixels(),
                     1e9.. => *seen == 0,
@@ -398,18 +400,18 @@ fn pictures_of_any_size_are_drawn() {
             format!("{width} x {height}: {end:?}")
         });
         let frame = Frame::render(&wall, &camera, Channels::Depth);
-        // Its front is at 0, and so are 8 units before the camera.
+        // The front of the wall is at 0, which is 8 units from the camera.
         let right = frame.depth.iter().all(|d| (f64::from(*d) / 8.0 - 1.0).abs() < DEPTH_ERROR);
         points.check(right, || format!("{width} x {height}: {:?}", frame.depth.first()));
     }
-    // The largest: the area of a disc seen, and its middle.
+    // The largest picture: the visible area of a disc, and the depth at its middle.
     let camera = Camera::default_for(8192, 8192);
     let frame = Frame::render(&ball(64), &camera, Channels::Depth);
     let middle = frame.depth[4096 * 8192 + 4096];
     points.check((middle - 7.0).abs() < 0.02, || format!("a depth of {middle}"));
     let seen = frame.mask().filter(|m| *m).count() as f64 / camera.pixels() as f64;
-    // A sphere of radius 1 at 8 has an outline of radius 8 / sqrt(63) at its middle's
-    // depth, where 4.4 units are seen.
+    // The outline of a sphere of radius 1 at distance 8 has radius 8 / sqrt(63) at the
+    // depth of its centre, where the picture is 4.4 units wide.
     let expected = std::f64::consts::PI * (64.0 / 63.0) / (4.4 * 4.4);
     points.check((seen / expected - 1.0).abs() < 0.01, || {
         format!("a share of {seen}, expected {expected}")

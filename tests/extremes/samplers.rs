@@ -1,5 +1,5 @@
-//! Draws at extreme parameters against distribution functions of the table (Kolmogorov
-//! and Smirnov's distance at its points).
+//! Draws at extreme parameters compared with the distribution functions of the table
+//! (Kolmogorov-Smirnov distance at its points).
 
 use super::points::Points;
 use super::table::{Row, rows};
@@ -21,7 +21,7 @@ fn draws_follow_their_distribution_functions() {
         for r in group {
             let below = draws.partition_point(|x| *x <= r.point[0]) as f64 / DRAWS as f64;
             let distance = (below - r.values[0]).abs() * (DRAWS as f64).sqrt();
-            // The greatest distance anywhere is above 2.2 with probability 1e-4.
+            // The greatest distance over all points exceeds 2.2 with probability 1e-4.
             points.check(distance < 2.2, || format!("{}: {below} of the draws are below", r.line));
         }
     }

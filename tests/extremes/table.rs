@@ -1,9 +1,9 @@
-//! Reference values by mpmath: `tests/data/make_extremes_reference.py` says what the
-//! columns are.
+//! Reference values computed with mpmath; `tests/data/make_extremes_reference.py`
+//! documents the columns.
 
 const TABLE: &str = include_str!("../data/extremes_reference.csv");
 
-/// A line of the table.
+/// A row of the table.
 pub struct Row {
     pub name: &'static str,
     pub parameters: Vec<f64>,
@@ -13,7 +13,7 @@ pub struct Row {
     pub line: &'static str,
 }
 
-/// The rows of a kind.
+/// Returns the rows of a kind.
 pub fn rows(kind: &str) -> Vec<Row> {
     let numbers = |s: &str| s.split_whitespace().map(|x| x.parse().unwrap()).collect();
     let row = |line: &'static str| {
@@ -27,8 +27,7 @@ pub fn rows(kind: &str) -> Vec<Row> {
     TABLE.lines().skip(1).filter_map(row).collect()
 }
 
-/// Whether a value has at most this relative error, or this absolute one; infinities must
-/// be the same.
+/// Whether a value is within a relative or an absolute error; infinities must be equal.
 pub fn agree(got: f64, expected: f64, relative: f64, absolute: f64) -> bool {
     got == expected || (got - expected).abs() <= (relative * expected.abs()).max(absolute)
 }

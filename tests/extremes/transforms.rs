@@ -1,4 +1,5 @@
-//! The maps to unconstrained space and back, and their log Jacobians, against the table.
+//! The transforms to unconstrained space and back, and their log Jacobians, compared with
+//! the table.
 
 use super::points::Points;
 use super::table::{Row, agree, rows};
@@ -27,7 +28,7 @@ fn flat(x: &Datum) -> Vec<f64> {
     }
 }
 
-/// The nearest double that is strictly inside.
+/// Returns the nearest double strictly inside of the support.
 fn inside(s: &Support, x: f64) -> f64 {
     match s {
         Support::AtLeast { lo } => x.max(lo.next_up()),
@@ -45,7 +46,7 @@ fn values_and_jacobians_agree_with_the_table() {
         let (x, jacobian) = s.from_free(&r.point);
         let (expected, values) = r.values.split_last().unwrap();
         let got = flat(&x);
-        // Beside a bound, to the rounding of the bound.
+        // Near a bound, up to the rounding error of the bound.
         let bound = r.parameters.iter().fold(0.0, |m: f64, p| m.max(p.abs()));
         let right = got.len() == values.len()
             && got.iter().zip(values).all(|(g, v)| agree(*g, inside(&s, *v), 1e-12, 4e-16 * bound))

@@ -1,5 +1,4 @@
-//! Formatting changes spaces, line ends and commas before closing brackets, and nothing
-//! else.
+//! Formatting only changes spaces, line ends and commas before closing brackets.
 
 use super::generator::Generator;
 use super::{bare, program, shown};
@@ -7,8 +6,8 @@ use pcadlang::syntax::{SyntaxErrorKind, WIDTH, format, parse, print, span::FileI
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// What formatting a text gives, which means the same and stays as it is when formatted
-/// again.
+/// Returns the formatted text, after checking that it has the same meaning and that
+/// formatting is idempotent.
 fn formatted(text: &str) -> String {
     let once = format(text).unwrap_or_else(|errors| panic!("{}\n{text}", shown(text, errors)));
     let (again, errors) = parse(&once, FileId(0));
@@ -22,7 +21,7 @@ fn formatted(text: &str) -> String {
     once
 }
 
-/// Every `.pcad` file in a folder.
+/// Collects every `.pcad` file in a folder and its subfolders.
 fn programs(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -102,8 +101,8 @@ fn difficult_texts() {
     });
 }
 
-/// A canonical text with other spaces and with comments, each with a number, and how many
-/// those are.
+/// Returns a canonical text with changed spaces and numbered comments, and the number of
+/// comments.
 fn scattered(text: &str, bytes: &[u8]) -> (String, usize) {
     let (mut out, mut comments) = (String::new(), 0);
     let mut bytes = bytes.iter().cycle();

@@ -1,10 +1,10 @@
-//! Rubbish: no text makes the parser panic, and whatever it says can be shown.
+//! Random text: no text makes the parser panic, and all of its errors can be displayed.
 
 use super::{bare, shown};
 use pcadlang::syntax::{MAX_ERRORS, parse, parse_expr, print, span::FileId};
 use proptest::prelude::*;
 
-/// What has to hold for every text.
+/// Checks the properties that hold for every text.
 fn check(text: &str) {
     let (program, errors) = parse(text, FileId(0));
     assert!(errors.len() <= MAX_ERRORS + 1, "{} errors", errors.len());
@@ -27,7 +27,7 @@ fn check(text: &str) {
     let _ = parse_expr(text, FileId(0));
 }
 
-/// Everything a program is made of, and some that it is not.
+/// Every kind of token of the language, and some that are invalid.
 #[rustfmt::skip]
 const PIECES: [&str; 104] = [
     "include", "param", "data", "fn", "kernel", "infer", "report", "export", "as", "to", "assume", "let", "observe", "with",
@@ -69,7 +69,7 @@ proptest! {
         check(&text);
     }
 
-    /// A sample with some of its bytes cut out, doubled or exchanged for a piece.
+    /// A sample with some of its bytes removed, doubled or replaced by a piece.
     #[test]
     fn broken_samples(sample in 0..SAMPLES.len(), edits in prop::collection::vec((any::<u16>(), 0..12_usize, 0..PIECES.len(), 0..3), 1..6)) {
         let mut text = SAMPLES[sample].to_owned();

@@ -1,8 +1,8 @@
-//! Random well-formed programs: every tree that the parser can make, from a string of
-//! bytes that decides each choice.
+//! Random well-formed programs: every tree that the parser can produce, from a string of
+//! bytes that determines each choice.
 //!
-//! Bytes run out after a while; from then on every choice is the simplest one, so trees
-//! are finite, and shrinking the bytes shrinks the program.
+//! When the bytes run out, every choice is the simplest one, so trees are finite, and
+//! shrinking the bytes shrinks the program.
 
 use pcadlang::syntax::ast::*;
 use pcadlang::syntax::span::{Span, Spanned};
@@ -43,7 +43,7 @@ fn hole(kind: ExprKind) -> Expr {
 
 pub struct Generator<'a> {
     bytes: std::slice::Iter<'a, u8>,
-    /// In a computed key, which has no statements.
+    /// Whether the generator is in a computed key, which cannot contain statements.
     in_key: bool,
 }
 
@@ -61,7 +61,7 @@ impl<'a> Generator<'a> {
         Program { items }
     }
 
-    /// A number below `n`; 0 when the bytes have run out.
+    /// Returns a number below `n`, or 0 when the bytes have run out.
     fn pick(&mut self, n: usize) -> usize {
         self.bytes.next().map_or(0, |b| usize::from(*b) % n)
     }
@@ -87,7 +87,7 @@ impl<'a> Generator<'a> {
         spanned(self.of(&NAMES).into())
     }
 
-    /// A name where keywords are allowed.
+    /// Returns a name where keywords are allowed.
     fn word(&mut self) -> Name {
         if self.coin() { spanned(self.of(&WORDS).into()) } else { self.name() }
     }
@@ -290,7 +290,8 @@ impl<'a> Generator<'a> {
             1 => Key::Str(self.word().node),
             2 => Key::Str(self.text()),
             3 => Key::Num(if self.coin() { -self.of(&NUMBERS) } else { self.of(&NUMBERS) }),
-            // Addresses in keys may be nested eight deep only.
+            // Addresses in keys can be nested only eight deep, so there is no key in a
+            // key.
             _ if self.in_key => Key::Any,
             _ => {
                 self.in_key = true;

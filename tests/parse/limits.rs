@@ -1,4 +1,4 @@
-//! Texts made to exhaust the stack, the memory or the patience of a parser.
+//! Texts designed to exhaust the stack, memory or time of a parser.
 
 use pcadlang::diag::MAX_SOURCE_BYTES;
 use pcadlang::syntax::{
@@ -7,7 +7,8 @@ use pcadlang::syntax::{
 
 const MANY: usize = 100_000;
 
-/// Parses, prints, clones, compares and drops on a small stack: the errors.
+/// Parses, prints, clones, compares and drops a text on a small stack, and returns the
+/// errors.
 fn on_small_stack(text: String) -> Vec<SyntaxErrorKind> {
     let work = move || {
         let (program, errors) = parse(&text, FileId(0));
@@ -22,7 +23,7 @@ fn nested(open: &str, inner: &str, close: &str, times: usize) -> String {
     format!("{}{inner}{}", open.repeat(times), close.repeat(times))
 }
 
-/// Texts with something inside itself so many times.
+/// Returns texts with a construct nested `n` deep.
 fn towers(n: usize) -> Vec<(&'static str, String)> {
     let value = |text: String| format!("let x = {text};");
     vec![
@@ -105,7 +106,7 @@ fn the_limits_are_where_they_are_said_to_be() {
 
 #[test]
 fn depth_adds_up_through_brackets() {
-    // A tower of sums inside parentheses, each of which alone is below both limits.
+    // Sums nested inside parentheses, each alone below both limits.
     let mut text = "1".to_owned();
     for _ in 0..100 {
         text = format!("({text}){}", "+1".repeat(100));

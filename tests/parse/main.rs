@@ -1,6 +1,5 @@
-//! The parser against its specification: the sample programs, precedence, spans,
-//! printing, recovery, limits, rubbish. What is said about mistakes is tested in
-//! `tests/errors.rs`.
+//! The parser compared with its specification: the sample programs, precedence, spans,
+//! printing, recovery, limits, random text. Messages are tested in `tests/errors.rs`.
 
 mod formatting;
 mod fuzz;
@@ -19,19 +18,19 @@ use pcadlang::syntax::span::FileId;
 use pcadlang::syntax::{SyntaxError, parse, parse_expr};
 use std::fmt::Debug;
 
-/// The program of a text that has to be correct.
+/// Parses a program that must be valid.
 fn program(text: &str) -> Program {
     let (program, errors) = parse(text, FileId(0));
     assert!(errors.is_empty(), "{}\n{text}", shown(text, errors));
     program
 }
 
-/// The expression of a text that has to be correct.
+/// Parses an expression that must be valid.
 fn expr(text: &str) -> Expr {
     parse_expr(text, FileId(0)).unwrap_or_else(|errors| panic!("{}", shown(text, errors)))
 }
 
-/// Errors as the user sees them.
+/// Renders errors as the user sees them.
 fn shown(text: &str, errors: Vec<SyntaxError>) -> String {
     let mut map = SourceMap::new();
     map.add("test.pcad", text);
@@ -39,7 +38,7 @@ fn shown(text: &str, errors: Vec<SyntaxError>) -> String {
     render(&map, &diagnostics, false)
 }
 
-/// A tree without its spans, to compare what two texts mean.
+/// Returns a tree without its spans, to compare the meaning of two texts.
 fn bare(tree: &impl Debug) -> String {
     const SPAN: &str = "Span { file: FileId(";
     let text = format!("{tree:?}");

@@ -1,10 +1,10 @@
-//! Which operator binds tighter, and to which side.
+//! Precedence and associativity of operators.
 
 use super::{bare, expr, program};
 use pcadlang::syntax::ast::{BinaryOp, ExprKind, ItemKind, StmtKind, UnaryOp};
 use pcadlang::syntax::{parse_expr, print, print_expr, span::FileId};
 
-/// Both texts mean the same.
+/// Asserts that both texts have the same meaning.
 fn same(text: &str, with_parentheses: &str) {
     assert_eq!(bare(&expr(text)), bare(&expr(with_parentheses)), "{text}");
 }
@@ -96,7 +96,7 @@ fn whole_expressions_are_no_operands() {
     rejected("if a { 1 } else { 2 } + 1");
 }
 
-/// The statements and the value of a body, by their number and presence.
+/// Returns the number of statements of a body, and whether it has a value.
 fn body(text: &str) -> (usize, bool) {
     let tree = program(&format!("fn f(c) {{ {text} }}"));
     let ItemKind::Fn(f) = &tree.items[0].kind else { panic!() };

@@ -1,10 +1,11 @@
-//! One error for each mistake, and the statements around it kept.
+//! Each mistake gives one error, and the surrounding statements are kept.
 
 use super::shown;
 use pcadlang::syntax::ast::{Expr, ExprKind, Item, ItemKind, Program, Stmt, StmtKind};
 use pcadlang::syntax::{MAX_ERRORS, SyntaxErrorKind, parse, print, span::FileId};
 
-/// The program in canonical form, bad statements as `<error>`, and the number of errors.
+/// Returns the program in canonical form, with invalid statements as `<error>`, and the
+/// number of errors.
 fn recover(text: &str) -> (String, usize) {
     let (program, errors) = parse(text, FileId(0));
     (print(&program), errors.len())
@@ -126,7 +127,7 @@ fn unfinished_texts_are_told_from_wrong_ones() {
     }
 }
 
-/// Whether a program has a hole, looking at statements only.
+/// Whether a statement of a program is a hole.
 fn has_hole(program: &Program) -> bool {
     let hole =
         |stmt: &Stmt| matches!(&stmt.kind, StmtKind::Expr(Expr { kind: ExprKind::Error, .. }));

@@ -1,12 +1,13 @@
-//! Printing and parsing again is the identity, and no pair of parentheses is printed in
-//! vain.
+//! Printing followed by parsing is the identity, and all printed parentheses are
+//! necessary.
 
 use super::generator::Generator;
 use super::{bare, shown};
 use pcadlang::syntax::{SyntaxErrorKind, parse, parse_expr, print, print_expr, span::FileId};
 use proptest::prelude::*;
 
-/// A configuration without a file of past failures: each is to become a test of its own.
+/// A configuration without a file of past failures, since each failure should become a
+/// test.
 fn cases(cases: u32) -> ProptestConfig {
     ProptestConfig {
         cases,
@@ -140,7 +141,7 @@ fn no_parentheses_in_vain() {
     for text in exact {
         let expr = parse_expr(text, FileId(0)).unwrap();
         assert_eq!(print_expr(&expr), text);
-        // Taking any pair away changes the meaning.
+        // Removing any pair of parentheses changes the meaning.
         for (open, _) in text.match_indices('(') {
             let call = text[..open].ends_with(|c: char| c.is_alphanumeric() || c == ')')
                 && !text[..open].ends_with("if");

@@ -1,4 +1,4 @@
-//! The programs in `tests/syntax` and those that are shipped.
+//! The programs in `tests/syntax`, and the shipped programs.
 
 use super::{bare, program};
 use pcadlang::syntax::print;

@@ -1,4 +1,4 @@
-//! Where nodes and errors are said to stand.
+//! The positions of nodes and errors.
 
 use super::program;
 use pcadlang::diag::SourceMap;
