@@ -15,7 +15,7 @@ use super::{Failure, date, edges, files, inputs, people, plain, seen};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
-    BestSoFar, BestState,  Callback , Callbacks , ChainResult, Evidence, KeptTraces, Progress  ,
+    BestSoFar, BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress,
     stuck_structure,
 };
 use pcadlang::lang::{self, builtins::scene::ImageValue};
@@ -353,7 +353,7 @@ fn fill(
     let kept = Arc::new(KeptTraces::new(s.chains(), manner.keep as usize, model.hash()));
     let callbacks: Vec<Arc<dyn Callback>> =
         vec![Arc::new(joints.clone()), best.clone(), evidence.clone(), kept.clone()];
-    let options = options(job, ready, Some(Arc::new(Callbacks : : from_iter(callbacks))));
+    let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
     let memories: Vec<Memory> =
         (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;

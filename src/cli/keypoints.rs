@@ -2,7 +2,7 @@
 //! `keypoints.json`.
 
 use super::scene::view_operand;
-use pcadlang::infer::{ Callback , StateError };
+use pcadlang::infer::{Callback, StateError};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Located;
@@ -88,7 +88,11 @@ impl Joints {
         let mixed = |part: fn(&LandmarkMoments) -> &Moments| {
             Moments::mixture(&each.iter().map(|(p, s)| (*p, part(s))).collect::<Vec<_>>())
         };
-        LandmarkMoments { joints: mixed(|s| &s.joints), own: mixed(|s| &s.own), scene: mixed(|s| &s.scene)  , }
+        LandmarkMoments {
+            joints: mixed(|s| &s.joints),
+            own: mixed(|s| &s.own),
+            scene: mixed(|s| &s.scene),
+        }
     }
 
     /// Returns the landmarks of a view; a position is `None` if it is not in front of the
