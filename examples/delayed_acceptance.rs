@@ -16,9 +16,9 @@
 mod clock;
 
 use clock::process_seconds;
-use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::value::Value;
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::scene::{ImageValue, ViewValue};
 use pcadlang::trace::Draws;
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program, RunOptions};

@@ -8,7 +8,7 @@ mod known_truth;
 
 use known_truth::{SIZE, argument, compile, draw, global, quantile, score, sorted};
 use pcadlang::infer::Callback;
-use pcadlang::lang::builtins::scene::ViewValue;
+use pcadlang::scene::ViewValue;
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, RunOptions};

@@ -14,10 +14,10 @@ mod clock;
 
 use clock::processor_seconds;
 use pcadlang::infer::{Drift, Kernel, Pick, SiteSelection, StepContext};
-use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::scene::{ImageValue, ViewValue};
 use pcadlang::trace::{Draws, Selector, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};

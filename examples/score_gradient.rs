@@ -9,10 +9,10 @@
 //! Coordinates are scaled so that what each one moves of the surface moves by half a
 //! pixel in the picture.
 
-use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::scene::{ImageValue, ViewValue};
 use pcadlang::trace::{Change, Draws, Selector, Target, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};

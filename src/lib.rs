@@ -34,10 +34,15 @@ mod platform;
 pub mod render;
 pub mod report;
 pub mod rng;
+#[cfg(feature = "scene")]
+#[doc(hidden)]
+pub mod scene;
 #[doc(hidden)]
 pub mod score;
 #[doc(hidden)]
 pub mod session;
+#[doc(hidden)]
+pub mod standard;
 #[doc(hidden)]
 pub mod syntax;
 pub mod trace;

@@ -9,11 +9,13 @@
 //! # Ok::<(), pcadlang::Error>(())
 //! ```
 
+#[cfg(feature = "scene")]
+mod camera;
 mod edited;
-mod error;
+mod hosted;
 mod program;
 
-pub use error::Error;
+pub use crate::diag::Error;
 pub use program::Program;
 
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap};

@@ -5,7 +5,7 @@
 use ciborium::Value;
 use pcadlang::infer::draws::{Column, DrawRow, KernelStats, Sink};
 use pcadlang::infer::{Banks, Checkpoint, Latent, Neighbours, Progress, RunOptions};
-use pcadlang::lang::builtins::Table;
+use pcadlang::standard;
 use pcadlang::{Model, Program};
 use std::io;
 use std::sync::atomic::Ordering;
@@ -291,7 +291,7 @@ fn a_metric_depends_on_nothing_but_the_choices_there_are() {
 
 #[test]
 fn every_kernel_of_the_table_has_a_case() {
-    let table = Table::default();
+    let table = standard::table();
     for b in table.iter().filter(|b| b.section == "Kernels" && !b.is_planned()) {
         let name = b.full_name();
         assert!(CASES.iter().any(|c| c.0 == name), "`{name}`: add a case, or several");

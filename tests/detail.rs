@@ -78,8 +78,8 @@ fn the_score_is_off_by_no_more_than_the_detail_allows() {
 /// drawn before or on which thread.
 #[test]
 fn the_level_depends_on_the_state_and_not_on_the_way_there() {
-    use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
     use pcadlang::lang::value::Value;
+    use pcadlang::scene::{ImageValue, ViewValue};
     use pcadlang::trace::{Draws, Trace};
     let text = "include \"std/scene.pcad\" as scene;
          data photo: image \"contours\";

@@ -7,8 +7,8 @@ mod folder;
 mod forests;
 
 use folder::{Folder, disc, png};
-use pcadlang::lang::builtins::scene::{DetectorValue, ImageValue};
 use pcadlang::lang::value::Value;
+use pcadlang::scene::{DetectorValue, ImageValue};
 use pcadlang::trace::Draws;
 use pcadlang::vision::{FileDetector, NetworkOptions, Photo};
 use pcadlang::{Model, Program};

@@ -9,9 +9,10 @@ mod forests;
 
 use folder::{Folder, disc, png};
 use pcadlang::bank::as_view;
+use pcadlang::lang::builtins::Builtin;
 use pcadlang::lang::builtins::examples::INCLUDE;
-use pcadlang::lang::builtins::{Builtin, Table};
 use pcadlang::lang::value::Value;
+use pcadlang::standard;
 use pcadlang::syntax::format;
 use pcadlang::trace::Draws;
 use pcadlang::{Model, Program, RunOptions};
@@ -119,9 +120,9 @@ fn every_example_runs() {
     let f = files();
     let mut wrong = Vec::new();
     let (mut expressions, mut programs) = (0, 0);
-    for b in Table::default().iter() {
+    for b in standard::table().iter() {
         let name = b.full_name();
-        let done = match b.example().map(|example| (example, expression(example))) {
+        let done = match b.example.as_deref().map(|example| (example, expression(example))) {
             None => Err("it has no example".to_owned()),
             Some((example, _))
                 if b.name.starts_with(char::is_alphabetic)
@@ -151,8 +152,8 @@ fn every_example_runs() {
 #[test]
 fn examples_are_written_as_the_formatter_writes_them() {
     let mut wrong = Vec::new();
-    for b in Table::default().iter() {
-        let Some(example) = b.example() else { continue };
+    for b in standard::table().iter() {
+        let Some(example) = b.example.as_deref() else { continue };
         let text = match expression(example) {
             Some((expression, value)) => format!("{expression}; // {value}\n"),
             None => format!("{example}\n"),

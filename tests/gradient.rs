@@ -6,10 +6,10 @@ mod tape;
 
 use pcadlang::Program;
 use pcadlang::dist::Datum;
-use pcadlang::lang::builtins::scene::{DepthValue, ImageValue, MaskValue};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::scene::{DepthValue, ImageValue, MaskValue};
 use pcadlang::trace::{Change, Draws, Selector, Target, Trace};
 use pcadlang::vision::{ContourMap, DepthMap, Mask, Photo};
 

@@ -5,14 +5,14 @@
 
 mod common;
 use common::kernels::PROOFS;
-use pcadlang::lang::builtins::Table;
+use pcadlang::standard;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
 /// Returns the kernels of the language, in the order of its reference, and whether this
 /// version implements them.
 fn kernels() -> Vec<(String, bool)> {
-    let table = Table::default();
+    let table = standard::table();
     let kernels = table.iter().filter(|b| b.section == "Kernels");
     kernels.map(|b| (b.full_name(), !b.is_planned())).collect()
 }

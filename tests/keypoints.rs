@@ -4,8 +4,8 @@
 mod folder;
 
 use folder::{Folder, disc, png};
-use pcadlang::lang::builtins::scene::{ImageValue, KeypointsValue};
 use pcadlang::lang::value::Value;
+use pcadlang::scene::{ImageValue, KeypointsValue};
 use pcadlang::vision::Photo;
 use pcadlang::vision::keypoints::{
     Detection, Keypoint, KeypointLikelihood, KeypointOptions, Keypoints, People,

@@ -3,10 +3,10 @@
 
 mod common;
 use common::{assert_mean, integrate};
-use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::load::embedded;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
+use pcadlang::scene::{ImageValue, ViewValue};
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program, RunOptions};

@@ -1,11 +1,11 @@
 //! What the examples of recovery share: a shipped program observing clean contours, those
 //! of one of its own draws.
 
-use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::load::embedded;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::scene::{ImageValue, ViewValue};
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};

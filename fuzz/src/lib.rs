@@ -9,7 +9,7 @@ use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
 use pcadlang::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
 use pcadlang::infer::draws::{Column, DrawRow, Sink};
 use pcadlang::infer::{Checkpoint, Progress};
-use pcadlang::lang::builtins::data::{Options, load};
+use pcadlang::lang::builtins::data::Options;
 use pcadlang::nn::Network;
 use pcadlang::num::fnv1a;
 use pcadlang::render::Camera;
@@ -30,7 +30,9 @@ const PIXELS: Pixels = Pixels { max_side: 512, max_pixels: 1 << 16 };
 
 /// Reads data as a program does, with a file beside it for whatever name it asks for.
 fn data(kind: &str, file: &str, bytes: &[u8], beside: &[u8]) -> bool {
-    load(kind, file, bytes, &Options::default(), &|_| Ok(beside.to_vec())).is_ok()
+    pcadlang::standard::table()
+        .load(kind, file, bytes, &Options::default(), &|_| Ok(beside.to_vec()))
+        .is_ok()
 }
 
 /// A program's text: every mistake can be shown, and what has none is printed and read

@@ -3,10 +3,10 @@
 use super::{BankError, command};
 use crate::Model;
 use crate::infer::in_parallel;
-use crate::lang::builtins::scene::{ImageValue, KeypointsValue, ViewValue};
 use crate::lang::value::Value;
 use crate::render::{BatchRenderer, ContourSlice, Contours, Scene, View};
 use crate::report::pictures::{Drawn, shaded};
+use crate::scene::{ImageValue, KeypointsValue, ViewValue};
 use crate::vision::Elements;
 use crate::vision::features::{self, Query};
 use serde::{Deserialize, Serialize};

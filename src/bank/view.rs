@@ -1,9 +1,9 @@
 //! The picture of a scene: finding the view in a program.
 
-use crate::lang::builtins::scene::{SolidValue, ViewValue};
 use crate::lang::code::Operand;
 use crate::lang::value::Value;
 use crate::render::{Camera, View};
+use crate::scene::{SolidValue, ViewValue};
 use crate::trace::{Draws, Trace};
 use std::sync::Arc;
 

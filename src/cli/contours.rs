@@ -2,8 +2,8 @@
 
 use super::args::Contours;
 use super::{Failure, edges, files, plain};
-use pcadlang::lang::builtins::scene::DetectorValue;
 use pcadlang::report::pictures::png;
+use pcadlang::scene::DetectorValue;
 use pcadlang::vision::{FileDetector, GradientDetector};
 
 /// Detects the contours of a photograph and writes them as a map.

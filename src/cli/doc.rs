@@ -4,10 +4,11 @@ use super::args::Doc;
 use super::{Failure, plain};
 use pcadlang::lang::builtins::search::search;
 use pcadlang::lang::builtins::{Table, doc as docs};
+use pcadlang::standard;
 
 /// Prints documentation from the table of built-ins.
 pub fn doc(a: &Doc) -> Result<(), Failure> {
-    let table = Table::default();
+    let table = standard::table();
     if let Some(words) = &a.search {
         return find(&table, &words.join(" "));
     }

@@ -1,8 +1,9 @@
 //! `--edges`: a contour detector that replaces the built-in one.
 
 use super::{Failure, files};
-use pcadlang::lang::builtins::data::{self, Options};
-use pcadlang::lang::builtins::scene::DetectorValue;
+use pcadlang::lang::builtins::data::Options;
+use pcadlang::scene::DetectorValue;
+use pcadlang::standard;
 use pcadlang::syntax::ast::{ExprKind, ItemKind};
 use pcadlang::syntax::parse;
 use pcadlang::syntax::span::FileId;
@@ -40,7 +41,7 @@ pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
     let alone = |other: &str| {
         Err(format!("{file} refers to {other}, but a detector must be a single file"))
     };
-    let loaded = data::load("detector", file, &bytes, &options, &alone);
+    let loaded = standard::table().load("detector", file, &bytes, &options, &alone);
     let loaded = loaded.map_err(|f| Failure::Plain(f.message, f.hint))?;
     let detector = loaded.downcast::<DetectorValue>().cloned().unwrap_or_default();
     *last = Some((spec.to_owned(), detector.clone()));
@@ -70,7 +71,7 @@ fn options(text: &str) -> Result<Options, Failure> {
     };
     let args =
         args.ok_or_else(|| wrong("expected the options of a detector after the file name", None))?;
-    Options::parse("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
+    standard::table().options("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
 }
 
 /// Returns what contours depend on besides the picture: the bytes of the file, and the

@@ -4,10 +4,11 @@ use super::args::{Inputs, Job};
 use super::{Failure, files, plain};
 use image::DynamicImage;
 use pcadlang::Program;
-use pcadlang::lang::builtins::data;
-use pcadlang::lang::builtins::scene::ImageValue;
+use pcadlang::lang::builtins::data::Options;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
+use pcadlang::scene::{self, ImageValue};
+use pcadlang::standard;
 use pcadlang::trace::Limits as Bounds;
 use pcadlang::vision::ContourMap;
 use std::path::Path;
@@ -85,8 +86,8 @@ pub fn observe(
         detected.push((only(&program, "keypoints", "--keypoints")?, path.clone()));
     }
     for (name, path) in detected {
-        let bytes = files::read(Path::new(data::path_of("keypoints", &path)))?;
-        let found = data::load_keypoints(&path, &bytes, stem.as_deref());
+        let bytes = files::read(Path::new(standard::table().path_of("keypoints", &path)))?;
+        let found = scene::data::load_keypoints(&path, &bytes, stem.as_deref());
         program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
     if let Some(path) = &job.observe_contours {
@@ -132,7 +133,8 @@ fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure
             "{called} refers to {other}, but an entry of a JSON file cannot refer to other files"
         ))
     };
-    data::load(kind, called, found.to_string().as_bytes(), &data::Options::default(), &alone)
+    standard::table()
+        .load(kind, called, found.to_string().as_bytes(), &Options::default(), &alone)
         .map_err(|e| Failure::Plain(e.message, e.hint))
 }
 

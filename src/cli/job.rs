@@ -18,11 +18,12 @@ use pcadlang::infer::{
     BestSoFar, BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress,
     stuck_structure,
 };
-use pcadlang::lang::{self, builtins::scene::ImageValue};
+use pcadlang::lang;
 use pcadlang::report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
     table, text_hash, widen, zarr,
 };
+use pcadlang::scene::ImageValue;
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
 use serde_json::{Map, Value, json};

@@ -3,10 +3,10 @@
 
 use super::scene::view_operand;
 use pcadlang::infer::{Callback, StateError};
-use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Located;
 use pcadlang::report::{Mode, Moments};
+use pcadlang::scene::ViewValue;
 use pcadlang::trace::{Draws, Trace};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};

@@ -1,8 +1,8 @@
 //! Selects a person of a photograph for a run, and warns about the people detected there.
 
 use clap::Args;
-use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Value;
+use pcadlang::scene::ImageValue;
 use pcadlang::vision::people::Person;
 use std::path::PathBuf;
 

@@ -1,11 +1,11 @@
 //! Finds and evaluates the view of a program in a trace.
 
 use pcadlang::bank;
-use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Value;
 use pcadlang::render::{Camera, View};
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::scene::ViewValue;
 use pcadlang::trace::{Constraint, Draws, Trace};
 use pcadlang::{Error, Model};
 use std::sync::Arc;

@@ -7,10 +7,10 @@ use super::{Failure, plain};
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::crop_imm;
-use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Located;
 use pcadlang::report::RunDir;
 use pcadlang::report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, Strokes, png};
+use pcadlang::scene::ImageValue;
 use pcadlang::vision::ContourMap;
 
 /// The maximum longer side of the photograph, in pixels.

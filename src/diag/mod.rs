@@ -7,6 +7,7 @@
 #![doc = include_str!("guide.md")]
 
 mod diagnostic;
+mod error;
 mod excerpt;
 mod nearest;
 mod render;
@@ -15,6 +16,7 @@ mod source;
 #[doc(inline)]
 pub use crate::syntax::span::{FileId, Span};
 pub use diagnostic::{Diagnostic, IntoDiagnostic, Label, Severity};
+pub use error::Error;
 pub use nearest::nearest;
 pub use render::render;
 pub(crate) use source::too_large;

@@ -5,7 +5,9 @@ use super::checked::Checked;
 use crate::dist::{Dist, Distribution};
 use crate::infer::{Kernel, KernelCall, KernelMaker};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Argument, Before, Builtin, Derivative, HostItem, State, Type};
+use crate::lang::builtins::{
+    Args, Argument, Before, Builtin, Derivative, HostItem, Row, State, Type,
+};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Likelihood, Value};
 use crate::syntax::{is_keyword, is_name};
@@ -45,6 +47,8 @@ impl Entry {
             scalar: None,
             derivative,
             host: Some(host),
+            format: None,
+            example: None,
         };
         Entry { builtin, replaces: false, wrong: None }
     }
@@ -267,6 +271,14 @@ impl Entry {
         self
     }
 
+    /// An example of its use, for `doc`: an expression with its value behind `//`, or a
+    /// program.
+    #[must_use]
+    pub fn example(mut self, text: impl Into<Cow<'static, str>>) -> Entry {
+        self.builtin.example = Some(text.into());
+        self
+    }
+
     /// It takes the place of the language's own of that name.
     ///
     /// ```
@@ -309,6 +321,13 @@ impl Entry {
             }
         }
         wrong
+    }
+}
+
+/// A built-in of plain functions, which capture nothing.
+impl From<&Row> for Entry {
+    fn from(row: &Row) -> Entry {
+        Entry { builtin: row.into(), replaces: false, wrong: None }
     }
 }
 

@@ -33,7 +33,6 @@
 mod checked;
 mod entry;
 mod previous;
-mod scene_view;
 
 #[doc(inline)]
 pub use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
@@ -49,11 +48,9 @@ pub use crate::lang::error::{Fault, FaultKind};
 pub use crate::lang::value::{Likelihood, Located, Object};
 pub use entry::Entry;
 pub use previous::Previous;
-pub use scene_view::SceneView;
 
-use crate::Error;
-use crate::diag::{Diagnostic, Severity, SourceMap};
-use crate::lang::builtins::{Builtin, Table, doc};
+use crate::diag::{Diagnostic, Error, Severity, SourceMap};
+use crate::lang::builtins::{Builtin, InputHook, Table};
 use crate::syntax::{is_keyword, is_name};
 use std::sync::Arc;
 
@@ -61,6 +58,7 @@ use std::sync::Arc;
 #[derive(Clone, Default)]
 pub struct Host {
     entries: Vec<Entry>,
+    hooks: Vec<Arc<dyn InputHook>>,
 }
 
 impl Host {
@@ -76,19 +74,18 @@ impl Host {
         self
     }
 
-    /// What `pcadlang doc` says of a name: the host's own, or the language's. `None` also
-    /// where an entry is not valid.
-    pub fn doc(&self, name: &str) -> Option<String> {
-        doc::doc(&*self.table().ok()?, name)
+    /// The same with what prepares the inputs of programs.
+    pub(crate) fn hook(mut self, hook: Arc<dyn InputHook>) -> Host {
+        self.hooks.push(hook);
+        self
     }
 
-    /// The built-ins of the language and the host's.
+    /// These built-ins and the host's.
     ///
     /// # Errors
     /// A name that is none or taken, arguments that cannot be told apart, a gradient of
     /// what is no function: all of them.
-    pub(crate) fn table(&self) -> Result<Arc<Table>, Error> {
-        let own = Table::default();
+    pub(crate) fn table(&self, own: &Table) -> Result<Arc<Table>, Error> {
         let mut diagnostics = Vec::new();
         let mut wrong = |message: String, hint: &str| {
             let d = Diagnostic::new(Severity::Error, message);
@@ -96,7 +93,7 @@ impl Host {
         };
         for (i, e) in self.entries.iter().enumerate() {
             let (b, name) = (&e.builtin, &*e.builtin.name);
-            let taken = own.find("", name).is_some() || own.constant(name).is_some();
+            let taken = own.find(&b.module, name).is_some() || own.constant(name).is_some();
             if !is_name(name) || is_keyword(name) {
                 wrong(
                     format!("`{name}` is not a valid name for a host function"),
@@ -107,7 +104,10 @@ impl Host {
                     format!("`{name}` is a built-in of the language"),
                     "choose another name; functions can be `replacing()`",
                 );
-            } else if self.entries[..i].iter().any(|o| o.builtin.name == b.name) {
+            } else if self.entries[..i]
+                .iter()
+                .any(|o| o.builtin.name == b.name && o.builtin.module == b.module)
+            {
                 wrong(format!("the host registers `{name}` twice"), "");
             }
             if let Some(what) = &e.wrong {
@@ -117,7 +117,10 @@ impl Host {
         }
         match diagnostics.is_empty() {
             true => {
-                Ok(Arc::new(Table::new(self.entries.iter().map(|e| Builtin::clone(&e.builtin)))))
+                let entries = self.entries.iter().map(|e| Builtin::clone(&e.builtin));
+                let mut table = own.clone().with(entries);
+                table.hooks.extend(self.hooks.iter().cloned());
+                Ok(Arc::new(table))
             }
             false => Err(Error { diagnostics, sources: SourceMap::new() }),
         }

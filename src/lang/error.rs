@@ -2,6 +2,7 @@
 //! through which calls.
 
 use super::address::Address;
+use crate::diag::{Diagnostic, IntoDiagnostic};
 use crate::syntax::span::Span;
 use std::fmt;
 use std::sync::Arc;
@@ -116,3 +117,23 @@ impl fmt::Display for RunError {
 }
 
 impl std::error::Error for RunError {}
+
+impl IntoDiagnostic for RunError {
+    fn into_diagnostic(self) -> Diagnostic {
+        let mut d = Diagnostic::error(self.message, self.span, "");
+        if !self.address.segments.is_empty() {
+            d = d.note(format!("while running {}", self.address.shortened()));
+        }
+        let calls: Vec<&str> = self.calls.iter().map(|(f, _)| &**f).collect();
+        match calls.len() {
+            0 => {}
+            1..=8 => d = d.note(format!("called through {}", calls.join(" -> "))),
+            n => {
+                let (first, last) = (calls[..4].join(" -> "), calls[n - 3..].join(" -> "));
+                d = d.note(format!("called through {first} -> … {} more … -> {last}", n - 7));
+            }
+        }
+        d.hints.extend(self.hint);
+        d
+    }
+}

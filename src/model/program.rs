@@ -1,31 +1,23 @@
 //! Programs before they become models: loading, parameters and data, compilation.
 
-use super::error::plain_error;
 use super::{Error, Model};
-use crate::diag::SourceMap;
-use crate::host::Host;
+use crate::diag::{Diagnostic, Severity, SourceMap};
 use crate::lang::builtins::data::Options;
-use crate::lang::builtins::scene::{
-    CameraValue, DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue,
-};
-use crate::lang::builtins::{Table, data};
+use crate::lang::builtins::{Defaults, Table};
 use crate::lang::code::Eager;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::load::{Loaded, Loader, beside, load, load_text, read, reason};
 use crate::lang::lower::{Inputs, Interface, compile, inspect};
 use crate::lang::reach::{Outside, Reach, folder_of, read_file};
 use crate::lang::value::Value;
-use crate::render::Camera;
 use crate::report::{bytes_hash, text_hash};
+use crate::standard;
 use crate::trace::Limits;
 use indexmap::IndexMap;
 use rustc_hash::FxHashMap;
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// The arguments that default to the run's camera.
-const CAMERAS: [(&str, &str); 2] = [("scene.render", "camera"), ("scene.candidates", "camera")];
 
 /// The data files that a program has read, with their hashes, by kind, path and reading
 /// options.
@@ -43,7 +35,7 @@ pub struct Program {
     pub(super) text: String,
     pub(super) sets: Vec<(String, String)>,
     pub(super) data: IndexMap<String, Value>,
-    pub(super) defaults: FxHashMap<(String, String), Value>,
+    pub(super) defaults: Defaults,
     pub(super) needs_data: bool,
     pub(super) eager: Eager,
     pub(super) builtins: Arc<Table>,
@@ -122,17 +114,17 @@ impl Program {
             text,
             sets: Vec::new(),
             data: IndexMap::new(),
-            defaults: FxHashMap::default(),
+            defaults: Defaults::default(),
             needs_data: true,
             eager: Eager::default(),
-            builtins: Arc::new(Table::default()),
+            builtins: standard::table(),
             files: Files::default(),
         }
     }
 
     /// Returns its parameters and data.
     pub fn interface(&self) -> Interface {
-        inspect(&self.loaded)
+        inspect(&self.loaded, &self.builtins)
     }
 
     /// Returns the name of its main file.
@@ -218,13 +210,13 @@ impl Program {
         let item = self.interface().data.into_iter().find(|d| d.name == name);
         let (kind, options) = item.map_or((None, Options::default()), |d| (d.ty, d.options));
         let kind = kind.unwrap_or_else(|| "image".into());
-        let file = data::path_of(&kind, path);
+        let file = self.builtins.path_of(&kind, path);
         let folder = folder_of(Path::new(file));
         let reach = self.reach.clone().allow(folder).unwrap_or_else(|_| self.reach.clone());
         let loaded = match read_file(Path::new(file)) {
-            Ok(bytes) => {
-                data::load(&kind, path, &bytes, &options, &|other| sibling(&reach, path, other))
-            }
+            Ok(bytes) => self
+                .builtins
+                .load(&kind, path, &bytes, &options, &|other| sibling(&reach, path, other)),
             Err(e) => {
                 Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e))))
             }
@@ -243,16 +235,6 @@ impl Program {
         self
     }
 
-    /// Makes the host's functions available to the program.
-    ///
-    /// # Errors
-    /// If the host defines a name of the language without marking it as a replacement, or
-    /// one of its definitions is invalid.
-    pub fn host(mut self, host: &Host) -> Result<Program, Error> {
-        self.builtins = host.table()?;
-        Ok(self)
-    }
-
     /// Allows compilation with missing `data` items, to check the rest of the program.
     #[must_use]
     pub fn without_data(mut self) -> Program {
@@ -268,72 +250,17 @@ impl Program {
         self
     }
 
-    /// Sets the camera of views that do not specify one.
-    #[must_use]
-    pub fn camera(self, camera: Camera) -> Program {
-        CAMERAS.iter().fold(self, |p, (of, name)| {
-            p.default_argument(of, name, Value::object(CameraValue(camera)))
-        })
-    }
-
-    /// Sets the contour detector for photographs for which the program does not specify
-    /// one: a value as from `data d = detector("file");`, or one with `None` for the
-    /// built-in detector.
-    #[must_use]
-    #[doc(hidden)]
-    pub fn detector(self, detector: DetectorValue) -> Program {
-        self.default_argument("scene.edges", "detector", Value::object(detector))
-    }
-
-    /// Returns the detector that was set by [`Program::detector`].
-    fn chosen_detector(&self) -> Option<DetectorValue> {
-        let chosen = self.defaults.get(&("scene.edges".to_owned(), "detector".to_owned()))?;
-        chosen.downcast::<DetectorValue>().cloned()
-    }
-
-    /// If no camera was set, uses the default view with the size of the first picture
-    /// among the data, or else of the first keypoints that state one. Keypoints that do
-    /// not state their picture's size get that of the first picture.
-    fn default_camera(&mut self) {
-        let picture = self.data.values().find_map(|v| {
-            let image = v.downcast::<ImageValue>().map(ImageValue::size);
-            let mask = || v.downcast::<MaskValue>().map(|m| (m.mask.width(), m.mask.height()));
-            let depth = || v.downcast::<DepthValue>().map(|d| (d.depth.width(), d.depth.height()));
-            image.or_else(mask).or_else(depth)
-        });
-        if let Some((width, height)) = picture {
-            for v in self.data.values_mut() {
-                if let Some(KeypointsValue(k)) = v.downcast::<KeypointsValue>() {
-                    *v = Value::object(KeypointsValue(k.clone().in_image(width, height)));
-                }
-            }
-        }
-        let cameras = CAMERAS.map(|(of, name)| (of.to_owned(), name.to_owned()));
-        if self.defaults.contains_key(&cameras[0]) {
-            return;
-        }
-        let keypoints = || {
-            self.data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()))
-        };
-        if let Some((width, height)) = picture.or_else(keypoints) {
-            let camera = CameraValue(Camera::default_for(width, height));
-            for of in cameras {
-                self.defaults.insert(of, Value::object(CameraValue(camera.0)));
-            }
-        }
-    }
-
     /// Checks and lowers the program.
     ///
     /// # Errors
     /// All errors in the program.
     pub fn compile(mut self) -> Result<Model, Error> {
-        self.default_camera();
-        let detector = self.chosen_detector();
-        let detecting = |v: Value| {
-            detector.as_ref().map_or_else(|| v.clone(), |d| ImageValue::detecting(&v, d))
-        };
-        self.data.values_mut().for_each(|v| *v = detecting(v.clone()));
+        let builtins = Arc::clone(&self.builtins);
+        for hook in &builtins.hooks {
+            hook.prepare(&mut self.data, &mut self.defaults);
+        }
+        let adapted =
+            |v: Value| builtins.hooks.iter().fold(v, |v, hook| hook.adapt(v, &self.defaults));
         let (reach, files) = (&self.reach, &*self.files);
         let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {
@@ -342,21 +269,20 @@ impl Program {
             let mut files = files.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some((value, hash)) = files.get(&key) {
                 data_hash.borrow_mut().push_str(hash);
-                return Ok(detecting(value.clone()));
+                return Ok(adapted(value.clone()));
             }
-            let file = data::path_of(kind, &beside);
+            let file = builtins.path_of(kind, &beside);
             let (bytes, _) = read(reach, file).map_err(|e| {
                 let fault =
                     Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)));
                 Outside::hint(&e).into_iter().fold(fault, Fault::with_hint)
             })?;
-            let value = data::load(kind, &beside, &bytes, options, &|other| {
-                sibling(reach, &beside, other)
-            })?;
+            let value = builtins
+                .load(kind, &beside, &bytes, options, &|other| sibling(reach, &beside, other))?;
             let hash = bytes_hash(&bytes);
             data_hash.borrow_mut().push_str(&hash);
             files.insert(key, (value.clone(), hash));
-            Ok(detecting(value))
+            Ok(adapted(value))
         };
         let inputs = Inputs {
             builtins: Arc::clone(&self.builtins),
@@ -364,7 +290,7 @@ impl Program {
             data: self.data,
             read: &read_data,
             needs_data: self.needs_data,
-            defaults: self.defaults,
+            defaults: self.defaults.clone(),
             eager: self.eager,
         };
         match compile(&self.loaded, inputs, &mut self.sources) {
@@ -418,4 +344,11 @@ fn hash_of(loaded: &Loaded, sources: &SourceMap, sets: &[(String, String)]) -> S
         all.push_str(&format!("{k}={v}\0"));
     }
     text_hash(&all)
+}
+
+/// Creates an error without a source location.
+fn plain_error(f: Fault, sources: &SourceMap) -> Error {
+    let mut d = Diagnostic::new(Severity::Error, f.message);
+    d.hints.extend(f.hint);
+    Error { diagnostics: vec![d], sources: sources.clone() }
 }

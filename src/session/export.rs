@@ -2,10 +2,10 @@
 //! the value as text.
 
 use crate::geom::{glb, obj};
-use crate::lang::builtins::scene::{SolidValue, ViewValue};
 use crate::lang::code::{Code, Operand};
 use crate::lang::lower::Export;
 use crate::lang::value::Value;
+use crate::scene::{SolidValue, ViewValue};
 use crate::syntax::ast::ExprKind;
 
 /// Returns the operand of an export; that of `best(e)` is `e`, evaluated in the current

@@ -4,11 +4,11 @@
 use super::{Reply, Session, Trouble};
 use crate::bank;
 use crate::diag::nearest;
-use crate::lang::builtins::scene::{ImageValue, ViewValue};
 use crate::lang::code::{Code, Operand};
 use crate::lang::value::Located;
 use crate::render::{Contours, Frame, View};
 use crate::report::pictures::{self, Drawn, Strokes};
+use crate::scene::{ImageValue, ViewValue};
 use image::RgbImage;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! Scores: comparators, their prepared data, and what they remember of the last contours.
 
 use super::afresh;
-use pcadlang::lang::builtins::scene::{DepthValue, ImageValue, MaskValue};
 use pcadlang::lang::value::Value;
+use pcadlang::scene::{DepthValue, ImageValue, MaskValue};
 use pcadlang::trace::Draws;
 use pcadlang::vision::{DepthMap, Mask, Photo};
 use pcadlang::{Model, Program};

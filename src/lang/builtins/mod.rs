@@ -27,7 +27,6 @@ mod matrix;
 mod operators;
 mod reduce;
 mod row;
-pub mod scene;
 pub mod search;
 mod table;
 
@@ -37,8 +36,8 @@ pub(crate) use derivative::times;
 pub use derivative::{ArgAdjoints, Binary, Derivative, Reduction, Vjp};
 pub use host::{Before, HostItem, State};
 pub(crate) use reduce::dot;
-use row::{Arg, Row, arg, function, opt};
-pub use table::{Constant, Table};
+pub(crate) use row::{Arg, Row, arg, function, opt};
+pub use table::{Constant, Defaults, InputHook, Table};
 
 use super::error::Fault;
 use super::value::{MOST_ELEMENTS, MOST_NESTED, Value};
@@ -204,6 +203,10 @@ pub struct Builtin {
     pub derivative: Derivative,
     /// What stands behind it, where that is a host's and not the language's own.
     pub host: Option<HostItem>,
+    /// How files are read, for a kind of data.
+    pub format: Option<Arc<dyn data::DataFormat>>,
+    /// An example of its use: an expression with its value behind `//`, or a program.
+    pub example: Option<Text>,
 }
 
 impl fmt::Debug for Builtin {
@@ -358,4 +361,4 @@ impl Builtin {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

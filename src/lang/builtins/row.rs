@@ -1,9 +1,11 @@
 //! The rows that the language's own built-ins are written in: constants, from which the
 //! table's entries are made.
 
+use super::data::DataFormat;
 use super::{Args, Argument, Builtin, Derivative, Kind, Scalar, Type, Vjp};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
+use std::sync::Arc;
 
 /// One argument.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +47,8 @@ pub struct Row {
     pub kind: Kind,
     pub scalar: Option<Scalar>,
     pub derivative: Derivative,
+    /// How files are read, for a kind of data.
+    pub format: Option<fn() -> Arc<dyn DataFormat>>,
 }
 
 /// A pure function of the language's own namespace.
@@ -81,6 +85,7 @@ impl Row {
             kind,
             scalar: None,
             derivative,
+            format: None,
         }
     }
 
@@ -132,6 +137,8 @@ impl From<&Row> for Builtin {
             scalar: r.scalar,
             derivative: r.derivative,
             host: None,
+            format: r.format.map(|format| format()),
+            example: None,
         }
     }
 }

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     fn names(words: &str) -> Vec<String> {
-        search(&Table::default(), words).entries.iter().map(|b| b.full_name()).collect()
+        search(&crate::standard::table(), words).entries.iter().map(|b| b.full_name()).collect()
     }
 
     #[test]
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn every_name_finds_itself_first() {
-        let table = Table::default();
+        let table = crate::standard::table();
         for b in table.iter() {
             let found = search(&table, &b.full_name()).entries;
             assert!(
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn misspelt_words_are_replaced() {
-        let table = Table::default();
+        let table = crate::standard::table();
         let found = search(&table, "chamfr");
         assert_eq!(found.instead, [("chamfr".to_owned(), "chamfer".to_owned())]);
         assert_eq!(found.entries[0].full_name(), "scene.chamfer");

@@ -1,5 +1,6 @@
 //! What a program wants from outside: its parameters and data, without lowering it.
 
+use crate::lang::builtins::Table;
 use crate::lang::builtins::data::Options;
 use crate::lang::load::Loaded;
 use crate::syntax::ast::{ExprKind, ItemKind};
@@ -44,15 +45,15 @@ pub struct Interface {
 }
 
 /// Reads a program's interface off its text.
-pub fn inspect(loaded: &Loaded) -> Interface {
+pub fn inspect(loaded: &Loaded, builtins: &Table) -> Interface {
     let mut found = Interface::default();
     if !loaded.units.is_empty() {
-        unit(loaded, 0, "", &mut found);
+        unit(loaded, builtins, 0, "", &mut found);
     }
     found
 }
 
-fn unit(loaded: &Loaded, index: usize, prefix: &str, found: &mut Interface) {
+fn unit(loaded: &Loaded, builtins: &Table, index: usize, prefix: &str, found: &mut Interface) {
     let unit_ = &loaded.units[index];
     for (i, item) in unit_.program.items.iter().enumerate() {
         match &item.kind {
@@ -74,7 +75,7 @@ fn unit(loaded: &Loaded, index: usize, prefix: &str, found: &mut Interface) {
                 });
                 // What is wrong with options is said when the program is lowered.
                 let options =
-                    read.as_ref().and_then(|(kind, args)| Options::parse(kind, args).ok());
+                    read.as_ref().and_then(|(kind, args)| builtins.options(kind, args).ok());
                 found.data.push(DataItem {
                     name: format!("{prefix}{}", d.name.node),
                     ty: d.ty.as_ref().map(|t| t.node.to_string()).or(read.map(|(kind, _)| kind)),
@@ -86,8 +87,8 @@ fn unit(loaded: &Loaded, index: usize, prefix: &str, found: &mut Interface) {
             ItemKind::Include { alias, .. } => {
                 if let Some(inner) = unit_.includes.get(i).copied().flatten() {
                     match alias {
-                        Some(a) => unit(loaded, inner, &format!("{}/", a.node), found),
-                        None => unit(loaded, inner, prefix, found),
+                        Some(a) => unit(loaded, builtins, inner, &format!("{}/", a.node), found),
+                        None => unit(loaded, builtins, inner, prefix, found),
                     }
                 }
             }

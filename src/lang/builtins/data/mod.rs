@@ -1,141 +1,109 @@
-//! Data: what a `data` item can hold, and the loaders that read it from a file's bytes.
+//! Data: what a `data` item can hold, and the formats that read it from a file's bytes.
 //!
-//! The names are built-ins so that they are documented and checked like any other; a
+//! The names are built-ins so that they are documented and checked like any other. A
 //! program cannot call them on values it computes, because what a run reads must be known
-//! before it starts. Which files may be read, and where they lie, is the host's business:
-//! this module gets bytes.
+//! before it starts. Which files may be read, and where they lie, is not decided here:
+//! formats get bytes.
 
-mod armature;
 mod csv;
 mod json;
 mod options;
 
-pub use options::{Options, has_options};
+pub use options::{Literal, Options};
 
-use super::scene::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
-use super::{Arg, Args, Row, Type, arg, function, opt};
-use crate::geom::{GeomError, Solid, gltf, obj};
+use super::{Arg, Args, Builtin, Row, Table, Type, arg, function};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
-use crate::vision::keypoints::{self, Keypoints, People};
-use crate::vision::{ContourMap, FileDetector, Limits, VisionError, depth, mask, npy, photo};
+use std::fmt;
+use std::sync::Arc;
 
 const SECTION: &str = "Data files";
 
-/// Reads a file by its path relative to that of another, or says why not.
+/// Reads a file by its path relative to that of another, or says why it cannot.
 pub type Beside<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
-const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program's folder.")];
+/// How the files of a kind of data are read; the kind's name, options and documentation are
+/// its row in the table of built-ins.
+pub trait DataFormat: fmt::Debug + Send + Sync {
+    /// Reads a value from the bytes of a file. `file` is its name in messages, and `beside`
+    /// reads files by paths relative to it.
+    ///
+    /// # Errors
+    /// If the bytes are not in this format: a message that names the file.
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        options: &Options,
+        beside: &Beside,
+    ) -> Result<Value, Fault>;
 
-const SHAPE: &[Arg] = &[
-    arg("file", Type::Str, "The path, relative to the program's folder."),
-    opt(
-        "up",
-        Type::Str,
-        "\"y\"",
-        "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y.",
-    ),
-    opt(
-        "unit",
-        Type::Num,
-        "1",
-        "The length of the file's unit in scene units: 0.01 for centimetres.",
-    )
-    .unit("m"),
-];
+    /// The value of a `data` item that is given no file, if this kind can do without.
+    fn without_file(&self) -> Option<Value> {
+        None
+    }
 
-const NETWORK: &[Arg] = &[
-    opt("file", Type::Str, "none", "The path, relative to the program's folder."),
-    opt(
-        "colours",
-        Type::Str,
-        "\"rgb\"",
-        "The order of the network's input channels, \"rgb\" or \"bgr\".",
-    ),
-    opt(
-        "white",
-        Type::Num,
-        "1",
-        "The value of white, above 0; the network's input is (value - mean) / spread.",
-    ),
-    opt("mean", Type::Any, "0", "The mean to subtract: a number, or one per channel."),
-    opt("spread", Type::Any, "1", "The divisor: a number, or one per channel."),
-    opt(
-        "output",
-        Type::Any,
-        "the last",
-        "The output to use as the map: its name, or its number from 1.",
-    ),
-    opt("logits", Type::Bool, "false", "Whether the map holds log odds instead of probabilities."),
-    opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
-];
+    /// The file to read for a path, which may also name an entry in it (`file#entry`).
+    fn path_of<'a>(&self, path: &'a str) -> &'a str {
+        path
+    }
 
-const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Row {
-    function(name, SECTION, FILE, returns, doc, not_an_expression)
+    /// Checks the value of an option that the kind's row lists.
+    ///
+    /// # Errors
+    /// A message for the user if the value does not fit.
+    fn check_option(&self, _name: &str, _value: &Literal) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// A call of the kind with its options, for hints.
+    fn example(&self) -> Option<&'static str> {
+        None
+    }
+}
+
+/// The argument of kinds that take nothing but a path.
+pub(crate) const FILE: &[Arg] =
+    &[arg("file", Type::Str, "The path, relative to the program's folder.")];
+
+/// The row of a kind of data.
+pub(crate) const fn kind(
+    name: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    format: fn() -> Arc<dyn DataFormat>,
+) -> Row {
+    Row { format: Some(format), ..function(name, SECTION, args, returns, doc, not_an_expression) }
 }
 
 pub(super) const TABLE: &[Row] = &[
     kind(
         "csv",
+        FILE,
         Type::Record,
         "A table with a header line: a record of columns, numbers, bools or strings.",
+        || Arc::new(Text(csv::parse)),
     ),
-    kind("json", Type::Any, "JSON: objects are records, null is nothing."),
-    kind(
-        "image",
-        Type::Object("an image"),
-        "A photograph, PNG or JPEG; its contours are detected when a likelihood needs them.",
-    ),
-    kind("contours", Type::Object("an image"), "A contour map: bright pixels are contour."),
-    kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
-    kind(
-        "depth",
-        Type::Object("a depth map"),
-        "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit.",
-    ),
-    function(
-        "detector",
-        SECTION,
-        NETWORK,
-        Type::Object("a detector"),
-        "A contour detector for photographs, for `scene.edges`: an OpenCV structured forest \
-         (`model.yml.gz`), or a network (`.onnx`; only in builds with the feature `onnx`), to \
-         which the options apply; without a file, the built-in detector. See `docs/detectors.md`.",
-        not_an_expression,
-    ),
-    function(
-        "armature",
-        SECTION,
-        SHAPE,
-        Type::Object("an armature"),
-        "A body: a glTF file (`.glb`, `.gltf`) with a skin, or a JSON rig file, with its mesh and \
-         morphs in the same folder: see `docs/bodies.md`. `up` and `unit` apply to glTF.",
-        not_an_expression,
-    ),
-    function(
-        "keypoints",
-        SECTION,
-        &[opt(
-            "file",
-            Type::Str,
-            "none",
-            "The path, relative to the program's folder; a suffix `#ID` selects a person.",
-        )],
-        Type::Object("keypoints"),
-        "A person's joints from a pose detector, JSON in the program's own layout, COCO's or \
-         MediaPipe's; without a file, no joints.",
-        not_an_expression,
-    ),
-    function(
-        "mesh",
-        SECTION,
-        SHAPE,
-        Type::Object("a solid"),
-        "A Wavefront OBJ mesh, each object or group a part, or the default scene of a glTF file \
-         (`.glb`, `.gltf`), each node with a mesh a part.",
-        not_an_expression,
-    ),
+    kind("json", FILE, Type::Any, "JSON: objects are records, null is nothing.", || {
+        Arc::new(Text(json::parse))
+    }),
 ];
+
+/// A format without options.
+#[derive(Debug)]
+struct Text(fn(&[u8]) -> Result<Value, String>);
+
+impl DataFormat for Text {
+    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+        (self.0)(bytes).map_err(|why| unreadable(file, &why))
+    }
+}
+
+/// The error of a file that cannot be read as its kind.
+pub(crate) fn unreadable(file: &str, why: &str) -> Fault {
+    Fault::new(FaultKind::Other, format!("{file}: {why}"))
+}
 
 fn not_an_expression(a: &Args) -> Result<Value, Fault> {
     let name = &a.builtin.name;
@@ -144,96 +112,43 @@ fn not_an_expression(a: &Args) -> Result<Value, Fault> {
         .with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
 }
 
-/// The kinds of data that [`load`] reads: what may stand after the colon of
-/// `data d: kind;`.
-pub fn kinds() -> impl Iterator<Item = &'static str> + Clone {
-    TABLE.iter().map(|b| b.name)
-}
-
-/// The value of a data item of a kind that is given no file, for those that can do
-/// without: no keypoints, the detector that is built in.
-pub fn without_file(kind: &str) -> Option<Value> {
-    match kind {
-        "keypoints" => Some(Value::object(KeypointsValue(Keypoints::default()))),
-        "detector" => Some(Value::object(DetectorValue::default())),
-        _ => None,
+impl Table {
+    /// The kinds of data: what may stand after the colon of `data d: kind;`.
+    pub fn kinds(&self) -> impl Iterator<Item = &str> + Clone {
+        self.iter().filter(|b| b.format.is_some()).map(|b| &*b.name)
     }
-}
 
-/// The file to read for data of a kind: what is given, but for keypoints without the
-/// `#ID` that chooses a person.
-pub fn path_of<'a>(kind: &str, file: &'a str) -> &'a str {
-    if kind == "keypoints" { keypoints::split_id(file).0 } else { file }
-}
+    /// The built-in that is a kind of data.
+    pub(crate) fn kind(&self, name: &str) -> Option<&Builtin> {
+        self.find("", name).map(|i| self.get(i)).filter(|b| b.format.is_some())
+    }
 
-/// Keypoints from the bytes of a file: of the person whom `#ID` at the end of `file`
-/// names, or else the one whom the picture is called by, or else the only one.
-///
-/// # Errors
-/// As [`People::parse`] and [`People::pick`], with the file's name.
-pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result<Value, Fault> {
-    let (path, id) = keypoints::split_id(file);
-    let found = People::parse(bytes).and_then(|people| people.pick(id, picture));
-    found.map(|k| Value::object(KeypointsValue(k))).map_err(|e| {
-        let fault = Fault::new(FaultKind::Other, format!("{path}: {}", e.message));
-        e.hint.into_iter().fold(fault, Fault::with_hint)
-    })
-}
+    /// The file to read for data of a kind.
+    pub fn path_of<'a>(&self, kind: &str, path: &'a str) -> &'a str {
+        match self.kind(kind).and_then(|b| b.format.as_ref()) {
+            Some(format) => format.path_of(path),
+            None => path,
+        }
+    }
 
-/// Reads data of a kind from the bytes of a file; `file` is what messages call it, and
-/// `beside` reads files by paths relative to it. Options are those of the item's default
-/// call.
-///
-/// # Errors
-/// An unknown kind, or bytes that are not of that kind: a message with the line where
-/// there are lines.
-pub fn load(
-    kind: &str,
-    file: &str,
-    bytes: &[u8],
-    options: &Options,
-    beside: &Beside,
-) -> Result<Value, Fault> {
-    let limits = Limits::default();
-    let text = |e: VisionError| e.to_string();
-    let loaded = match kind {
-        "csv" => csv::parse(bytes),
-        "json" => json::parse(bytes),
-        "image" => {
-            photo::decode(bytes, &limits).map(|p| Value::object(ImageValue::photo(p))).map_err(text)
+    /// Reads data of a kind from the bytes of a file: see [`DataFormat::load`].
+    ///
+    /// # Errors
+    /// An unknown kind, or bytes that are not of that kind.
+    pub fn load(
+        &self,
+        kind: &str,
+        file: &str,
+        bytes: &[u8],
+        options: &Options,
+        beside: &Beside,
+    ) -> Result<Value, Fault> {
+        match self.kind(kind).and_then(|b| b.format.as_ref()) {
+            Some(format) => format.load(file, bytes, options, beside),
+            None => {
+                let fault = Fault::type_error(format!("there is no data of type `{kind}`"));
+                Err(fault.with_nearest(kind, "there are", self.kinds()))
+            }
         }
-        "contours" => photo::decode(bytes, &limits)
-            .map(|p| ContourMap::from_image(&image::DynamicImage::from(p.rgb().clone()).to_luma8()))
-            .map(|m| Value::object(ImageValue::contours(m, None)))
-            .map_err(text),
-        "mask" => {
-            mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text)
-        }
-        "depth" => {
-            // An array holds depths; a picture's whole numbers are thousandths.
-            let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
-            depth::decode(bytes, scale, &limits)
-                .map(|d| Value::object(DepthValue::new(d)))
-                .map_err(text)
-        }
-        "detector" => FileDetector::read(bytes, options.network())
-            .map(|d| Value::object(DetectorValue(Some(d.into()))))
-            .map_err(text),
-        "armature" => armature::load(file, bytes, options, beside),
-        "keypoints" => return load_keypoints(file, bytes, None),
-        "mesh" => {
-            let mesh = if gltf::is_gltf(file, bytes) {
-                gltf::load(bytes, &options.frame(), beside).and_then(gltf::Loaded::mesh)
-            } else {
-                obj::load_in(bytes, &options.frame())
-            };
-            mesh.map(|m| Value::object(SolidValue(Solid::lasting(m))))
-                .map_err(|e: GeomError| e.to_string())
-        }
-        _ => {
-            let fault = Fault::type_error(format!("there is no data of type `{kind}`"));
-            return Err(fault.with_nearest(kind, "there are", kinds()));
-        }
-    };
-    loaded.map_err(|why| Fault::new(FaultKind::Other, format!("{file}: {why}")))
+    }
 }

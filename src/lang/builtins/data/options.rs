@@ -1,162 +1,123 @@
-//! What a `data` item says of its file beside the path:
+//! What a `data` item says of its file besides the path:
 //! `mesh("x.glb", up = "z", unit = 0.01)`.
 //!
-//! Written as constants, since what a run reads must be known before it starts.
+//! Options are written as constants, since what a run reads must be known before it starts.
 
-use crate::geom::{FileFrame, UpAxis};
+use super::super::{Builtin, Table};
 use crate::lang::error::Fault;
 use crate::syntax::ast::{Arg, Expr, ExprKind, UnaryOp};
-use crate::vision::NetworkOptions;
-use crate::vision::file_detector::Output;
-use crate::vision::soft_map::Shows;
+use std::sync::Arc;
 
-/// How a file is to be read.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Options {
-    frame: FileFrame,
-    network: NetworkOptions,
+/// A constant as written.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Literal {
+    /// A number.
+    Num(f64),
+    /// A string.
+    Str(Arc<str>),
+    /// A truth value.
+    Bool(bool),
+    /// An array of numbers.
+    Nums(Vec<f64>),
+    /// Anything else.
+    Other,
 }
 
+impl Literal {
+    fn of(e: &Expr) -> Literal {
+        let number = |e: &Expr| match Literal::of(e) {
+            Literal::Num(x) => Some(x),
+            _ => None,
+        };
+        match &e.kind {
+            ExprKind::Num(x) => Literal::Num(*x),
+            ExprKind::Str(s) => Literal::Str(Arc::from(&**s)),
+            ExprKind::Bool(b) => Literal::Bool(*b),
+            ExprKind::Unary { op: UnaryOp::Neg, expr } => {
+                number(expr).map_or(Literal::Other, |x| Literal::Num(-x))
+            }
+            ExprKind::Array(all) => {
+                all.iter().map(number).collect::<Option<_>>().map_or(Literal::Other, Literal::Nums)
+            }
+            _ => Literal::Other,
+        }
+    }
+}
+
+/// How a file is to be read: options by name, in the order they are written.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options(Vec<(Arc<str>, Literal)>);
+
 impl Options {
-    /// A mesh file's axes and unit.
-    pub fn frame(&self) -> FileFrame {
-        self.frame
+    /// One option.
+    pub fn single(name: &str, value: Literal) -> Options {
+        Options(vec![(name.into(), value)])
     }
 
-    /// How a network takes its picture and gives its map.
-    pub fn network(&self) -> &NetworkOptions {
-        &self.network
+    /// The options as written.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Literal)> {
+        self.0.iter().map(|(name, value)| (&**name, value))
     }
 
-    /// From the arguments of a call after the path; for [kinds](super::kinds) of data
-    /// that have options.
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The option of this name.
+    pub fn get(&self, name: &str) -> Option<&Literal> {
+        self.iter().find(|(n, _)| *n == name).map(|(_, value)| value)
+    }
+}
+
+impl Table {
+    /// The options of a kind of data, from the arguments of a call after the path.
     ///
     /// # Errors
     /// An argument of another name or type, or given twice, or outside its domain: with
     /// its place among the arguments.
-    pub fn parse(kind: &str, args: &[Arg]) -> Result<Options, (usize, Fault)> {
-        let mut seen: Vec<&str> = Vec::new();
-        let mut frame = (UpAxis::default(), 1.0);
-        let mut network = NetworkOptions::default();
+    pub fn options(&self, kind: &str, args: &[Arg]) -> Result<Options, (usize, Fault)> {
+        let mut options = Options::default();
+        let Some(builtin) = self.kind(kind) else { return Ok(options) };
         for (i, a) in args.iter().enumerate() {
-            let fault = |message: String| (i, Fault::type_error(message).with_hint(hint(kind)));
+            let fault = |message: String| (i, Fault::type_error(message).with_hint(hint(builtin)));
             let name = match &a.name {
-                Some(name) if has_options(kind) => &*name.node,
+                Some(name) if is_option(builtin, &name.node) => &*name.node,
                 Some(name) => return Err(fault(format!("{kind} has no option `{}`", name.node))),
-                None if has_options(kind) => {
+                None if has_options(builtin) => {
                     return Err(fault(format!("{kind} takes one path; give options by name")));
                 }
                 None => return Err(fault(format!("{kind} takes one path"))),
             };
-            let set = match kind {
-                "detector" => set_network(&mut network, name, &a.value),
-                _ => set_frame(&mut frame, name, &a.value),
-            };
-            if !set.map_err(fault)? {
-                return Err(fault(format!("{kind} has no option `{name}`")));
+            let value = Literal::of(&a.value);
+            if let Some(format) = &builtin.format {
+                format.check_option(name, &value).map_err(fault)?;
             }
-            if seen.contains(&name) {
+            if options.get(name).is_some() {
                 return Err(fault(format!("`{name}` is given twice")));
             }
-            seen.push(name);
+            options.0.push((name.into(), value));
         }
-        // Only the unit can be refused.
-        let at = args
-            .iter()
-            .position(|a| a.name.as_ref().is_some_and(|n| &*n.node == "unit"))
-            .unwrap_or(0);
-        let frame = FileFrame::new(frame.0, frame.1);
-        frame
-            .map(|frame| Options { frame, network })
-            .map_err(|e| (at, Fault::type_error(e.to_string()).with_hint(hint(kind))))
+        Ok(options)
+    }
+
+    /// Whether data of a kind have options.
+    pub fn has_options(&self, kind: &str) -> bool {
+        self.kind(kind).is_some_and(has_options)
     }
 }
 
-/// Sets an option of a mesh; false if there is none of that name.
-fn set_frame(frame: &mut (UpAxis, f64), name: &str, value: &Expr) -> Result<bool, String> {
-    match (name, &value.kind) {
-        ("up", ExprKind::Str(axis)) => {
-            frame.0 = match &**axis {
-                "x" => UpAxis::X,
-                "y" => UpAxis::Y,
-                "z" => UpAxis::Z,
-                other => {
-                    return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\""));
-                }
-            };
-        }
-        ("unit", ExprKind::Num(x)) => frame.1 = *x,
-        ("up", _) => return Err("`up` must be an axis in quotes".into()),
-        ("unit", _) => return Err("`unit` must be a literal number".into()),
-        _ => return Ok(false),
-    }
-    Ok(true)
+fn has_options(kind: &Builtin) -> bool {
+    kind.args.len() > 1
 }
 
-/// Sets an option of a network; false if there is none of that name.
-fn set_network(network: &mut NetworkOptions, name: &str, value: &Expr) -> Result<bool, String> {
-    let word = |ways: [&str; 2]| match &value.kind {
-        ExprKind::Str(s) if **s == *ways[0] => Ok(false),
-        ExprKind::Str(s) if **s == *ways[1] => Ok(true),
-        _ => Err(format!("`{name}` must be \"{}\" or \"{}\"", ways[0], ways[1])),
-    };
-    let each = || match &value.kind {
-        ExprKind::Array(all) => match &all.iter().filter_map(number).collect::<Vec<_>>()[..] {
-            &[a, b, c] if all.len() == 3 => Some([a, b, c]),
-            _ => None,
-        },
-        _ => number(value).map(|x| [x; 3]),
-    };
-    let each =
-        || each().ok_or_else(|| format!("`{name}` must be a literal number or a list of three"));
-    match name {
-        "colours" => network.bgr = word(["rgb", "bgr"])?,
-        "shows" => {
-            network.shows =
-                if word(["contours", "objects"])? { Shows::Objects } else { Shows::Contours }
-        }
-        "white" => network.white = number(value).ok_or("`white` must be a literal number")?,
-        "mean" => network.mean = each()?,
-        "spread" => network.spread = each()?,
-        "logits" => match value.kind {
-            ExprKind::Bool(b) => network.logits = b,
-            _ => return Err("`logits` must be true or false".into()),
-        },
-        "output" => match &value.kind {
-            ExprKind::Str(name) => network.output = Output::Named(name.to_string()),
-            ExprKind::Num(n) if *n >= 1.0 && *n <= 1e6 && n.fract() == 0.0 => {
-                network.output = Output::Number(*n as usize)
-            }
-            _ => return Err("`output` must be a name in quotes or a number from 1".into()),
-        },
-        _ => return Ok(false),
-    }
-    Ok(true)
+fn is_option(kind: &Builtin, name: &str) -> bool {
+    kind.args.iter().skip(1).any(|a| a.name == name)
 }
 
-/// A number that is written out.
-fn number(e: &Expr) -> Option<f32> {
-    match &e.kind {
-        ExprKind::Num(x) => Some(*x as f32),
-        ExprKind::Unary { op: UnaryOp::Neg, expr } => number(expr).map(|x| -x),
-        _ => None,
-    }
-}
-
-/// Whether data of a kind have options.
-pub fn has_options(kind: &str) -> bool {
-    matches!(kind, "mesh" | "armature" | "detector")
-}
-
-fn hint(kind: &str) -> String {
-    match kind {
-        "detector" => {
-            "for example detector(\"network.onnx\", colours = \"bgr\", white = 255, logits = true)"
-                .into()
-        }
-        _ if has_options(kind) => {
-            format!("for example {kind}(\"file.glb\", up = \"z\", unit = 0.01)")
-        }
-        _ => format!("write {kind}(\"file\")"),
+fn hint(kind: &Builtin) -> String {
+    match kind.format.as_ref().and_then(|format| format.example()) {
+        Some(example) => format!("for example {example}"),
+        None => format!("write {}(\"file\")", kind.name),
     }
 }

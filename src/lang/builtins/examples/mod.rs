@@ -5,28 +5,21 @@
 
 mod distributions;
 mod inference;
-mod scene;
 mod values;
 
-use super::Builtin;
+use super::Text;
 
 /// The line that programs with `scene` begin with.
 pub const INCLUDE: &str = "include \"std/scene.pcad\" as scene;";
 
 /// By full name.
-type Examples = &'static [(&'static str, &'static str)];
+pub(crate) type Examples = &'static [(&'static str, &'static str)];
 
-impl Builtin {
-    /// An example of its use, if it is the language's own.
-    pub fn example(&self) -> Option<&'static str> {
-        if self.host.is_some() {
-            return None;
-        }
-        let name = self.full_name();
-        [values::EXAMPLES, distributions::EXAMPLES, inference::EXAMPLES, scene::EXAMPLES]
-            .into_iter()
-            .flatten()
-            .find(|(of, _)| *of == name)
-            .map(|(_, text)| *text)
-    }
+/// The example of one of the language's built-ins.
+pub(super) fn of(name: &str) -> Option<Text> {
+    [values::EXAMPLES, distributions::EXAMPLES, inference::EXAMPLES]
+        .into_iter()
+        .flatten()
+        .find(|(of, _)| *of == name)
+        .map(|(_, text)| (*text).into())
 }

@@ -122,30 +122,4 @@ infer { repeat 100 { drift(@x); collect x, log_likelihood(); } }",
         "json",
         "data prior = json(\"std/human/pose_prior.json\");\nlet kinds = len(prior.weights_balanced);",
     ),
-    ("image", "data photo = image(\"ball.png\");\nlet wide = photo.width;"),
-    ("contours", "data edges = contours(\"contours.png\");\nlet wide = edges.width;"),
-    (
-        "mask",
-        "\
-data seen = mask(\"mask.png\");
-assume r ~ uniform(0.5, 1.5);
-observe scene.mask(scene.render(scene.sphere(r)), size = 32) = seen as outline;",
-    ),
-    (
-        "depth",
-        "\
-data seen = depth(\"depth.npy\");
-assume r ~ uniform(0.5, 1.5);
-observe scene.depth(scene.render(scene.sphere(r)), size = 32) = seen as distance;",
-    ),
-    (
-        "armature",
-        "data body = armature(\"std/human/human.lod2.rig.json\");\nlet n = len(body.joints);",
-    ),
-    (
-        "detector",
-        "data photo = image(\"ball.png\");\ndata trees = detector(\"model.yml.gz\");\nlet found = scene.edges(photo, detector = trees);",
-    ),
-    ("keypoints", "data points = keypoints(\"person.json\");\nlet n = points.count;"),
-    ("mesh", "data dog = mesh(\"data/dog.obj\");\nlet view = scene.render(dog);"),
 ];

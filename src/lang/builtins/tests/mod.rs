@@ -1,20 +1,19 @@
 //! Tests of the built-ins through the table, as a program calls them.
 
-mod gradients;
 mod lists;
 mod maths;
 mod operators;
 mod table;
 
-use super::{Args, Builtin, Kind, Table};
+pub(crate) use super::{Args, Builtin, Kind, Table};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
-static TABLE: LazyLock<Table> = LazyLock::new(Table::default);
+pub(crate) static TABLE: LazyLock<Arc<Table>> = LazyLock::new(crate::standard::table);
 
 /// A built-in by `module.name` or `name`.
-pub(super) fn find(name: &str) -> &'static Builtin {
+pub(crate) fn find(name: &str) -> &'static Builtin {
     let (module, short) = match name.split_once('.') {
         Some((m, n)) if !m.is_empty() && !n.is_empty() => (m, n),
         _ => ("", name),
@@ -23,7 +22,7 @@ pub(super) fn find(name: &str) -> &'static Builtin {
 }
 
 /// Calls a function with arguments by position.
-pub(super) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
+pub(crate) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
     let builtin = find(name);
     let order = builtin.match_names(values.iter().map(|_| None)).map_err(Fault::type_error)?;
     let values: Vec<&Value> =
@@ -37,12 +36,12 @@ pub(super) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
 }
 
 /// The same, of a call that must succeed.
-pub(super) fn call(name: &str, values: &[Value]) -> Value {
+pub(crate) fn call(name: &str, values: &[Value]) -> Value {
     try_call(name, values).unwrap_or_else(|f| panic!("{name}: {}", f.message))
 }
 
 /// The message, and hint if any, of a call that must fail.
-pub(super) fn fails(name: &str, values: &[Value]) -> String {
+pub(crate) fn fails(name: &str, values: &[Value]) -> String {
     match try_call(name, values) {
         Ok(v) => panic!("{name} gave {v}"),
         Err(Fault { message, hint: Some(hint), .. }) => format!("{message} ({hint})"),
@@ -50,31 +49,31 @@ pub(super) fn fails(name: &str, values: &[Value]) -> String {
     }
 }
 
-pub(super) fn num(x: f64) -> Value {
+pub(crate) fn num(x: f64) -> Value {
     Value::Num(x)
 }
 
-pub(super) fn arr(xs: &[f64]) -> Value {
+pub(crate) fn arr(xs: &[f64]) -> Value {
     Value::array(xs.to_vec())
 }
 
-pub(super) fn list(xs: &[Value]) -> Value {
+pub(crate) fn list(xs: &[Value]) -> Value {
     Value::List(xs.to_vec().into())
 }
 
-pub(super) fn bools(xs: &[bool]) -> Value {
+pub(crate) fn bools(xs: &[bool]) -> Value {
     Value::List(xs.iter().map(|b| Value::Bool(*b)).collect())
 }
 
 /// Asserts that two values are the same to the last bit.
 #[track_caller]
-pub(super) fn same(got: Value, wanted: Value) {
+pub(crate) fn same(got: Value, wanted: Value) {
     assert!(got.same(&wanted), "got {got}, wanted {wanted}");
 }
 
 /// Asserts that a number is near another.
 #[track_caller]
-pub(super) fn near(got: Value, wanted: f64) {
+pub(crate) fn near(got: Value, wanted: f64) {
     let Value::Num(x) = got else { panic!("got {got}") };
     assert!((x - wanted).abs() <= 1e-15 * wanted.abs().max(1.0), "got {x}, wanted {wanted}");
 }

@@ -1,6 +1,6 @@
-//! The module `scene`.
+//! An example for every built-in of the scene.
 
-use super::Examples;
+use crate::lang::builtins::Row;
 
 /// A ball, a picture of something, and this observation.
 macro_rules! seen {
@@ -20,7 +20,33 @@ macro_rules! body {
     };
 }
 
-pub(super) const EXAMPLES: Examples = &[
+const EXAMPLES: &[(&str, &str)] = &[
+    ("image", "data photo = image(\"ball.png\");\nlet wide = photo.width;"),
+    ("contours", "data edges = contours(\"contours.png\");\nlet wide = edges.width;"),
+    (
+        "mask",
+        "\
+data seen = mask(\"mask.png\");
+assume r ~ uniform(0.5, 1.5);
+observe scene.mask(scene.render(scene.sphere(r)), size = 32) = seen as outline;",
+    ),
+    (
+        "depth",
+        "\
+data seen = depth(\"depth.npy\");
+assume r ~ uniform(0.5, 1.5);
+observe scene.depth(scene.render(scene.sphere(r)), size = 32) = seen as distance;",
+    ),
+    (
+        "armature",
+        "data body = armature(\"std/human/human.lod2.rig.json\");\nlet n = len(body.joints);",
+    ),
+    (
+        "detector",
+        "data photo = image(\"ball.png\");\ndata trees = detector(\"model.yml.gz\");\nlet found = scene.edges(photo, detector = trees);",
+    ),
+    ("keypoints", "data points = keypoints(\"person.json\");\nlet n = points.count;"),
+    ("mesh", "data dog = mesh(\"data/dog.obj\");\nlet view = scene.render(dog);"),
     ("scene.lathe", "scene.lathe({ y: [0, 1, 2], r: [0.5, 1, 0.2] }, sides = 16) // a solid"),
     ("scene.sphere", "scene.sphere(1, sides = 16) // a solid"),
     ("scene.box", "scene.box([1, 2, 3]) // a solid"),
@@ -144,3 +170,12 @@ observe scene.relative_depth(view, s) = metres as depths;",
         ),
     ),
 ];
+
+/// The example of a built-in.
+pub(super) fn of(row: &Row) -> Option<&'static str> {
+    let name = match row.module {
+        "" => row.name.to_owned(),
+        module => format!("{module}.{}", row.name),
+    };
+    EXAMPLES.iter().find(|(of, _)| *of == name).map(|(_, text)| *text)
+}

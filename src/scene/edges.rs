@@ -84,7 +84,7 @@ mod tests {
     use crate::vision::{ContourMap, Photo};
 
     fn edges(image: &Value, more: &[f64]) -> Result<Value, Fault> {
-        let table = crate::lang::builtins::Table::default();
+        let table = crate::standard::table();
         let builtin = table.get(table.find("scene", "edges").unwrap());
         let numbers: Vec<Value> = more.iter().map(|x| Value::Num(*x)).collect();
         let values: Vec<&Value> = std::iter::once(image).chain(&numbers).collect();

@@ -2,11 +2,12 @@
 //! zero, or one of a few that have none. Every product is compared with differences,
 //! alone or composed with others, for random derivatives of what comes out.
 
-use super::*;
 use crate::geom::Affine;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::scene::{AffineValue, ArmatureValue, SolidValue};
-use crate::lang::builtins::{Derivative, data};
+use crate::lang::builtins::Derivative;
+use crate::lang::builtins::tests::*;
+use crate::lang::value::Value;
+use crate::scene::{AffineValue, ArmatureValue, SolidValue};
 use glam::DVec3;
 use std::collections::HashSet;
 
@@ -232,7 +233,9 @@ fn body() -> Value {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/programs/std/human/");
     let read = |name: &str| std::fs::read(format!("{folder}{name}")).map_err(|e| e.to_string());
     let name = "human.lod2.rig.json";
-    data::load("armature", name, &read(name).unwrap(), &Default::default(), &read).unwrap()
+    crate::standard::table()
+        .load("armature", name, &read(name).unwrap(), &Default::default(), &read)
+        .unwrap()
 }
 
 /// At least one expression with each function.

@@ -156,7 +156,7 @@ mod tests {
             Camera::default_for(256, 256),
             0.0,
         ))));
-        let table = crate::lang::builtins::Table::default();
+        let table = crate::standard::table();
         let builtin = table.get(table.find("scene", "bounds").unwrap());
         builtin.apply(&[&view]).unwrap().numbers()
     }

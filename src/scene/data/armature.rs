@@ -1,23 +1,23 @@
 //! Armatures: a rig file and what it names, or a glTF file with a skin.
 
-use super::{Beside, Options};
-use crate::geom::GeomError;
+use super::Beside;
 use crate::geom::armature::{Armature, morphs_from_json, rig_from_json};
+use crate::geom::{FileFrame, GeomError};
 use crate::geom::{gltf, obj};
-use crate::lang::builtins::scene::ArmatureValue;
 use crate::lang::value::Value;
+use crate::scene::ArmatureValue;
 use std::sync::Arc;
 
 /// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
 pub(super) fn load(
     file: &str,
     bytes: &[u8],
-    options: &Options,
+    frame: &FileFrame,
     beside: &Beside,
 ) -> Result<Value, String> {
     let plain = |e: GeomError| e.to_string();
     if gltf::is_gltf(file, bytes) {
-        let loaded = gltf::load(bytes, &options.frame(), beside).map_err(plain)?;
+        let loaded = gltf::load(bytes, frame, beside).map_err(plain)?;
         if loaded.rig.is_none() {
             return Err(
                 "the glTF file has no skin, so it does not define which joint moves which \
@@ -27,7 +27,7 @@ pub(super) fn load(
         }
         return Ok(Value::object(ArmatureValue(Arc::new(loaded.armature().map_err(plain)?))));
     }
-    if *options != Options::default() {
+    if *frame != FileFrame::default() {
         return Err(
             "`up` and `unit` are for glTF files; a rig file is in the scene's axes and units"
                 .into(),

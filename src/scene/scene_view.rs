@@ -1,8 +1,9 @@
 //! What a host's comparator sees of a scene.
 
+use super::ViewValue;
+use super::compare::{by_contours, by_silhouette};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::Args;
-use crate::lang::builtins::scene::{ViewValue, by_contours, by_silhouette};
 use crate::lang::error::Fault;
 use crate::render::View;
 use std::fmt;
