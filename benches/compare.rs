@@ -1,6 +1,6 @@
-//! Comparators, and what loading an observation costs: one evaluation of each comparator
-//! of a lathe's picture with the photograph, at 128 and 512 pixels; and, at 512, every
-//! step from the file to comparators that are ready.
+//! Benchmarks of comparators, and of loading an observation: one evaluation of each
+//! comparator for a picture of a lathe and the photograph, at 128 and 512 pixels; and, at
+//! 512 pixels, every step from the file to prepared comparators.
 //!
 //!     cargo bench --bench compare -- "prepare" --quick
 
@@ -17,10 +17,10 @@ use pcadlang::vision::{
 };
 use std::hint::black_box;
 
-/// The picture that is loaded: pixels along a side.
+/// The side of the loaded picture, in pixels.
 const SIDE: u32 = 512;
 
-/// The kinds of chamfer comparator.
+/// Returns the kinds of chamfer comparators.
 fn chamfers() -> [(&'static str, ChamferOptions); 3] {
     let plain = ChamferOptions::default();
     [
@@ -30,7 +30,7 @@ fn chamfers() -> [(&'static str, ChamferOptions); 3] {
     ]
 }
 
-/// The region comparator without and with its shading term.
+/// Returns the region comparator without and with its shading term.
 fn regions() -> [(&'static str, RegionOptions); 2] {
     let colours = RegionOptions::default();
     [
@@ -39,7 +39,7 @@ fn regions() -> [(&'static str, RegionOptions); 2] {
     ]
 }
 
-/// Contours with contours.
+/// Measures comparators of contours.
 fn contours(c: &mut Criterion) {
     let map = GradientDetector::default().contours(&photograph(SIDE));
     for size in [128, SIDE] {
@@ -66,7 +66,7 @@ fn contours(c: &mut Criterion) {
     }
 }
 
-/// Pixels with pixels.
+/// Measures comparators of pixels.
 fn pixels(c: &mut Criterion) {
     let photo = photograph(SIDE);
     for size in [128, SIDE] {
@@ -99,7 +99,7 @@ fn pixels(c: &mut Criterion) {
     }
 }
 
-/// From a file to contours.
+/// Measures the steps from a file to contours.
 fn load(c: &mut Criterion) {
     let file = std::fs::read(picture("skier.jpg")).expect("a file");
     c.bench_function("load/decode 344 x 425", |b| {
@@ -123,7 +123,7 @@ fn load(c: &mut Criterion) {
     c.bench_function("load/contour map", |b| b.iter(|| ContourMap::from_image(black_box(&drawn))));
 }
 
-/// From contours, or the photograph, to comparators.
+/// Measures the steps from contours, or the photograph, to comparators.
 fn prepare(c: &mut Criterion) {
     let photo = photograph(SIDE);
     let map = GradientDetector::default().contours(&photo);

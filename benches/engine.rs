@@ -1,7 +1,8 @@
-//! What a step costs: one transition of a regression with 10 and with 10,000 points, one
-//! update of a choice that reaches one point among 10 to 100,000, one sweep over such
-//! choices, one gradient, and one evaluation of the contour likelihood of `lathe.pcad` at
-//! 128 pixels. `cargo bench --bench engine -- update` runs those with a name.
+//! Benchmarks of inference steps: one transition of a regression with 10 and with 10,000
+//! points, one update of a choice on which one point among 10 to 100,000 depends, one
+//! sweep over such choices, one gradient, and one evaluation of the contour likelihood of
+//! `lathe.pcad` at 128 pixels. `cargo bench --bench engine -- update` runs the benchmarks
+//! with that name.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::dist::Datum;
@@ -12,7 +13,7 @@ use pcadlang::trace::{Change, ChoiceKind, Draws, Selector, Trace};
 use pcadlang::{Model, Program};
 use std::hint::black_box;
 
-/// A line through `n` points, observed as one array or one by one.
+/// Compiles a line through `n` points, observed as one array or one by one.
 fn line(n: usize, one_by_one: bool) -> Model {
     let y: Vec<String> = (0..n)
         .map(|i| format!("{:.3}", 1.5 * i as f64 / n as f64 - 0.5 + 0.1 * ((i * 7 % 11) as f64)))
@@ -35,7 +36,7 @@ fn draws(step: u64) -> Draws {
     Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step, substream: 0 }
 }
 
-/// Steps a kernel.
+/// Measures the steps of a kernel.
 fn steps(c: &mut Criterion, what: &str, trace: &mut Trace, kernel: &mut dyn Kernel) {
     let mut step = 0;
     c.bench_function(what, |b| {
@@ -71,8 +72,8 @@ fn transitions(c: &mut Criterion) {
     }
 }
 
-/// A shipped model of the comparison with other languages: a flag for each point says
-/// whether it is an outlier.
+/// Simulates a model from the comparison with other languages, in which a flag for each
+/// point says whether it is an outlier.
 fn flags(n: usize) -> Trace {
     let text = include_str!("peers/linreg.pcad");
     let text = text.split("infer {").next().unwrap_or(text);
@@ -88,7 +89,7 @@ fn flags(n: usize) -> Trace {
     model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// One choice that reaches one of n points.
+/// Measures updates of a choice on which one of n points depends.
 fn update(c: &mut Criterion) {
     let scope =
         || SiteSelection { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::One };
@@ -99,7 +100,7 @@ fn update(c: &mut Criterion) {
     }
 }
 
-/// Every one of n such choices, one after the other.
+/// Measures sweeps over n such choices, one after the other.
 fn sweep(c: &mut Criterion) {
     let scope = SiteSelection { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::Each };
     for n in [10, 1_000] {
@@ -120,7 +121,7 @@ fn sweep(c: &mut Criterion) {
     }
 }
 
-/// A number or arrays of them.
+/// Converts a number, or nested arrays of numbers.
 fn value(j: &serde_json::Value) -> Value {
     match j.as_array() {
         Some(xs) => Value::from_elements(xs.iter().map(value).collect()),
@@ -128,8 +129,8 @@ fn value(j: &serde_json::Value) -> Value {
     }
 }
 
-/// One gradient of the log joint density by all continuous choices, in a draw from the
-/// prior.
+/// Measures one gradient of the log joint density with respect to all continuous choices,
+/// at a draw from the prior.
 fn gradient(c: &mut Criterion) {
     for (name, what) in [
         ("eight_schools", "schools, 10 coordinates"),
@@ -161,8 +162,8 @@ fn gradient(c: &mut Criterion) {
     }
 }
 
-/// Proposes values that wander a little, so that everything that depends on the choice
-/// runs again.
+/// Measures proposals of slightly varying values, so that everything that depends on the
+/// choice is recomputed.
 fn wander(c: &mut Criterion, what: &str, trace: &mut Trace, name: &str, around: f64) {
     let Some(target) = name.parse().ok().and_then(|a| trace.find(&a)) else {
         panic!("no choice {name}")
@@ -182,7 +183,7 @@ fn wander(c: &mut Criterion, what: &str, trace: &mut Trace, name: &str, around: 
 
 fn likelihood(c: &mut Criterion) {
     let photograph = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/images/coffee_cup.png");
-    // A pose that can be set by itself, and a size, which makes a new profile.
+    // `@S_L/place/t[x]` changes the pose alone, and `@H` the profile as well.
     let text = include_str!("../programs/lathe.pcad");
     let model = Program::parse(text)
         .map(|p| p.set("size", "128"))

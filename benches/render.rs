@@ -1,6 +1,7 @@
-//! Drawing, stage by stage: making a mesh, posing a body, depth, all channels and
-//! contours, for a lathe of 2,000 triangles, the shipped human body and a mesh of 100,352
-//! triangles at 64 to 512 pixels; and a body of 22 parts (2,420 triangles) of which some
+//! Benchmarks of rendering, stage by stage: building a mesh, posing a body, depth, all
+//! channels and contours, for a lathe of 2,000 triangles, the shipped human body and a
+//! mesh of 100,352 triangles at 64 to 512 pixels; and for a body of 22 parts (2,420
+//! triangles), some of which move.
 //! move.
 //!
 //!     cargo bench --bench render -- "contours/human" --quick
@@ -20,7 +21,7 @@ use std::sync::Arc;
 
 const SIZES: [u32; 4] = [64, 128, 256, 512];
 
-/// A solid in a new pose: depth, all channels, contours.
+/// Measures a solid in new poses: depth, all channels, contours.
 fn drawn(c: &mut Criterion, name: &str, solid: &Solid, pose: &dyn Fn(&mut f64) -> Affine) {
     let mut step = 0.0;
     for size in SIZES {
@@ -43,7 +44,7 @@ fn meshes(c: &mut Criterion) {
     drawn(c, "dense", &dense(), &pose);
 }
 
-/// New profiles: the mesh, its normals and edges, and its contours.
+/// Measures new profiles: the mesh, its normals and edges, and its contours.
 fn profile(c: &mut Criterion) {
     let camera = Camera::default_for(128, 128);
     let mut step = 0.0;
@@ -56,8 +57,8 @@ fn profile(c: &mut Criterion) {
     });
 }
 
-/// The shipped body: posed and skinned with one joint moved and with all, and drawn as it
-/// stands.
+/// Measures the shipped body: posing and skinning with one joint moved and with all
+/// joints moved, and rendering it with fixed joints.
 fn person(c: &mut Criterion) {
     let rules = Rules::default();
     for lod in ["human.lod2", "human"] {
@@ -90,8 +91,8 @@ fn person(c: &mut Criterion) {
     }
 }
 
-/// The contours of the body when the meshes of some of its parts are new, as when a joint
-/// moved.
+/// Measures the contours of the body when some of its parts have new meshes, as after a
+/// joint moved.
 fn body(c: &mut Criterion) {
     let camera = Camera::default_for(128, 128);
     let parts: Vec<_> =

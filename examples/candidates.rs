@@ -1,22 +1,22 @@
-//! How well regions that may be objects of revolution are found in photographs whose
-//! objects are known.
+//! Measures how well candidate regions of objects of revolution are found in photographs
+//! with known masks.
 //!
 //!     cargo run --release --example candidates -- FOLDER... [most=64] [size=128]
 //!
-//! A folder holds `image.png` and `mask.png`, the truth. Says for each the best overlap
-//! (intersection over union) of the first 1, 5 and 20 candidates and of all, how many
-//! there are, and the seconds; at last how many folders reach 0.8 and 0.9.
+//! A folder holds `image.png` and the ground truth `mask.png`. Prints for each folder the
+//! best intersection over union of the first 1, 5 and 20 candidates and of all
+//! candidates, their number, and the seconds; and finally how many folders reach 0.8 and
+//! 0.9.
 
 use pcadlang::vision::candidates::{CandidateOptions, candidates};
 use pcadlang::vision::{Limits, Mask, mask, photo};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Of how many candidates the best overlap is said.
+/// The numbers of candidates for which the best overlap is printed.
 const FIRST: [usize; 4] = [1, 5, 20, usize::MAX];
 
-/// What a folder gives: the best overlaps, how many candidates there are, and the
-/// seconds.
+/// The results of a folder: the best overlaps, the number of candidates, and the seconds.
 struct Outcome {
     best: [f64; FIRST.len()],
     count: usize,

@@ -1,17 +1,18 @@
-//! What delayed acceptance gains: effective draws a second with and without a coarse
-//! first stage, for the same posterior.
+//! Measures the gain of delayed acceptance: effective draws per second with and without a
+//! coarse first stage, for the same posterior.
 //!
 //!     cargo run --release --example delayed_acceptance [-- DRAWS]
 //!
-//! The pose of a known object of revolution, its own clean contours observed by the
-//! distance both ways at 256 and 512 pixels; the first stage compares at 64 pixels. Once
-//! with a light mesh (2,000 triangles), once with a full one (100,000), whose first stage
-//! draws it with a coarser mesh as well (`detail` 1). Two chains from the truth; random
-//! walks of all pose variables at once, with steps so long that fewer and fewer are
-//! accepted. Prints, for each: the share accepted, milliseconds of processor time a step,
-//! the effective number of draws a second (the geometric mean over the five pose
-//! variables), the ratio of these, and that of accepted steps a second, which is less
-//! noisy. DRAWS: how many steps a chain (20,000).
+//! The pose of a known object of revolution is inferred from its own clean contours,
+//! observed by the symmetric chamfer distance at 256 and 512 pixels; the first stage
+//! compares at 64 pixels. The mesh is either light (2,000 triangles) or full (100,000);
+//! the first stage renders the full one with a coarser mesh as well (`detail` 1). Two
+//! chains start from the truth. Random walks move all pose variables at once, with
+//! increasing step sizes and therefore decreasing acceptance rates. Prints, for each: the
+//! acceptance rate, milliseconds of processor time per step, the effective sample size
+//! per second (the geometric mean over the five pose variables), the ratio of the latter,
+//! and the ratio of accepted steps per second, which is less noisy. DRAWS is the number
+//! of steps of a chain (20,000).
 
 mod clock;
 
@@ -51,10 +52,10 @@ infer {
 }
 "#;
 
-/// How many chains, each on a thread of its own.
+/// The number of chains, each on its own thread.
 const CHAINS: usize = 2;
 
-/// The longer side of the picture whose contours are observed.
+/// The longer side of the observed picture, in pixels.
 const SEEN: u32 = 512;
 
 fn program(step: &str, set: &[(&str, String)], map: ContourMap) -> Result<Model, pcadlang::Error> {
@@ -63,7 +64,7 @@ fn program(step: &str, set: &[(&str, String)], map: ContourMap) -> Result<Model,
     set.iter().fold(program, |p, (name, value)| p.set(name, value)).compile()
 }
 
-/// The contours of the forced state.
+/// Returns the contours of the forced state.
 fn contours(set: &[(&str, String)]) -> Result<ContourMap, Box<dyn Error>> {
     let model = program("mh(one(@**))", set, ContourMap::new(SEEN, SEEN))?;
     let mut trace = model
@@ -78,8 +79,8 @@ fn contours(set: &[(&str, String)]) -> Result<ContourMap, Box<dyn Error>> {
     Ok(ContourMap { strength: vec![1.0; x.len()], x, y, tx, ty, ..ContourMap::new(SEEN, SEEN) })
 }
 
-/// What the chains give: the share of steps accepted, seconds a step, effective draws a
-/// second (the geometric mean over the pose's variables).
+/// Runs the chains. Returns the acceptance rate, seconds per step, and effective draws
+/// per second (the geometric mean over the pose variables).
 fn measure(
     step: &str,
     set: &[(&str, String)],

@@ -1,18 +1,18 @@
-//! What levels of detail save, and what they cost in the score: triangles, time and the
-//! mean chamfer distance for several `detail`s.
+//! Measures the savings of levels of detail and their effect on the score: triangles,
+//! time and the mean chamfer distance for several values of `detail`.
 //!
 //!     cargo run --release --example detail_price [-- POSES]
 //!
-//! A lathe of the language (a new shape each time), the shipped body by its three assets
-//! (a new pose each time, skinned anew) and a mesh of 100,352 triangles (placed anew), at
-//! 128 and 256 pixels, before POSES (64) random poses that fill half to all of the
-//! picture. For each `detail` in pixels: triangles in the picture (median); processor
-//! time of an evaluation on one thread (making the shape, contours, and their mean
-//! distance from those of another pose; mean of 512, the best of three); the mean
-//! distance of contours from those with `detail` 0 (greatest); and how far rho, the mean
-//! distance from the contours of another pose, is from that with `detail` 0: median, 99th
-//! percentile, greatest. Distances in pixels, the last column in percent of the diagonal,
-//! as rho is given.
+//! The subjects are a lathe of the language (a new shape each time), the shipped body in
+//! its three levels of detail (a new pose each time, skinned again) and a mesh of 100,352
+//! triangles (placed again), at 128 and 256 pixels, in POSES (64) random poses that fill
+//! half to all of the picture. The columns, for each `detail` in pixels: triangles in the
+//! picture (median); processor time of an evaluation on one thread (making the shape,
+//! contours, and their mean distance from those of another pose; mean of 512, the best of
+//! three); the mean distance of contours from those with `detail` 0 (maximum); and the
+//! change of rho, the mean distance from the contours of another pose, from its value
+//! with `detail` 0: median, 99th percentile, maximum. Distances are in pixels, except in
+//! the last column, which is in percent of the diagonal, like rho.
 
 mod clock;
 #[path = "detail_price/subjects.rs"]
@@ -52,7 +52,7 @@ fn measure(subject: &Subject, size: u32, poses: usize) -> Result<(), Box<dyn Err
         let seen = map(&view(&subject.at(i)?, size, 0.0), size);
         chamfers.push(Chamfer::prepare(&seen, size, size, &ChamferOptions::default())?);
     }
-    // Distances from the contours of the same pose and of another.
+    // The distances from the contours of the same pose and of another pose.
     let (mut exact_own, mut exact) = (Vec::new(), Vec::new());
     for detail in DETAILS {
         let (mut own, mut rhos, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
@@ -97,7 +97,8 @@ fn view(solid: &Solid, size: u32, detail: f64) -> View {
     View::with_detail(solid.clone(), Camera::default_for(size, size), detail)
 }
 
-/// The mean distance of a view's contours from others, in percent of the diagonal.
+/// Returns the mean distance of a view's contours from others, in percent of the
+/// diagonal.
 fn rho(chamfer: &Chamfer, view: &View, size: u32) -> f64 {
     let c = view.contours(size);
     let elements = Elements {

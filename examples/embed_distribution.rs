@@ -1,4 +1,4 @@
-//! A distribution of the host, drawn, observed and followed by `hmc`:
+//! A distribution of the host program that is sampled, observed and used with `hmc`:
 //! `cargo run --release --example embed_distribution`.
 
 use pcadlang::host::{Datum, Distribution, Entry, Fault, Gradient, Host, Support, Type};
@@ -17,12 +17,12 @@ impl Distribution for Kumaraswamy {
         "kumaraswamy"
     }
 
-    /// It brings the transform to the unconstrained space along.
+    /// The support determines the transform to unconstrained space.
     fn support(&self) -> Support {
         Support::Interval { lo: 0.0, hi: 1.0 }
     }
 
-    /// Its bounds are the same for all parameters.
+    /// The bounds are the same for all parameters.
     fn has_moving_support(&self) -> bool {
         false
     }
@@ -55,7 +55,7 @@ impl Distribution for Kumaraswamy {
     }
 }
 
-/// The host.
+/// Returns the host with this distribution.
 pub fn host() -> Host {
     let family = Entry::distribution("kumaraswamy", |args| {
         let (a, b) = (args.num(0)?, args.num(1)?);
@@ -71,11 +71,11 @@ pub fn host() -> Host {
     Host::new().with(family)
 }
 
-/// A share with this prior after 14 successes in 20, under an unknown shape: by a kernel
-/// with and one without gradients.
+/// Returns the posterior means of a proportion with this prior and of its unknown shape,
+/// after 14 successes in 20 trials, inferred by the given kernel.
 ///
 /// # Errors
-/// What is wrong with the program.
+/// Returns the errors of the program.
 pub fn share(kernel: &str) -> Result<(f64, f64), Error> {
     let text = format!(
         "assume b ~ lognormal(0.5, 0.3); assume p ~ kumaraswamy(2, b);

@@ -1,9 +1,9 @@
-//! Errors are values with places: `cargo run --release --example embed_errors`.
+//! Errors are values with source locations: `cargo run --release --example embed_errors`.
 
 use pcadlang::{Model, Program};
 
-/// What an editor would show of a program: line, column, message and hint of each
-/// mistake.
+/// Returns the line, column, message and hint of each mistake in a program, as an editor
+/// would show them.
 pub fn mistakes(text: &str) -> Vec<(usize, usize, String, Option<String>)> {
     let Err(e) = Model::from_text(text) else { return Vec::new() };
     let one = |d: &pcadlang::diag::Diagnostic| {
@@ -14,8 +14,8 @@ pub fn mistakes(text: &str) -> Vec<(usize, usize, String, Option<String>)> {
     e.diagnostics.iter().filter_map(one).collect()
 }
 
-/// What is wrong while it runs comes as a value too, and as text with the line it is
-/// about.
+/// Returns an error at run time: it is also a value, and its text shows the line in
+/// question.
 pub fn while_running() -> Option<String> {
     let program = Program::parse(
         "let xs = [1, 2, 3];\nassume i ~ uniform_discrete(3, 5);\nobserve normal(xs[i], 1) = 2;",

@@ -1,18 +1,19 @@
-//! A primitive of the host with incremental state and gradient, used by `hmc`:
+//! A primitive of the host program with incremental state and a gradient, used by `hmc`:
 //! `cargo run --release --example embed_function`.
 //!
-//! A watt flows through a rod of many cells; a program infers their conductivities from
-//! temperatures. When some cells change, the sweep along the rod goes on from the first
-//! of them, from what was kept of the state before: that of the state it is in, also
-//! after a rejected proposal. `tests/embedding.rs` checks that incremental equals full,
-//! bit for bit.
+//! One watt flows through a rod of many cells; a program infers the conductivities of the
+//! cells from temperatures. When some cells change, the sweep along the rod resumes at
+//! the first of them, from the state kept by the previous evaluation. That is always the
+//! state of the current trace, also after a rejected proposal. `tests/embedding.rs`
+//! checks that incremental and full evaluation are equal, bit for bit.
 
 use pcadlang::host::{Adjoint, Args, Entry, Fault, Host, Previous, Type};
 use pcadlang::{Error, Model, Program, RunOptions, Value};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The temperature at the far end, and what is kept: that after each cell.
+/// Returns the temperature at the far end, and the state to keep: the temperatures after
+/// each cell.
 fn rod(
     a: &Args,
     previous: Option<Previous<'_, Vec<f64>>>,
@@ -22,8 +23,8 @@ fn rod(
     if conductivity.iter().any(|k| k.is_nan() || *k <= 0.0) {
         return Err(a.outside(0, "positive"));
     }
-    // The cells before the first that changed are as they were, unless what they start
-    // from changed too.
+    // Cells before the first change keep their temperatures, unless the start temperature
+    // has changed too.
     let known = previous.filter(|p| !p.changed(a, 1)).and_then(|p| {
         let changed = p.changed_elements(a, 0)?;
         Some(&p.state()[..changed.first().copied().unwrap_or(conductivity.len())])
@@ -38,15 +39,15 @@ fn rod(
     Ok((Value::Num(temperatures.last().copied().unwrap_or(start)), temperatures))
 }
 
-/// The adjoints of the arguments: the end moves with the start, and by 1 / k^2 with a
-/// conductivity.
+/// Returns the adjoints of the arguments: the derivative of the end temperature is 1 with
+/// respect to the start, and 1 / k^2 with respect to a conductivity.
 fn vjp(a: &Args, _end: &Value, by: &Adjoint) -> Option<Vec<Adjoint>> {
     let conductivity = a.array(0).ok()?;
     let each = conductivity.iter().map(|k| by.number() / (k * k)).collect();
     Some(vec![Adjoint::Array(each), by.clone()])
 }
 
-/// The host, and how many cells its sweeps have gone through.
+/// Returns the host, and a counter of the cells that its sweeps have visited.
 pub fn host() -> (Host, Arc<AtomicUsize>) {
     let cells = Arc::new(AtomicUsize::new(0));
     let counted = Arc::clone(&cells);
@@ -61,7 +62,7 @@ pub fn host() -> (Host, Arc<AtomicUsize>) {
     (Host::new().with(rod), cells)
 }
 
-/// Most moves are of the few cells at the far end.
+/// Most moves change the few cells at the far end.
 pub const PROGRAM: &str = "
     assume near ~ iid(lognormal(0, 0.3), 40);
     assume far ~ iid(lognormal(0, 0.3), 4);
@@ -73,10 +74,10 @@ pub const PROGRAM: &str = "
         repeat 600 { hmc(@far, steps = 4); drift(one(@far)); every 20 { drift(one(@near)); } collect end, near, far; }
     }";
 
-/// The model.
+/// Compiles the model.
 ///
 /// # Errors
-/// What is wrong with it.
+/// Returns the errors of the program.
 pub fn model(host: &Host) -> Result<Model, Error> {
     Program::parse(PROGRAM)?.host(host)?.compile()
 }

@@ -1,15 +1,15 @@
-//! A kernel of the host, called by name in `infer`:
+//! A kernel of the host program, called by name in `infer`:
 //! `cargo run --release --example embed_kernel`.
 //!
-//! It reflects one number about a point, which keeps volume and leads back: a jump
-//! between two modes that walks seldom make.
+//! It reflects one number about a point, which preserves volume and is its own inverse: a
+//! jump between two modes that random walks rarely make.
 
 use pcadlang::host::{Datum, Entry, Host, Type};
 use pcadlang::infer::{Kernel, Outcome, SiteSelection, StepContext, decide, recoverable};
 use pcadlang::trace::{Change, Trace, TraceResult};
 use pcadlang::{Error, Program, RunOptions};
 
-/// `reflect(sel, about)`.
+/// The kernel `reflect(sel, about)`.
 struct Reflect {
     scope: SiteSelection,
     about: f64,
@@ -32,7 +32,8 @@ impl Kernel for Reflect {
             return Ok(Outcome::default());
         };
         let change = Change::Set(Datum::Num(2.0 * self.about - x));
-        // A place where the program has no value is a rejection, not the end of the run.
+        // A proposal at which the program is undefined is rejected and does not end the
+        // run.
         let Some(weight) = recoverable(trace.propose(&[(target, change)], at.draws(0)))? else {
             return Ok(Outcome::failed().at(target));
         };
@@ -40,7 +41,7 @@ impl Kernel for Reflect {
     }
 }
 
-/// The host.
+/// Returns the host with this kernel.
 pub fn host() -> Host {
     let reflect = Entry::kernel("reflect", |call| {
         Ok(Reflect { scope: call.scope(0)?, about: call.args().num(1)? })
@@ -51,10 +52,10 @@ pub fn host() -> Host {
     Host::new().with(reflect)
 }
 
-/// How much of the posterior is on the right, where 0.8 of it is.
+/// Returns the fraction of draws in the right-hand mode, whose probability is 0.8.
 ///
 /// # Errors
-/// What is wrong with the program.
+/// Returns the errors of the program.
 pub fn share_on_the_right() -> Result<f64, Error> {
     let text = "assume x ~ mixture([0.2, 0.8], [normal(-4, 0.5), normal(4, 0.5)]);
                 observe normal(x, 100) = 0;

@@ -1,14 +1,14 @@
-//! A likelihood of the host, with gradient, without a sampler:
+//! A likelihood of the host program with a gradient but without a sampler:
 //! `cargo run --release --example embed_likelihood`.
 //!
-//! For a comparator, which looks at a rendered view, see the example of
+//! For a comparator, which scores a rendered view, see the example of
 //! `pcadlang::host::Seen`.
 
 use pcadlang::host::{Adjoint, Entry, Host, Likelihood, Type};
 use pcadlang::{Error, Program, RunOptions, Value};
 
-/// Numbers about a line, scored by Huber's loss: quadratic near it, linear far off, so
-/// that outliers pull less.
+/// Huber's loss of numbers about their means: quadratic for small deviations and linear
+/// for large ones, so that outliers have less influence.
 #[derive(Debug)]
 struct Huber {
     mean: Vec<f64>,
@@ -16,7 +16,7 @@ struct Huber {
 }
 
 impl Huber {
-    /// How far each observed number is off, in scales.
+    /// Returns the deviation of each observed number, in units of the scale.
     fn off(&self, observed: &Value) -> Result<Vec<f64>, String> {
         let xs = observed.numbers();
         if xs.len() != self.mean.len() {
@@ -40,20 +40,22 @@ impl Likelihood for Huber {
         Ok(-self.off(observed)?.into_iter().map(loss).sum::<f64>())
     }
 
-    /// By the arguments of `huber`: the means, and the scale, which is not followed.
+    /// Returns the adjoints of the arguments of `huber`: the means, and the scale, whose
+    /// adjoint is unknown.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let by_mean =
             self.off(observed).ok()?.into_iter().map(|z| z.clamp(-1.0, 1.0) / self.scale).collect();
         Some(Adjoint::List(vec![Adjoint::Array(by_mean), Adjoint::Unknown]))
     }
 
-    /// It does not integrate to 1: a run says that its posterior is a pseudo-posterior.
+    /// It does not integrate to 1, so a run reports that its posterior is a
+    /// pseudo-posterior.
     fn is_proper(&self) -> bool {
         false
     }
 }
 
-/// The host.
+/// Returns the host with this likelihood.
 pub fn host() -> Host {
     let huber = Entry::likelihood("huber", |a| {
         Ok(Huber { mean: a.array(0)?.to_vec(), scale: a.positive_or(1, 1.0)? })
@@ -64,10 +66,10 @@ pub fn host() -> Host {
     Host::new().with(huber)
 }
 
-/// The slope of a line through points of which one is far off.
+/// Returns the slope of a line through points with one outlier.
 ///
 /// # Errors
-/// What is wrong with the program.
+/// Returns the errors of the program.
 pub fn slope() -> Result<f64, Error> {
     let text = "let x = [0, 1, 2, 3, 4];
                 assume a ~ normal(0, 10); assume b ~ normal(0, 10);

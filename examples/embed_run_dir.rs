@@ -1,4 +1,4 @@
-//! A run into a folder, watched and ended from outside:
+//! Runs a program into a folder, and observes and ends the run from the host program:
 //! `cargo run --release --example embed_run_dir [-- FOLDER]`.
 
 use pcadlang::infer::draws::Sink;
@@ -12,19 +12,20 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Runs two chains into a folder until each has so many draws; what was drawn in all.
+/// Runs two chains into a folder until each has `most` draws. Returns the total number of
+/// draws.
 ///
 /// # Errors
-/// If the folder holds something else, or the program fails.
+/// Returns an error if the folder holds other files, or if the program fails.
 pub fn run(folder: &Path, most: u64) -> Result<usize, Box<dyn Error>> {
     let model = Model::from_text(
         "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
          infer { warmup 200 { drift(@x); } repeat 1000000 { drift(@x); } }",
     )?;
     let dir = RunDir::create(folder)?;
-    // Callbacks come from the chains' threads; a break ends the run at the next step, and
-    // so does `progress.cancelled`, which another thread or a signal handler may set at
-    // any time.
+    // Callbacks run on the chains' threads. A break ends the run at the next step; so
+    // does setting `progress.cancelled`, which another thread or a signal handler may do
+    // at any time.
     let callbacks =
         Callbacks::new().on_step(move |_chain, steps, _trace| match steps < 200 + most {
             true => ControlFlow::Continue(()),
@@ -35,7 +36,7 @@ pub fn run(folder: &Path, most: u64) -> Result<usize, Box<dyn Error>> {
     let options =
         RunOptions { seed: 1, callback: Some(Arc::new(callbacks)), ..RunOptions::default() };
 
-    // Draws go to files as they come, and to memory for what is said at the end.
+    // Draws go to files as they are made, and to memory for the summary at the end.
     let memories = [Memory::default(), Memory::default()];
     let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
     for (i, memory) in memories.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Trace operations by hand, and a Metropolis-Hastings loop of one's own:
+//! Trace operations by hand, in a custom Metropolis-Hastings loop:
 //! `cargo run --release --example embed_trace`.
 
 use pcadlang::Model;
@@ -6,7 +6,8 @@ use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Change, Draws};
 use std::error::Error;
 
-/// A coin's bias after 14 heads in 20 throws, by random walk in the unconstrained space.
+/// Samples a coin's bias after 14 heads in 20 throws, by a random walk in unconstrained
+/// space.
 pub fn chain(steps: u64) -> Result<Vec<f64>, Box<dyn Error>> {
     let model = Model::from_text("assume p ~ beta(2, 2); observe binomial(20, p) = 14 as heads;")?;
     let mut trace = model.simulate(1, 0)?;
@@ -16,8 +17,8 @@ pub fn chain(steps: u64) -> Result<Vec<f64>, Box<dyn Error>> {
     let mut draws = Vec::new();
     for step in 0..steps {
         let mut rng = key.stream(step, 0, 0);
-        // Where the choice is in the unconstrained space, and the log Jacobian there: the
-        // density over that space has it as a factor.
+        // The coordinate of the choice in unconstrained space and the log Jacobian there,
+        // which is part of the log density over that space.
         let (y, jacobian) = trace.free(p).ok_or("`p` has no coordinate")?;
         let moved = vec![y[0] + 0.8 * rng.standard_normal()];
         let weight = trace

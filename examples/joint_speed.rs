@@ -1,10 +1,11 @@
-//! What one joint's change costs on the shipped body: skinning and contours at 128
-//! pixels, for each joint, beside a full redraw.
+//! Measures a change of one joint of the shipped body: skinning and contours at 128
+//! pixels, for each joint, in comparison with a full redraw.
 //!
 //!     cargo run --release --example joint_speed -- [LOD [JOINT]]     (such as human.lod2 hand_l; all if left out)
 //!
-//! Medians of processor-bound wall time on one thread, a full redraw and the joints by
-//! turns; ratios of one run mean something, single times depend on the machine.
+//! Prints medians of processor-bound wall time on one thread, alternating between full
+//! redraws and joints. Only ratios within one run are meaningful; single times depend on
+//! the machine.
 
 mod shipped;
 
@@ -36,8 +37,7 @@ fn main() -> Result<(), GeomError> {
             std::hint::black_box(view.contours(128).len());
             Ok(begun.elapsed().as_secs_f64() * 1e6)
         };
-        // The joint turns by a little more each time, so no result can be one from
-        // before.
+        // The rotation differs slightly each time, so that no cached result can be used.
         let time = |joint: usize, from: usize, times: &mut Vec<f64>| -> Result<(), GeomError> {
             let mut pose = vec![JointPose::REST; joints.len()];
             for k in from..from + REPEATS {
@@ -49,7 +49,7 @@ fn main() -> Result<(), GeomError> {
         };
         let wanted: Vec<usize> =
             (0..joints.len()).filter(|j| chosen(1, &joints[*j].name)).collect();
-        // The root moves every part: a full redraw.
+        // The root moves every part, which is a full redraw.
         let (mut full, mut each) = (Vec::new(), vec![Vec::new(); wanted.len()]);
         for (i, (joint, times)) in wanted.iter().zip(&mut each).enumerate() {
             time(0, i * REPEATS, &mut full)?;

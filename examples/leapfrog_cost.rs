@@ -1,5 +1,5 @@
-//! What a density with its gradient costs, the price of a leapfrog step: by a proposal
-//! and a reverse pass through the trace, and by a tape.
+//! Measures a log density with its gradient, the main cost of a leapfrog step: by a
+//! proposal and a reverse pass through the trace, and by a tape.
 //!
 //!     cargo run --release --example leapfrog_cost
 //!
@@ -12,7 +12,7 @@ use pcadlang::Model;
 use pcadlang::trace::{Change, Draws, Target, Trace};
 use std::error::Error;
 
-/// Programs with data of their own.
+/// Programs that include their data.
 const PROGRAMS: &[(&str, &str)] = &[
     (
         "schools",
@@ -39,7 +39,7 @@ const PROGRAMS: &[(&str, &str)] = &[
     ),
 ];
 
-/// The least time of a call among a few rounds, in microseconds.
+/// Returns the smallest mean time of a call over a few rounds, in microseconds.
 fn cost(mut call: impl FnMut(usize) -> Result<(), Box<dyn Error>>) -> Result<f64, Box<dyn Error>> {
     let mut least = f64::INFINITY;
     for _ in 0..5 {

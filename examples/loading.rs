@@ -1,12 +1,12 @@
-//! What loading an observation costs at 512 x 512 pixels, stage by stage, on the two
-//! shipped photographs and on one with noise.
+//! Measures loading an observation at 512 x 512 pixels, stage by stage, on the two
+//! shipped photographs and on one with added noise.
 //!
 //!     cargo run --release --example loading [-- digest]
 //!
-//! Milliseconds of this thread's processor time and of wall time; the oriented chamfer
-//! and the contour ratio work on threads of their own, whose time only the second shows
-//! (`taskset -c 0` for what one core does alone). With `digest` each line has a number
-//! made from every bit of the result too, to see whether two versions agree.
+//! Prints milliseconds of this thread's processor time and of wall time. The oriented
+//! chamfer and the contour ratio use additional threads, whose time only the wall time
+//! includes (`taskset -c 0` measures a single core). With `digest`, each line also has a
+//! hash of every bit of the result, to check whether two versions agree.
 
 mod clock;
 
@@ -25,11 +25,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Instant;
 
 const SIDE: u32 = 512;
-/// Runs of a stage that are timed together, since processor time is told in steps of some
-/// milliseconds: so many seconds of them.
+/// The duration in seconds for which runs of a stage are timed together, because the
+/// resolution of processor time is some milliseconds.
 const TOGETHER: f64 = 0.03;
 
-/// Runs a stage many times and prints the mean, of two the less.
+/// Runs a stage many times and prints the mean time, the smaller of two.
 fn stage<T: Debug>(picture: &str, name: &str, digest: bool, mut run: impl FnMut() -> T) {
     let (mut processor, mut wall) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..2 {
@@ -74,7 +74,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Every byte changed by up to 60 either way, so that there are edges everywhere.
+/// Changes every byte by up to 60 in either direction, so that there are edges
+/// everywhere.
 fn noisy(rgb: &mut RgbImage) {
     let mut seed = 1u64;
     for v in rgb.iter_mut() {
@@ -121,10 +122,10 @@ fn picture(name: &str, photo: &Photo, digest: bool) -> Result<(), Box<dyn Error>
     Ok(())
 }
 
-/// What is timed: gives its result.
+/// A timed stage, which returns its result.
 type Work<'a> = &'a mut dyn FnMut() -> Box<dyn Debug>;
 
-/// The comparators of contours, for frames of 512 pixels.
+/// Measures the preparation of contour comparators, for frames of 512 pixels.
 fn compare(from: &str, map: &ContourMap, stage: &dyn Fn(&str, Work<'_>)) {
     let plain = ChamferOptions::default();
     for (what, options) in [

@@ -1,12 +1,12 @@
-//! What one run of a network costs on one core: median, best and worst of 21 runs on an
-//! even grey picture.
+//! Measures one run of a network on one core: median, best and worst time of 21 runs on a
+//! uniform grey picture.
 //!
 //!     cargo run --release --example network_time -- models/*.tflite
 
 use pcadlang::nn::Network;
 use std::time::Instant;
 
-/// Runs that are timed.
+/// The number of timed runs.
 const RUNS: usize = 21;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

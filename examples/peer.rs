@@ -1,12 +1,12 @@
-//! Runs one model of a side-by-side benchmark of probabilistic languages and writes what
-//! it took.
+//! Runs one model of a benchmark that compares probabilistic languages, and writes the
+//! time that it took.
 //!
 //!     cargo run --release --example peer -- DATA.json OUT.json MODEL N BUDGET_S SEED
 //!
 //! The models are the programs in `benches/peers`; DATA holds the data sets by model (and
-//! size, where there are several). OUT gets the time at which sampling could start, the
-//! number of transitions after warm-up, the processor time they took on their one thread,
-//! and the draws.
+//! by size, if there are several). OUT gets the time at which sampling could start, the
+//! number of transitions after warm-up, their processor time on one thread, and the
+//! draws.
 
 mod clock;
 
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::sync::Mutex;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// A model: its program, what it is given, and the names of what it collects.
+/// The models: name, program, and the names of the collected quantities.
 const MODELS: &[(&str, &str, &[&str])] = &[
     ("coin", include_str!("../benches/peers/coin.pcad"), &["p"]),
     ("linreg", include_str!("../benches/peers/linreg.pcad"), &["slope", "intercept", "log_noise"]),
@@ -32,14 +32,15 @@ const MODELS: &[(&str, &str, &[&str])] = &[
     ("tree", include_str!("../benches/peers/tree.pcad"), &["leaves"]),
 ];
 
-/// The first and the last draw seen: processor time and steps done.
+/// The draws so far: processor time (NaN if it was not read) and number of steps.
 #[derive(Debug, Default)]
 struct Clock(Mutex<Vec<(f64, u64)>>);
 
 impl Callback for Clock {
     fn draw(&self, _chain: u32, _trace: &mut Trace, draws: Draws) {
         let Ok(mut seen) = self.0.lock() else { return };
-        // Reading the clock costs more than a small step, so not at every draw.
+        // Reading the clock takes longer than a small step, so it is not read at every
+        // draw.
         seen.push((f64::NAN, draws.step));
         let n = seen.len();
         if n == 1 || n.is_multiple_of(64) {

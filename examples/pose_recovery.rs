@@ -1,6 +1,6 @@
-//! Known truth: people drawn from the prior of `human.pcad`, their own clean contours as
-//! the observation. How far from the truth do their joints end up, and how often do 90 %
-//! intervals hold it?
+//! Recovery of known poses: people are drawn from the prior of `human.pcad`, and their
+//! own clean contours are observed. How far are the inferred joints from the ground
+//! truth, and how often do 90 % intervals contain it?
 //!
 //! `cargo run --release --example pose_recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
@@ -18,7 +18,7 @@ use std::time::Duration;
 
 const LIMBS: [&str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
 
-/// By joint: x and y in pixels, and z, towards the camera, in scene units.
+/// Joints by name: x and y in pixels, and z, towards the camera, in scene units.
 type Joints = BTreeMap<Arc<str>, [f64; 3]>;
 
 fn over(map: ContourMap) -> Result<Model, pcadlang::Error> {
@@ -46,8 +46,8 @@ impl Callback for Seen {
     }
 }
 
-/// The same with left and right exchanged where that is nearer to the truth: from behind,
-/// a body has nearly the contours it has from the front.
+/// Exchanges left and right if that is closer to the ground truth: the contours of a body
+/// from behind are nearly those from the front.
 fn either_way(seen: &Joints, truth: &Joints) -> Joints {
     let exchanged: Joints = seen
         .iter()
@@ -65,7 +65,7 @@ fn either_way(seen: &Joints, truth: &Joints) -> Joints {
     if far(&exchanged) < far(seen) { exchanged } else { seen.clone() }
 }
 
-/// The distance of two joints in the picture.
+/// Returns the distance of two joints in the picture.
 fn apart(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
@@ -106,8 +106,8 @@ fn main() -> Result<(), pcadlang::Error> {
             0.5 * (apart(&at("l_shoulder"), &at("r_hip")) + apart(&at("r_shoulder"), &at("l_hip")));
         let nearer: Vec<Joints> = drawn.iter().map(|j| either_way(j, &truth)).collect();
         let mut exchanged = Vec::new();
-        // Scene units a pixel in the plane z = 0, near enough for what is given in
-        // percent.
+        // Scene units per pixel in the plane z = 0, which is accurate enough for results
+        // in percent.
         let unit = 4.4 / f64::from(SIZE);
         let mut by_limb = Vec::new();
         let (mut case_held, mut case_asked) = (0, 0);

@@ -1,15 +1,17 @@
-//! The paper's figure (Kulkarni et al. 2014, section 4): chains with and without
-//! discriminative proposals on one photograph, log joint density against time.
+//! Reproduces a figure of the paper (Kulkarni et al. 2014, section 4): the log joint
+//! density over time of chains with and without discriminative proposals, on one
+//! photograph.
 //!
 //!     cargo run --release --example proposals -- human.pcad examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS] [CAMERA.json]
 //!     cargo run --release --example proposals -- lathe.pcad examples/images/table_lamp.png proposals.svg
 //!
-//! The same program with the same likelihood, one chain a thread: people with the jumps
-//! of `modes` (its search counts) and without them, both started from the prior; objects
-//! started from the best of 200 lathes that fill regions of the picture (finding these
-//! counts), and from the best of 200 draws from the prior, without annealing. Writes the
-//! figure, medians and quantiles as CSV beside it, and says when medians pass what the
-//! others end with.
+//! Both variants use the same program with the same likelihood, one chain per thread.
+//! People: with the jumps of `modes` (the time of its search counts) and without them,
+//! both started from the prior. Objects: started from the best of 200 lathes that fill
+//! regions of the picture (the time to find these counts), and from the best of 200 draws
+//! from the prior, without annealing. Writes the figure, and medians and quantiles as CSV
+//! beside it, and prints when the median with proposals exceeds the final median without
+//! them.
 
 use pcadlang::Program;
 use pcadlang::infer::draws::{Column, DrawRow, Sink};
@@ -22,11 +24,12 @@ use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Moments at which chains are compared, evenly spaced in the logarithm, from 10 ms.
+/// The number of times at which chains are compared, evenly spaced in the logarithm, from
+/// 10 ms.
 const MOMENTS: usize = 40;
 const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
-/// The log joint density of a chain over its own time.
+/// The log joint density of a chain over its elapsed time.
 #[derive(Default)]
 struct Path {
     begun: Option<Instant>,
@@ -60,14 +63,14 @@ impl Sink for Recorder {
     }
 }
 
-/// A shipped program with a plan that records every step, with its proposals from the
-/// picture or without.
+/// Returns the text of a shipped program with a plan that records every step, with or
+/// without its proposals from the picture.
 fn program(name: &str, with: bool) -> Result<String, String> {
     let text = load::embedded(name).ok_or_else(|| format!("{name} is not shipped"))?;
     let plan = text.rfind("infer {").ok_or_else(|| format!("{name} has no plan"))?;
     let steps = "repeat 1000000 { moves(); collect log_joint(); }";
-    // Of people, after a short warm-up, in which steps learn their size and the search
-    // for modes takes the chain to one.
+    // For people, a short warm-up adapts the step sizes, and the search for modes moves
+    // the chain to one of them.
     let begin = match (name, with) {
         ("human.pcad", _) => "warmup 40 { moves(); }".to_owned(),
         ("lathe.pcad", true) => {
@@ -86,7 +89,7 @@ fn program(name: &str, with: bool) -> Result<String, String> {
     Ok(if with { text } else { text.replace(jumps, "0 * (1 - blind) => modes(") })
 }
 
-/// What is run, and on what.
+/// A program and its inputs.
 struct Job<'a> {
     name: &'a str,
     image: &'a str,
@@ -95,7 +98,7 @@ struct Job<'a> {
     seconds: f64,
 }
 
-/// The paths of all chains, and the seconds that finding regions took.
+/// Runs all chains and returns their paths. Times include the search for regions.
 fn paths(job: &Job, with: bool) -> Result<Vec<Vec<(f64, f64)>>, String> {
     let said = |e: pcadlang::Error| e.to_string();
     let program =
@@ -109,12 +112,12 @@ fn paths(job: &Job, with: bool) -> Result<Vec<Vec<(f64, f64)>>, String> {
         None => program,
     };
     let model = program.compile().map_err(said)?;
-    // Found once for all chains, and to be paid for by each.
+    // Regions are found once for all chains, but the cost counts for each chain.
     let cost = if with && job.name == "lathe.pcad" { regions(job.image)? } else { 0.0 };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut all = Vec::new();
-    // As many at once as there are cores, so that each has one to itself and all have the
-    // same time.
+    // Runs as many chains at once as there are cores, so that each has its own core and
+    // all have the same time.
     for first in (0..job.chains).step_by(threads) {
         let shared: Vec<Arc<Mutex<Path>>> =
             (first..job.chains.min(first + threads)).map(|_| Arc::default()).collect();
@@ -131,7 +134,7 @@ fn paths(job: &Job, with: bool) -> Result<Vec<Vec<(f64, f64)>>, String> {
     Ok(all)
 }
 
-/// The seconds that finding regions in a picture takes.
+/// Returns the time to find regions in a picture, in seconds.
 fn regions(image: &str) -> Result<f64, String> {
     let photo = photo::load(image.as_ref(), &Limits::default()).map_err(|e| e.to_string())?;
     let begun = Instant::now();
@@ -139,7 +142,8 @@ fn regions(image: &str) -> Result<f64, String> {
     Ok(begun.elapsed().as_secs_f64())
 }
 
-/// Quantiles over chains at each moment; before its first draw a chain is nowhere.
+/// Returns quantiles over chains at each time; before its first draw, a chain counts as
+/// minus infinity.
 fn quantiles(paths: &[Vec<(f64, f64)>], moments: &[f64]) -> Vec<[f64; 5]> {
     let at = |t: &f64| {
         let value = |p: &Vec<(f64, f64)>| {
@@ -152,11 +156,11 @@ fn quantiles(paths: &[Vec<(f64, f64)>], moments: &[f64]) -> Vec<[f64; 5]> {
     moments.iter().map(at).collect()
 }
 
-/// Bands of quantiles and medians as SVG.
+/// Draws bands of quantiles, and medians, as SVG.
 fn figure(moments: &[f64], both: &[(&str, &str, Vec<[f64; 5]>)]) -> String {
     let (width, height, left, bottom) = (720.0, 420.0, 70.0, 40.0);
     let ends = (moments[0].ln(), moments[moments.len() - 1].ln());
-    // The scale is that of the later moments: starts from the prior are far below.
+    // The scale covers the later times only, because starts from the prior are far below.
     let late = moments.len() / 3;
     let shown = || {
         both.iter().flat_map(|b| b.2[late..].iter().flatten()).copied().filter(|x| x.is_finite())

@@ -5,7 +5,7 @@ use pcadlang::{Program, RunOptions};
 use std::time::Duration;
 
 fn main() -> Result<(), pcadlang::Error> {
-    // A model without pictures: a conjugate normal, whose answer is known (mean 1.6,
+    // A model without pictures: a conjugate normal with a known posterior (mean 1.6,
     // variance 0.2).
     let model =
         Program::parse("assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;")?.compile()?;

@@ -1,6 +1,6 @@
-//! Known truth: scenes drawn from the prior of `lathe.pcad`, their own clean contours as
-//! the observation. How well are pose and profile recovered, and how often do 90 %
-//! intervals hold the truth?
+//! Recovery of known scenes: scenes are drawn from the prior of `lathe.pcad`, and their
+//! own clean contours are observed. How well are pose and profile recovered, and how
+//! often do 90 % intervals contain the ground truth?
 //!
 //! `cargo run --release --example recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
@@ -14,14 +14,14 @@ use pcadlang::vision::ContourMap;
 use pcadlang::{Model, RunOptions};
 use std::time::Duration;
 
-/// Where the default camera stands on the z axis.
+/// The position of the default camera on the z axis.
 const EYE: f64 = 8.0;
 
 fn over(map: ContourMap) -> Result<Model, pcadlang::Error> {
     compile("lathe.pcad", &[("sigma", "0.1")], map)
 }
 
-/// A number of the truth by the name of its column.
+/// Returns a number of the ground truth by the name of its column.
 fn truth(trace: &mut Trace, column: &str) -> Option<f64> {
     let (path, index) = match column.split_once('[') {
         Some((path, rest)) => (path, rest.trim_end_matches(']').parse().ok()),
@@ -43,11 +43,11 @@ fn truth(trace: &mut Trace, column: &str) -> Option<f64> {
     }
 }
 
-/// Knots of the profile.
+/// The number of knots of the profile.
 const KNOTS: usize = 24;
 
-/// The radius at 51 heights from the bottom to the top, as fractions of the height; `get`
-/// reads a column.
+/// Returns the radius at 51 heights from the bottom to the top, as a fraction of the
+/// total height; `get` reads a column.
 fn shape(get: &mut dyn FnMut(&str) -> f64) -> Vec<f64> {
     let h = get("H");
     let radii: Vec<f64> = (0..KNOTS).map(|i| get(&format!("r[{i}]")) / h).collect();
@@ -59,7 +59,7 @@ fn shape(get: &mut dyn FnMut(&str) -> f64) -> Vec<f64> {
     (0..=50).map(|i| at(f64::from(i) / 50.0)).collect()
 }
 
-/// Root mean square of the differences.
+/// Returns the root mean square of the differences.
 fn rms(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
 }
@@ -94,8 +94,8 @@ fn main() -> Result<(), pcadlang::Error> {
             names.iter().map(|n| (known(n) - found(n)).powi(2)).sum::<f64>().sqrt()
         };
         let z = "S_L/translate/z";
-        // How large it looks: what one picture tells, while height and distance trade
-        // against each other.
+        // The apparent size: one picture determines it, but not height and distance
+        // separately.
         let size = |get: &mut dyn FnMut(&str) -> f64| get("H") / (EYE - get(z));
         let e = [
             (size(&mut found) / size(&mut known) - 1.0).abs(),

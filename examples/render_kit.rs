@@ -1,16 +1,16 @@
-//! How fast a new pose is drawn and scored, on the meshes and poses of a folder, beside a
-//! plain rasteriser written out below.
+//! Measures the time to render and score a new pose, for the meshes and poses of a
+//! folder, in comparison with a plain rasteriser.
 //!
 //!     cargo run --release --example render_kit -- DATA_DIR [MESHES [SIZES [TASKS [PEERS]]]]     (lists with commas; all if left out)
 //!
 //! DATA_DIR holds `vase.bin`, `body.bin`, `dense.bin` (two u32 counts, float32 vertices,
 //! u32 triangles) and `poses.bin` (row-major 4 x 4 float32). The camera is at the origin
-//! and looks along -z, 45 degrees from top to bottom. Each evaluation has another pose.
-//! Prints one JSON line for each mesh, size and task: `depth`, `contour` (contour pieces,
-//! for us; contour pixels, for the plain one) `likelihood` (their mean distance from the
-//! contours of the last pose), and `likelihood_newmesh` (with other vertices each time
-//! too, whose normals are worked out each time; ours alone). `pcadlang_detail_…` are
-//! likelihoods with levels of detail.
+//! and looks along -z, with a vertical field of view of 45 degrees. Each evaluation uses
+//! another pose. Prints one JSON line for each mesh, size and task: `depth`, `contour`
+//! (contour elements for pcadlang, contour pixels for the plain rasteriser), `likelihood`
+//! (the mean distance of these from the contours of the last pose), and
+//! `likelihood_newmesh` (also with new vertices each time, whose normals are recomputed;
+//! pcadlang only). `pcadlang_detail_…` are likelihoods with levels of detail.
 
 mod clock;
 #[path = "render_kit/plain.rs"]
@@ -30,7 +30,7 @@ use std::sync::Arc;
 
 type Pose = [f32; 16];
 
-/// Vertices and triangles as they are in the file.
+/// The vertices and triangles of a file.
 pub struct Raw {
     vertices: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
@@ -91,17 +91,17 @@ fn load(path: &Path) -> Result<Raw, Box<dyn Error>> {
     Ok(Raw { vertices, triangles: triangles.as_chunks().0.to_vec() })
 }
 
-/// What is drawn, at how many pixels.
+/// A mesh and the size of its picture in pixels.
 struct Case<'a> {
     mesh: &'static str,
     triangles: usize,
     size: u32,
-    /// Whether a peer's task was asked for.
+    /// Whether a peer's task was selected.
     chosen: &'a dyn Fn(&str, &str) -> bool,
 }
 
 impl Case<'_> {
-    /// Times evaluations until they are known well, and prints the line.
+    /// Times evaluations until the result is precise enough, and prints the line.
     fn measure(&self, peer: &str, task: &str, extra: &str, mut evaluate: impl FnMut(usize)) {
         if !(self.chosen)(peer, task) {
             return;
@@ -113,7 +113,7 @@ impl Case<'_> {
             next += n;
             1e3 * (processor_seconds() - begun)
         };
-        // The clock ticks in milliseconds.
+        // The resolution of the clock is some milliseconds.
         let (mut n, mut taken) = (1, 0.0);
         while taken < 50.0 {
             n *= 2;
@@ -191,8 +191,8 @@ fn ours(
     };
     case.measure("pcadlang", "likelihood", "", |i| likelihood(&at(i)));
     let Some(mesh) = solid.instances().first().map(|i| Arc::clone(&i.mesh)) else { return Ok(()) };
-    // Not the same work: meshes as coarse as leaves every vertex within so many pixels,
-    // and how far that takes the distance.
+    // These do less work: the mesh is as coarse as possible with every vertex within
+    // `detail` pixels. The line also gives the resulting change of the distance.
     let lasting = Solid::lasting((*mesh).clone());
     for (peer, detail) in [("pcadlang_detail_0.1", 0.1), ("pcadlang_detail_0.25", 0.25)] {
         if !(case.chosen)(peer, "likelihood") {
@@ -225,13 +225,13 @@ fn ours(
     Ok(())
 }
 
-/// Another shape of a mesh: narrower and wider by height.
+/// Returns another shape of a mesh: narrower or wider depending on height.
 fn deformed(mesh: &Mesh, k: usize) -> Vec<Vec3> {
     let scale = |p: &Vec3| 1.0 + 0.06 * libm::sinf(3.0 * p.y + k as f32);
     mesh.positions.iter().map(|p| Vec3::new(p.x * scale(p), p.y, p.z * scale(p))).collect()
 }
 
-/// A normal for each vertex: the mean over the faces around it, by area.
+/// Returns a normal for each vertex: the mean over the faces around it, weighted by area.
 fn normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut sums = vec![Vec3::ZERO; positions.len()];
     for t in triangles {
@@ -256,8 +256,8 @@ fn theirs(case: &Case<'_>, raw: &Raw, poses: &[Pose], last: &Pose) {
     });
 }
 
-/// How far a depth picture is from the reference: pixels of the mask, and the median of
-/// relative differences.
+/// Compares a depth picture with the reference: the number of pixels in which the masks
+/// differ, and the median and maximum of relative differences.
 fn agreement(depth: &[f32], reference: &[f32]) -> String {
     let pairs = || depth.iter().zip(reference);
     let mask = pairs().filter(|(a, b)| a.is_finite() != b.is_finite()).count();

@@ -1,14 +1,14 @@
-//! What one transition costs as a scene grows of which one object is uncertain: a vase
-//! whose pose drifts among boxes, balls and lathes that stand still.
+//! Measures one transition as a scene grows in which only one object is uncertain: the
+//! pose of a vase drifts among fixed boxes, spheres and lathes.
 //!
 //!     cargo run --release --example scene_cost -- [N…] [nested|flat] [front|hidden] [contour|chamfer|both] [count=TRANSITIONS] [scale=S]
 //!
-//! The picture is that of the program at the truth, rendered; N counts the vase.
-//! `nested`: what stands still is a group of its own; `flat`: all objects are members of
-//! one group. `front`: the vase stands before the others; `hidden`: among them, so that
-//! half of them may stand before it. Without a scale the kernel learns it in a warm-up.
-//! Prints processor times of the one thread. For instructions, run it twice under
-//! callgrind with different `count` and take the difference.
+//! The observed picture is rendered from the program at the truth; N includes the vase.
+//! `nested`: the fixed objects form a separate group; `flat`: all objects are members of
+//! one group. `front`: the vase is in front of the others; `hidden`: it is among them, so
+//! that half of them may be in front of it. Without a scale, the kernel learns it during
+//! a warm-up. Prints processor times of the single thread. To count instructions, run it
+//! twice under callgrind with different `count` and take the difference.
 
 mod clock;
 
@@ -24,13 +24,13 @@ use pcadlang::{Model, Program};
 use std::error::Error;
 use std::fmt::Write;
 
-/// The longer side of the picture.
+/// The longer side of the picture, in pixels.
 const SIZE: u32 = 128;
 
-/// Transitions of the warm-up, in which the kernel learns its scale.
+/// The number of transitions of the warm-up, in which the kernel learns its scale.
 const WARM: u64 = 3000;
 
-/// What is asked for.
+/// The options.
 struct Wanted {
     flat: bool,
     front: bool,
@@ -80,7 +80,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Steps of a kernel; how many were accepted.
+/// Runs steps of a kernel. Returns how many of them were accepted.
 fn run(
     kernel: &mut dyn Kernel,
     trace: &mut Trace,
@@ -97,8 +97,8 @@ fn run(
     Ok(moved)
 }
 
-/// A scene of so many objects that observes its own picture at the truth, and a trace at
-/// the truth.
+/// Builds a scene of `n` objects that observes its own picture at the truth, and a trace
+/// at the truth.
 fn scene(n: usize, wanted: &Wanted) -> Result<(Model, Trace), Box<dyn Error>> {
     let text = program(n, wanted);
     let over = |map: ContourMap| {
@@ -133,8 +133,8 @@ fn view(trace: &mut Trace) -> Result<ViewValue, Box<dyn Error>> {
     value.downcast::<ViewValue>().cloned().ok_or_else(|| "no view".into())
 }
 
-/// The program's text: what stands still is at random places in view, smaller the more
-/// there are.
+/// Returns the program's text. The fixed objects are at random positions in view, and
+/// smaller if there are more of them.
 fn program(n: usize, wanted: &Wanted) -> String {
     let mut text =
         String::from("include \"std/scene.pcad\" as scene;\ndata photo: image \"the picture\";\n");

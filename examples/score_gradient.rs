@@ -1,13 +1,13 @@
 //! Does the gradient of a picture's score point where the score rises? For random poses
-//! of a lathe and of a body before the contours of another pose: the cosine between the
-//! gradient and central differences over half a pixel each way, and what a gradient
-//! costs.
+//! of a lathe and of a body, scored against the contours of another pose: the cosine
+//! between the gradient and central differences of half a pixel each way, and the cost of
+//! a gradient.
 //!
 //! `cargo run --release --example score_gradient -- [POSES] [LIKELIHOOD]`, such as
 //! `200 "scene.contour(view)"`
 //!
-//! Coordinates are scaled so that what each one moves of the surface moves by half a
-//! pixel in the picture.
+//! Each coordinate is scaled so that it moves its part of the surface by half a pixel in
+//! the picture.
 
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
@@ -59,7 +59,8 @@ fn view(trace: &mut Trace) -> Option<ViewValue> {
     trace.global("view", draws())?.ok()?.downcast::<ViewValue>().cloned()
 }
 
-/// A draw from the prior that lies within the picture, and its contours.
+/// Samples a draw from the prior that lies within the picture. Returns it with its
+/// contours.
 fn draw(model: &Model, seed: u64) -> Result<Option<(Trace, ContourMap)>> {
     for attempt in 0..200 {
         let mut trace = model.simulate(seed, attempt)?;
@@ -82,7 +83,7 @@ fn draw(model: &Model, seed: u64) -> Result<Option<(Trace, ContourMap)>> {
     Ok(None)
 }
 
-/// A trace by its free coordinates.
+/// A trace and its unconstrained coordinates.
 struct System {
     trace: Trace,
     targets: Vec<Target>,
@@ -120,7 +121,7 @@ impl System {
         self.go(&y)
     }
 
-    /// The gradient of the log likelihood.
+    /// Returns the gradient of the log likelihood.
     fn gradient(&self) -> Result<Vec<f64>> {
         let (mut all, mut prior) = (Vec::new(), Vec::new());
         for (power, out) in [(1.0, &mut all), (0.0, &mut prior)] {
@@ -129,7 +130,7 @@ impl System {
         Ok(all.iter().zip(&prior).map(|(a, b)| a - b).collect())
     }
 
-    /// Where the surface is in the picture.
+    /// Returns the positions of the surface's vertices in the picture.
     fn seen(&mut self) -> Vec<[f64; 2]> {
         let Some(view) = view(&mut self.trace) else { return Vec::new() };
         let camera = view.0.camera().scaled_to(SIZE);
@@ -140,14 +141,14 @@ impl System {
         view.0.solid().vertices().map(at).collect()
     }
 
-    /// How far each coordinate goes for half a pixel.
+    /// Returns the step of each coordinate that moves the surface by half a pixel.
     fn halves(&mut self) -> Vec<f64> {
         let (here, small, count) = (self.seen(), 1e-3, self.at.len());
         let half = |i: usize| {
             self.moved(i, small);
             let there = self.seen();
-            // The mean over what moves, weighted by how much: one hand counts as the
-            // whole body does.
+            // The mean over the vertices, weighted by their movement: one hand counts as
+            // much as the whole body.
             let squares =
                 here.iter().zip(&there).map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
             let (fourth, square) = squares.fold((0.0, 0.0), |(f, s), d| (f + d * d, s + d));
@@ -197,7 +198,7 @@ fn main() -> Result<()> {
             let differences: Vec<f64> = up.iter().zip(&down).map(|(a, b)| a - b).collect();
             let away: Vec<f64> = s.at.iter().zip(&halves).map(|(y, h)| y + h).collect();
             let here = s.at.clone();
-            // All coordinates change, so everything is drawn.
+            // All coordinates change, so everything is rendered.
             let start = Instant::now();
             s.go(&away);
             s.go(&here);

@@ -1,12 +1,12 @@
-//! What one transition of a local choice costs as a program grows: outlier flags of a
-//! regression, hidden states of a chain.
+//! Measures one transition of a local choice as a program grows: the outlier flags of a
+//! regression, or the hidden states of a Markov chain.
 //!
 //!     cargo run --release --example transition_cost -- MODEL N TRANSITIONS [sweep]
 //!
 //! MODEL is `linreg` or `hmm` (programs of `benches/peers`, without their plans). Choices
-//! come at random, or by `sweep` one after the other. Prints processor times of the one
-//! thread, and memory. For instructions, run it twice under callgrind with different
-//! TRANSITIONS and take the difference.
+//! are updated in random order or, with `sweep`, one after the other. Prints processor
+//! times of the single thread, and memory. To count instructions, run it twice under
+//! callgrind with different TRANSITIONS and take the difference.
 
 mod clock;
 
@@ -17,7 +17,7 @@ use pcadlang::trace::{Selector, Trace};
 use pcadlang::{Model, Program};
 use std::error::Error;
 
-/// Transitions before the clock starts.
+/// The number of transitions before timing starts.
 const WARM: u64 = 1000;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Steps of a kernel; how many moved the choice.
+/// Runs steps of a kernel. Returns how many of them moved the choice.
 fn run(
     kernel: &mut dyn Kernel,
     trace: &mut Trace,
@@ -94,7 +94,7 @@ fn hmm(n: usize) -> Result<Model, Box<dyn Error>> {
     )
 }
 
-/// The model of a program; its plan is left out.
+/// Compiles the model of a program without its plan.
 fn compile(text: &str, data: Vec<(&str, Value)>) -> Result<Model, Box<dyn Error>> {
     let model = text.split("infer {").next().unwrap_or(text);
     let program = data
@@ -103,7 +103,7 @@ fn compile(text: &str, data: Vec<(&str, Value)>) -> Result<Model, Box<dyn Error>
     Ok(program.compile()?)
 }
 
-/// Memory in use.
+/// Returns the resident memory in MiB.
 fn resident_mib() -> u64 {
     let s = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = s.lines().find(|l| l.starts_with("VmRSS")).unwrap_or_default();

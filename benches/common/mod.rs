@@ -1,7 +1,7 @@
-//! What several benchmarks draw and compare: shapes from plain to fine, poses, a
-//! photograph, contours as comparators take them.
+//! Shapes from simple to dense, poses, a photograph and contours that several benchmarks
+//! use.
 
-// Every benchmark uses some of it.
+// Each benchmark uses only some of these.
 #![allow(dead_code)]
 
 pub mod parts;
@@ -19,7 +19,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Few samples of short runs: a file of benchmarks is done in some minutes.
+/// Configures few samples of short runs, so that a file of benchmarks takes some minutes.
 pub fn short() -> Criterion {
     Criterion::default()
         .sample_size(20)
@@ -27,8 +27,8 @@ pub fn short() -> Criterion {
         .measurement_time(Duration::from_millis(1000))
 }
 
-/// A closed surface of revolution (two triangles for each vertex but the last ring's);
-/// `bulge` is the profile's parameter.
+/// Builds a closed surface of revolution (two triangles for each vertex except those of
+/// the last ring); `bulge` is the parameter of the profile.
 pub fn lathe(bulge: f32, rings: u32, sides: u32) -> Mesh {
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
@@ -50,41 +50,41 @@ pub fn lathe(bulge: f32, rings: u32, sides: u32) -> Mesh {
     Mesh::new(positions, triangles, parts).expect("a valid mesh")
 }
 
-/// A lathe of 2,000 triangles.
+/// Builds a lathe of 2,000 triangles.
 pub fn vase() -> Solid {
     Solid::new(Arc::new(lathe(0.2, 26, 40)))
 }
 
-/// One of 100,352 triangles.
+/// Builds a lathe of 100,352 triangles.
 pub fn dense() -> Solid {
     Solid::new(Arc::new(lathe(0.2, 225, 224)))
 }
 
-/// A pose a little farther on with every call, so that no result can be one from before.
+/// Returns a slightly different pose on every call, so that no cached result can be used.
 pub fn pose(step: &mut f64) -> Affine {
     *step += 1e-4;
     Affine::new(DVec3::new(0.1, -0.1, *step), DVec3::new(0.4 + *step, 0.3, 0.1), DVec3::splat(1.2))
 }
 
-/// Where a shipped human body stands before the default camera, turned by so much
-/// (radians).
+/// Returns the pose of a shipped human body before the default camera, rotated by `turn`
+/// radians.
 pub fn standing(turn: f64) -> Affine {
     Affine::new(DVec3::new(0.0, -1.8, 0.0), DVec3::new(0.05, 0.5 + turn, 0.0), DVec3::splat(2.1))
 }
 
-/// A shipped photograph's path.
+/// Returns the path of a shipped photograph.
 pub fn picture(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/images").join(name)
 }
 
-/// The skier at `side` by `side` pixels.
+/// Loads the photograph of the skier at `side` by `side` pixels.
 pub fn photograph(side: u32) -> Photo {
     let photo = photo::load(&picture("skier.jpg"), &Limits::default()).expect("a photograph");
     Photo::from_rgb(resize(photo.rgb(), side, side, FilterType::Triangle))
         .expect("a photograph with pixels")
 }
 
-/// Contours as comparators take them.
+/// Converts contours to the form that comparators take.
 pub fn elements(c: &Contours) -> Elements<'_> {
     Elements {
         x: &c.x,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use pcadlang::geom::Mesh;
 
-/// The parts of a standing figure: middle, direction of the long axis, half its length,
+/// The parts of a standing figure: centre, direction of the long axis, half length,
 /// radius.
 pub const BODY: [([f32; 3], [f32; 3], f32, f32); 22] = [
     ([0.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.35, 0.32),
@@ -30,7 +30,7 @@ pub const BODY: [([f32; 3], [f32; 3], f32, f32); 22] = [
     ([0.0, 1.78, -0.05], [0.0, 1.0, -0.4], 0.14, 0.12),
 ];
 
-/// A closed spindle of 110 triangles about an axis.
+/// Builds a closed spindle of 110 triangles around an axis.
 pub fn spindle(middle: [f32; 3], axis: [f32; 3], half: f32, radius: f32) -> Mesh {
     let (rings, sides) = (5u32, 11u32);
     let (middle, axis) = (Vec3::from(middle), Vec3::from(axis).normalize());

@@ -1,9 +1,9 @@
-//! A plain edge detector, so that the comparison does not depend on the library's:
+//! A simple edge detector, so that the comparison does not depend on the library's own:
 //! smoothed colour gradients, ridges with sub-pixel offsets, hysteresis.
 
 use pcadlang::vision::contour_map::ContourMap;
 
-/// The edges of a picture.
+/// Detects the edges of a picture.
 pub fn detect(img: &image::RgbImage) -> ContourMap {
     let (w, h) = (img.width() as usize, img.height() as usize);
     let sigma = 1.4f32;

@@ -1,11 +1,10 @@
-//! Random lathe objects under the paper's prior, and their masks through the data set's
-//! camera.
+//! Random lathes under the paper's prior, and their masks in the camera of the data set.
 
-/// Numbers in 0..1.
+/// A random number generator.
 pub struct Numbers(pub u64);
 
 impl Numbers {
-    /// Uniform in 0..1.
+    /// Samples uniformly from 0..1.
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -14,7 +13,7 @@ impl Numbers {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// About normal (0, 1).
+    /// Samples from an approximate standard normal distribution.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
@@ -25,13 +24,13 @@ impl Numbers {
 pub struct Lathe {
     radius: f64,
     knots: [f64; 12],
-    /// Scale, three rotations, three translations, each as a number in 0..1 of its
+    /// Scale, three rotations, three translations, each as a fraction (0..1) of its
     /// prior's range.
     pose: [f64; 7],
 }
 
 impl Lathe {
-    /// A draw from the prior.
+    /// Samples from the prior.
     pub fn draw(n: &mut Numbers) -> Self {
         let mut knots = [0.0; 12];
         let mut level = 0.0;
@@ -42,7 +41,7 @@ impl Lathe {
         Lathe { radius: -1.2 + 0.9 * n.unit(), knots, pose: std::array::from_fn(|_| n.unit()) }
     }
 
-    /// A small change to some of it.
+    /// Returns a copy with a small random change of the pose or the profile.
     pub fn changed(&self, n: &mut Numbers) -> Self {
         let mut l = self.clone();
         let size = 0.3f64.powf(1.0 + 3.0 * n.unit());
@@ -62,7 +61,7 @@ impl Lathe {
         l
     }
 
-    /// The silhouette in a square picture.
+    /// Renders the silhouette in a square picture.
     pub fn mask(&self, size: usize) -> Vec<bool> {
         let mut mask = vec![false; size * size];
         let focal = 465.45 * size as f64 / 256.0;
@@ -100,7 +99,7 @@ impl Lathe {
     }
 }
 
-/// Fills a convex polygon, at least a pixel row high.
+/// Fills a convex polygon, in at least one row of pixels.
 fn fill(ring: &[(f64, f64)], size: usize, mask: &mut [bool]) {
     let (low, high) = ring.iter().fold((f64::MAX, f64::MIN), |m, p| (m.0.min(p.1), m.1.max(p.1)));
     for row in low.max(0.0) as usize..=(high.max(-1.0) as usize).min(size - 1) {

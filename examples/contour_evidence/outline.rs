@@ -1,9 +1,9 @@
-//! Silhouettes as sub-pixel outlines: a blurred mask and its half level by marching
+//! Silhouettes as sub-pixel outlines: the level 0.5 of a blurred mask, by marching
 //! squares.
 
 use pcadlang::vision::elements::Elements;
 
-/// An outline's pieces.
+/// The elements of an outline.
 #[derive(Default)]
 pub struct Outline {
     x: Vec<f32>,
@@ -15,7 +15,7 @@ pub struct Outline {
 }
 
 impl Outline {
-    /// The outline of a square mask.
+    /// Returns the outline of a square mask.
     pub fn of(mask: &[bool], size: usize) -> Self {
         let field = blur(mask, size);
         let mut out = Outline { size, ..Outline::default() };
@@ -48,7 +48,7 @@ impl Outline {
         out
     }
 
-    /// For the comparators.
+    /// Returns the elements in the form that comparators take.
     pub fn elements(&self) -> Elements<'_> {
         let (width, height) = (self.size as u32, self.size as u32);
         Elements {
@@ -79,7 +79,7 @@ fn blur(mask: &[bool], size: usize) -> Vec<f32> {
     a
 }
 
-/// Intersection over union of two masks.
+/// Returns the intersection over union of two masks.
 pub fn overlap(a: &[bool], b: &[bool]) -> f64 {
     let both = a.iter().zip(b).filter(|(a, b)| **a && **b).count();
     let any = a.iter().zip(b).filter(|(a, b)| **a || **b).count();

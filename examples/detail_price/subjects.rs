@@ -1,4 +1,4 @@
-//! What is drawn, in many random poses: shared with the test of the bound on the score.
+//! Shapes in many random poses: shared with the test of the bound on the score.
 
 #[path = "../shipped/mod.rs"]
 mod shipped;
@@ -9,9 +9,9 @@ use pcadlang::geom::{Affine, Caps, GeomError, Mesh, Profile, Solid};
 use shipped::human;
 use std::sync::Arc;
 
-/// A kind of shape, in pose after pose.
+/// A kind of shape with a sequence of poses.
 pub struct Subject {
-    /// What the table calls it.
+    /// Its name in the table.
     pub name: String,
     make: Make,
 }
@@ -23,7 +23,7 @@ enum Make {
 }
 
 impl Subject {
-    /// A lathe, the body by its three assets, a dense mesh.
+    /// Returns a lathe, the body in its three levels of detail, and a dense mesh.
     pub fn all() -> Result<Vec<Subject>, GeomError> {
         let mut all = vec![Subject { name: "lathe".into(), make: Make::Lathe }];
         for lod in ["human", "human.lod1", "human.lod2"] {
@@ -34,7 +34,7 @@ impl Subject {
         Ok(all)
     }
 
-    /// In its pose number `i`.
+    /// Returns the shape in pose number `i`.
     pub fn at(&self, i: usize) -> Result<Solid, GeomError> {
         let mut rng = Uniform(i as u64 + 1);
         let size = rng.between(0.5, 1.0);
@@ -58,7 +58,7 @@ impl Subject {
     }
 }
 
-/// A vase of two profiles with some 31 rings and 48 sides, hollow.
+/// Builds a hollow vase of two profiles with about 31 rings and 48 sides.
 fn vase(rng: &mut Uniform) -> Result<Solid, GeomError> {
     let (phase, waist) = (rng.between(0.0, 6.0), rng.between(0.2, 0.5));
     let profile = |from: f64, to: f64, n: usize| {
@@ -70,7 +70,7 @@ fn vase(rng: &mut Uniform) -> Result<Solid, GeomError> {
     Solid::lathe(&[profile(-1.0, 0.4, 24), profile(0.4, 1.0, 8)], 48, 0.03, Caps::Bottom)
 }
 
-/// A lumpy ball of 100,352 triangles.
+/// Builds a lumpy ball of 100,352 triangles.
 pub fn dense() -> Result<Mesh, GeomError> {
     let (rows, columns) = (225u32, 224u32);
     let point = |row: u32, column: u32| {
@@ -106,7 +106,7 @@ pub fn dense() -> Result<Mesh, GeomError> {
     Mesh::new(positions, triangles, parts)
 }
 
-/// Uniform numbers, the same in every run.
+/// Uniform random numbers, the same in every run.
 struct Uniform(u64);
 
 impl Uniform {

@@ -1,5 +1,5 @@
-//! What the examples of recovery share: a shipped program observing clean contours, those
-//! of one of its own draws.
+//! Code shared by the recovery examples: a shipped program observes the clean contours of
+//! one of its own draws.
 
 use pcadlang::lang::load::embedded;
 use pcadlang::lang::value::Value;
@@ -11,20 +11,20 @@ use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};
 use std::sync::Arc;
 
-/// The longer side of the pictures.
+/// The longer side of the pictures, in pixels.
 pub const SIZE: u32 = 256;
 
-/// Where values are drawn that no observation asks for.
+/// The random stream of values on which no observation depends.
 pub const DRAWS: fn() -> Draws =
     || Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, substream: 0 };
 
-/// A number from the command line.
+/// Reads a number from the command line.
 pub fn argument(i: usize, default: u64) -> u64 {
     std::env::args().nth(i).and_then(|a| a.parse().ok()).unwrap_or(default)
 }
 
-/// A program over a contour map, with these parameters and those of the command line
-/// after the first two arguments.
+/// Compiles a program that observes a contour map, with the given settings and those on
+/// the command line after the first two arguments.
 pub fn compile(
     program: &str,
     settings: &[(&str, &str)],
@@ -45,7 +45,8 @@ pub fn compile(
         .compile()
 }
 
-/// A draw from the prior that lies within the picture: its trace and contours.
+/// Samples a draw from the prior that lies within the picture. Returns its trace and
+/// contours.
 pub fn draw(blank: &Model, seed: u64) -> Result<(Trace, ContourMap), pcadlang::Error> {
     for attempt in 0.. {
         let mut trace = blank.simulate(seed, attempt)?;
@@ -69,25 +70,25 @@ pub fn draw(blank: &Model, seed: u64) -> Result<(Trace, ContourMap), pcadlang::E
     unreachable!("attempts do not end")
 }
 
-/// The value of a top-level name.
+/// Returns the value of a top-level name.
 pub fn global(trace: &mut Trace, name: &str) -> Value {
     trace.global(name, DRAWS()).and_then(Result::ok).unwrap_or_default()
 }
 
-/// The log joint density of a draw under another observation.
+/// Returns the log joint density of a draw under another observation.
 pub fn score(model: &Model, truth: &Trace) -> f64 {
     let rebuilt =
         Trace::generate(Arc::clone(model.code()), truth.constraints(), DRAWS(), Default::default());
     rebuilt.map_or(f64::NAN, |(t, _)| t.log_joint())
 }
 
-/// In ascending order.
+/// Sorts numbers in ascending order.
 pub fn sorted(mut v: Vec<f64>) -> Vec<f64> {
     v.sort_by(f64::total_cmp);
     v
 }
 
-/// Of numbers in ascending order.
+/// Returns a quantile of numbers in ascending order.
 pub fn quantile(sorted: &[f64], q: f64) -> f64 {
     sorted.get((q * sorted.len() as f64) as usize).copied().unwrap_or(f64::NAN)
 }

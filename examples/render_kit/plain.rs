@@ -1,19 +1,20 @@
-//! The plain way, as the peers have it: edge functions pixel by pixel, contours where
-//! depth jumps or bends, the mean of the distance transform at contour pixels.
+//! A plain rasteriser like those of the peers: edge functions for each pixel, contours
+//! where depth jumps or bends, and the mean of the distance transform at contour pixels.
 
 use super::{Pose, Raw};
 use pcadlang::vision::distance_transform::distance_transform;
 
-/// A neighbour farther by more than this share is behind.
+/// A neighbour that is farther by more than this fraction is behind.
 const JUMP: f32 = 0.03;
-/// The second difference of 1/z that is a crease, times the square of the size over 16.
+/// The threshold of a crease: the second difference of 1/z, relative to 1/z, times (size
+/// / 4)^2.
 const CREASE: f32 = 6.0;
 
-/// A mesh with the pictures drawn of it.
+/// A mesh and its pictures.
 pub struct Plain<'a> {
     raw: &'a Raw,
     size: usize,
-    /// Vertices in pixels, and 1/z.
+    /// Projected vertices: x and y in pixels, and the inverse depth.
     points: Vec<[f32; 3]>,
     depth: Vec<f32>,
     contour: Vec<bool>,
@@ -27,7 +28,7 @@ impl<'a> Plain<'a> {
         Plain { raw, size, points, depth, contour, distance: Vec::new() }
     }
 
-    /// Takes the contours of a pose as what is observed.
+    /// Sets the observation to the contours of a pose.
     pub fn observe(&mut self, pose: &Pose) {
         let size = self.size as u32;
         let map = distance_transform(size, size, self.contour(pose));
@@ -36,7 +37,7 @@ impl<'a> Plain<'a> {
             (0..self.size * self.size).map(|i| map.sample(at(i).0, at(i).1).0).collect();
     }
 
-    /// Depth along the viewing axis, infinite off the object.
+    /// Renders depth along the viewing axis, infinite outside the object.
     pub fn depth(&mut self, pose: &Pose) -> &[f32] {
         let (size, half) = (self.size, self.size as f32 * 0.5);
         let focal = half / 22.5f32.to_radians().tan();
@@ -85,7 +86,7 @@ impl<'a> Plain<'a> {
         &self.depth
     }
 
-    /// Pixels where the object ends, hides itself, or bends sharply.
+    /// Marks pixels where the object ends, occludes itself, or bends sharply.
     pub fn contour(&mut self, pose: &Pose) -> &[bool] {
         self.depth(pose);
         let (size, z) = (self.size, &self.depth);
@@ -109,7 +110,7 @@ impl<'a> Plain<'a> {
         &self.contour
     }
 
-    /// The mean distance of contour pixels from what is observed.
+    /// Returns the mean distance of contour pixels from the observed contours.
     pub fn likelihood(&mut self, pose: &Pose) -> f64 {
         self.contour(pose);
         let (mut sum, mut n) = (0.0, 0.0);

@@ -1,11 +1,11 @@
-//! The bodies that come with the program, for examples, benchmarks and tests.
+//! Shipped human bodies, for examples, benchmarks and tests.
 
 use pcadlang::geom::armature::{Armature, morphs_from_json, rig_from_json};
 use pcadlang::geom::{GeomError, obj};
 use pcadlang::lang::load::embedded;
 use std::sync::Arc;
 
-/// A human body: `human.lod2` (coarse), `human.lod1` or `human`.
+/// Loads a human body: `human.lod2` (coarse), `human.lod1` or `human`.
 pub fn human(lod: &str) -> Result<Arc<Armature>, GeomError> {
     let file =
         |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();

@@ -1,8 +1,8 @@
-//! What fuzzing tries, one function a target: whatever the bytes, a result or an error,
-//! no panic, and what was read can be used.
+//! The fuzz targets, one function each: any bytes give a result or an error without a
+//! panic, and a result can be used.
 //!
-//! `tests/fuzz.rs` compiles these functions as well and runs them on seeds and on every
-//! input that once went wrong.
+//! `tests/fuzz.rs` also compiles these functions, and runs them on seeds and on every
+//! input that failed before.
 
 use pcadlang::bank::Bank;
 use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
@@ -25,18 +25,18 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-/// Pictures of a size that many can be tried of in a second.
+/// Limits on pictures, so that many can be tried per second.
 const PIXELS: Pixels = Pixels { max_side: 512, max_pixels: 1 << 16 };
 
-/// Reads data as a program does, with a file beside it for whatever name it asks for.
+/// Reads data as a program does. Every file that it requests has the contents `beside`.
 fn data(kind: &str, file: &str, bytes: &[u8], beside: &[u8]) -> bool {
     pcadlang::standard::table()
         .load(kind, file, bytes, &Options::default(), &|_| Ok(beside.to_vec()))
         .is_ok()
 }
 
-/// A program's text: every mistake can be shown, and what has none is printed and read
-/// back the same.
+/// Tests the text of a program: every error can be rendered, and a program without errors
+/// is printed and read back the same.
 pub fn program_text(bytes: &[u8]) {
     let mut sources = SourceMap::new();
     let Ok(file) = sources.add_bytes("fuzz.pcad", bytes) else { return };
@@ -52,7 +52,7 @@ pub fn program_text(bytes: &[u8]) {
     assert_eq!(all.is_empty(), render(&sources, &all, false).is_empty());
 }
 
-/// A whole program: compiled, and run for a few steps within small limits.
+/// Tests a whole program: compiles it, and runs a few steps within small limits.
 pub fn program(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let program = match Program::parse(text) {
@@ -84,7 +84,7 @@ fn run(model: &Model) {
     }
 }
 
-/// Limits under which a program takes a fraction of a second.
+/// Returns limits under which a program takes a fraction of a second.
 fn small() -> Limits {
     Limits {
         depth: 200,
@@ -95,7 +95,7 @@ fn small() -> Limits {
     }
 }
 
-/// What a saved trace gives when loaded is saved as the same.
+/// Loads a saved trace and checks the result of saving it again.
 fn reload(model: &Model, saved: &SavedTrace) {
     if let Ok(trace) = Trace::load(Arc::clone(model.code()), model.hash(), saved, small()) {
         let again = trace.save(model.hash());
@@ -104,7 +104,7 @@ fn reload(model: &Model, saved: &SavedTrace) {
     }
 }
 
-/// A mesh in Wavefront OBJ: what is read can be written and read again.
+/// Tests a mesh in Wavefront OBJ: a mesh that was read can be written and read again.
 pub fn obj(bytes: &[u8]) {
     let frame = FileFrame::new(UpAxis::Z, 0.01).unwrap_or_default();
     let _ = obj_file::load_in(bytes, &frame);
@@ -117,7 +117,7 @@ pub fn obj(bytes: &[u8]) {
     }
 }
 
-/// A glTF file, in either form; what is beside it is one small buffer.
+/// Tests a glTF file in either form; every file beside it is one small buffer.
 pub fn gltf(bytes: &[u8]) {
     let beside = [0u8; 256];
     let read = |_: &str| Ok(beside.to_vec());
@@ -130,8 +130,8 @@ pub fn gltf(bytes: &[u8]) {
     data("armature", "x.gltf", bytes, &beside);
 }
 
-/// A rig file, then a zero byte, then the file beside it, which stands for its mesh and
-/// its morphs.
+/// Tests a rig file, then a zero byte, then the contents of the files beside it (its mesh
+/// and its morphs).
 pub fn rig(bytes: &[u8]) {
     let (rig, beside) = match bytes.iter().position(|b| *b == 0) {
         Some(i) => (&bytes[..i], &bytes[i + 1..]),
@@ -146,7 +146,7 @@ pub fn rig(bytes: &[u8]) {
 /// A mesh of one triangle.
 const CORNER: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-/// A picture, PNG or JPEG, as a photograph, mask, and depth map.
+/// Tests a picture, PNG or JPEG, as a photograph, mask, and depth map.
 pub fn image(bytes: &[u8]) {
     if let Ok(photo) = photo::decode(bytes, &PIXELS) {
         assert!(photo.width() > 0 && photo.height() > 0);
@@ -158,7 +158,7 @@ pub fn image(bytes: &[u8]) {
     }
 }
 
-/// An array in numpy's format, as a mask and depth map.
+/// Tests an array in numpy's format, as a mask and depth map.
 pub fn array(bytes: &[u8]) {
     if let Ok(array) = npy::parse(bytes) {
         let count: usize = array.shape.iter().product();
@@ -174,8 +174,8 @@ pub fn array(bytes: &[u8]) {
     }
 }
 
-/// A camera: what is read has numbers that are finite, and is written and read back the
-/// same.
+/// Tests a camera: the vectors of a camera that was read are finite, and it can be
+/// written and read back.
 pub fn camera(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Camera::from_json(text) {
@@ -190,13 +190,13 @@ pub fn camera(bytes: &[u8]) {
     }
 }
 
-/// The program whose saved traces are tried.
+/// The program for saved traces.
 const TRACED: &str = "fn f(n) { s ~ flip(0.5); if s and n < 5 { 1 + f(n + 1) } else { 0 } }
 assume n = f(0); assume k ~ poisson(3); for i in 0 .. 3 { x[i] ~ normal(0, 1); }
 assume w ~ dirichlet([1, 2, 3]); assume c ~ categorical(w); assume v ~ mv_normal([0, 0], [[2, 1], [1, 2]]);
 observe normal(n + k + c + sum(v) + x[0] + x[1] + x[2], 1) = 2;";
 
-/// The program of [`trace`], compiled once.
+/// Returns the program of [`trace`], compiled once.
 ///
 /// # Panics
 /// If it does not compile.
@@ -205,7 +205,7 @@ pub fn traced() -> &'static Model {
     MODEL.get_or_init(|| Model::from_text(TRACED).unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// A saved trace, as of a program of ours whatever it says.
+/// Tests a saved trace, as one of the program above, whatever program it names.
 pub fn trace(bytes: &[u8]) {
     let Ok(mut saved) = serde_json::from_slice::<SavedTrace>(bytes) else { return };
     saved.program = traced().hash().to_owned();
@@ -213,8 +213,8 @@ pub fn trace(bytes: &[u8]) {
     reload(traced(), &saved);
 }
 
-/// The program whose chains go on from checkpoints: kernels that remember much,
-/// statements within statements.
+/// The program whose chains resume from checkpoints: kernels with much state, and nested
+/// statements.
 const BROKEN_OFF: &str = "
 assume m ~ normal(0, 5); assume s ~ half_normal(2); assume c ~ flip(0.5);
 assume d = if c { e ~ normal(0, 1); e } else { 0 };
@@ -232,7 +232,7 @@ infer {
     }
 }";
 
-/// The program of [`checkpoint`], compiled once.
+/// Returns the program of [`checkpoint`], compiled once.
 ///
 /// # Panics
 /// If it does not compile.
@@ -241,7 +241,7 @@ pub fn broken_off() -> &'static Model {
     MODEL.get_or_init(|| Model::from_text(BROKEN_OFF).unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// Goes on from a checkpoint, and keeps those that are made.
+/// Resumes from a checkpoint, and keeps the checkpoints that are made.
 struct GoingOn {
     from: Option<Checkpoint>,
     kept: Arc<Mutex<Vec<Vec<u8>>>>,
@@ -276,7 +276,7 @@ impl Sink for GoingOn {
     }
 }
 
-/// The checkpoints of a chain at each of its steps.
+/// Returns the checkpoints of a chain at each of its steps.
 pub fn checkpoints(from: Option<Checkpoint>) -> Vec<Vec<u8>> {
     let (kept, progress) = (Arc::<Mutex<Vec<_>>>::default(), Arc::new(Progress::default()));
     progress.checkpoints.store(1, Ordering::Relaxed);
@@ -294,7 +294,8 @@ pub fn checkpoints(from: Option<Checkpoint>) -> Vec<Vec<u8>> {
     std::mem::take(&mut *kept.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// What is inside of the file of a checkpoint, as of a run of ours; and any file as one.
+/// Tests the contents of a checkpoint of the program above, and the reader of checkpoint
+/// files.
 pub fn checkpoint(bytes: &[u8]) {
     let _ = SavedChain::read(bytes, "");
     if let Ok(checkpoint) = Checkpoint::from_bytes(bytes) {
@@ -302,8 +303,8 @@ pub fn checkpoint(bytes: &[u8]) {
     }
 }
 
-/// A bank: its header, every kind of entry, and a search. The hash of the header is put
-/// right, or nothing would get past it.
+/// Tests a bank: its header, every kind of entry, and a search. The hash of the header is
+/// corrected first; otherwise hardly any input would pass it.
 pub fn bank(bytes: &[u8]) {
     let mut bytes = bytes.to_vec();
     let header = bytes
@@ -334,7 +335,7 @@ pub fn bank(bytes: &[u8]) {
     let _ = std::fs::remove_file(&path);
 }
 
-/// What a pose detector writes.
+/// Tests the output of a pose detector.
 pub fn keypoints(bytes: &[u8]) {
     match People::parse(bytes) {
         Ok(people) => {
@@ -353,13 +354,13 @@ pub fn keypoints(bytes: &[u8]) {
     }
 }
 
-/// A table: the first byte says whether it is CSV or JSON.
+/// Tests a table: the first byte selects CSV or JSON.
 pub fn table(bytes: &[u8]) {
     let Some((kind, rest)) = bytes.split_first() else { return };
     data(if kind % 2 == 0 { "json" } else { "csv" }, "x", rest, &[]);
 }
 
-/// A network: what is read runs, if that does not take long.
+/// Tests a network: one that was read can run, unless that takes too long.
 pub fn network(bytes: &[u8]) {
     match Network::read(bytes) {
         Ok(network) if network.work() < 1 << 20 => {
@@ -372,7 +373,7 @@ pub fn network(bytes: &[u8]) {
     }
 }
 
-/// A picture that forests look at.
+/// Returns the picture to which forests are applied.
 fn looked_at() -> &'static Photo {
     static PHOTO: OnceLock<Photo> = OnceLock::new();
     let read = || {
@@ -381,7 +382,8 @@ fn looked_at() -> &'static Photo {
     PHOTO.get_or_init(|| read().unwrap_or_else(|e| panic!("{e}")).shrunk(48))
 }
 
-/// A structured forest: what is read says something finite of each pixel of a picture.
+/// Tests a structured forest: one that was read gives a finite value for each pixel of a
+/// picture.
 pub fn forest(bytes: &[u8]) {
     match Forest::read(bytes) {
         Ok(forest) => {

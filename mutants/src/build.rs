@@ -1,4 +1,4 @@
-//! The copy with all mutants in it, compiled; those that do not compile are left out.
+//! Builds the copy with all mutants in it; those that do not compile are left out.
 
 use crate::Failure;
 use crate::find::Mutant;
@@ -9,18 +9,18 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A program of tests.
+/// An executable with tests.
 #[derive(Clone, Debug)]
 pub struct TestProgram {
     pub name: String,
     pub path: PathBuf,
 }
 
-/// What the copy lacks.
+/// The names that are not copied.
 const LEFT_OUT: [&str; 3] = ["target", ".git", "mutants"];
 
-/// Copies the project but for some files, which are written otherwise; files that are as
-/// they were are left alone.
+/// Copies the project except some files, which are rewritten elsewhere; unchanged files
+/// are not touched.
 pub fn copy(from: &Path, to: &Path, without: &[PathBuf]) -> Result<(), Failure> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from)? {
@@ -48,7 +48,7 @@ fn put(file: &Path, content: &[u8]) -> Result<(), Failure> {
     Ok(std::fs::write(file, content)?)
 }
 
-/// Where mutants are in a file that was written.
+/// The ranges of mutants in the rewritten files.
 type Places = BTreeMap<PathBuf, Vec<(Range<usize>, usize)>>;
 
 fn write(root: &Path, copy: &Path, mutants: &[Mutant]) -> Result<Places, Failure> {
@@ -70,7 +70,7 @@ fn write(root: &Path, copy: &Path, mutants: &[Mutant]) -> Result<Places, Failure
     Ok(places)
 }
 
-/// Runs cargo and gives its messages.
+/// Runs cargo. Returns whether it succeeded, and its messages.
 fn cargo(copy: &Path, args: &[&str]) -> Result<(bool, Vec<Value>), Failure> {
     let out = Command::new("cargo")
         .args(args)
@@ -87,7 +87,7 @@ fn cargo(copy: &Path, args: &[&str]) -> Result<(bool, Vec<Value>), Failure> {
     Ok((out.status.success(), lines))
 }
 
-/// The mutants that errors are about.
+/// Returns the mutants to which compiler errors belong, and the text of all other errors.
 fn blamed(messages: &[Value], places: &Places) -> (BTreeSet<usize>, Vec<String>) {
     let (mut out, mut others) = (BTreeSet::new(), Vec::new());
     for m in messages.iter().map(|m| &m["message"]).filter(|m| m["level"] == "error") {
@@ -99,7 +99,7 @@ fn blamed(messages: &[Value], places: &Places) -> (BTreeSet<usize>, Vec<String>)
             };
             let inside = |(range, _): &&(Range<usize>, usize)| range.contains(&(at as usize));
             let all = places.get(Path::new(file)).into_iter().flatten().filter(inside);
-            // The innermost one.
+            // Choose the innermost mutant.
             if let Some((_, id)) = all.min_by_key(|(range, _)| range.len()) {
                 out.insert(*id);
                 found = true;
@@ -112,8 +112,8 @@ fn blamed(messages: &[Value], places: &Places) -> (BTreeSet<usize>, Vec<String>)
     (out, others)
 }
 
-/// Builds the tests; mutants that do not compile go. Those are kept in a file, so that
-/// another run builds nothing again.
+/// Builds the tests and removes mutants that do not compile. These are listed in a file,
+/// so that another run does not try them again.
 pub fn build(
     root: &Path,
     copy: &Path,

@@ -1,4 +1,4 @@
-//! Where an error can be made, and which of these places are taken.
+//! Finds the places where an error can be made, and selects some of them.
 
 use crate::{Failure, within};
 use proc_macro2::Span;
@@ -9,19 +9,20 @@ use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 use syn::{BinOp, Expr, Lit, Stmt, UnOp};
 
-/// One error: the text of a range is replaced in places.
+/// A mutant: an expression in which some ranges are replaced.
 #[derive(Clone, Debug)]
 pub struct Mutant {
     pub file: PathBuf,
     pub line: usize,
-    /// File, function, text and change; what it is known by.
+    /// File, function, text and change, which identify the mutant.
     pub key: String,
-    /// The expression, in bytes of the file.
+    /// The range of the expression, in bytes of the file.
     pub range: Range<usize>,
     pub replaced: Vec<(Range<usize>, String)>,
 }
 
-/// Mutants of these folders: the share of each is that of its places, but at least forty.
+/// Selects mutants of these folders, in proportion to the number of places in each, but
+/// at least forty.
 pub fn select(root: &Path, folders: &[&str], count: usize) -> Result<Vec<Mutant>, Failure> {
     let mut by_folder = Vec::new();
     for folder in folders {
@@ -95,7 +96,7 @@ struct Finder<'a> {
     into: &'a mut Vec<(u64, Mutant)>,
 }
 
-/// FNV-1a, then mixed: the same on any machine.
+/// Computes FNV-1a and mixes the bits; the result is the same on any machine.
 fn hash(text: &str) -> u64 {
     let h = text
         .bytes()
@@ -105,7 +106,7 @@ fn hash(text: &str) -> u64 {
 }
 
 impl Finder<'_> {
-    /// `seldom` divides the chance to be chosen.
+    /// Adds a mutant. `seldom` divides its chance of being selected.
     fn add(
         &mut self,
         whole: Span,
@@ -157,7 +158,7 @@ fn other(op: &BinOp) -> Option<&'static str> {
     })
 }
 
-/// Whether a condition binds names.
+/// Returns whether a condition binds names.
 fn binds(e: &Expr) -> bool {
     match e {
         Expr::Let(_) => true,
@@ -182,7 +183,7 @@ impl<'ast> Visit<'ast> for Finder<'_> {
     }
 
     fn visit_impl_item_fn(&mut self, f: &'ast syn::ImplItemFn) {
-        // What only shows a value to people who debug is not worth a test.
+        // Debug output is not worth a test.
         if f.sig.constness.is_none() && f.sig.ident != "fmt" {
             self.function = f.sig.ident.to_string();
             visit::visit_block(self, &f.block);

@@ -1,13 +1,14 @@
 //! Mutation testing by schemata: many small errors are built into one copy of the
-//! library, each behind a number, and the tests run once for each number. What no test
-//! notices is a survivor: a test is missing, or the error makes no difference.
+//! library, each with a number, and the tests run once for each number. A mutant that no
+//! test notices survives: a test is missing, or the error makes no difference.
 //!
 //!     cargo run --release --manifest-path mutants/Cargo.toml -- [--mutants N] [--minutes M] [--patience SECONDS] [--jobs J]
 //!         [--work DIR]
 //!
-//! Run from the project's root. Results are kept in `mutants/results.jsonl`, one line a
-//! mutant, and what is there is not run again: a run that was stopped goes on. A mutant
-//! is known by its file, function and text, so edits elsewhere leave it as it is.
+//! Run it from the project's root. Results are kept in `mutants/results.jsonl`, one line
+//! per mutant, and mutants with results are not run again, so that a stopped run can be
+//! resumed. A mutant is identified by its file, function and text, so edits elsewhere do
+//! not affect it.
 
 #![forbid(unsafe_code)]
 
@@ -22,7 +23,7 @@ use results::Results;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What is mutated.
+/// The mutated folders.
 const FOLDERS: [&str; 6] =
     ["src/infer", "src/trace", "src/dist", "src/rng", "src/render", "src/vision"];
 
@@ -31,7 +32,7 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 struct Options {
     mutants: usize,
     minutes: u64,
-    /// How long tests of a mutant may take that none of them catches, in seconds.
+    /// The time limit for all tests of a mutant that do not notice it, in seconds.
     patience: u64,
     jobs: usize,
     work: PathBuf,
@@ -87,7 +88,7 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The path as results have it.
+/// Returns the path in the form that results use.
 pub fn within(root: &Path, file: &Path) -> String {
     file.strip_prefix(root).unwrap_or(file).to_string_lossy().replace('\\', "/")
 }

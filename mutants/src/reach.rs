@@ -1,4 +1,4 @@
-//! Which tests come by which mutants, from one run of all tests.
+//! Determines which tests reach which mutants, from one run of all tests.
 
 use crate::Failure;
 use crate::build::TestProgram;
@@ -7,18 +7,19 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A program of tests, how long it takes, and what it comes by.
+/// A test program, its running time, and the mutants that it reaches.
 pub struct Reached {
     pub test: TestProgram,
     pub takes: Duration,
-    /// By mutant: the tests whose own threads came by it.
+    /// For each mutant, the tests whose own threads reached it.
     pub tests: Vec<BTreeSet<String>>,
-    /// By mutant: whether a thread without a test's name did.
+    /// For each mutant, whether a thread without a test's name reached it.
     pub unnamed: Vec<bool>,
 }
 
-/// Runs all test programs that pass without a mutant, the quick ones first. What a
-/// program came by is kept beside the copy's builds, until it is built anew.
+/// Runs all test programs. Returns those that pass without a mutant, the fastest first.
+/// The mutants that a program reaches are kept beside the copy's builds, until it is
+/// rebuilt.
 pub fn reached(
     copy: &Path,
     tests: &[TestProgram],
@@ -62,7 +63,7 @@ fn is_newer(file: &Path, than: &Path) -> bool {
     time(file).zip(time(than)).is_some_and(|(a, b)| a > b)
 }
 
-/// Runs a test program that notes what it comes by; whether it passes.
+/// Runs a test program that records the mutants it reaches. Returns whether it passes.
 fn run(copy: &Path, test: &TestProgram, folder: &Path, took: &Path) -> Result<bool, Failure> {
     let _ = std::fs::remove_dir_all(folder);
     std::fs::create_dir_all(folder)?;

@@ -1,4 +1,4 @@
-//! What came of each mutant, one line of JSON each.
+//! The results of the mutants, one line of JSON each.
 
 use crate::Failure;
 use crate::find::Mutant;
@@ -12,7 +12,7 @@ use std::sync::Mutex;
 pub struct Line {
     pub mutant: String,
     pub line: usize,
-    /// The test that failed, `time` for one that did not end; none for a survivor.
+    /// The test that failed, or `time` if it did not end in time; `None` for a survivor.
     pub caught_by: Option<String>,
 }
 
@@ -43,7 +43,7 @@ impl Results {
         Ok(())
     }
 
-    /// Of these mutants: how many were caught, and which were not.
+    /// Prints how many of these mutants were caught, and which were not.
     pub fn report(&self, mutants: &[Mutant]) {
         let Ok(lines) = self.lines.lock() else { return };
         let known: Vec<&Line> = mutants.iter().filter_map(|m| lines.get(&m.key)).collect();

@@ -1,11 +1,11 @@
-//! A file with its mutants built in: `(if on(7) { changed } else { as it was })`, within
-//! each other where they are.
+//! Rewrites a file with its mutants built in: `(if on(7) { changed } else { original })`,
+//! nested where mutants are nested.
 
 use crate::find::Mutant;
 use std::ops::Range;
 
-/// The text of a file with these mutants, given with their numbers, and where each ended
-/// up.
+/// Returns the text of a file with these numbered mutants built in, and the resulting
+/// range of each.
 pub fn rewritten(text: &str, mutants: &[(usize, &Mutant)]) -> (String, Vec<(Range<usize>, usize)>) {
     let mut r = Rewrite { text, out: String::with_capacity(text.len() * 2), places: Vec::new() };
     let mut sorted = mutants.to_vec();
@@ -21,8 +21,8 @@ struct Rewrite<'a> {
 }
 
 impl Rewrite<'_> {
-    /// Writes a range with the mutants in it, sorted, outer ones first; some parts are
-    /// replaced, and mutants there left out.
+    /// Writes a range with the mutants in it, which are sorted, outer ones first. Some
+    /// parts are replaced; mutants that overlap these are left out.
     fn range(
         &mut self,
         range: Range<usize>,
@@ -55,7 +55,7 @@ impl Rewrite<'_> {
                         .collect();
                     let begin = self.out.len();
                     self.out.push_str(&format!("(if crate::mutation::on({id}) {{ "));
-                    // What is replaced must not be hidden by another mutant about it.
+                    // A mutant inside must not hide the replacement.
                     let beside = |o: &Mutant| {
                         let meets =
                             |r: &Range<usize>| o.range.start < r.end && r.start < o.range.end;
@@ -77,7 +77,7 @@ impl Rewrite<'_> {
         self.out.push_str(&self.text[at..range.end]);
     }
 
-    /// Goes on after something was put in at a place.
+    /// Continues after an insertion.
     fn range_after(
         &mut self,
         range: Range<usize>,

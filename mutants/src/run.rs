@@ -1,4 +1,4 @@
-//! Running the tests on each mutant, those that come by it first, until one fails.
+//! Runs the tests on each mutant, first those that reach it, until one fails.
 
 use crate::Failure;
 use crate::find::Mutant;
@@ -12,11 +12,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// More tests than these are run as a whole program.
+/// If more tests than this reach a mutant, the whole program is run.
 const SINGLE: usize = 60;
 
-/// Runs what is not known yet, until there is no time left. A mutant that `patience` of
-/// tests have not caught is given up.
+/// Runs the mutants without a result until the time is up. A mutant that is not caught
+/// within `patience` counts as a survivor.
 pub fn all(
     copy: &Path,
     mutants: &[Mutant],
@@ -27,7 +27,7 @@ pub fn all(
     patience: Duration,
 ) -> Result<(), Failure> {
     let (next, failed) = (AtomicUsize::new(0), Mutex::new(None));
-    // Spread over files, so that a run that is cut short has seen some of each.
+    // Spread the mutants over files, so that an interrupted run covers some of each.
     let mut order: Vec<usize> = (0..mutants.len()).collect();
     order.sort_by_key(|i| i.wrapping_mul(0x9e37_79b9) % mutants.len().max(1));
     let work = || {
@@ -52,8 +52,8 @@ pub fn all(
     failed.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
-/// What catches a mutant: single tests that come by it, then whole programs where others
-/// may.
+/// Returns the test that catches a mutant: first single tests that reach it, then whole
+/// programs if other threads may reach it.
 fn one(
     copy: &Path,
     id: usize,
@@ -81,7 +81,7 @@ fn one(
     Ok(None)
 }
 
-/// Runs tests of a program; the first that fails.
+/// Runs tests of a program. Returns the first that fails.
 fn fails(copy: &Path, id: usize, r: &Reached, tests: Vec<&str>) -> Result<Option<String>, Failure> {
     let mut command = Command::new(&r.test.path);
     if !tests.is_empty() {
@@ -111,7 +111,7 @@ fn fails(copy: &Path, id: usize, r: &Reached, tests: Vec<&str>) -> Result<Option
     let caught = match receive.recv_timeout(left) {
         Ok(name) => Some(format!("{}::{name}", r.test.name)),
         Err(RecvTimeoutError::Timeout) => Some("time".to_owned()),
-        // It ended: by a signal or a stack overflow too.
+        // The process ended, possibly by a signal or a stack overflow.
         Err(RecvTimeoutError::Disconnected) if child.wait()?.success() => None,
         Err(RecvTimeoutError::Disconnected) => Some(r.test.name.clone()),
     };

@@ -1,11 +1,13 @@
-//! The chains of a run that has ended in one form, as ArviZ and CmdStan's tools want
-//! them: the same columns, and equally many draws.
+//! Brings the chains of a run that has ended to the same columns and the same number of
+//! draws, as ArviZ and CmdStan's tools require.
 //!
-//! A chain's file grows while it runs, and under a limit of time one chain gets further
-//! than another; columns come when the structure of a scene changes. What does not fit is
-//! kept as it came in `draws-N.csv` beside `chain-N.csv`, from which the chain can go on.
+//! A chain's file grows while it runs; under a time limit some chains get further than
+//! others, and columns are added when the structure of a scene changes. A file that has
+//! to be changed is kept in its original form as `draws-N.csv` beside `chain-N.csv`, so
+//! that the chain can resume from it.
 //!
-//! Invariant: whenever the process stops, either file holds all draws of the chain.
+//! Invariant: whenever the process stops, one of the two files holds all draws of the
+//! chain.
 
 use super::atomic_write::begin;
 use super::csv::{CsvSink, DrawReader, named};
@@ -14,35 +16,35 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::Path;
 
-/// The name of a chain's draws; chains are counted from 0.
+/// Returns the name of the file of a chain's draws; chains are counted from 0.
 pub(super) fn draws_name(chain: u32) -> String {
     format!("chain-{}.csv", u64::from(chain) + 1)
 }
 
-/// The name of the file that keeps all draws of a chain, where it has more than the
-/// others.
+/// Returns the name of the file that keeps all draws of a chain, if its main file was
+/// changed.
 pub(super) fn all_name(chain: u32) -> String {
     format!("draws-{}.csv", u64::from(chain) + 1)
 }
 
-/// What a chain's file has.
+/// The contents of a chain's file.
 #[derive(Default)]
 pub(super) struct Found {
     comments: String,
-    /// The columns of any of its draws.
+    /// The union of the columns of its draws.
     pub(super) columns: Vec<Column>,
-    /// Whether one line of names is all there is.
+    /// Whether the file has only one line of names.
     plain: bool,
     /// The number of its draws.
     pub(super) draws: u64,
 }
 
-/// Brings the files of so many chains to the same columns and, if `even`, to equally many
-/// draws: as many as the chain with the fewest has, of those that have any. Returns how
-/// many each has then, if draws were left out.
+/// Brings the files of `chains` chains to the same columns and, if `even`, to the same
+/// number of draws: that of the shortest chain with any draws. Returns that number if
+/// draws were left out.
 ///
 /// # Errors
-/// If a file cannot be read or written.
+/// Returns an error if a file cannot be read or written.
 pub fn align(dir: &Path, chains: u32, even: bool) -> io::Result<Option<u64>> {
     let found =
         (0..chains).map(|c| look(&dir.join(draws_name(c)))).collect::<io::Result<Vec<_>>>()?;
@@ -58,10 +60,10 @@ pub fn align(dir: &Path, chains: u32, even: bool) -> io::Result<Option<u64>> {
     Ok((keep < most).then_some(keep))
 }
 
-/// Gives a chain's file all its draws back, if some were put aside.
+/// Restores all draws of a chain's file, if some were set aside.
 ///
 /// # Errors
-/// If the system cannot.
+/// Returns an error if the file cannot be renamed.
 pub(super) fn restore(dir: &Path, chain: u32) -> io::Result<()> {
     match std::fs::rename(dir.join(all_name(chain)), dir.join(draws_name(chain))) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
@@ -69,10 +71,10 @@ pub(super) fn restore(dir: &Path, chain: u32) -> io::Result<()> {
     }
 }
 
-/// What a chain's file has.
+/// Reads the comments, the columns and the number of draws of a chain's file.
 ///
 /// # Errors
-/// If it cannot be read.
+/// Returns an error if it cannot be read.
 pub(super) fn look(path: &Path) -> io::Result<Found> {
     let mut found = Found { plain: true, ..Found::default() };
     for line in BufReader::new(File::open(path)?).lines() {
@@ -90,8 +92,8 @@ pub(super) fn look(path: &Path) -> io::Result<Found> {
     Ok(found)
 }
 
-/// Writes a chain's file anew, with its first draws in these columns, and keeps the old
-/// one.
+/// Rewrites a chain's file with its first draws in the given columns, and keeps the old
+/// file.
 fn rewrite(dir: &Path, chain: u32, found: &Found, columns: &[Column], keep: u64) -> io::Result<()> {
     let path = dir.join(draws_name(chain));
     let file = File::open(&path)?;
@@ -139,7 +141,7 @@ mod tests {
         );
         std::fs::write(dir.join("chain-1.csv"), &one).unwrap();
         std::fs::write(dir.join("chain-2.csv"), &two).unwrap();
-        // A chain that was ended before it began.
+        // A chain that was stopped before it began.
         std::fs::write(dir.join("chain-3.csv"), "# id = 3\n").unwrap();
         assert_eq!(align(&dir, 3, true).unwrap(), Some(2));
         let chain = |name: &str| read(&std::fs::read_to_string(dir.join(name)).unwrap()).unwrap();
@@ -155,14 +157,14 @@ mod tests {
                 && b.rows[1].values[3] == 8.0
         );
         assert!(a.comments.contains(&("steps".into(), "2".into())));
-        // All draws are there still, and are taken up again.
+        // All draws are still there, and are restored.
         assert_eq!(chain("draws-2.csv").rows.len(), 3);
         assert_eq!(align(&dir, 3, true).unwrap(), None, "nothing is left to do");
         (0..3).for_each(|c| restore(&dir, c).unwrap());
         assert_eq!(std::fs::read_to_string(dir.join("chain-1.csv")).unwrap(), one);
         assert_eq!(std::fs::read_to_string(dir.join("chain-2.csv")).unwrap(), two);
         assert!(!dir.join("draws-1.csv").exists());
-        // Of a run that was interrupted nothing is left out.
+        // No draws of an interrupted run are left out.
         assert_eq!(align(&dir, 3, false).unwrap(), None);
         assert_eq!((chain("chain-1.csv").rows.len(), chain("chain-2.csv").rows.len()), (2, 3));
         std::fs::remove_dir_all(&dir).unwrap();

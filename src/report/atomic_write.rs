@@ -1,33 +1,34 @@
-//! Files that no reader ever sees half of: written under another name, then renamed.
+//! Files that readers never see half-written: written under a temporary name, then
+//! renamed.
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// The ending of files that are being written.
+/// The suffix of files that are being written.
 const PARTIAL: &str = ".partial";
 
-/// Writes a file of a folder; an older one of the name is kept if that fails, and lends
-/// the new one its permissions.
+/// Writes a file in a folder. If that fails, an older file of the same name is kept;
+/// otherwise the new file gets the permissions of the older one.
 ///
 /// # Errors
-/// As the file system has it.
+/// Returns the error of the file system.
 pub fn write_atomically(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
     let partial = begin(folder, name, |f| f.write_all(bytes))?;
     partial.end().inspect_err(|_| {
-        // The error that is told is the first one.
+        // Report the first error, not one of the clean-up.
         let _ = std::fs::remove_file(&partial.0);
     })
 }
 
-/// A file under its other name.
+/// A file under its temporary name, and its final path.
 pub(super) struct PartialFile(PathBuf, PathBuf);
 
-/// Writes a file of a folder under another name: it is at its place when it is
-/// [ended](PartialFile::end).
+/// Writes a file in a folder under a temporary name; [`Partial::end`] gives it its final
+/// name.
 ///
 /// # Errors
-/// If it cannot be written; nothing is left of it then.
+/// Returns an error if it cannot be written; the temporary file is then removed.
 pub(super) fn begin(
     folder: &Path,
     name: &str,
@@ -36,7 +37,7 @@ pub(super) fn begin(
     let (path, partial) = (folder.join(name), folder.join(format!(".{name}{PARTIAL}")));
     let written = File::create(&partial).and_then(|mut f| {
         write(&mut f)?;
-        // The new name must not reach the disk before what it is of.
+        // The final name must not reach the disk before the contents.
         f.sync_data()
     });
     match written {
@@ -49,10 +50,10 @@ pub(super) fn begin(
 }
 
 impl PartialFile {
-    /// Puts it at its place, with the permissions of an older file there.
+    /// Gives the file its final name, with the permissions of an older file of that name.
     ///
     /// # Errors
-    /// If the system cannot.
+    /// Returns an error if the permissions cannot be set or the file cannot be renamed.
     pub fn end(&self) -> io::Result<()> {
         if let Ok(older) = std::fs::metadata(&self.1) {
             std::fs::set_permissions(&self.0, older.permissions())?;
@@ -61,16 +62,16 @@ impl PartialFile {
     }
 }
 
-/// Writes a file; an older one of the path is kept if that fails.
+/// Writes a file; if that fails, an older file at the path is kept.
 ///
 /// # Errors
-/// If it cannot be written, or the path names no file.
+/// Returns an error if it cannot be written, or the path does not name a file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let name = path.file_name().and_then(|n| n.to_str()).ok_or(io::ErrorKind::InvalidInput)?;
     write_atomically(path.parent().unwrap_or(Path::new("")), name, bytes)
 }
 
-/// Whether a file is half of one, as [`write_atomically`] names them.
+/// Returns whether a file is partially written, by the names that [`write_whole`] uses.
 pub(super) fn is_partial(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(PARTIAL)
 }

@@ -1,8 +1,8 @@
-//! The files of one chain in a run's folder: its draws, and the checkpoint it can go on
-//! from.
+//! The files of one chain in a run's folder: its draws, and the checkpoint from which it
+//! can resume.
 //!
-//! Invariant: the checkpoint is whole, and what it says is in the file of draws is there,
-//! whenever the process or the machine stops.
+//! Invariant: whenever the process or the machine stops, the checkpoint is complete, and
+//! the file of draws holds all draws that precede the checkpoint.
 
 use super::aligned::{draws_name, restore};
 use super::checkpoint::SavedChain;
@@ -14,25 +14,25 @@ use crate::infer::draws::{Column, DrawRow, Sink};
 use std::fs::File;
 use std::io::{self, BufReader, Seek, SeekFrom};
 
-/// A sink that writes a chain's draws to its file, keeps as many as there is room for in
-/// memory, and keeps checkpoints.
+/// A sink that writes a chain's draws to its file, keeps as many of them in memory as
+/// there is room for, and writes checkpoints.
 pub struct ChainFile {
     dir: RunDir,
     chain: u32,
-    /// What tells the run from others.
+    /// The identity of the run.
     run: String,
     draws: CsvSink,
     memory: Memory,
     from: Option<Checkpoint>,
 }
 
-/// What the files of all chains of a run have in common.
+/// The parts that the files of all chains of a run have in common.
 pub struct ChainFiles<'a> {
     /// The run's folder.
     pub dir: &'a RunDir,
-    /// What tells the run from others.
+    /// The identity of the run.
     pub run: &'a str,
-    /// What the files of draws say at their head.
+    /// The comments at the head of the files of draws.
     pub comments: &'a [(&'a str, String)],
 }
 
@@ -40,7 +40,7 @@ fn checkpoint_name(chain: u32) -> String {
     format!("chain-{}.checkpoint", u64::from(chain) + 1)
 }
 
-/// An error with the name of the file it is about.
+/// Adds the name of the affected file to an error.
 fn about(name: &str, error: impl std::fmt::Display, kind: io::ErrorKind) -> io::Error {
     io::Error::new(kind, format!("{name}: {error}"))
 }
@@ -49,11 +49,11 @@ impl ChainFiles<'_> {
     /// Begins the files of a chain.
     ///
     /// # Errors
-    /// If they cannot be written.
+    /// Returns an error if they cannot be written.
     pub fn begin(&self, chain: u32, memory: &Memory) -> io::Result<ChainFile> {
         let name = draws_name(chain);
         let told = |e: io::Error| about(&name, &e, e.kind());
-        // An earlier checkpoint must not outlive the draws it is of.
+        // An earlier checkpoint must not outlive its draws.
         let checkpoint = self.dir.file(&checkpoint_name(chain));
         if checkpoint.exists() {
             std::fs::remove_file(checkpoint)?;
@@ -63,12 +63,12 @@ impl ChainFiles<'_> {
         Ok(self.file(chain, draws, memory.clone(), None))
     }
 
-    /// Takes up the files of a chain where its last checkpoint was; without one it begins
-    /// anew. Draws after it are cut off: the chain makes them again.
+    /// Resumes the files of a chain at its last checkpoint, or begins them if there is no
+    /// checkpoint. Later draws are cut off; the chain repeats them.
     ///
     /// # Errors
-    /// If the checkpoint is of another run or version, or the draws before it are not
-    /// there.
+    /// Returns an error if the checkpoint is from another run or version, or draws before
+    /// it are missing.
     pub fn resume(&self, chain: u32, memory: &Memory) -> io::Result<ChainFile> {
         let name = checkpoint_name(chain);
         let bytes = match std::fs::read(self.dir.file(&name)) {
@@ -144,7 +144,7 @@ impl Sink for ChainFile {
     }
 
     fn checkpoint(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {
-        // Draws reach the disk before the checkpoint that counts on them.
+        // Draws must reach the disk before the checkpoint that depends on them.
         self.draws.sync()?;
         let saved = SavedChain::new(&self.run, self.draws.written(), checkpoint);
         self.dir.write(&checkpoint_name(self.chain), &saved.to_bytes()).map_err(io::Error::other)

@@ -1,10 +1,10 @@
-//! The file of a checkpoint: what a chain goes on from, and what tells that it is this
-//! run's and whole.
+//! The file format of checkpoints: the state from which a chain resumes, and data to
+//! verify that the file is complete and belongs to this run.
 //!
-//! A line of text that says what the file is; the version of the format and a hash of the
-//! rest; the rest (CBOR): the version of pcadlang, the run it belongs to, the length of
-//! its file of draws, the chain. Only the version that wrote it goes on from it: another
-//! may draw other numbers.
+//! It begins with a line of text that identifies the format and its version, followed by
+//! a hash of the rest. The rest (CBOR) holds the version of pcadlang, the identity of the
+//! run, the length of its file of draws, and the chain. A checkpoint can only be resumed
+//! by the version that wrote it, because another version may draw different numbers.
 
 use super::hash::bytes_hash;
 use crate::infer::{Checkpoint, StateError, pack, unpack};
@@ -12,13 +12,13 @@ use serde::{Deserialize, Serialize};
 
 const HEAD: &[u8] = b"pcadlang checkpoint 1\n";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// The length of a hash.
+/// The length of a hash in characters.
 const HASH: usize = 16;
 
-/// Why a file is no checkpoint to go on from.
+/// The reasons why a checkpoint cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// It begins with something else.
+    /// It does not begin with the identifying line.
     #[error("this is not a chain checkpoint, or has another format")]
     Format,
     /// Its contents have changed since it was written.
@@ -32,23 +32,23 @@ pub enum CheckpointError {
     /// It belongs to another program, data or settings.
     #[error("the checkpoint belongs to another run: the program, its data or its settings differ")]
     Run,
-    /// It does not fit together.
+    /// Its contents are inconsistent.
     #[error("the checkpoint cannot be read: {0}")]
     State(#[from] StateError),
 }
 
-/// What a file of a checkpoint holds.
+/// The contents of a checkpoint file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedChain {
     version: String,
     run: String,
-    /// The bytes of the file of draws that come before it.
+    /// The length of the file of draws up to this checkpoint, in bytes.
     pub draws_end: u64,
     chain: Vec<u8>,
 }
 
 impl SavedChain {
-    /// A checkpoint of a run, with so many bytes of draws before it.
+    /// Creates a checkpoint of a run, preceded by `draws_end` bytes of draws.
     pub fn new(run: &str, draws_end: u64, checkpoint: &Checkpoint) -> SavedChain {
         SavedChain {
             version: VERSION.into(),
@@ -58,7 +58,7 @@ impl SavedChain {
         }
     }
 
-    /// The file.
+    /// Returns the contents of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let body = pack(self);
         [HEAD, bytes_hash(&body).as_bytes(), &body].concat()
@@ -67,7 +67,8 @@ impl SavedChain {
     /// Reads the file of a checkpoint of a run.
     ///
     /// # Errors
-    /// If it is none, damaged, or of another version or run.
+    /// Returns an error if it is not a checkpoint, is damaged, or is from another version
+    /// or run.
     pub fn read(bytes: &[u8], run: &str) -> Result<(SavedChain, Checkpoint), CheckpointError> {
         let rest = bytes.strip_prefix(HEAD).ok_or(CheckpointError::Format)?;
         let (hash, body) = rest.split_at_checked(HASH).ok_or(CheckpointError::Damaged)?;

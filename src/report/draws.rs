@@ -1,4 +1,4 @@
-//! The draws of a chain in memory, and the scalar quantities they give.
+//! The draws of a chain in memory, and the scalar quantities in them.
 
 use crate::infer::diagnostics::{Summary, summary};
 use crate::infer::draws::{Column, DrawRow, Layout, POINTWISE, Shape, merged, width};
@@ -7,13 +7,13 @@ use std::borrow::Cow;
 /// The draws of one chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainDraws {
-    /// Pairs said about the chain (settings, counts), as the file of draws has them.
+    /// Key-value pairs about the chain (settings, counts), as in the file of draws.
     pub comments: Vec<(String, String)>,
     /// The recorded quantities.
     pub columns: Vec<Column>,
     /// The draws, in order.
     pub rows: Vec<DrawRow>,
-    /// Of how many draws each one is kept: 1, unless there was no room for all.
+    /// One of every `every` draws is kept: 1, unless there was not enough room for all.
     pub every: u64,
 }
 
@@ -24,7 +24,7 @@ impl Default for ChainDraws {
 }
 
 impl Quantity {
-    /// Why there is no R-hat; `None` if there is one.
+    /// Returns the reason why R-hat is undefined; `None` if it is defined.
     ///
     /// ```
     /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); infer { repeat 100 { collect x; } }")?;
@@ -50,7 +50,7 @@ impl Quantity {
         })
     }
 
-    /// Whether each chain stays where it is, and not all at one value.
+    /// Returns whether each chain is constant, but not all of them at the same value.
     #[doc(hidden)]
     pub fn is_stuck(&self) -> bool {
         let same = |xs: &[f64]| xs.windows(2).all(|w| w[0].to_bits() == w[1].to_bits());
@@ -60,7 +60,7 @@ impl Quantity {
 }
 
 impl ChainDraws {
-    /// Puts the draws in other columns, among which theirs are.
+    /// Converts the draws to other columns, which must include the current ones.
     #[doc(hidden)]
     pub fn widen(&mut self, columns: Vec<Column>) {
         let layout = Layout::new(&self.columns, &columns);
@@ -71,14 +71,13 @@ impl ChainDraws {
     }
 }
 
-/// Brings chains to the same columns: those that any of them has, with NaN where a draw
-/// has none.
+/// Converts all chains to the union of their columns, with NaN where a draw has no value.
 pub fn widen(chains: &mut [ChainDraws]) {
     let Some(all) = common(chains) else { return };
     chains.iter_mut().filter(|c| !c.rows.is_empty()).for_each(|c| c.widen(all.clone()));
 }
 
-/// The columns of all chains together, if they have not the same ones.
+/// Returns the union of the columns of all chains, if they are not all the same.
 fn common(chains: &[ChainDraws]) -> Option<Vec<Column>> {
     let mut each = chains.iter().map(|c| &c.columns).filter(|c| !c.is_empty());
     let first = each.next()?;
@@ -89,21 +88,21 @@ fn common(chains: &[ChainDraws]) -> Option<Vec<Column>> {
 /// One number per draw, over all chains.
 #[derive(Clone, Debug)]
 pub struct Quantity {
-    /// Its name: the column's, with `[i]` (from 0, as the language counts) for the
-    /// element of a vector.
+    /// Its name: that of the column, with `[i]` (counted from 0, as in the language) for
+    /// an element of a vector.
     pub name: String,
     /// The column it belongs to; `None` for the log joint density.
     pub column: Option<usize>,
     /// The draws, `[chain][draw]`.
     pub chains: Vec<Vec<f64>>,
-    /// What they say.
+    /// The summary of the draws.
     pub summary: Summary,
 }
 
-/// Every scalar quantity of some chains, the log joint density (`log_joint`) first, with
-/// its summary. Columns are those that any chain has; what a draw lacks is NaN. A column
-/// that says the log joint density again is left out, and so are the log densities of
-/// single observed values.
+/// Returns every scalar quantity of the chains with its summary, starting with the log
+/// joint density (`log_joint`). The columns are the union of those of all chains, with
+/// NaN where a draw has no value. A column that repeats the log joint density is left
+/// out, and so are the log densities of single observed values.
 pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let mut chains = Cow::Borrowed(chains);
     if common(&chains).is_some() {
@@ -120,8 +119,8 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let mut at = 0;
     for (index, column) in columns.iter().enumerate() {
         if column.name == POINTWISE {
-            // There are as many as data, for comparing models (`az.loo`), and nothing of
-            // the posterior.
+            // One column per observed value, for model comparison (`az.loo`); these are
+            // not posterior quantities.
             at += column.shape.len();
             continue;
         }
@@ -141,7 +140,7 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     out
 }
 
-/// Whether the numbers at a place of every row are the log joint density.
+/// Returns whether the numbers at index `at` of all rows are the log joint density.
 fn repeats(chains: &[ChainDraws], at: usize) -> bool {
     let mut rows = chains.iter().flat_map(|c| &c.rows);
     rows.all(|r| r.values.get(at).is_some_and(|x| x.to_bits() == r.log_joint.to_bits()))

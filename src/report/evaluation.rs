@@ -1,9 +1,9 @@
-//! A program on a dataset: one row a case, the table of them, and the keypoints that
-//! scorers read.
+//! The evaluation of a program on a dataset: one row per case, a table of all rows, and
+//! keypoints for scorers.
 //!
-//! Not the runs, and no truth: nothing here is compared with anything. Rows are read off
-//! `run.json`, so that a case that was done earlier and one that was done now give the
-//! same row. Invariant: the folder holds evaluations only, and its files are whole or
+//! This module neither runs programs nor compares results with ground truth. Rows are
+//! read from `run.json`, so that cases completed earlier and cases completed now give the
+//! same rows. Invariant: the folder holds evaluations only, and its files are complete or
 //! absent.
 
 use super::RunDirError;
@@ -12,9 +12,9 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// The file every folder of an evaluation has.
+/// The file that marks the folder of an evaluation.
 pub const MARK: &str = "evaluation.json";
-/// The table for people.
+/// The table for human readers.
 pub const TABLE: &str = "table.md";
 /// The keypoints of all cases.
 pub const PREDICTIONS: &str = "predictions.json";
@@ -26,11 +26,11 @@ pub struct EvaluationDir {
 }
 
 impl EvaluationDir {
-    /// Makes the folder, or takes up one that an earlier evaluation left; nothing is
+    /// Creates the folder, or opens one that an earlier evaluation left; nothing is
     /// removed.
     ///
     /// # Errors
-    /// If it cannot be made, or holds something and no evaluation.
+    /// Returns an error if it cannot be created, or holds files but no evaluation.
     pub fn open(path: &Path) -> Result<EvaluationDir, RunDirError> {
         let io = |error| RunDirError::Io { path: path.to_owned(), error };
         std::fs::create_dir_all(path).map_err(io)?;
@@ -47,29 +47,30 @@ impl EvaluationDir {
         Ok(EvaluationDir { path: path.to_owned() })
     }
 
-    /// The path of something in it.
+    /// Returns the path of a file in the folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// Writes a file, under another name first.
+    /// Writes a file under a temporary name, then renames it.
     ///
     /// # Errors
-    /// If it cannot be written; an older file of the name is kept then.
+    /// Returns an error if it cannot be written; an older file of the same name is then
+    /// kept.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
         write_atomically(&self.path, name, bytes)
             .map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
 }
 
-/// What is said of a case.
+/// The results of a case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
-    /// Its name.
+    /// The name of the case.
     pub case: String,
     /// `done`, `failed`, `interrupted`, or `pending`: not run yet.
     pub status: String,
-    /// Wall time until the last draw, reading and compiling included.
+    /// Wall time until the last draw, including reading and compiling.
     pub seconds: Option<f64>,
     /// Wall time until every file was written.
     pub wall_seconds: Option<f64>,
@@ -77,21 +78,21 @@ pub struct Row {
     pub best_log_joint: Option<f64>,
     /// The largest R-hat of any recorded quantity.
     pub r_hat_max: Option<f64>,
-    /// Draws of all chains.
+    /// The number of draws over all chains.
     pub draws: Option<u64>,
-    /// Kernel applications of all chains, warm-up included.
+    /// The number of kernel applications over all chains, including warm-up.
     pub steps: Option<u64>,
-    /// Why it failed.
+    /// The reason for a failure.
     pub error: Option<String>,
 }
 
 impl Row {
-    /// A case that has not been run.
+    /// Returns the row of a case that has not been run.
     pub fn pending(case: &str) -> Row {
         Row { case: case.to_owned(), status: "pending".into(), ..Row::default() }
     }
 
-    /// What a `run.json` says. A run that neither ended nor failed is pending.
+    /// Reads a row from a `run.json`. A run that neither ended nor failed is pending.
     pub fn of(case: &str, run: &Value) -> Row {
         let status =
             run["state"].as_str().filter(|s| ["done", "failed", "interrupted"].contains(s));
@@ -114,8 +115,8 @@ impl Row {
     }
 }
 
-/// The rows as a Markdown table, aligned to be read as text too; what failed is said
-/// below it.
+/// Formats the rows as a Markdown table that is also aligned as plain text; errors of
+/// failed cases are listed below it.
 pub fn markdown(rows: &[Row]) -> String {
     let head =
         ["case", "status", "seconds", "wall seconds", "best log joint", "R-hat", "draws", "steps"];
@@ -139,7 +140,7 @@ pub fn markdown(rows: &[Row]) -> String {
     }
     let width = |c: usize| cells.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
     let widths: [usize; 8] = std::array::from_fn(width);
-    // Words to the left, numbers to the right.
+    // Words are aligned to the left, numbers to the right.
     let left = |c: usize| c < 2;
     let rule: [String; 8] = std::array::from_fn(|c| {
         if left(c) { "-".repeat(widths[c]) } else { format!("{}:", "-".repeat(widths[c] - 1)) }
@@ -165,8 +166,8 @@ pub fn markdown(rows: &[Row]) -> String {
     text
 }
 
-/// The entry of `predictions.json` for a case: the points of its `keypoints.json` without
-/// their spread, or null where there is none, and the seconds it took.
+/// Returns the entry of `predictions.json` for a case: the points of its `keypoints.json`
+/// without their standard deviations, or null if there are none, and the seconds it took.
 pub fn prediction(keypoints: Option<&Value>, seconds: Option<f64>) -> Value {
     let points = keypoints.and_then(|k| k["keypoints"].as_object()).map(|all| {
         let xy = |p: &Value| Some(json!([p.get(0)?.as_f64()?, p.get(1)?.as_f64()?]));

@@ -2,13 +2,13 @@
 
 use crate::num::fnv1a;
 
-/// The 64-bit FNV-1a hash of a text as 16 hexadecimal digits: tells programs apart, keeps
-/// no secrets.
+/// Returns the 64-bit FNV-1a hash of a text as 16 hexadecimal digits. It distinguishes
+/// programs, but is not cryptographic.
 pub fn text_hash(text: &str) -> String {
     bytes_hash(text.as_bytes())
 }
 
-/// As [`text_hash`](super::text_hash), of any bytes.
+/// Does the same as [`text_hash`](super::text_hash) for arbitrary bytes.
 pub fn bytes_hash(bytes: &[u8]) -> String {
     format!("{:016x}", fnv1a(bytes))
 }

@@ -1,8 +1,9 @@
-//! What a run leaves behind: draws as CmdStan CSV, a run directory, pictures, tables, and
-//! a page that shows all of it.
+//! The output of a run: draws as CmdStan CSV, a run directory, pictures, tables, and a
+//! page that shows all of it.
 //!
-//! Nothing here prints or decides; it turns results into text and files. It knows draws,
-//! diagnostics and plain pixel buffers, not programs, traces or the renderer.
+//! This module neither prints nor makes decisions; it turns results into text and files.
+//! It depends on draws, diagnostics and plain pixel buffers, but not on programs, traces
+//! or the renderer.
 
 #![doc = include_str!("guide.md")]
 

@@ -1,5 +1,5 @@
-//! The modes that chains stay in, where they disagree: reported one by one, besides the
-//! means over all of them.
+//! The modes of chains that disagree, reported separately in addition to the means over
+//! all chains.
 
 use super::{Quantity, number, table};
 use crate::infer::diagnostics;
@@ -8,39 +8,39 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt::Write;
 
-/// Chains whose worst R-hat is above this are looked at for modes.
+/// Chains whose worst R-hat exceeds this are grouped into modes.
 pub const DISAGREE: f64 = 1.1;
-/// Quantities that chains are compared by: those with the largest R-hat.
+/// The number of quantities by which chains are compared: those with the largest R-hat.
 const COMPARED: usize = 20;
-/// Columns and rows of the table.
+/// The numbers of columns and rows of the table.
 const SHOWN: (usize, usize) = (5, 8);
 
-/// Chains that agree with each other and not with the rest.
+/// Chains that agree with each other but not with the others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
-    /// Their numbers, from 1.
+    /// The numbers of the chains, counted from 1.
     pub chains: Vec<usize>,
-    /// How many of all chains they are. Chains fall where they start: it is no
-    /// probability.
+    /// The fraction of all chains in this mode. It depends on where chains start and is
+    /// not a probability.
     pub share: f64,
-    /// Its probability among the modes ([`Weighed::probabilities`]); none if it cannot be
-    /// told.
+    /// Its probability among the modes ([`Weighed::probabilities`]), if it can be
+    /// estimated.
     pub probability: Option<f64>,
-    /// Whether that is by estimates of the evidence, or as if the modes were equally
-    /// wide.
+    /// Whether the probability is based on estimates of the evidence, rather than on the
+    /// assumption that all modes are equally wide.
     pub by_evidence: bool,
-    /// The logarithm of its evidence and the standard error of that, if there is an
-    /// estimate ([`diagnostics::log_evidence()`]).
+    /// The logarithm of its evidence and its standard error, if there is an estimate
+    /// ([`diagnostics::log_evidence()`]).
     pub log_evidence: Option<[f64; 2]>,
-    /// The mean log joint density of their draws.
+    /// The mean log joint density of its draws.
     #[serde(deserialize_with = "number_or_null")]
     pub log_joint: f64,
-    /// The mean and standard deviation of each quantity over their draws.
+    /// The mean and standard deviation of each quantity over its draws.
     #[serde(deserialize_with = "numbers_or_null")]
     pub quantities: IndexMap<String, [f64; 2]>,
 }
 
-/// JSON has no number for what is not finite.
+/// Reads null as NaN, because JSON cannot represent numbers that are not finite.
 fn number_or_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
@@ -52,9 +52,9 @@ fn numbers_or_null<'de, D: Deserializer<'de>>(
     Ok(read.into_iter().map(|(name, m)| (name, m.map(|x| x.unwrap_or(f64::NAN)))).collect())
 }
 
-/// The modes of a run, the most probable first, or the one of most chains where
-/// probabilities are not known; none where the chains agree, or cannot be told apart.
-/// `evidence` is what watched the run.
+/// Returns the modes of a run, the most probable first, or the one with most chains if
+/// probabilities are not known; empty if the chains agree or cannot be separated.
+/// `evidence` holds the estimates made during the run.
 pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> {
     let worst = apart(quantities);
     let compared: Vec<&[Vec<f64>]> = worst.iter().take(COMPARED).map(|q| &q.chains[..]).collect();
@@ -79,8 +79,8 @@ pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> 
     all
 }
 
-/// The quantities that chains may disagree on, the worst first. Those that never moved
-/// have no R-hat, but may be at several places.
+/// Returns the quantities on which chains may disagree, the worst first. Those that never
+/// moved have no R-hat, but may differ between chains.
 fn apart(quantities: &[Quantity]) -> Vec<&Quantity> {
     let rank =
         |q: &Quantity| if q.summary.r_hat.is_nan() { f64::INFINITY } else { q.summary.r_hat };
@@ -108,7 +108,8 @@ fn mode(quantities: &[Quantity], members: &[usize], count: usize) -> Mode {
     }
 }
 
-/// The means of the quantities that differ most, a column a mode; nothing without modes.
+/// Formats the means of the quantities that differ most, with a column for each mode;
+/// empty without modes.
 pub fn modes_table(modes: &[Mode], quantities: &[Quantity]) -> String {
     let rows = modes_rows(modes, quantities);
     if rows.is_empty() {
@@ -122,7 +123,7 @@ pub fn modes_table(modes: &[Mode], quantities: &[Quantity]) -> String {
     s
 }
 
-/// The cells of [`modes_table`].
+/// Returns the cells of [`modes_table`].
 pub(super) fn modes_rows(modes: &[Mode], quantities: &[Quantity]) -> Vec<Vec<String>> {
     if modes.is_empty() {
         return Vec::new();
@@ -153,7 +154,7 @@ pub(super) fn modes_rows(modes: &[Mode], quantities: &[Quantity]) -> Vec<Vec<Str
     table::narrowed(rows)
 }
 
-/// What to tell the user: a sentence where there are modes.
+/// Returns a sentence for the user, if there are several modes.
 pub(super) fn warning(modes: &[Mode]) -> Option<String> {
     let chains: usize = modes.iter().map(|m| m.chains.len()).sum();
     let (n, each) = (modes.len(), modes.iter().all(|m| m.chains.len() == 1));
@@ -181,7 +182,8 @@ pub(super) fn warning(modes: &[Mode]) -> Option<String> {
     ))
 }
 
-/// An R-hat for people: chains in different modes have one as large as they are apart.
+/// Formats an R-hat for people; that of chains in different modes can be arbitrarily
+/// large.
 pub fn r_hat_text(r: f64) -> String {
     match r {
         r if r.is_nan() => "-".into(),

@@ -1,32 +1,33 @@
-//! Means and variances of named points of the plane or of space, one draw at a time and
-//! merged over chains.
+//! Means and variances of named points in the plane or in space, updated with one draw at
+//! a time and merged over chains.
 //!
-//! Invariant: the same draws in the same order give the same bits, and merging chains in
-//! order does not depend on when they ran.
+//! Invariant: the same draws in the same order give the same bits, and the result of
+//! merging chains in order does not depend on when they ran.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// One point's draws so far.
+/// The moments of one point over the draws so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// The number of draws.
     pub count: u64,
     /// Their mean, by axis.
     pub mean: Vec<f64>,
-    /// Sums of squares about it.
+    /// Sums of squared deviations from the mean, by axis.
     squares: Vec<f64>,
 }
 
 impl Point {
-    /// The square root of the mean of the variances along the axes; 0 of a single draw.
+    /// Returns the square root of the mean of the variances along the axes; 0 for a
+    /// single draw.
     pub fn sd(&self) -> f64 {
         let mean = self.squares.iter().sum::<f64>() / self.squares.len().max(1) as f64;
         (mean / self.freedom()).sqrt()
     }
 
-    /// What sums of squares are divided by.
+    /// Returns the divisor of the sums of squares.
     fn freedom(&self) -> f64 {
         self.count.saturating_sub(1).max(1) as f64
     }
@@ -51,14 +52,14 @@ impl Point {
     }
 }
 
-/// Points by name, in order of first appearance, each of as many axes in all draws. A
-/// point need not be in every draw.
+/// Points by name, in order of first appearance. A point has the same number of axes in
+/// all draws, but need not be in every draw.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Moments(IndexMap<Arc<str>, Point>);
 
 impl Moments {
-    /// Takes a point of a draw (Welford 1962), or the mean and variance of what the draw
-    /// says of it; one that is not finite is left out.
+    /// Adds a point of a draw (Welford 1962), or the mean and variance of the point given
+    /// the draw. Values that are not finite are left out.
     pub fn add(&mut self, name: &Arc<str>, at: &[f64], variance: f64) {
         if at.iter().all(|x| x.is_finite()) && variance.is_finite() {
             let one = Point { count: 1, mean: at.to_vec(), squares: vec![variance; at.len()] };
@@ -73,8 +74,8 @@ impl Moments {
         }
     }
 
-    /// A mixture of others by their shares, which sum to 1; a point that some lack is a
-    /// mixture of the rest. Counts are summed.
+    /// Returns a mixture of moments with the given weights, which sum to 1. A point that
+    /// some of them lack is a mixture of the others. Counts are summed.
     pub fn mixture(all: &[(f64, &Moments)]) -> Moments {
         let mut mixed = Moments::default();
         for (_, moments) in all {
@@ -102,7 +103,7 @@ impl Moments {
         mixed
     }
 
-    /// The points.
+    /// Returns the points.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Point)> {
         self.0.iter().map(|(name, p)| (&**name, p))
     }
@@ -127,7 +128,8 @@ mod tests {
         ]);
         let (_, p) = mixed.iter().next().unwrap();
         assert!((p.mean[0] - (0.5 + 0.25 * 8.0)).abs() < 1e-12, "{p:?}");
-        // Within: 1/4. Between: 3/16 of 8 squared.
+        // The variance within the parts is 1/4; the variance between them is 3/16 of 8
+        // squared.
         assert!((p.sd() * p.sd() - (0.25 + 0.1875 * 64.0)).abs() < 0.001, "{}", p.sd());
         assert_eq!(p.count, 10_170);
     }

@@ -1,7 +1,7 @@
-//! Numbers for people.
+//! Formats numbers for people.
 
-/// About four significant digits, without a trailing zero too many; `-` for what is not a
-/// number.
+/// Formats a number with about four significant digits and without unneeded trailing
+/// zeros; `-` for NaN.
 pub fn number(x: f64) -> String {
     if x.is_nan() {
         return "-".into();
@@ -19,7 +19,7 @@ pub fn number(x: f64) -> String {
     if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').to_owned() } else { s }
 }
 
-/// A time: `0.42 s`, `12 s`, `3 min 5 s`.
+/// Formats a time: `0.42 s`, `12 s`, `3 min 5 s`.
 pub fn seconds(s: f64) -> String {
     if s < 10.0 {
         format!("{s:.2} s")

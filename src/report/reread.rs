@@ -1,7 +1,7 @@
-//! The draws of a run read back from its folder, as they were in memory when it ended.
+//! Reads the draws of a run from its folder, as they were in memory when it ended.
 //!
-//! Invariant: as many draws are kept, and as many are left out, as the run itself kept
-//! and left out for its summary.
+//! Invariant: the draws that are kept and left out are those that the run itself kept and
+//! left out for its summary.
 
 use super::aligned::{all_name, draws_name, look};
 use super::csv::DrawReader;
@@ -12,11 +12,11 @@ use crate::infer::draws::{DrawRow, Sink};
 use std::fs::File;
 use std::io::{self, BufReader};
 
-/// The draws of each chain of a run, with room for so many numbers of all of them; a line
-/// that is not finished is left out.
+/// Reads the draws of each chain of a run, with room for `room` numbers in all of them
+/// together; an incomplete line is left out.
 ///
 /// # Errors
-/// If a file cannot be read, or is none of draws.
+/// Returns an error if a file cannot be read, or is not a file of draws.
 pub fn reread(dir: &RunDir, room: usize) -> io::Result<Vec<ChainDraws>> {
     let chains: Vec<u32> =
         (0..u32::MAX).take_while(|c| dir.file(&draws_name(*c)).is_file()).collect();
@@ -26,7 +26,8 @@ pub fn reread(dir: &RunDir, room: usize) -> io::Result<Vec<ChainDraws>> {
             io::Error::new(e.kind(), format!("{}: {e}", dir.file(name).display()))
         };
         let (short, whole) = (draws_name(*chain), all_name(*chain));
-        // Where one chain came further than another, the summary is of what all have.
+        // If some chains got further than others, the summary uses only the draws that
+        // all have.
         let name = match dir.file(&whole).is_file() {
             true => {
                 even = even.min(look(&dir.file(&short)).map_err(|e| told(&short, e))?.draws);
@@ -58,9 +59,9 @@ fn read(dir: &RunDir, name: &str, chain: u32, mut memory: Memory) -> io::Result<
     Ok(())
 }
 
-/// Gives quantities that were read from files the names that they had before, in the same
-/// order: files cannot bear every name. Where there are more or fewer names, they stay as
-/// they are.
+/// Restores the names that quantities had before they were written to files, in the same
+/// order, because files cannot represent every name. If the numbers of names and
+/// quantities differ, the names stay unchanged.
 pub fn rename<'a>(quantities: &mut [Quantity], names: impl ExactSizeIterator<Item = &'a str>) {
     if names.len() == quantities.len() {
         quantities.iter_mut().zip(names).for_each(|(q, name)| name.clone_into(&mut q.name));

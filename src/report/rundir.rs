@@ -1,19 +1,19 @@
-//! The folder of a run: readable at any moment, never mixed with anything else.
+//! The folder of a run: readable at any moment, and never mixed with other files.
 //!
-//! Invariant: a file written through [`RunDir::write`] is whole or absent; draws are the
-//! only files that grow. The folder holds one run: what an earlier run left is removed
+//! Invariant: a file written through [`RunDir::write`] is complete or absent; only files
+//! of draws grow. The folder holds one run: the files of an earlier run are removed
 //! before the next one starts.
 
 use super::atomic_write::{is_partial, write_atomically};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The file every run folder has.
+/// The file that marks the folder of a run.
 pub const MARK: &str = "run.json";
-/// What it holds while an earlier run is cleared away.
+/// Its contents while the files of an earlier run are being removed.
 const CLEARED: &[u8] = b"{}";
-/// What a run writes besides `run.json`, files with numbers, and what its program
-/// exports.
+/// The files that a run writes besides `run.json`, numbered files, and the exports of its
+/// program.
 const WRITTEN: [&str; 19] = [
     "program.pcad",
     "traces.jsonl",
@@ -36,24 +36,24 @@ const WRITTEN: [&str; 19] = [
     "report.html",
 ];
 
-/// A folder that cannot be used.
+/// The reasons why a folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum RunDirError {
-    /// It holds something else.
+    /// It holds other files.
     #[error("{0} is not empty and is not the folder of a run; choose another with --out")]
     Occupied(PathBuf),
-    /// It holds something, and no evaluation.
+    /// It holds files, but no evaluation.
     #[error("{0} is not empty and is not the folder of an evaluation; choose another with --out")]
     NoEvaluation(PathBuf),
-    /// It holds no run.
+    /// It does not hold a run.
     #[error("{0} is not the folder of a run")]
     NoRun(PathBuf),
-    /// It cannot be made or written.
+    /// It cannot be created or written.
     #[error("{path}: {error}")]
     Io {
-        /// Where.
+        /// The path.
         path: PathBuf,
-        /// What.
+        /// The error.
         error: io::Error,
     },
 }
@@ -65,12 +65,12 @@ pub struct RunDir {
 }
 
 impl RunDir {
-    /// Makes the folder. One that holds an earlier run is used again, and what that run
-    /// left is removed first, so that draws and pictures of two runs are never side by
-    /// side.
+    /// Creates the folder. If it holds an earlier run, the files of that run are removed
+    /// first, so that draws and pictures of two runs are never mixed.
     ///
     /// # Errors
-    /// If it cannot be made, or holds files that are none of a run's.
+    /// Returns an error if it cannot be created, or holds files that do not belong to a
+    /// run.
     pub fn create(path: &Path) -> Result<RunDir, RunDirError> {
         let io = |error| RunDirError::Io { path: path.to_owned(), error };
         std::fs::create_dir_all(path).map_err(io)?;
@@ -80,11 +80,12 @@ impl RunDir {
             .collect::<Result<_, _>>()
             .map_err(io)?;
         let names: Vec<&str> = names.iter().map(|n| n.to_str().unwrap_or("")).collect();
-        // A run that was killed before its first file was whole leaves only that.
+        // A run that was killed before its first file was complete leaves only a partial
+        // file.
         if !names.contains(&MARK) && names.iter().any(|n| !is_partial(n)) {
             return Err(RunDirError::Occupied(path.to_owned()));
         }
-        // Its mark must not stand for a whole run when this is stopped half way.
+        // If this is interrupted, the mark must not stand for a complete run.
         if names.contains(&MARK) {
             write_atomically(path, MARK, CLEARED).map_err(io)?;
         }
@@ -98,20 +99,21 @@ impl RunDir {
         Ok(RunDir { path: path.to_owned() })
     }
 
-    /// The first of `name`, `name-2`, `name-3`, … that does not exist yet.
+    /// Creates the first of the folders `name`, `name-2`, `name-3`, … that does not exist
+    /// yet.
     ///
     /// # Errors
-    /// If it cannot be made.
+    /// Returns an error if it cannot be created.
     pub fn fresh(parent: &Path, name: &str) -> Result<RunDir, RunDirError> {
         let free = (1..MOST).map(|n| numbered(parent, name, n)).find(|p| !p.exists());
         let free = free.unwrap_or_else(|| numbered(parent, name, MOST));
         RunDir::create(&free)
     }
 
-    /// A folder that holds a run, with all that is in it.
+    /// Opens a folder that holds a run, and keeps its files.
     ///
     /// # Errors
-    /// If it holds none.
+    /// Returns an error if it does not hold a run.
     pub fn open(path: &Path) -> Result<RunDir, RunDirError> {
         match path.join(MARK).is_file() {
             true => Ok(RunDir { path: path.to_owned() }),
@@ -119,41 +121,44 @@ impl RunDir {
         }
     }
 
-    /// The last one that [`RunDir::fresh`] made, or the first that it would make.
+    /// Returns the last folder that [`RunDir::fresh`] created, or the first that it would
+    /// create.
     pub fn latest(parent: &Path, name: &str) -> PathBuf {
         let made = (1..MOST).map(|n| numbered(parent, name, n)).take_while(|p| p.exists()).last();
         made.unwrap_or_else(|| numbered(parent, name, 1))
     }
 
-    /// Where it is.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The path of a file in it.
+    /// Returns the path of a file in the folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// Writes a file: under another name first, so that no reader sees half of it.
+    /// Writes a file under a temporary name first, so that readers never see half of it.
     ///
     /// # Errors
-    /// If it cannot be written; an older file of the name is kept then.
+    /// Returns an error if it cannot be written; an older file of the same name is then
+    /// kept.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
         write_atomically(&self.path, name, bytes)
             .map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
 }
 
-/// The most folders of runs with one name.
+/// The maximum number of run folders with the same name.
 const MOST: u32 = 10_000;
 
-/// `name`, `name-2`, `name-3`, ….
+/// Returns the path `name`, `name-2`, `name-3`, ….
 fn numbered(parent: &Path, name: &str, n: u32) -> PathBuf {
     parent.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") })
 }
 
-/// Whether a file holds draws of a chain, its checkpoint, or the picture of a mode.
+/// Returns whether a file holds draws of a chain, its checkpoint, or the picture of a
+/// mode.
 fn is_numbered(name: &str) -> bool {
     let forms =
         [("chain-", ".csv"), ("draws-", ".csv"), ("chain-", ".checkpoint"), ("mode-", ".png")];
@@ -166,7 +171,7 @@ fn is_numbered(name: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// An empty folder of a test's own.
+    /// Returns the path of a folder for one test, which does not exist yet.
     fn base(name: &str) -> PathBuf {
         let base =
             std::env::temp_dir().join(format!("pcadlang-rundir-{name}-{}", std::process::id()));

@@ -1,25 +1,26 @@
-//! Sinks that keep draws in memory, and that send them to several places.
+//! Sinks that keep draws in memory, and that send draws to several sinks.
 
 use super::draws::ChainDraws;
 use crate::infer::draws::{Column, DrawRow, Sink};
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Keeps the draws of a chain in memory. Clones share them, so that one clone can be
-/// handed to the chain and the other looked into.
+/// Keeps the draws of a chain in memory. Clones share them, so that the chain can write
+/// to one clone while another is read.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
     draws: Arc<Mutex<ChainDraws>>,
-    /// The most numbers it holds; 0: no bound.
+    /// The maximum number of numbers to keep; 0 means no bound.
     room: usize,
 }
 
-/// The numbers that a draw takes besides those recorded.
+/// The size of a draw in numbers, in addition to its recorded values.
 const OVERHEAD: usize = 14;
 
 impl Memory {
-    /// Room for so many numbers: when they are used up, every other draw is let go, and
-    /// from then on only every second one is kept, every fourth, and so on.
+    /// Creates a sink with room for `room` numbers. When it is full, every second draw is
+    /// dropped, and from then on only every second draw is kept; then every fourth, and
+    /// so on.
     pub fn bounded(room: usize) -> Memory {
         Memory { room, ..Memory::default() }
     }
@@ -28,7 +29,7 @@ impl Memory {
         self.draws.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The draws so far.
+    /// Returns the draws so far.
     pub fn draws(&self) -> ChainDraws {
         self.lock().clone()
     }
@@ -67,7 +68,8 @@ impl Sink for Memory {
     }
 }
 
-/// Hands everything to each of its sinks, in order; an error stops the row there.
+/// Passes everything to each of its sinks, in order; after an error, the remaining sinks
+/// are skipped.
 #[derive(Default)]
 pub struct Tee(pub Vec<Box<dyn Sink>>);
 

@@ -6,12 +6,12 @@ use std::fmt::Write;
 
 pub use super::warnings::warnings;
 
-/// Letters in a line of the tables of a run.
+/// The maximum width of a table of a run, in characters.
 pub const COLUMNS: usize = 100;
-/// Elements of one vector that are shown.
+/// The number of elements of a vector that are shown.
 const SHOWN: usize = 6;
 
-/// Rows of aligned columns; the first is flush left.
+/// Aligns the columns of rows; the first column is flush left, the others flush right.
 pub fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| {
@@ -31,13 +31,13 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
     s
 }
 
-/// Mean, spread, 90 % interval, effective sample size (and that of a second of the
-/// kernels' time) and R-hat of each quantity.
+/// Formats mean, standard deviation, 90 % interval, effective sample size (also per
+/// second of the kernels' time) and R-hat of each quantity.
 pub fn quantities(quantities: &[Quantity], kernel_seconds: f64) -> String {
     summaries(quantities, Some(kernel_seconds))
 }
 
-/// The same of a single chain: without R-hat, and without times.
+/// Formats the same table for a single chain, without R-hat and times.
 pub fn means(quantities: &[Quantity]) -> String {
     summaries(quantities, None)
 }
@@ -75,18 +75,18 @@ fn summaries(quantities: &[Quantity], seconds: Option<f64>) -> String {
     text
 }
 
-/// Effective draws in a second; none where that says nothing.
+/// Returns the number of effective draws per second, if it is defined.
 pub fn per_second(ess: f64, seconds: f64) -> Option<f64> {
     Some(ess / seconds).filter(|r| r.is_finite() && seconds > 0.0)
 }
 
-/// At least one digit, and no more than three that count.
+/// Formats a number with one decimal below 10, and as an integer otherwise.
 fn whole(x: f64) -> String {
     if x < 10.0 { number((x * 10.0).round() / 10.0) } else { number(x.round()) }
 }
 
-/// The choices that single-site kernels move least often, over all chains; nothing where
-/// there is only one.
+/// Formats the choices that single-site kernels move least often, over all chains; empty
+/// if there are fewer than two choices.
 pub fn sites(sites: &[SiteStats]) -> String {
     if sites.len() < 2 {
         return String::new();
@@ -110,7 +110,7 @@ pub fn sites(sites: &[SiteStats]) -> String {
     text
 }
 
-/// What the kernels did, over all chains.
+/// Formats the statistics of the kernels, over all chains.
 pub fn kernels(kernels: &[KernelStats]) -> String {
     let mut rows =
         vec![["kernel", "proposals", "accepted", "failed", "time"].map(str::to_owned).to_vec()];
@@ -137,8 +137,8 @@ pub fn kernels(kernels: &[KernelStats]) -> String {
     text
 }
 
-/// Names (the first column) are cut in their middle until the lines fit, for their ends
-/// tell them apart.
+/// Cuts names (the first column) in the middle until the lines fit, because their ends
+/// distinguish them.
 pub(super) fn narrowed(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
     let width = |rows: &[Vec<String>], c: usize| {
         rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max()
@@ -157,7 +157,8 @@ pub(super) fn narrowed(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
     rows
 }
 
-/// Adds up the kernels of several chains by name, in order of first appearance.
+/// Adds up the statistics of the kernels of several chains by name, in order of first
+/// appearance.
 pub fn merged<'a>(chains: impl IntoIterator<Item = &'a [KernelStats]>) -> Vec<KernelStats> {
     KernelStats::total(chains.into_iter().flatten())
 }

@@ -1,20 +1,19 @@
-//! What a reader should know before believing the numbers of a run, and what to do about
-//! it.
+//! Warnings about the reliability of a run's results, and possible remedies.
 //!
-//! Thresholds are those of Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021): R-hat of
-//! at most 1.01 and 100 effective draws a chain.
+//! The thresholds are those of Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021):
+//! R-hat of at most 1.01 and 100 effective draws per chain.
 
 use super::Quantity;
 use super::modes::{self, DISAGREE, Mode};
 use crate::infer::draws::KernelStats;
 
-/// Proposals before a kernel is judged.
+/// The minimum number of proposals for a kernel to be judged.
 const JUDGED: u64 = 200;
-/// Draws of a chain before it counts as stuck.
+/// The minimum number of draws for a chain to count as stuck.
 const STUCK: usize = 50;
 
-/// Sentences for the user, the gravest first; none if all is well. `chains` is the number
-/// of chains that were run.
+/// Returns sentences for the user, the most serious first; the list is empty if there is
+/// nothing to warn about. `chains` is the number of chains that were run.
 pub fn warnings(
     quantities: &[Quantity],
     modes: &[Mode],
@@ -83,13 +82,13 @@ pub fn warnings(
     out
 }
 
-/// The largest value of `f` that is a number, and the quantity it is of.
+/// Returns the largest value of `f` that is not NaN, and the name of its quantity.
 fn worst(quantities: &[Quantity], f: impl Fn(&Quantity) -> f64) -> Option<(f64, &str)> {
     let known = quantities.iter().map(|q| (f(q), &*q.name)).filter(|(x, _)| !x.is_nan());
     known.max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Whether no chain is long enough to be split and compared.
+/// Returns whether some chain is too short to be split and compared.
 fn too_short(q: &Quantity) -> bool {
     q.chains.iter().any(|c| c.len() < 4)
 }
@@ -104,7 +103,7 @@ mod tests {
         Quantity { name: name.into(), column: None, summary: summary(&chains), chains }
     }
 
-    /// Numbers without any order to them, between 0 and 1.
+    /// Returns numbers between 0 and 1 without any order.
     fn noise(seed: u64, n: u64) -> Vec<f64> {
         (0..n)
             .map(|i| (((i + 1) * (i + seed) * 2_654_435_761) % 1_000_003) as f64 / 1_000_003.0)

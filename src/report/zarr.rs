@@ -1,11 +1,11 @@
-//! A run as ArviZ keeps it: `inference.zarr`, a folder in the Zarr format (version 2),
-//! that `xarray.open_datatree(…, engine="zarr")` and, with Zarr's own second version,
-//! `arviz.from_zarr` open. Groups: `posterior`, `sample_stats`, `log_likelihood` and
-//! `observed_data`.
+//! A run in ArviZ's format: `inference.zarr`, a folder in the Zarr format (version 2),
+//! which can be opened by `xarray.open_datatree(…, engine="zarr")` and, with version 2 of
+//! the Zarr library, by `arviz.from_zarr`. Its groups are `posterior`, `sample_stats`,
+//! `log_likelihood` and `observed_data`.
 //!
-//! Arrays have one chunk and no compression: eight bytes a number, little-endian. Vectors
-//! have a dimension `NAME_dim_0`, observed values one dimension `observation` with their
-//! names as its coordinate. `/` in names is `.`, as programs have it.
+//! Arrays have one chunk and no compression; numbers are 8 bytes, little-endian. A vector
+//! has a dimension `NAME_dim_0`; observed values have one dimension `observation`, with
+//! their names as its coordinate. `/` in names becomes `.`, as in programs.
 
 use super::ChainDraws;
 use crate::infer::draws::{Column, DrawRow, POINTWISE, Shape};
@@ -14,13 +14,13 @@ use std::collections::HashSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The name of the folder in a run's folder.
+/// The name of the folder inside a run's folder.
 pub const ZARR: &str = "inference.zarr";
 
-/// An observed value: its name, and its number; NaN of what is none.
+/// The name of an observed value, and the value; NaN if it is not a number.
 pub type Point = (String, f64);
 
-/// The numbers of an array.
+/// The elements of an array.
 enum Numbers {
     Floats(Vec<f64>),
     Integers(Vec<i64>),
@@ -35,13 +35,13 @@ struct Array {
     numbers: Numbers,
 }
 
-/// Writes the draws of a run's chains, with the step size of each one's Hamiltonian
-/// kernel if it has one, brought to the same columns before; of chains with draws as many
-/// of each as the one with the fewest has. An older folder is replaced when the new one
-/// is whole.
+/// Writes the draws of a run's chains, which must have the same columns, with the step
+/// size of each chain's Hamiltonian kernel if it has one. Chains without draws are left
+/// out, and the others are cut to the length of the shortest. An older folder is replaced
+/// when the new one is complete.
 ///
 /// # Errors
-/// If it cannot be written.
+/// Returns an error if it cannot be written.
 pub fn write(
     dir: &Path,
     chains: &[ChainDraws],
@@ -94,7 +94,7 @@ pub fn write(
     std::fs::rename(&partial, &place)
 }
 
-/// Removes a folder with all that is in it, if it is there.
+/// Removes a folder with its contents, if it exists.
 fn remove(path: &Path) -> io::Result<()> {
     match std::fs::remove_dir_all(path) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
@@ -102,7 +102,7 @@ fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Where the numbers of a column are in a row, and how many there are.
+/// Returns the position of a column's numbers in a row, and how many there are.
 fn place_of(columns: &[Column], name: &str) -> Option<(usize, usize)> {
     let before = columns.iter().position(|c| c.name == name)?;
     Some((columns[..before].iter().map(|c| c.shape.len()).sum(), columns[before].shape.len()))
@@ -140,7 +140,7 @@ fn sample_stats(rows: &[&DrawRow], dims: &[(String, usize)]) -> Vec<Array> {
     ]
 }
 
-/// A name that a folder can have, unlike those before it.
+/// Converts a name to one that is valid for a folder and differs from all names taken.
 fn name_of(name: &str, taken: &mut HashSet<String>) -> String {
     let fits = |c: char| c.is_alphanumeric() || "_.-+[]()".contains(c);
     let plain: String = name
@@ -161,15 +161,15 @@ fn name_of(name: &str, taken: &mut HashSet<String>) -> String {
     all.find(|name| taken.insert(name.to_lowercase())).unwrap_or(plain)
 }
 
-/// A folder that is being filled.
+/// A folder that is being written.
 struct Store {
     dir: PathBuf,
-    /// All that its small files say, which readers want in one.
+    /// The contents of all metadata files, which readers expect in one file.
     metadata: Map<String, Value>,
 }
 
 impl Store {
-    /// Writes a group with its arrays and, for each dimension, the coordinate that counts
+    /// Writes a group with its arrays and, for each dimension, a coordinate that counts
     /// from 0.
     fn group(&mut self, name: &str, arrays: Vec<Array>) -> io::Result<()> {
         self.put(&format!("{name}/.zgroup"), json!({ "zarr_format": 2 }))?;
@@ -190,7 +190,7 @@ impl Store {
     /// Writes an array into its group.
     fn save(&mut self, group: &str, array: &Array) -> io::Result<()> {
         let place = format!("{group}/{}", array.name);
-        // No value stands for a missing one, or readers would take zeros for that.
+        // The fill value is null; otherwise readers would take zeros for missing values.
         let (kind, bytes): (String, Vec<u8>) = match &array.numbers {
             Numbers::Floats(xs) => {
                 ("<f8".into(), xs.iter().flat_map(|x| x.to_le_bytes()).collect())
@@ -228,7 +228,7 @@ impl Store {
         Ok(())
     }
 
-    /// Writes what all the small files say.
+    /// Writes the consolidated metadata.
     fn end(self) -> io::Result<()> {
         let all = json!({ "zarr_consolidated_format": 1, "metadata": self.metadata });
         std::fs::write(
@@ -238,7 +238,7 @@ impl Store {
     }
 }
 
-/// Texts as numpy has them: four bytes a letter, all of one length.
+/// Encodes texts as numpy does: four bytes per character, all padded to one length.
 fn texts(all: &[String]) -> (String, Vec<u8>) {
     let length = all.iter().map(|s| s.chars().count()).max().unwrap_or(0).max(1);
     let letters = |s: &String| {
@@ -292,14 +292,14 @@ mod tests {
             json!(["chain", "draw", "w_dim_0"])
         );
         assert_eq!(floats("sample_stats/lp/0.0"), [-1.0, -2.0, -4.0, -5.0]);
-        // Each chain's own, and the one without draws is left out.
+        // Each chain has its step size, and the one without draws is left out.
         assert_eq!(floats("sample_stats/step_size/0.0"), [0.25, 0.25, 0.5, 0.5]);
         assert_eq!(floats("log_likelihood/observed/0.0.0"), [-0.5; 4]);
         assert_eq!(floats("observed_data/observed/0"), [7.0]);
         assert_eq!(json("log_likelihood/observation/.zarray")["dtype"], "<U4");
         assert_eq!(read("log_likelihood/observation/0")[8..12], 0xe4u32.to_le_bytes());
         assert!(!dir.join(ZARR).join("posterior").join(POINTWISE).exists());
-        // Without draws there is nothing in it, and it is no error.
+        // Without draws the folder is empty, which is not an error.
         write(&dir, &[], &[], &[]).unwrap();
         assert!(!dir.join(ZARR).join("log_likelihood").exists());
         std::fs::remove_dir_all(&dir).unwrap();

@@ -1,10 +1,11 @@
 //! Address literals, `@pose[upperarm_l]/bone#2/rot[{k}]`, and tag selections,
-//! `$bone:arm_l`: one token each.
+//! `$bone:arm_l`. Each of them is a single token.
 //!
-//! A segment is a name, `*` (any one) or `**` (any number), then the occurrence `#n` and
-//! keys, in either order. Segments are separated by `/`; a `.` is read as one. There is
-//! no space inside, so `@a / 2` divides and `@a/b` does not. A computed key `[{…}]` is
-//! lexed and parsed like any other expression.
+//! A segment is a name, `*` (any one segment) or `**` (any number of segments), followed
+//! by the occurrence `#n` and keys, in either order. Segments are separated by `/`; a `.`
+//! is read as `/`. Spaces inside an address are not allowed, so `@a / 2` is a division
+//! and `@a/b` is not. A computed key `[{…}]` is lexed and parsed like any other
+//! expression.
 
 use super::ast::{Address, Expr, ExprKind, Key, Segment, SegmentName};
 use super::deep::Deep;
@@ -16,18 +17,18 @@ use super::token::{Token, is_name};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// The deepest nesting of addresses in computed keys of addresses.
+/// The maximum nesting of addresses in computed keys of addresses.
 const MAX_LEVEL: u32 = 8;
 
-/// What is read so far.
+/// The state of an address scan.
 struct Scanner<'a, 's> {
     lexer: &'a mut Lexer<'s>,
     at: usize,
     depth: u32,
 }
 
-/// The address whose `@` is at `start` and ends at `at`, and its end. After an error it
-/// holds what came before.
+/// Scans the address whose `@` starts at `start` and ends at `at`. Returns the address
+/// and its end; after an error, the address holds the segments read before it.
 pub(super) fn scan(lexer: &mut Lexer<'_>, start: usize, at: usize) -> (Rc<Deep<Address>>, usize) {
     let mut scanner = Scanner { lexer, at, depth: 1 };
     let mut segments = Vec::new();
@@ -87,7 +88,7 @@ impl<'s> Scanner<'_, 's> {
         Some(SegmentName::Name(name.into()))
     }
 
-    /// `#n` and `[key]`.
+    /// Reads the suffixes `#n` and `[key]` of a segment.
     fn suffixes(&mut self, segment: &mut Segment) -> Result<(), AddressError> {
         let mut numbered = false;
         loop {
@@ -136,7 +137,7 @@ impl<'s> Scanner<'_, 's> {
         Ok(key)
     }
 
-    /// The expression after `[{`, up to its `}`.
+    /// Parses the expression after `[{`, up to its `}`.
     fn computed_key(&mut self) -> Result<Expr, AddressError> {
         let start = self.at;
         let length = key_length(self.rest()).ok_or(AddressError::OpenKey)?;
@@ -153,7 +154,8 @@ impl<'s> Scanner<'_, 's> {
         Ok(expr.node)
     }
 
-    /// After an error in a key: skips to its end, if that is near.
+    /// Skips the rest of a bad key, if its `]` comes before the end of the line and any
+    /// `;`.
     fn skip_key(&mut self) {
         let rest = self.rest();
         let near = rest.find(['\n', ';']).unwrap_or(rest.len());
@@ -163,8 +165,8 @@ impl<'s> Scanner<'_, 's> {
     }
 }
 
-/// Whether a word that parses as a number is written as the language writes it: neither
-/// `+1` nor `.5` nor `1.`.
+/// Returns whether a word that parses as an `f64` is also a number of the language, which
+/// excludes `+1`, `.5` and `1.`.
 fn is_number(word: &str) -> bool {
     let digits = word.strip_prefix('-').unwrap_or(word);
     digits.starts_with(|c: char| c.is_ascii_digit())
@@ -172,7 +174,7 @@ fn is_number(word: &str) -> bool {
         && !digits.contains(".e")
 }
 
-/// The length of the text before the `}` that closes a computed key.
+/// Returns the length of the text before the `}` that closes a computed key.
 fn key_length(text: &str) -> Option<usize> {
     let mut depth = 0_usize;
     let mut chars = text.char_indices();
@@ -182,14 +184,15 @@ fn key_length(text: &str) -> Option<usize> {
             '}' if depth == 0 => return Some(i),
             '}' => depth -= 1,
             '"' => {
-                // A string may hold braces.
+                // A string may contain braces.
                 while let Some((_, c)) = chars.next().filter(|(_, c)| *c != '"' && *c != '\n') {
                     if c == '\\' {
                         chars.next();
                     }
                 }
             }
-            // A key is short; without its end, what follows would be taken for it.
+            // A key is short; if its end is missing, do not read the following text as
+            // part of it.
             '\n' | ';' => return None,
             _ => {}
         }
@@ -198,7 +201,8 @@ fn key_length(text: &str) -> Option<usize> {
 }
 
 impl<'s> Lexer<'s> {
-    /// The tag selection whose `$` is at `start` and ends at `at`, and its end.
+    /// Scans the tag selection whose `$` starts at `start` and ends at `at`. Returns its
+    /// token and its end.
     pub(super) fn tag_selection(&mut self, start: usize, at: usize) -> (Option<Token<'s>>, usize) {
         let Some(name) = self.name(at) else {
             self.error(SyntaxErrorKind::TagSelection, start, at);

@@ -20,7 +20,7 @@ pub struct Program {
 /// A top-level item.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// What it is.
+    /// The kind of item.
     pub kind: ItemKind,
     /// The whole item, with its semicolon.
     pub span: Span,
@@ -33,7 +33,8 @@ pub enum ItemKind {
     Include {
         /// The path, relative to the including file, or `std/…`.
         path: Spanned<Arc<str>>,
-        /// The namespace its names go into; without one they join this file's.
+        /// The namespace of the included names; without one, they are added to this
+        /// file's.
         alias: Option<Name>,
     },
     /// `param name: type = default "help";`, set by `--set name=value`.
@@ -53,14 +54,14 @@ pub enum ItemKind {
     },
     /// `report e, … as "file";`
     Report {
-        /// What to report.
+        /// The reported expressions.
         exprs: Vec<Expr>,
         /// The file in the run directory, if named.
         file: Option<Spanned<Arc<str>>>,
     },
     /// `export e to "file";`
     Export {
-        /// What to export.
+        /// The exported expression.
         expr: Expr,
         /// The file in the run directory.
         file: Spanned<Arc<str>>,
@@ -122,22 +123,22 @@ pub struct Param {
     pub default: Option<Expr>,
 }
 
-/// `{ stmt* expr }`: statements and the value of the last expression (nothing, if there
-/// is none).
+/// `{ stmt* expr }`: statements, then the expression whose value is that of the body.
+/// Without one, the body has no value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// The statements.
     pub stmts: Vec<Stmt>,
-    /// The value.
+    /// The final expression, if any.
     pub result: Option<Box<Expr>>,
-    /// From brace to brace.
+    /// The span from the opening to the closing brace.
     pub span: Span,
 }
 
 /// A model statement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stmt {
-    /// What it is.
+    /// The kind of statement.
     pub kind: StmtKind,
     /// The whole statement, with its semicolon.
     pub span: Span,
@@ -226,7 +227,7 @@ pub enum StmtKind {
     For {
         /// The loop variable.
         var: Name,
-        /// What it runs over: a range, an array, or a record's keys.
+        /// The iterated expression: a range, an array, or a record's keys.
         iter: Expr,
         /// The body.
         body: Vec<Stmt>,
@@ -249,9 +250,9 @@ pub struct Tag {
 /// An expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expr {
-    /// What it is.
+    /// The kind of expression.
     pub kind: ExprKind,
-    /// Where it stands.
+    /// Its place in the source.
     pub span: Span,
 }
 
@@ -272,7 +273,7 @@ pub enum ExprKind {
     TagSel {
         /// The tag's name.
         name: Arc<str>,
-        /// The value asked for.
+        /// The value that the tag must have, if given.
         value: Option<Arc<str>>,
     },
     /// `[a, b]`
@@ -320,9 +321,9 @@ pub enum ExprKind {
     If {
         /// The condition.
         cond: Box<Expr>,
-        /// When true.
+        /// The branch taken if the condition is true.
         then: Box<Body>,
-        /// When false; `else if` is a body holding one `if`.
+        /// The branch taken if it is false; `else if` is a body that holds a single `if`.
         otherwise: Box<Body>,
     },
     /// `fn(x) { … }`
@@ -385,7 +386,8 @@ pub struct Address {
 pub struct Segment {
     /// The name.
     pub name: SegmentName,
-    /// `#n`: which textual call site or unnamed observation; 1 when not written.
+    /// `#n`: the number of the textual call site or unnamed observation; 1 if not
+    /// written.
     pub occurrence: u32,
     /// `[key]`, any number of them.
     pub keys: Vec<Key>,
@@ -418,7 +420,7 @@ pub enum Key {
 /// A statement of an inference block or kernel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KStmt {
-    /// What it is.
+    /// The kind of statement.
     pub kind: KStmtKind,
     /// The whole statement.
     pub span: Span,
@@ -429,14 +431,14 @@ pub struct KStmt {
 pub enum KStmtKind {
     /// `warmup n { … }`
     Warmup {
-        /// How many times.
+        /// The number of passes.
         count: Expr,
         /// The body.
         body: Vec<KStmt>,
     },
     /// `repeat n { … }`
     Repeat {
-        /// How many times.
+        /// The number of passes.
         count: Expr,
         /// The body.
         body: Vec<KStmt>,
@@ -454,7 +456,7 @@ pub enum KStmtKind {
     For {
         /// The loop variable.
         var: Name,
-        /// What it runs over.
+        /// The iterated expression.
         iter: Expr,
         /// The body.
         body: Vec<KStmt>,
@@ -470,7 +472,8 @@ pub enum KStmtKind {
         /// The proposal distribution.
         dist: Expr,
     },
-    /// `propose @x = e;`, in kernels only: what a choice or auxiliary variable becomes.
+    /// `propose @x = e;`, in kernels only: the new value of a choice or auxiliary
+    /// variable.
     Map {
         /// The address of one choice, or the name of an auxiliary variable.
         target: Expr,

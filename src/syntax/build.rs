@@ -1,5 +1,5 @@
-//! What the grammar's actions do: building the tree, and the checks that are easier here
-//! than in productions.
+//! The actions of the grammar: they build the tree, and make the checks that are easier
+//! here than in productions.
 
 use super::ast::*;
 use super::deep::{Deep, MAX_DEPTH, all, opt};
@@ -7,16 +7,16 @@ use super::error::{SyntaxError, SyntaxErrorKind};
 use super::span::{FileId, Span, Spanned};
 use std::sync::Arc;
 
-/// The state of the actions: which file the spans are in, and the errors found so far.
+/// The state of the actions: the file of the spans, and the errors so far.
 pub(crate) struct Builder {
     file: FileId,
-    /// Errors of the actions; the text itself parses.
+    /// Errors found by the actions; the text itself parses.
     pub errors: Vec<SyntaxError>,
     too_deep: bool,
 }
 
-/// A statement of a body, and whether it is an `if … else …` without a semicolon: as the
-/// last one, it is the value.
+/// A statement of a body. `open_if` marks an `if … else …` without a semicolon; as the
+/// last statement, it is the value of the body.
 pub(crate) struct BodyStmt {
     stmt: Deep<Stmt>,
     open_if: bool,
@@ -39,28 +39,29 @@ impl Builder {
         Spanned::new(text, self.span(start, end))
     }
 
-    // Every node that has children goes through `expr` or `body`, so these two keep the
-    // limit.
+    // Every node with children goes through `expr`, `block` or `body`, which enforce the
+    // depth limit.
 
-    /// An expression over parts of the given depth.
+    /// Builds an expression from parts of the given depth.
     pub fn expr(&mut self, start: usize, parts: Deep<ExprKind>, end: usize) -> Deep<Expr> {
         let span = self.span(start, end);
         let Deep { node: kind, depth } = self.limit(span, parts, || ExprKind::Error);
         Deep { node: Expr { kind, span }, depth }
     }
 
-    /// An expression without parts.
+    /// Builds an expression without parts.
     pub fn atom(&self, start: usize, kind: ExprKind, end: usize) -> Deep<Expr> {
         Deep::leaf(Expr { kind, span: self.span(start, end) })
     }
 
-    /// Statements in braces, which count as a level.
+    /// Builds the statements in braces, which count as a level.
     pub fn block<T>(&mut self, start: usize, stmts: Vec<Deep<T>>, end: usize) -> Deep<Vec<T>> {
         let span = self.span(start, end);
         self.limit(span, all(stmts), Vec::new)
     }
 
-    /// One level more than the parts; `cut` in their place if that is too deep.
+    /// Adds a level to the parts; if that is too deep, reports it once and returns
+    /// `cut()` instead.
     fn limit<T>(&mut self, span: Span, parts: Deep<T>, cut: impl FnOnce() -> T) -> Deep<T> {
         let depth = parts.depth + 1;
         if depth <= MAX_DEPTH {
@@ -127,7 +128,7 @@ impl Builder {
         all(params).and(body).map(|(params, body)| Lambda { params, body })
     }
 
-    /// `if cond { … } else { … }`
+    /// Builds `if cond { … } else { … }`.
     pub fn if_else(
         &mut self,
         at: usize,
@@ -144,7 +145,7 @@ impl Builder {
         self.expr(at, parts, end)
     }
 
-    /// `if cond { … }`, a statement: nothing happens otherwise, so there can be no value.
+    /// Builds the statement `if cond { … }`, which cannot have a value.
     pub fn if_only(
         &mut self,
         at: usize,
@@ -157,19 +158,19 @@ impl Builder {
         self.if_else(at, cond, then, empty, end)
     }
 
-    /// A branch of an `if` that lacks its last `else`.
+    /// Reports the value of a branch, in an `if` without its last `else`.
     pub fn no_value(&mut self, body: &Body) {
         if let Some(result) = &body.result {
             self.errors.push(SyntaxError::new(SyntaxErrorKind::ValueWithoutElse, result.span));
         }
     }
 
-    /// The body that `else if …` stands for.
+    /// Builds the body that stands for `else if …`.
     pub fn else_if(&mut self, nested: Deep<Expr>) -> Deep<Body> {
         nested.map(|e| Body { stmts: Vec::new(), span: e.span, result: Some(Box::new(e)) })
     }
 
-    /// `target ~ dist`, where the target has to be a name, or one with keys.
+    /// Builds `target ~ dist`; the target must be a name, with or without keys.
     pub fn draw(
         &mut self,
         target: Deep<Expr>,
@@ -195,14 +196,14 @@ impl Builder {
         BodyStmt { stmt: kind.map(|kind| Stmt { kind, span }), open_if: false }
     }
 
-    /// `if … else …` without a semicolon.
+    /// Builds an `if … else …` without a semicolon.
     pub fn open_if(&self, expr: Deep<Expr>) -> BodyStmt {
         let stmt = expr.map(|e| Stmt { span: e.span, kind: StmtKind::Expr(e) });
         BodyStmt { stmt, open_if: true }
     }
 
-    /// The statement and value of a body. Without a value of its own, a last
-    /// `if … else …` is its value.
+    /// Builds a body. Without a final expression, a last `if … else …` without a
+    /// semicolon is its value.
     pub fn body(
         &mut self,
         start: usize,

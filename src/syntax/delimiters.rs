@@ -1,27 +1,26 @@
-//! Brackets: which closes which, and what was probably meant where they do not match.
+//! Matches brackets, and repairs those that do not match.
 //!
-//! After [`balance`] every bracket of the tokens has its mate, so that
-//! [`recover`](super::recover) can find statements by hopping over brackets, and one
-//! forgotten bracket is one error, not a parse error at the end of the file. If the
-//! brackets match, nothing is changed; only if they do not, indentation and keywords are
-//! asked where one is missing.
+//! After [`balance`] every bracket has its mate. [`recover`](super::recover) can then
+//! find statements by skipping over bracketed tokens, and a forgotten bracket is one
+//! error instead of a parse error at the end of the file. Brackets that match are left
+//! unchanged; if they do not, indentation and keywords show where one is missing.
 
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 use super::lexer::Lexeme;
 use super::span::{FileId, Span};
 use super::token::Token;
 
-/// The most brackets that may be open at a time.
+/// The maximum number of brackets that may be open at a time.
 pub const MAX_NESTING: usize = 200;
 
-/// A bracket that is open.
+/// An open bracket.
 #[derive(Clone, Copy)]
 struct Open {
     /// Its index in the output.
     index: usize,
     close: char,
-    /// The indentation of its line, and that of the next token's line where that begins a
-    /// line.
+    /// The indentation of its line. `inner` is the indentation of the next token's line,
+    /// if that token begins a line.
     indent: usize,
     inner: Option<usize>,
 }
@@ -39,13 +38,13 @@ struct Balancer<'a, 's> {
 /// Tokens whose brackets match.
 pub(crate) struct Balanced<'s> {
     pub lexemes: Vec<Lexeme<'s>>,
-    /// For each bracket the index of its mate, for other tokens their own.
+    /// For each bracket, the index of its mate; for any other token, its own index.
     pub mates: Vec<usize>,
     pub errors: Vec<SyntaxError>,
 }
 
-/// The tokens with brackets added, exchanged or left out such that they match, at most
-/// [`MAX_NESTING`] inside each other; no tokens if they are deeper.
+/// Adds, replaces or removes brackets so that they match. Returns no tokens if brackets
+/// are nested more than [`MAX_NESTING`] deep.
 pub(crate) fn balance<'s>(text: &'s str, file: FileId, lexemes: Vec<Lexeme<'s>>) -> Balanced<'s> {
     match mates(&lexemes) {
         Ok(Some(mates)) => Balanced { lexemes, mates, errors: Vec::new() },
@@ -74,8 +73,8 @@ pub(crate) fn balance<'s>(text: &'s str, file: FileId, lexemes: Vec<Lexeme<'s>>)
     }
 }
 
-/// The mates, if all brackets match and no `;` stands in parentheses; the index of the
-/// first bracket that is too deep.
+/// Returns the mates, or `None` if brackets do not match or a `;` is inside parentheses
+/// or square brackets. The error is the index of the first bracket that is too deep.
 fn mates(lexemes: &[Lexeme<'_>]) -> Result<Option<Vec<usize>>, usize> {
     let mut mates: Vec<usize> = (0..lexemes.len()).collect();
     let mut open: Vec<(usize, char)> = Vec::new();
@@ -101,7 +100,7 @@ fn mates(lexemes: &[Lexeme<'_>]) -> Result<Option<Vec<usize>>, usize> {
     Ok((matched && open.is_empty()).then_some(mates))
 }
 
-/// The bracket that closes this one.
+/// Returns the bracket that closes this one.
 fn closing(token: &Token<'_>) -> Option<char> {
     match token {
         Token::LParen => Some(')'),
@@ -111,7 +110,7 @@ fn closing(token: &Token<'_>) -> Option<char> {
     }
 }
 
-/// The bracket itself, if it closes.
+/// Returns the bracket itself, if it is a closing one.
 fn closes(token: &Token<'_>) -> Option<char> {
     match token {
         Token::RParen => Some(')'),
@@ -141,7 +140,7 @@ impl<'s> Balancer<'_, 's> {
                 self.push(lexeme.clone());
             }
             if self.errors.len() > MAX_ERRORS {
-                // What is made of the rest is not looked at.
+                // After this many errors the remaining tokens do not matter.
                 break;
             }
         }
@@ -153,9 +152,9 @@ impl<'s> Balancer<'_, 's> {
         self.output.push(lexeme);
     }
 
-    /// Closes what cannot be open before token `i`: parentheses before `;` or a
-    /// statement, and braces before a statement that is indented no further than the line
-    /// that opened them.
+    /// Closes brackets that cannot be open before token `i`: parentheses and square
+    /// brackets before `;` or a statement, and braces before a statement that is not
+    /// indented further than the line that opened them.
     fn close_before(&mut self, i: usize, indent: Option<usize>) {
         let Some(lexeme) = self.input.get(i) else { return };
         let parentheses =
@@ -174,26 +173,27 @@ impl<'s> Balancer<'_, 's> {
         }
     }
 
-    /// A closing bracket.
+    /// Handles a closing bracket.
     fn close(&mut self, close: char, i: usize, indent: Option<usize>) {
         let lexeme = &self.input[i];
         let brace = self.open.iter().rposition(|open| open.close == '}');
         let parentheses = brace.map_or(0, |brace| brace + 1);
         let mate = if close == '}' {
-            // A brace that begins a line closes the one whose line is indented like it.
+            // A `}` that begins a line indented less than that of the innermost open
+            // brace closes the brace whose line has the same indentation.
             let aligned = |open: &Open| open.close == '}' && Some(open.indent) == indent;
             let inner =
                 brace.is_some_and(|b| indent.is_some_and(|indent| indent < self.open[b].indent));
             brace.map(|b| self.open.iter().rposition(aligned).filter(|_| inner).unwrap_or(b))
         } else {
-            // A brace on the same line may be forgotten, one that spans lines is not
-            // closed by this.
+            // A brace opened on the same line may lack its `}`; a block that spans lines
+            // is not closed by `)` or `]`.
             let line = self.text[..lexeme.start].rfind('\n').map_or(0, |i| i + 1);
             let passed = |open: &&Open| open.close != '}' || self.output[open.index].start >= line;
             let reach = self.open.len() - self.open.iter().rev().take_while(passed).count();
             let same =
                 self.open[reach..].iter().rposition(|open| open.close == close).map(|p| reach + p);
-            // The wrong one of `)` and `]` is exchanged.
+            // Otherwise `)` and `]` were confused.
             same.or((self.open.len() > parentheses).then(|| self.open.len() - 1))
         };
         match mate {
@@ -215,8 +215,8 @@ impl<'s> Balancer<'_, 's> {
         }
     }
 
-    /// Closes the open brackets from the `first` on before token `i`, or at the end, and
-    /// reports the innermost.
+    /// Closes the open brackets from index `first` on, before token `i` or at the end of
+    /// the text, and reports the innermost.
     fn close_from(&mut self, first: usize, i: Option<usize>) {
         let Some(innermost) = self.open[first..].last().copied() else { return };
         let opener = &self.output[innermost.index];
@@ -239,7 +239,7 @@ impl<'s> Balancer<'_, 's> {
         }
     }
 
-    /// Adds the bracket that closes `open`.
+    /// Adds the bracket that closes `open` and makes the two mates.
     fn finish(&mut self, open: Open, lexeme: Lexeme<'s>) {
         let index = self.output.len();
         self.push(lexeme);
@@ -247,22 +247,22 @@ impl<'s> Balancer<'_, 's> {
         self.mates[index] = open.index;
     }
 
-    /// The indentation of token `i`, if it is the first of its line.
+    /// Returns the indentation of token `i`, if it is the first on its line.
     fn indent_if_first(&self, i: usize) -> Option<usize> {
         let lexeme = self.input.get(i)?;
         first_on_line(self.text, self.input, i).then(|| line_indent(self.text, lexeme.start))
     }
 }
 
-/// Whether token `i` is the first of its line.
+/// Returns whether token `i` is the first on its line.
 pub(crate) fn first_on_line(text: &str, lexemes: &[Lexeme<'_>], i: usize) -> bool {
     let Some(lexeme) = lexemes.get(i) else { return false };
     let before = i.checked_sub(1).and_then(|i| lexemes.get(i)).map_or(0, |l| l.end);
     before == 0 || text.get(before..lexeme.start).is_some_and(|gap| gap.contains('\n'))
 }
 
-/// Whether token `i` is a keyword that starts a statement or item, and not the name of a
-/// field or tag.
+/// Returns whether token `i` is a keyword that starts a statement or item, and not the
+/// name of a field or tag.
 pub(crate) fn starts_statement(lexemes: &[Lexeme<'_>], i: usize) -> bool {
     let at = |i: usize| lexemes.get(i).map(|l| &l.token);
     let Some(token) = at(i) else { return false };
@@ -275,7 +275,8 @@ pub(crate) fn starts_statement(lexemes: &[Lexeme<'_>], i: usize) -> bool {
     keyword && !name
 }
 
-/// The number of spaces and tabs the line of a byte begins with.
+/// Returns the number of spaces and tabs at the start of the line that contains byte
+/// `at`.
 fn line_indent(text: &str, at: usize) -> usize {
     let start = text[..at].rfind('\n').map_or(0, |i| i + 1);
     text[start..].bytes().take_while(|b| matches!(b, b' ' | b'\t')).count()

@@ -1,15 +1,15 @@
-//! What an editor or a prompt asks of a text that is still being written: the classes of
-//! its words, and whether it goes on.
+//! Queries about text that is still being written in an editor or at a prompt: the
+//! classes of its tokens, and whether it is incomplete.
 
 use super::lexer::lex;
 use super::span::FileId;
 use super::token::Token;
 use std::ops::Range;
 
-/// What a piece of text is, for colours.
+/// The class of a piece of text, for syntax highlighting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// A word of the language.
+    /// A keyword.
     Keyword,
     /// Any other name.
     Name,
@@ -23,7 +23,7 @@ pub enum Class {
     Comment,
 }
 
-/// The pieces of a text that have a class, in order. Any text will do.
+/// Returns the pieces of a text that have a class, in order. The text need not be valid.
 pub fn classes(text: &str) -> Vec<(Range<usize>, Class)> {
     let (lexemes, _) = lex(text, 0..text.len(), FileId(0), 0);
     let mut out = Vec::with_capacity(lexemes.len());
@@ -45,7 +45,7 @@ pub fn classes(text: &str) -> Vec<(Range<usize>, Class)> {
     out
 }
 
-/// The comments between two tokens.
+/// Adds the comments between two tokens to `out`.
 fn comments(text: &str, gap: Range<usize>, out: &mut Vec<(Range<usize>, Class)>) {
     let mut at = gap.start;
     while let Some(rest) = text.get(at..gap.end) {
@@ -61,8 +61,8 @@ fn comments(text: &str, gap: Range<usize>, out: &mut Vec<(Range<usize>, Class)>)
     }
 }
 
-/// Whether a text ends within brackets or a comment, or after something that needs a
-/// right side: more is to come.
+/// Returns whether a text is incomplete: it ends inside brackets or a comment, or after a
+/// token that needs a right-hand side.
 pub fn goes_on(text: &str) -> bool {
     let (lexemes, errors) = lex(text, 0..text.len(), FileId(0), 0);
     if errors.iter().any(|e| e.kind == super::SyntaxErrorKind::UnterminatedComment) {
@@ -76,7 +76,7 @@ pub fn goes_on(text: &str) -> bool {
             _ => 0,
         };
         if depth < 0 {
-            // Nothing that follows can mend it.
+            // No continuation can match this closing bracket.
             return false;
         }
     }
@@ -86,7 +86,8 @@ pub fn goes_on(text: &str) -> bool {
     depth > 0 || lexemes.last().is_some_and(|l| open(&l.token))
 }
 
-/// Whether a text reads as an item or statement of a program, and not as an expression.
+/// Returns whether a text reads as an item or statement of a program rather than as an
+/// expression.
 pub fn is_directive(text: &str) -> bool {
     let (lexemes, _) = lex(text, 0..text.len(), FileId(0), 0);
     let mut depth = 0_i64;

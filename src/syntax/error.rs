@@ -1,5 +1,5 @@
-//! What can be wrong with a text, and how it is said. The advice on what does not fit the
-//! grammar is in [`advice`](super::advice).
+//! Syntax errors and their messages. The advice on text that does not fit the grammar is
+//! in [`advice`](super::advice).
 
 use super::advice::Advice;
 use super::deep::MAX_DEPTH;
@@ -9,37 +9,38 @@ use super::span::Span;
 use super::token::Foreign;
 use crate::diag::{Diagnostic, IntoDiagnostic, too_large};
 
-/// At most this many errors are reported for a text, and then that there are more.
+/// The maximum number of errors reported for a text; a last one then says that there are
+/// more.
 pub const MAX_ERRORS: usize = 20;
 
-/// An error in a text, and where.
+/// A syntax error and its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SyntaxError {
-    /// What is wrong.
+    /// The kind of error.
     pub kind: SyntaxErrorKind,
-    /// Where.
+    /// Its place in the source.
     pub span: Span,
 }
 
-/// What can be wrong with a text.
+/// The kinds of syntax errors.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(private_interfaces)] // `Foreign` and `Advice` are for the messages only.
 #[non_exhaustive]
 pub enum SyntaxErrorKind {
     /// A character that begins no token.
     UnknownCharacter(char),
-    /// A spelling of another language.
+    /// A spelling from another language.
     #[doc(hidden)]
     Foreign(Foreign, String),
     /// A string without its closing quote on the same line.
     UnterminatedString,
     /// A `/*` without `*/`.
     UnterminatedComment,
-    /// An escape in a string that is not one.
+    /// An unknown escape in a string.
     UnknownEscape,
     /// A number beyond the range of 64-bit floating point.
     NumberTooLarge,
-    /// An address literal that is not one.
+    /// A malformed address literal.
     Address(AddressError),
     /// A `$` without a name.
     TagSelection,
@@ -47,20 +48,20 @@ pub enum SyntaxErrorKind {
     Unclosed {
         /// The bracket.
         open: char,
-        /// Before what it should have been closed, in words; `None` for the end of the
-        /// text.
+        /// The token before which it should have been closed, in words; `None` for the
+        /// end of the text.
         before: Option<(String, Span)>,
     },
     /// A closing bracket that nothing opened.
     StrayClose(char),
-    /// Brackets inside brackets, more than [`MAX_NESTING`] of them.
+    /// More than [`MAX_NESTING`] brackets inside each other.
     TooNested,
     /// A tree deeper than [`MAX_DEPTH`].
     TooDeep,
-    /// More than [`MAX_TOKENS`].
+    /// More than [`MAX_TOKENS`] tokens.
     TooManyTokens,
-    /// A text over [`MAX_SOURCE_BYTES`](crate::diag::MAX_SOURCE_BYTES): its size in
-    /// bytes.
+    /// A text larger than [`MAX_SOURCE_BYTES`](crate::diag::MAX_SOURCE_BYTES), with its
+    /// size in bytes.
     TooLarge(usize),
     /// A statement without its semicolon.
     MissingSemicolon {
@@ -69,32 +70,32 @@ pub enum SyntaxErrorKind {
     },
     /// A token that does not fit the grammar.
     Unexpected {
-        /// What was found, in words.
+        /// The token that was found, in words.
         found: String,
-        /// Whether that is the end of the text.
+        /// Whether it is the end of the text.
         at_end: bool,
-        /// What was expected, in words.
+        /// The tokens that were expected, in words.
         expected: String,
-        /// What was probably meant.
+        /// Advice on what was probably meant.
         #[doc(hidden)]
         advice: Option<Advice>,
     },
     /// An `if` without `else` whose branch has a value.
     ValueWithoutElse,
-    /// A `~` after something that is no name.
+    /// A `~` after something that is not a name.
     DrawTarget,
     /// Further errors are not reported.
     TooManyErrors,
 }
 
-/// What can be wrong with an address literal.
+/// The kinds of errors in address literals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AddressError {
     /// No name after the `@`.
     NoName,
     /// `#0`, or a number beyond 32 bits.
     Occurrence,
-    /// A key that is none of the forms.
+    /// A key in none of the allowed forms.
     Key,
     /// A key without its `]`.
     KeyEnd,
@@ -107,8 +108,8 @@ impl SyntaxError {
         SyntaxError { kind, span }
     }
 
-    /// Whether the text may only be unfinished: an interactive prompt can ask for another
-    /// line.
+    /// Returns whether the text may merely be unfinished, so that an interactive prompt
+    /// can ask for another line.
     pub fn is_incomplete(&self) -> bool {
         matches!(
             self.kind,

@@ -1,41 +1,42 @@
-//! What the parser could have gone on with, in words a user knows.
+//! Describes what the parser expected, in words that a user knows.
 
 use std::collections::BTreeSet;
 
-/// Tokens that begin expressions (and some that also begin something else).
+/// Tokens that begin expressions (some of them also begin other things).
 #[rustfmt::skip]
 const EXPRESSION: [&str; 17] = [
     "a name", "a number", "a string", "an address", "a tag selection", "true", "false", "not", "-", "(", "[", "{", "if", "fn",
     "to", "when", "coarse",
 ];
-/// Tokens that go on with an expression.
+/// Tokens that continue an expression.
 const OPERATOR: [&str; 16] =
     ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**"];
-/// Tokens that go on with a name or call.
+/// Tokens that continue a name or call.
 const SUFFIX: [&str; 3] = ["(", "[", "."];
 
-/// The names of tokens as the parser lists them, without their quotes.
+/// Returns the names of the tokens that the parser lists, without their quotes and
+/// without the placeholder of bad statements.
 pub(super) fn names(expected: &[String]) -> BTreeSet<&str> {
     expected.iter().map(|e| e.trim_matches('"')).filter(|e| *e != "a bad statement").collect()
 }
 
-/// Whether a statement could begin. (Where any word could be a field's name, the keywords
-/// of statements are expected too.)
+/// Returns whether a statement could begin. (The keywords of statements are also expected
+/// wherever any word may be a field's name; `in` is then one of them.)
 pub(super) fn is_statement(names: &BTreeSet<&str>) -> bool {
     names.contains("let") && names.contains("for") && !names.contains("in")
 }
 
-/// Whether an expression could begin.
+/// Returns whether an expression could begin.
 pub(super) fn is_expression(names: &BTreeSet<&str>) -> bool {
     names.contains("a number") && names.contains("(")
 }
 
-/// Whether an expression could go on with an operator.
+/// Returns whether an expression could continue with an operator.
 pub(super) fn is_operator(names: &BTreeSet<&str>) -> bool {
     !is_expression(names) && !names.contains("in") && OPERATOR.iter().any(|op| names.contains(op))
 }
 
-/// A list in words: "`,`, `)` or an operator".
+/// Returns a list in words, such as "`)`, `,` or an operator".
 pub(super) fn describe(expected: &[String]) -> String {
     let mut names = names(expected);
     let mut words: Vec<String> = Vec::new();
@@ -55,7 +56,7 @@ pub(super) fn describe(expected: &[String]) -> String {
         names.retain(|name| !EXPRESSION.contains(name));
     }
     if names.contains("a name") {
-        // Words that may also be names.
+        // Keywords that may also be names.
         names.retain(|name| {
             !name.starts_with(|c: char| c.is_ascii_lowercase()) || name.contains(' ')
         });
@@ -66,7 +67,7 @@ pub(super) fn describe(expected: &[String]) -> String {
     }
     let quoted =
         |name: &&str| if name.contains(' ') { (*name).to_owned() } else { format!("`{name}`") };
-    // What ends something is what is most often missing.
+    // Closing tokens come first: they are the most likely to be missing.
     let (ends, others): (Vec<&str>, Vec<&str>) =
         names.iter().partition(|name| [";", ")", "]", "}"].contains(*name));
     let mut all: Vec<String> = ends.iter().chain(&others).map(quoted).collect();

@@ -1,9 +1,10 @@
-//! Text to tokens: drives logos, scans by hand what logos only opens, and reports what is
-//! no token.
+//! Converts text to tokens: drives logos, scans by hand the lexemes that logos can only
+//! begin, and reports characters that are not part of any token.
 //!
-//! Every byte is consumed, also after errors, and what was meant is guessed (`&&` becomes
-//! `and`), so that the parser sees a likely program and the rest of the text is still
-//! checked. Spans are bytes of the whole text.
+//! Unless there are too many errors or tokens, every byte is consumed, also after errors.
+//! Foreign spellings are replaced by their probable meaning (`&&` becomes `and`), so that
+//! the parser sees a likely program and still checks the rest of the text. Spans are byte
+//! offsets in the whole text.
 
 use super::address;
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
@@ -12,10 +13,10 @@ use super::token::{Foreign, Open, Token, is_name};
 use logos::Logos;
 use std::ops::Range;
 
-/// The largest number of tokens accepted in a file.
+/// The maximum number of tokens in a file.
 pub const MAX_TOKENS: usize = 1 << 20;
 
-/// A token and its bytes.
+/// A token and its byte range.
 #[derive(Clone, Debug)]
 pub(crate) struct Lexeme<'s> {
     pub token: Token<'s>,
@@ -23,20 +24,20 @@ pub(crate) struct Lexeme<'s> {
     pub end: usize,
 }
 
-/// What the lexer is working on.
+/// The state of the lexer.
 pub(crate) struct Lexer<'s> {
     /// The whole text of the file.
     pub text: &'s str,
-    /// Where the part being lexed ends.
+    /// The end of the part being lexed.
     pub end: usize,
     pub file: FileId,
-    /// How many addresses this text is inside of: keys may be expressions, which may hold
-    /// addresses.
+    /// The number of addresses around this text: keys may be expressions, which may
+    /// contain addresses.
     pub level: u32,
     pub errors: Vec<SyntaxError>,
 }
 
-/// The tokens of `text[range]`, and the errors.
+/// Returns the tokens of `text[range]` and the errors in it.
 pub(crate) fn lex(
     text: &str,
     range: Range<usize>,
@@ -80,7 +81,7 @@ pub(crate) fn lex(
             break;
         }
         if lexer.errors.len() > MAX_ERRORS {
-            // Not a program, or one that needs repair before more is said about it.
+            // This is not a program, or it needs repair before more errors are useful.
             break;
         }
     }
@@ -92,20 +93,20 @@ impl<'s> Lexer<'s> {
         self.errors.push(SyntaxError::new(kind, Span::new(self.file, start, end)));
     }
 
-    /// The text from a byte on.
+    /// Returns the text from byte `at` to the end of the part being lexed.
     pub fn rest(&self, at: usize) -> &'s str {
         self.text.get(at..self.end).unwrap_or("")
     }
 
-    /// The name that stands at a byte.
+    /// Returns the name that starts at byte `at`.
     pub fn name(&self, at: usize) -> Option<&'s str> {
         let rest = self.rest(at);
         let length = rest.bytes().take_while(|b| b.is_ascii_alphanumeric() || *b == b'_').count();
         Some(&rest[..length]).filter(|name| is_name(name))
     }
 
-    /// Scans a lexeme that starts at `start` and is opened by the text up to `at`: the
-    /// token and its end.
+    /// Scans the lexeme that starts at `start` and whose opening delimiter ends at `at`.
+    /// Returns its token, if it makes one, and its end.
     fn scan(&mut self, open: Open, start: usize, at: usize) -> (Option<Token<'s>>, usize) {
         match open {
             Open::Str => {
@@ -127,7 +128,7 @@ impl<'s> Lexer<'s> {
         }
     }
 
-    /// Reports a spelling that is not of this language: the token that was meant, and its
+    /// Reports a foreign spelling. Returns the token that was probably meant, and its
     /// end.
     fn foreign(
         &mut self,
@@ -158,7 +159,7 @@ impl<'s> Lexer<'s> {
         (Some(meant), end)
     }
 
-    /// Reports a spelling, once on a line.
+    /// Reports a foreign spelling, at most once per line.
     fn foreign_error(&mut self, foreign: Foreign, text: &str, start: usize, end: usize) {
         let kind = SyntaxErrorKind::Foreign(foreign, text.into());
         let said = |e: &SyntaxError| {
@@ -169,7 +170,7 @@ impl<'s> Lexer<'s> {
         }
     }
 
-    /// A string in quotes that are none here, if it is closed on the same line.
+    /// Reads a string in foreign quotes, if it is closed on the same line.
     fn foreign_string(&mut self, start: usize, at: usize) -> (Option<Token<'s>>, usize) {
         let quote = &self.text[start..at];
         let close: &[char] = if quote == "'" {
@@ -187,7 +188,7 @@ impl<'s> Lexer<'s> {
         (Some(Token::Str(value)), end)
     }
 
-    /// Reports characters that begin no token; a run of them is one error.
+    /// Reports characters that cannot begin a token; adjacent ones are one error.
     fn unknown(&mut self, start: usize, end: usize) {
         let text = &self.text[start..end];
         if let Some(SyntaxError { kind: SyntaxErrorKind::UnknownCharacter(_), span }) =

@@ -1,10 +1,11 @@
-//! The surface language: tokens, grammar, syntax tree, spans. Pure: text in, tree and
-//! errors out.
+//! The surface language: tokens, grammar, syntax tree and spans. It is pure: text in,
+//! tree and errors out.
 //!
-//! The way of a text: `lexer` makes tokens (with `string`, `address`), `delimiters`
-//! matches their brackets, the parser generated from `grammar/pcad.lalrpop` builds the
-//! tree through `build`, and `recover` repairs and parses again where it does not fit,
-//! with `advice` on what was probably meant. `format` is the way back.
+//! The stages are: `lexer` makes tokens (with `string` and `address`), `delimiters`
+//! matches their brackets, and the parser generated from `grammar/pcad.lalrpop` builds
+//! the tree through `build`. Where the text does not fit the grammar, `recover` repairs
+//! the tokens and parses again, with `advice` on what was probably meant. `format`
+//! converts a tree back to text.
 
 mod address;
 mod advice;

@@ -14,10 +14,10 @@ use std::ops::Range;
 
 /// Parses a file.
 ///
-/// The program holds what could be parsed: where a statement could not, it has an
-/// expression statement of [`ExprKind::Error`]. Without errors it holds no such
-/// expression, and its tree is no deeper than [`MAX_DEPTH`](super::MAX_DEPTH). The errors
-/// are in the order of the text; after [`MAX_ERRORS`] of them comes
+/// The program holds everything that could be parsed; each statement that could not is
+/// replaced by an expression statement of [`ExprKind::Error`]. Without errors it holds no
+/// such expression, and its tree is no deeper than [`MAX_DEPTH`](super::MAX_DEPTH). The
+/// errors are in source order; after [`MAX_ERRORS`] of them comes
 /// [`SyntaxErrorKind::TooManyErrors`].
 pub fn parse(text: &str, file: FileId) -> (Program, Vec<SyntaxError>) {
     if text.len() > MAX_SOURCE_BYTES {
@@ -34,10 +34,10 @@ pub fn parse(text: &str, file: FileId) -> (Program, Vec<SyntaxError>) {
     (program, finish(errors))
 }
 
-/// Parses one expression: a value given to `--set`, a line of the REPL.
+/// Parses a single expression, such as a value given to `--set` or a line of the REPL.
 ///
 /// # Errors
-/// What is wrong with the text, in its order.
+/// Returns the syntax errors of the text, in source order.
 pub fn parse_expr(text: &str, file: FileId) -> Result<Expr, Vec<SyntaxError>> {
     if text.len() > MAX_SOURCE_BYTES {
         return Err(vec![SyntaxError::new(
@@ -51,8 +51,8 @@ pub fn parse_expr(text: &str, file: FileId) -> Result<Expr, Vec<SyntaxError>> {
     }
 }
 
-/// Parses the expression in a part of a text, `level` addresses deep; after errors it may
-/// be [`ExprKind::Error`].
+/// Parses the expression in a part of a text, inside `level` addresses. After errors the
+/// result may be [`ExprKind::Error`].
 pub(crate) fn parse_range(
     text: &str,
     range: Range<usize>,
@@ -61,7 +61,8 @@ pub(crate) fn parse_range(
 ) -> (Deep<Expr>, Vec<SyntaxError>) {
     let hole =
         Deep::leaf(Expr { kind: ExprKind::Error, span: Span::new(file, range.start, range.end) });
-    // Without what follows the part, errors at its end are placed there.
+    // Cut off the text after the part, so that errors at the end of the part are placed
+    // there.
     let text = &text[..range.end];
     let (lexemes, mut errors) = lex(text, range, file, level);
     let mut balanced = balance(text, file, lexemes);
@@ -86,10 +87,10 @@ pub(crate) fn parse_range(
     (expr, finish(errors))
 }
 
-/// The errors in the order of the text, and no more than are useful.
+/// Sorts the errors by their place and limits their number.
 fn finish(mut errors: Vec<SyntaxError>) -> Vec<SyntaxError> {
     errors.sort_by_key(|e| (e.span.start, e.span.end));
-    // A `}` that nothing opened follows from a `{` that was expected before.
+    // A stray `}` is a consequence of a `{` that was expected earlier.
     let mut missing = 0_usize;
     errors.retain(|e| match &e.kind {
         SyntaxErrorKind::Unexpected { expected, .. } if expected.contains("`{`") => {
@@ -110,8 +111,8 @@ fn finish(mut errors: Vec<SyntaxError>) -> Vec<SyntaxError> {
     errors
 }
 
-/// Adds the errors about brackets, but for those that a lexeme without an end may have
-/// swallowed.
+/// Adds the errors about brackets, except those about brackets that may be closed inside
+/// a lexeme without an end.
 fn add_brackets(errors: &mut Vec<SyntaxError>, balanced: &mut Balanced<'_>) {
     use SyntaxErrorKind::{Address, UnterminatedComment, UnterminatedString};
     let swallows =

@@ -1,11 +1,11 @@
-//! Several errors from one text: where it does not parse, the tokens are repaired and
-//! parsed again.
+//! Error recovery: where a text does not parse, its tokens are repaired and parsed again,
+//! so that several errors can be reported.
 //!
-//! A repair adds a forgotten `;`, or replaces the statement that holds the error by
-//! [`Token::Bad`]. So a bad statement hides neither the statements after it nor those
-//! around it, the grammar needs no error productions, and the work is bounded: one parse
-//! for each error. What follows from an error already reported in the same statement is
-//! repaired without a word.
+//! A repair adds a forgotten `;`, or replaces the statement that contains the error with
+//! [`Token::Bad`]. A bad statement therefore hides neither the statements after it nor
+//! those around it, the grammar needs no error productions, and the work is bounded: one
+//! parse for each repair. Consequences of an error already reported in the same statement
+//! are repaired silently.
 
 use super::advice::{self, Context};
 use super::ast::Program;
@@ -25,19 +25,20 @@ use std::ops::Range;
 pub(crate) struct Tokens<'s> {
     pub text: &'s str,
     pub file: FileId,
-    /// What the user calls the end of this text.
+    /// The name of the end of this text in messages.
     pub end_name: &'static str,
     pub lexemes: Vec<Lexeme<'s>>,
     mates: Vec<usize>,
-    /// Whether a `;` is added before the token; also for the end of the text.
+    /// Whether a `;` is added before each token; the last entry is for the end of the
+    /// text.
     semicolon: Vec<bool>,
-    /// Whether the token is left out, being part of a bad statement.
+    /// Whether each token is left out, as part of a bad statement.
     dropped: Vec<bool>,
-    /// The index of the token the parser asked for last.
+    /// The index of the token that the parser requested last.
     last: Cell<usize>,
 }
 
-/// A token with its first byte and the byte after its last, as the parser wants it.
+/// A token between its start and end byte, as the parser expects it.
 pub(crate) type Triple<'s> = (usize, Token<'s>, usize);
 
 impl<'s> Tokens<'s> {
@@ -52,7 +53,7 @@ impl<'s> Tokens<'s> {
         Tokens { text, file, end_name, lexemes, mates, semicolon, dropped, last: Cell::new(0) }
     }
 
-    /// The tokens as repaired.
+    /// Returns the repaired tokens.
     pub fn iter(&self) -> impl Iterator<Item = Triple<'s>> {
         (0..=self.lexemes.len()).flat_map(move |i| {
             let end = i.checked_sub(1).and_then(|i| self.lexemes.get(i)).map_or(0, |l| l.end);
@@ -63,33 +64,33 @@ impl<'s> Tokens<'s> {
         })
     }
 
-    /// The index of the token that did not fit (the number of tokens at the end of the
-    /// text), and what would have.
+    /// Returns the index of the token that did not fit (the number of tokens for the end
+    /// of the text), and the tokens that would have fitted.
     fn misfit<'e>(&self, error: &'e ParseError<usize, Token<'s>, ()>) -> (usize, &'e [String]) {
         match error {
             ParseError::UnrecognizedEof { expected, .. } => (self.lexemes.len(), expected),
             ParseError::UnrecognizedToken { expected, .. } => (self.last.get(), expected),
-            // Errors of the grammar's own, of a built-in lexer, and extra tokens do not
-            // occur.
+            // Errors of grammar actions, errors of a built-in lexer, and extra tokens do
+            // not occur.
             _ => (self.last.get(), &[]),
         }
     }
 
-    /// Turns an error of the parser, in a text that is no list of statements, into one
-    /// for the user.
+    /// Converts an error of the parser into one for the user, in a text that is not a
+    /// list of statements.
     pub fn explain(&self, error: &ParseError<usize, Token<'s>, ()>) -> SyntaxError {
         let (at, expected) = self.misfit(error);
         advice::explain(&Context { tokens: self, at, start: 0, expected, semicolon: false })
     }
 
-    /// The place of a token, or of the end of the text.
+    /// Returns the span of a token, or of the end of the text.
     pub fn span_at(&self, at: usize) -> Span {
         let end = self.text.trim_end().len().max(self.lexemes.last().map_or(0, |l| l.end));
         let (start, end) = self.lexemes.get(at).map_or((end, end), |l| (l.start, l.end));
         Span::new(self.file, start, end)
     }
 
-    /// The place right after the token before token `at`.
+    /// Returns the empty span right after the token before token `at`.
     pub fn span_after(&self, at: usize) -> Span {
         let end = at.checked_sub(1).and_then(|i| self.lexemes.get(i)).map_or(0, |l| l.end);
         Span::new(self.file, end, end)
@@ -99,8 +100,8 @@ impl<'s> Tokens<'s> {
         self.lexemes.get(i).map(|l| &l.token)
     }
 
-    /// Whether a `;` is missing before token `at`, where one would fit: a line, a block
-    /// or the text ends, or a statement starts.
+    /// Returns whether a `;` is missing before token `at`: it would fit there, and a
+    /// line, a block or the text ends, or a statement starts.
     fn lacks_semicolon(&self, at: usize, expected: &[String]) -> bool {
         let fits = expected.iter().any(|e| e == "\";\"") && at > 0 && !self.semicolon[at];
         fits && match self.token(at) {
@@ -113,9 +114,9 @@ impl<'s> Tokens<'s> {
         }
     }
 
-    /// The statement to give up for an error at token `at`: the innermost that has any
-    /// tokens. If a statement was to begin there (`fresh`), nothing before it belongs to
-    /// it.
+    /// Returns the statement to discard for an error at token `at`: the innermost one
+    /// that has any tokens. If a statement was expected to begin there (`fresh`), it
+    /// excludes the tokens before `at`.
     fn statement(&self, at: usize, fresh: bool) -> Option<Range<usize>> {
         let (mut block, mut found) = (0..self.lexemes.len(), None);
         loop {
@@ -128,7 +129,7 @@ impl<'s> Tokens<'s> {
         }
     }
 
-    /// The statement of a block that token `at` belongs to.
+    /// Returns the statement of a block that token `at` belongs to.
     fn statement_in(&self, block: &Range<usize>, at: usize, fresh: bool) -> Range<usize> {
         let (mut start, mut i) = (block.start, block.start);
         while i < block.end {
@@ -144,8 +145,8 @@ impl<'s> Tokens<'s> {
             let begins = starts_statement(&self.lexemes, next)
                 && first_on_line(self.text, &self.lexemes, next);
             if ended || begins || self.semicolon[next] {
-                // A statement that broke off before a keyword owns the error at the
-                // keyword.
+                // An error at a keyword belongs to the statement that broke off before
+                // it.
                 if next > at || (next == at && !ended && !fresh) {
                     return start..next;
                 }
@@ -156,12 +157,13 @@ impl<'s> Tokens<'s> {
         start..block.end
     }
 
-    /// The first token from `i` on that is not left out.
+    /// Returns the first token from `i` on that is not left out.
     fn live(&self, i: usize) -> usize {
         (i..self.lexemes.len()).find(|&i| !self.dropped[i]).unwrap_or(self.lexemes.len())
     }
 
-    /// The outermost brace of a block in the statement that token `at` is inside of.
+    /// Returns the outermost opening brace of a block in the statement that contains
+    /// token `at`.
     fn block_around(&self, statement: &Range<usize>, at: usize) -> Option<usize> {
         let mut i = statement.start;
         while i < statement.end.min(at) {
@@ -178,12 +180,12 @@ impl<'s> Tokens<'s> {
         None
     }
 
-    /// Whether token `i` opens a block of statements, and not a record.
+    /// Returns whether token `i` opens a block of statements rather than a record.
     fn is_block(&self, i: usize) -> bool {
         self.token(i) == Some(&Token::LBrace) && self.token(i + 2) != Some(&Token::Colon)
     }
 
-    /// Whether a statement goes on after a block with token `i`.
+    /// Returns whether token `i` continues a statement after a block.
     fn goes_on(&self, i: usize) -> bool {
         use Token::*;
         self.token(i).is_some_and(|t| {
@@ -205,8 +207,8 @@ impl<'s> Tokens<'s> {
         })
     }
 
-    /// Adds what the actions found, but for what lies in an item with an error: it may
-    /// only follow from that.
+    /// Adds the errors found by the actions, except those in an item that already has an
+    /// error: they may only be consequences of it.
     fn add_new(&self, found: Vec<SyntaxError>, errors: &mut Vec<SyntaxError>) {
         let known: Vec<u32> = errors.iter().map(|e| e.span.start).collect();
         for error in found {
@@ -227,7 +229,7 @@ impl<'s> Tokens<'s> {
     }
 }
 
-/// Parses a program, repairing what does not fit.
+/// Parses a program, and repairs tokens that do not fit.
 pub(crate) fn parse_program(mut tokens: Tokens<'_>, errors: &mut Vec<SyntaxError>) -> Program {
     let earlier: Vec<Span> = errors.iter().map(|e| e.span).collect();
     loop {
@@ -255,7 +257,7 @@ pub(crate) fn parse_program(mut tokens: Tokens<'_>, errors: &mut Vec<SyntaxError
         match statement {
             _ if add_semicolon => tokens.semicolon[at] = true,
             Some(range) => tokens.drop_statement(range),
-            // Nothing is left to give up.
+            // Nothing is left to discard.
             None => return Program::default(),
         }
         if errors.len() > MAX_ERRORS {

@@ -1,4 +1,4 @@
-//! Places in source text: byte ranges of numbered files.
+//! Places in source text: byte ranges in numbered files.
 
 /// The number of a source file in a [`SourceMap`](crate::diag::SourceMap).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -16,23 +16,23 @@ pub struct Span {
 }
 
 impl Span {
-    /// A span of the bytes `start..end` of `file`.
+    /// Creates the span of the bytes `start..end` of `file`.
     pub fn new(file: FileId, start: usize, end: usize) -> Self {
         Span { file, start: start as u32, end: end as u32 }
     }
 
-    /// The smallest span holding both; they must be in the same file.
+    /// Returns the smallest span that contains both; they must be in the same file.
     pub fn to(self, other: Span) -> Span {
         Span { file: self.file, start: self.start.min(other.start), end: self.end.max(other.end) }
     }
 }
 
-/// A value and where it was written.
+/// A value and its place in the source.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spanned<T> {
     /// The value.
     pub node: T,
-    /// Where it stands.
+    /// Its place in the source.
     pub span: Span,
 }
 

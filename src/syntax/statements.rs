@@ -1,32 +1,32 @@
-//! What the statements of the language are, for `pcadlang doc`, the prompt and the
+//! Descriptions of the statements of the language, for `pcadlang doc`, the prompt and the
 //! reference.
 
-/// A statement, by the word that one looks it up by.
+/// A statement, under the word by which it is looked up.
 #[derive(Clone, Copy, Debug)]
 pub struct Statement {
     /// Its keyword.
     pub name: &'static str,
-    /// How it is written; several ways with three spaces between them.
+    /// Its syntax; alternatives are separated by three spaces.
     form: &'static str,
-    /// One line about it.
+    /// A one-line description.
     pub doc: &'static str,
-    /// A program, or a part of an inference plan.
+    /// An example: a program, or part of an inference plan.
     pub example: &'static str,
-    /// Where it may stand.
+    /// Where it is allowed.
     pub place: Place,
 }
 
 impl Statement {
-    /// The ways in which it is written.
+    /// Returns the alternative forms of its syntax.
     pub fn forms(&self) -> impl Iterator<Item = &'static str> {
         self.form.split("   ")
     }
 }
 
-/// Where a statement may stand.
+/// Where a statement is allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// In the model; `param`, `data`, `include`, `fn`, … at its top level.
+    /// In the model; `param`, `data`, `include`, `fn`, … only at its top level.
     Model,
     /// In an `infer` block or a kernel.
     Plan,
@@ -52,7 +52,7 @@ const fn plan(
     Statement { name, form, doc, example, place: Place::Plan }
 }
 
-/// All of them: first those of the model, then those of inference.
+/// All statements: first those of models, then those of inference plans.
 pub const STATEMENTS: &[Statement] = &[
     model(
         "assume",

@@ -6,8 +6,8 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 impl Lexer<'_> {
-    /// Reads a string that starts at `start` and whose text starts at `at`, up to one of
-    /// the quotes `close` on the same line: its value and its end.
+    /// Reads the string that starts at `start` and whose contents start at `at`, up to
+    /// one of the quotes `close` on the same line. Returns its value and its end.
     pub(super) fn string(
         &mut self,
         start: usize,
@@ -33,8 +33,8 @@ impl Lexer<'_> {
     }
 }
 
-/// The character that the escape at the start of the text stands for, and the length of
-/// the escape.
+/// Returns the character that the escape at the start of the text stands for, if it is
+/// valid, and the length of the escape.
 fn escape(text: &str) -> (Option<char>, usize) {
     let simple = match text.chars().nth(1) {
         Some('n') => '\n',
@@ -49,7 +49,7 @@ fn escape(text: &str) -> (Option<char>, usize) {
     (Some(simple), 2)
 }
 
-/// `\u{…}` with one to six hexadecimal digits.
+/// Reads `\u{…}` with one to six hexadecimal digits.
 fn unicode_escape(text: &str) -> (Option<char>, usize) {
     let digits = text
         .strip_prefix("\\u{")
@@ -62,7 +62,7 @@ fn unicode_escape(text: &str) -> (Option<char>, usize) {
     }
 }
 
-/// A string as a literal of the language.
+/// Formats a string as a literal of the language.
 pub(super) fn quote(text: &str) -> String {
     let mut quoted = String::with_capacity(text.len() + 2);
     quoted.push('"');
@@ -73,7 +73,7 @@ pub(super) fn quote(text: &str) -> String {
             '\r' => quoted.push_str("\\r"),
             '"' | '\\' => quoted.extend(['\\', c]),
             c if c.is_control() => {
-                // Writing to a string does not fail.
+                // Writing to a string cannot fail.
                 let _ = write!(quoted, "\\u{{{:x}}}", u32::from(c));
             }
             c => quoted.push(c),

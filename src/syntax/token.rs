@@ -1,11 +1,11 @@
-//! The tokens of the language, and what logos can recognise of them by itself.
+//! The tokens of the language, as far as logos can recognise them.
 //!
 //! Lexing is context-free. Keywords, punctuation, names and numbers are regular and left
-//! to logos; lexemes that need more (strings, block comments, addresses, tag selections)
-//! are only opened here, by a [`Token::Open`], and scanned by hand in
-//! [`lexer`](super::lexer). Spellings from other languages are tokens too
-//! ([`Token::Foreign`]), so that the message can say what to write instead; neither of
-//! the two reaches the parser.
+//! to logos. Of lexemes that need more (strings, block comments, addresses, tag
+//! selections), logos recognises only the first characters, as a [`Token::Open`], and
+//! [`lexer`](super::lexer) scans the rest by hand. Spellings from other languages are
+//! tokens too ([`Token::Foreign`]), so that the message can say what to write instead.
+//! Neither of these two reaches the parser.
 
 use super::ast::Address;
 use super::deep::Deep;
@@ -175,8 +175,8 @@ pub(crate) enum Token<'s> {
     #[token("$", |_| Open::TagSel)]
     Open(Open),
 
-    /// What other languages write, or a slip; reported by the lexer and replaced by what
-    /// was meant.
+    /// A spelling from another language, or a slip; the lexer reports it and replaces it
+    /// with its probable meaning.
     #[token("&&", |_| Foreign::And)]
     #[token("||", |_| Foreign::Or)]
     #[token("!", |_| Foreign::Not)]
@@ -200,8 +200,8 @@ pub(crate) enum Token<'s> {
     #[regex(r"[0-9A-Za-z_]*[\p{L}--[A-Za-z]][\p{L}\p{M}\p{N}_]*", |_| Foreign::Name)]
     Foreign(Foreign),
 
-    /// Stands for a statement that did not parse; made by [`recover`](super::recover)
-    /// only.
+    /// The placeholder of a statement that did not parse; only
+    /// [`recover`](super::recover) makes it.
     Bad,
 }
 
@@ -214,7 +214,7 @@ pub(crate) enum Open {
     TagSel,
 }
 
-/// A spelling that is not of this language, but whose meaning can be guessed.
+/// A spelling from another language whose meaning can be guessed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Foreign {
     And,
@@ -236,7 +236,7 @@ pub(crate) enum Foreign {
 }
 
 impl Token<'_> {
-    /// Whether the token is a word that the language keeps for itself.
+    /// Returns whether the token is a keyword.
     pub(crate) fn is_keyword(&self) -> bool {
         use Token::*;
         self.starts_statement()
@@ -247,33 +247,33 @@ impl Token<'_> {
             )
     }
 
-    /// Whether the token starts an item that cannot stand inside a body. `fn` counts only
-    /// where a name follows it, which the caller has to check.
+    /// Returns whether the token starts an item that is not allowed inside a body. `fn`
+    /// counts only if a name follows it, which the caller has to check.
     pub(crate) fn starts_item(&self) -> bool {
         use Token::*;
         matches!(self, Include | Param | Data | Fn | Kernel | Infer | Report | Export)
     }
 
-    /// Whether the token starts a statement and cannot stand anywhere else.
+    /// Returns whether the token starts a statement and is not allowed anywhere else.
     pub(crate) fn starts_statement(&self) -> bool {
         self.starts_model_statement()
             || self.starts_inference_statement()
             || matches!(self, Token::Let | Token::For)
     }
 
-    /// Whether the token starts a statement of models only.
+    /// Returns whether the token starts a statement of models only.
     pub(crate) fn starts_model_statement(&self) -> bool {
         use Token::*;
         matches!(self, Assume | Observe | Predict | Factor | Force | Freeze | Forget | Sample)
     }
 
-    /// Whether the token starts a statement of inference blocks only.
+    /// Returns whether the token starts a statement of inference blocks only.
     pub(crate) fn starts_inference_statement(&self) -> bool {
         use Token::*;
         matches!(self, Warmup | Repeat | Every | Mix | Stop | Collect | Propose)
     }
 
-    /// Whether the token starts an expression.
+    /// Returns whether the token starts an expression.
     pub(crate) fn starts_expression(&self) -> bool {
         use Token::*;
         matches!(
@@ -294,32 +294,32 @@ impl Token<'_> {
         )
     }
 
-    /// Whether the token stands between two operands.
+    /// Returns whether the token is an infix operator.
     pub(crate) fn is_infix(&self) -> bool {
         use Token::*;
         matches!(self, Or | And | Range | Plus | Minus | Star | Slash | Percent | StarStar | Amp)
             || self.is_comparison()
     }
 
-    /// Whether the token compares.
+    /// Returns whether the token is a comparison operator.
     pub(crate) fn is_comparison(&self) -> bool {
         use Token::*;
         matches!(self, EqEq | NotEq | Lt | Le | Gt | Ge)
     }
 }
 
-/// The value of a well-formed number; infinite if it is too large.
+/// Returns the value of a well-formed number, which is infinite if it is too large.
 fn number<'s>(lexer: &mut logos::Lexer<'s, Token<'s>>) -> Option<f64> {
     lexer.slice().parse().ok()
 }
 
-/// Whether a text is a word of the grammar.
+/// Returns whether a text is a keyword.
 pub(crate) fn is_keyword(text: &str) -> bool {
     is_name(text) && !matches!(Token::lexer(text).next(), Some(Ok(Token::Name(_))))
 }
 
-/// Whether a text is a name (or a keyword): an ASCII letter or `_`, then letters, digits
-/// and `_`.
+/// Returns whether a text is a name (or a keyword): an ASCII letter or `_`, then letters,
+/// digits and `_`.
 pub(crate) fn is_name(text: &str) -> bool {
     let mut bytes = text.bytes();
     bytes.next().is_some_and(|b| b.is_ascii_alphabetic() || b == b'_')

@@ -1,17 +1,17 @@
-//! Draws of one chain as CSV in the form CmdStan writes, which ArviZ (`from_cmdstan`),
-//! posterior and CmdStan's own tools open.
+//! Draws of one chain as CSV in CmdStan's format, which ArviZ (`from_cmdstan`), posterior
+//! and CmdStan's tools can read.
 //!
-//! Comment lines (`# key = value`), one line of column names, one line a draw; where a
-//! draw has columns that those before it lack, a line of names comes again, until the run
-//! ends and all chains are brought to the same columns. Columns that end in `__` are
-//! about the draw: `lp__` (log joint), `accept_stat__` (accepted proposals per proposal
-//! since the last draw), `divergent__` (divergent trajectories since then),
-//! `log_prior__`, `log_likelihood__`, `step__`; then the recorded quantities, the
-//! elements of a vector as `name.1, name.2, …`. Numbers are written so that reading gives
-//! the same bits back.
+//! A file has comment lines (`# key = value`), a line of column names, and a line per
+//! draw. When a draw has new columns, the line of names is repeated with them; at the end
+//! of a run, all chains are brought to the same columns. Columns that end in `__` are
+//! about the draw: `lp__` (log joint density), `accept_stat__` (acceptance rate since the
+//! last draw), `divergent__` (divergent trajectories since the last draw), `log_prior__`,
+//! `log_likelihood__`, `step__`. The recorded quantities follow, with the elements of a
+//! vector as `name.1, name.2, …`. Numbers are written so that reading them gives the same
+//! bits.
 //!
-//! Invariant: the file is readable at any moment, for every line is handed to the system
-//! in one call; the reader leaves out a last line without its end.
+//! Invariant: the file is readable at any moment, because every line is passed to the
+//! system in one call and the reader leaves out an incomplete last line.
 
 mod names;
 mod read;

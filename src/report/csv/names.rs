@@ -1,14 +1,14 @@
-//! Names of columns as CSV and ArviZ can bear them.
+//! Column names that are valid in CSV and in ArviZ.
 
 use crate::infer::draws::{Column, Shape};
 use std::collections::HashSet;
 
-/// The name of every column of the file, elements of vectors one by one.
+/// Returns the name of every column of the file, with the elements of vectors one by one.
 ///
 /// In ArviZ a `.` starts an index and a trailing `__` marks a statistic of the sampler,
-/// and neither it nor CmdStan knows quotes, so `.` becomes `/`, a comma `;`, white space
-/// and quotes `_`, and a name that ends in `__` gets a `/`. Names that fall together are
-/// told apart by `/2`, `/3`, ….
+/// and neither ArviZ nor CmdStan supports quotes. Therefore `.` becomes `/`, a comma `;`,
+/// white space and quotes `_`, and a name that ends in `__` gets a trailing `/`. Names
+/// that become equal get the suffixes `/2`, `/3`, ….
 pub fn column_names(columns: &[Column]) -> Vec<String> {
     let mut taken = HashSet::new();
     let mut names = Vec::new();
@@ -47,8 +47,8 @@ fn bearable(name: &str) -> String {
     out
 }
 
-/// The columns a line of names stands for: the inverse of [`column_names`] on names that
-/// needed no change.
+/// Returns the columns of a line of names: the inverse of [`column_names`] for names that
+/// it did not change.
 pub(super) fn columns(names: &[&str]) -> Vec<Column> {
     let mut columns: Vec<Column> = Vec::new();
     for name in names {

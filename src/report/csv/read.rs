@@ -1,4 +1,4 @@
-//! Reading a chain's draws back.
+//! Reads a chain's draws.
 
 use super::DRAW_COLUMNS;
 use super::names::columns;
@@ -6,7 +6,7 @@ use crate::infer::draws::{Column, DrawRow, Layout, merged, width};
 use crate::report::ChainDraws;
 use thiserror::Error;
 
-/// What is wrong with a file of draws. Lines are counted from 1.
+/// An error in a file of draws. Lines are counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CsvError {
     /// The line of names does not start with the columns about the draw.
@@ -14,34 +14,34 @@ pub enum CsvError {
         "line {line}: not a file of draws by pcadlang: its columns do not start with lp__, accept_stat__, …"
     )]
     Columns {
-        /// Where.
+        /// The line.
         line: usize,
     },
     /// A line has too few or too many numbers.
     #[error("line {line}: {found} numbers, but {expected} columns")]
     Width {
-        /// Where.
+        /// The line.
         line: usize,
-        /// How many there are.
+        /// The number of numbers in the line.
         found: usize,
-        /// How many there should be.
+        /// The expected number.
         expected: usize,
     },
     /// Something that is not a number.
     #[error("line {line}: `{text}` is not a number")]
     Number {
-        /// Where.
+        /// The line.
         line: usize,
-        /// What stands there.
+        /// The text found.
         text: String,
     },
 }
 
-/// Reads what [`super::CsvSink`] writes, also while it is still being written: a last
-/// line that is not finished is left out.
+/// Reads the output of [`super::CsvSink`], also while it is still being written: an
+/// incomplete last line is left out.
 ///
 /// # Errors
-/// If a finished line is not what it should be.
+/// Returns an error if a complete line is malformed.
 pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
     let mut chain = ChainDraws::default();
     let mut id = 0;
@@ -57,7 +57,7 @@ pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
                 chain.comments.push((key.to_owned(), value.to_owned()));
             }
         } else if let Some(now) = named(text) {
-            // Columns that come later are in no draw before them.
+            // Earlier draws lack the columns that are added later.
             let all =
                 if chain.columns.is_empty() { now.clone() } else { merged(&chain.columns, &now) };
             chain.widen(all);
@@ -75,13 +75,14 @@ pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
     Ok(chain)
 }
 
-/// The recorded columns of a line of names; `None` of any other line.
+/// Returns the recorded columns of a line of names; `None` for any other line.
 pub(crate) fn named(text: &str) -> Option<Vec<Column>> {
     let names: Vec<&str> = text.split(',').collect();
     names.strip_prefix(&DRAW_COLUMNS).map(columns)
 }
 
-/// A draw of so many recorded numbers; its chain and number are left 0.
+/// Parses a draw with `expected` recorded numbers; the chain and the number of the draw
+/// are left at 0.
 pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRow, CsvError> {
     let parse = |s: &str| {
         s.parse::<f64>().map_err(|_| CsvError::Number { line, text: s.chars().take(40).collect() })

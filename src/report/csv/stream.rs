@@ -1,53 +1,53 @@
-//! Reading draws back one at a time, however many there are.
+//! Reads draws one at a time, however many there are.
 
 use super::names::column_names;
 use super::read::{CsvError, named, numbers};
 use crate::infer::draws::{Column, DrawRow, Layout, merged, width};
 use std::io::{self, BufRead, Read};
 
-/// Why the next draw cannot be had.
+/// The reasons why the next draw cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// A line is not what it should be.
+    /// A line is malformed.
     #[error(transparent)]
     Csv(#[from] CsvError),
 }
 
-/// Reads the draws of the first so many bytes of a file.
+/// Reads the draws in the first `end` bytes of a file.
 pub struct DrawReader<R> {
     from: R,
-    /// The columns that draws are wanted in, by their names in the file.
+    /// The columns of the returned draws, under their names in the file.
     columns: Vec<Column>,
     position: u64,
     end: u64,
     line: usize,
     text: String,
-    /// What the lines after the last line of names have: so many numbers, and where they
-    /// belong.
+    /// The number of numbers in the lines after the last line of names, and the positions
+    /// of these numbers in `columns`.
     layout: Option<(usize, Layout)>,
 }
 
 impl<R: BufRead> DrawReader<R> {
-    /// A reader of what [`super::CsvSink`] wrote with these columns, or with fewer before
-    /// more came; nothing at or after byte `end` is looked at.
+    /// Creates a reader of the output of [`super::CsvSink`] with these columns, or with
+    /// fewer before more were added; nothing at or after byte `end` is read.
     pub fn new(from: R, columns: &[Column], end: u64) -> Self {
         let names = column_names(columns);
         let columns = super::names::columns(&names.iter().map(String::as_str).collect::<Vec<_>>());
         DrawReader { from, columns, position: 0, end, line: 0, text: String::new(), layout: None }
     }
 
-    /// The bytes of all finished lines so far.
+    /// Returns the length of all complete lines read so far, in bytes.
     pub fn position(&self) -> u64 {
         self.position
     }
 
-    /// The next draw; `None` at the end, or at a line that is not finished.
+    /// Reads the next draw; returns `None` at the end or at an incomplete line.
     ///
     /// # Errors
-    /// If the file cannot be read, or a line is not what it should be.
+    /// Returns an error if the file cannot be read, or a line is malformed.
     pub fn next_row(&mut self) -> Result<Option<DrawRow>, StreamError> {
         loop {
             self.text.clear();

@@ -1,4 +1,4 @@
-//! Writing a chain's draws as they come.
+//! Writes a chain's draws as they are made.
 
 use super::DRAW_COLUMNS;
 use super::names::column_names;
@@ -8,30 +8,30 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// A sink that writes CmdStan CSV, to a file or anything else that can be written to.
+/// A sink that writes CmdStan CSV to a file or another writer.
 #[derive(Debug)]
 pub struct CsvSink<W = File> {
     out: W,
     comments: String,
-    /// Numbers in a row; `None` before the columns are known.
+    /// The number of numbers in a row; `None` before the columns are known.
     width: Option<usize>,
     line: String,
-    /// The bytes so far.
+    /// The number of bytes written so far.
     written: u64,
 }
 
 impl CsvSink {
     /// Creates (or empties) the file of a chain, counted from 0, and writes its comments:
-    /// first what ArviZ looks for, then the given pairs.
+    /// first those that ArviZ needs, then the given pairs.
     ///
     /// # Errors
-    /// If the file cannot be created or written.
+    /// Returns an error if the file cannot be created or written.
     pub fn create(path: &Path, chain: u32, comments: &[(&str, String)]) -> io::Result<Self> {
         CsvSink::new(File::create(path)?, chain, comments)
     }
 
-    /// Goes on with a file whose first `written` bytes are a chain's, and that ends
-    /// there. The columns are those announced, if they were.
+    /// Continues a file that ends after the first `written` bytes of a chain. `columns`
+    /// are the columns declared so far, if any.
     pub(crate) fn resume(file: File, written: u64, columns: Option<&[Column]>) -> Self {
         CsvSink {
             out: file,
@@ -42,20 +42,20 @@ impl CsvSink {
         }
     }
 
-    /// Brings all draws so far to the disk.
+    /// Flushes all draws to the disk.
     ///
     /// # Errors
-    /// If the system cannot.
+    /// Returns an error if the file cannot be synchronised.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.out.sync_data()
     }
 }
 
 impl<W: Write> CsvSink<W> {
-    /// As [`CsvSink::create`], to a writer, which should not hold lines back.
+    /// Does the same as [`CsvSink::create`] for a writer, which should not buffer lines.
     ///
     /// # Errors
-    /// If it cannot be written to.
+    /// Returns an error if the writer fails.
     pub fn new(mut out: W, chain: u32, comments: &[(&str, String)]) -> io::Result<Self> {
         let mut text =
             format!("# model = pcadlang\n# id = {}\n# save_warmup = 0\n", u64::from(chain) + 1);
@@ -68,25 +68,25 @@ impl<W: Write> CsvSink<W> {
         Ok(CsvSink { out, comments: text, width: None, line: String::new(), written })
     }
 
-    /// A sink that begins with the line of names.
+    /// Creates a sink whose output begins with the line of names.
     pub(crate) fn bare(out: W) -> Self {
         CsvSink { out, comments: String::new(), width: None, line: String::new(), written: 0 }
     }
 
-    /// Hands everything to the system.
+    /// Flushes the writer.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// Returns an error if the output cannot be written.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    /// The bytes written so far.
+    /// Returns the number of bytes written so far.
     pub(crate) fn written(&self) -> u64 {
         self.written
     }
 
-    /// The comments at the head of the file.
+    /// Returns the comments at the head of the file.
     #[doc(hidden)]
     pub fn comments(&self) -> &str {
         &self.comments
@@ -110,8 +110,8 @@ impl<W: Write + Send> Sink for CsvSink<W> {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         }
         self.line.clear();
-        // Writing to a string does not fail. `{:?}` is the shortest text that reads back
-        // to the same bits.
+        // Writing to a string cannot fail. `{:?}` is the shortest text that reads back to
+        // the same bits.
         let r = row;
         let _ = write!(self.line, "{:?},{:?},{}", r.log_joint, r.acceptance, r.divergent);
         let _ = write!(self.line, ",{:?},{:?},{}", r.log_prior, r.log_likelihood, r.step);
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use std::sync::{Arc, Mutex};
 
-    /// Remembers where every call to `write` ended.
+    /// Records the total length after every call to `write`.
     #[derive(Clone, Default)]
     struct Shared(Arc<Mutex<(Vec<u8>, Vec<usize>)>>);
 

@@ -1,8 +1,9 @@
-//! What a page holds as text: quoted text, pictures in base64 (RFC 4648), coordinates.
+//! Encodes the contents of a page as text: escaped text, pictures in base64 (RFC 4648),
+//! coordinates.
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Base64 with padding.
+/// Encodes bytes in base64 with padding.
 pub fn base64(bytes: &[u8]) -> String {
     let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
@@ -16,7 +17,7 @@ pub fn base64(bytes: &[u8]) -> String {
     out
 }
 
-/// A text inside an element or a quoted attribute.
+/// Escapes a text for use inside an element or a quoted attribute.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -32,8 +33,8 @@ pub(super) fn escaped(text: &str) -> String {
     out
 }
 
-/// A name of a quantity or a kernel as text that may go on in another line where one of
-/// its parts ends, and nowhere else.
+/// Escapes the name of a quantity or a kernel, and allows line breaks at the ends of its
+/// parts only.
 pub(super) fn breakable(name: &str) -> String {
     let mut out = String::with_capacity(2 * name.len());
     let mut parts = name.split_inclusive(['.', '_', '/', '[', '(', ',', ';', ':', '-']).peekable();
@@ -46,13 +47,13 @@ pub(super) fn breakable(name: &str) -> String {
     out
 }
 
-/// Coordinates in a row, separated by commas, to a ten-thousandth of the largest: the
-/// page stays small, and every number is one in JSON.
+/// Formats coordinates separated by commas, to a ten-thousandth of the largest, which
+/// keeps the page small. Every number is valid in JSON.
 pub(super) fn coordinates(positions: &[[f32; 3]]) -> String {
     let all =
         || positions.iter().flatten().map(|x| if x.is_finite() { f64::from(*x) } else { 0.0 });
     let largest = all().fold(0.0, |m: f64, x| m.max(x.abs()));
-    // Four digits after the first of the largest number.
+    // The largest number has four digits after its first.
     let digits =
         if largest > 0.0 { (4 - largest.log10().floor() as i32).clamp(0, 40) as usize } else { 0 };
     let numbers = all().map(|x| {

@@ -1,7 +1,7 @@
-//! `report.html`: one file that holds everything: pictures, plots, tables, the mesh to
-//! turn round, the program.
+//! `report.html`: a single file that contains the pictures, plots, tables, a mesh that
+//! can be rotated, and the program.
 //!
-//! Invariant: the page asks nothing of the network, and whatever it quotes is escaped.
+//! Invariant: the page loads nothing from the network, and all quoted text is escaped.
 
 mod encode;
 mod pictures;
@@ -14,30 +14,30 @@ pub use encode::base64;
 use encode::escaped;
 use std::fmt::Write;
 
-/// What a page shows.
+/// The contents of a page.
 #[derive(Clone, Debug, Default)]
 pub struct Page<'a> {
     /// The program's name.
     pub title: &'a str,
-    /// What is said below it: when it was, how long it took, and the like.
+    /// Facts shown below the title, such as the date and the time taken.
     pub facts: Vec<String>,
-    /// What is typed to have the run again; nothing if that is not known.
+    /// The command that repeats the run; empty if it is not known.
     pub command: &'a str,
     /// Pairs of setting and value.
     pub settings: Vec<(&'a str, String)>,
-    /// Pictures; those that belong side by side together.
+    /// Pictures in groups; those of a group are side by side.
     pub pictures: Vec<Vec<Picture<'a>>>,
     /// The scalar quantities.
     pub quantities: &'a [Quantity],
     /// The modes that the chains are in, if there are several.
     pub modes: &'a [Mode],
-    /// A picture of each of the first modes, as files.
+    /// A picture of each of the first modes, as the bytes of a file.
     pub mode_pictures: Vec<Option<Vec<u8>>>,
-    /// The kernels.
+    /// The statistics of the kernels.
     pub kernels: &'a [KernelStats],
-    /// What a reader should know first.
+    /// Warnings that a reader should see first.
     pub warnings: &'a [String],
-    /// What is approximate.
+    /// The approximations that were made.
     pub approximate: &'a [String],
     /// The mesh of the best state.
     pub mesh: Option<MeshData<'a>>,
@@ -48,30 +48,31 @@ pub struct Page<'a> {
 /// A picture on the page.
 #[derive(Clone, Debug, Default)]
 pub struct Picture<'a> {
-    /// What is said below it.
+    /// The text below it.
     pub caption: &'a str,
     /// The bytes of a PNG or JPEG file.
     pub file: Vec<u8>,
-    /// Whether it is bright lines on black: a bright page shows them dark on white.
+    /// Whether it shows bright lines on black; on a bright page they are shown dark on
+    /// white.
     pub lines: bool,
 }
 
-/// A mesh to turn round.
+/// A mesh that the reader can rotate.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshData<'a> {
-    /// Vertices.
+    /// The positions of the vertices.
     pub positions: &'a [[f32; 3]],
-    /// Vertices of each triangle; a triangle with a number that is no vertex is left out.
+    /// The vertices of each triangle; a triangle with an invalid vertex is left out.
     pub triangles: &'a [[u32; 3]],
 }
 
-/// Quantities that get plots.
+/// The maximum number of quantities with plots.
 const PLOTTED: usize = 40;
 const STYLE: &str = include_str!("style.css");
 const COPY: &str = include_str!("copy.js");
 
-/// The page. Writing to a text does not fail, so results of `write!` are not looked at
-/// here.
+/// Returns the page. Writing to a string cannot fail, so the results of `write!` are
+/// ignored in this module.
 pub fn page(p: &Page) -> String {
     let mut s = String::new();
     let title = escaped(p.title);
@@ -110,7 +111,8 @@ pub fn page(p: &Page) -> String {
     s
 }
 
-/// What the page is made of, without what is empty: names to link to, headings, contents.
+/// Returns the sections of the page that are not empty: identifiers for links, headings,
+/// contents.
 fn parts(p: &Page) -> Vec<(&'static str, &'static str, String)> {
     let mut all = vec![
         ("pictures", "Pictures", pictures::pictures(p)),

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 const VIEWER: &str = include_str!("viewer.js");
 
-/// A file of a picture as an address that holds all of it.
+/// Returns the file of a picture as a `data:` URL.
 pub(super) fn source(file: &[u8]) -> String {
     let kind = if file.starts_with(b"\xff\xd8") { "jpeg" } else { "png" };
     format!("data:image/{kind};base64,{}", base64(file))

@@ -7,17 +7,17 @@ use crate::report::{Quantity, number};
 use std::fmt::Write;
 
 const WIDTH: f64 = 260.0;
-/// The height of the plot, and with the line of labels below it.
+/// The height of the plot; `WHOLE` includes the line of labels below it.
 const HEIGHT: f64 = 90.0;
 const WHOLE: f64 = 103.0;
-/// One colour for each chain, told apart also by the colour blind (Okabe and Ito 2008):
-/// classes of the style.
+/// One colour for each chain, distinguishable for the colour-blind (Okabe and Ito 2008):
+/// classes of the style sheet.
 const COLORS: [&str; 6] = ["c0", "c1", "c2", "c3", "c4", "c5"];
-/// At most this many points of a chain are drawn.
+/// The maximum number of points drawn for a chain.
 const POINTS: usize = 400;
-/// Bars of a distribution.
+/// The number of bars of a distribution.
 const BINS: usize = 40;
-/// Bars of a histogram of ranks.
+/// The number of bars of a histogram of ranks.
 const RANK_BINS: usize = 20;
 
 fn open(title: &str) -> String {
@@ -27,28 +27,28 @@ fn open(title: &str) -> String {
     )
 }
 
-/// A label below the plot, at its left or its right end.
+/// Writes a label below the plot, at its left or right end.
 fn label(s: &mut String, right: bool, text: &str) {
     let (x, anchor) = if right { (WIDTH, "end") } else { (0.0, "start") };
     let _ =
         write!(s, "<text x=\"{x}\" y=\"{}\" text-anchor=\"{anchor}\">{text}</text>", WHOLE - 3.0);
 }
 
-/// The smallest and the largest finite draw.
+/// Returns the smallest and the largest finite draw.
 fn range(q: &Quantity) -> Option<(f64, f64)> {
     let all = || q.chains.iter().flatten().copied().filter(|x| x.is_finite());
     let (lo, hi) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     (lo <= hi).then_some((lo, hi))
 }
 
-/// Where between the ends a draw is, from 0 to 1; in the middle if the ends are the same.
-/// Halves, so that the largest doubles do not overflow.
+/// Returns the relative position of a draw between two ends, from 0 to 1, or 0.5 if the
+/// ends are equal. The values are halved so that the largest doubles do not overflow.
 fn place(x: f64, (lo, hi): (f64, f64)) -> f64 {
     let share = (0.5 * x - 0.5 * lo) / (0.5 * hi - 0.5 * lo);
     if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 }
 }
 
-/// A line of level steps, one for each height in pixels from the top.
+/// Returns the path of a step function with the given heights, in pixels from the top.
 fn steps(heights: &[f64]) -> String {
     let width = WIDTH / heights.len().max(1) as f64;
     let mut path = String::new();
@@ -63,7 +63,7 @@ fn color(chain: usize) -> &'static str {
     COLORS[chain % COLORS.len()]
 }
 
-/// The draws of each chain in order; the labels are the smallest and the largest.
+/// Plots the draws of each chain in order; the labels are the smallest and the largest.
 pub(super) fn traces(q: &Quantity) -> String {
     let mut s = open("draws in order, one line a chain");
     if let Some(ends) = range(q) {
@@ -95,7 +95,8 @@ pub(super) fn traces(q: &Quantity) -> String {
     s + "</svg>"
 }
 
-/// The distribution of the draws of each chain; the labels are the ends of the axis.
+/// Plots the distribution of the draws of each chain; the labels are the ends of the
+/// axis.
 pub(super) fn marginal(q: &Quantity) -> String {
     let mut s = open("distribution of the draws, one line a chain");
     if let Some(ends) = range(q) {
@@ -123,9 +124,9 @@ pub(super) fn marginal(q: &Quantity) -> String {
     s + "</svg>"
 }
 
-/// How many of each chain's draws have ranks in each bin, relative to level;
-/// `[chain][bin]`. Equal draws share their ranks, so that chains that agree look alike
-/// for discrete quantities too.
+/// Returns the number of each chain's draws with ranks in each bin, relative to a uniform
+/// distribution; `[chain][bin]`. Equal draws share their ranks, so that chains that agree
+/// look alike for discrete quantities too.
 fn rank_shares(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
     let mut order: Vec<(f64, usize)> = chains
         .iter()
@@ -137,7 +138,7 @@ fn rank_shares(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
     let mut shares = vec![[0.0f64; RANK_BINS]; chains.len()];
     let mut first = 0;
     for equal in order.chunk_by(|a, b| a.0.total_cmp(&b.0).is_eq()) {
-        // The ranks of these draws, in bins.
+        // The range of the ranks of these draws, in bins.
         let (from, to) = (first as f64 * scale, (first + equal.len()) as f64 * scale);
         let mut own = vec![0.0; chains.len()];
         equal.iter().for_each(|(_, c)| own[*c] += 1.0);
@@ -152,12 +153,13 @@ fn rank_shares(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
     shares
 }
 
-/// Histograms of the ranks of each chain's draws among all: level if the chains agree
-/// (Vehtari et al. 2021, section 4.3).
+/// Plots histograms of the ranks of each chain's draws among all draws: uniform if the
+/// chains agree (Vehtari et al. 2021, section 4.3).
 pub(super) fn ranks(q: &Quantity) -> String {
     let mut s =
         open("ranks of each chain's draws among all; level lines mean that the chains agree");
-    // Agreement is at a third of the height; what is beyond the top is cut.
+    // A uniform distribution is at a third of the height; values beyond the top are
+    // clipped.
     let height = |share: f64| (HEIGHT - HEIGHT / 3.0 * share).max(2.0);
     let level = height(1.0);
     let _ =

@@ -1,5 +1,5 @@
-//! The tables of a page. What matters most stands in their first columns; those that are
-//! too wide scroll by themselves.
+//! The tables of a page. The most important columns come first; tables that are too wide
+//! scroll separately.
 
 use super::encode::{breakable, escaped};
 use super::pictures::source;
@@ -8,7 +8,7 @@ use crate::infer::draws::KernelStats;
 use crate::report::{Quantity, number, r_hat_text, seconds};
 use std::fmt::Write;
 
-/// A table that may be wider than the page.
+/// Formats a table that may be wider than the page.
 fn wide(head: &str, rows: &str) -> String {
     format!("<div class=\"wide\"><table>\n<tr>{head}</tr>\n{rows}</table></div>\n")
 }
@@ -37,7 +37,8 @@ pub(super) fn quantities(quantities: &[Quantity]) -> String {
     wide(head, &s)
 }
 
-/// The modes that the chains are in, if there are several, each with its picture.
+/// Formats a table of the modes that the chains are in, if there are several, each with
+/// its picture.
 pub(super) fn modes(p: &Page) -> String {
     let rows = crate::report::modes::modes_rows(p.modes, p.quantities);
     let Some((names, body)) = rows.split_first() else { return String::new() };
@@ -45,7 +46,7 @@ pub(super) fn modes(p: &Page) -> String {
     for (i, name) in names.iter().enumerate() {
         let name = escaped(name);
         head.push_str("<th>");
-        // The first two columns are names, and all chains together.
+        // The first two columns are the names and the means over all chains.
         if let Some(file) = i.checked_sub(2).and_then(|i| p.mode_pictures.get(i)?.as_deref()) {
             let _ = write!(
                 head,

@@ -1,4 +1,4 @@
-//! The page as a whole.
+//! Tests of the page as a whole.
 
 use super::*;
 use crate::infer::diagnostics::summary;
@@ -32,7 +32,7 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
         warnings: &[text.into()],
         approximate: &[text.into()],
     });
-    // Where names may break is no part of them.
+    // Possible line breaks are not part of the names.
     let page = page.replace("<wbr>", "");
     assert!(
         !page.contains("alert(1)</") && !page.contains("& ") && !page.contains("alert(1)<"),
@@ -60,7 +60,7 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
     }
 }
 
-/// Every part can be gone to, and every link leads somewhere.
+/// Every part has a link, and every link has a target.
 #[test]
 fn links_lead_to_parts() {
     let text = page(&Page {
@@ -95,8 +95,8 @@ fn many_quantities_are_listed_but_not_all_plotted() {
     assert!(page.contains("and 3 more") && page.contains("<th>q42<"));
 }
 
-/// What says whether chains agree stands next to the mean, where a narrow screen shows
-/// it, and tables that are wider scroll by themselves with their names in view.
+/// The R-hat is next to the mean, where narrow screens show it, and wider tables scroll
+/// separately while their names stay in view.
 #[test]
 fn the_table_fits_narrow_screens() {
     let text = page(&Page { quantities: &[quantity("pose.left_arm[2]")], ..Page::default() });
@@ -113,9 +113,9 @@ fn the_table_fits_narrow_screens() {
     );
 }
 
-/// Three pictures stand in a row of a window that is 1200 pixels wide, its scroll bar and
-/// margins taken off; heads of tables are one line, and labels of plots that are made
-/// smaller stay legible.
+/// A window 1200 pixels wide, less its scroll bar and margins, has room for three
+/// pictures in a row; table heads are one line, and the labels of shrunken plots stay
+/// legible.
 #[test]
 fn the_style_uses_the_width() {
     let after =
@@ -131,12 +131,12 @@ fn the_style_uses_the_width() {
         STYLE.contains(".wide tr:first-child th { white-space: nowrap }"),
         "R-hat breaks at its hyphen"
     );
-    // Of a plot of 260 pixels that is 180 wide.
+    // A plot of 260 pixels that is shown 180 pixels wide.
     let label = after("  .plots svg text { font-size: ").unwrap();
     assert!(label * 180 / 260 >= 9, "{label}");
 }
 
-/// No colour is fixed: all are of the scheme that the reader has.
+/// No colour is fixed: all of them follow the reader's colour scheme.
 #[test]
 fn the_page_has_a_dark_side() {
     let text = page(&Page { quantities: &[quantity("a")], ..Page::default() });

@@ -1,18 +1,18 @@
-//! Dots: where named points of a draw are.
+//! Dots at the positions of named points of a draw.
 
 use super::{LONGER_SIDE, mix};
 use image::RgbImage;
 
 /// The colour of points of the scene.
 pub const OF_SCENE: [f32; 3] = [255.0, 220.0, 0.0];
-/// The colour of points that a detector found.
+/// The colour of detected points.
 pub const DETECTED: [f32; 3] = [90.0, 220.0, 255.0];
-/// The colour of the ring around a dot that sets it off from what is below.
+/// The colour of the ring that separates a dot from its background.
 const RING: [f32; 3] = [20.0, 20.0, 20.0];
 
 /// Draws dots, about 9 pixels wide in a picture of [`LONGER_SIDE`]. Positions are in
-/// pixels of a picture of `width` x `height` and scaled to this one; what is not finite
-/// is left out.
+/// pixels of a picture of `width` x `height` and are scaled to this one; positions that
+/// are not finite are left out.
 pub fn dots(out: &mut RgbImage, (width, height): (u32, u32), at: &[[f64; 2]], color: [f32; 3]) {
     let (w, h) = (out.width() as f32, out.height() as f32);
     let (sx, sy) = (w / width.max(1) as f32, h / height.max(1) as f32);

@@ -1,15 +1,15 @@
-//! Letters for captions: five pixels high, drawn here pixel by pixel, so that no font has
-//! to be shipped.
+//! Letters for captions: five pixels high, drawn here pixel by pixel, so that no font
+//! file is needed.
 //!
-//! Small letters look as capitals do; what has no picture is a small box. Not a
-//! typesetter: one line, no kerning.
+//! Lower-case letters look like capitals; a character without a glyph is shown as a small
+//! box. This is not a typesetter: one line, no kerning.
 
 use image::{Rgb, RgbImage};
 
-/// Height of a line in pixels at scale 1, without the gap to the next.
+/// The height of a line in pixels at scale 1, without the gap to the next line.
 pub(super) const HEIGHT: u32 = 5;
 
-/// The rows of each sign from top to bottom, separated by `/`.
+/// The rows of each glyph from top to bottom, separated by `/`.
 #[rustfmt::skip]
 const GLYPHS: [(char, &str); 54] = [
     ('0', "###/#.#/#.#/#.#/###"), ('1', ".#./##./.#./.#./###"), ('2', "###/..#/###/#../###"),
@@ -31,22 +31,22 @@ const GLYPHS: [(char, &str); 54] = [
     ('*', ".../#.#/.#./#.#/..."), ('<', "..#/.#./#../.#./..#"), ('>', "#../.#./..#/.#./#.."),
     ('@', ".##./#..#/#.##/#.../.###"),
 ];
-/// What stands for a sign without a picture.
+/// The glyph of characters without one.
 const UNKNOWN: &str = ".../###/#.#/###/...";
 
-/// The rows of a sign, and how many pixels it is wide.
+/// Returns the rows of a glyph, and its width in pixels.
 fn glyph(c: char) -> (&'static str, u32) {
     let c = if c == '\u{2212}' || c == '–' { '-' } else { c.to_ascii_uppercase() };
     let rows = GLYPHS.iter().find(|(g, _)| *g == c).map_or(UNKNOWN, |(_, rows)| rows);
     (rows, rows.find('/').unwrap_or(0) as u32)
 }
 
-/// The width of a text in pixels at scale 1.
+/// Returns the width of a text in pixels at scale 1.
 pub(super) fn width(text: &str) -> u32 {
     text.chars().map(|c| glyph(c).1 + 1).sum::<u32>().saturating_sub(1)
 }
 
-/// The longest beginning of a text that is no wider than `room` pixels at scale 1.
+/// Returns the longest prefix of a text that is at most `room` pixels wide at scale 1.
 pub(super) fn fitting(text: &str, room: u32) -> &str {
     let mut used = 0;
     for (at, c) in text.char_indices() {
@@ -59,8 +59,8 @@ pub(super) fn fitting(text: &str, room: u32) -> &str {
     text
 }
 
-/// Writes a text with its upper left corner at (x, y), every pixel of a sign `scale`
-/// pixels large. What lies outside the picture is left out.
+/// Writes a text with its upper left corner at (x, y); every pixel of a glyph is `scale`
+/// pixels large. Pixels outside the picture are left out.
 pub(super) fn write(out: &mut RgbImage, x: u32, y: u32, scale: u32, color: Rgb<u8>, text: &str) {
     let mut left = x;
     for c in text.chars() {

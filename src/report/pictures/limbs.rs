@@ -4,7 +4,7 @@ use super::strokes::{Strokes, draw_strokes};
 use image::RgbImage;
 
 /// Draws lines between points. Positions are in pixels of a picture of `width` x `height`
-/// and scaled to this one; what is not finite is left out.
+/// and are scaled to this one; lines with ends that are not finite are left out.
 pub fn limbs(
     out: &mut RgbImage,
     (width, height): (u32, u32),
@@ -15,7 +15,7 @@ pub fn limbs(
         |k: usize| ends.iter().map(|[a, b]| (0.5 * (a[k] + b[k])) as f32).collect::<Vec<f32>>();
     let along = |k: usize| ends.iter().map(|[a, b]| (b[k] - a[k]) as f32).collect::<Vec<f32>>();
     let (x, y, tx, ty) = (middle(0), middle(1), along(0), along(1));
-    // Tangents of the lines' own lengths.
+    // The tangents have the lengths of the lines.
     let length = vec![1.0; ends.len()];
     draw_strokes(
         out,

@@ -1,9 +1,9 @@
-//! Pictures of draws, from plain buffers: over the photograph, on their own, and many on
-//! one sheet.
+//! Pictures of draws, made from plain buffers: over the photograph, alone, or many on one
+//! sheet.
 //!
-//! Nothing here renders a scene; it colours what was rendered. Rows go down, pixel (0, 0)
-//! is the upper left one, and its middle is at (0.5, 0.5). Buffers that are too short
-//! count as background, so no input panics.
+//! This module does not render scenes; it colours rendered buffers. Rows go down, pixel
+//! (0, 0) is the upper left one, and its centre is at (0.5, 0.5). Missing pixels of short
+//! buffers count as background, so no input panics.
 
 mod dots;
 mod font;
@@ -21,8 +21,8 @@ pub use surface::{Drawn, frequency, mask, overlay, shaded};
 /// Pictures are enlarged until their longer side has this many pixels.
 pub const LONGER_SIDE: u32 = 768;
 
-/// The size of pictures of a photograph of some size: at least [`LONGER_SIDE`] along the
-/// longer side.
+/// Returns the size of the pictures for a photograph of the given size: at least
+/// [`LONGER_SIDE`] along the longer side.
 pub fn picture_size(width: u32, height: u32) -> (u32, u32) {
     let longer = width.max(height).max(1);
     if longer >= LONGER_SIDE {
@@ -32,10 +32,10 @@ pub fn picture_size(width: u32, height: u32) -> (u32, u32) {
     (scale(width), scale(height))
 }
 
-/// The bytes of a PNG file.
+/// Encodes a picture as a PNG file.
 ///
 /// # Errors
-/// If the picture has no pixels.
+/// Returns an error if the picture has no pixels.
 pub fn png<P>(picture: &image::ImageBuffer<P, Vec<u8>>) -> Result<Vec<u8>, image::ImageError>
 where
     P: image::Pixel<Subpixel = u8> + image::PixelWithColorType,
@@ -45,7 +45,7 @@ where
     Ok(bytes)
 }
 
-/// One colour over another.
+/// Blends one colour over another.
 fn mix(under: [u8; 3], over: [f32; 3], share: f32) -> [u8; 3] {
     [0, 1, 2].map(|c| {
         (f32::from(under[c]) * (1.0 - share) + over[c].clamp(0.0, 255.0) * share).round() as u8

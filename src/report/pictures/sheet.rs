@@ -1,28 +1,28 @@
-//! Contact sheets: many pictures in rows, as Figure 1 of Kulkarni et al. (2014) shows
-//! draws from a prior.
+//! Contact sheets: many pictures in rows, like the draws from a prior in Figure 1 of
+//! Kulkarni et al. (2014).
 
 use super::font;
 use image::imageops::replace;
 use image::{Rgb, RgbImage};
 
-/// Pixels between pictures and around them.
+/// The number of pixels between pictures and around them.
 const GAP: u32 = 2;
-/// Between pictures.
+/// The colour between pictures.
 const LINE: Rgb<u8> = Rgb([200; 3]);
-/// Letters of captions.
+/// The colour of the letters of captions.
 const INK: Rgb<u8> = Rgb([30; 3]);
-/// Behind captions.
+/// The colour behind captions.
 const PAPER: Rgb<u8> = Rgb([250; 3]);
 
-/// Pictures in rows, with thin lines between them. Cells have the size of the largest
-/// picture; smaller ones lie in the upper left corner of theirs. Without a picture, a
-/// sheet of one pixel.
+/// Arranges pictures in rows, with thin lines between them. Cells have the size of the
+/// largest picture; smaller pictures are in the upper left corners of their cells.
+/// Without pictures, the sheet is a single pixel.
 pub fn contact_sheet(pictures: &[RgbImage], columns: u32) -> RgbImage {
     captioned_sheet(pictures, columns, &[])
 }
 
-/// As [`contact_sheet`], with a line of text below each picture that has one; what is too
-/// wide for the picture is cut.
+/// Does the same as [`contact_sheet`], with a line of text below each picture that has a
+/// caption; captions wider than the picture are cut off.
 pub fn captioned_sheet(pictures: &[RgbImage], columns: u32, captions: &[String]) -> RgbImage {
     let Some(w) = pictures.iter().map(|p| p.width()).max() else { return RgbImage::new(1, 1) };
     let h = pictures.iter().map(|p| p.height()).max().unwrap_or(0);

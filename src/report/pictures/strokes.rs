@@ -1,37 +1,37 @@
-//! Contours: short straight pieces, drawn anti-aliased.
+//! Contours: short straight strokes, drawn with anti-aliasing.
 
 use super::{LONGER_SIDE, mix};
 use image::RgbImage;
 
-/// Short straight pieces of contour in pixels of a picture of `width` x `height`.
+/// Short straight strokes of contours, in pixels of a picture of `width` x `height`.
 #[derive(Clone, Copy, Debug)]
 pub struct Strokes<'a> {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Middles.
+    /// The x coordinates of the centres.
     pub x: &'a [f32],
-    /// Middles.
+    /// The y coordinates of the centres.
     pub y: &'a [f32],
-    /// Unit tangents.
+    /// The x components of the unit tangents.
     pub tx: &'a [f32],
-    /// Unit tangents.
+    /// The y components of the unit tangents.
     pub ty: &'a [f32],
     /// Lengths.
     pub length: &'a [f32],
 }
 
-/// Contours on black, bright, as a ready contour map has them.
+/// Draws bright contours on black, like a contour map.
 pub fn contours(width: u32, height: u32, strokes: &Strokes) -> RgbImage {
     let mut out = RgbImage::new(width, height);
     draw_strokes(&mut out, strokes, [255.0; 3]);
     out
 }
 
-/// Draws strokes, scaled to the picture, about 2 pixels wide in one of [`LONGER_SIDE`]. A
-/// pixel is covered by as much as its middle is inside the stroke, up to one pixel; where
-/// strokes meet the larger cover counts, so joints do not show.
+/// Draws strokes, scaled to the picture, about 2 pixels wide in one of [`LONGER_SIDE`].
+/// Coverage falls linearly from 1 to 0 over one pixel across the edge of a stroke; where
+/// strokes meet, the larger coverage counts, so joints are not visible.
 pub(super) fn draw_strokes(out: &mut RgbImage, s: &Strokes, color: [f32; 3]) {
     let (width, height) = (out.width() as usize, out.height() as usize);
     let (w, h) = (width as f32, height as f32);
@@ -89,7 +89,8 @@ mod tests {
                 && c.get_pixel(8, 14).0[0] == 0
                 && c.get_pixel(17, 10).0[0] == 0
         );
-        // The light it leaves is its area: width 1.4 by length 8, and round ends.
+        // The summed brightness is the stroke's area: width 1.4 by length 8, and round
+        // ends.
         let sum: f32 = c.pixels().map(|p| f32::from(p.0[0]) / 255.0).sum();
         let area = 1.4 * 8.0 + std::f32::consts::PI * 0.7 * 0.7;
         assert!((sum - area).abs() < 0.15 * area, "{sum} {area}");

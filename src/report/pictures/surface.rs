@@ -1,33 +1,33 @@
 //! The surface of a draw: shaded, over a photograph, as a mask, and how often draws cover
-//! a pixel.
+//! each pixel.
 
 use super::strokes::{Strokes, draw_strokes};
 use super::{LONGER_SIDE, mix};
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, Luma, Rgb, RgbImage};
 
-/// A drawn scene: row by row, `width` x `height` pixels.
+/// A rendered scene: row by row, `width` x `height` pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawn<'a> {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Depth along the viewing axis, infinite off the object.
+    /// Depth along the viewing axis, infinite outside the object.
     pub depth: &'a [f32],
     /// Unit normals in the camera's frame: x right, y up, z towards the camera.
     pub normal: &'a [[f32; 3]],
-    /// The part of the scene that is seen, counted from 0; may be empty, then all is one
-    /// part.
+    /// The visible part of the scene, counted from 0; if empty, everything is one part.
     pub part: &'a [u16],
 }
 
-/// The share of the surface where it lies over the photograph.
+/// The opacity of the surface over the photograph.
 const OVER: f32 = 0.55;
-/// The colour of contours: far from the surface's blues and from most photographs.
+/// The colour of contours: unlike the surface's blues and the colours of most
+/// photographs.
 const STROKE: [f32; 3] = [255.0, 60.0, 20.0];
-/// The colours of a part in the dark and in full light. Parts take turns; they differ a
-/// little in hue only, for a cap and the side below it are parts too.
+/// The colours of a part in the dark and in full light, used in turn. They differ
+/// slightly in hue only, because a cap and the side below it are also separate parts.
 const PALETTE: [[[f32; 3]; 2]; 4] = [
     [[30.0, 42.0, 66.0], [206.0, 232.0, 255.0]],
     [[24.0, 52.0, 62.0], [200.0, 244.0, 246.0]],
@@ -35,15 +35,15 @@ const PALETTE: [[[f32; 3]; 2]; 4] = [
     [[38.0, 46.0, 54.0], [224.0, 232.0, 238.0]],
 ];
 
-/// How light a pixel is, from 0 to 1: a light at the camera's upper left, a weaker one at
-/// the camera, and some from everywhere (Lambert's law).
+/// Returns the brightness of a pixel, from 0 to 1: a light at the upper left of the
+/// camera, a weaker one at the camera, and ambient light (Lambert's law).
 fn light([x, y, z]: [f32; 3]) -> f32 {
     let key = (0.7 * z - 0.45 * x + 0.55 * y).max(0.0);
     let light = 0.72 * key + 0.22 * z.max(0.0) + 0.06;
     if light.is_finite() { light.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// The colour of a pixel; `None` off the object.
+/// Returns the colour of a pixel; `None` outside the object.
 fn shade(d: &Drawn, i: usize) -> Option<[f32; 3]> {
     if !d.depth.get(i)?.is_finite() {
         return None;
@@ -54,16 +54,16 @@ fn shade(d: &Drawn, i: usize) -> Option<[f32; 3]> {
     Some([0, 1, 2].map(|c| dark[c] + (bright[c] - dark[c]) * light))
 }
 
-/// The same brightness with twice the colour, so that a surface is told from what is seen
-/// through it.
+/// Doubles the saturation at the same brightness, so that the surface differs from the
+/// photograph that shines through it.
 fn vivid(c: [f32; 3]) -> [f32; 3] {
     let mean = (c[0] + c[1] + c[2]) / 3.0;
     c.map(|x| (mean + 2.0 * (x - mean)).clamp(0.0, 255.0))
 }
 
-/// The surface drawn over the photograph, half transparent, with its contours on top. The
-/// drawing's size decides, but a small picture is enlarged to [`LONGER_SIDE`] so that it
-/// can be judged.
+/// Draws the surface over the photograph, half transparent, with its contours on top. The
+/// result has the drawing's size, but a small picture is enlarged to [`LONGER_SIDE`] so
+/// that details are visible.
 pub fn overlay(photo: Option<&RgbImage>, drawn: &Drawn, strokes: &Strokes) -> RgbImage {
     let mut out = match photo.filter(|p| p.width() > 0 && p.height() > 0) {
         Some(p) if p.dimensions() == (drawn.width, drawn.height) => p.clone(),
@@ -83,7 +83,7 @@ pub fn overlay(photo: Option<&RgbImage>, drawn: &Drawn, strokes: &Strokes) -> Rg
     out
 }
 
-/// The shaded surface on a light ground.
+/// Draws the shaded surface on a light background.
 pub fn shaded(drawn: &Drawn) -> RgbImage {
     let mut out = RgbImage::from_pixel(drawn.width, drawn.height, Rgb([250; 3]));
     for (i, p) in out.pixels_mut().enumerate() {
@@ -94,19 +94,20 @@ pub fn shaded(drawn: &Drawn) -> RgbImage {
     out
 }
 
-/// White on the object, black off it.
+/// Draws the object white on black.
 pub fn mask(drawn: &Drawn) -> GrayImage {
     let on = |i: usize| drawn.depth.get(i).is_some_and(|z| z.is_finite());
     from_fn(drawn.width, drawn.height, |i| if on(i) { 255 } else { 0 })
 }
 
-/// How often each pixel showed the object, from black (never) to white (`of` times).
+/// Draws how often each pixel showed the object, from black (never) to white (`of`
+/// times).
 pub fn frequency(width: u32, height: u32, counts: &[u32], of: u32) -> GrayImage {
     let share = |i: usize| f64::from(counts.get(i).copied().unwrap_or(0)) / f64::from(of.max(1));
     from_fn(width, height, |i| (255.0 * share(i)).round() as u8)
 }
 
-/// A picture from a function of the place in row-major order.
+/// Makes a picture from a function of the row-major pixel index.
 fn from_fn(width: u32, height: u32, value: impl Fn(usize) -> u8) -> GrayImage {
     GrayImage::from_fn(width, height, |x, y| {
         Luma([value(y as usize * width as usize + x as usize)])

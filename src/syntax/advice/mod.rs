@@ -1,8 +1,8 @@
-//! What was probably meant by a text that does not fit the grammar: habits from other
+//! Guesses what was meant by a text that does not fit the grammar: habits from other
 //! languages, and common slips.
 //!
-//! This only chooses words; a rule that misses costs a hint, not a message. [`words`]
-//! looks at names and keywords, [`symbols`] at the rest.
+//! The rules only choose words: if one is missing, the message lacks a hint. The rules
+//! about names and keywords are in [`words`], the others in [`symbols`].
 
 mod symbols;
 mod words;
@@ -13,33 +13,34 @@ use super::recover::Tokens;
 use super::token::Token;
 use std::collections::BTreeSet;
 
-/// Words for an error, where there are better ones than "unexpected …, expected …".
+/// The wording of an error, if it can be better than "unexpected …, expected …".
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Advice {
     /// What is wrong.
     pub message: Option<String>,
-    /// What to say at the place.
+    /// The label at its place.
     pub label: Option<String>,
-    /// What to do.
+    /// What to do instead.
     pub hint: Option<String>,
-    /// The index of the token to point at, if not the one that did not fit.
+    /// The index of the token to point at, if it is not the one that did not fit.
     place: Option<usize>,
 }
 
-/// Where the text does not fit.
+/// The position at which the text does not fit.
 pub(crate) struct Context<'a, 's> {
     pub tokens: &'a Tokens<'s>,
-    /// The index of the token that did not fit; the number of tokens at the end.
+    /// The index of the token that did not fit; the number of tokens for the end of the
+    /// text.
     pub at: usize,
     /// The index of the first token of the statement.
     pub start: usize,
     /// The tokens that would have fitted, as the parser names them.
     pub expected: &'a [String],
-    /// Whether a statement may only lack its semicolon.
+    /// Whether the statement may merely lack its semicolon.
     pub semicolon: bool,
 }
 
-/// The error for a token that does not fit.
+/// Returns the error for a token that does not fit.
 pub(crate) fn explain(context: &Context<'_, '_>) -> SyntaxError {
     let Context { tokens, at, .. } = *context;
     let rules = Rules { expected: expected::names(context.expected), context };
@@ -65,12 +66,12 @@ pub(crate) fn explain(context: &Context<'_, '_>) -> SyntaxError {
     SyntaxError::new(SyntaxErrorKind::Unexpected { found, at_end, expected, advice }, span)
 }
 
-/// Keeps the message, adds a hint.
+/// Returns advice that keeps the message and adds a hint.
 fn hint(hint: impl Into<String>) -> Option<Advice> {
     Some(Advice { hint: Some(hint.into()), ..Advice::default() })
 }
 
-/// Another message and label, and a hint.
+/// Returns advice with another message and label, and a hint.
 fn say(
     message: impl Into<String>,
     label: impl Into<String>,
@@ -84,7 +85,7 @@ fn say(
     })
 }
 
-/// What the rules look at.
+/// The input of the rules.
 struct Rules<'a, 's> {
     context: &'a Context<'a, 's>,
     expected: BTreeSet<&'a str>,
@@ -110,7 +111,7 @@ impl<'s> Rules<'_, 's> {
         self.context.tokens.lexemes.get(i).map(|l| &l.token)
     }
 
-    /// The token that did not fit, and its neighbours.
+    /// Returns the token that did not fit; `next` and `back` return its neighbours.
     fn found(&self) -> Option<&Token<'s>> {
         self.token(self.context.at)
     }
@@ -127,7 +128,7 @@ impl<'s> Rules<'_, 's> {
         self.token(self.context.start)
     }
 
-    /// How many tokens of the statement come before.
+    /// Returns the number of tokens of the statement before the one that did not fit.
     fn distance(&self) -> usize {
         self.context.at.saturating_sub(self.context.start)
     }
@@ -148,7 +149,8 @@ impl<'s> Rules<'_, 's> {
         expected::is_operator(&self.expected)
     }
 
-    /// Whether only the braces of a block could follow, or the head could go on.
+    /// Returns whether only the braces of a block, or a continuation of its head, could
+    /// follow.
     fn expects_block(&self) -> bool {
         self.expects("{") && !self.expects_expression()
     }

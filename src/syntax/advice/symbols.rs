@@ -5,7 +5,7 @@ use crate::syntax::delimiters::first_on_line;
 use crate::syntax::token::Token;
 
 impl Rules<'_, '_> {
-    /// Symbols that do not fit.
+    /// Returns advice on symbols that do not fit.
     pub(super) fn symbol(&self) -> Option<Advice> {
         match self.found()? {
             Token::Bind => self.bind(),
@@ -195,7 +195,7 @@ impl Rules<'_, '_> {
         None
     }
 
-    /// Numbers and what is written around them.
+    /// Returns advice on numbers and the tokens around them.
     pub(super) fn number(&self) -> Option<Advice> {
         match (self.back(2), self.back(1), self.found()?, self.next()) {
             (_, _, Token::Dot, Some(Token::Number(_))) if self.expects_expression() => {
@@ -222,7 +222,7 @@ impl Rules<'_, '_> {
         }
     }
 
-    /// Heads of statements and blocks.
+    /// Returns advice on the heads of statements and blocks.
     pub(super) fn head(&self) -> Option<Advice> {
         let found = self.found();
         let counted = match self.back(3) {
@@ -267,7 +267,7 @@ impl Rules<'_, '_> {
         }
     }
 
-    /// Commas, too many or too few.
+    /// Returns advice on superfluous and missing commas.
     pub(super) fn comma(&self) -> Option<Advice> {
         let found = self.found()?;
         if *found == Token::Comma && !self.expects_expression() {
@@ -288,7 +288,7 @@ impl Rules<'_, '_> {
     }
 }
 
-/// How elements that need the ones before them are written.
+/// Describes how to write an array whose elements depend on earlier ones.
 fn recurrence(name: &str) -> String {
     let i = if name == "t" { "i" } else { "t" };
     let fold = format!("fold(fn(all, {i}) {{ append(all, f(all[{i} - 1])) }}, [first], 1 .. n)");

@@ -1,11 +1,10 @@
-//! Rules about words: statements of other languages, and keywords where they do not
-//! belong.
+//! Rules about words: statements of other languages, and misplaced keywords.
 
 use super::{Advice, Rules, say};
 use crate::syntax::token::Token;
 
 impl Rules<'_, '_> {
-    /// Statements of other languages, by their first word.
+    /// Returns advice on statements of other languages, recognised by their first word.
     pub(super) fn foreign_statement(&self) -> Option<Advice> {
         let start = self.context.start;
         if !matches!(self.first(), Some(Token::Name(_))) || !(1..=2).contains(&self.distance()) {
@@ -58,7 +57,7 @@ impl Rules<'_, '_> {
         advice.map(|advice| Advice { place: Some(start), ..advice })
     }
 
-    /// Keywords where they do not belong.
+    /// Returns advice on misplaced keywords.
     pub(super) fn misplaced(&self) -> Option<Advice> {
         let found = self.found()?;
         let word = self.text(self.context.at);
@@ -126,7 +125,7 @@ impl Rules<'_, '_> {
         None
     }
 
-    /// A keyword where a name is wanted.
+    /// Returns advice on a keyword where a name is expected.
     pub(super) fn keyword_as_name(&self) -> Option<Advice> {
         let found = self.found()?;
         let word = self.text(self.context.at);

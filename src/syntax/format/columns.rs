@@ -1,19 +1,19 @@
-//! What a writer lined up stays lined up: `~`, `=`, `=>`, tags and comments that stood in
-//! one column on lines below each other, with more than one space before one of them.
+//! Keeps the alignment of the source: `~`, `=`, `=>`, tags and comments that were in the
+//! same column on consecutive lines, with more than one space before one of them.
 
-/// Where something stood in the source.
+/// The position of something in the source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SourcePlace {
     pub line: usize,
     pub column: usize,
-    /// How many spaces were before it.
+    /// The number of spaces before it.
     pub spaces: usize,
 }
 
-/// Something that may be lined up.
+/// The position of something that may be aligned.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop {
-    /// Its column.
+    /// Its column in the output.
     pub at: usize,
     pub seen: SourcePlace,
 }
@@ -22,14 +22,14 @@ pub(super) struct Stop {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Row {
     pub text: String,
-    /// From left to right.
+    /// The stops, from left to right.
     pub stops: Vec<Stop>,
-    /// The comment at its end.
+    /// The position of the comment at its end.
     pub comment: Option<Stop>,
 }
 
 impl Row {
-    /// Moves what starts at a column, and all behind it, to another one.
+    /// Moves the text from column `from` on to column `to`.
     fn shift(&mut self, from: usize, to: usize) {
         let Some(by) = to.checked_sub(from) else { return };
         let byte = self.text.char_indices().nth(from).map_or(self.text.len(), |(i, _)| i);
@@ -43,13 +43,13 @@ impl Row {
         self.text.chars().count()
     }
 
-    /// Where the code ends.
+    /// Returns the column at which the code ends.
     fn code(&self) -> usize {
         self.comment.map_or_else(|| self.width(), |stop| stop.at)
     }
 }
 
-/// Lines up what was, unless a line of code would become longer than `width`.
+/// Aligns what the source aligns, unless a line of code would become longer than `width`.
 pub(super) fn line_up(rows: &mut [Row], width: usize) {
     let most = rows.iter().map(|row| row.stops.len()).max().unwrap_or(0);
     for k in 0..most {
@@ -66,8 +66,8 @@ pub(super) fn line_up(rows: &mut [Row], width: usize) {
             }
         }
     }
-    // Comments keep their column, so that those further away stay in line too, if the
-    // code before them leaves room.
+    // Comments keep their column if the code before them leaves room, so that they also
+    // stay aligned with comments further away.
     for run in runs(rows, |row| row.comment) {
         let rows = &mut rows[run];
         let column =
@@ -80,8 +80,8 @@ pub(super) fn line_up(rows: &mut [Row], width: usize) {
     }
 }
 
-/// The longest runs of rows whose stops were in one column of lines below each other, if
-/// spaces were put there for it.
+/// Returns the longest runs of rows whose stops were in the same column on consecutive
+/// lines, if spaces were added to align them.
 fn runs(rows: &[Row], stop: impl Fn(&Row) -> Option<Stop>) -> Vec<std::ops::Range<usize>> {
     let seen: Vec<Option<SourcePlace>> =
         rows.iter().map(|row| stop(row).map(|stop| stop.seen)).collect();

@@ -1,12 +1,12 @@
-//! Expressions: operators and their parentheses, calls, literals, addresses.
+//! Prints expressions: operators and their parentheses, calls, literals, addresses.
 
 use super::printer::{Printer, Share};
 use crate::syntax::ast::*;
 use crate::syntax::string::quote;
 use crate::syntax::token::is_name;
 
-/// How tightly an expression binds, as in the grammar; an operand looser than its place
-/// needs parentheses.
+/// How tightly an expression binds, as in the grammar. An operand that binds less tightly
+/// than its position requires needs parentheses.
 pub(super) type Binding = u8;
 const WHOLE: Binding = 0;
 const OR: Binding = 1;
@@ -20,7 +20,7 @@ const NEGATION: Binding = 8;
 const POWER: Binding = 9;
 pub(super) const POSTFIX: Binding = 10;
 
-/// The text of an operator, its own binding, and those its operands need.
+/// Returns the text of an operator, its binding, and the least bindings of its operands.
 fn operator(op: BinaryOp) -> (&'static str, Binding, Binding, Binding) {
     match op {
         BinaryOp::Or => ("or", OR, OR, AND),
@@ -53,8 +53,8 @@ fn binding(expr: &Expr) -> Binding {
     }
 }
 
-/// Whether an `if` must be, or may be, written without its last `else`: no branch has a
-/// value, and nothing is done otherwise.
+/// Returns whether an `if` must be, or may be, written without its last `else`: the
+/// branches have no value, and the `else` would be empty.
 pub(super) fn lacks_else(expr: &Expr) -> bool {
     match &expr.kind {
         ExprKind::If { then, otherwise, .. } if then.result.is_none() => match &otherwise.result {
@@ -66,7 +66,7 @@ pub(super) fn lacks_else(expr: &Expr) -> bool {
     }
 }
 
-/// Whether an expression ends with a bracket that it opens.
+/// Returns whether an expression ends with a bracket that it opens.
 pub(super) fn in_brackets(expr: &Expr) -> bool {
     matches!(
         expr.kind,
@@ -74,7 +74,7 @@ pub(super) fn in_brackets(expr: &Expr) -> bool {
     )
 }
 
-/// Whether an expression is short: numbers, names.
+/// Returns whether an expression is short: a literal or a name.
 fn is_short(expr: &Expr) -> bool {
     match &expr.kind {
         ExprKind::Num(_) | ExprKind::Bool(_) | ExprKind::Var(_) | ExprKind::Str(_) => true,
@@ -83,15 +83,15 @@ fn is_short(expr: &Expr) -> bool {
     }
 }
 
-/// The shortest text that is read as the same number.
+/// Returns the shortest text that is read as the same number.
 fn number(x: f64) -> String {
     let text = format!("{x:?}");
     text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
 }
 
 impl Printer<'_> {
-    /// An expression that stands where one binds at least so tightly. The source has the
-    /// parentheses that it needs.
+    /// Prints an expression in a position that requires the binding `least`. If there is
+    /// a source, the parentheses come from it.
     pub fn operand(&mut self, expr: &Expr, least: Binding) {
         if self.source.is_none() && binding(expr) < least {
             self.text("(");
@@ -102,7 +102,7 @@ impl Printer<'_> {
         }
     }
 
-    /// An expression, in the parentheses that the source has round it.
+    /// Prints an expression, in the parentheses that it has in the source.
     pub fn expr(&mut self, expr: &Expr) {
         let parentheses =
             self.source.as_ref().map_or(0, |source| source.parentheses(expr.span.start));
@@ -186,8 +186,8 @@ impl Printer<'_> {
         });
     }
 
-    /// Operands of operators that bind equally; a line may be broken before each
-    /// operator.
+    /// Prints operators of equal binding and their operands; except at `..` and `**`, a
+    /// line may be broken before each operator.
     fn chain(&mut self, expr: &Expr) {
         let ExprKind::Binary { op, left, right } = &expr.kind else { return self.bare(expr) };
         let (text, own, left_least, right_least) = operator(*op);
@@ -212,19 +212,20 @@ impl Printer<'_> {
         }
     }
 
-    /// What is indexed: right after an address, `[` and `.` would belong to it.
+    /// Prints what is indexed. An address needs parentheses, because `[` and `.` right
+    /// after it would be part of it.
     fn base(&mut self, base: &Expr) {
         let address = matches!(base.kind, ExprKind::Address(_));
         self.operand(base, if address { POSTFIX + 1 } else { POSTFIX });
     }
 
-    /// An `if`, without its last `else` if `open`. Its blocks are broken together.
+    /// Prints an `if`, without its last `else` if `open`. Its blocks are broken together.
     pub fn if_else(&mut self, expr: &Expr, open: bool) {
         let broken = self.breaks(expr);
         self.blocks(broken, |p| p.if_chain(expr, open));
     }
 
-    /// Whether a block of an `if` is written on several lines.
+    /// Returns whether a block of an `if` is on several lines in the source.
     fn breaks(&self, expr: &Expr) -> bool {
         let ExprKind::If { then, otherwise, .. } = &expr.kind else { return false };
         let broken = |body: &Body| {
@@ -257,7 +258,7 @@ impl Printer<'_> {
         }
     }
 
-    /// A block of an `if`: in the canonical form each is broken or not by itself.
+    /// Prints a block of an `if`; in the canonical form, each is broken or not by itself.
     fn branch(&mut self, body: &Body) {
         if self.source.is_some() { self.body_lines(body) } else { self.body(body) }
     }

@@ -1,8 +1,7 @@
-//! Where lines end: pieces of text and the places where a line may be broken, set within
-//! a width.
+//! Line breaking: text and possible line breaks, laid out within a width.
 //!
-//! After Oppen (1980) and Wadler (2003): a group is set on one line if it fits, else its
-//! lines are broken. A group that holds a broken one is not itself broken by that:
+//! After Oppen (1980) and Wadler (2003): a group is set on one line if it fits, and
+//! broken into lines if it does not. A broken group does not break the group around it:
 //! `map(fn(x) {`, the body, `}, xs)`.
 
 use super::columns::{self, Row, SourcePlace, Stop};
@@ -12,24 +11,27 @@ use std::borrow::Cow;
 /// When a line is broken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Rule {
-    /// With its group.
+    /// If its group is broken.
     Group,
-    /// In a group that is broken: if what comes next does not fit.
+    /// If its group is broken and the following text does not fit.
     Fill,
-    /// In a group that is broken: as the writer had it.
+    /// If its group is broken; the source has a line end here.
     Kept,
 }
 
-/// What a group is, which tells how it keeps its shape when it is formatted again.
+/// The kind of a group, which determines how it keeps its shape when it is formatted
+/// again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
-    /// A list in brackets: broken if the source has a line end behind the bracket.
+    /// A list in brackets: broken if the source has a line end behind the opening
+    /// bracket.
     Brackets,
-    /// A block of statements: likewise, or if all of it, on one line, would be too long;
-    /// those around it are broken with it.
+    /// A block of statements: broken if the source has a line end behind the opening
+    /// brace, or if the whole block is too long for one line. The blocks around it are
+    /// broken with it.
     Block,
-    /// Parts that may go on in new lines: broken if all of it, on one line, would be too
-    /// long.
+    /// Parts that may continue on new lines: broken if all of them are too long for one
+    /// line.
     Parts,
 }
 
@@ -37,9 +39,9 @@ pub(super) enum Kind {
 enum Op<'s> {
     Text(Cow<'s, str>),
     Space,
-    /// A line break; this text (a space or nothing) if it is not broken.
+    /// A line break, with the text (a space or nothing) in its place if it is not broken.
     Line(&'static str, Rule),
-    /// An empty line, if there is a break here.
+    /// An empty line, if there is a line break here.
     Blank,
     Open {
         broken: bool,
@@ -48,18 +50,18 @@ enum Op<'s> {
     Close,
     Indent,
     Dedent,
-    /// A text that is there if its group is broken.
+    /// A text that is present only if its group is broken.
     IfBroken(&'static str),
     Comment(Comment<'s>),
-    /// A place that the writer may have lined up with those above and below.
+    /// A position that may be aligned with those above and below.
     Stop(SourcePlace),
 }
 
-/// A text in the making.
+/// A text to be laid out, as a list of operations.
 #[derive(Debug, Default)]
 pub(super) struct Layout<'s> {
     ops: Vec<Op<'s>>,
-    /// The groups that are open.
+    /// The indices of the open groups.
     open: Vec<usize>,
 }
 
@@ -96,7 +98,7 @@ impl<'s> Layout<'s> {
         self.ops.push(Op::Stop(seen));
     }
 
-    /// Opens a group; a block of statements that is broken breaks those it is in.
+    /// Opens a group. A block of statements that is broken breaks the blocks around it.
     pub fn open(&mut self, broken: bool, kind: Kind) {
         if broken && kind == Kind::Block {
             self.break_blocks();
@@ -110,8 +112,8 @@ impl<'s> Layout<'s> {
         self.ops.push(Op::Close);
     }
 
-    /// A comment; what must go on behind it in a new line breaks the groups it is in, up
-    /// to a block of statements.
+    /// Adds a comment. If the following text must be on a new line, breaks the groups
+    /// around the comment up to a block of statements, and all blocks around it.
     pub fn comment(&mut self, comment: Comment<'s>) {
         if comment.place != Place::Inline {
             for &i in self.open.iter().rev() {
@@ -135,7 +137,8 @@ impl<'s> Layout<'s> {
         }
     }
 
-    /// The text, in lines of at most so many columns where they can be broken.
+    /// Returns the text in lines of at most `width` columns, as far as they can be
+    /// broken.
     pub fn set(&self, width: usize) -> String {
         let mut setter = Setter {
             ops: &self.ops,
@@ -162,17 +165,17 @@ struct Setter<'a, 's> {
     width: usize,
     rows: Vec<Row>,
     column: usize,
-    /// By open indent: whether the group it is in is broken; on one line nothing is
-    /// further in.
+    /// For each open indent, whether its group is broken; on one line, indents have no
+    /// effect.
     indents: Vec<bool>,
-    /// By open group, outermost first: whether it is broken.
+    /// For each open group, outermost first, whether it is broken.
     groups: Vec<bool>,
-    /// Line ends to be written before the next text.
+    /// The number of line ends to write before the next text.
     breaks: usize,
-    /// A space to be written before the next text, if it stays on the line.
+    /// Whether to write a space before the next text, if it stays on the line.
     space: bool,
-    /// Whether the last thing written was a comment that a line end must follow, and one
-    /// that runs to the line's end.
+    /// Set if the last text was a comment that needs a line end after it; true if the
+    /// comment runs to the end of its line.
     comment: Option<bool>,
 }
 
@@ -209,17 +212,17 @@ impl Setter<'_, '_> {
         }
     }
 
-    /// Whether the innermost group is broken.
+    /// Returns whether the innermost group is broken.
     fn is_broken(&self) -> bool {
         self.groups.last().is_none_or(|broken| *broken)
     }
 
-    /// Whether what comes next starts a line.
+    /// Returns whether the next text starts a line.
     fn ends_line(&self) -> bool {
         self.breaks > 0 || self.comment.is_some()
     }
 
-    /// The columns before a line.
+    /// Returns the width of the current indentation.
     fn indent(&self) -> usize {
         2 * self.indents.iter().filter(|broken| **broken).count()
     }
@@ -232,8 +235,8 @@ impl Setter<'_, '_> {
         &mut self.rows[last]
     }
 
-    /// Ends lines, if that is due; nothing is above the first line, and no empty line
-    /// follows what opens.
+    /// Writes the line ends that are due. Drops them before the first line, and empty
+    /// lines after an opening bracket.
     fn end_lines(&mut self, indent: usize) {
         if self.comment.take().is_some() {
             self.breaks = self.breaks.max(1);
@@ -301,10 +304,9 @@ impl Setter<'_, '_> {
         self.comment = Some(to_the_end);
     }
 
-    /// Whether what starts at an operation fits on the line, up to the next place where
-    /// the line may be broken. Groups in it are measured as they are on one line, those
-    /// that are broken in any case too if `all`; the line may be broken in those behind
-    /// it.
+    /// Returns whether the text from an operation up to the next possible line break fits
+    /// on the line. Groups in it are measured on one line, even those already marked as
+    /// broken if `all`; groups after it may be broken.
     fn fits(&self, start: usize, before: usize, all: bool) -> bool {
         if self.width == usize::MAX {
             return true;

@@ -1,29 +1,29 @@
-//! What the printer is made of: tokens, lists, blocks, and the comments that come with
+//! The building blocks of the printer: tokens, lists, blocks, and the comments beside
 //! them.
 
 use super::layout::{Kind, Layout, Rule};
 use super::source::{Comment, Place, Source};
 use std::fmt::Display;
 
-/// Walks a tree and lays its text out; with a source, it takes the tokens from there.
+/// Walks a tree and lays out its text; if there is a source, takes the tokens from it.
 #[derive(Debug, Default)]
 pub(super) struct Printer<'s> {
     layout: Layout<'s>,
     pub source: Option<Source<'s>>,
-    /// Comments behind what was written last.
+    /// Comments to be written behind the last token.
     behind: Vec<Comment<'s>>,
-    /// In a computed key, which must stay on its line.
+    /// Whether this is in a computed key, which must stay on its line.
     pub inline: bool,
 }
 
-/// How the items of a list share lines, if they do not fit on one.
+/// How the items of a list share lines, if they do not all fit on one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Share {
-    /// One on each line.
+    /// One item per line.
     Nothing,
-    /// As many on a line as fit.
+    /// As many items per line as fit.
     Lines,
-    /// They stay beside the brackets: the only one is in brackets itself.
+    /// A single item that is itself in brackets stays beside the brackets of the list.
     Brackets,
 }
 
@@ -32,13 +32,13 @@ impl<'s> Printer<'s> {
         Printer { source: Some(Source::new(text)), ..Printer::default() }
     }
 
-    /// The text of what was printed.
+    /// Returns the text of everything printed.
     pub fn set(mut self, width: usize) -> String {
         self.flush();
         self.layout.set(width)
     }
 
-    /// Tokens, with the spaces between them.
+    /// Prints tokens, with the spaces between them.
     pub fn text(&mut self, text: impl Display) {
         for (i, token) in text.to_string().split(' ').enumerate() {
             if i > 0 {
@@ -51,7 +51,7 @@ impl<'s> Printer<'s> {
         }
     }
 
-    /// One token, which may hold spaces.
+    /// Prints one token, which may contain spaces.
     pub fn token(&mut self, canonical: &str) {
         let Some(source) = &mut self.source else { return self.layout.text(canonical.to_owned()) };
         let token = source.peek();
@@ -59,8 +59,8 @@ impl<'s> Printer<'s> {
         source.advance();
         let after = source.take(|place| matches!(place, Place::Trailing | Place::Below));
         if matches!(token, "," | ";") {
-            // What is written before these goes behind them, but for a remark on what
-            // they end.
+            // Comments before these tokens move behind them, except inline comments,
+            // which belong to what the tokens end.
             let (inline, lines): (Vec<_>, Vec<_>) =
                 before.into_iter().partition(|c| c.place == Place::Inline);
             if !inline.is_empty() {
@@ -77,15 +77,15 @@ impl<'s> Printer<'s> {
         self.behind.extend(after);
     }
 
-    /// Writes the comments behind what was written last.
+    /// Writes the comments behind the last token.
     fn flush(&mut self) {
         for comment in self.behind.drain(..) {
             self.layout.comment(comment);
         }
     }
 
-    /// Writes the comments on lines of their own that are before the next token, and the
-    /// empty line before it.
+    /// Writes the comments before the next token that are not inline, and the empty line
+    /// before it.
     pub fn leading(&mut self) {
         let Some(source) = &mut self.source else { return };
         let comments = source.take(|place| place != Place::Inline);
@@ -97,12 +97,13 @@ impl<'s> Printer<'s> {
         }
     }
 
-    /// Whether the next token of the source is this one, where the source decides.
+    /// Returns whether the next token of the source is this one; `None` without a source.
     pub fn next_is(&self, token: &str) -> Option<bool> {
         self.source.as_ref().map(|source| source.peek() == token)
     }
 
-    /// Whether the source has a line end behind the bracket that was just written.
+    /// Returns whether the source has a line end behind the bracket that was just
+    /// written.
     fn opened(&self) -> bool {
         self.source.as_ref().is_some_and(Source::ended_line)
     }
@@ -112,7 +113,7 @@ impl<'s> Printer<'s> {
         self.layout.line(flat, rule);
     }
 
-    /// A place where what follows may go to a line of its own, further in.
+    /// Prints something that may go on a new line, indented.
     pub fn continued(&mut self, print: impl FnOnce(&mut Self)) {
         self.flush();
         self.layout.indent();
@@ -121,7 +122,7 @@ impl<'s> Printer<'s> {
         self.layout.dedent();
     }
 
-    /// Parts that go on in new lines together.
+    /// Prints parts that continue on new lines together.
     pub fn group(&mut self, print: impl FnOnce(&mut Self)) {
         self.flush();
         self.layout.open(false, Kind::Parts);
@@ -129,7 +130,7 @@ impl<'s> Printer<'s> {
         self.layout.close();
     }
 
-    /// The blocks of what is broken together.
+    /// Prints blocks that are broken together.
     pub fn blocks(&mut self, broken: bool, print: impl FnOnce(&mut Self)) {
         self.flush();
         self.layout.open(broken && !self.inline, Kind::Block);
@@ -137,7 +138,8 @@ impl<'s> Printer<'s> {
         self.layout.close();
     }
 
-    /// What comes next may be lined up with lines above and below.
+    /// Marks the position of the next token as one that may be aligned with lines above
+    /// and below.
     pub fn stop(&mut self) {
         self.flush();
         if let Some(source) = self.source.as_ref().filter(|source| !source.has_comments()) {
@@ -145,7 +147,7 @@ impl<'s> Printer<'s> {
         }
     }
 
-    /// `prefix` and what `print` prints, if there is a value.
+    /// Prints `prefix` and the value, if there is one.
     pub fn maybe<T>(&mut self, prefix: &str, value: Option<&T>, print: impl FnOnce(&mut Self, &T)) {
         if let Some(value) = value {
             self.text(prefix);
@@ -153,7 +155,7 @@ impl<'s> Printer<'s> {
         }
     }
 
-    /// Items with commas between them.
+    /// Prints items separated by commas.
     pub fn list<T>(&mut self, items: &[T], mut print: impl FnMut(&mut Self, &T)) {
         self.group(|p| {
             for (i, item) in items.iter().enumerate() {
@@ -172,7 +174,7 @@ impl<'s> Printer<'s> {
         });
     }
 
-    /// A list in brackets, with `pad` inside of them.
+    /// Prints a list in brackets, with `pad` next to them if it is on one line.
     pub fn brackets<T>(
         &mut self,
         (open, pad, close): (&str, &'static str, &str),
@@ -188,7 +190,7 @@ impl<'s> Printer<'s> {
             [only] if share == Share::Brackets && !remarks => {
                 print(self, only);
                 self.skip_comma();
-                // Without the comma there is nothing to be below of.
+                // Without the comma, these comments have no trailing comment to continue.
                 let below = self.behind.iter_mut().filter(|comment| comment.place == Place::Below);
                 below.for_each(|comment| comment.place = Place::OwnLine);
                 return self.text(close);
@@ -196,7 +198,7 @@ impl<'s> Printer<'s> {
             _ => {}
         }
         let opened = self.opened();
-        // Comments behind the bracket break the list, not what is around it.
+        // Comments behind the bracket break the list, but not the groups around it.
         self.layout.open(opened, Kind::Brackets);
         self.flush();
         self.layout.indent();
@@ -222,8 +224,8 @@ impl<'s> Printer<'s> {
         self.layout.close();
     }
 
-    /// Goes past a comma before a closing bracket, which is there or not as lines are
-    /// broken.
+    /// Skips a comma of the source before a closing bracket; the layout decides whether
+    /// one is written.
     fn skip_comma(&mut self) {
         if let Some(source) = &mut self.source
             && source.peek() == ","
@@ -236,7 +238,7 @@ impl<'s> Printer<'s> {
         }
     }
 
-    /// The end of a list or block, with the comments that are left in it.
+    /// Prints the end of a list or block, with the remaining comments in it.
     fn closing(&mut self, pad: &'static str, close: &str) {
         self.flush();
         self.leading_comments();
@@ -245,7 +247,7 @@ impl<'s> Printer<'s> {
         self.text(close);
     }
 
-    /// Writes the comments on lines of their own that are before the next token.
+    /// Writes the comments before the next token that are not inline.
     fn leading_comments(&mut self) {
         if let Some(source) = &mut self.source {
             self.behind.extend(source.take(|place| place != Place::Inline));
@@ -253,7 +255,8 @@ impl<'s> Printer<'s> {
         }
     }
 
-    /// Statements in braces, on lines of their own or not as what they are in has it.
+    /// Prints statements in braces; the enclosing group decides whether they are on
+    /// separate lines.
     pub fn braces(&mut self, lines: usize, mut print: impl FnMut(&mut Self, usize)) {
         self.text("{");
         let remarks =
@@ -271,21 +274,21 @@ impl<'s> Printer<'s> {
         self.closing(" ", "}");
     }
 
-    /// A block of statements: on one line only if the source has it so.
+    /// Prints a block of statements, on one line only if it is in the source.
     pub fn block(&mut self, lines: usize, print: impl FnMut(&mut Self, usize)) {
-        // Comments that come before the brace are no part of the block.
+        // Comments before the brace are not part of the block.
         self.flush();
         let broken = self.opens_lines(lines > 0);
         self.blocks(broken, |p| p.braces(lines, print));
     }
 
-    /// Whether the block that comes next is written on several lines; without a source,
-    /// `canonical`.
+    /// Returns whether the next block is on several lines in the source; without a
+    /// source, returns `canonical`.
     pub fn opens_lines(&self, canonical: bool) -> bool {
         self.source.as_ref().map_or(canonical, Source::opens_lines)
     }
 
-    /// All lines of a file.
+    /// Prints all lines of a file.
     pub fn lines(&mut self, lines: usize, mut print: impl FnMut(&mut Self, usize)) {
         for i in 0..lines {
             self.line("", Rule::Group);

@@ -1,45 +1,45 @@
-//! The text that is formatted, read token by token, and the comments between them.
+//! The text that is formatted, read token by token, with the comments between the tokens.
 
 use super::columns::SourcePlace;
 use crate::syntax::lexer::lex;
 use crate::syntax::span::FileId;
 use std::ops::Range;
 
-/// How a comment stands among the tokens.
+/// The position of a comment among the tokens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Place {
-    /// Before a token of its line.
+    /// Before a token on the same line.
     Inline,
     /// Behind the last token of a line.
     Trailing,
-    /// Under a trailing one, which it continues.
+    /// Below a trailing comment, which it continues.
     Below,
-    /// On lines of its own.
+    /// On separate lines.
     OwnLine,
 }
 
 /// A comment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Comment<'s> {
-    /// With its delimiters.
+    /// The comment with its delimiters.
     pub text: &'s str,
     pub place: Place,
-    /// Whether an empty line is before it.
+    /// Whether an empty line precedes it.
     pub blank: bool,
     pub seen: SourcePlace,
 }
 
-/// A text, its tokens, and which comes next.
+/// A text, its tokens, and the position of the next one.
 #[derive(Debug)]
 pub(super) struct Source<'s> {
     text: &'s str,
     tokens: Vec<Range<usize>>,
-    /// Where each line starts.
+    /// The byte at which each line starts.
     lines: Vec<usize>,
     next: usize,
     /// The comments before the next token that have not been taken.
     comments: Vec<Comment<'s>>,
-    /// Whether an empty line is right before the next token.
+    /// Whether an empty line directly precedes the next token.
     blank: bool,
 }
 
@@ -55,12 +55,13 @@ impl<'s> Source<'s> {
         source
     }
 
-    /// The next token.
+    /// Returns the next token; the empty text at the end.
     pub fn peek(&self) -> &'s str {
         self.tokens.get(self.next).map_or("", |token| &self.text[token.clone()])
     }
 
-    /// How many tokens from the next one on are parentheses that open before a byte.
+    /// Returns how many tokens from the next one on are opening parentheses that start
+    /// before a byte.
     pub fn parentheses(&self, before: u32) -> usize {
         let open = |token: &&Range<usize>| {
             token.start < before as usize && &self.text[(*token).clone()] == "("
@@ -68,46 +69,46 @@ impl<'s> Source<'s> {
         self.tokens[self.next.min(self.tokens.len())..].iter().take_while(open).count()
     }
 
-    /// Goes past the next token.
+    /// Moves past the next token.
     pub fn advance(&mut self) {
         self.next += 1;
         self.read_gap();
     }
 
-    /// Takes the comments before the next token that satisfy a condition, up to the first
-    /// that does not.
+    /// Takes the comments before the next token, up to the first whose place is not
+    /// wanted.
     pub fn take(&mut self, wanted: impl Fn(Place) -> bool) -> Vec<Comment<'s>> {
         let n = self.comments.iter().take_while(|comment| wanted(comment.place)).count();
         self.comments.drain(..n).collect()
     }
 
-    /// Whether there are comments before the next token that have not been taken.
+    /// Returns whether comments before the next token have not been taken.
     pub fn has_comments(&self) -> bool {
         !self.comments.is_empty()
     }
 
-    /// Whether an empty line is right before what comes next.
+    /// Returns whether an empty line directly precedes the next comment or token.
     pub fn blank(&self) -> bool {
         self.comments.first().map_or(self.blank, |comment| comment.blank)
     }
 
-    /// Whether the token that was just passed ends its line.
+    /// Returns whether the token that was just passed ends its line.
     pub fn ended_line(&self) -> bool {
         self.gap(self.next).trim_start_matches([' ', '\t']).starts_with('\n')
     }
 
-    /// Whether the next token, a bracket, ends its line.
+    /// Returns whether the next token, a bracket, ends its line.
     pub fn opens_lines(&self) -> bool {
         self.tokens.get(self.next).is_some_and(|token| self.opened_at(token.start as u32))
     }
 
-    /// Whether the bracket at a byte ends its line.
+    /// Returns whether the bracket at a byte ends its line.
     pub fn opened_at(&self, byte: u32) -> bool {
         let behind = self.text.get(byte as usize + 1..).unwrap_or("");
         behind.trim_start_matches([' ', '\t']).starts_with('\n')
     }
 
-    /// Where the next token stands.
+    /// Returns the position of the next token.
     pub fn seen(&self) -> SourcePlace {
         self.place(self.tokens.get(self.next).map_or(self.text.len(), |token| token.start))
     }
@@ -119,7 +120,7 @@ impl<'s> Source<'s> {
         SourcePlace { line, column, spaces: column - before.trim_end().chars().count() }
     }
 
-    /// What is between the token before and a token.
+    /// Returns the text between the previous token and this one.
     fn gap(&self, token: usize) -> &'s str {
         let start =
             token.checked_sub(1).and_then(|last| self.tokens.get(last)).map_or(0, |last| last.end);
@@ -134,11 +135,11 @@ impl<'s> Source<'s> {
         let base = gap.as_ptr() as usize - self.text.as_ptr() as usize;
         let mut comments: Vec<Comment<'s>> = Vec::new();
         let mut at = 0;
-        // How many lines end before the next comment.
+        // The number of line ends before the next comment.
         let mut ends = usize::from(first);
         let mut own_line = Vec::new();
-        // Behind less than a whole statement or item, a comment may stand where those on
-        // lines of their own do.
+        // Only after `,` or `;` can a comment continue the trailing one above it;
+        // elsewhere it is one on separate lines.
         let last_token = self.next.checked_sub(1).and_then(|last| self.tokens.get(last));
         let ends_part =
             last_token.is_some_and(|token| matches!(&self.text[token.clone()], "," | ";"));
@@ -176,7 +177,7 @@ impl<'s> Source<'s> {
             at += length;
         }
         self.blank = ends > 1;
-        // Comments after which no line ends belong to the next token.
+        // Comments on the line of the next token belong to that token.
         if ends == 0 && !last {
             for (comment, ends) in comments.iter_mut().zip(own_line).rev() {
                 comment.place = Place::Inline;

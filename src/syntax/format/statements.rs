@@ -1,4 +1,4 @@
-//! Items, statements of models and of plans.
+//! Prints items, and statements of models and plans.
 
 use super::expressions::{POSTFIX, in_brackets, lacks_else};
 use super::printer::{Printer, Share};
@@ -8,7 +8,7 @@ use crate::syntax::string::quote;
 use std::sync::Arc;
 
 impl Printer<'_> {
-    /// A whole file.
+    /// Prints a whole file.
     pub fn program(&mut self, program: &Program) {
         self.lines(program.items.len(), |p, i| {
             program.items.get(i).map_or((), |item| p.item(item))
@@ -99,20 +99,20 @@ impl Printer<'_> {
         });
     }
 
-    /// What follows the name of a function, or `fn`.
+    /// Prints the parameters and body after `fn` or the name of a function.
     pub fn lambda(&mut self, lambda: &Lambda) {
         self.params(&lambda.params);
         self.text(" ");
         self.body(&lambda.body);
     }
 
-    /// The body of a function.
+    /// Prints the body of a function.
     pub fn body(&mut self, body: &Body) {
         let broken = self.opens_lines(!body.stmts.is_empty());
         self.blocks(broken, |p| p.body_lines(body));
     }
 
-    /// A body whose lines are broken as what it is in has it.
+    /// Prints a body whose lines are broken if its enclosing group is.
     pub fn body_lines(&mut self, Body { stmts, result, .. }: &Body) {
         self.braces(stmts.len() + usize::from(result.is_some()), |p, i| {
             match (stmts.get(i), result) {
@@ -123,8 +123,8 @@ impl Printer<'_> {
         });
     }
 
-    /// A statement; `last` if it ends a body without a value, so that a last `if` must
-    /// not become the value.
+    /// Prints a statement. `last` means that it ends a body without a value, so that a
+    /// last `if` must not become the value.
     fn stmt(&mut self, stmt: &Stmt, last: bool) {
         match &stmt.kind {
             StmtKind::Assume { name, bind, expr, tags } => {
@@ -177,8 +177,8 @@ impl Printer<'_> {
         self.text(" ");
     }
 
-    /// What is observed: the value on a line of its own if there is no room, but for one
-    /// in brackets.
+    /// Prints the parts of an observation. The value goes on a new line if there is no
+    /// room, unless it is in brackets.
     fn observed(&mut self, dist: &Expr, value: &Expr, coarse: Option<&Expr>) {
         self.expr(dist);
         if in_brackets(value) {
@@ -217,7 +217,7 @@ impl Printer<'_> {
         self.bound(if bind == Bind::Random { "~ " } else { "= " }, expr, tags);
     }
 
-    /// The part of a statement from `~` or `=` on.
+    /// Prints the part of a statement from `~` or `=` on.
     fn bound(&mut self, bind: &str, expr: &Expr, tags: &[Tag]) {
         self.text(" ");
         self.stop();
