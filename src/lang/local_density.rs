@@ -81,8 +81,8 @@ pub struct LocalDensity {
     pub instructions: Box<[Instruction]>,
     /// The computations that depend on the value; other blocks must not read them.
     pub computations: Box<[Slot]>,
-    /// The registers of computations, once computed: of these, and of those that
-    /// alternatives need.
+    /// The registers that contain the results of computations, once computed: of
+    /// `computations`, and of those that alternatives need.
     pub results: Box<[(Slot, u8)]>,
     /// What the alternatives of its selections hold. When a selection switches, it must
     /// be kept by other holders.

@@ -13,10 +13,10 @@ use crate::syntax::ast::{
 use crate::syntax::parse_expr;
 use std::sync::Arc;
 
-/// The types a parameter may have.
+/// The possible types of a parameter.
 const TYPES: [&str; 5] = ["number", "int", "bool", "string", "array"];
 
-/// The name by which a later `forget` can remove an item.
+/// Returns the name by which a later `forget` can remove an item.
 fn forgettable(item: &Item) -> Option<&crate::syntax::ast::Name> {
     let ItemKind::Stmt(s) = &item.kind else { return None };
     match &s.kind {
@@ -31,7 +31,7 @@ impl Lowerer<'_> {
     pub fn unit(&mut self, index: usize) {
         let loaded = self.loaded;
         let unit = &loaded.units[index];
-        // Named functions first: they may be called before they are written.
+        // Named functions come first, since they may be called before they are written.
         for item in &unit.program.items {
             if let ItemKind::Fn(f) = &item.kind {
                 self.declare(f);
@@ -91,7 +91,7 @@ impl Lowerer<'_> {
                         e.hint_also("rename one of them");
                     }
                 }
-                // A plan of an included file is that file's own.
+                // A plan of an included file belongs to that file, and is ignored here.
                 ItemKind::Infer { name, body } if index == 0 => {
                     let name = name.as_ref().map(|n| Arc::clone(&n.node));
                     self.plans.push(Plan { name, body: body.clone().into() });
@@ -111,7 +111,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The items that a later `forget` removes, and the `forget` statements themselves.
+    /// Returns the items that a later `forget` removes, and the `forget` statements
+    /// themselves.
     fn forgotten(&mut self, items: &[Item]) -> Vec<usize> {
         let mut gone = Vec::new();
         for (i, item) in items.iter().enumerate() {
@@ -151,7 +152,7 @@ impl Lowerer<'_> {
         gone
     }
 
-    /// Makes the block of a named function, so that it can be called.
+    /// Creates the block of a named function, so that it can be called.
     fn declare(&mut self, f: &FnDecl) {
         let block = self.function_block(Arc::clone(&f.name.node), &f.lambda);
         self.bind(&f.name, Meaning::Function(block), Type::Function);
@@ -162,7 +163,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// An empty function block.
+    /// Creates an empty function block.
     pub fn function_block(&mut self, name: Arc<str>, lambda: &Lambda) -> u32 {
         let params: Arc<[Arc<str>]> =
             lambda.params.iter().map(|p| Arc::clone(&p.name.node)).collect();
@@ -176,7 +177,7 @@ impl Lowerer<'_> {
         self.new_block(BlockKind::Function { name, params, required })
     }
 
-    /// Fills a function's block.
+    /// Lowers a function's body into its block.
     pub fn function_body(&mut self, block: u32, lambda: &Lambda) {
         self.scopes.push(Scope::new(block, ScopeKind::Function));
         self.bodies.push(Body::default());
@@ -202,7 +203,7 @@ impl Lowerer<'_> {
         self.scopes.pop();
     }
 
-    /// The bodies of all named functions.
+    /// Lowers the bodies of all named functions.
     pub fn function_bodies(&mut self) {
         for p in std::mem::take(&mut self.pending) {
             let outer = std::mem::replace(&mut self.module, p.module);
@@ -260,7 +261,7 @@ impl Lowerer<'_> {
         );
     }
 
-    /// The value of `--set name=text`.
+    /// Lowers the value of `--set name=text`.
     fn set_value(&mut self, name: &str, text: &str, ty: Type) -> Typed {
         let file = self.map.add(&format!("--set {name}"), text);
         if ty == Type::Str && !text.starts_with('"') {
@@ -280,7 +281,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// A number that is known must be whole where that is asked for.
+    /// Reports a constant that is not a whole number, if the type requires one.
     fn check_whole(
         &mut self,
         value: Typed,
@@ -331,7 +332,7 @@ impl Lowerer<'_> {
         }
         let value = match (self.inputs.data.get(&*name).cloned(), &d.default) {
             (Some(v), default) => {
-                // The file was read with the default's options.
+                // The file was read with the options of the default.
                 if let Some(ExprKind::Call { callee, args }) = default.as_ref().map(|e| &e.kind)
                     && let ExprKind::Var(kind) = &callee.kind
                     && data::kinds().any(|k| k == &**kind)
@@ -354,7 +355,7 @@ impl Lowerer<'_> {
         self.bind_value(&d.name, value);
     }
 
-    /// `csv("file")` and the like, or any expression.
+    /// Lowers `csv("file")` and the like, or any expression.
     fn data_default(&mut self, e: &Expr, folder: &str) -> Typed {
         if let ExprKind::Call { callee, args } = &e.kind
             && let ExprKind::Var(kind) = &callee.kind
@@ -389,7 +390,8 @@ impl Lowerer<'_> {
         self.expr(e)
     }
 
-    /// How a data item's file is to be read, from the arguments after its path.
+    /// Parses the reading options of a data item's file from the arguments that follow
+    /// its path.
     fn options(&mut self, kind: &str, args: &[crate::syntax::ast::Arg]) -> Option<data::Options> {
         let (i, fault) = match data::Options::parse(kind, args) {
             Ok(options) => return Some(options),
@@ -406,7 +408,7 @@ impl Lowerer<'_> {
         None
     }
 
-    /// `--set` and `--observe` names that no file declares.
+    /// Reports `--set` and `--observe` names that no file declares.
     pub fn unused_inputs(&mut self) {
         let interface = super::inspect(self.loaded);
         let params: Vec<&str> = interface.params.iter().map(|p| p.name.as_str()).collect();
@@ -436,7 +438,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// The type of a literal; anything where it is not one.
+/// Returns the type of a literal; `Any` if it is not one.
 fn literal_type(e: &Expr) -> Type {
     match &e.kind {
         ExprKind::Num(_) => Type::Num,
