@@ -328,7 +328,7 @@ pub enum Op {
     Closure(BlockId),
     /// `for x in e { … }`: one frame per pass.
     For {
-        /// What it runs over.
+        /// The array, range or record that it iterates over.
         iter: Operand,
         /// The body.
         body: BlockId,
@@ -337,7 +337,7 @@ pub enum Op {
     Map {
         /// The function.
         f: Operand,
-        /// What it runs over.
+        /// The array or record that it iterates over.
         over: Operand,
         /// Its site; the element's key goes to its last segment but one, or to its only
         /// one.
@@ -349,7 +349,7 @@ pub enum Op {
         f: Operand,
         /// The first running value.
         init: Operand,
-        /// What it runs over.
+        /// The array or record that it iterates over.
         over: Operand,
         /// Its site, by index into [`Code::sites`].
         site: u32,

@@ -1,8 +1,8 @@
 //! Values of the language: immutable, cheap to clone, shared by pointer.
 //!
 //! Scene objects (solids, views, photographs) enter as [`Object`]s and comparators as
-//! [`Likelihood`]s, so that neither the language nor the traces depend on what a picture
-//! is.
+//! [`Likelihood`]s, so that neither the language nor the traces depend on how pictures
+//! are represented.
 
 use super::adjoint::Adjoint;
 pub use super::extent::{Extent, MOST_ELEMENTS, MOST_NESTED};

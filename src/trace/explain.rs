@@ -41,7 +41,7 @@ pub enum Effect {
 pub struct Dependent {
     /// Its address.
     pub address: Address,
-    /// What it is.
+    /// Its kind.
     pub term: Term,
     /// The effect of the update on it.
     pub effect: Effect,

@@ -29,7 +29,7 @@ impl Graph {
         }
     }
 
-    /// Invalidates what reads a choice from other frames.
+    /// Invalidates the nodes of other frames that read a choice.
     pub fn invalidate_outside_users(&mut self, code: &Code, n: NodeId) {
         self.invalidate_each_outside(code, n);
         self.invalidate_pending(code);
@@ -113,7 +113,7 @@ impl Graph {
         }
     }
 
-    /// Invalidates what reads the result of a pass of a `fold`: the next pass, or the
+    /// Invalidates the reader of the result of a pass of a `fold`: the next pass, or the
     /// fold itself.
     fn invalidate_next_pass(&mut self, code: &Code, owner: NodeId, frame: FrameId) {
         let pass = self.frames[frame as usize].pass as usize;
