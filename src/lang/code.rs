@@ -165,7 +165,7 @@ pub struct Site {
 pub struct SiteSegment {
     /// Its name.
     pub name: Arc<str>,
-    /// Which occurrence.
+    /// The occurrence of the name.
     pub occurrence: u32,
     /// A hash of both.
     pub hash: u64,
@@ -264,7 +264,7 @@ pub enum Probe {
 pub enum Op {
     /// A parameter of the function, or its default.
     Param {
-        /// Which parameter.
+        /// The index of the parameter.
         index: u16,
         /// Its default.
         default: Option<Operand>,

@@ -83,8 +83,8 @@ pub(crate) struct Graph {
     pub starting: bool,
     /// Values that choices take when they are first drawn.
     pub constraints: FxHashMap<u64, Constraint>,
-    /// Values observed in place of the program's, by the hash of the observation's
-    /// address.
+    /// Values that replace the program's observed values, by the hash of the
+    /// observation's address.
     pub observed: std::sync::Arc<FxHashMap<u64, Value>>,
     /// The sums before a query, for probes; `None` outside of queries.
     pub before: Option<Before>,

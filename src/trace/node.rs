@@ -21,7 +21,7 @@ pub(crate) type FrameId = u32;
 /// No node or no frame.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// How far a node's value can be trusted.
+/// Whether a node's value is up to date.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum State {
     /// Not evaluated: nothing needs it.
@@ -55,7 +55,7 @@ pub(crate) const SAVED: u8 = 32;
 pub(crate) struct Node {
     /// Its value; `nothing` while empty.
     pub value: Value,
-    /// How far its value can be trusted.
+    /// Whether its value is up to date.
     pub state: State,
     /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`], [`SAVED`].
     pub flags: u8,
@@ -248,7 +248,7 @@ pub(crate) struct ChoiceSide {
     pub deps: Deps,
 }
 
-/// Where a function's parameters come from.
+/// The source of a function's parameters.
 #[derive(Clone, Debug)]
 pub(crate) enum Arguments {
     /// Not a function's frame.
@@ -284,7 +284,7 @@ pub(crate) struct Frame {
     pub pass: u32,
     /// The key of the pass, `map` element or `mem` entry.
     pub key: Option<Key>,
-    /// Where parameters come from.
+    /// The source of its parameters.
     pub args: Arguments,
     /// Whether its owner still uses it.
     pub attached: bool,

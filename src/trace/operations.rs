@@ -116,7 +116,8 @@ impl Trace {
     /// let mut trace = model.simulate(1, 0)?;
     /// let draws = Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step: 0, substream: 0 };
     ///
-    /// // Another branch, a value for the choice that appears in it, other data: one update, and back.
+    /// // One update changes the branch, gives a value to the choice that appears in it,
+    /// // and replaces the data; another one undoes it.
     /// trace.set("@spare", false, draws)?;
     /// let before = trace.log_joint();
     /// let given = [("@spare".parse()?, true.into()), ("@x/a".parse()?, 1.5.into()), ("@y".parse()?, 2.0.into())];

@@ -18,7 +18,7 @@ pub struct Draws {
     pub key: StreamKey,
     /// The step of the chain.
     pub step: u64,
-    /// Which of several alternatives at one step.
+    /// The index of one of several alternatives at one step.
     pub substream: u64,
 }
 

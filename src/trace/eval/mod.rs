@@ -223,7 +223,7 @@ impl Graph {
         self.fail(code, n, f.kind, f.message, f.hint)
     }
 
-    /// An error of the wrong type at a node.
+    /// Builds a type error at a node.
     pub(super) fn type_error(&self, code: &Code, n: NodeId, message: String) -> Failure {
         self.fail(code, n, FaultKind::Type, message, None)
     }
