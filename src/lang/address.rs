@@ -1,9 +1,9 @@
 //! Addresses: the path that leads to a random choice or observation, as a value and as
 //! text.
 //!
-//! What an address prints as reads back as the same address, but for keys that are arrays
-//! of one element or of arrays, which print as their elements. Not here: patterns with
-//! wildcards, and the address literals of programs.
+//! An address that is printed reads back as the same address, except if keys are arrays
+//! of one element or of arrays, which print as their elements. Patterns with wildcards
+//! and the address literals of programs are in other modules.
 
 use super::code::segment_hash;
 use super::key::{Key, mix};
@@ -23,7 +23,7 @@ pub struct Address {
 pub struct AddressSegment {
     /// The name of a binding, function, or observation.
     pub name: Arc<str>,
-    /// Which textual occurrence, from 1; 0 prints as nothing and equals 1.
+    /// The textual occurrence, from 1; 0 prints as nothing and is equivalent to 1.
     pub occurrence: u32,
     /// The keys of loops, containers, `map`, `iid` and `mem`.
     pub keys: Vec<Key>,
@@ -33,8 +33,8 @@ pub struct AddressSegment {
 pub(crate) const ROOT_HASH: u64 = 0x7063_6164_6c61_6e67;
 
 impl Address {
-    /// A 64-bit hash, the same on every platform: it keys the random stream of the
-    /// choice.
+    /// Returns a 64-bit hash, the same on every platform, which keys the random stream of
+    /// the choice.
     pub fn hash64(&self) -> u64 {
         self.segments.iter().fold(ROOT_HASH, |h, s| {
             let h = mix(h, segment_hash(&s.name, s.occurrence));
@@ -42,8 +42,8 @@ impl Address {
         })
     }
 
-    /// Whether this address is `other` or lies below it: same segments, and at the last
-    /// of them the same leading keys.
+    /// Whether this address is `other` or below it: the same segments, with the same
+    /// leading keys at the last of them.
     pub fn starts_with(&self, other: &Address) -> bool {
         let Some((last, init)) = other.segments.split_last() else { return true };
         self.segments.len() >= other.segments.len() && self.segments[..init.len()] == *init && {
@@ -54,7 +54,8 @@ impl Address {
 }
 
 impl Address {
-    /// The address as text for messages: of a long one the first and last segments.
+    /// Returns the address as text for messages; a long one is shortened to its first and
+    /// last segments.
     pub fn shortened(&self) -> String {
         let n = self.segments.len();
         if n <= 12 {
@@ -97,13 +98,13 @@ impl fmt::Display for AddressSegment {
     }
 }
 
-/// Names given to observations and factors without one of their own; they always show
+/// Whether a name is one given to unnamed observations or factors, which always show
 /// their number.
 pub(crate) fn is_numbered(name: &str) -> bool {
     name == "obs" || name == "factor"
 }
 
-/// A text that is not an address.
+/// The error for a text that is not an address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{text}` is not an address: expected {expected} at byte {at}; an example of an address \
@@ -112,7 +113,7 @@ pub(crate) fn is_numbered(name: &str) -> bool {
 pub struct AddressTextError {
     /// The text.
     pub text: String,
-    /// Where reading stopped, in bytes.
+    /// The byte offset at which reading stopped.
     pub at: usize,
     /// What was expected there.
     pub expected: &'static str,
@@ -121,7 +122,7 @@ pub struct AddressTextError {
 impl FromStr for Address {
     type Err = AddressTextError;
 
-    /// Reads an address as it is printed; the `@` may be left out.
+    /// Reads an address in its printed form; the `@` may be omitted.
     fn from_str(text: &str) -> Result<Self, AddressTextError> {
         let mut rest = text.strip_prefix('@').unwrap_or(text);
         let wrong = |rest: &str, expected| AddressTextError {
@@ -160,14 +161,14 @@ impl FromStr for Address {
     }
 }
 
-/// Takes the leading characters of a kind.
+/// Takes the leading characters of a given kind.
 fn take<'t>(rest: &mut &'t str, of_kind: impl Fn(char) -> bool) -> &'t str {
     let (taken, left) = rest.split_at(rest.find(|c| !of_kind(c)).unwrap_or(rest.len()));
     *rest = left;
     taken
 }
 
-/// Takes a key up to its bracket: one, or several between commas.
+/// Takes a key up to its closing bracket: a single one, or several separated by commas.
 fn read_key(rest: &mut &str) -> Option<Key> {
     let mut keys = Vec::new();
     loop {
@@ -196,7 +197,7 @@ fn read_key(rest: &mut &str) -> Option<Key> {
     }
 }
 
-/// Takes the rest of a string that is printed with escapes, and its closing quote.
+/// Takes the rest of a string printed with escapes, and its closing quote.
 fn quoted(rest: &mut &str) -> Option<String> {
     let mut text = String::new();
     let mut chars = rest.chars();

@@ -1,36 +1,37 @@
-//! Adjoints: the derivatives of a number by a value, in the value's shape. They are what
-//! flows backwards through a program when a gradient is taken (reverse mode).
+//! Adjoints: the derivatives of a number with respect to a value, in the value's shape.
+//! They flow backwards through a program when a gradient is taken (reverse mode).
 
 use super::value::Value;
 use crate::num::accumulate;
 use std::sync::Arc;
 
-/// The derivatives of a number by a value.
+/// The derivatives of a number with respect to a value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Adjoint {
     /// Zero, whatever the shape.
     #[default]
     Zero,
-    /// By a number.
+    /// With respect to a number.
     Num(f64),
-    /// By an array of numbers. By a distribution: by its parameters, in the order of its
-    /// constructor. By an object or a likelihood: as its type says.
+    /// With respect to an array of numbers. For a distribution: with respect to its
+    /// parameters, in the order of its constructor. For an object or a likelihood: as its
+    /// type defines.
     Array(Vec<f64>),
-    /// By the elements of an array.
+    /// With respect to the elements of an array.
     List(Vec<Adjoint>),
-    /// By some fields of a record.
+    /// With respect to some fields of a record.
     Record(Vec<(Arc<str>, Adjoint)>),
-    /// There is a dependence, and nobody knows its derivative.
+    /// There is a dependence whose derivative is not known.
     Unknown,
 }
 
 impl Adjoint {
-    /// Whether nothing flows.
+    /// Whether it is zero.
     pub fn is_zero(&self) -> bool {
         matches!(self, Adjoint::Zero)
     }
 
-    /// Whether something in it is unknown.
+    /// Whether any part of it is unknown.
     pub fn is_unknown(&self) -> bool {
         match self {
             Adjoint::Unknown => true,
@@ -40,12 +41,13 @@ impl Adjoint {
         }
     }
 
-    /// By a number; 0 for what is none.
+    /// Returns the derivative with respect to a number; 0 if this is not the adjoint of a
+    /// number.
     pub fn number(&self) -> f64 {
         if let Adjoint::Num(g) = self { *g } else { 0.0 }
     }
 
-    /// By element `i` of an array.
+    /// Returns the adjoint of element `i` of an array.
     pub fn element(&self, i: usize) -> Adjoint {
         match self {
             Adjoint::Array(gs) => gs.get(i).map_or(Adjoint::Zero, |g| Adjoint::Num(*g)),
@@ -55,7 +57,7 @@ impl Adjoint {
         }
     }
 
-    /// By a field of a record.
+    /// Returns the adjoint of a field of a record.
     pub fn field(&self, name: &str) -> Adjoint {
         match self {
             Adjoint::Record(all) => {
@@ -66,7 +68,7 @@ impl Adjoint {
         }
     }
 
-    /// By the numbers of an array, so many of them.
+    /// Returns the derivatives with respect to an array of `n` numbers.
     pub fn numbers(&self, n: usize) -> Vec<f64> {
         match self {
             Adjoint::Array(gs) if gs.len() == n => gs.clone(),
@@ -74,7 +76,7 @@ impl Adjoint {
         }
     }
 
-    /// Multiplies all of it.
+    /// Multiplies all of it by a factor.
     pub fn scale(&mut self, factor: f64) {
         if factor == 1.0 {
             return;
@@ -88,7 +90,7 @@ impl Adjoint {
         }
     }
 
-    /// Adds another of the same shape.
+    /// Adds another adjoint of the same shape.
     pub fn add(&mut self, other: Adjoint) {
         match (&mut *self, other) {
             (_, Adjoint::Zero) | (Adjoint::Unknown, _) => {}
@@ -116,7 +118,7 @@ impl Adjoint {
         }
     }
 
-    /// Adds to element `i` of an array of `n`.
+    /// Adds to the adjoint of element `i` of an array of `n`.
     pub fn add_element(&mut self, n: usize, i: usize, by: Adjoint) {
         match (&mut *self, by) {
             (_, Adjoint::Zero) | (Adjoint::Unknown, _) => {}
@@ -159,7 +161,7 @@ impl Adjoint {
         }
     }
 
-    /// Adds to a field of a record.
+    /// Adds to the adjoint of a field of a record.
     pub fn add_field(&mut self, name: &Arc<str>, by: Adjoint) {
         if by.is_zero() {
             return;
@@ -174,7 +176,8 @@ impl Adjoint {
         }
     }
 
-    /// Adds to what indexing a value with these keys picks out, one key after the other.
+    /// Adds to the part that indexing a value with these keys selects, one key after the
+    /// other.
     #[doc(hidden)]
     pub fn add_at(&mut self, base: &Value, keys: &[Value], by: Adjoint) {
         let Some((key, rest)) = keys.split_first() else { return self.add(by) };
@@ -191,7 +194,7 @@ impl Adjoint {
             (Value::Array(_) | Value::List(_), Value::Array(at)) => {
                 let n = base.len().unwrap_or(0);
                 for (k, i) in at.iter().enumerate() {
-                    // What comes after picks from the array of what was picked.
+                    // The remaining keys index into the array of selected elements.
                     let part = if rest.is_empty() { by.element(k) } else { Adjoint::Unknown };
                     self.add_element(n, *i as usize, part);
                 }
@@ -205,7 +208,7 @@ impl Adjoint {
         }
     }
 
-    /// In the shape of a record's fields, by position.
+    /// Adds to the adjoint of element `i` of an array, or of field `i` of a record.
     #[doc(hidden)]
     pub fn add_position(&mut self, base: &Value, i: usize, by: Adjoint) {
         match base {

@@ -2,9 +2,9 @@
 //!
 //! A block is a straight line of operations; slot `i` holds the result of operation `i`,
 //! and an operand is a constant, a slot of the same block, or a slot of an enclosing one.
-//! Bodies that may run any number of times (functions, branches, loop passes) are blocks
-//! of their own. The trace instantiates a block as a frame of nodes, one node a slot, and
-//! evaluates a slot when something asks for it.
+//! Bodies that may run any number of times (functions, branches, loop passes) are
+//! separate blocks. The trace instantiates a block as a frame of nodes, one node per
+//! slot, and evaluates a slot on demand.
 
 pub use super::slots::{SlotFacts, StaticScaffold};
 
@@ -40,8 +40,8 @@ pub enum Operand {
 pub struct Code {
     /// The blocks; block 0 is the top level.
     pub blocks: Vec<Block>,
-    /// The operations of all blocks, one block after the other, and what is known of the
-    /// slot of each.
+    /// The operations of all blocks, one block after the other, and the static facts
+    /// about the slot of each.
     pub ops: Vec<Op>,
     /// See `ops`.
     pub slots: Vec<SlotFacts>,
@@ -55,9 +55,9 @@ pub struct Code {
     pub tags: Vec<Arc<str>>,
     /// Top-level names and their slots, in order of binding.
     pub globals: indexmap::IndexMap<Arc<str>, Operand>,
-    /// What `predict` records, in order.
+    /// The quantities that `predict` records, in order.
     pub predictions: Vec<(Arc<str>, Operand)>,
-    /// The names bound by `assume`, in order: what a report shows when nothing else is
+    /// The names bound by `assume`, in order: what a report shows if nothing else is
     /// collected.
     pub assumed: Vec<(Arc<str>, Operand)>,
     /// `sample e;` statements, in order.
@@ -69,26 +69,26 @@ pub struct Code {
     /// The kernels the program declares.
     pub kernels: Vec<crate::syntax::ast::KernelDecl>,
     /// Expressions of inference blocks, reports and exports that only read the model, by
-    /// their place.
+    /// source span.
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
-    /// Values observed in place of what the program says, by the hash of the
+    /// Observed values that replace those of the program, by the hash of the
     /// observation's address.
     pub observed: Arc<Observed>,
-    /// What runs although nothing asks for it.
+    /// What runs even if nothing depends on it.
     pub eager: Eager,
 }
 
-/// What runs although nothing asks for it.
+/// What runs even if nothing depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Eager {
-    /// Observations and factors: a choice that none of them asks for is not part of a
+    /// Observations and factors: a choice that none of them depends on is not part of a
     /// trace.
     #[default]
     Observations,
-    /// Top-level names too (predictions aside), so that who looks at a name twice sees
-    /// one value.
+    /// Top-level names too (except predictions), so that reading a name twice gives the
+    /// same value.
     Names,
-    /// Top-level names alone: the prior, of a program whose data are not there.
+    /// Only top-level names: the prior of a program whose data are not available.
     NamesOnly,
 }
 
@@ -106,18 +106,18 @@ pub struct Force {
     pub span: Span,
 }
 
-/// What a block is for.
+/// The kind of a block.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BlockKind {
     /// The top level.
     Root,
     /// A function.
     Function {
-        /// Its name; `fn` when it has none.
+        /// Its name; `fn` if it is anonymous.
         name: Arc<str>,
         /// The names of its parameters.
         params: Arc<[Arc<str>]>,
-        /// How many of them, from the left, have no default.
+        /// The number of leading parameters without a default.
         required: usize,
     },
     /// A branch of an `if`.
@@ -129,32 +129,32 @@ pub enum BlockKind {
 /// A straight line of operations.
 #[derive(Clone, Debug)]
 pub struct Block {
-    /// What it is for.
+    /// Its kind.
     pub kind: BlockKind,
     /// The lexically enclosing block.
     pub parent: Option<BlockId>,
-    /// The operations, by slot, while the block is being filled; then they go to
+    /// The operations, by slot, while the block is being built; they are then moved to
     /// [`Code::ops`].
     pub ops: Vec<Op>,
     /// The index of its first operation in [`Code::ops`].
     pub first: u32,
-    /// Where each operation was written.
+    /// The source span of each operation.
     pub spans: Vec<Span>,
     /// The value of the block.
     pub result: Option<Operand>,
-    /// The slots that run whether or not anything asks for them: observations, factors,
-    /// and what contains them.
+    /// The slots that run even if nothing depends on them: observations, factors, and
+    /// what contains them.
     pub effects: Vec<Slot>,
 }
 
-/// A place in the text that adds to addresses.
+/// A place in the program text that contributes to addresses.
 #[derive(Clone, Debug)]
 pub struct Site {
-    /// The segments it adds to the path of its function's frame, outermost first. The
-    /// keys of the enclosing loops go to the first of them.
+    /// The segments that it adds to the path of its function's frame, outermost first.
+    /// The keys of the enclosing loops go to the first of them.
     pub segments: Arc<[SiteSegment]>,
-    /// Which of the enclosing loops of the same function, innermost first, add no key
-    /// because the target carries it.
+    /// The enclosing loops of the same function, as a bit mask from the innermost, that
+    /// add no key because the target carries it.
     pub carried: u32,
     /// Tags of the choices at and below it: name and value.
     pub tags: Box<[SiteTag]>,
@@ -165,22 +165,22 @@ pub struct Site {
 pub struct SiteSegment {
     /// Its name.
     pub name: Arc<str>,
-    /// Which occurrence.
+    /// The occurrence of the name.
     pub occurrence: u32,
     /// A hash of both.
     pub hash: u64,
 }
 
 impl SiteSegment {
-    /// A segment; observations without a name show their occurrence even when it is the
-    /// first.
+    /// Creates a segment. Observations without a name show their occurrence even if it is
+    /// the first.
     pub fn new(name: Arc<str>, occurrence: u32) -> Self {
         let hash = segment_hash(&name, occurrence);
         SiteSegment { name, occurrence, hash }
     }
 }
 
-/// The hash of a segment without its keys.
+/// Returns the hash of a segment without its keys.
 pub fn segment_hash(name: &str, occurrence: u32) -> u64 {
     super::key::mix(super::key::hash_str(0x5e67_3a11, name), u64::from(occurrence))
 }
@@ -190,14 +190,14 @@ pub fn segment_hash(name: &str, occurrence: u32) -> u64 {
 pub struct SiteTag {
     /// The index of its name in [`Code::tags`].
     pub name: u32,
-    /// Its value, if it has one; an operand of the site's block.
+    /// Its value, if any: an operand of the site's block.
     pub value: Option<Operand>,
 }
 
-/// A distribution: made in place from its parameters, or a value.
+/// A distribution: constructed in place from its parameters, or a value.
 #[derive(Clone, Debug)]
 pub enum DistSpec {
-    /// A call of a built-in family, made where it is needed and never stored.
+    /// A call of a built-in family, constructed where it is needed and never stored.
     Family {
         /// The built-in, by index in the table.
         builtin: u32,
@@ -209,7 +209,7 @@ pub enum DistSpec {
 }
 
 impl DistSpec {
-    /// The operands it reads.
+    /// Returns the operands it reads.
     pub fn operands(&self) -> &[Operand] {
         match self {
             DistSpec::Family { args, .. } => args,
@@ -227,11 +227,11 @@ pub enum Callee {
     Value(Operand),
 }
 
-/// Where the elements of a keyed container are drawn.
+/// A draw whose choices are elements of a keyed container.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// The `for` operations to go through, outermost first: a slot of the container's
-    /// block, then of each body.
+    /// The `for` operations that lead to the draw, outermost first: a slot of the
+    /// container's block, then of each body.
     pub loops: Box<[Slot]>,
     /// The draw, in the innermost body (or the container's own block).
     pub draw: Slot,
@@ -248,7 +248,7 @@ pub enum SourceKey {
     Operand(Operand),
 }
 
-/// What is asked of the trace as a whole.
+/// A property of the whole trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Probe {
     /// The log joint density.
@@ -264,12 +264,12 @@ pub enum Probe {
 pub enum Op {
     /// A parameter of the function, or its default.
     Param {
-        /// Which parameter.
+        /// The index of the parameter.
         index: u16,
         /// Its default.
         default: Option<Operand>,
     },
-    /// The element a loop pass or `map` call is for.
+    /// The element of a loop pass or `map` call.
     Item,
     /// The running value of a `fold`.
     Accumulator,
@@ -277,7 +277,7 @@ pub enum Op {
     Prim {
         /// Its index in the table.
         builtin: u32,
-        /// Its arguments in the table's order; the constant `nothing` for those left out.
+        /// Its arguments in the table's order; the constant `nothing` for omitted ones.
         args: Box<[Operand]>,
     },
     /// `[a, b]`
@@ -302,7 +302,7 @@ pub enum Op {
         callee: Callee,
         /// The arguments as written.
         args: Box<[(Option<Arc<str>>, Operand)]>,
-        /// What it adds to addresses.
+        /// Its site, by index into [`Code::sites`].
         site: u32,
     },
     /// `if c { … } else { … }`
@@ -314,8 +314,8 @@ pub enum Op {
         /// When false.
         otherwise: BlockId,
     },
-    /// A branch whose alternatives are slots of this block (made by `flatten`): only the
-    /// one taken is asked for.
+    /// A branch whose alternatives are slots of this block (created by `flatten`); only
+    /// the one taken is evaluated.
     Select {
         /// The condition.
         cond: Operand,
@@ -326,9 +326,9 @@ pub enum Op {
     },
     /// A function value, closing over this frame.
     Closure(BlockId),
-    /// `for x in e { … }`: holds one frame a pass.
+    /// `for x in e { … }`: one frame per pass.
     For {
-        /// What it runs over.
+        /// The array, range or record that it iterates over.
         iter: Operand,
         /// The body.
         body: BlockId,
@@ -337,9 +337,10 @@ pub enum Op {
     Map {
         /// The function.
         f: Operand,
-        /// What it runs over.
+        /// The array or record that it iterates over.
         over: Operand,
-        /// What it adds to addresses; the element's key goes to its last binding segment.
+        /// Its site; the element's key goes to its last segment but one, or to its only
+        /// one.
         site: u32,
     },
     /// `fold(f, init, xs)`
@@ -348,32 +349,32 @@ pub enum Op {
         f: Operand,
         /// The first running value.
         init: Operand,
-        /// What it runs over.
+        /// The array or record that it iterates over.
         over: Operand,
-        /// What it adds to addresses.
+        /// Its site, by index into [`Code::sites`].
         site: u32,
     },
     /// A keyed container of random choices.
     Container {
         /// Its name.
         name: Arc<str>,
-        /// Where its elements are drawn.
+        /// The draws of its elements.
         sources: Box<[Source]>,
     },
-    /// The array or record of all elements of the container in the slot before.
+    /// The array or record of all elements of the container in the preceding slot.
     Gather,
     /// `mem(f)`
     Mem {
         /// The function.
         f: Operand,
-        /// What it adds to addresses.
+        /// Its site, by index into [`Code::sites`].
         site: u32,
     },
     /// A random choice.
     Draw {
         /// Its distribution.
         dist: DistSpec,
-        /// Its address.
+        /// Its site, by index into [`Code::sites`].
         site: u32,
         /// The keys of `t[k] ~ d`.
         keys: Box<[Operand]>,
@@ -384,17 +385,17 @@ pub enum Op {
         dist: DistSpec,
         /// The observed value.
         value: Operand,
-        /// The surrogate of delayed acceptance: a slot of this block that nothing else
-        /// asks for.
+        /// The surrogate for delayed acceptance: a slot of this block that nothing else
+        /// depends on.
         coarse: Option<Operand>,
-        /// Its address.
+        /// Its site, by index into [`Code::sites`].
         site: u32,
     },
     /// A soft constraint.
     Factor {
         /// The log weight.
         weight: Operand,
-        /// Its address.
+        /// Its site, by index into [`Code::sites`].
         site: u32,
     },
     /// A property of the whole trace; never cached.
@@ -402,7 +403,7 @@ pub enum Op {
 }
 
 impl Op {
-    /// Calls `f` with each operand the operation always reads when it is evaluated;
+    /// Calls `f` with each operand that the operation always reads when it is evaluated;
     /// branches, bodies and callees read more.
     pub fn operands(&self, mut f: impl FnMut(Operand)) {
         match self {
@@ -452,7 +453,7 @@ impl Op {
 }
 
 impl Block {
-    /// An empty block.
+    /// Creates an empty block.
     pub fn new(kind: BlockKind, parent: Option<BlockId>) -> Self {
         Block {
             kind,
@@ -465,17 +466,17 @@ impl Block {
         }
     }
 
-    /// How many slots it has.
+    /// Returns the number of slots.
     pub fn len(&self) -> usize {
         self.spans.len()
     }
 
-    /// Whether it has none.
+    /// Whether it has no slots.
     pub fn is_empty(&self) -> bool {
         self.spans.is_empty()
     }
 
-    /// Adds an operation and gives its slot.
+    /// Appends an operation and returns its slot.
     pub fn push(&mut self, op: Op, span: Span) -> Slot {
         self.ops.push(op);
         self.spans.push(span);
@@ -483,24 +484,25 @@ impl Block {
     }
 }
 
-/// Among how many constants one of the same value is looked for.
+/// The number of most recent constants that are searched for an equal one.
 const SHARED_CONSTANTS: usize = 256;
 
 impl Code {
-    /// The same program with other observed values.
+    /// Returns the same program with other observed values.
     #[must_use]
     pub fn with_observed(&self, observed: Arc<Observed>) -> Code {
         Code { observed, ..self.clone() }
     }
 
-    /// The index of a constant, added if new. Numbers, bools and strings are shared.
+    /// Returns the operand of a constant, which is added if it is new. Numbers, bools and
+    /// strings are shared.
     pub fn constant(&mut self, v: Value) -> Operand {
         let shareable = matches!(
             v,
             Value::Num(_) | Value::Bool(_) | Value::Str(_) | Value::Unit | Value::Builtin(_)
         );
-        // Only the last ones are looked at, so that a long table of numbers costs no more
-        // than its length.
+        // Only the most recent ones are searched, so that the cost of a long table of
+        // numbers is linear in its length.
         let first = self.consts.len().saturating_sub(SHARED_CONSTANTS);
         if shareable && let Some(i) = self.consts[first..].iter().position(|c| c.same(&v)) {
             return Operand::Const((first + i) as u32);
@@ -509,13 +511,13 @@ impl Code {
         Operand::Const(self.consts.len() as u32 - 1)
     }
 
-    /// The value of a constant.
+    /// Returns the value of a constant.
     pub fn const_value(&self, i: u32) -> &Value {
         &self.consts[i as usize]
     }
 
-    /// Every literal key of a container indexed somewhere would go here; computed keys
-    /// are checked when they run.
+    /// Returns the key that a constant operand stands for; computed keys are checked at
+    /// run time.
     pub fn key_of(&self, o: Operand) -> Option<Key> {
         match o {
             Operand::Const(i) => Key::from_value(self.const_value(i)),

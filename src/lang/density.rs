@@ -1,5 +1,5 @@
-//! Densities of values of the language and their derivatives: what observations and
-//! choices are scored by, whatever scores them.
+//! Densities of values of the language and their derivatives, by which observations and
+//! choices are scored in traces and on tapes.
 
 use crate::dist::{Datum, Dist, Flat, Support};
 use crate::lang::adjoint::Adjoint;
@@ -15,17 +15,17 @@ use std::sync::Arc;
 pub(crate) enum Score {
     /// One term.
     One(f64),
-    /// One an element.
+    /// A sum over elements.
     Sum(ExactSum),
 }
 
-/// Whether it is flat over everything, so that it may be of what is no number: as a
-/// surrogate, it leaves an observation out.
+/// Whether it is flat everywhere. It then also accepts values that are not numbers: as a
+/// surrogate, it ignores an observation.
 fn tells_nothing(dist: &Dist) -> bool {
     matches!(dist, Dist::Flat(f) if *f == Flat::EVERYWHERE)
 }
 
-/// The log density of an observed value under a likelihood.
+/// Returns the log density of an observed value under a likelihood.
 pub(crate) fn likelihood_score(v: &Value, observed: &Value) -> Result<f64, Fault> {
     let Value::Likelihood(l) = v else { return Err(Fault::type_error("not a likelihood")) };
     let score = l.log_density(observed).map_err(Fault::type_error)?;
@@ -35,8 +35,8 @@ pub(crate) fn likelihood_score(v: &Value, observed: &Value) -> Result<f64, Fault
     Ok(score)
 }
 
-/// Scores a value, element by element where the distribution is over single numbers and
-/// the value is an array.
+/// Scores a value, element by element if the distribution is over single numbers and the
+/// value is an array.
 pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
     let wrong = || {
         Fault::type_error(format!(
@@ -88,8 +88,8 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
     }
 }
 
-/// The log density of each value that is observed: their sum is the [`score`]. NaN of
-/// what has none.
+/// Returns the log density of each observed value, whose sum is the [`score`]; NaN if it
+/// is undefined.
 pub(crate) fn pointwise(dist: &Dist, observed: &Value) -> Vec<f64> {
     let one = |d: &Dist, x: Option<Datum>| x.map_or(f64::NAN, |x| d.log_density(&x));
     let element = |i: usize| observed.element(i).as_ref().and_then(Value::to_datum);
@@ -105,7 +105,8 @@ pub(crate) fn pointwise(dist: &Dist, observed: &Value) -> Vec<f64> {
     }
 }
 
-/// Whether a value is many of what a distribution gives, each observed by itself.
+/// Whether a value consists of several values of a distribution, each observed on its
+/// own.
 pub(crate) fn is_repeated(dist: &Dist, observed: &Value) -> bool {
     match observed {
         Value::Array(_) => dist.is_scalar() || is_truth(dist),
@@ -114,7 +115,7 @@ pub(crate) fn is_repeated(dist: &Dist, observed: &Value) -> bool {
     }
 }
 
-/// Whether it is over a truth value: of an array of numbers each is one, 1 or 0.
+/// Whether it is over a boolean; the numbers 1 and 0 of an array are then booleans too.
 fn is_truth(dist: &Dist) -> bool {
     !dist.is_scalar() && dist.support() == Support::Boolean
 }
@@ -130,8 +131,9 @@ fn sum_scores(
     Ok(Score::Sum(sum))
 }
 
-/// The derivatives of the log density of a value: by the value, in its shape, and by the
-/// parameters. As scored, many values under a distribution of one number are independent.
+/// Returns the derivatives of the log density with respect to the value, in its shape,
+/// and to the parameters. As in scoring, several values under a distribution of one
+/// number are independent.
 pub(crate) fn gradient(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)> {
     if let (Value::Array(xs), true) = (value, dist.is_scalar() || is_truth(dist)) {
         let (mut by_x, mut params) = (Vec::with_capacity(xs.len()), Vec::new());
@@ -161,7 +163,7 @@ pub(crate) fn gradient(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)
     Some((shaped(value, &mut rest), g.params))
 }
 
-/// Numbers one after the other in the shape of a value; nothing by discrete parts.
+/// Arranges numbers in the shape of a value; discrete parts have zero adjoints.
 fn shaped(value: &Value, rest: &mut &[f64]) -> Adjoint {
     match value {
         Value::Num(_) => match rest.split_first() {
@@ -181,12 +183,12 @@ fn shaped(value: &Value, rest: &mut &[f64]) -> Adjoint {
     }
 }
 
-/// From the derivatives by a distribution's parameters to those by the arguments it was
-/// made from.
+/// Converts derivatives with respect to a distribution's parameters to derivatives with
+/// respect to the arguments it was made from.
 pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[Adjoint; 4]> {
     let count = a.values.len();
     let covariance = matrix(dist, a.values);
-    // A product made of arrays: the parameters of each element in turn.
+    // A product made from arrays: the parameters of each element in turn.
     if let Dist::Product(p) = dist
         && !p.is_empty()
     {
@@ -194,7 +196,7 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
         let column = |i: usize| {
             params.chunks_exact(each.max(1)).map(move |c| c.get(i).copied().unwrap_or(0.0))
         };
-        // A truncated one: the parameters of what is truncated, then the bounds.
+        // A truncated one: the parameters of the base distribution, then the bounds.
         if let Value::Dist(d) = a.get(0) {
             let own = each.saturating_sub(2);
             let inner = params.chunks_exact(each.max(1)).map(|c| &c[..own]);
@@ -230,7 +232,7 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
             _ if covariance == Some(i) => Adjoint::Unknown,
             // The jitter.
             Value::Num(_) if i == 4 && matches!(dist, Dist::Gp(_)) => Adjoint::Unknown,
-            // A bound left out has a place among the parameters.
+            // An omitted bound still has a place among the parameters.
             Value::Unit
                 if matches!(
                     dist,
@@ -262,8 +264,8 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     (0..count).map(one).collect()
 }
 
-/// The argument that is a covariance or a factor of one, whose derivatives come by
-/// another way: [`by_factor`] and [`by_matrix`].
+/// Returns the index of the argument that is a covariance or a factor of one, whose
+/// derivatives are computed by [`by_factor`] and [`by_matrix`] instead.
 pub(crate) fn matrix(dist: &Dist, values: &[&Value]) -> Option<usize> {
     match (dist, values.get(1)) {
         (Dist::MvNormal(_), Some(Value::Unit)) => Some(2),
@@ -272,9 +274,10 @@ pub(crate) fn matrix(dist: &Dist, values: &[&Value]) -> Option<usize> {
     }
 }
 
-/// The derivatives by the Cholesky factor of a distribution's covariance, its lower
-/// triangle by rows: of the log density of a stored value; of one stored as noise, of
-/// what has these derivatives by the value.
+/// Returns the derivatives with respect to the Cholesky factor of a distribution's
+/// covariance (its lower triangle, row by row): for a value stored as such, those of its
+/// log density; for one stored as white noise, those of the quantity whose derivatives
+/// with respect to the value are `by_value`.
 pub(crate) fn by_factor(dist: &Dist, stored: &Datum, by_value: &[f64]) -> Option<Vec<f64>> {
     match dist {
         Dist::Gp(d) => d.factor_gradient(stored, by_value),
@@ -284,10 +287,10 @@ pub(crate) fn by_factor(dist: &Dist, stored: &Datum, by_value: &[f64]) -> Option
     }
 }
 
-/// From those to the derivatives by the argument the factor was made from, in its shape.
+/// Converts those to derivatives with respect to the argument that the factor was made
+/// from, in its shape.
 pub(crate) fn by_matrix(a: &Args, dist: &Dist, by_factor: &[f64]) -> Option<Adjoint> {
-    // An entry off the diagonal of a covariance stands for two places, one of a factor
-    // for one.
+    // An off-diagonal entry of a covariance occurs twice in it, one of a factor once.
     let rows = |by: &[f64], above: f64| {
         let n = (0..).find(|n| n * (n + 1) / 2 >= by.len()).unwrap_or(0);
         let cell = |i: usize, j: usize| {

@@ -1,5 +1,5 @@
-//! Errors while a program runs: what went wrong, where in the text, at which address,
-//! through which calls.
+//! Errors at run time: what went wrong, where in the text, at which address, and through
+//! which calls.
 
 use super::address::Address;
 use crate::diag::{Diagnostic, IntoDiagnostic};
@@ -7,22 +7,22 @@ use crate::syntax::span::Span;
 use std::fmt;
 use std::sync::Arc;
 
-/// What kind of failure it is, and so what may be done about it.
+/// The kind of a failure, which determines how it is handled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// A number outside a parameter's domain, a matrix that will not factor: impossible
-    /// under the model, so that a proposal that leads here is rejected and counted. At
-    /// the start of a chain it is reported.
+    /// A number outside a parameter's domain, or a matrix that cannot be factorised:
+    /// impossible under the model, so a proposal that leads here is rejected and counted.
+    /// At the start of a chain it is reported.
     Domain,
     /// A value of the wrong type.
     Type,
-    /// An index or key that is not there.
+    /// An index or key that does not exist.
     Index,
     /// A limit on recursion or size.
     Limit,
-    /// A stop that was asked for, or the end of the time.
+    /// A requested stop, or the end of the available time.
     Stopped,
-    /// A value that needs itself.
+    /// A value that depends on itself.
     Cycle,
     /// Two draws at one address.
     Duplicate,
@@ -30,10 +30,11 @@ pub enum FaultKind {
     Other,
 }
 
-/// A failure inside a built-in function: it knows its arguments, not where it was called.
+/// A failure inside a built-in function, which knows its arguments but not where it was
+/// called.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// What kind.
+    /// Its kind.
     pub kind: FaultKind,
     /// What went wrong.
     pub message: String,
@@ -42,29 +43,29 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// A failure of some kind.
+    /// Creates a failure of some kind.
     pub fn new(kind: FaultKind, message: impl Into<String>) -> Self {
         Fault { kind, message: message.into(), hint: None }
     }
 
-    /// A number outside its domain.
+    /// Creates a failure for a number outside its domain.
     pub fn domain(message: impl Into<String>) -> Self {
         Fault::new(FaultKind::Domain, message)
     }
 
-    /// A value of the wrong type.
+    /// Creates a failure for a value of the wrong type.
     pub fn type_error(message: impl Into<String>) -> Self {
         Fault::new(FaultKind::Type, message)
     }
 
-    /// The same with a hint.
+    /// Adds a hint.
     pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
         self
     }
 
-    /// The same with a hint for a name that is not known: the known one most like it, or
-    /// all of them after `introduced`.
+    /// Adds a hint for an unknown name: the most similar known one, or all of them after
+    /// `introduced`.
     #[doc(hidden)]
     pub fn with_nearest<'a>(
         self,
@@ -84,7 +85,7 @@ impl Fault {
 /// A failure while a program runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunError {
-    /// What kind.
+    /// Its kind.
     pub kind: FaultKind,
     /// What went wrong.
     pub message: String,
@@ -99,8 +100,7 @@ pub struct RunError {
 }
 
 impl RunError {
-    /// Whether a proposal that fails like this is to be rejected rather than to end the
-    /// run.
+    /// Whether a proposal that fails like this is rejected, rather than ending the run.
     pub fn is_recoverable(&self) -> bool {
         self.kind == FaultKind::Domain
     }

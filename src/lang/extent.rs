@@ -1,30 +1,30 @@
-//! How large and how deep a value is. Values are shared, so that a short program can make
-//! one that has more elements than any memory (`[x, x]` of `[x, x]` of …); and what is
-//! nested deeply is a danger to every function that walks it.
+//! Limits on the size and depth of values. Values are shared, so a short program can
+//! build one with more elements than fit into any memory (`[x, x]` of `[x, x]` of …), and
+//! deep nesting endangers every function that walks a value recursively.
 
 use super::value::Value;
 
-/// The most elements of a value, those of its elements counted, and of an array that a
-/// function makes in one go.
+/// The maximum number of elements of a value, including those of its elements, and of an
+/// array that a function builds at once.
 pub const MOST_ELEMENTS: usize = 10_000_000;
-/// How deep arrays and records, distributions, and covariances may be nested.
+/// The maximum nesting depth of arrays and records, distributions, and covariances.
 pub const MOST_NESTED: u32 = 200;
 
-/// Whether a value can be handled.
+/// Whether a value is within the limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// It can.
+    /// It is.
     Fits,
-    /// It has more than [`MOST_ELEMENTS`].
+    /// It has more than [`MOST_ELEMENTS`] elements.
     TooLarge,
-    /// It is nested deeper than [`MOST_NESTED`].
+    /// It is nested more deeply than [`MOST_NESTED`].
     TooDeep,
 }
 
 impl Value {
-    /// Whether it is small and flat enough to be handled. Takes time in proportion to its
-    /// elements, but not to the numbers in arrays of numbers, and stops where it is too
-    /// large.
+    /// Returns whether it is within the limits. The time is proportional to its elements,
+    /// but does not depend on the numbers in arrays of numbers, and the search stops as
+    /// soon as a limit is exceeded.
     pub fn extent(&self) -> Extent {
         let mut left = MOST_ELEMENTS;
         extent(self, MOST_NESTED, &mut left)

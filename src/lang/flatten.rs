@@ -1,10 +1,10 @@
-//! Branches without structure of their own become slots of the block around them.
+//! Branches without structure become slots of the block around them.
 //!
-//! An `if` makes a frame for the branch it takes. Where both branches only compute (no
+//! An `if` creates a frame for the branch it takes. If both branches only compute (no
 //! choices, observations, calls, loops), no frame is needed: their operations are
-//! appended to the block, and the `if` becomes a [`Op::Select`] that asks for one of the
-//! two results. Evaluation is by need, so the other branch is still not run, and what
-//! only it reads is not drawn.
+//! appended to the block, and the `if` becomes an [`Op::Select`] that reads one of the
+//! two results. Evaluation is on demand, so the other branch is still not run, and
+//! choices that only it reads are not drawn.
 
 use super::code::{Block, BlockKind, Code, Op, Operand, Slot};
 use super::value::Value;
@@ -41,8 +41,8 @@ fn only_computes(block: &Block) -> bool {
         })
 }
 
-/// Moves the operations of a branch to the end of the block around it, and gives its
-/// result as seen from there.
+/// Moves the operations of a branch to the end of the block around it, and returns its
+/// result as an operand of that block.
 fn splice(code: &mut Code, into: usize, branch: usize, nothing: Operand) -> Operand {
     let (ops, spans) = (
         std::mem::take(&mut code.blocks[branch].ops),

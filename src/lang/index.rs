@@ -1,17 +1,17 @@
-//! Indexing plain values: arrays by position, records by name, objects by field.
+//! Indexing of plain values: arrays by position, records by name, objects by field.
 
 use super::error::{Fault, FaultKind};
 use super::value::Value;
 use std::sync::Arc;
 
-/// `base[key]` and `base.key`. An array of positions picks that many elements.
+/// Returns `base[key]` or `base.key`. An array of positions selects that many elements.
 ///
 /// # Errors
-/// A position or name that is not there, or a value that has none.
+/// If a position or name does not exist, or the value cannot be indexed.
 pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
     match (base, key) {
         (Value::Array(_) | Value::List(_), Value::Num(x)) => position(base, *x),
-        // As the arm below, without a value for each number.
+        // The same as the arm below, without a value for each number.
         (Value::Array(xs), Value::Array(at))
             if at.iter().all(|x| place(xs.len(), *x).is_some()) =>
         {
@@ -59,14 +59,14 @@ fn position(base: &Value, x: f64) -> Result<Value, Fault> {
         .with_hint(range))
 }
 
-/// The index that `x` is into so many elements.
+/// Returns `x` as an index into `len` elements, if it is one.
 pub(crate) fn place(len: usize, x: f64) -> Option<usize> {
-    // The conversion saturates, and is 0 for NaN: then it does not lead back.
+    // The conversion saturates, and gives 0 for NaN; the comparison then fails.
     let i = x as usize;
     (i < len && i as f64 == x).then_some(i)
 }
 
-/// The components of `[x, y, z]` by name, as a record.
+/// Returns the components `[x, y, z]` as a record with these names.
 pub fn xyz(v: [f64; 3]) -> Value {
     Value::Record(Arc::new(
         ["x", "y", "z"].into_iter().map(Arc::from).zip(v.map(Value::Num)).collect(),

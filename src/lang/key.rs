@@ -1,5 +1,5 @@
-//! Keys: what tells the elements of containers, the passes of loops and the entries of
-//! `mem` apart.
+//! Keys, which identify the elements of containers, the passes of loops and the entries
+//! of `mem`.
 
 use super::error::Fault;
 use super::value::Value;
@@ -7,29 +7,29 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
 
-/// A key. Numbers compare by their bits, with -0 made 0; NaN is not a key.
+/// A key. Numbers are compared by their bits, with -0 replaced by 0; NaN is not a key.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Key {
     /// A number, by its bits.
     Num(u64),
     /// A string.
     Str(Arc<str>),
-    /// A truth value.
+    /// A boolean.
     Bool(bool),
     /// Several keys: an array, or the arguments of a `mem` function.
     List(Arc<[Key]>),
 }
 
 impl Key {
-    /// A number's key; `None` for NaN.
+    /// Returns a number's key; `None` for NaN.
     pub fn num(x: f64) -> Option<Key> {
         if x.is_nan() { None } else { Some(Key::Num((x + 0.0).to_bits())) }
     }
 
-    /// The key that a value is.
+    /// Returns the key that a value stands for.
     ///
     /// # Errors
-    /// If it is none.
+    /// If the value cannot be a key.
     pub fn of(v: &Value) -> Result<Key, Fault> {
         let other = || {
             Fault::type_error(format!(
@@ -40,8 +40,8 @@ impl Key {
         Key::from_value(v).ok_or_else(other)
     }
 
-    /// The key a value stands for; `None` if it cannot be one (a function, an object,
-    /// NaN).
+    /// Returns the key that a value stands for; `None` if it cannot be a key (a function,
+    /// an object, NaN).
     pub fn from_value(v: &Value) -> Option<Key> {
         match v {
             Value::Num(x) => Key::num(*x),
@@ -55,7 +55,7 @@ impl Key {
         }
     }
 
-    /// The value the key was made from.
+    /// Returns the value that the key was made from.
     pub fn to_value(&self) -> Value {
         match self {
             Key::Num(bits) => Value::Num(f64::from_bits(*bits)),
@@ -65,7 +65,7 @@ impl Key {
         }
     }
 
-    /// The index, if the key is a whole number that can be one.
+    /// Returns the index, if the key is a whole number that is a valid index.
     pub fn as_index(&self) -> Option<usize> {
         match self {
             Key::Num(bits) => {
@@ -107,8 +107,8 @@ pub fn hash_str(h: u64, s: &str) -> u64 {
     h
 }
 
-/// Whether a string can stand in an address without quotes, and not be taken for
-/// something else.
+/// Whether a string can be written in an address without quotes and cannot be mistaken
+/// for something else.
 pub(crate) fn is_bare(s: &str) -> bool {
     !s.is_empty()
         && !matches!(s, "true" | "false")

@@ -1,9 +1,9 @@
-//! Finding the files of a program: the main one and what it includes, each parsed once
-//! per `include`.
+//! Loads the files of a program: the main one and those it includes, each parsed once per
+//! `include`.
 //!
-//! Files come from a [`Loader`], as a rule a [`Reach`](super::reach::Reach); `std/…` and
-//! the shipped programs are embedded, so that they work in any folder. A file of the
-//! user's own wins over an embedded one of the same name.
+//! Files come from a [`Loader`], usually a [`Reach`](super::reach::Reach); `std/…` and
+//! the shipped programs are embedded, so that they work in any folder. A user's file
+//! takes precedence over an embedded one of the same name.
 
 use super::reach::Outside;
 use crate::diag::{Diagnostic, IntoDiagnostic, SourceMap};
@@ -13,16 +13,16 @@ use crate::syntax::span::{FileId, Span};
 use std::io;
 use std::path::Path;
 
-/// Where files come from.
+/// A source of files.
 pub trait Loader: Send + Sync {
-    /// The bytes of a file.
+    /// Returns the bytes of a file.
     ///
     /// # Errors
-    /// As the file system has it.
+    /// If the file cannot be read.
     fn read(&self, path: &str) -> io::Result<Vec<u8>>;
 }
 
-/// Knows only what is embedded.
+/// A loader without files: only embedded ones are found.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nowhere;
 
@@ -32,7 +32,7 @@ impl Loader for Nowhere {
     }
 }
 
-/// The shipped programs and what they read, by the name a user gives.
+/// The shipped programs and the files they read, by the name that a user gives.
 pub const EMBEDDED: &[(&str, &str)] = &[
     ("coin.pcad", include_str!("../../programs/coin.pcad")),
     ("linreg.pcad", include_str!("../../programs/linreg.pcad")),
@@ -75,15 +75,15 @@ pub const EMBEDDED: &[(&str, &str)] = &[
     ("data/groups.csv", include_str!("../../programs/data/groups.csv")),
 ];
 
-/// An embedded file.
+/// Returns an embedded file.
 pub fn embedded(path: &str) -> Option<&'static str> {
     EMBEDDED.iter().find(|(name, _)| *name == path).map(|(_, text)| *text)
 }
 
-/// A file's contents, and whether they are the embedded ones.
+/// Returns a file's contents, and whether they are embedded.
 ///
 /// # Errors
-/// As the loader has it, if nothing of that name is embedded either.
+/// If the loader fails and there is no embedded file of that name.
 pub fn read(loader: &dyn Loader, path: &str) -> io::Result<(Vec<u8>, bool)> {
     match loader.read(path) {
         Ok(bytes) => Ok((bytes, false)),
@@ -103,13 +103,13 @@ pub struct Unit {
     pub folder: String,
     /// Its path.
     pub path: String,
-    /// Its tree.
+    /// Its syntax tree.
     pub program: Program,
-    /// By item: the unit an `include` brings in.
+    /// By item: the unit that an `include` loads.
     pub includes: Vec<Option<usize>>,
 }
 
-/// A program with all it includes; unit 0 is the main file.
+/// A program with all its includes; unit 0 is the main file.
 #[derive(Clone, Debug, Default)]
 pub struct Loaded {
     /// The files.
@@ -118,13 +118,13 @@ pub struct Loaded {
     pub embedded: Vec<String>,
 }
 
-/// What the names of programs end with.
+/// The ending of the names of programs.
 const PCAD: &str = ".pcad";
 
-/// At most this many includes, nested ones counted.
+/// The maximum number of includes, nested ones counted.
 const MAX_INCLUDES: usize = 256;
 
-/// Loads a program given by path. Sources go to `map` also when there are errors.
+/// Loads a program given by path. Sources are added to `map` even if there are errors.
 ///
 /// # Errors
 /// Every syntax error of every file, missing files, circular includes.
@@ -140,7 +140,7 @@ pub fn load(
                 crate::diag::Severity::Error,
                 format!("cannot read {path}: {}", reason(&e)),
             );
-            // The ending is no part of what a name is like.
+            // The ending is not part of the comparison.
             let stem = |path: &'static str| path.strip_suffix(PCAD).unwrap_or(path);
             let wanted = path.strip_suffix(PCAD).unwrap_or(path);
             let near = crate::diag::nearest(wanted, shipped().map(stem));
@@ -175,12 +175,13 @@ pub fn load_text(
     loading.finish()
 }
 
-/// The programs that come with the binary.
+/// Returns the names of the programs that come with the binary.
 pub fn shipped() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(n, _)| *n).filter(|n| n.ends_with(".pcad") && !n.contains('/'))
 }
 
-/// Why a file could not be read, without the number of the operating system's error.
+/// Returns why a file could not be read, without the error number of the operating
+/// system.
 pub fn reason(e: &io::Error) -> String {
     match e.kind() {
         io::ErrorKind::NotFound => "no such file".into(),
@@ -190,14 +191,13 @@ pub fn reason(e: &io::Error) -> String {
     }
 }
 
-/// A path that a file in a folder names: relative to the folder, which is empty or ends
-/// in `/`.
+/// Resolves a path given in a file of `folder`, which is empty or ends in `/`.
 pub fn beside(folder: &str, path: &str) -> String {
     if Path::new(path).is_absolute() { path.to_owned() } else { format!("{folder}{path}") }
 }
 
-/// A path without the `./` at its start: a file has one name here, so that a circle is
-/// seen.
+/// Removes `./` from the start of a path, so that a file has one name here and cycles are
+/// detected.
 fn tidy(mut path: &str) -> &str {
     while let Some(rest) = path.strip_prefix("./") {
         path = rest.trim_start_matches('/');

@@ -1,40 +1,41 @@
-//! Formulas: what another value of a choice does to the scores beside it, as a short
-//! program over single numbers.
+//! Local densities: how another value of a choice changes the scores of its block, as a
+//! short program over single numbers.
 //!
 //! Most choices are single numbers that feed a little arithmetic and a few scores of the
-//! same block. For those the scores under another value can be had without touching the
-//! trace: this is the code for it, made once for each slot. It covers what has a form on
-//! single numbers (see [`Scalar`]) and gives up on all else, at run time as well: then
-//! the general way decides, so a formula needs to be right only where it answers.
+//! same block. For those, the scores under another value can be computed without touching
+//! the trace, by this code, which is compiled once per slot. It covers operations with a
+//! form on single numbers (see [`Scalar`]) and gives up on everything else, at run time
+//! as well. An update then decides, so a local density must be correct only where it
+//! returns a result.
 
 use super::builtins::{Scalar, Table};
 use super::code::{DistSpec, Op, Operand, Slot, SlotFacts};
 
-/// The most registers of a formula.
+/// The number of registers of a local density.
 pub const REGISTERS: usize = 16;
 
-/// The most parameters of a distribution in a formula.
+/// The maximum number of parameters of a distribution in a local density.
 pub const PARAMETERS: usize = 4;
 
-/// The most steps worth keeping.
+/// The maximum number of instructions.
 const LONGEST: usize = 96;
 
-/// Where a step finds an input.
+/// Where an instruction finds an input.
 #[derive(Clone, Copy, Debug)]
 pub enum Source {
-    /// A register; register 0 has the value at which the formula is evaluated.
+    /// A register; register 0 contains the value at which the density is evaluated.
     Register(u8),
     /// A constant or an evaluated slot.
     Operand(Operand),
 }
 
-/// A step of a formula.
+/// An instruction of a local density.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub enum Instruction {
-    /// Goes on at `to` if the slot is not evaluated: nothing asks for it.
+    /// Jumps to `to` if the slot is not evaluated, because nothing needs it.
     SkipUnasked { slot: Slot, to: u16 },
-    /// Takes the value of the slot and goes on at `to`, if it is evaluated.
+    /// If the slot is evaluated, takes its value and jumps to `to`.
     Recall { slot: Slot, into: u8, to: u16 },
     /// A function of single numbers.
     Unary { f: fn(f64) -> f64, x: Source, into: u8 },
@@ -46,10 +47,9 @@ pub enum Instruction {
     Logic { f: fn(bool) -> bool, x: Source, into: u8 },
     /// An element of an array.
     Index { base: Source, key: Source, into: u8 },
-    /// Goes on at `otherwise` if the condition of the selection in the slot does not
-    /// hold.
+    /// Jumps to `otherwise` if the condition of the selection in the slot does not hold.
     Branch { slot: Slot, cond: Source, otherwise: u16 },
-    /// Goes on elsewhere.
+    /// Jumps.
     Go { to: u16 },
     /// Copies a value.
     Copy { from: Source, into: u8 },
@@ -61,32 +61,31 @@ pub enum Instruction {
     Factor { slot: Slot, weight: Source },
 }
 
-/// Something that an alternative of a selection holds.
+/// A node that an alternative of a selection holds.
 #[derive(Clone, Copy, Debug)]
 pub struct KeptAlternative {
     /// The selection.
     pub selection: Slot,
     /// Whether it is the first alternative.
     pub first: bool,
-    /// What is held.
+    /// The operand that is held.
     pub operand: Operand,
-    /// How often all alternatives together do.
+    /// How often all alternatives together hold it.
     pub times: u32,
 }
 
 /// The scores of a block as a function of the value of one slot.
 #[derive(Clone, Debug, Default)]
 pub struct LocalDensity {
-    /// What is done.
+    /// The instructions.
     pub instructions: Box<[Instruction]>,
-    /// The computations that depend on the value; they must not be read from other
-    /// blocks.
+    /// The computations that depend on the value; other blocks must not read them.
     pub computations: Box<[Slot]>,
-    /// In which registers computations are left, if they are computed: these and those
-    /// that alternatives ask for.
+    /// The registers that contain the results of computations, once computed: of
+    /// `computations`, and of those that alternatives need.
     pub results: Box<[(Slot, u8)]>,
-    /// What the alternatives of its selections hold: who else holds it keeps it when a
-    /// selection takes the other alternative.
+    /// What the alternatives of its selections hold. When a selection switches, it must
+    /// be kept by other holders.
     pub held: Box<[KeptAlternative]>,
     /// The computations of the alternatives; they must hold nothing besides their
     /// operands.
@@ -94,7 +93,7 @@ pub struct LocalDensity {
 }
 
 impl LocalDensity {
-    /// The formula of a slot of a block, if there is one.
+    /// Returns the local density of a slot of a block, if there is one.
     pub(super) fn new(
         ops: &[Op],
         slots: &[SlotFacts],
@@ -143,11 +142,11 @@ struct Compiler<'a> {
     /// By slot: whether it depends on the value.
     dependent: Vec<bool>,
     instructions: Vec<Instruction>,
-    /// By slot: the register that has its value wherever the next step runs.
+    /// By slot: the register that contains its value whenever the next instruction runs.
     known: Vec<Option<u8>>,
     registers: usize,
-    /// Whether the next step is inside an alternative: what it reads may not be
-    /// evaluated.
+    /// Whether the next instruction is inside an alternative, so that what it reads may
+    /// not be evaluated.
     inside: bool,
     results: Vec<(Slot, u8)>,
     held: Vec<KeptAlternative>,
@@ -155,7 +154,7 @@ struct Compiler<'a> {
 }
 
 impl Compiler<'_> {
-    /// The steps that score a slot.
+    /// Emits the instructions that score a slot.
     fn score(&mut self, slot: Slot) -> Option<()> {
         let known = self.known.clone();
         let skip = self.push(Instruction::SkipUnasked { slot, to: 0 })?;
@@ -177,7 +176,7 @@ impl Compiler<'_> {
         };
         self.push(instruction)?;
         self.land(skip);
-        // What was computed for it was not if it was skipped.
+        // If the score is skipped, so is everything computed for it.
         self.known = known;
         Some(())
     }
@@ -197,7 +196,7 @@ impl Compiler<'_> {
         matches!(o, Operand::Local(s) if s == self.from || self.dependent[s as usize])
     }
 
-    /// Where an operand's value will be.
+    /// Returns the source of an operand's value.
     fn source(&mut self, o: Operand) -> Option<Source> {
         let Operand::Local(slot) = o else { return Some(Source::Operand(o)) };
         if slot == self.from {
@@ -236,7 +235,7 @@ impl Compiler<'_> {
         }
     }
 
-    /// The steps that compute a slot; the register of its value.
+    /// Emits the instructions that compute a slot; returns the register of its value.
     fn compute(&mut self, slot: Slot) -> Option<u8> {
         match &self.ops[slot as usize] {
             Op::Prim { builtin, args } => {
@@ -288,7 +287,7 @@ impl Compiler<'_> {
         Some(())
     }
 
-    /// Notes what an alternative of a selection holds.
+    /// Records what an alternative of a selection holds.
     fn hold(&mut self, selection: Slot, first: bool, o: Operand) -> Option<()> {
         let inner = match o {
             Operand::Const(_) => return Some(()),
@@ -306,7 +305,7 @@ impl Compiler<'_> {
         inner.into_iter().try_for_each(|o| self.hold(selection, first, o))
     }
 
-    /// A slot that only computes, and its operands.
+    /// Returns a slot that only computes, with its operands.
     fn computation(&self, slot: Slot) -> Option<(Slot, Vec<Operand>)> {
         let op = &self.ops[slot as usize];
         let mut operands = Vec::new();
@@ -329,7 +328,7 @@ impl Compiler<'_> {
         (self.instructions.len() <= LONGEST).then(|| self.instructions.len() - 1)
     }
 
-    /// Lets the jump at a step lead to the next one.
+    /// Makes the jump at an instruction lead to the next one.
     fn land(&mut self, jump: usize) {
         let here = self.instructions.len() as u16;
         if let Instruction::SkipUnasked { to, .. }

@@ -1,8 +1,8 @@
-//! The language without its syntax: values, addresses, built-ins, and lowering from
+//! The language without its syntax: values, addresses, built-ins, and the lowering of
 //! syntax trees to code.
 //!
-//! The way of a program: [`load`] finds its files, [`lower`] checks names and types and
-//! makes [`code`]; the trace runs it.
+//! A program is processed in this order: [`load`] finds its files, [`lower`] checks names
+//! and types and produces [`code`], and the trace runs that.
 
 pub mod address;
 pub mod adjoint;

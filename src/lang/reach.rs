@@ -1,6 +1,6 @@
-//! What a program may read: files below some folders, and files that were named from
-//! outside. Symbolic links and `..` are followed before anything is compared. A file that
-//! is exchanged between the comparison and the reading is not noticed.
+//! The files that a program may read: those below some folders, and those named from
+//! outside. Symbolic links and `..` are resolved before paths are compared. A file that
+//! is replaced between the comparison and the reading is not detected.
 
 use super::load::Loader;
 use std::fmt;
@@ -10,15 +10,15 @@ use std::path::{Path, PathBuf};
 /// The folders and files that a program may read; by default none.
 #[derive(Clone, Debug, Default)]
 pub struct Reach {
-    /// The program's own folder, like the others without links and `..`.
+    /// The program's own folder; like all folders here, without links and `..`.
     own: Option<PathBuf>,
-    /// The program's file as it was named, and without links.
+    /// The program's file as it was named, and with links resolved.
     program: Option<(PathBuf, PathBuf)>,
-    /// What it may read besides.
+    /// Other folders that it may read.
     folders: Vec<PathBuf>,
 }
 
-/// A file that is there, or would be, where a program may not read.
+/// The error for a file, existing or not, in a place that a program may not read.
 #[derive(Debug)]
 pub struct Outside {
     /// The folder to allow.
@@ -34,7 +34,7 @@ impl fmt::Display for Outside {
 impl std::error::Error for Outside {}
 
 impl Outside {
-    /// What to try, if an error is a refusal.
+    /// Returns a hint, if an error is such a refusal.
     pub fn hint(e: &io::Error) -> Option<String> {
         let refused = e.get_ref()?.downcast_ref::<Outside>()?;
         Some(format!(
@@ -45,9 +45,9 @@ impl Outside {
 }
 
 impl Reach {
-    /// That of another program with the same folders besides: its file, wherever it may
-    /// lie in truth, and all below its folder. Where there is no such folder, there is
-    /// nothing to read.
+    /// Returns the reach of another program with the same additional folders: its file,
+    /// wherever links lead, and everything below its folder. If that folder does not
+    /// exist, nothing can be read.
     #[must_use]
     pub fn of(&self, program: &str) -> Reach {
         let path = Path::new(program);
@@ -56,10 +56,10 @@ impl Reach {
         Reach { own, program, folders: self.folders.clone() }
     }
 
-    /// The same, and all below a folder.
+    /// Also allows everything below a folder.
     ///
     /// # Errors
-    /// If there is no such folder.
+    /// If the folder does not exist.
     pub fn allow(mut self, folder: &Path) -> io::Result<Reach> {
         let real = folder.canonicalize()?;
         if !real.is_dir() {
@@ -69,11 +69,11 @@ impl Reach {
         Ok(self)
     }
 
-    /// The file to read for a path.
+    /// Returns the file to read for a path.
     ///
     /// # Errors
-    /// If there is none, or it may not be read. What lies outside is not told from what
-    /// does not exist there.
+    /// If the file does not exist or may not be read. Outside of the allowed folders the
+    /// error does not tell whether it exists.
     pub fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
         let outside = |folder: &Path| Err(io::Error::other(Outside { folder: folder.to_owned() }));
         match path.canonicalize() {
@@ -100,7 +100,7 @@ impl Loader for Reach {
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
         let real = self.resolve(Path::new(path))?;
         let found = real.metadata()?;
-        // A pipe would wait for ever.
+        // Reading a pipe could block forever.
         if !found.is_file() && !found.is_dir() {
             return Err(io::Error::other("it is not a regular file"));
         }
@@ -108,13 +108,13 @@ impl Loader for Reach {
     }
 }
 
-/// The most bytes of a file that is read whole.
+/// The maximum size in bytes of a file that is read as a whole.
 pub const MOST_BYTES: u64 = 1 << 29;
 
-/// The bytes of a file that is not too large.
+/// Returns the bytes of a file that is not too large.
 ///
 /// # Errors
-/// As the file system has it, and if it has more than [`MOST_BYTES`].
+/// If the file cannot be read, or is larger than [`MOST_BYTES`].
 pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
@@ -126,12 +126,12 @@ pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     }
 }
 
-/// The folder of a file.
+/// Returns the folder of a file.
 pub fn folder_of(file: &Path) -> &Path {
     existing(file.parent().unwrap_or(file))
 }
 
-/// The empty path is the folder one is in.
+/// Replaces the empty path by the current folder.
 fn existing(path: &Path) -> &Path {
     if path.as_os_str().is_empty() { Path::new(".") } else { path }
 }

@@ -1,18 +1,18 @@
-//! How the change of a choice spreads within its block, found once for all frames.
+//! The static scaffold of a choice within its block, found once for all frames.
 //!
-//! Most choices feed a few computations and observations beside them. Where no operation
-//! on the way makes structure (calls, branches with frames, loops), what depends on the
-//! choice is the same list in every state, and an update can go through it in order
-//! instead of marking and asking.
+//! Most choices are read by a few computations and observations of the same block. If no
+//! operation on the way creates structure (calls, branches with frames, loops), the slots
+//! that depend on the choice are the same in every state, and an update can go through
+//! them in order instead of invalidating and re-evaluating on demand.
 
 use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, StaticScaffold};
 use smallvec::SmallVec;
 
-/// The longest list worth keeping; a bit each in [`StaticScaffold::conditional`].
+/// The maximum length of the list; one bit per slot in [`StaticScaffold::conditional`].
 const LONGEST: usize = u64::BITS as usize;
 
-/// The spread of the choice in slot `from` of a block, if it is the same in every state.
-/// `asked` are the slots that are always asked for.
+/// Returns the static scaffold of the choice in slot `from` of a block, if it is the same
+/// in every state. `asked` tells which slots are always needed.
 pub(super) fn scaffold(
     ops: &[Op],
     slots: &[SlotFacts],
@@ -20,7 +20,7 @@ pub(super) fn scaffold(
     from: Slot,
 ) -> Option<StaticScaffold> {
     let order = dependents(ops, slots, from)?;
-    // A keyed choice may turn into another one.
+    // The address of a keyed choice may change.
     if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty()))
     {
         return None;
@@ -34,7 +34,7 @@ pub(super) fn scaffold(
     Some(StaticScaffold { slots: order.into(), is_closed, conditional, turns })
 }
 
-/// Which slots effects of their block ask for whatever conditions say.
+/// Returns which slots the effects of their block need whatever the values of conditions.
 pub(super) fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
     let mut asked: Vec<bool> = slots.iter().map(|s| s.is_effect).collect();
     let mut open: Vec<usize> = (0..slots.len()).filter(|s| asked[*s]).collect();
@@ -53,9 +53,9 @@ pub(super) fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
     asked
 }
 
-/// Whether all that these dependents of a slot read is in order when they run: in their
-/// list, or of this block through and through. What comes from frames may have changed
-/// because they read what changes here.
+/// Whether everything that these dependents of a slot read is up to date when they run:
+/// it is in their list, or computed in this block without other frames. Values that come
+/// from frames may have changed because the frames read what changes here.
 fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
     let mut seen = vec![false; ops.len()];
     order.iter().chain([&from]).for_each(|s| seen[*s as usize] = true);
@@ -89,8 +89,8 @@ fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
     true
 }
 
-/// What depends on a slot in its block, each after what it reads, up to and including
-/// observations and other choices, if that is the same in every state.
+/// Returns the slots of a block that depend on a slot, each after those it reads, up to
+/// and including observations and other choices, if that is the same in every state.
 pub(super) fn dependents(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Vec<Slot>> {
     let (mut reached, mut order) = (vec![false; slots.len()], Vec::new());
     visit(ops, slots, from, &mut reached, &mut order)?;
@@ -99,7 +99,7 @@ pub(super) fn dependents(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<
     Some(order)
 }
 
-/// Depth first: users before what they read, so that the reverse is an order of
+/// Depth first: users come before what they read, so that the reverse is an order of
 /// evaluation.
 fn visit(
     ops: &[Op],
@@ -128,8 +128,8 @@ fn visit(
                 reached[*user as usize] = true;
                 order.push(*user);
             }
-            // A choice keeps its value when its parameters change, unless it is of a form
-            // that is seen only when it runs.
+            // A choice keeps its value when its parameters change, unless its form
+            // requires otherwise; that is checked at run time.
             Op::Draw { dist: DistSpec::Family { .. }, .. } => {
                 reached[*user as usize] = true;
                 order.push(*user);

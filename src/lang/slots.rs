@@ -1,53 +1,54 @@
-//! What follows from the operations of lowered code and updates need at hand: who reads a
-//! slot, what it reads, whether it runs although nothing asks for it, how the change of a
-//! choice spreads.
+//! Static facts about the slots of lowered code that updates need: which slots read a
+//! slot, what it reads, whether it is an effect, and the static scaffold and local
+//! density of a choice.
 
 use super::code::{Block, Callee, Code, Eager, Op, Operand, Slot};
 use super::local_density::LocalDensity;
 use super::value::Value;
 
-/// What updates need to know of a slot.
+/// Static facts about a slot.
 #[derive(Clone, Debug, Default)]
 pub struct SlotFacts {
     /// The slot.
     pub slot: Slot,
-    /// Whether it runs although nothing asks for it.
+    /// Whether it runs even if nothing depends on it.
     pub is_effect: bool,
     /// Whether it is a random choice.
     pub is_draw: bool,
     /// Whether it is the result of its block.
     pub is_result: bool,
-    /// The slots it reads whenever it is evaluated: how many levels out, and which;
-    /// `None` where that depends on the state.
+    /// The slots it reads whenever it is evaluated: the number of levels out, and the
+    /// slot there; `None` if they depend on the state.
     pub reads: Option<Box<[(u16, Slot)]>>,
     /// The slots of the same block that have it as an operand.
     pub users: Box<[Slot]>,
-    /// For a choice that only computations of its own block depend on: how its change
-    /// spreads.
+    /// For a choice that only computations of its own block depend on: its static
+    /// scaffold.
     pub scaffold: Option<StaticScaffold>,
-    /// For a choice or an element of an array: what another number there does to the
-    /// scores of its block.
+    /// For a choice or an element of an array: the scores of its block as a function of
+    /// its value.
     pub local_density: Option<Box<LocalDensity>>,
 }
 
-/// The part of a choice's scaffold that lies in its own block, where that is the same in
+/// The part of a choice's scaffold that lies in its own block, if that is the same in
 /// every state.
 #[derive(Clone, Debug)]
 pub struct StaticScaffold {
-    /// What depends on the choice, each after what it reads, up to and including
-    /// observations and other choices.
+    /// The slots that depend on the choice, each after those it reads, up to and
+    /// including observations and other choices.
     pub slots: Box<[Slot]>,
-    /// Whether none of them reads anything of another block.
+    /// Whether none of them reads from another block.
     pub is_closed: bool,
-    /// A bit for each of the slots: it may be asked for by nothing once conditions have
-    /// changed, so it must not run before they have.
+    /// A bit mask of the slots that may not be needed any more when conditions have
+    /// changed, so they must not run before the conditions.
     pub conditional: u64,
-    /// Whether conditions of selections are among them.
+    /// Whether the condition of a selection depends on the choice.
     pub turns: bool,
 }
 
 impl Code {
-    /// Fills in what follows from the operations: in-block users and effects.
+    /// Derives the facts about all slots from the operations, among them users and
+    /// effects.
     pub fn finish(&mut self) {
         super::flatten::flatten(self);
         let effects = self.effects();
@@ -107,7 +108,7 @@ impl Code {
         }
     }
 
-    /// Marks the slots that run although nothing asks for them.
+    /// Returns, by block, which slots run even if nothing depends on them.
     fn effects(&self) -> Vec<Vec<bool>> {
         let mut effects = match self.eager {
             Eager::NamesOnly => self.blocks.iter().map(|b| vec![false; b.ops.len()]).collect(),
@@ -119,15 +120,16 @@ impl Code {
         let predicted = |o: &Operand| self.predictions.iter().any(|(_, p)| p == o);
         for o in self.globals.values().filter(|o| !predicted(o)) {
             let Operand::Local(slot) = *o else { continue };
-            // Of a container all elements: they are gathered in the slot after it.
+            // For a container, all elements: they are gathered in the slot that follows
+            // it.
             let is_container = matches!(self.blocks[0].ops[slot as usize], Op::Container { .. });
             effects[0][slot as usize + usize::from(is_container)] = true;
         }
         effects
     }
 
-    /// Marks the slots that observe, or hold or call a block that does. Calls of function
-    /// values count if any function that is used as a value observes.
+    /// Finds the slots that observe, or that contain or call a block that does. Calls of
+    /// function values count if any function that is used as a value observes.
     fn find_effects(&self) -> Vec<Vec<bool>> {
         let n = self.blocks.len();
         let mut observes = vec![false; n];
@@ -167,7 +169,8 @@ impl Code {
 }
 
 impl Op {
-    /// Where its operands are, if those it always reads are all it holds.
+    /// Returns the locations of its operands, if it holds exactly those that it always
+    /// reads.
     pub(super) fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
         if matches!(
             self,

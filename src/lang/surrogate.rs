@@ -1,12 +1,12 @@
-//! Programs in which the coarse surrogates of observations (`with coarse = …`) stand in
-//! their place: what delayed acceptance moves in first.
+//! Programs in which the coarse surrogates of observations (`with coarse = …`) replace
+//! them: the first stage of delayed acceptance.
 
 use super::code::{Code, DistSpec, Op, Operand};
 use super::slots::SlotFacts;
 
 impl Code {
-    /// The same program with the surrogates of these observations, given as indices of
-    /// operations, in their place.
+    /// Returns the program with these observations, given as indices of operations,
+    /// replaced by their surrogates.
     #[must_use]
     pub fn with_surrogates(&self, observations: &[u32]) -> Code {
         let mut code = self.clone();
@@ -23,7 +23,8 @@ impl Code {
                 }
             }
         }
-        // How changes spread was found for the program as it was.
+        // Scaffolds and local densities were found for the original program, so they are
+        // dropped.
         for facts in &mut code.slots {
             let SlotFacts { slot, is_effect, is_draw, is_result, reads, users, .. } =
                 std::mem::take(facts);

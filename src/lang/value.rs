@@ -1,7 +1,8 @@
 //! Values of the language: immutable, cheap to clone, shared by pointer.
 //!
-//! Scene things (solids, views, photographs) enter as [`Object`]s and comparators as
-//! [`Likelihood`]s, so that neither the language nor the traces know what a picture is.
+//! Scene objects (solids, views, photographs) enter as [`Object`]s and comparators as
+//! [`Likelihood`]s, so that neither the language nor the traces depend on how pictures
+//! are represented.
 
 use super::adjoint::Adjoint;
 pub use super::extent::{Extent, MOST_ELEMENTS, MOST_NESTED};
@@ -20,47 +21,47 @@ pub enum Value {
     Unit,
     /// A number.
     Num(f64),
-    /// A truth value.
+    /// A boolean.
     Bool(bool),
     /// A string.
     Str(Arc<str>),
     /// An array of numbers.
     Array(Arc<[f64]>),
-    /// An array with anything else in it.
+    /// An array with at least one element that is not a number.
     List(Arc<[Value]>),
     /// A record, its fields in the order written.
     Record(Arc<Record>),
-    /// A function and the frame it was made in.
+    /// A function, and the frame in which it was created.
     Closure(Closure),
     /// A function of the table of built-ins, by index.
     Builtin(u32),
-    /// What `mem(f)` gives.
+    /// The result of `mem(f)`.
     Memo(NodeRef),
     /// Random choices by key, or the results of a `map`, by reference: indexing depends
     /// on one element only.
     Container(NodeRef),
     /// A distribution.
     Dist(Arc<Dist>),
-    /// A log-density in the scene without a sampler.
+    /// A log density in the scene without a sampler.
     Likelihood(Arc<dyn Likelihood>),
-    /// Anything the host or the scene brings.
+    /// Any object of the host or the scene.
     Object(Arc<dyn Object>),
 }
 
 /// The fields of a record.
 pub type Record = IndexMap<Arc<str>, Value>;
 
-/// A function value: a lowered body and the frame whose names it sees.
+/// A function value: a lowered body, and the frame whose names it can access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Closure {
     /// The function's block.
     pub block: u32,
-    /// The frame it was made in.
+    /// The frame in which it was created.
     pub frame: u32,
 }
 
 /// A reference to a node of the trace that holds structure rather than a value. The
-/// version changes whenever the set of elements does, so that equal references mean equal
+/// version changes whenever the set of elements does, so equal references mean equal
 /// structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeRef {
@@ -70,106 +71,109 @@ pub struct NodeRef {
     pub version: u32,
 }
 
-/// A value the language itself knows nothing about: a solid, a camera, a view, a
+/// A value that is opaque to the language itself: a solid, a camera, a view, a
 /// photograph, a host's own type.
 pub trait Object: Any + fmt::Debug + Send + Sync {
-    /// What errors and `doc` call the type.
+    /// The name of the type in errors and `doc`.
     fn type_name(&self) -> &'static str;
-    /// For downcasting.
+    /// Returns `self` for downcasting.
     fn as_any(&self) -> &dyn Any;
-    /// `self * other`, where the type defines it (a placement times a solid).
+    /// Returns `self * other`, if the type defines it (a placement times a solid).
     fn multiply(&self, _other: &Value) -> Option<Result<Value, String>> {
         None
     }
-    /// The adjoints of both sides of `self * other`; `None` where they are not known.
+    /// Returns the adjoints of both sides of `self * other`; `None` if they are not
+    /// known.
     #[doc(hidden)]
     fn vjp_product(&self, _other: &Value, _by: &Adjoint) -> Option<[Adjoint; 2]> {
         None
     }
-    /// `self.name`, where the type has fields.
+    /// Returns `self.name`, if the type has fields.
     fn field(&self, _name: &str) -> Option<Value> {
         None
     }
-    /// One line for people, where the type has something to say of its contents.
+    /// Returns a one-line description of its contents for users, if the type has one.
     fn summary(&self) -> Option<String> {
         None
     }
-    /// About how many numbers it holds that nothing else does, where they are many.
+    /// Returns the approximate count of numbers that it alone holds, if that is large.
     #[doc(hidden)]
     fn own_numbers(&self) -> usize {
         0
     }
-    /// Its contents as numbers, in an order and number that depend on its form alone; NaN
-    /// where something is missing.
+    /// Returns its contents as numbers, whose order and count depend only on its form;
+    /// NaN for missing ones.
     fn numbers(&self) -> Option<Vec<f64>> {
         None
     }
 }
 
-/// Where a named point of the scene is in the observed picture.
+/// The position of a named point of the scene in the observed picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Located {
     /// Its name.
     pub name: Arc<str>,
-    /// The mean, as shares of the picture's width and height, from its upper left corner.
+    /// The mean position, as fractions of the picture's width and height, from its upper
+    /// left corner.
     pub at: [f64; 2],
-    /// The variance along an axis, in units of the squared diagonal.
+    /// The variance along an axis, in units of the squared diagonal of the picture.
     pub variance: f64,
-    /// Where it was observed, in the same shares; of several places the likeliest.
+    /// The observed position, in the same fractions; the likeliest of several candidates.
     pub observed: [f64; 2],
-    /// Where the scene has it, in the same shares.
+    /// The position in the scene, in the same fractions.
     pub own: [f64; 2],
-    /// The variance along an axis of the point about where the scene has it, as far as no
-    /// observation tells of it; as `variance`.
+    /// The variance along an axis of the point around its position in the scene that no
+    /// observation reduces (the systematic variance), in the units of `variance`.
     pub own_variance: f64,
 }
 
-/// A log-density of an observed value given the scene: it scores; some can draw
-/// observations, none can be drawn with `~`.
+/// A log density of an observed value given the scene. It scores; some can sample
+/// observations, but none can be drawn from with `~`.
 ///
-/// What can be prepared from the observed value alone (a distance transform) is prepared
-/// once, by the implementation, and kept with the value.
+/// Data that can be prepared from the observed value alone (such as a distance transform)
+/// are prepared once by the implementation and stored with the value.
 pub trait Likelihood: fmt::Debug + Send + Sync {
-    /// What errors call it.
+    /// The name used in errors.
     fn name(&self) -> &str;
-    /// The log density; never NaN.
+    /// Returns the log density; never NaN.
     ///
     /// # Errors
-    /// When the observed value is of the wrong type or cannot be compared.
+    /// If the observed value has the wrong type or cannot be compared.
     fn log_density(&self, observed: &Value) -> Result<f64, String>;
-    /// The derivatives of the log density by what the likelihood was made from, in a form
-    /// that the derivative of the built-in that makes it understands; `None` where they
-    /// are not known.
+    /// Returns the derivatives of the log density with respect to the arguments of the
+    /// likelihood, in the form that the derivative of the built-in that makes it expects;
+    /// `None` if they are not known.
     fn gradient(&self, _observed: &Value) -> Option<Adjoint> {
         None
     }
-    /// Draws an observation given the scene: in the form of the observed one, with the
-    /// same parts missing. `None` where it has no sampler.
+    /// Samples an observation given the scene, in the form of the observed one and with
+    /// the same parts missing. `None` if it has no sampler.
     ///
     /// # Errors
-    /// As [`Likelihood::log_density`], inside.
+    /// The inner result fails as [`Likelihood::log_density`].
     fn sample(&self, _observed: &Value, _rng: &mut Stream) -> Option<Result<Value, String>> {
         None
     }
-    /// Named points of the scene as the observation puts them, where that says more than
-    /// the scene alone.
+    /// Returns named points of the scene at the positions that the observation gives
+    /// them, if it is more informative than the scene alone.
     fn located(&self, _observed: &Value) -> Vec<Located> {
         Vec::new()
     }
-    /// False when the result is not a density over observations, so that its scale is a
-    /// matter of choice; the run then says that its posterior is a pseudo-posterior.
+    /// False if the likelihood is unnormalised, so that its scale is a modelling
+    /// decision; the run then reports that its posterior is a pseudo-posterior.
     fn is_proper(&self) -> bool {
         true
     }
-    /// What is approximate in it by its settings, for readers: single precision, coarser
-    /// meshes, distances cut off. The run says so.
+    /// Describes what is approximate under its settings: single precision, coarser
+    /// meshes, truncated distances. The run reports it.
     fn approximations(&self) -> Vec<String> {
         Vec::new()
     }
 }
 
 impl Value {
-    /// What a `for` over it goes through: its elements, or the names of a record.
+    /// Returns the items that a `for` over it iterates over: its elements, or the names
+    /// of a record.
     #[doc(hidden)]
     pub fn passes(&self) -> Vec<Value> {
         match self {
@@ -178,27 +182,27 @@ impl Value {
         }
     }
 
-    /// An array of numbers.
+    /// Returns an array of numbers.
     pub fn array(xs: impl Into<Arc<[f64]>>) -> Self {
         Value::Array(xs.into())
     }
 
-    /// A string.
+    /// Returns a string.
     pub fn str(s: &str) -> Self {
         Value::Str(Arc::from(s))
     }
 
-    /// A record from its fields.
+    /// Returns a record of these fields.
     pub fn record<'a>(fields: impl IntoIterator<Item = (&'a str, Value)>) -> Self {
         Value::Record(Arc::new(fields.into_iter().map(|(k, v)| (Arc::from(k), v)).collect()))
     }
 
-    /// A host or scene object.
+    /// Returns a host or scene object.
     pub fn object(o: impl Object) -> Self {
         Value::Object(Arc::new(o))
     }
 
-    /// The smallest array form of these elements: numbers pack.
+    /// Returns the most compact array of these elements: numbers are packed.
     pub fn from_elements(xs: Vec<Value>) -> Self {
         if xs.iter().all(|x| matches!(x, Value::Num(_))) {
             Value::Array(xs.iter().map(|x| if let Value::Num(v) = x { *v } else { 0.0 }).collect())
@@ -207,7 +211,7 @@ impl Value {
         }
     }
 
-    /// The object inside, if it is a `T`.
+    /// Returns the object inside, if it is a `T`.
     pub fn downcast<T: Object>(&self) -> Option<&T> {
         match self {
             Value::Object(o) => o.as_any().downcast_ref(),
@@ -215,7 +219,7 @@ impl Value {
         }
     }
 
-    /// What errors call its type, with an article where one reads well.
+    /// Returns the name of its type in errors, with an article where appropriate.
     pub fn type_name(&self) -> &'static str {
         match self {
             Value::Unit => "nothing",
@@ -232,8 +236,8 @@ impl Value {
         }
     }
 
-    /// The numbers in it, one after the other: bools as 0 and 1, arrays and records
-    /// element by element, what objects say of themselves; nothing for anything else.
+    /// Returns the numbers in it, flattened: bools as 0 and 1, arrays and records element
+    /// by element, objects by [`Object::numbers`]; none for anything else.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Value::Num(x) => vec![*x],
@@ -246,7 +250,7 @@ impl Value {
         }
     }
 
-    /// The number of elements, for arrays and records.
+    /// Returns the number of elements, for arrays and records.
     pub fn len(&self) -> Option<usize> {
         match self {
             Value::Array(xs) => Some(xs.len()),
@@ -261,7 +265,7 @@ impl Value {
         self.len() == Some(0)
     }
 
-    /// Element `i` of an array.
+    /// Returns element `i` of an array.
     pub fn element(&self, i: usize) -> Option<Value> {
         match self {
             Value::Array(xs) => xs.get(i).map(|x| Value::Num(*x)),
@@ -270,9 +274,9 @@ impl Value {
         }
     }
 
-    /// Whether two values are the same to the last bit; shared things are compared by
-    /// pointer first, objects only by pointer. Used to stop propagation: a false negative
-    /// costs time, never truth.
+    /// Whether two values are the same to the last bit. Shared data are compared by
+    /// pointer first, objects only by pointer. It is used to stop propagation, so a false
+    /// negative costs time but is never wrong.
     pub fn same(&self, other: &Value) -> bool {
         match (self, other) {
             (Value::Unit, Value::Unit) => true,
@@ -303,7 +307,7 @@ impl Value {
         }
     }
 
-    /// The value of a random choice.
+    /// Returns the value of a random choice.
     pub fn from_datum(d: &Datum) -> Self {
         match d {
             Datum::Num(x) => Value::Num(*x),
@@ -313,7 +317,7 @@ impl Value {
         }
     }
 
-    /// The other way round, for values a distribution can draw.
+    /// Returns the datum of a value that a distribution can generate.
     pub fn to_datum(&self) -> Option<Datum> {
         match self {
             Value::Num(x) => Some(Datum::Num(*x)),
@@ -351,7 +355,7 @@ impl fmt::Debug for Value {
     }
 }
 
-/// At most this many elements of an array are printed.
+/// The maximum number of elements of an array that are printed.
 const PRINTED: usize = 8;
 
 fn write_list<T>(

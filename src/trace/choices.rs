@@ -1,10 +1,10 @@
-//! The register of active choices: by address, and by the selections kernels have asked
-//! for.
+//! The register of active choices, by address and by the selections that kernels have
+//! registered.
 //!
-//! Each selection keeps its members in a list, so that one of them is picked in constant
+//! Each selection keeps its members in a list, so that one can be picked in constant
 //! time. The order is that of the hashes of their addresses: a function of the state, not
-//! of how it came about. Who appears or leaves in an update is noted, and entered at its
-//! end.
+//! of its history. Members that appear or vanish during an update are noted, and the list
+//! is updated at its end.
 
 use super::graph::Graph;
 use super::journal::Entry;
@@ -20,7 +20,7 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// One thing a kernel can propose: a choice, or an element of one.
+/// A unit that a kernel can propose: a choice, or an element of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Target {
     pub(crate) node: NodeId,
@@ -28,18 +28,18 @@ pub struct Target {
     pub(crate) element: u32,
 }
 
-/// The number of a registered selection in a trace.
+/// The number of a registered selection of a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Selection(pub(crate) u32);
 
-/// A list of targets and the address hash of each, both in order.
+/// A list of targets and the address hash of each, in the same order.
 pub(crate) type Listed = (Arc<Vec<u64>>, Arc<Vec<Target>>);
 
 #[derive(Clone, Debug)]
 pub(crate) struct Members {
     selector: Selector,
     listed: Listed,
-    /// What this update adds and takes away.
+    /// The members that this update adds and removes.
     added: Vec<(u64, Target)>,
     removed: Vec<(u64, NodeId)>,
 }
@@ -54,17 +54,17 @@ impl Members {
         }
     }
 
-    /// The members in order.
+    /// Returns the members in order.
     pub fn targets(&self) -> &[Target] {
         &self.listed.1
     }
 
-    /// The list itself.
+    /// Returns the shared list of members.
     pub fn listed(&self) -> &Arc<Vec<Target>> {
         &self.listed.1
     }
 
-    /// Enters what this update changed, and gives the list as it was.
+    /// Applies the changes of this update; returns the previous list if it changed.
     fn apply(&mut self) -> Option<Listed> {
         let (hashes, targets) = &self.listed;
         self.removed.retain(|(hash, node)| {
@@ -92,7 +92,7 @@ impl Members {
         if self.added.len() > 8 {
             let mut all: Vec<(u64, Target)> =
                 hashes.drain(..).zip(targets.drain(..)).chain(self.added.drain(..)).collect();
-            // Stable, and nearly sorted already.
+            // The sort is stable, and the list nearly sorted already.
             all.sort_by_key(|(hash, t)| (*hash, t.element));
             hashes.extend(all.iter().map(|(h, _)| *h));
             targets.extend(all.iter().map(|(_, t)| *t));
@@ -109,8 +109,8 @@ impl Members {
                 targets.insert(at, target);
             }
         }
-        // What vanished and appeared again left it as it was: sweeps go by whether it is
-        // the same list.
+        // If choices vanished and appeared again, keep the old allocation: kernels that
+        // sweep over a selection detect changes by pointer.
         if self.listed == before {
             self.listed = before;
             return None;
@@ -123,8 +123,8 @@ impl Members {
 pub(crate) struct Choices {
     by_address: FxHashMap<u64, NodeId>,
     pub selections: Vec<Members>,
-    /// Addresses drawn while another choice had them: an error if that one is still there
-    /// at the end.
+    /// Pairs of an earlier and a later choice at the same address: an error if both still
+    /// exist at the end of the update.
     suspects: Vec<(NodeId, NodeId)>,
 }
 
@@ -136,7 +136,7 @@ impl Default for Choices {
 }
 
 impl Choices {
-    /// The choice at an address.
+    /// Returns the choice at an address.
     pub fn find(&self, hash: u64) -> Option<NodeId> {
         self.by_address.get(&hash).copied()
     }
@@ -169,7 +169,7 @@ impl Choices {
 }
 
 impl Graph {
-    /// Registers a selection, or finds it if it is known.
+    /// Registers a selection, or returns the one already registered for this selector.
     pub fn selection(&mut self, code: &Code, selector: &Selector) -> Selection {
         if let Some(i) = self.choices.selections.iter().position(|m| m.selector == *selector) {
             return Selection(i as u32);
@@ -192,21 +192,21 @@ impl Graph {
         selector.selects(&facts)
     }
 
-    /// Choices by their place in the program: slot by slot and pass by pass, from the
-    /// outside in.
+    /// Sorts choices by their position in the program: slot by slot and pass by pass,
+    /// from the outside in.
     pub fn in_program_order(&self, targets: &[Target]) -> Vec<Target> {
         let mut keyed: Vec<_> = targets.iter().map(|t| (self.place(t.node), *t)).collect();
         keyed.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.element.cmp(&b.1.element)));
         keyed.into_iter().map(|(_, t)| t).collect()
     }
 
-    /// The slots and passes that lead to a node, from the outside in.
+    /// Returns the slots and passes that lead to a node, from the outside in.
     fn place(&self, mut n: NodeId) -> SmallVec<[u64; 6]> {
         let mut place = SmallVec::new();
         while n != NONE {
             let frame = &self.frames[self.nodes[n as usize].frame as usize];
             place.push(u64::from(n - frame.base));
-            // Entries of a `mem` have no order of their own.
+            // The entries of a `mem` function have no order.
             let entry = if matches!(frame.args, Arguments::Values(_)) { frame.path } else { 0 };
             place.extend([u64::from(frame.pass), entry]);
             n = frame.owner;
@@ -215,8 +215,8 @@ impl Graph {
         place
     }
 
-    /// Sorts nodes frame by frame, in an order that is a function of the state: their
-    /// numbers are one of how it came about.
+    /// Sorts nodes frame by frame, in an order that depends on the state only; node
+    /// numbers depend on its history.
     pub fn sort_by_place(&self, nodes: &mut [NodeId]) {
         let frame = |n: NodeId| self.nodes[n as usize].frame;
         let mut frames: Vec<u32> = nodes.iter().map(|n| frame(*n)).collect();
@@ -230,7 +230,8 @@ impl Graph {
         nodes.sort_unstable_by_key(|n| (ranks.get(&frame(*n)), *n));
     }
 
-    /// What selections ask about a choice, or `project` about an observation.
+    /// Returns the facts that selectors need about a choice (or an observation, for
+    /// `project`).
     pub fn facts(&self, code: &Code, n: NodeId, with_address: bool, dist: Option<&Dist>) -> Facts {
         let made = if dist.is_none() { self.dist_of(code, n) } else { None };
         let dist = dist.or(made.as_ref());
@@ -245,7 +246,7 @@ impl Graph {
         }
     }
 
-    /// The distribution of a choice under the current values of its parameters.
+    /// Returns the distribution of a choice under the current values of its parameters.
     pub fn dist_of(&self, code: &Code, n: NodeId) -> Option<Dist> {
         let Op::Draw { dist, .. } = self.op(code, n) else { return None };
         if let Some(simple) = self.simple_dist(code, n) {
@@ -284,7 +285,7 @@ impl Graph {
         }
     }
 
-    /// Enters a new choice.
+    /// Registers a new choice.
     pub fn register_choice(
         &mut self,
         code: &Code,
@@ -324,7 +325,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Removes a choice.
+    /// Removes a choice from the register.
     pub fn unregister_choice(&mut self, n: NodeId, hash: u64) {
         if self.choices.by_address.get(&hash) == Some(&n) {
             self.choices.by_address.remove(&hash);
@@ -339,8 +340,8 @@ impl Graph {
         }
     }
 
-    /// Ends an update: selections get their new members, and two choices at one address
-    /// are an error at the second.
+    /// Ends an update: updates the members of selections, and fails at the second of two
+    /// choices with the same address.
     pub fn update_selections(&mut self, code: &Code) -> Result<(), Failure> {
         for i in 0..self.choices.selections.len() {
             if let Some(before) = self.choices.selections[i].apply() {
@@ -350,7 +351,7 @@ impl Graph {
         self.check_duplicates(code)
     }
 
-    /// Two choices at one address are an error at the second.
+    /// Fails if two choices have the same address, at the second of them.
     fn check_duplicates(&mut self, code: &Code) -> Result<(), Failure> {
         for (old, new) in std::mem::take(&mut self.choices.suspects) {
             let alive = |n: NodeId| self.nodes[n as usize].state != State::Empty;

@@ -1,10 +1,11 @@
-//! What a choice's other values would weigh, without an update.
+//! Enumeration: the weights of a choice's other values without an update.
 //!
-//! Gibbs updates ask for the weight of every value and keep one. Where a value changes no
-//! structure, the weight is that of the few observations and choices that depend on it,
-//! so those are scored beside the trace: nothing is journaled, released or rolled back.
-//! Terms are quantised as in an update, so the weights are the same to the last bit. What
-//! would change structure, or is of a kind not handled here, is left to an update.
+//! Gibbs updates need the weight of every value and keep one. If a value changes no
+//! structure, its weight depends only on the few observations and choices that depend on
+//! the choice, so those are scored without modifying the trace: nothing is journaled,
+//! released or rolled back. Terms are quantised as in an update, so the weights agree to
+//! the last bit. Values that would change the structure, or that need operations not
+//! handled here, are left to an update.
 
 use super::choices::Target;
 use super::eval::Score;
@@ -20,30 +21,30 @@ use crate::lang::value::Value;
 use crate::num::ExactSum;
 use smallvec::SmallVec;
 
-/// What depends on a choice: found once, good until the trace changes.
+/// Everything that depends on a choice: found once, valid until the trace changes.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Enumeration {
     target: NodeId,
-    /// Computations, with their values under the value being weighed, and those that only
-    /// it asks for.
+    /// Computations with their values under the candidate value, followed by those that
+    /// only the candidate value needs.
     values: Vec<(NodeId, Option<Value>)>,
     /// How many of them depend on the choice.
     dependent: usize,
-    /// Observations, factors and choices that are scored.
+    /// Observations, factors and choices to be scored.
     sinks: Vec<NodeId>,
-    /// How often each node would be let go.
+    /// How many references to each node would be released.
     released: Vec<(NodeId, u32)>,
     stack: Vec<NodeId>,
 }
 
-/// The most computations and scores it is worth doing this way.
+/// The maximum number of computations and scores for which this is worthwhile.
 const MOST: usize = 48;
 
-/// Why a value cannot be weighed here.
+/// Why a value cannot be weighted here.
 pub(crate) enum Obstacle {
     /// An update must decide.
     Unsuitable,
-    /// The program has no value there.
+    /// The program fails at this value.
     Fault(Failure),
 }
 
@@ -54,10 +55,11 @@ impl From<Failure> for Obstacle {
 }
 
 impl Trace {
-    /// The log weights that the values of a choice with this distribution would have in
-    /// an update, each relative to the present state (that of the `current` one is 0),
-    /// with the likelihood raised to a power; `None` for values that the program does not
-    /// have. False if that takes updates, since structure depends on the choice.
+    /// Passes to `weight` the log weights that the values of a choice with this
+    /// distribution would have in an update, relative to the current state (that of the
+    /// `current` value is 0), with the likelihood raised to a power; `None` for values at
+    /// which the program fails with a recoverable error. Returns false if updates are
+    /// needed instead, because structure depends on the choice.
     pub(crate) fn enumerate_conditional(
         &self,
         target: Target,
@@ -100,7 +102,8 @@ impl Trace {
 }
 
 impl Graph {
-    /// Finds what depends on a choice; false if its values must be weighed by updates.
+    /// Finds everything that depends on a choice; false if its values must be weighted by
+    /// updates.
     pub fn enumerate_at(&self, code: &Code, target: NodeId, enumeration: &mut Enumeration) -> bool {
         enumeration.target = target;
         enumeration.values.clear();
@@ -154,7 +157,7 @@ impl Graph {
         !enumeration.sinks.iter().any(keyed)
     }
 
-    /// A single number or truth value, stored as the program sees it.
+    /// Whether a choice is a single number or boolean, stored as the program sees it.
     pub fn is_plain_choice(&self, n: NodeId) -> bool {
         let node = &self.nodes[n as usize];
         let whole = match node.side.as_deref() {
@@ -165,7 +168,7 @@ impl Graph {
         whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
     }
 
-    /// The log weight of a value of the choice, relative to the present one.
+    /// Returns the log weight of a value of the choice relative to the current one.
     fn enumeration(
         &self,
         code: &Code,
@@ -267,7 +270,7 @@ impl Graph {
         }
     }
 
-    /// The value a node would have.
+    /// Returns the value that a node would have.
     fn value_of_node(
         &self,
         code: &Code,
@@ -317,7 +320,7 @@ impl Graph {
                     None => self.value(code, frame, *chosen).clone(),
                 }
             }
-            // A choice that would appear, or something with structure of its own.
+            // A choice that would appear, or an operation with structure.
             _ => return Err(Obstacle::Unsuitable),
         };
         match place {
@@ -342,7 +345,7 @@ impl Graph {
             None => self.value(code, frame, base).clone(),
         };
         if let Value::Container(r) = whole {
-            // The same element as before, if the keys are the same.
+            // The element is the same as before if the keys are.
             let depends = |o: &Operand| {
                 self.resolve(frame, *o)
                     .is_some_and(|d| d == enumeration.target || enumeration.knows(d))
@@ -367,8 +370,8 @@ impl Graph {
         Ok(v)
     }
 
-    /// Notes that a node would be let go, with what it alone holds; a choice that nothing
-    /// else holds would vanish.
+    /// Records that a reference to a node would be released, and with the last one
+    /// everything that only it holds; fails if a choice would vanish.
     fn let_go(
         &self,
         code: &Code,
@@ -423,7 +426,7 @@ mod tests {
     use super::*;
     use crate::trace::{Change, Draws};
 
-    /// Arrays on the way are not for formulas.
+    /// Local densities do not cover arrays.
     #[test]
     fn weights_through_arrays_are_those_of_updates() {
         let text = "assume k ~ categorical([1, 2, 3]); factor(-sum([k, 1])); observe normal(sum([k, 0.5]), 1) = 1;";

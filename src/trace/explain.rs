@@ -1,8 +1,8 @@
-//! Why a trace is as it is: what an update of a choice would reach, and which choices
-//! something was made from.
+//! Explanations of a trace: what an update of a choice would affect, and which choices
+//! something depends on.
 //!
-//! What is reached is told by marking, as an update marks (`invalidate.rs`), and undoing that.
-//! Nothing runs.
+//! What is affected is found by invalidation, as in an update (`invalidate.rs`), which is
+//! then undone. Nothing is evaluated.
 
 use super::graph::Graph;
 use super::node::*;
@@ -13,7 +13,7 @@ use crate::syntax::span::Span;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
-/// What a term of the log joint density is of.
+/// The kind of a term of the log joint density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
     /// A random choice.
@@ -24,44 +24,44 @@ pub enum Term {
     Factor,
 }
 
-/// What an update does to a term that it reaches.
+/// The effect of an update on a term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
-    /// Its density is worked out anew; a choice keeps its value.
+    /// Its density is recomputed; a choice keeps its value.
     Scored,
-    /// Its value may change as well: it moves with its distribution, or is drawn anew if
-    /// that takes another form.
+    /// Its value may change as well: it moves with its distribution, or is resampled if
+    /// its form changes.
     Moved,
-    /// It may vanish, or another one appear: whether it is there depends on what changes.
+    /// It may vanish, or another term may appear: its existence depends on what changes.
     Structural,
 }
 
-/// A term of the log joint density that an update reaches.
+/// A term of the log joint density that an update affects.
 #[derive(Clone, Debug)]
 pub struct Dependent {
     /// Its address.
     pub address: Address,
-    /// What it is.
+    /// Its kind.
     pub term: Term,
-    /// What the update does to it.
+    /// The effect of the update on it.
     pub effect: Effect,
-    /// Its log density now.
+    /// Its current log density.
     pub log_density: f64,
 }
 
-/// What an update of a choice would reach.
+/// Everything that an update of a choice would affect.
 #[derive(Clone, Debug, Default)]
 pub struct Dependents {
     /// Terms of the log joint density, by address.
     pub terms: Vec<Dependent>,
-    /// Top-level names, in the order of the program.
+    /// Top-level names, in program order.
     pub names: Vec<Arc<str>>,
-    /// How many values would be worked out anew if all that they read changed.
+    /// How many values would be recomputed if everything they read changed.
     pub values: usize,
 }
 
 impl Trace {
-    /// What an update of a choice would reach.
+    /// Returns what an update of a choice would affect.
     pub fn dependents(&mut self, t: Target) -> Dependents {
         self.rollback();
         let before = self.graph.begin();
@@ -71,16 +71,16 @@ impl Trace {
         reach
     }
 
-    /// The choices that a choice's distribution was made from, and those that decide
-    /// whether it is there; by address.
+    /// Returns the choices that a choice's distribution depends on and those that decide
+    /// whether it exists, by address.
     pub fn origins(&self, t: Target) -> Vec<Address> {
         self.graph.origins(&self.code, t.node)
     }
 }
 
 impl Trace {
-    /// Where choices are written of which there are none in this state: nothing that is
-    /// observed asks for them. In the order of the text.
+    /// Returns the source spans of draws that have no choice in this state because no
+    /// observation depends on them, in source order.
     pub fn undrawn(&self) -> Vec<Span> {
         let there: FxHashSet<u32> =
             self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
@@ -94,7 +94,7 @@ impl Trace {
 }
 
 impl Graph {
-    /// What is marked, but for the choice that it began with.
+    /// Collects the stale nodes, except the choice at which invalidation started.
     fn dependents_of(&self, code: &Code, from: NodeId) -> Dependents {
         let mut reach = Dependents::default();
         let mut add = |n: NodeId, term, effect| {
@@ -127,7 +127,8 @@ impl Graph {
         reach
     }
 
-    /// The log density of a choice with all its elements, an observation or a factor.
+    /// Returns the log density of a choice with all its elements, an observation or a
+    /// factor.
     fn term_score(&self, n: NodeId) -> f64 {
         let mut sum = ExactSum::default();
         match self.nodes[n as usize].side.as_deref() {
@@ -139,15 +140,15 @@ impl Graph {
         sum.value()
     }
 
-    /// Whether what decides that a node is there is marked: the condition of a branch
-    /// around it, what a loop runs over.
+    /// Whether a node that decides whether `n` exists is stale: the condition of a branch
+    /// around it, or what a loop runs over.
     fn hangs_on_marked(&self, code: &Code, n: NodeId) -> bool {
         let mut deciding = Vec::new();
         self.deciding(code, n, &mut deciding);
         deciding.iter().any(|d| self.nodes[*d as usize].state == State::Stale)
     }
 
-    /// What decides that a node is there.
+    /// Collects the nodes that decide whether `n` exists.
     fn deciding(&self, code: &Code, n: NodeId, into: &mut Vec<NodeId>) {
         let mut frame = self.nodes[n as usize].frame;
         loop {
@@ -213,7 +214,7 @@ mod tests {
             t.set("@c", c, Default::default()).unwrap();
             let absent: Vec<&str> =
                 t.undrawn().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
-            // Of each its distribution.
+            // The span of a draw is that of its distribution.
             assert_eq!(absent, ["normal(0, 1)", if c { "normal(5, 1)" } else { "normal(0, 1)" }]);
         }
     }
@@ -248,11 +249,11 @@ mod tests {
                 && !terms.iter().any(|t| t.starts_with("@b"))
         );
         assert_eq!(t.log_joint().to_bits(), before.to_bits(), "nothing has happened");
-        // The densities are those that the trace knows.
+        // The densities agree with those of the trace.
         let y = reach.terms.iter().find(|r| r.address.to_string() == "@y").unwrap();
         let known = t.observations().into_iter().find(|(a, _)| a.to_string() == "@y").unwrap();
         assert_eq!(y.log_density, known.1);
-        // And the trace still works.
+        // The trace still works.
         t.propose(&[(a, Change::Value(crate::dist::Datum::Num(0.5)))], Default::default()).unwrap();
         t.commit();
         assert_eq!(t.log_joint().to_bits(), t.rerun().unwrap().log_joint().to_bits());

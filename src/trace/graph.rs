@@ -1,4 +1,4 @@
-//! The graph behind a trace: nodes, frames, who holds whom.
+//! The graph behind a trace: nodes, frames, and references between nodes.
 //!
 //! Invariants between updates: an evaluated node holds each operand it reads, once per
 //! reading; a node that nothing holds is empty; every evaluated node that reads a node of
@@ -26,7 +26,7 @@ pub(crate) struct Graph {
     pub nodes: Vec<Node>,
     pub frames: Vec<Frame>,
     pub free_frames: Vec<FrameId>,
-    /// By block: the first nodes of frames that were freed.
+    /// By block: the first nodes of freed frames.
     pub free_bases: Vec<Vec<NodeId>>,
     pub outside: Vec<Outside>,
     pub free_outside: Vec<u32>,
@@ -35,69 +35,69 @@ pub(crate) struct Graph {
     pub epoch: u32,
     /// Counts structural versions.
     pub version: u32,
-    /// Counts the updates that were kept.
+    /// Counts committed updates.
     pub revision: u64,
-    /// Nodes being evaluated.
+    /// The stack of nodes being evaluated.
     pub stack: Vec<NodeId>,
-    /// Those that were when an evaluation failed.
+    /// The contents of the stack when an evaluation failed.
     pub failed: Vec<NodeId>,
-    /// Effects of new frames, to be run.
+    /// Effects of new frames that are still to be run.
     pub effects: Vec<NodeId>,
     /// Effects and choices that became stale.
     pub stale_effects: Vec<NodeId>,
     pub stale_choices: Vec<NodeId>,
-    /// Nodes whose last holder let go in this update.
+    /// Nodes whose last reference was released in this update.
     pub unheld: Vec<NodeId>,
-    /// Entries of `mem` functions whose last call let go in this update.
+    /// Entries of `mem` functions whose last call was released in this update.
     pub idle: Vec<(NodeId, Key)>,
-    /// Frames their owners let go in this update.
+    /// Frames that their owners released in this update.
     pub detached: Vec<FrameId>,
-    /// Lists of outside users that need tidying.
+    /// Nodes whose lists of outside users need compaction.
     pub untidy: Vec<NodeId>,
-    /// The changes this update is about.
+    /// The changes that this update applies.
     pub pending: Vec<Pending>,
     /// The log prior of the choices, and the log density of observations and factors.
     pub prior: ExactSum,
     pub likelihood: ExactSum,
-    /// The log prior of what this update drew from the prior, and of what it would have
-    /// to draw to be undone.
+    /// The log prior of what this update drew from the prior, and of what an update back
+    /// would have to draw.
     pub drawn: ExactSum,
     pub undrawn: ExactSum,
-    /// Elements of choices that this update drew anew: their prior density before it is
-    /// in `undrawn`.
+    /// Elements of choices that this update resampled: their previous prior density is in
+    /// `undrawn`.
     pub redrawn: Vec<(NodeId, u32)>,
-    /// The choices that vanished, with their scores at that time. Others may have been
-    /// scored under other parameters before they did.
+    /// The choices that vanished, with their scores at that time. Choices may have been
+    /// re-scored under other parameters before they vanished.
     pub retired: Vec<(NodeId, f64)>,
     /// The choices this update removed: node, address hash and stored value.
     pub removed: Vec<(NodeId, u64, Datum)>,
     /// The log Jacobians of choices set through the unconstrained space.
     pub jacobian: ExactSum,
-    /// Choices that appeared and vanished in this update.
+    /// How many choices appeared and vanished in this update.
     pub appeared: u32,
     pub vanished: u32,
     pub choices: Choices,
     pub draws: Draws,
-    /// While a program runs for the first time: improper choices may take a value to
-    /// start from.
+    /// Set while a program runs for the first time: improper choices may then take a
+    /// value to start from.
     pub starting: bool,
     /// Values that choices take when they are first drawn.
     pub constraints: FxHashMap<u64, Constraint>,
-    /// Values observed in place of the program's, by the hash of the observation's
-    /// address.
+    /// Values that replace the program's observed values, by the hash of the
+    /// observation's address.
     pub observed: std::sync::Arc<FxHashMap<u64, Value>>,
-    /// During a query: the sums before it, for probes.
+    /// The sums before a query, for probes; `None` outside of queries.
     pub before: Option<Before>,
-    /// False: every update re-runs everything.
+    /// If false, every update re-runs everything.
     pub incremental: bool,
     pub limits: Limits,
     pub spent: Spent,
-    /// What was executed, when somebody watches.
+    /// Block and slot of everything executed, while execution is recorded.
     pub execution_log: Option<Vec<(u32, u32)>>,
 }
 
 impl Graph {
-    /// The graph of a program that has not run.
+    /// Creates the graph of a program that has not run.
     pub fn new(code: &Code, limits: Limits) -> Self {
         let mut g = Graph {
             nodes: Vec::new(),
@@ -157,7 +157,7 @@ impl Graph {
         g
     }
 
-    /// Puts a frame and its nodes in storage, re-using what was freed.
+    /// Allocates a frame and its nodes, re-using freed storage.
     pub fn place_frame(&mut self, code: &Code, mut frame: Frame) -> FrameId {
         let block = &code.blocks[frame.block as usize];
         let (len, first) = (block.len(), block.first);
@@ -184,7 +184,7 @@ impl Graph {
         id
     }
 
-    /// Makes a frame for `owner` as part of the current update, and queues its effects.
+    /// Creates a frame for `owner` as part of the current update, and queues its effects.
     pub fn make_frame(&mut self, code: &Code, frame: Frame) -> Result<FrameId, Box<RunError>> {
         let len = code.blocks[frame.block as usize].len();
         if frame.depth > self.limits.depth {
@@ -220,24 +220,25 @@ impl Graph {
         Ok(id)
     }
 
-    /// The slot of a node in its block.
+    /// Returns the slot of a node in its block.
     pub fn slot(&self, n: NodeId) -> u32 {
         n - self.frames[self.nodes[n as usize].frame as usize].base
     }
 
-    /// The operation a node evaluates.
+    /// Returns the operation that a node evaluates.
     #[inline]
     pub fn op<'c>(&self, code: &'c Code, n: NodeId) -> &'c Op {
         &code.ops[self.nodes[n as usize].op as usize]
     }
 
-    /// What is known of a node's slot.
+    /// Returns the static facts about a node's slot.
     #[inline]
     pub fn slot_facts<'c>(&self, code: &'c Code, n: NodeId) -> &'c SlotFacts {
         &code.slots[self.nodes[n as usize].op as usize]
     }
 
-    /// The node an operand of a frame's block refers to; `None` for constants.
+    /// Returns the node that an operand of a frame's block refers to; `None` for
+    /// constants.
     pub fn resolve(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
         match o {
             Operand::Const(_) => None,
@@ -246,7 +247,7 @@ impl Graph {
         }
     }
 
-    /// The node in a slot of a frame further out.
+    /// Returns the node in a slot of an enclosing frame, `up` levels out.
     fn outer(&self, frame: FrameId, up: u16, slot: u32) -> NodeId {
         let mut f = frame;
         for _ in 0..up {
@@ -255,7 +256,7 @@ impl Graph {
         self.frames[f as usize].base + slot
     }
 
-    /// The value of an operand that is evaluated.
+    /// Returns the value of an evaluated operand.
     pub fn value<'a>(&'a self, code: &'a Code, frame: FrameId, o: Operand) -> &'a Value {
         match o {
             Operand::Const(i) => code.const_value(i),
@@ -266,7 +267,8 @@ impl Graph {
         }
     }
 
-    /// The operand in the caller's frame that feeds a parameter, with that frame.
+    /// Returns the operand that feeds a parameter, with the caller's frame to which it
+    /// belongs.
     pub fn argument(&self, code: &Code, n: NodeId) -> Option<(FrameId, Operand)> {
         let frame = &self.frames[self.nodes[n as usize].frame as usize];
         let Op::Param { index, .. } = self.op(code, n) else { return None };
@@ -283,8 +285,8 @@ impl Graph {
         }
     }
 
-    /// Calls `f` with every node `n` holds, structure first, and whether the link is an
-    /// outside one. The order matters: a change of an earlier one may make the later ones
+    /// Calls `f` with every node that `n` holds, structure first, and whether the link is
+    /// an outside one. The order matters: a change of an earlier node may make later ones
     /// irrelevant.
     pub fn each_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
         let facts = self.slot_facts(code, n);
@@ -303,7 +305,7 @@ impl Graph {
         }
     }
 
-    /// The operands that a node holds, where that depends on the state.
+    /// Calls `f` with the operands that a node holds, if they depend on the state.
     fn each_changing_dep(&self, code: &Code, n: NodeId, f: &mut impl FnMut(NodeId, bool)) {
         let frame = self.nodes[n as usize].frame;
         let mut operand = |o: Operand| {
@@ -382,15 +384,15 @@ impl Graph {
         }
     }
 
-    /// Whether the link from a frame's result to the frame's owner follows from the
-    /// block.
+    /// Whether the link from a frame's result to the frame's owner can be derived from
+    /// the block.
     pub fn is_owned_result(&self, code: &Code, result: NodeId, owner: NodeId) -> bool {
         let f = &self.frames[self.nodes[result as usize].frame as usize];
         f.owner == owner
             && code.blocks[f.block as usize].result == Some(Operand::Local(result - f.base))
     }
 
-    /// Takes hold of a node.
+    /// Adds a reference to a node.
     pub fn acquire(&mut self, dep: NodeId, user: NodeId, outside: bool) {
         self.note(Entry::Acquired(dep, outside));
         self.nodes[dep as usize].refs += 1;
@@ -403,7 +405,7 @@ impl Graph {
         }
     }
 
-    /// A list of users for a node that has had none.
+    /// Allocates a list of users for a node without one.
     fn new_outside(&mut self, n: NodeId) -> u32 {
         let list = self.free_outside.pop().unwrap_or_else(|| {
             self.outside.push(Outside::default());
@@ -413,8 +415,8 @@ impl Graph {
         list
     }
 
-    /// Lets go of a node; what nothing holds any more is emptied at the end of the
-    /// update.
+    /// Releases a reference to a node; nodes without references are emptied at the end of
+    /// the update.
     pub fn release(&mut self, dep: NodeId, outside: bool) {
         self.note(Entry::Released(dep, outside));
         let node = &mut self.nodes[dep as usize];
@@ -431,8 +433,7 @@ impl Graph {
         }
     }
 
-    /// Lets go of a frame: its effects are released, and what they alone held goes with
-    /// them.
+    /// Detaches a frame: its effects are released, together with what only they hold.
     pub fn detach(&mut self, code: &Code, id: FrameId) {
         let frame = &mut self.frames[id as usize];
         if !frame.attached {
@@ -463,7 +464,7 @@ impl Graph {
         }
     }
 
-    /// Empties a node: takes back what it added to the score, lets go of what it holds.
+    /// Empties a node: removes its contribution to the score and releases what it holds.
     fn retire(&mut self, code: &Code, n: NodeId) {
         self.save(n);
         let op = self.op(code, n);
@@ -487,7 +488,8 @@ impl Graph {
         node.score = 0.0;
     }
 
-    /// Lets go of all a node holds besides its operands, before it takes another form.
+    /// Releases everything that a node holds besides its operands, before its form
+    /// changes.
     pub fn let_side_go(&mut self, code: &Code, n: NodeId) {
         if self.nodes[n as usize].flags & HELD != 0 {
             let mut deps: SmallVec<[(NodeId, bool); 4]> = SmallVec::new();
@@ -499,7 +501,7 @@ impl Graph {
         self.drop_structure(code, n);
     }
 
-    /// Lets go of the frames and table entries a node owns, and of its side.
+    /// Releases the frames and table entries that a node owns, and its side.
     pub fn drop_structure(&mut self, code: &Code, n: NodeId) {
         let Some(side) = self.swap_side(n, None) else { return };
         match &side {
@@ -519,13 +521,13 @@ impl Graph {
         std::mem::replace(&mut self.nodes[n as usize].side, side.map(Box::new)).map(|b| *b)
     }
 
-    /// Replaces a node's side, to be restored on roll-back.
+    /// Replaces a node's side, and records the old one for a roll-back.
     pub fn set_side(&mut self, n: NodeId, side: Option<Side>) {
         let old = std::mem::replace(&mut self.nodes[n as usize].side, side.map(Box::new));
         self.note(Entry::Side(n, old));
     }
 
-    /// An error at a node.
+    /// Builds an error at a node.
     pub fn fail(
         &self,
         code: &Code,
@@ -559,9 +561,9 @@ impl Graph {
                 self.address_near(code, n),
             )
         };
-        // A choice outside of its support, such as a label beyond the number of groups:
-        // the state has density zero, whatever it is an index of. What depends on a
-        // choice is evaluated after it is scored.
+        // A choice outside of its support, such as a label beyond the number of groups,
+        // gives the state density zero, whatever it indexes. A choice is scored before
+        // anything that depends on it is evaluated.
         let is_impossible = kind == FaultKind::Index && self.prior.value() == f64::NEG_INFINITY;
         let kind = if is_impossible { FaultKind::Domain } else { kind };
         Box::new(RunError { kind, message, span, address, calls, hint })

@@ -1,4 +1,5 @@
-//! What a trace contains: selections, choices by address, values, distributions, observations.
+//! The contents of a trace: selections, choices by address, values, distributions,
+//! observations.
 
 use super::node::{self, NONE, State};
 use super::{Address, Selection, Selector, Target, Trace};
@@ -9,40 +10,41 @@ use crate::lang::value::{Likelihood, Located, Value};
 use std::sync::Arc;
 
 impl Trace {
-    /// Registers a selection; its members are kept up to date from then on.
+    /// Registers a selection, whose members are kept up to date from then on.
     pub fn select(&mut self, selector: &Selector) -> Selection {
         self.rollback();
         self.graph.selection(&self.code, selector)
     }
 
-    /// The choices a selection now has.
+    /// Returns the current members of a selection.
     pub fn targets(&self, selection: Selection) -> &[Target] {
         self.graph.choices.selections[selection.0 as usize].targets()
     }
 
-    /// What selections belong to.
+    /// Returns the identity of the trace that selections belong to.
     pub(crate) fn identity(&self) -> &Arc<()> {
         &self.identity
     }
 
-    /// The choices a selection now has, as kept: another list as soon as they change.
+    /// Returns the current members of a selection as a shared list, which is replaced
+    /// when they change.
     pub(crate) fn listed(&self, selection: Selection) -> &Arc<Vec<Target>> {
         self.graph.choices.selections[selection.0 as usize].listed()
     }
 
-    /// The choices a selection now has, in the order of the program: by place in the text
-    /// and pass of the loops around.
+    /// Returns the current members of a selection in program order: by position in the
+    /// text and pass of the enclosing loops.
     pub fn in_program_order(&self, selection: Selection) -> Vec<Target> {
         self.graph.in_program_order(self.targets(selection))
     }
 
-    /// All active choices, in the order of the hashes of their addresses.
+    /// Returns all active choices, in the order of the hashes of their addresses.
     pub fn all_targets(&self) -> &[Target] {
         self.graph.choices.selections[0].targets()
     }
 
-    /// The choice at an address, if it is active. An element of a choice has the
-    /// element's index as last key.
+    /// Returns the choice at an address, if it is active. The address of an element of a
+    /// choice has the element's index as its last key.
     pub fn find(&self, address: &Address) -> Option<Target> {
         if let Some(n) = self.graph.choices.find(address.hash64()) {
             return Some(Target { node: n, element: NONE });
@@ -58,7 +60,7 @@ impl Trace {
         Some(Target { node: n, element: element as u32 })
     }
 
-    /// The address of a choice.
+    /// Returns the address of a choice.
     pub fn address(&self, t: Target) -> Address {
         let mut a = self.graph.address(&self.code, t.node);
         if t.element != NONE {
@@ -67,20 +69,20 @@ impl Trace {
         a
     }
 
-    /// A hash of the address of a choice, stable between runs.
+    /// Returns a hash of the address of a choice, stable between runs.
     pub fn address_hash(&self, t: Target) -> u64 {
         let h = self.graph.choice_hash(&self.code, t.node);
         if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
     }
 
-    /// Whether a target that was listed before is still a choice of this trace.
+    /// Whether a target that was listed earlier is still a choice of this trace.
     pub fn is_active(&self, t: Target) -> bool {
         let node = self.graph.nodes.get(t.node as usize);
         node.is_some_and(|n| n.state == State::Clean)
             && matches!(self.graph.op(&self.code, t.node), Op::Draw { .. })
     }
 
-    /// The value of a choice as the program sees it.
+    /// Returns the value of a choice as the program sees it.
     pub fn value(&self, t: Target) -> Value {
         let v = &self.graph.nodes[t.node as usize].value;
         if t.element == NONE {
@@ -90,14 +92,14 @@ impl Trace {
         }
     }
 
-    /// The value of a choice in stored form.
+    /// Returns the value of a choice in stored form.
     pub fn stored(&self, t: Target) -> Option<Datum> {
         if t.element == NONE { self.graph.stored(t.node) } else { self.value(t).to_datum() }
     }
 
-    /// Where a continuous choice is in the unconstrained space, and the log Jacobian of
-    /// the transform there: what a [`Change::Free`] starts from. `None` for a discrete
-    /// one.
+    /// Returns the point of a continuous choice in the unconstrained space and the log
+    /// Jacobian of the transform there, from which a [`Change::Free`] starts. `None` for
+    /// a discrete choice.
     pub fn free(&self, t: Target) -> Option<(Vec<f64>, f64)> {
         self.free_unless(t, Support::is_discrete)
     }
@@ -113,20 +115,21 @@ impl Trace {
         Some((y, jacobian))
     }
 
-    /// [`Trace::free`] of a choice that moves there can reach in all its parts: `None`
-    /// also for one that is discrete in part, which a [`Change::Free`] puts at its least
-    /// value.
+    /// [`Trace::free`] for choices that moves in the unconstrained space can reach in all
+    /// parts: `None` also for a partly discrete choice, which a [`Change::Free`] sets to
+    /// its smallest value.
     pub(crate) fn free_to_move(&self, t: Target) -> Option<(Vec<f64>, f64)> {
         self.free_unless(t, Support::has_discrete_part)
     }
 
-    /// The distribution a choice now has.
+    /// Returns the current distribution of a choice.
     pub fn dist(&self, t: Target) -> Option<Dist> {
         let d = self.graph.dist_of(&self.code, t.node)?;
         Some(if t.element == NONE { d } else { d.element(t.element as usize) })
     }
 
-    /// Whether a choice is an array of separately addressed elements.
+    /// Returns the number of elements, if a choice is an array of separately addressed
+    /// elements.
     pub fn elements(&self, t: Target) -> Option<usize> {
         match self.graph.nodes[t.node as usize].side.as_deref() {
             Some(node::Side::Choice(c)) if c.elements != NONE && t.element == NONE => {
@@ -136,25 +139,25 @@ impl Trace {
         }
     }
 
-    /// How many choices (elements counted one by one) are active.
+    /// Returns the number of active choices, counting elements separately.
     pub fn choice_count(&self) -> usize {
         self.all_targets().len()
     }
 
-    /// Named points of the scene as the observations put them (see
-    /// [`crate::lang::value::Likelihood::located`]).
+    /// Returns named points of the scene at the positions that the observations give them
+    /// (see [`crate::lang::value::Likelihood::located`]).
     pub fn located(&self) -> Vec<Located> {
         self.likelihoods().flat_map(|(l, observed)| l.located(observed)).collect()
     }
 
-    /// Every observation and factor with its log density, in the order of the program's
-    /// blocks.
+    /// Returns every observation and factor with its log density, in the order of the
+    /// program's blocks.
     pub fn observations(&self) -> Vec<(Address, f64)> {
         self.scored().into_iter().map(|(n, s)| (self.graph.address(&self.code, n), s)).collect()
     }
 
-    /// What has log density -∞, with its place in the program: observations and factors
-    /// first, then choices.
+    /// Returns everything with log density -∞ and its source span: observations and
+    /// factors first, then choices.
     pub fn impossible(&self) -> Vec<(Address, crate::syntax::span::Span)> {
         let observed =
             self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY).map(|(n, _)| n);
@@ -168,8 +171,8 @@ impl Trace {
         found
     }
 
-    /// Which observations observe what their distributions cannot give, by address, and
-    /// why.
+    /// Returns the observations whose values are outside the support of their
+    /// distributions, by address, with the reason.
     pub(crate) fn outside_support(&self) -> Vec<(Address, String)> {
         let zero = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY);
         let why = |(n, _)| {
@@ -183,13 +186,14 @@ impl Trace {
         self.code.blocks[frame.block as usize].spans[(n - frame.base) as usize]
     }
 
-    /// Whether an observation's likelihood is no density over its data, so that its scale
-    /// is a matter of choice.
+    /// Whether an observation has an unnormalised likelihood, whose scale is a modelling
+    /// decision.
     pub fn is_pseudo(&self) -> bool {
         self.likelihoods().any(|(l, _)| !l.is_proper())
     }
 
-    /// What is approximate in the likelihoods by their settings, each once.
+    /// Returns descriptions of what is approximate in the likelihoods under their
+    /// settings, each once.
     pub fn approximations(&self) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for (l, _) in self.likelihoods() {
@@ -203,7 +207,7 @@ impl Trace {
         all
     }
 
-    /// The observations and factors.
+    /// Iterates over the observations and factors.
     pub(super) fn scored_nodes(&self) -> impl Iterator<Item = u32> {
         let nodes = self
             .graph
@@ -221,7 +225,7 @@ impl Trace {
         self.scored_nodes().map(|n| (n, self.score_at(n))).collect()
     }
 
-    /// The log density of an observation or factor.
+    /// Returns the log density of an observation or factor.
     pub(super) fn score_at(&self, n: u32) -> f64 {
         let n = &self.graph.nodes[n as usize];
         match n.side.as_deref() {
@@ -230,7 +234,8 @@ impl Trace {
         }
     }
 
-    /// The likelihoods that are not distributions, and what is observed under each.
+    /// Iterates over the likelihoods that are not distributions, with the value observed
+    /// under each.
     fn likelihoods(&self) -> impl Iterator<Item = (&dyn Likelihood, &Value)> {
         self.scored_nodes().filter_map(|n| {
             let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n)
@@ -243,7 +248,7 @@ impl Trace {
         })
     }
 
-    /// Every active choice with its address and log density, by address.
+    /// Returns every active choice with its address, value and log density, by address.
     pub fn choices(&self) -> Vec<(Address, Value, f64)> {
         let targets = self.all_targets();
         let mut all: Vec<_> =

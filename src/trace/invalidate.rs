@@ -1,9 +1,10 @@
-//! The first half of an update: marking what may have changed.
+//! The first half of an update: invalidation of everything that may change.
 //!
-//! Marking follows users, not values, and stops at choices: an absorbing choice keeps its
-//! value whatever its distribution becomes, so only its density is in question (but for
-//! those that may have to be drawn anew). The second half ([`super::propagate`]) re-runs
-//! marked nodes on demand and stops where values come out equal.
+//! Invalidation follows users regardless of values, and stops at choices: an absorbing
+//! choice keeps its value whatever its distribution becomes, so only its density may
+//! change (except for choices that may have to be resampled). The second half
+//! ([`super::propagate`]) re-runs stale nodes on demand and stops where values come out
+//! equal.
 
 use super::graph::Graph;
 use super::node::*;
@@ -11,15 +12,15 @@ use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
 use crate::lang::value::Value;
 
 impl Graph {
-    /// Marks a choice or observation that is about to change, and everything that reads
-    /// it.
+    /// Invalidates a choice or observation that is about to change, and everything that
+    /// reads it.
     pub fn invalidate_target(&mut self, code: &Code, n: NodeId) {
         self.make_stale(code, n);
         self.invalidate_users(code, n);
         self.invalidate_pending(code);
     }
 
-    /// Marks every evaluated node (full re-execution).
+    /// Invalidates every evaluated node (full re-execution).
     pub fn invalidate_everything(&mut self, code: &Code) {
         for n in 0..self.nodes.len() as NodeId {
             if self.nodes[n as usize].state == State::Clean {
@@ -28,7 +29,7 @@ impl Graph {
         }
     }
 
-    /// Marks what reads a choice from other frames.
+    /// Invalidates the nodes of other frames that read a choice.
     pub fn invalidate_outside_users(&mut self, code: &Code, n: NodeId) {
         self.invalidate_each_outside(code, n);
         self.invalidate_pending(code);
@@ -42,14 +43,15 @@ impl Graph {
         }
     }
 
-    /// Works off the stack of nodes whose users are to be marked.
+    /// Invalidates the users of all nodes on the stack.
     fn invalidate_pending(&mut self, code: &Code) {
         while let Some(n) = self.stack.pop() {
             self.invalidate_users(code, n);
         }
     }
 
-    /// Marks the users of a node; those that may pass a change on go to the stack.
+    /// Invalidates the users of a node; those that may propagate a change go onto the
+    /// stack.
     fn invalidate_users(&mut self, code: &Code, n: NodeId) {
         let facts = self.slot_facts(code, n);
         for user in &facts.users {
@@ -70,8 +72,8 @@ impl Graph {
         }
     }
 
-    /// Marks a user in the same frame. An argument's change goes to the parameter it
-    /// feeds, past the call itself.
+    /// Invalidates a user in the same frame. The change of an argument goes to the
+    /// parameter it feeds, past the call itself.
     fn invalidate_static_user(&mut self, code: &Code, n: NodeId, user: NodeId) {
         let (callee, args) = match self.op(code, user) {
             Op::Call { callee, args, .. } => (callee, args),
@@ -111,8 +113,8 @@ impl Graph {
         }
     }
 
-    /// Marks what reads the result of a pass of a `fold`: the next pass, or the fold
-    /// itself.
+    /// Invalidates the reader of the result of a pass of a `fold`: the next pass, or the
+    /// fold itself.
     fn invalidate_next_pass(&mut self, code: &Code, owner: NodeId, frame: FrameId) {
         let pass = self.frames[frame as usize].pass as usize;
         let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else { return };
@@ -125,11 +127,11 @@ impl Graph {
         }
     }
 
-    /// Marks one node, if it is evaluated and not yet marked.
+    /// Invalidates one node, if it is evaluated and not yet stale.
     fn invalidate(&mut self, code: &Code, n: NodeId) {
         let state = self.nodes[n as usize].state;
         if state != State::Clean {
-            // A choice marked before its key was.
+            // The choice became stale before its key did.
             if matches!(state, State::Stale)
                 && matches!(self.op(code, n), Op::Draw { keys, .. } if !keys.is_empty())
                 && self.may_be_redrawn(code, n)
@@ -154,9 +156,9 @@ impl Graph {
         }
     }
 
-    /// Whether a marked choice may get another value without being a target: a whitened
-    /// one moves with its distribution; one whose key, length or kind changes is drawn
-    /// anew.
+    /// Whether a stale choice may get another value without being a target: a whitened
+    /// one moves with its distribution, and one whose key, length or kind changes is
+    /// resampled.
     pub(super) fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
         let node = &self.nodes[n as usize];
         let Op::Draw { dist, keys, .. } = self.op(code, n) else { return false };
@@ -171,7 +173,8 @@ impl Graph {
             || keys.iter().any(stale)
     }
 
-    /// Marks the elements of a loop's passes: what it runs over may have changed.
+    /// Invalidates the elements of a loop's passes: what the loop runs over may have
+    /// changed.
     fn invalidate_items(&mut self, code: &Code, n: NodeId) {
         let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref() else { return };
         let item = u32::from(matches!(self.op(code, n), Op::Fold { .. }));

@@ -1,9 +1,9 @@
-//! Updates that can be undone: every mutation leaves an entry, and a roll-back replays
-//! them backwards.
+//! Undo journal: every mutation leaves an entry, and a roll-back replays the entries
+//! backwards.
 //!
-//! A node's plain fields are saved once an update, before their first change; structure
-//! is saved at each change. The score sums are saved whole. Nothing is allocated in the
-//! steady state: the journal keeps its capacity.
+//! A node's plain fields are saved once per update, before their first change; structure
+//! is saved at each change. The score sums are saved whole. In the steady state nothing
+//! is allocated, because the journal keeps its capacity.
 
 use super::graph::Graph;
 use super::node::*;
@@ -29,23 +29,23 @@ pub(crate) enum Entry {
     Side(NodeId, Option<Box<Side>>),
     /// The content of a choice's side before it changed.
     Choice(NodeId, Box<ChoiceSide>),
-    /// The total of an observed array, or what it holds, before it changed.
+    /// The total of an observed array, or the nodes it holds, before a change.
     Sum(NodeId, ExactSum),
     TotalDeps(NodeId, Deps),
     /// A frame was made.
     FrameMade(FrameId),
-    /// A frame was let go.
+    /// A frame was detached.
     FrameDetached(FrameId),
-    /// The frame of a pass was made when something asked for it.
+    /// The frame of a pass was made on demand.
     PassMade(NodeId, u32),
-    /// A frame became that of another pass.
+    /// A frame now belongs to another pass.
     PassMoved(FrameId, u32),
     /// An entry of a `mem` function changed.
     Memo(NodeId, Key, Option<(FrameId, u32)>),
-    /// A node was taken hold of or let go, from another frame or not.
+    /// A reference to a node was acquired or released, from another frame or not.
     Acquired(NodeId, bool),
     Released(NodeId, bool),
-    /// A choice was registered, or removed from the given places.
+    /// A choice was registered, or removed, under this address hash.
     ChoiceAdded(NodeId, u64),
     ChoiceRemoved(NodeId, u64),
     /// The members of a selection changed.
@@ -53,13 +53,13 @@ pub(crate) enum Entry {
         selection: u32,
         before: super::choices::Listed,
     },
-    /// An address index entry was overwritten.
+    /// An entry of the address index was overwritten.
     AddressShadowed(u64, NodeId),
-    /// Another value was put in place of an observed one.
+    /// An observed value was replaced.
     Observed(u64, Option<Value>),
 }
 
-/// The sums before an update.
+/// The score sums before an update.
 #[derive(Clone, Debug)]
 pub(crate) struct Before {
     pub prior: ExactSum,
@@ -91,7 +91,8 @@ impl Graph {
         Before { prior: self.prior.clone(), likelihood: self.likelihood.clone() }
     }
 
-    /// Notes a mutation. A first run is never undone.
+    /// Records a mutation; the first run of a program is never undone and leaves no
+    /// entries.
     #[inline]
     pub fn note(&mut self, entry: Entry) {
         if !self.starting {
@@ -99,7 +100,7 @@ impl Graph {
         }
     }
 
-    /// Saves a node's plain fields, once an update.
+    /// Saves a node's plain fields, once per update.
     pub fn save(&mut self, n: NodeId) {
         let node = &mut self.nodes[n as usize];
         if node.flags & SAVED == 0 && !self.starting {
@@ -116,7 +117,7 @@ impl Graph {
         }
     }
 
-    /// Keeps the update.
+    /// Commits the update.
     pub fn commit(&mut self, code: &Code) {
         self.revision += 1;
         let mut journal = std::mem::take(&mut self.journal);
@@ -211,7 +212,7 @@ impl Graph {
         self.untidy.clear();
     }
 
-    /// Clears what belongs to one update.
+    /// Clears the data of one update.
     fn forget_update(&mut self) {
         self.stack.clear();
         self.effects.clear();
@@ -224,7 +225,7 @@ impl Graph {
         self.choices.forget_update();
     }
 
-    /// Gives a frame's storage back.
+    /// Frees a frame's storage.
     fn free_frame(&mut self, code: &Code, f: FrameId) {
         let (block, base) = (self.frames[f as usize].block as usize, self.frames[f as usize].base);
         let end = base + code.blocks[block].len() as u32;
@@ -241,7 +242,7 @@ impl Graph {
         self.free_frames.push(f);
     }
 
-    /// Removes from a node's outside users those that are gone.
+    /// Removes the users that have released a node from its list of outside users.
     fn tidy(&mut self, code: &Code, n: NodeId) {
         let list = self.nodes[n as usize].outside as usize;
         if list == 0 || self.outside[list].gone as usize * 2 <= self.outside[list].users.len() {
@@ -249,7 +250,7 @@ impl Graph {
         }
         let mut users = std::mem::take(&mut self.outside[list].users);
         users.sort_unstable();
-        // One entry for each reading, as each is let go by itself.
+        // Keeps one entry per reading, since each is released on its own.
         let (mut user, mut readings) = (NONE, 0);
         users.retain(|u| {
             if *u != user {

@@ -1,6 +1,6 @@
-//! Bounds on what a program may build and how long one evaluation may take: errors at a
-//! place in the program, rather than memory or patience that run out. The numbers are in
-//! `docs/reliability.md`.
+//! Limits on what a program may build and how long one evaluation may take. Exceeding one
+//! is an error with a location in the program, instead of exhausted memory or an endless
+//! run. The numbers are in `docs/reliability.md`.
 
 use super::graph::Graph;
 use super::node::NodeId;
@@ -13,19 +13,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Bounds on what a program may build.
+/// Limits on what a program may build.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Calls within calls.
+    /// Depth of nested calls.
     pub depth: u32,
     /// Nodes of the trace: at 100 to 200 bytes each, most of its memory.
     pub nodes: u32,
-    /// Elements of all arrays that one update makes, and numbers of its meshes: some
+    /// Elements of all arrays that one update makes, and numbers of its meshes: about
     /// eight bytes each.
     pub elements: u64,
     /// Nodes that one update evaluates.
     pub operations: u64,
-    /// When to give up in the middle of an update.
+    /// When to interrupt an update.
     pub stop: Stop,
 }
 
@@ -42,13 +42,13 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// The limits that are numbers, by name.
+    /// The names of the numeric limits.
     pub const NAMES: [&str; 4] = ["depth", "nodes", "elements", "operations"];
 
-    /// The same with another number for the limit of a name.
+    /// Sets the limit with this name.
     ///
     /// # Errors
-    /// A name that is none of [`Limits::NAMES`], or a number that is too large for it.
+    /// If the name is not in [`Limits::NAMES`], or the number is too large.
     pub fn with(mut self, name: &str, number: u64) -> Result<Limits, String> {
         let small =
             || u32::try_from(number).map_err(|_| format!("{name} may be at most {}", u32::MAX));
@@ -68,36 +68,36 @@ impl Limits {
     }
 }
 
-/// How to raise a limit, for hints.
+/// Returns a hint on how to raise a limit.
 pub(super) fn raise(name: &str) -> String {
     format!("raise it with --limit {name}=N")
 }
 
-/// When to give up in the middle of an update: some time after it was asked for, or after
-/// time is up. Until then an update may end by itself, so that a state is left in which
-/// everything has run.
+/// When to interrupt an update: some time after a stop was requested or time is up. Until
+/// then the update may finish by itself, so that the state it leaves is complete.
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
     asked: Vec<Arc<AtomicBool>>,
-    /// Since when it has how much time.
+    /// The start and length of the available time.
     time: Option<(Instant, Duration)>,
     patience: Duration,
 }
 
-/// How long an update may go on after it was asked to stop, where nobody says.
+/// The default time for which an update may continue after a stop request.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// So many operations go by between two looks at flags and clock.
+/// The number of operations between two checks of flags and clock.
 const BETWEEN_LOOKS: u32 = 1 << 12;
-/// What may draw a picture counts as so many of them.
+/// An operation that may render a picture counts as this many.
 const LARGE: u32 = 1 << 8;
 
 impl Stop {
-    /// Two seconds after this is set.
+    /// Stops two seconds after this flag is set.
     pub fn when(asked: Arc<AtomicBool>) -> Stop {
         Stop { asked: vec![asked], time: None, patience: PATIENCE }
     }
 
-    /// Also when this is set; what never stops otherwise does so two seconds after.
+    /// Also stops when this flag is set; two seconds after it if there was no stop
+    /// condition before.
     #[must_use]
     pub fn or(mut self, asked: Arc<AtomicBool>) -> Stop {
         if self.asked.is_empty() && self.time.is_none() {
@@ -107,14 +107,14 @@ impl Stop {
         self
     }
 
-    /// Also when so much time has gone by from now on.
+    /// Also stops when this much time has passed from now.
     #[must_use]
     pub fn or_within(self, time: Option<Duration>) -> Stop {
         let time = time.map(|t| (Instant::now(), t)).or(self.time);
         Stop { time, ..self }
     }
 
-    /// With another time than two seconds in which an update may end by itself.
+    /// Replaces the two seconds in which an update may finish by itself.
     #[must_use]
     pub fn after(self, patience: Duration) -> Stop {
         Stop { patience, ..self }
@@ -125,12 +125,12 @@ impl Stop {
         self.asked.iter().any(|a| a.load(Ordering::Relaxed))
     }
 
-    /// Whether it has been asked for, or time is up.
+    /// Whether a stop was requested or time is up.
     pub fn is_asked(&self) -> bool {
         self.has_used(1.0)
     }
 
-    /// Whether it has been asked for, or this share of the time has gone by.
+    /// Whether a stop was requested or this fraction of the time has passed.
     pub fn has_used(&self, share: f64) -> bool {
         self.is_set()
             || self
@@ -139,25 +139,25 @@ impl Stop {
     }
 }
 
-/// What an update has used up of its limits.
+/// How much of its limits an update has used.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Spent {
     operations: u64,
     elements: u64,
-    /// Evaluations since the clock was looked at, over all updates: many short ones take
-    /// time as well.
+    /// Evaluations since the last check of the clock, across updates: many short ones
+    /// take time as well.
     since_look: u32,
-    /// Since when it should have stopped.
+    /// The time at which it should have stopped.
     late: Option<Instant>,
 }
 
 impl Spent {
-    /// At the beginning of an update.
+    /// Resets the counts at the start of an update.
     pub fn renew(&mut self) {
         (self.operations, self.elements) = (0, 0);
     }
 
-    /// Notes an operation that may take as long as many.
+    /// Counts an operation that may take as long as many.
     pub fn count_large(&mut self) {
         self.since_look += LARGE;
     }
@@ -193,8 +193,8 @@ impl Graph {
         Err(self.fail(code, n, FaultKind::Stopped, message, Some(hint)))
     }
 
-    /// Counts the elements of a value that a node made, and refuses what is too large or
-    /// too deep to be handled.
+    /// Counts the elements of a value that a node made, and rejects values that are too
+    /// large or too deeply nested.
     #[inline]
     pub(super) fn count_elements(
         &mut self,

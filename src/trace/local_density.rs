@@ -1,9 +1,9 @@
-//! Weights of other values of a choice by formulas (see [`crate::lang::local_density`]):
-//! nothing in the trace changes.
+//! Weights of other values of a choice by local densities (see
+//! [`crate::lang::local_density`]), without changing the trace.
 //!
-//! The scores are computed by the same functions as in an update and quantised as there,
-//! so the weights are the same to the last bit. Whatever a formula does not cover makes
-//! it give up; then [`super::enumeration`] or an update decides.
+//! The scores are computed by the same functions as in an update and quantised in the
+//! same way, so the weights agree to the last bit. A case that a local density does not
+//! cover is left to [`super::enumeration`] or an update.
 
 use super::graph::Graph;
 use super::node::*;
@@ -19,10 +19,10 @@ use crate::lang::value::Value;
 use crate::num::ExactSum;
 use smallvec::SmallVec;
 
-/// The formulas that tell what another value of a choice does.
+/// The local densities that together give the effect of another value of a choice.
 pub(crate) type LocalDensities<'c> = SmallVec<[Placed<'c>; 4]>;
 
-/// A formula in a frame.
+/// A local density in a frame.
 #[derive(Clone, Copy)]
 pub(crate) struct Placed<'c> {
     /// The first node of the frame.
@@ -33,10 +33,10 @@ pub(crate) struct Placed<'c> {
     pub local_density: &'c LocalDensity,
 }
 
-/// The most other frames that may read the choice.
+/// The maximum number of other frames that may read the choice.
 const READERS: usize = 4;
 
-/// A value in a formula.
+/// A value in a local density.
 #[derive(Clone, Copy)]
 pub(crate) enum Register<'a> {
     Num(f64),
@@ -44,15 +44,15 @@ pub(crate) enum Register<'a> {
     Other(&'a Value),
 }
 
-/// A formula at work on the nodes of one frame.
+/// The evaluation of a local density on the nodes of one frame.
 pub(crate) struct Evaluation<'a, const N: usize> {
     graph: &'a Graph,
     code: &'a Code,
     base: NodeId,
     registers: [Register<'a>; N],
-    /// A bit for each register that was filled.
+    /// A bit for each filled register.
     filled: u32,
-    /// The selections that took their other alternative.
+    /// The selections that take their other alternative.
     pub turned: SmallVec<[NodeId; 4]>,
     /// The scores, by node.
     pub scores: SmallVec<[(NodeId, f64); 8]>,
@@ -61,8 +61,8 @@ pub(crate) struct Evaluation<'a, const N: usize> {
 }
 
 impl Graph {
-    /// The formulas that together tell what another value of a choice does; `None` if
-    /// there are none in this state.
+    /// Returns the local densities that together give the effect of another value of a
+    /// choice; `None` if there are none in this state.
     pub fn local_densities<'c>(
         &self,
         code: &'c Code,
@@ -108,7 +108,7 @@ impl Graph {
         Some(all)
     }
 
-    /// Adds a formula, if it sees all that depends on its value.
+    /// Adds a local density, if it covers everything that depends on its value.
     fn add_local_density<'c>(
         &self,
         entry: NodeId,
@@ -119,7 +119,7 @@ impl Graph {
         if local_density.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
             return None;
         }
-        // Two in one frame could move the same score.
+        // Two local densities in one frame could change the same score.
         if !local_density.instructions.is_empty()
             && all.iter().any(|p| p.base == base && !p.local_density.instructions.is_empty())
         {
@@ -129,13 +129,13 @@ impl Graph {
         Some(())
     }
 
-    /// Formulas at work, for [`Evaluation::weigh`].
+    /// Returns an evaluation of local densities, for [`Evaluation::weigh`].
     pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a, REGISTERS> {
         Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
     }
 
-    /// The distribution of a choice whose parameters are single numbers, or arrays as
-    /// they are.
+    /// Returns the distribution of a choice whose parameters are single numbers or
+    /// evaluated arrays.
     pub fn simple_dist(&self, code: &Code, n: NodeId) -> Option<Dist> {
         let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else {
             return None;
@@ -152,8 +152,8 @@ impl Graph {
 }
 
 impl<'a> Evaluation<'a, REGISTERS> {
-    /// The log weight of a value of the choice, relative to the present one, with the
-    /// likelihood raised to a power; `None` if the formulas do not cover it.
+    /// Returns the log weight of a value of the choice relative to the current one, with
+    /// the likelihood raised to a power; `None` if the local densities do not cover it.
     pub fn weigh(
         &mut self,
         target: NodeId,
@@ -171,7 +171,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         Some(Weight::beside(&self.prior, &self.likelihood, power))
     }
 
-    /// Begins with a value of the choice.
+    /// Starts with a value of the choice.
     pub fn begin(&mut self, value: Register<'a>) {
         self.registers[0] = value;
         self.turned.clear();
@@ -180,7 +180,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
         self.likelihood = ExactSum::default();
     }
 
-    /// Runs a formula. `may_choose`: selections may take their other alternative.
+    /// Runs a local density. With `may_choose`, selections may take their other
+    /// alternative.
     pub fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
         let local_density = placed.local_density;
         (self.base, self.filled) = (placed.base, 1);
@@ -266,12 +267,12 @@ impl<'a> Evaluation<'a, REGISTERS> {
         Some(())
     }
 
-    /// Whether a register was filled.
+    /// Whether a register has been filled.
     pub fn is_filled(&self, r: u8) -> bool {
         self.filled & (1 << r) != 0
     }
 
-    /// What is in a register.
+    /// Returns the contents of a register.
     pub fn register(&self, r: u8) -> Register<'a> {
         self.registers[r as usize]
     }
@@ -282,8 +283,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
         self.filled |= 1 << into;
     }
 
-    /// Whether its selections can take their other alternatives without letting anything
-    /// go but computations.
+    /// Whether its selections can take their other alternatives without releasing
+    /// anything except computations.
     fn can_choose(&self, local_density: &LocalDensity) -> bool {
         let is_taken = |h: &KeptAlternative| {
             let node = self.node(h.selection);
@@ -308,7 +309,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
             && local_density.held.iter().all(is_kept)
     }
 
-    /// The log density of a single number or truth value.
+    /// The log density of a single number or boolean.
     fn log_density(
         &self,
         builtin: u32,
@@ -432,7 +433,7 @@ impl<'a> Register<'a> {
     }
 }
 
-/// Parameters that are all numbers.
+/// Returns the parameters, if all of them are numbers.
 #[inline]
 fn numbers<'s>(parameters: &[Register], space: &'s mut [f64; PARAMETERS]) -> Option<&'s [f64]> {
     let numbers = space.get_mut(..parameters.len())?;
@@ -443,7 +444,7 @@ fn numbers<'s>(parameters: &[Register], space: &'s mut [f64; PARAMETERS]) -> Opt
     Some(numbers)
 }
 
-/// The distribution with these parameters.
+/// Returns the distribution with these parameters.
 fn family(builtin: &Builtin, parameters: &[Register]) -> Option<Dist> {
     if let Some(Scalar::Family { make, .. }) = builtin.scalar {
         return make(numbers(parameters, &mut [0.0; PARAMETERS])?);
@@ -459,7 +460,7 @@ fn family(builtin: &Builtin, parameters: &[Register]) -> Option<Dist> {
     make(&Args { builtin, values: &values }).ok()
 }
 
-/// An element of an array that is there.
+/// Returns an element of an array, if the index is in range.
 fn element(base: Register, key: f64) -> Option<Register> {
     let Register::Other(base) = base else { return None };
     match base {

@@ -1,5 +1,5 @@
-//! Formulas against updates: the same weights and the same states, to the last bit, or no
-//! answer.
+//! Local densities against updates: the same weights and the same states to the last bit,
+//! or no answer.
 
 use super::*;
 use crate::trace::{Change, Draws, Selector, Target, Trace};
@@ -9,8 +9,8 @@ fn model(text: &str) -> Model {
     Program::parse(text).unwrap().compile().unwrap()
 }
 
-/// How many weights and moves formulas gave, over states of a walk through the prior; all
-/// are compared with updates.
+/// Counts the weights and moves that local densities gave, over the states of a random
+/// walk through the prior; all are compared with updates.
 fn compared(text: &str) -> [usize; 2] {
     let mut trace = model(text).simulate(1, 0).unwrap();
     let every = Selector::Tag { name: "d".into(), value: None };
@@ -53,8 +53,8 @@ fn compared(text: &str) -> [usize; 2] {
     [weights, moves]
 }
 
-/// Compares the state that the pending update leads to with the one that a formula
-/// assigns, if it does; undoes both.
+/// Compares the state after the pending update with the one that local densities assign,
+/// if they do; undoes both.
 fn same_state(trace: &mut Trace, t: Target, dist: &Dist, value: &Datum) -> bool {
     let mut updated = trace.clone();
     updated.commit();
@@ -72,7 +72,7 @@ fn same_state(trace: &mut Trace, t: Target, dist: &Dist, value: &Datum) -> bool 
         )
     };
     assert_eq!(state(&assigned), state(&updated));
-    // What is computed, too, and who is told of the next change.
+    // Computed values agree too, and so does the effect of the next update.
     let same_nodes = |a: &Trace, b: &Trace| {
         for (a, b) in a.graph.nodes.iter().zip(&b.graph.nodes) {
             assert!(
@@ -150,7 +150,7 @@ fn choices_that_would_vanish_are_left_to_updates() {
 
 #[test]
 fn impossible_states_are_left_to_updates() {
-    // With one of two impossible terms gone it is impossible still.
+    // With one of two impossible terms gone, the state is still impossible.
     let [weights, _] = compared(
         "assume k ~ flip(0.5) #d; assume j ~ flip(0.5) #d;
          observe uniform(if k { 1 } else { 0 }, 2) = 0.5; observe uniform(if j { 1 } else { 0 }, 2) = 0.5;",

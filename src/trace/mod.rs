@@ -1,9 +1,9 @@
 //! Traces: one execution of a program as a dependency graph with dynamic structure.
 //!
-//! Everything is an operation on traces through one small interface: *propose* changes at
-//! addresses, get the weight of the incremental update, *commit* or *roll back*. A choice
-//! that no observation asks for is not part of a trace; it is drawn when a
-//! [`query`](Trace::query) asks for it, from its prior given the rest.
+//! All access goes through one small interface: *propose* changes at addresses, get the
+//! weight of the incremental update, then *commit* or *roll back*. A choice that no
+//! observation depends on is not part of a trace; a [`query`](Trace::query) that needs it
+//! draws it from its prior given the rest.
 
 #![doc = include_str!("guide.md")]
 
@@ -55,13 +55,14 @@ pub(crate) use marginal::{Elimination, Explored, Marginal};
 use node::NONE;
 use std::sync::Arc;
 
-/// One execution of a program: the values of its choices and all that follows from them.
+/// One execution of a program: the values of its choices and everything computed from
+/// them.
 #[derive(Debug)]
 pub struct Trace {
     code: Arc<Code>,
     graph: Graph,
     update: Option<Before>,
-    /// What selections belong to: a clone registers its own.
+    /// Identifies the trace that selections belong to; a clone gets its own.
     identity: Arc<()>,
 }
 
@@ -72,30 +73,31 @@ impl Clone for Trace {
     }
 }
 
-/// A failure of an operation on a trace; the trace is as it was before.
+/// The result of an operation on a trace; if it fails, the trace is unchanged.
 pub type TraceResult<T> = Result<T, Box<RunError>>;
 
 impl Trace {
-    /// A trace in which nothing has run: queries draw from the prior, observations are
-    /// ignored.
+    /// Returns a trace in which nothing has run: queries draw from the prior, and
+    /// observations are ignored.
     pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
         let graph = Graph::new(&code, limits);
         Trace { code, graph, update: None, identity: Arc::new(()) }
     }
 
-    /// Runs a program: draws what its observations ask for.
+    /// Runs a program and draws the choices that its observations depend on.
     ///
     /// # Errors
-    /// What the program does wrong, with its place.
+    /// If the program fails, with the location of the fault.
     pub fn simulate(code: Arc<Code>, draws: Draws, limits: Limits) -> TraceResult<Self> {
         Trace::generate(code, std::iter::empty(), draws, limits).map(|(t, _)| t)
     }
 
     /// Runs a program with the values of some choices given. The weight is the log joint
-    /// less the log density of what was drawn: the importance weight of the trace.
+    /// minus the log density of the choices that were drawn: the importance weight of the
+    /// trace.
     ///
     /// # Errors
-    /// What the program does wrong, with its place.
+    /// If the program fails, with the location of the fault.
     pub fn generate(
         code: Arc<Code>,
         constraints: impl IntoIterator<Item = (u64, Constraint)>,
@@ -122,22 +124,23 @@ impl Trace {
         Ok((trace, weight))
     }
 
-    /// The program.
+    /// Returns the program.
     pub fn code(&self) -> &Arc<Code> {
         &self.code
     }
 
-    /// Proposes changes and updates what depends on them. The update is pending until
-    /// [`Trace::commit`] or [`Trace::rollback`]; a second proposal rolls the first back,
-    /// and its targets must be of the state before that.
+    /// Proposes changes and updates everything that depends on them. The update is
+    /// pending until [`Trace::commit`] or [`Trace::rollback`]. A second proposal rolls
+    /// the first one back, so its targets must belong to the state before the first.
     ///
     /// # Errors
-    /// What goes wrong under the proposed values; the trace is then as before.
+    /// If the program fails under the proposed values; the trace is then unchanged.
     pub fn propose(&mut self, changes: &[(Target, Change)], draws: Draws) -> TraceResult<Weight> {
         self.propose_constrained(changes, &[], draws)
     }
 
-    /// The same, with the values that some choices take if they appear.
+    /// Does the same as [`Trace::propose`]; `constraints` are values that choices take if
+    /// they appear.
     ///
     /// # Errors
     /// As [`Trace::propose`].
@@ -150,8 +153,8 @@ impl Trace {
         self.propose_observed(changes, constraints, &[], draws)
     }
 
-    /// The same, with values in place of observed ones, by the hashes of the
-    /// observations' addresses.
+    /// Does the same as [`Trace::propose_constrained`], and replaces observed values,
+    /// given by the hashes of the observations' addresses.
     fn propose_observed(
         &mut self,
         changes: &[(Target, Change)],
@@ -183,7 +186,7 @@ impl Trace {
         self.pend(before, settled)
     }
 
-    /// Leaves an update pending, or undoes one that failed.
+    /// Leaves a successful update pending, and undoes one that failed.
     fn pend(&mut self, before: Before, settled: TraceResult<()>) -> TraceResult<Weight> {
         match settled {
             Ok(()) => {
@@ -198,7 +201,7 @@ impl Trace {
         }
     }
 
-    /// Draws the targets anew from the prior, together.
+    /// Resamples the targets jointly from the prior.
     ///
     /// # Errors
     /// As [`Trace::propose`].
@@ -207,18 +210,20 @@ impl Trace {
         self.propose(&changes, draws)
     }
 
-    /// The choices that vanish in the pending proposal, with the values they had.
+    /// Returns the choices that vanish in the pending proposal, with their previous
+    /// values.
     pub fn removed(&self) -> Vec<(u64, Constraint)> {
         self.graph.removed.iter().map(|(_, h, d)| (*h, Constraint::Stored(d.clone()))).collect()
     }
 
-    /// Whether the pending proposal takes away a choice: also one that is drawn anew at
-    /// the same place, because its form changed. What was proposed for it had no effect.
+    /// Whether the pending proposal removes a choice. This includes a choice that is
+    /// resampled at the same address because its form changed; the value proposed for it
+    /// had no effect.
     pub fn was_removed(&self, t: Target) -> bool {
         self.graph.removed.iter().any(|(n, _, _)| *n == t.node)
     }
 
-    /// Goes over to a saved state (see [`Trace::constraints`]); selections stay valid.
+    /// Moves to a saved state (see [`Trace::constraints`]); selections stay valid.
     ///
     /// # Errors
     /// As [`Trace::propose`].
@@ -239,7 +244,7 @@ impl Trace {
         Ok(())
     }
 
-    /// Keeps the pending proposal, if there is one.
+    /// Commits the pending proposal, if there is one.
     pub fn commit(&mut self) {
         if self.update.take().is_some() {
             self.graph.commit(&self.code);
@@ -253,22 +258,23 @@ impl Trace {
         }
     }
 
-    /// The log joint density of choices, observations and factors.
+    /// Returns the log joint density of choices, observations and factors.
     pub fn log_joint(&self) -> f64 {
         self.graph.log_joint()
     }
 
-    /// Its prior part: the choices.
+    /// Returns the prior part of the log joint: the choices.
     pub fn log_prior(&self) -> f64 {
         self.graph.prior.value()
     }
 
-    /// Its observed part: observations and factors.
+    /// Returns the likelihood part of the log joint: observations and factors.
     pub fn log_likelihood(&self) -> f64 {
         self.graph.likelihood.value()
     }
 
-    /// The log density of what a selection selects: its share of the log prior.
+    /// Returns the sum of the log densities of the selected choices: their part of the
+    /// log prior.
     pub fn score(&mut self, selector: &Selector) -> f64 {
         let selection = self.select(selector);
         let mut sum = crate::num::ExactSum::default();
@@ -278,8 +284,8 @@ impl Trace {
         sum.value()
     }
 
-    /// The log density of a choice under its prior given the rest, in the present state,
-    /// also that of a pending proposal.
+    /// Returns the log density of a choice under its prior given the rest, in the current
+    /// state (including a pending proposal).
     pub fn score_of(&self, t: Target) -> f64 {
         let node = &self.graph.nodes[t.node as usize];
         match node.side.as_deref() {
@@ -288,20 +294,20 @@ impl Trace {
         }
     }
 
-    /// The gradient of the log prior plus `power` times the log likelihood, by the
-    /// unconstrained coordinates of these choices one after the other, the log Jacobians
-    /// of their transforms included (see [`Change::Free`]): in the present state, also
-    /// that of a pending proposal. Discrete choices have no coordinates. Appended to
-    /// `out`.
+    /// Appends to `out` the gradient of the log prior plus `power` times the log
+    /// likelihood with respect to the unconstrained coordinates of these choices, one
+    /// choice after the other. It includes the log Jacobians of their transforms (see
+    /// [`Change::Free`]) and is taken in the current state (including a pending
+    /// proposal). Discrete choices have no coordinates.
     ///
     /// # Errors
-    /// An operation between a choice and the score of which no derivative is known.
+    /// If an operation between a choice and a score has no known derivative.
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
         self.weighted_gradient(targets, power, &|_| 1.0, out)
     }
 
-    /// The same with the log density of each choice, observation and factor weighed;
-    /// Jacobians are not.
+    /// Does the same as [`Trace::gradient`], with the log density of each choice,
+    /// observation and factor multiplied by a weight; the log Jacobians are not weighted.
     ///
     /// # Errors
     /// As [`Trace::gradient`].
@@ -321,47 +327,48 @@ impl Trace {
         self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
     }
 
-    /// Whether nothing was committed since the program was run.
+    /// Whether nothing has been committed since the program was run.
     pub(crate) fn is_new(&self) -> bool {
         self.graph.revision == 0
     }
 
-    /// Turns incremental updates off (every proposal re-runs the whole program) or on
-    /// again; chains are the same either way.
+    /// Turns incremental updates off (every proposal then re-runs the whole program) or
+    /// on again; chains are the same either way.
     pub fn set_incremental(&mut self, on: bool) {
         self.graph.incremental = on;
     }
 
-    /// Sets other bounds on what updates may build.
+    /// Replaces the limits on what updates may build.
     #[doc(hidden)]
     pub fn set_limits(&mut self, limits: Limits) {
         self.graph.limits = limits;
     }
 
-    /// What ends its updates, and the searches among them.
+    /// Returns the condition that interrupts updates, and searches that consist of many
+    /// updates.
     pub(crate) fn stop(&self) -> &Stop {
         &self.graph.limits.stop
     }
 
-    /// Starts to note which operations are executed.
+    /// Starts to record which operations are executed.
     #[doc(hidden)]
     pub fn record_execution(&mut self) {
         self.graph.execution_log = Some(Vec::new());
     }
 
-    /// What was executed since [`Trace::record_execution`]: the text of each expression, where the
-    /// source is at hand by its span.
+    /// Returns the source spans of the expressions that were executed since
+    /// [`Trace::record_execution`].
     #[doc(hidden)]
     pub fn executed(&mut self) -> Vec<crate::syntax::span::Span> {
         let log = self.graph.execution_log.take().unwrap_or_default();
         log.into_iter().map(|(b, s)| self.code.blocks[b as usize].spans[s as usize]).collect()
     }
 
-    /// Runs the program again from scratch with the same choices: a check that increments
-    /// and structure are right.
+    /// Runs the program again from scratch with the same choices, to check the
+    /// incremental updates and the structure.
     ///
     /// # Errors
-    /// What the program does wrong.
+    /// If the program fails.
     pub fn rerun(&self) -> TraceResult<Trace> {
         Trace::generate(
             self.present_code(),
@@ -372,11 +379,11 @@ impl Trace {
         .map(|(t, _)| t)
     }
 
-    /// Another execution of the same program under the same observations, with the values
-    /// of some choices given.
+    /// Generates another trace of the same program under the same observations, with the
+    /// values of some choices given.
     ///
     /// # Errors
-    /// What the program does wrong.
+    /// If the program fails.
     pub(crate) fn another(
         &self,
         constraints: impl IntoIterator<Item = (u64, Constraint)>,
@@ -388,7 +395,7 @@ impl Trace {
         Ok(trace)
     }
 
-    /// The program, with the values that are observed now.
+    /// The program, with the values that are currently observed.
     fn present_code(&self) -> Arc<Code> {
         match Arc::ptr_eq(&self.graph.observed, &self.code.observed) {
             true => Arc::clone(&self.code),
@@ -396,7 +403,7 @@ impl Trace {
         }
     }
 
-    /// The choices as constraints for [`Trace::generate`].
+    /// Returns the choices as constraints for [`Trace::generate`].
     pub fn constraints(&self) -> Vec<(u64, Constraint)> {
         let targets = self.all_targets();
         let stored =

@@ -1,8 +1,8 @@
 //! Nodes and frames: the storage of a trace.
 //!
-//! A frame is one instance of a block; its nodes lie side by side, one a slot. A node
-//! keeps its last value, what it adds to the score, and how many evaluated nodes (or
-//! effects) hold it. What only structural nodes need is boxed beside it.
+//! A frame is one instance of a block; its nodes are contiguous, one per slot. A node
+//! stores its last value, its contribution to the score, and a reference count: how many
+//! evaluated nodes and effects hold it. Data that only structural nodes need is boxed.
 
 use crate::dist::Datum;
 use crate::lang::builtins::Before;
@@ -18,13 +18,13 @@ pub(crate) type NodeId = u32;
 /// The index of a frame.
 pub(crate) type FrameId = u32;
 
-/// No node, no frame.
+/// No node or no frame.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// How far a node's value can be trusted.
+/// Whether a node's value is up to date.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum State {
-    /// Not evaluated: nothing asked for it.
+    /// Not evaluated: nothing needs it.
     #[default]
     Empty,
     /// Up to date.
@@ -35,35 +35,35 @@ pub(crate) enum State {
     Running,
 }
 
-/// The node's operands are held by it.
+/// The node holds its operands.
 pub(crate) const HELD: u8 = 1;
 /// The node is a choice with a pending change, or an observation with another value.
 pub(crate) const TARGET: u8 = 2;
 /// The node's state before it began to run was [`State::Stale`].
 pub(crate) const WAS_STALE: u8 = 4;
-/// The node is a choice with an improper distribution: nothing can draw it.
+/// The node is a choice with an improper distribution, which cannot be sampled.
 pub(crate) const IMPROPER: u8 = 8;
-/// The node is a selection that reads its second alternative.
+/// The node is a selection that takes its second alternative.
 pub(crate) const OTHERWISE: u8 = 16;
 
 /// The node was saved to the journal in this update.
 pub(crate) const SAVED: u8 = 32;
 
-/// A node: one cache line, with what is read most in front.
+/// A node: one cache line, with the most frequently read fields first.
 #[derive(Clone, Debug, Default)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
     /// Its value; `nothing` while empty.
     pub value: Value,
-    /// How far its value can be trusted.
+    /// Whether its value is up to date.
     pub state: State,
     /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`], [`SAVED`].
     pub flags: u8,
     /// Its operation, by index in [`crate::lang::code::Code::ops`].
     pub op: u32,
-    /// What it adds to the log joint, when that is one term.
+    /// Its contribution to the log joint, if that is a single term.
     pub score: f64,
-    /// What only structural nodes and vector choices need.
+    /// Data that only structural nodes and vector choices need.
     pub side: Option<Box<Side>>,
     /// How many evaluated nodes and effects hold it.
     pub refs: u32,
@@ -71,20 +71,20 @@ pub(crate) struct Node {
     pub changed: u32,
     /// Its frame.
     pub frame: FrameId,
-    /// Its list of users in other frames.
+    /// Its list of users in other frames, by index in the graph's `outside`.
     pub outside: u32,
 }
 
 const _: () = assert!(size_of::<Node>() == 64);
 
-/// What only some nodes need.
+/// Data that only some nodes need.
 #[derive(Clone, Debug)]
 pub(crate) enum Side {
-    /// Nodes held besides the operands: the element an index found, the elements a gather
-    /// read.
+    /// Nodes held besides the operands: the element that an index selected, the elements
+    /// that a gather read.
     Deps(Deps),
-    /// What an incremental function of a host starts from next time, and nodes held
-    /// besides the operands.
+    /// The previous evaluation of an incremental host function, from which the next one
+    /// starts, and nodes held besides the operands.
     Kept(Kept),
     /// `if` and calls of user functions.
     Child(Child),
@@ -96,7 +96,7 @@ pub(crate) enum Side {
     Table(Table),
     /// `mem(f)`.
     Memo(Memo),
-    /// A choice whose stored form is not its value, or that has several elements.
+    /// A choice whose stored form differs from its value, or that has several elements.
     Choice(ChoiceSide),
     /// An observed array, or an observation that reads containers.
     Total(Total),
@@ -119,7 +119,7 @@ pub(crate) struct Kept {
 pub(crate) struct MemoCall {
     /// The node of the `mem` function.
     pub memo: NodeId,
-    /// The entry.
+    /// The key of the entry.
     pub key: Key,
     /// The node with its result, or [`NONE`].
     pub result: NodeId,
@@ -141,7 +141,7 @@ pub(crate) struct Total {
 pub(crate) struct Child {
     /// The frame.
     pub frame: FrameId,
-    /// The node with its result, or [`NONE`] when that is a constant or nothing.
+    /// The node with its result, or [`NONE`] if the result is a constant or missing.
     pub result: NodeId,
 }
 
@@ -152,7 +152,7 @@ pub(crate) struct Loop {
     pub keys: Keys,
     /// The elements.
     pub items: Value,
-    /// The frames; [`NONE`] where nothing has asked for the pass yet.
+    /// The frames; [`NONE`] for a pass that nothing has needed yet.
     pub frames: Vec<FrameId>,
     /// The block of the body and its lexical parent frame.
     pub block: u32,
@@ -182,7 +182,7 @@ impl Keys {
         }
     }
 
-    /// The key of pass `i`.
+    /// Returns the key of pass `i`.
     pub fn get(&self, i: usize) -> Key {
         match self {
             Keys::Range { start, .. } => Key::Num(((start + i as i64) as f64 + 0.0).to_bits()),
@@ -190,7 +190,7 @@ impl Keys {
         }
     }
 
-    /// Which pass a key belongs to.
+    /// Returns the pass that a key belongs to.
     pub fn find(&self, key: &Key) -> Option<usize> {
         match self {
             Keys::Range { start, len } => {
@@ -206,10 +206,10 @@ impl Keys {
 /// Where the elements of a keyed container are.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
-    /// What was read to make it.
+    /// The nodes that were read to build it.
     pub deps: Deps,
-    /// By key: the source and the pass of each of its loops; none when one loop's keys
-    /// are the container's.
+    /// By key: the source, and the pass of each of its loops; `None` if the keys of one
+    /// loop are those of the container.
     pub entries: Option<Arc<indexmap::IndexMap<SmallVec<[Key; 1]>, Element>>>,
 }
 
@@ -218,7 +218,7 @@ pub(crate) struct Table {
 pub(crate) struct Element {
     /// The index of the source.
     pub source: u32,
-    /// The pass of each loop on the way.
+    /// The pass of each loop that leads to it.
     pub passes: SmallVec<[u32; 2]>,
 }
 
@@ -229,26 +229,26 @@ pub(crate) struct Memo {
     pub block: u32,
     /// Its lexical parent frame.
     pub parent: FrameId,
-    /// The live entries: frame and number of calls that use it.
+    /// The live entries: frame and number of calls that use each.
     pub entries: FxHashMap<Key, (FrameId, u32)>,
 }
 
-/// What a vector choice, or one stored in another form than its value, keeps.
+/// Data of a vector choice, or of one whose stored form differs from its value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ChoiceSide {
     /// The stored form, if it is not the value.
     pub stored: Option<Datum>,
     /// The scores of the elements.
     pub scores: Vec<f64>,
-    /// The number of separately addressed elements; [`NONE`] when it is one choice.
+    /// The number of separately addressed elements; [`NONE`] for a single choice.
     pub elements: u32,
-    /// The hash of its address, where that is not a function of its frame.
+    /// The hash of its address, if its frame does not determine that.
     pub hash: Option<u64>,
     /// Nodes held besides the operands.
     pub deps: Deps,
 }
 
-/// Where a function's parameters come from.
+/// The source of a function's parameters.
 #[derive(Clone, Debug)]
 pub(crate) enum Arguments {
     /// Not a function's frame.
@@ -278,22 +278,22 @@ pub(crate) struct Frame {
     pub base: NodeId,
     /// The hash of the address prefix of its function's frame.
     pub path: u64,
-    /// How many calls deep.
+    /// The depth of nested calls.
     pub depth: u32,
-    /// Which pass of its owner's loop.
+    /// The pass of its owner's loop.
     pub pass: u32,
     /// The key of the pass, `map` element or `mem` entry.
     pub key: Option<Key>,
-    /// Where parameters come from.
+    /// The source of its parameters.
     pub args: Arguments,
-    /// Whether its owner still wants it.
+    /// Whether its owner still uses it.
     pub attached: bool,
 }
 
-/// The users of a node that its block does not tell.
+/// Users of a node that cannot be derived from its block.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outside {
-    /// The users; some may have gone.
+    /// The users; some may have released the node.
     pub users: SmallVec<[NodeId; 4]>,
     /// How many have.
     pub gone: u32,

@@ -1,11 +1,11 @@
-//! Observed values as part of a trace: reading them, putting others in their place,
-//! drawing them anew from their own distributions given the choices. What
-//! simulation-based checks and predictive checks are made of.
+//! Observed values as part of a trace: reading them, replacing them, and sampling them
+//! from their distributions given the choices. This is the basis of simulation-based
+//! calibration and posterior predictive checks.
 //!
-//! A value put in place of the program's is kept by the observation's address and scored
-//! from then on, also when the observation goes and comes back. Putting it there is a
-//! proposal like any other: pending until it is committed, undone by a roll-back. Not
-//! here: scoring ([`super::eval`]).
+//! A value that replaces the program's is kept under the observation's address and scored
+//! from then on, also when the observation vanishes and reappears. Replacing it is a
+//! proposal like any other: pending until it is committed, undone by a roll-back. Scoring
+//! is in [`super::eval`].
 
 use super::graph::Graph;
 use super::journal::Entry;
@@ -26,26 +26,26 @@ use std::sync::Arc;
 pub struct Observation {
     /// Its address.
     pub address: Address,
-    /// A hash of the address, stable between runs: what [`Trace::set_observed`] knows it
-    /// by.
+    /// A hash of the address, stable between runs, by which [`Trace::set_observed`]
+    /// identifies it.
     pub hash: u64,
     /// The observed value.
     pub value: Value,
 }
 
-/// What the observations of a trace would be if they were made again.
+/// New data for the observations of a trace, sampled given its choices.
 #[derive(Clone, Debug, Default)]
 pub struct Replicate {
-    /// The hash of the address and the new value of each observation that can be drawn,
-    /// by address.
+    /// The address hash and new value of each observation that can be sampled, by
+    /// address.
     pub values: Vec<(u64, Value)>,
-    /// What cannot: factors, and observations under a likelihood without a sampler. The
-    /// address, and what it is.
+    /// Those that cannot be sampled: factors, and observations under a likelihood without
+    /// a sampler. The address, and a description.
     pub silent: Vec<(Address, String)>,
 }
 
 impl Trace {
-    /// The observations with their values, by address; factors observe nothing.
+    /// Returns the observations with their values, by address; factors are not included.
     pub fn observed(&self) -> Vec<Observation> {
         let (g, code) = (&self.graph, &*self.code);
         let one = |n: NodeId| {
@@ -59,12 +59,11 @@ impl Trace {
         all
     }
 
-    /// Draws every observation anew given the choices, in the form of what is observed
-    /// (as many elements, the same size). The trace stays as it is:
-    /// [`Trace::set_observed`] takes the values.
+    /// Samples every observation given the choices, in the shape of the observed value.
+    /// The trace is unchanged; [`Trace::set_observed`] takes the values.
     ///
     /// # Errors
-    /// What goes wrong while a likelihood draws.
+    /// If a likelihood fails while it samples.
     pub fn replicate(&self, draws: Draws) -> TraceResult<Replicate> {
         let (g, code) = (&self.graph, &*self.code);
         let mut all = Vec::new();
@@ -89,21 +88,20 @@ impl Trace {
         })
     }
 
-    /// Proposes other values in place of what is observed, by the hashes of the
-    /// observations' addresses. The update is pending until [`Trace::commit`] or
-    /// [`Trace::rollback`]. A value of an observation that does not exist is kept until
-    /// it does.
+    /// Proposes replacements of observed values, given by the hashes of the observations'
+    /// addresses. The update is pending until [`Trace::commit`] or [`Trace::rollback`]. A
+    /// value for an observation that does not exist yet is kept until it does.
     ///
     /// # Errors
-    /// If a value cannot be scored; the trace is then as before.
+    /// If a value cannot be scored; the trace is then unchanged.
     pub fn set_observed(&mut self, values: &[(u64, Value)]) -> TraceResult<Weight> {
         self.propose_observed(&[], &[], values, Draws::default())
     }
 
-    /// The log density of each observed value: of each observation the hash of its
-    /// address and those of its elements, one where what it observes has none. In order
-    /// of the hashes, so that the same observations are in the same order. `None` if
-    /// there are more than `most`.
+    /// Returns the log density of each observed value: for each observation, the hash of
+    /// its address and the log densities of its elements (a single one if it has no
+    /// elements). Sorted by hash, so that the same observations come in the same order.
+    /// `None` if there are more than `most` values.
     ///
     /// ```
     /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = [1, 2] as y; observe poisson(3) = 2 as k;")?;
@@ -142,9 +140,9 @@ impl Trace {
         Some(all)
     }
 
-    /// The observed values in the order of [`Trace::pointwise`]: each by its name, the
-    /// observation's address and the number of the element, and its number; NaN of what
-    /// is none.
+    /// Returns the observed values in the order of [`Trace::pointwise`]: the name (the
+    /// observation's address and the index of the element) and the value as a number, or
+    /// NaN if it is not a number.
     pub fn points(&self, most: usize) -> Vec<(String, f64)> {
         let Some(scores) = self.pointwise(most) else { return Vec::new() };
         let mut observed: FxHashMap<u64, Observation> =
@@ -171,7 +169,7 @@ impl Trace {
         all
     }
 
-    /// The observations by the hashes of their addresses.
+    /// Returns the observations by the hashes of their addresses.
     pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
         let (g, code) = (&self.graph, &*self.code);
         let hashed = |n: NodeId| match g.op(code, n) {
@@ -183,7 +181,7 @@ impl Trace {
         self.scored_nodes().filter_map(hashed).collect()
     }
 
-    /// Puts values in place of observed ones, within an update.
+    /// Replaces observed values, within an update.
     pub(super) fn put_observed(&mut self, values: &[(u64, Value)]) {
         if values.is_empty() {
             return;
@@ -199,13 +197,13 @@ impl Trace {
         }
     }
 
-    /// What is observed in place of the program's values: another allocation as soon as
-    /// it changes, for whoever holds it.
+    /// Returns the values that replace the program's observed values. The allocation
+    /// changes whenever they do, so that holders can detect a change by pointer.
     pub(crate) fn replacements(&self) -> &Arc<Observed> {
         &self.graph.observed
     }
 
-    /// Observes what another trace of the same program observes.
+    /// Observes the same values as another trace of the same program.
     ///
     /// # Errors
     /// As [`Trace::set_observed`].
@@ -238,7 +236,7 @@ impl Graph {
         };
     }
 
-    /// What an observation observes in place of the program's value.
+    /// Returns the value that replaces an observation's value in the program, if any.
     pub(crate) fn replaced(&self, code: &Code, n: NodeId) -> Option<&Value> {
         if self.observed.is_empty() {
             return None;
@@ -247,7 +245,7 @@ impl Graph {
         self.observed.get(&self.site_hash(code, self.nodes[n as usize].frame, *site))
     }
 
-    /// What an observation observes; what is read for that goes to `deps`.
+    /// Returns the value of an observation; nodes read for it are added to `deps`.
     pub(crate) fn observed_value<'a>(
         &'a self,
         code: &'a Code,
@@ -261,8 +259,8 @@ impl Graph {
         }
     }
 
-    /// Why an observation has probability zero whatever its distribution's parameters, if
-    /// that is so at these: what is observed is not in its support.
+    /// Returns a message if the observed value is outside the support of its distribution
+    /// under the current parameters, so that its probability is zero.
     pub(super) fn outside_support(&self, code: &Code, n: NodeId) -> Option<String> {
         let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return None };
         let (mut deps, frame) = (Deps::new(), self.nodes[n as usize].frame);
@@ -279,7 +277,7 @@ impl Graph {
         (0..count).find_map(|i| outside(&dist.element(i), &observed.element(i)?))
     }
 
-    /// A draw of what an observation observes, or what it is that cannot be drawn.
+    /// Samples an observation, or describes why it cannot be sampled.
     fn draw_observed(
         &self,
         code: &Code,
@@ -308,7 +306,7 @@ impl Graph {
     }
 }
 
-/// What a value is that a distribution cannot give.
+/// Returns a message if a value is outside the support of a distribution.
 fn outside(dist: &Dist, observed: &Value) -> Option<String> {
     let x = observed.to_datum()?;
     let support = dist.support();
@@ -322,8 +320,8 @@ fn outside(dist: &Dist, observed: &Value) -> Option<String> {
     (!is_truth && !support.contains(&x)).then(apart)
 }
 
-/// A draw in the form in which a value is scored: element by element where the
-/// distribution is over less than the value.
+/// Samples in the form in which a value is scored: element by element if the distribution
+/// is over less than the whole value.
 fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
     let mut one = |d: &Dist| Value::from_datum(&d.sample(rng));
     if let Some(count) = dist.elements() {
@@ -443,7 +441,7 @@ mod tests {
             sum += number(0, 1);
             cross += (number(1, 0) - x) * number(1, 1);
         }
-        // Standard errors of 0.014 and 0.011.
+        // The standard errors are 0.014 and 0.011.
         assert!((sum / n as f64 - x).abs() < 0.07 && (cross / n as f64 - 0.5).abs() < 0.06);
     }
 }

@@ -1,10 +1,11 @@
 //! The operations of generative functions by name, for users of the library: reading and
-//! changing choices and observed values by address, undoing that, and the density of a
+//! changing choices and observed values by address, undoing changes, and the density of a
 //! part of a trace.
 //!
-//! Terms are Gen's (Cusumano-Towner et al. 2019): [`Trace::update`], [`Trace::project`];
-//! `simulate`, `generate`, `propose`, `regenerate` and `score` are beside them, and a
-//! fork of a trace is its clone. Not here: how an update runs.
+//! The terms are Gen's (Cusumano-Towner et al. 2019): [`Trace::update`] and
+//! [`Trace::project`] are here; `simulate`, `generate`, `propose`, `regenerate` and
+//! `score` are in the parent module. A fork of a trace is its clone. How an update runs
+//! is in other modules.
 
 use super::node::NodeId;
 use super::{Address, Change, Constraint, Draws, Selector, Target, Trace, TraceResult, Weight};
@@ -20,8 +21,8 @@ use rustc_hash::FxHashMap;
 pub enum Given {
     /// As the program sees it.
     Value(Value),
-    /// As the trace keeps a choice (for a whitened gp the white noise behind it): what
-    /// [`Update::discarded`] has, so that nothing is lost on the way back.
+    /// As the trace stores a choice (for a whitened gp, the underlying white noise): the
+    /// form used by [`Update::discarded`], so that the way back is exact.
     Stored(Datum),
 }
 
@@ -40,20 +41,20 @@ impl<V: Into<Value>> From<V> for Given {
     }
 }
 
-/// What [`Trace::update`] did.
+/// The result of [`Trace::update`].
 #[derive(Clone, Debug)]
 pub struct Update {
-    /// The change of the log joint density less the log density of what was drawn from
-    /// the prior: of the new state, as an importance weight relative to the old one.
+    /// The change of the log joint density minus the log density of what was drawn from
+    /// the prior: the importance weight of the new state relative to the old one.
     pub log_weight: f64,
     /// The same update as a proposal of an MCMC step.
     pub weight: Weight,
-    /// The values that were replaced and those of the choices that vanished, by address:
-    /// an update to these leads back.
+    /// The previous values of what was replaced and of the choices that vanished, by
+    /// address: an update with these leads back.
     pub discarded: Vec<(Address, Given)>,
 }
 
-/// Given values by what they are for.
+/// Given values, sorted by the kind of their addressee.
 #[derive(Default)]
 struct Sorted {
     changes: Vec<(Target, Change)>,
@@ -63,8 +64,8 @@ struct Sorted {
 }
 
 impl Trace {
-    /// The value of a choice, of an element of one, or an observed value, by its address:
-    /// `@pose[arm_l]/bone`.
+    /// Returns the value of a choice, of an element of a choice, or an observed value, by
+    /// its address, such as `@pose[arm_l]/bone`.
     ///
     /// # Errors
     /// If the trace has no such choice or observation; the message names the nearest
@@ -77,8 +78,8 @@ impl Trace {
         self.observed_at(&address, &self.observation_nodes()).ok_or_else(|| self.unknown(&address))
     }
 
-    /// Gives a choice, an element of one, or an observation a value, and keeps it:
-    /// [`Trace::update`] and [`Trace::commit`].
+    /// Gives a value to a choice, an element of a choice, or an observation, and commits:
+    /// [`Trace::update`] followed by [`Trace::commit`].
     ///
     /// # Errors
     /// As [`Trace::update`].
@@ -94,12 +95,12 @@ impl Trace {
         Ok(update)
     }
 
-    /// Changes choices and observed values by address, leaving the rest: what does not
-    /// exist yet takes its value when it appears, and choices that appear without one are
-    /// drawn from their prior. Gaussian processes keep the noise behind them where their
-    /// parameters change. The update is pending until [`Trace::commit`] or
-    /// [`Trace::rollback`]; there is a way back also after that ([`Update::discarded`]),
-    /// bit for bit.
+    /// Changes choices and observed values by address, leaving the rest unchanged. A
+    /// value for something that does not exist yet is used when it appears; choices that
+    /// appear without a given value are drawn from their prior. Gaussian processes keep
+    /// their underlying white noise when their parameters change. The update is pending
+    /// until [`Trace::commit`] or [`Trace::rollback`]; it can also be undone after that
+    /// ([`Update::discarded`]), bit for bit.
     ///
     /// ```
     /// use pcadlang::Model;
@@ -115,7 +116,8 @@ impl Trace {
     /// let mut trace = model.simulate(1, 0)?;
     /// let draws = Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step: 0, substream: 0 };
     ///
-    /// // Another branch, a value for the choice that appears in it, other data: one update, and back.
+    /// // One update changes the branch, gives a value to the choice that appears in it,
+    /// // and replaces the data; another one undoes it.
     /// trace.set("@spare", false, draws)?;
     /// let before = trace.log_joint();
     /// let given = [("@spare".parse()?, true.into()), ("@x/a".parse()?, 1.5.into()), ("@y".parse()?, 2.0.into())];
@@ -136,7 +138,7 @@ impl Trace {
     /// # Errors
     /// If an address is not in the updated trace (the message names the nearest one that
     /// is), if a value does not fit its choice, or if the program fails; the trace is
-    /// then as before.
+    /// then unchanged.
     pub fn update(&mut self, given: &[(Address, Given)], draws: Draws) -> TraceResult<Update> {
         self.rollback();
         let mut sorted = self.sort_given(given)?;
@@ -146,8 +148,8 @@ impl Trace {
         let late = self.appeared_observations(given, &sorted);
         let removed = self.graph.removed.clone();
         if !removed.is_empty() || !late.is_empty() {
-            // Addresses may be spelt with what is gone: they are spelt in the state
-            // before.
+            // Addresses may contain values that have changed, so they are spelt in the
+            // previous state.
             self.rollback();
             for (n, _, stored) in removed {
                 let address = self.graph.address(&self.code, n);
@@ -171,9 +173,10 @@ impl Trace {
         Ok(Update { log_weight: self.importance(), weight, discarded: sorted.discarded })
     }
 
-    /// The log density of the choices, observations and factors that a selector selects,
-    /// in the present state, also that of a pending update: of all of them the log joint,
-    /// bit for bit. Observations have addresses and tags but no kinds.
+    /// Returns the log density of the choices, observations and factors that a selector
+    /// selects, in the current state (including a pending update). For [`Selector::All`]
+    /// it equals the log joint bit for bit. Observations have addresses and tags but no
+    /// kinds.
     pub fn project(&self, selector: &Selector) -> f64 {
         let (g, code) = (&self.graph, &*self.code);
         let mut sum = ExactSum::default();
@@ -188,8 +191,8 @@ impl Trace {
         sum.value()
     }
 
-    /// The change of the log joint in the pending update less what it drew from the
-    /// prior.
+    /// The change of the log joint in the pending update minus the log density of what it
+    /// drew from the prior.
     fn importance(&self) -> f64 {
         let (g, none) = (&self.graph, ExactSum::default());
         let Some(before) = &self.update else { return 0.0 };
@@ -199,8 +202,8 @@ impl Trace {
         )
     }
 
-    /// Tells apart what is given to choices, to observations, and to what is not there
-    /// yet.
+    /// Sorts what is given into values of choices, values of observations, and values of
+    /// what does not exist yet.
     fn sort_given(&self, given: &[(Address, Given)]) -> TraceResult<Sorted> {
         let mut sorted = Sorted::default();
         let nodes = self.nodes_for(given);
@@ -240,7 +243,7 @@ impl Trace {
         Ok(sorted)
     }
 
-    /// What is given to observations that this update made.
+    /// Returns the values given to observations that appeared in this update.
     fn appeared_observations(
         &self,
         given: &[(Address, Given)],
@@ -255,7 +258,7 @@ impl Trace {
         hashed.filter(|(h, _)| nodes.contains_key(h)).collect()
     }
 
-    /// Whether all that was given is now there, in the form of its distribution.
+    /// Fails unless everything given now exists and fits its distribution.
     fn check_given(&self, given: &[(Address, Given)]) -> TraceResult<()> {
         let nodes = self.nodes_for(given);
         for (address, given) in given {
@@ -276,8 +279,8 @@ impl Trace {
         Ok(())
     }
 
-    /// The observations, where not all addresses are those of choices: finding them takes
-    /// a look at all nodes.
+    /// Returns the observations, unless all addresses are those of choices: finding
+    /// observations takes a pass over all nodes.
     fn nodes_for(&self, given: &[(Address, Given)]) -> FxHashMap<u64, NodeId> {
         match given.iter().all(|(a, _)| self.find(a).is_some()) {
             true => FxHashMap::default(),
@@ -285,7 +288,7 @@ impl Trace {
         }
     }
 
-    /// The observed value at an address.
+    /// Returns the observed value at an address.
     fn observed_at(&self, address: &Address, nodes: &FxHashMap<u64, NodeId>) -> Option<Value> {
         let n = *nodes.get(&address.hash64())?;
         let Op::Observe { value, .. } = self.graph.op(&self.code, n) else { return None };
@@ -306,8 +309,8 @@ impl Trace {
         wrong(format!("the trace has no choice or observation `{text}`{near}"))
     }
 
-    /// The value of another form than its choice has now, if there is one, that made the
-    /// program fail.
+    /// Replaces a failure of the program by a misfit error, if a given value does not fit
+    /// the current form of its choice.
     fn misfit_behind(&self, given: &[(Address, Given)], e: Box<RunError>) -> Box<RunError> {
         let misfits = |(address, given): &&(Address, Given)| {
             let dist = self.find(address).and_then(|t| self.dist(t));

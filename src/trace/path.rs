@@ -1,5 +1,5 @@
-//! From nodes to addresses. Frames keep a hash of their prefix; the address itself is
-//! spelt out when someone looks.
+//! From nodes to addresses. Frames store a hash of their prefix; the address itself is
+//! built on request.
 
 use super::graph::Graph;
 use super::node::*;
@@ -10,8 +10,8 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Graph {
-    /// The keys of the loops around a frame, up to its function, outermost first; less
-    /// those the site's target carries.
+    /// The keys of the loops around a frame, up to its function, outermost first, without
+    /// those that the site's target carries.
     fn loop_keys(&self, code: &Code, frame: FrameId, carried: u32) -> SmallVec<[Key; 2]> {
         let mut keys = SmallVec::new();
         let mut level = 0;
@@ -34,17 +34,17 @@ impl Graph {
         keys
     }
 
-    /// The hash of the path through a site.
+    /// Returns the hash of the path through a site.
     pub fn site_hash(&self, code: &Code, frame: FrameId, site: u32) -> u64 {
         self.hash_site(code, frame, &code.sites[site as usize], None, &[])
     }
 
-    /// The same, for an element of a `map` or an entry of `mem`.
+    /// [`Graph::site_hash`] for an element of a `map` or an entry of `mem`.
     pub fn keyed_site_hash(&self, code: &Code, frame: FrameId, site: u32, key: &Key) -> u64 {
         self.hash_site(code, frame, &code.sites[site as usize], Some(key), &[])
     }
 
-    /// The same, for a choice with keys of its own.
+    /// [`Graph::site_hash`] for a choice with its own keys.
     pub fn own_keyed_hash(&self, code: &Code, frame: FrameId, site: u32, own: &[Key]) -> u64 {
         self.hash_site(code, frame, &code.sites[site as usize], None, own)
     }
@@ -74,7 +74,7 @@ impl Graph {
         h
     }
 
-    /// The address through a site; the mirror image of [`Graph::hash_site`].
+    /// Returns the address through a site; mirrors [`Graph::hash_site`].
     fn spell_site(
         &self,
         code: &Code,
@@ -87,7 +87,7 @@ impl Graph {
         segments
     }
 
-    /// The segments that a site adds.
+    /// Appends the segments that a site adds.
     fn append_site(
         &self,
         code: &Code,
@@ -118,8 +118,8 @@ impl Graph {
         }
     }
 
-    /// The address prefix of a frame: the calls that lead to its function. Not by
-    /// recursion: calls may be nested deeply.
+    /// Returns the address prefix of a frame: the calls that lead to its function.
+    /// Iterative, because calls may be nested deeply.
     fn prefix(&self, code: &Code, frame: FrameId) -> Vec<AddressSegment> {
         let mut calls = Vec::new();
         let mut f = frame;
@@ -149,12 +149,12 @@ impl Graph {
         segments
     }
 
-    /// The own keys of a choice.
+    /// Returns a choice's own keys.
     pub fn own_keys(&self, code: &Code, frame: FrameId, keys: &[Operand]) -> SmallVec<[Key; 2]> {
         keys.iter().filter_map(|k| Key::from_value(self.value(code, frame, *k))).collect()
     }
 
-    /// The address of a choice, observation or factor.
+    /// Returns the address of a choice, observation or factor.
     pub fn address(&self, code: &Code, n: NodeId) -> Address {
         let frame = self.nodes[n as usize].frame;
         let segments = match self.op(code, n) {
@@ -170,8 +170,8 @@ impl Graph {
         Address { segments }
     }
 
-    /// The address a node is executed for: its own, or that of the choice or call around
-    /// it.
+    /// Returns the address for which a node is executed: its own, or that of the choice
+    /// or call around it.
     pub fn address_near(&self, code: &Code, n: NodeId) -> Address {
         let mut address = self.address(code, n);
         if address.segments.is_empty()
@@ -182,7 +182,7 @@ impl Graph {
         address
     }
 
-    /// The top-level name a node has.
+    /// Returns the top-level name of a node.
     pub fn name_of(&self, code: &Code, n: NodeId) -> Option<Arc<str>> {
         if self.nodes[n as usize].frame != 0 {
             return None;

@@ -1,9 +1,9 @@
-//! The second half of an update: running what is asked for.
+//! The second half of an update: propagation, which re-evaluates what is needed.
 //!
-//! Evaluation is by need and keeps its own stack, so that recursion in a program never
-//! becomes recursion here. A stale node first brings what it reads up to date, in an
-//! order in which structure comes before what depends on it, and runs again only if
-//! something it reads has changed.
+//! Evaluation is on demand and uses an explicit stack, so that recursion in a program
+//! does not become recursion here. A stale node first brings what it reads up to date,
+//! structure before what depends on it, and runs again only if something it reads has
+//! changed.
 
 use super::graph::Graph;
 use super::journal::Entry;
@@ -16,25 +16,25 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// What became of one attempt to evaluate a node.
+/// The outcome of one attempt to evaluate a node.
 pub(crate) enum Poll {
     /// It has its value.
     Ready,
-    /// It waits for the nodes it put on the stack.
+    /// It waits for the nodes that it put on the stack.
     Pending,
 }
 
-/// A failure with its place.
+/// A failure with its location.
 pub(crate) type Failure = Box<RunError>;
 
 impl Graph {
-    /// Finishes an update: runs new and stale effects, re-scores absorbing choices, drops
-    /// what nothing holds.
+    /// Finishes an update: runs new and stale effects, re-scores absorbing choices, and
+    /// empties nodes that nothing holds.
     pub fn propagate(&mut self, code: &Code) -> Result<(), Failure> {
         loop {
             self.run_effects(code)?;
-            // What one node lets go of a choice may take up, so choices come first, but
-            // for those that go as well.
+            // A stale choice may acquire what another node released, so stale choices run
+            // before the sweep, except those that are to be swept themselves.
             if self.unheld.is_empty() && self.idle.is_empty() {
                 let Some(n) = self.stale_choices.pop() else { break };
                 if self.nodes[n as usize].state == State::Stale {
@@ -61,7 +61,8 @@ impl Graph {
         self.update_selections(code)
     }
 
-    /// What would be emptied if nothing took up again what was let go, in order.
+    /// Returns the nodes that a sweep would empty now, if nothing released is acquired
+    /// again; sorted.
     fn unreachable(&self, code: &Code) -> Vec<NodeId> {
         let mut open = self.unheld.clone();
         open.retain(|n| self.nodes[*n as usize].refs == 0);
@@ -119,8 +120,8 @@ impl Graph {
         Ok(())
     }
 
-    /// Runs an effect or choice, unless an owner on the way to it lets its frame go:
-    /// outer ones decide whether inner ones still exist.
+    /// Runs an effect or choice, unless an owner of an enclosing frame detaches that
+    /// frame: outer owners decide whether inner ones still exist.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
         let mut owners: SmallVec<[NodeId; 8]> = SmallVec::new();
         let mut f = self.nodes[n as usize].frame;
@@ -148,7 +149,7 @@ impl Graph {
         self.run_stack(code, bottom)
     }
 
-    /// Works off the stack of nodes that are needed, down to a height.
+    /// Evaluates the nodes on the stack until it is down to height `bottom`.
     pub fn run_stack(&mut self, code: &Code, bottom: usize) -> Result<(), Failure> {
         while self.stack.len() > bottom {
             let n = self.stack[self.stack.len() - 1];
@@ -180,7 +181,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Puts a node that is needed on the stack.
+    /// Pushes a node that is needed onto the stack.
     pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         if self.nodes[n as usize].state == State::Running {
             let message = match self.name_of(code, n) {
@@ -204,14 +205,14 @@ impl Graph {
         self.finish_unchanged(code, n)
     }
 
-    /// Ends the evaluation of a node with a value that it made, which counts towards the
+    /// Ends the evaluation of a node with a newly built value, which counts towards the
     /// limits.
     pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Poll, Failure> {
         self.count_elements(code, n, &value)?;
         Ok(self.finish(code, n, value))
     }
 
-    /// Ends the evaluation of a node whose value stays.
+    /// Ends the evaluation of a node whose value does not change.
     pub fn finish_unchanged(&mut self, code: &Code, n: NodeId) -> Poll {
         let node = &mut self.nodes[n as usize];
         node.state = State::Clean;
@@ -227,7 +228,7 @@ impl Graph {
         Poll::Ready
     }
 
-    /// Replaces what a node holds besides its operands.
+    /// Replaces the nodes that a node holds besides its operands.
     pub fn set_deps(&mut self, n: NodeId, deps: Deps) {
         if deps.is_empty() && self.nodes[n as usize].side.is_none() {
             return;
@@ -259,7 +260,8 @@ impl Graph {
         }
     }
 
-    /// Keeps the evaluation of an incremental function, and what else the node now holds.
+    /// Stores the evaluation of an incremental function, and the nodes held besides the
+    /// operands.
     pub fn keep(&mut self, n: NodeId, deps: Deps, before: Before) {
         let old = match self.nodes[n as usize].side.as_deref() {
             Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
@@ -272,7 +274,7 @@ impl Graph {
         self.set_side(n, Some(Side::Kept(Kept { deps, before: Arc::new(before) })));
     }
 
-    /// What an incremental function may start from.
+    /// Returns the previous evaluation that an incremental function may start from.
     pub fn kept(&self, n: NodeId) -> Option<&Arc<Before>> {
         match self.nodes[n as usize].side.as_deref() {
             Some(Side::Kept(k)) if self.incremental => Some(&k.before),
@@ -280,7 +282,7 @@ impl Graph {
         }
     }
 
-    /// One attempt to evaluate a node.
+    /// Makes one attempt to evaluate a node.
     fn step(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         if self.nodes[n as usize].flags & WAS_STALE != 0 && self.incremental {
             let mut changed = false;
@@ -300,7 +302,8 @@ impl Graph {
                 if wait != NONE {
                     return self.need(code, wait);
                 }
-                // Elements of passes read their owner, and targets their pending change.
+                // Elements of passes also read their owner, and targets their pending
+                // change.
                 let op = self.op(code, n);
                 let reads_more = matches!(op, Op::Item | Op::Accumulator | Op::Param { .. });
                 if !reads_more && self.nodes[n as usize].flags & TARGET == 0 {
@@ -311,7 +314,7 @@ impl Graph {
         self.run(code, n)
     }
 
-    /// One attempt at the operation of a node.
+    /// Makes one attempt to run the operation of a node.
     pub fn run(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let step = self.run_op(code, n)?;
         if let (Poll::Ready, Some(log)) = (&step, &mut self.execution_log) {

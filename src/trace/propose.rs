@@ -1,5 +1,5 @@
-//! The vocabulary of updates: changes, their random streams, and what an update did to
-//! the score.
+//! The vocabulary of updates: changes, their random streams, and the effect of an update
+//! on the score.
 
 use super::choices::Target;
 use super::graph::Graph;
@@ -10,40 +10,40 @@ use crate::num::ExactSum;
 use crate::rng::{Stream, StreamKey};
 use serde::{Deserialize, Serialize};
 
-/// Where the random numbers of an update come from: one stream for each address, whatever
-/// the order of evaluation.
+/// The source of an update's random numbers: one stream per address, independent of the
+/// order of evaluation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Draws {
     /// Seed, chain and purpose.
     pub key: StreamKey,
     /// The step of the chain.
     pub step: u64,
-    /// Which of several alternatives at one step.
+    /// The index of one of several alternatives at one step.
     pub substream: u64,
 }
 
 impl Draws {
-    /// The stream of an address.
+    /// Returns the stream of an address.
     pub(crate) fn stream(&self, address_hash: u64) -> Stream {
         self.key.stream(self.step, address_hash, self.substream)
     }
 }
 
-/// What happens to one choice in an update.
+/// A change of one choice in an update.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
-    /// It takes this value, in stored form (for a whitened gp: the white noise behind
-    /// it).
+    /// It takes this value, in stored form (for a whitened gp: its underlying white
+    /// noise).
     Set(Datum),
     /// It takes this value, as the program sees it.
     Value(Datum),
-    /// It is drawn anew from its prior, as that is after the update.
+    /// It is resampled from its prior after the update.
     Resample,
-    /// It becomes the image of this point of the unconstrained space under its support,
-    /// as that is after the update; the log Jacobian goes to [`Weight::log_jacobian`].
+    /// It becomes the image of this point of the unconstrained space under the transform
+    /// of its support after the update; the log Jacobian is in [`Weight::log_jacobian`].
     Free(Vec<f64>),
-    /// It becomes the image of this white noise under its Gaussian prior, as that is
-    /// after the update.
+    /// It becomes the image of this white noise under its Gaussian prior after the
+    /// update.
     White(Vec<f64>),
 }
 
@@ -64,13 +64,13 @@ pub enum Constraint {
     Value(Datum),
 }
 
-/// What an update did to the score. Differences are taken between exact sums, so that
+/// The effect of an update on the score. Differences are taken between exact sums, so
 /// they do not depend on the order in which terms changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weight {
-    /// The change of the log joint density, less what was drawn from the prior, plus what
-    /// an update back would draw from it: the log acceptance ratio but for the proposal
-    /// terms of [`Change::Set`].
+    /// The change of the log joint density, minus the log density of what was drawn from
+    /// the prior, plus that of what an update back would draw: the log acceptance ratio
+    /// without the proposal terms of [`Change::Set`].
     pub log_weight: f64,
     /// The change of the log joint density.
     pub log_joint: f64,
@@ -85,8 +85,8 @@ pub struct Weight {
 }
 
 impl Weight {
-    /// The log weight with the likelihood raised to a power. What is impossible is so at
-    /// every power.
+    /// Returns the log weight with the likelihood raised to a power. An impossible state
+    /// is impossible at every power.
     pub fn tempered(&self, power: f64) -> f64 {
         if power == 1.0 || self.log_weight.is_infinite() {
             self.log_weight
@@ -95,7 +95,8 @@ impl Weight {
         }
     }
 
-    /// The same of an update that changes these sums by these terms, and no structure.
+    /// Returns the tempered log weight of an update that changes the two sums by these
+    /// terms and leaves the structure unchanged.
     pub(crate) fn beside(prior: &ExactSum, likelihood: &ExactSum, power: f64) -> f64 {
         let log_weight = ExactSum::of_both(prior, likelihood);
         let flat = power == 1.0 || log_weight.is_infinite();
@@ -104,13 +105,13 @@ impl Weight {
 }
 
 impl Graph {
-    /// The pending changes of a choice.
+    /// Returns the pending changes of a choice.
     pub fn pending_of(&self, n: NodeId) -> impl Iterator<Item = &Pending> {
         let first = self.pending.partition_point(|p| p.node < n);
         self.pending[first..].iter().take_while(move |p| p.node == n)
     }
 
-    /// Queues changes and marks what they reach.
+    /// Queues changes and invalidates what depends on them.
     pub fn queue(&mut self, code: &crate::lang::code::Code, changes: &[(Target, Change)]) {
         self.pending.extend(changes.iter().map(|(t, c)| Pending {
             node: t.node,
@@ -130,7 +131,7 @@ impl Graph {
         }
     }
 
-    /// The log prior of what this update would have to draw to be undone: of choices that
+    /// Returns the log prior of what an update back would have to draw; for choices that
     /// vanished, as it was before the update.
     fn undrawn(&self) -> ExactSum {
         let mut sum = self.undrawn.clone();
@@ -140,7 +141,7 @@ impl Graph {
             for entry in &self.journal {
                 let Entry::Node { id, score, state, .. } = entry else { continue };
                 let first = retired.partition_point(|(n, _)| n < id);
-                // What appeared, or was drawn anew, is undone with what that added to
+                // A choice that appeared or was resampled is undone with what it added to
                 // `drawn`.
                 if let Some((_, s)) = retired.get_mut(first).filter(|(n, _)| n == id)
                     && *state != State::Empty
@@ -154,7 +155,7 @@ impl Graph {
         sum
     }
 
-    /// What the current update did to the score.
+    /// Returns the effect of the current update on the score.
     pub fn weight(&self, prior: &ExactSum, likelihood: &ExactSum) -> Weight {
         let none = ExactSum::default();
         let log_joint =
@@ -173,14 +174,14 @@ impl Graph {
         }
     }
 
-    /// The log joint density.
+    /// Returns the log joint density.
     pub fn log_joint(&self) -> f64 {
         let mut sum = self.prior.clone();
         sum.merge(&self.likelihood);
         sum.value()
     }
 
-    /// A property of the whole trace.
+    /// Returns a property of the whole trace.
     pub fn probe(&self, p: crate::lang::code::Probe) -> f64 {
         use crate::lang::code::Probe;
         let (prior, likelihood) = match &self.before {

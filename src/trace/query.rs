@@ -1,5 +1,5 @@
-//! Asking a trace for what no observation asks for: values of expressions and names,
-//! surrogates of observations. What that draws is forgotten again.
+//! Queries: values of expressions and names that no observation depends on, and
+//! surrogates of observations. Choices drawn for a query are discarded afterwards.
 
 use super::graph::Graph;
 use super::node::Deps;
@@ -8,18 +8,19 @@ use crate::lang::code::{Code, Operand};
 use crate::lang::value::Value;
 
 impl Trace {
-    /// The values of expressions of the top level; what they need and no observation asks
-    /// for is drawn from its prior given the rest, and forgotten again.
+    /// Returns the values of top-level expressions. Choices that they need and no
+    /// observation depends on are drawn from their prior given the rest, and discarded
+    /// afterwards.
     ///
     /// # Errors
-    /// What goes wrong while they are evaluated.
+    /// If their evaluation fails.
     #[doc(hidden)]
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
         self.asked(operands, draws, |_, values| Ok(values))
     }
 
-    /// As [`Trace::query`], and shows the trace with the choices that were drawn for it,
-    /// before they are forgotten.
+    /// Like [`Trace::query`], and passes to `look` the trace with the choices that were
+    /// drawn for it, before they are discarded.
     ///
     /// # Errors
     /// As [`Trace::query`].
@@ -36,7 +37,7 @@ impl Trace {
         })
     }
 
-    /// Evaluates expressions, uses them, and forgets them.
+    /// Evaluates expressions, passes them to `used`, and undoes the evaluation.
     fn asked<T>(
         &mut self,
         operands: &[Operand],
@@ -54,21 +55,22 @@ impl Trace {
         result
     }
 
-    /// The value of a top-level name.
+    /// Returns the value of a top-level name.
     ///
     /// # Errors
-    /// As [`Trace::query`]; `None` if there is no such name.
+    /// As [`Trace::query`]; `None` if the name does not exist.
     pub fn global(&mut self, name: &str, draws: Draws) -> Option<TraceResult<Value>> {
         let operand = *self.code.globals.get(name)?;
         Some(self.query(&[operand], draws).map(|mut v| v.swap_remove(0)))
     }
 
-    /// The log density of the coarse surrogate of an observation (`with coarse = …`), by
-    /// the address it has. It is never part of the joint.
+    /// Returns the log density of the coarse surrogate of an observation
+    /// (`with coarse = …`), given the observation's address. It is never part of the
+    /// joint.
     ///
     /// # Errors
-    /// What goes wrong while it is evaluated; `None` if there is no such observation or
-    /// it has no surrogate.
+    /// If its evaluation fails; `None` if the observation does not exist or has no
+    /// surrogate.
     #[doc(hidden)]
     pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
         let Some((n, _)) =

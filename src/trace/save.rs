@@ -1,4 +1,4 @@
-//! Saved traces: versioned JSON, equal to the last bit when loaded.
+//! Saved traces: versioned JSON that is exact to the last bit when loaded.
 
 use super::{Constraint, Draws, Limits, Trace, TraceResult};
 use crate::dist::Datum;
@@ -16,7 +16,7 @@ pub struct SavedTrace {
     pub version: u32,
     /// A hash of the program.
     pub program: String,
-    /// The log joint density, for people.
+    /// The log joint density, for human readers.
     pub log_joint: Number,
     /// The choices in stored form, by address.
     pub choices: Vec<SavedChoice>,
@@ -25,7 +25,7 @@ pub struct SavedTrace {
 /// One choice of a [`SavedTrace`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedChoice {
-    /// Its address, for people.
+    /// Its address, for human readers.
     pub address: String,
     /// The hash of its address, in hexadecimal.
     pub hash: String,
@@ -33,7 +33,7 @@ pub struct SavedChoice {
     pub value: SavedDatum,
 }
 
-/// A number that may be infinite, which JSON's are not.
+/// A number that may be infinite or NaN, which JSON does not support.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Number {
@@ -82,7 +82,7 @@ mod text {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum SavedDatum {
-    /// A truth value.
+    /// A boolean.
     Bool(bool),
     /// A number.
     Num(Number),
@@ -144,7 +144,7 @@ pub enum SaveError {
 }
 
 impl Trace {
-    /// The trace as it is written to a file; `program` identifies the program.
+    /// Returns the trace in the form written to a file; `program` identifies the program.
     pub fn save(&self, program: &str) -> SavedTrace {
         let mut choices: Vec<_> = self
             .all_targets()
@@ -169,8 +169,8 @@ impl Trace {
     /// Runs a program with the choices of a saved trace.
     ///
     /// # Errors
-    /// If the trace is of another version or program, or has choices this program does
-    /// not make.
+    /// If the trace has another version or belongs to another program, or has choices
+    /// that this program does not make.
     pub fn load(
         code: Arc<Code>,
         program: &str,

@@ -1,11 +1,12 @@
-//! Updates of one choice whose change spreads through its own frame in a known order (see
-//! [`crate::lang::code::StaticScaffold`]).
+//! Updates of one choice along its static scaffold: the slots of its own frame that
+//! depend on it, in a known order (see [`crate::lang::code::StaticScaffold`]).
 //!
-//! The general way marks all that may change and asks for it; here the list is known, so
-//! each entry runs at once if something it reads has changed. What is outside of the
-//! frame is marked afterwards and runs the general way, and so is what nothing may ask
-//! for any more: run too soon it could fail, or draw choices, though the new state has no
-//! use for it. Both ways give the same values and the same exact sums.
+//! A general update invalidates everything that may change and then evaluates what is
+//! needed. Here the list is known, so each entry runs at once if something it reads has
+//! changed. Users in other frames are invalidated afterwards and updated in the general
+//! way, and so are entries that may no longer be needed: evaluated too early, they could
+//! fail or draw choices that the new state does not contain. Both ways give the same
+//! values and the same exact sums.
 
 use super::choices::Target;
 use super::graph::Graph;
@@ -16,8 +17,8 @@ use crate::lang::code::{Code, StaticScaffold};
 use crate::lang::value::Value;
 
 impl Graph {
-    /// How the change of a choice spreads, if it can be updated this way in this state,
-    /// and which of its slots run only if they are asked for, a bit each.
+    /// Returns the static scaffold of a choice, if it can be used in this state, and a
+    /// bit mask of the entries that are evaluated on demand only.
     pub fn scaffold_of<'c>(
         &self,
         code: &'c Code,
@@ -33,14 +34,14 @@ impl Graph {
             let m = target.node - facts.slot + slot;
             leaves |= self.is_read_outside(m);
             let node = &self.nodes[m as usize];
-            // A choice whose value may follow its parameters.
+            // The value of a choice that is not plain may change with its parameters.
             let plain = matches!(node.value, Value::Num(_) | Value::Bool(_)) && node.side.is_none();
             if node.state == State::Clean && self.slot_facts(code, m).is_draw && !plain {
                 return None;
             }
         }
-        // What is outside may come back to what reads from there: then only the general
-        // way has the right order.
+        // A change that leaves the frame may come back to an entry through other frames;
+        // only the general way has the right order then.
         let conditional = if leaves || scaffold.turns { scaffold.conditional } else { 0 };
         (scaffold.is_closed || !leaves).then_some((scaffold, conditional))
     }

@@ -1,4 +1,4 @@
-//! Selections: which choices a kernel is about.
+//! Selections: the choices that a kernel applies to.
 
 use crate::lang::address::{Address, AddressSegment};
 use crate::lang::key::Key;
@@ -21,7 +21,7 @@ pub enum Selector {
         /// The tag's value.
         value: Option<Key>,
     },
-    /// Choices of a kind: the tags every choice has by its distribution.
+    /// Choices of a kind: the predefined tags that every choice has by its distribution.
     Kind(ChoiceKind),
     /// Choices in either.
     Union(Box<Selector>, Box<Selector>),
@@ -36,7 +36,7 @@ pub enum Selector {
 pub enum ChoiceKind {
     /// `$continuous`
     Continuous,
-    /// `$discrete`: in part at least.
+    /// `$discrete`: at least in part.
     Discrete,
     /// `$gaussian`: normal, mv_normal, gp.
     Gaussian,
@@ -67,11 +67,10 @@ pub enum PatternSegment {
     },
 }
 
-/// What is known of a choice when it is registered, or of an observation when it is asked
-/// for.
+/// Facts about a choice when it is registered, or about an observation for `project`.
 #[derive(Clone, Debug)]
 pub(crate) struct Facts {
-    /// Kinds are of choices; an observation has none.
+    /// Whether it is a choice; kinds apply to choices only.
     pub choice: bool,
     pub address: Address,
     pub tags: Vec<(Arc<str>, Option<Key>)>,
@@ -81,7 +80,7 @@ pub(crate) struct Facts {
 }
 
 impl Pattern {
-    /// The pattern of exactly this address and what is below it.
+    /// Returns the pattern of this address and everything below it.
     pub fn exact(address: &Address) -> Self {
         let segment = |s: &AddressSegment| PatternSegment::Segment {
             name: Some(Arc::clone(&s.name)),
@@ -91,8 +90,8 @@ impl Pattern {
         Pattern { segments: address.segments.iter().map(segment).collect() }
     }
 
-    /// Whether it can match an address that ends in segments of these names: its last
-    /// names are among them, in order.
+    /// Whether it can match an address whose last segments have these names: its last
+    /// names occur among them, in order.
     fn may_match(&self, last: &[&str]) -> bool {
         let fits = |rest: &[PatternSegment]| {
             let mut names = last.iter();
@@ -106,7 +105,7 @@ impl Pattern {
         (0..self.segments.len()).any(|i| fits(&self.segments[i..]))
     }
 
-    /// Whether an address is selected: matched, or below something matched.
+    /// Whether an address is selected: it matches, or is below one that matches.
     pub fn matches(&self, address: &Address) -> bool {
         matches(&self.segments, &address.segments)
     }
@@ -132,7 +131,7 @@ fn matches(pattern: &[PatternSegment], address: &[AddressSegment]) -> bool {
 }
 
 impl Selector {
-    /// Whether it selects by address alone what has this address; kinds and tags select
+    /// Whether it selects this address by address patterns alone; kinds and tags select
     /// nothing.
     pub(crate) fn names(&self, address: &Address) -> bool {
         match self {
@@ -145,7 +144,7 @@ impl Selector {
         }
     }
 
-    /// Whether it may select by address something whose address ends in segments of these
+    /// Whether its address patterns may select an address whose last segments have these
     /// names, with any keys.
     pub(crate) fn may_name(&self, last: &[&str]) -> bool {
         match self {
@@ -158,7 +157,7 @@ impl Selector {
         }
     }
 
-    /// Whether deciding needs the address.
+    /// Whether the address is needed to decide.
     pub(crate) fn needs_address(&self) -> bool {
         match self {
             Selector::Address(_) => true,

@@ -1,6 +1,6 @@
-//! Moves of a choice by formulas: they tell the values and scores that follow, and which
-//! selections take their other alternative. The state is the one that an update would
-//! lead to.
+//! Changes of a choice in place by local densities, which give the dependent values and
+//! scores, and the selections that switch to their other alternative. The resulting state
+//! is the one that an update would give.
 
 use super::Trace;
 use super::choices::Target;
@@ -12,22 +12,22 @@ use crate::lang::code::{Code, Op, Operand};
 use crate::lang::value::Value;
 use smallvec::SmallVec;
 
-/// What is to be done to the nodes that depend on a choice.
+/// Changes to the nodes that depend on a choice.
 #[derive(Default)]
 struct Following {
     values: SmallVec<[(NodeId, Value); 8]>,
-    /// The values of computations that selections come to ask for.
+    /// Values of computations that become needed because selections switch.
     fresh: SmallVec<[(NodeId, Value); 8]>,
-    /// Computations that no score asks for any more.
+    /// Computations that no score needs any more.
     unasked: SmallVec<[NodeId; 4]>,
-    /// Selections that take their other alternative.
+    /// Selections that switch to their other alternative.
     turned: SmallVec<[NodeId; 4]>,
 }
 
 impl Trace {
-    /// Gives a choice with this distribution another value for good, where that changes
-    /// no structure and can be done in short; false, and nothing is done, otherwise: then
-    /// an update does it.
+    /// Gives a choice with this distribution another value permanently, if that changes
+    /// no structure and local densities cover it. Otherwise returns false and does
+    /// nothing: an update is needed.
     pub(crate) fn set_in_place(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
         self.update.is_none()
             && target.element == NONE
@@ -89,7 +89,7 @@ impl Graph {
         true
     }
 
-    /// Gives nodes their new values; false, and nothing is done, if an update has to
+    /// Gives nodes their new values. Returns false and does nothing if an update has to
     /// decide.
     fn follow(&mut self, code: &Code, following: Following) -> bool {
         if following.turned.is_empty() {
@@ -113,15 +113,15 @@ impl Graph {
         true
     }
 
-    /// Lets selections hold their other alternatives in place of those they held; `None`
-    /// if those cannot be computed.
+    /// Switches selections to their other alternatives, and releases the previous ones;
+    /// `None` if the new ones cannot be computed.
     fn turn(
         &mut self,
         code: &Code,
         selections: &[NodeId],
         fresh: &[(NodeId, Value)],
     ) -> Option<()> {
-        // What one takes up before what another lets go: it may be the same.
+        // Acquire before releasing: one may acquire what another releases.
         for n in selections {
             let (taken, _) = self.ways(code, *n)?;
             if let Some(d) = self.resolve(self.nodes[*n as usize].frame, taken) {
@@ -139,7 +139,7 @@ impl Graph {
         Some(())
     }
 
-    /// Takes hold of a node, and of what it reads if nothing has asked for it so far.
+    /// Acquires a node, and everything it reads if it was not evaluated before.
     fn take_up(
         &mut self,
         code: &Code,
@@ -172,7 +172,7 @@ impl Graph {
         Some(())
     }
 
-    /// The alternative that a selection does not hold, and the one that it does.
+    /// Returns the alternative that a selection does not hold, and the one that it holds.
     fn ways(&self, code: &Code, n: NodeId) -> Option<(Operand, Operand)> {
         let Op::Select { then, otherwise, .. } = self.op(code, n) else { return None };
         let is_first = self.nodes[n as usize].flags & OTHERWISE == 0;

@@ -1,6 +1,5 @@
-//! Two traces with the same choices under different scores: one is the trace of a
-//! program, the other that of the same program with surrogates in place of some
-//! observations. What delayed acceptance is made of.
+//! Surrogate traces, for delayed acceptance: a trace with the same choices as that of the
+//! program, in which surrogates replace some observations.
 
 use super::propose::{Change, Constraint, Draws, Weight};
 use super::{Selector, Target, Trace, TraceResult};
@@ -10,12 +9,13 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 impl Trace {
-    /// The same choices with the coarse surrogates of the selected observations in their
-    /// place, also of those that are not there now; `None` if none of them has one. An
-    /// operation in a loop or function changes as a whole.
+    /// Returns a trace with the same choices in which the selected observations are
+    /// replaced by their coarse surrogates, including observations that do not exist in
+    /// this state; `None` if none of them has a surrogate. An observation in a loop or
+    /// function is replaced in all its instances.
     ///
     /// # Errors
-    /// What goes wrong while the surrogates are evaluated.
+    /// If the evaluation of the surrogates fails.
     pub(crate) fn under_surrogates(&self, at: &Selector) -> TraceResult<Option<Trace>> {
         let mut present: FxHashMap<u32, bool> = FxHashMap::default();
         for n in self.scored_nodes() {
@@ -44,8 +44,8 @@ impl Trace {
         Ok(Some(surrogate))
     }
 
-    /// Proposes the values that another trace's choices have. Choices that the other one
-    /// has not stay as they are.
+    /// Proposes the values of another trace's choices. Choices that the other trace does
+    /// not have keep their values.
     ///
     /// # Errors
     /// As [`Trace::propose`].
@@ -63,7 +63,7 @@ impl Trace {
         self.propose_constrained(&changes, &constraints, Draws::default())
     }
 
-    /// Hashes of the addresses of the choices that another trace has not.
+    /// Returns the address hashes of the choices that another trace does not have.
     pub(crate) fn beyond(&self, other: &Trace) -> Vec<u64> {
         let mut own = Vec::new();
         pairs(self, other, |here, there| {
@@ -74,13 +74,13 @@ impl Trace {
         own
     }
 
-    /// Whether the pending proposal takes away a choice at one of these addresses, also
-    /// if another one comes in its place.
+    /// Whether the pending proposal removes a choice at one of these addresses, even if
+    /// another one replaces it.
     pub(crate) fn takes_away(&self, addresses: &[u64]) -> bool {
         self.graph.removed.iter().any(|(_, hash, _)| addresses.contains(hash))
     }
 
-    /// The first choice of another trace that this one has not.
+    /// Returns the first choice of another trace that this one does not have.
     pub(crate) fn lacks(&self, other: &Trace) -> Option<Target> {
         let mut found = None;
         pairs(self, other, |here, there| {
@@ -92,7 +92,7 @@ impl Trace {
     }
 }
 
-/// Goes through the choices of two traces side by side, by the hashes of their addresses.
+/// Iterates over the choices of two traces in parallel, by the hashes of their addresses.
 fn pairs(a: &Trace, b: &Trace, mut f: impl FnMut(Option<Target>, Option<Target>)) {
     let (mut left, mut right) =
         (a.all_targets().iter().copied().peekable(), b.all_targets().iter().copied().peekable());

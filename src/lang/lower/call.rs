@@ -1,4 +1,4 @@
-//! Calls: of built-ins, forms, named functions and function values, with their arguments
+//! Calls of built-ins, forms, named functions and function values, with their arguments
 //! matched and checked.
 
 use super::scope::Meaning;
@@ -11,7 +11,7 @@ use crate::syntax::ast::{Arg, Expr, ExprKind};
 use crate::syntax::span::Span;
 use std::sync::Arc;
 
-/// What a called expression turns out to be.
+/// What a called expression refers to.
 enum Target {
     Builtin(u32),
     Function(u32),
@@ -81,7 +81,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// A call of a built-in family of distributions, for `x ~ family(…)` and
+    /// Lowers a call of a built-in family of distributions, for `x ~ family(…)` and
     /// `observe family(…) = v`.
     pub fn family_call(&mut self, e: &Expr) -> Option<(u32, Box<[Operand]>)> {
         let ExprKind::Call { callee, args } = &e.kind else { return None };
@@ -148,7 +148,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// What a called expression is called in addresses.
+    /// Returns the name of a called expression in addresses.
     fn callee_name(&self, callee: &Expr) -> Arc<str> {
         match &callee.kind {
             ExprKind::Var(n) => Arc::clone(n),
@@ -165,7 +165,7 @@ impl Lowerer<'_> {
         args.iter().map(|a| one(self, a)).collect()
     }
 
-    /// The arguments of a built-in in the table's order.
+    /// Lowers the arguments of a built-in, in the table's order.
     pub fn builtin_args(&mut self, i: u32, args: &[Arg], span: Span) -> Option<Box<[Operand]>> {
         let table = Arc::clone(&self.code.builtins);
         let b = table.get(i);

@@ -1,4 +1,4 @@
-//! Random choices: `x ~ d`, and `t[k] ~ d` with the container `t` around its elements.
+//! Random choices: `x ~ d`, and `t[k] ~ d` with the container `t` of its elements.
 
 use super::scope::{Meaning, ScopeKind};
 use super::{AddHint, Lowerer, Typed};
@@ -11,7 +11,7 @@ use crate::syntax::span::Span;
 use std::sync::Arc;
 
 impl Lowerer<'_> {
-    /// `x ~ d`: gives the choice.
+    /// Lowers `x ~ d` and returns the choice.
     pub fn named_draw(&mut self, name: &Name, dist: &Expr, tags: &[Tag]) -> Typed {
         let spec = self.below(&name.node, |l| l.dist_spec(dist, false));
         let tags = self.tags(tags);
@@ -21,10 +21,10 @@ impl Lowerer<'_> {
         Typed { at: Operand::Local(slot), ty }
     }
 
-    /// What a family draws, where it can be told.
+    /// Returns the static type of a draw of a family, as far as it is known.
     fn drawn_type(&self, d: &DistSpec) -> Type {
         match d {
-            // What a host's family draws only the host knows.
+            // Only the host knows the type of its family's draws.
             DistSpec::Family { builtin, .. } if self.code.builtins.get(*builtin).host.is_some() => {
                 Type::Any
             }
@@ -34,7 +34,7 @@ impl Lowerer<'_> {
                 | "ordered" => Type::Array,
                 "iid" | "mixture" => Type::Any,
                 _ if args.iter().all(|a| self.is_number(*a)) => Type::Num,
-                // A parameter that is an array makes the choice one.
+                // A parameter that is an array makes the choice an array.
                 _ => Type::Nums,
             },
             DistSpec::Value(_) => Type::Any,
@@ -45,7 +45,7 @@ impl Lowerer<'_> {
         matches!(o, Operand::Const(i) if matches!(self.code.const_value(i), Value::Num(_)))
     }
 
-    /// `t[k] ~ d`.
+    /// Lowers `t[k] ~ d`.
     pub fn keyed_draw(&mut self, target: &Expr, dist: &Expr, tags: &[Tag]) {
         let Some((name, keys)) = keyed_target(target) else {
             self.error(
@@ -138,9 +138,9 @@ impl Lowerer<'_> {
         scope.drawn.push((name.node, written, slot));
     }
 
-    /// Which occurrence of its name a container is.
-    /// `z[0] ~ d; for t in 1 .. n { z[t] ~ e; }` draws `@z[0]`, `@z[1]`, …: that two of
-    /// its elements have one address is found when they are drawn.
+    /// Returns the occurrence of a container's name.
+    /// `z[0] ~ d; for t in 1 .. n { z[t] ~ e; }` draws `@z[0]`, `@z[1]`, …; two elements
+    /// with the same address are detected when they are drawn.
     fn occurrence_of(&mut self, container: (u32, Slot), name: &Arc<str>) -> u32 {
         if let Some(n) = self.bodies.last().and_then(|b| b.containers.get(&container)) {
             return *n;
@@ -152,7 +152,7 @@ impl Lowerer<'_> {
         n
     }
 
-    /// Declares the containers that statements of this block, and loops in them, draw
+    /// Declares the containers that statements of this block, including loops in it, draw
     /// into.
     pub fn declare_containers(&mut self, stmts: &[Stmt]) {
         if self.in_loop() {
@@ -165,7 +165,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Whether the innermost block is a loop's: its containers belong to a block further
+    /// Whether the innermost block is a loop, whose containers belong to a block further
     /// out.
     fn in_loop(&self) -> bool {
         self.scopes.last().is_some_and(|s| matches!(s.kind, ScopeKind::Loop { .. }))
@@ -202,8 +202,8 @@ impl Lowerer<'_> {
         e.hint_also("give the container another name");
     }
 
-    /// The slot that an element was drawn into, if `base[keys]` is written exactly as
-    /// where it was drawn, in this pass.
+    /// Returns the slot that an element was drawn into, if `base[keys]` is written
+    /// exactly as where it was drawn, in the same pass.
     pub fn drawn_here(&self, name: &str, written: &str) -> Option<Operand> {
         for (up, scope) in self.scopes.iter().rev().enumerate() {
             if let Some((_, _, slot)) =
@@ -223,7 +223,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// The name and keys of `t[a][b]`.
+/// Returns the name and keys of `t[a][b]`.
 fn keyed_target(e: &Expr) -> Option<(Name, Vec<&Expr>)> {
     match &e.kind {
         ExprKind::Var(name) => Some((Name::new(Arc::clone(name), e.span), Vec::new())),

@@ -13,7 +13,7 @@ use crate::syntax::span::Span;
 use std::sync::Arc;
 
 impl Lowerer<'_> {
-    /// Lowers an expression into the present block.
+    /// Lowers an expression into the current block.
     pub fn expr(&mut self, e: &Expr) -> Typed {
         match &e.kind {
             ExprKind::Num(x) => self.constant(Value::Num(*x)),
@@ -61,7 +61,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Lowers an expression that gets a name: a function is called by it in addresses.
+    /// Lowers an expression that is bound to a name, which is a function's name in
+    /// addresses.
     pub fn expr_named(&mut self, e: &Expr, name: &Arc<str>) -> Typed {
         match &e.kind {
             ExprKind::Lambda(l) => self.lambda(l, name, e.span),
@@ -75,7 +76,7 @@ impl Lowerer<'_> {
         Typed { at: Operand::Local(slot), ty }
     }
 
-    /// The array of constants, if all are.
+    /// Returns an array of the items, if all are constants.
     fn constant_items(&self, items: &[Operand]) -> Option<Value> {
         let values: Option<Vec<Value>> = items
             .iter()
@@ -147,7 +148,7 @@ impl Lowerer<'_> {
         self.op(Op::Record { names: names.into(), values: values.into() }, Type::Record, span)
     }
 
-    /// `a[i]`; all keys of a container in one step.
+    /// Lowers `a[i]`; all keys of a container are one operation.
     fn index(&mut self, e: &Expr) -> Typed {
         let mut keys = Vec::new();
         let mut base = e;
@@ -201,8 +202,8 @@ impl Lowerer<'_> {
         value
     }
 
-    /// A field of what is known before a run, such as a column of a file: where it is
-    /// read in any case, it must be there.
+    /// Checks a field of a value that is known before a run, such as a column of a file:
+    /// it must exist, unless it may never be read.
     fn check_field(&mut self, base: Operand, field: &Name) {
         let always = |s: &Scope| matches!(s.kind, ScopeKind::Root | ScopeKind::Loop { .. });
         let Operand::Const(i) = base else { return };
@@ -257,7 +258,7 @@ impl Lowerer<'_> {
         self.op(Op::Index { base: value.at, keys: [key.at].into() }, Type::Any, e.span)
     }
 
-    /// `ns.name` as a value.
+    /// Lowers `ns.name` as a value.
     fn member(&mut self, ns: &str, module: usize, field: &Name, span: Span) -> Typed {
         if let Some(b) = self.modules[module].names.get(&field.node).copied() {
             let up = (self.scopes.len() - 1) as u16;
@@ -281,8 +282,8 @@ impl Lowerer<'_> {
         self.nothing()
     }
 
-    /// The index of a built-in of the language, or of the native module whose file this
-    /// is.
+    /// Returns the index of a built-in of the language, or of the native module to which
+    /// this file belongs.
     pub fn find_builtin(&self, name: &str) -> Option<u32> {
         let native = self.modules[self.module].native.as_deref();
         native
@@ -318,10 +319,10 @@ impl Lowerer<'_> {
         }
     }
 
-    /// An operator of the table.
+    /// Lowers an operator of the table.
     fn operator(&mut self, name: &str, args: &[(Typed, Span)], span: Span) -> Typed {
         let Some(builtin) = self.code.builtins.find("", name) else { return self.nothing() };
-        // One message for one operator.
+        // One message per operator.
         if let Some((v, at)) = args.iter().find(|(v, _)| !operand_fits(name, v.ty)) {
             let shown_op = if name == "neg" { "-" } else { name };
             let wanted = match name {
@@ -376,14 +377,14 @@ impl Lowerer<'_> {
         self.op(Op::If { cond: c.at, then: a.0, otherwise: b.0 }, ty, cond.span)
     }
 
-    /// A block of its own that runs or not.
+    /// Lowers a branch into a separate block.
     fn branch(&mut self, f: impl FnOnce(&mut Self) -> Option<Typed>) -> (u32, Type) {
         let block = self.new_block(BlockKind::Branch);
         self.scopes.push(Scope::new(block, ScopeKind::Branch));
         let result = f(self);
         self.scopes.pop();
-        // A constant or a slot further out is seen one level deeper from inside; `f` gave
-        // it as seen there.
+        // The result is an operand as seen from inside the branch, from where outer slots
+        // are one level further out.
         self.code.blocks[block as usize].result = result.map(|t| t.at);
         (block, result.map_or(Type::Any, |t| t.ty))
     }
@@ -395,7 +396,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// Whether an operator can take an operand that looks like this.
+/// Whether an operator may take an operand of this static type.
 fn operand_fits(name: &str, ty: Type) -> bool {
     match (name, ty) {
         ("==" | "!=", _) | (_, Type::Any | Type::Array) => true,
@@ -408,7 +409,7 @@ fn operand_fits(name: &str, ty: Type) -> bool {
     }
 }
 
-/// The name of an operator in the table of built-ins.
+/// Returns the name of an operator in the table of built-ins.
 fn operator_name(op: BinaryOp) -> &'static str {
     match op {
         BinaryOp::Add => "+",

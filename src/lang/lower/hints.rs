@@ -1,7 +1,8 @@
-//! What to say of a name nobody knows: where it is bound after all, what is near, what it
-//! is called here.
+//! Hints for unknown names: where a name is bound elsewhere, similar names, and its
+//! equivalent in this language.
 //!
-//! Only messages are made here: nothing in it decides whether a program is correct.
+//! Only messages are produced here; nothing in this file decides whether a program is
+//! correct.
 
 use super::{AddHint, Lowerer};
 use crate::diag::{Diagnostic, nearest};
@@ -10,7 +11,7 @@ use crate::syntax::ast::{Arg, ItemKind, Name, Stmt, StmtKind};
 use crate::syntax::span::Span;
 use std::sync::Arc;
 
-/// Names of other languages and libraries, and what stands for them here.
+/// Names from other languages and libraries, and their equivalents here.
 const ELSEWHERE: [(&str, &str); 16] = [
     ("ln", "log"),
     ("length", "len"),
@@ -30,18 +31,18 @@ const ELSEWHERE: [(&str, &str); 16] = [
     ("False", "false"),
 ];
 
-/// Where a name is bound that is not known at some place.
+/// Where a name that is unknown at some place is bound.
 enum Elsewhere {
     /// At the top level, further down.
     Later(Span),
-    /// In the statement that asks for it.
+    /// In the statement that uses it.
     Itself(Span),
     /// In a function or a loop.
     Inside(Span, &'static str),
 }
 
 impl Lowerer<'_> {
-    /// A name nobody knows.
+    /// Reports an unknown name.
     pub fn unbound(&mut self, name: &str, span: Span) {
         let visible = self.visible();
         let builtins = Arc::clone(&self.code.builtins);
@@ -51,7 +52,7 @@ impl Lowerer<'_> {
             .filter(|b| !matches!(b.kind, Kind::Inference))
             .map(|b| &*b.name);
         let near = nearest(name, visible.iter().map(|n| &**n).chain(known)).map(str::to_owned);
-        // A name of a namespace, written without it.
+        // A name of a namespace, written without the namespace.
         let inside = self.modules[self.module].namespaces.iter().find_map(|(ns, space)| {
             let module = &self.modules[space.module];
             let native = module.native.as_deref().is_some_and(|m| builtins.find(m, name).is_some());
@@ -91,7 +92,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Where the present file binds a name all the same.
+    /// Returns where the current file binds the name.
     fn bound_elsewhere(&self, name: &str, span: Span) -> Option<Elsewhere> {
         let items = &self.loaded.units.iter().find(|u| u.file == span.file)?.program.items;
         let mut inner = None;
@@ -129,7 +130,7 @@ impl Lowerer<'_> {
         inner
     }
 
-    /// A name that is not in a namespace.
+    /// Reports a name that is not in a namespace.
     pub fn no_member(&mut self, ns: &str, module: usize, field: &Name) {
         let table = Arc::clone(&self.code.builtins);
         let m = &self.modules[module];
@@ -147,7 +148,7 @@ impl Lowerer<'_> {
             .hint_also(hint);
     }
 
-    /// The arguments of a built-in that do not match what it takes; `message` says how.
+    /// Reports arguments that do not match those of a built-in; `message` is the reason.
     pub fn mismatch(
         &mut self,
         b: &Builtin,
@@ -155,7 +156,7 @@ impl Lowerer<'_> {
         args: &[Arg],
         span: Span,
     ) -> &mut Diagnostic {
-        // The table's messages end with what it takes, or with a guess.
+        // The messages of the table end with the signature or with a suggestion.
         let cut = [": ", "; "].iter().filter_map(|s| message.find(s)).min();
         let (message, rest) = match cut {
             Some(i) => (message[..i].to_owned(), message[i + 2..].to_owned()),
@@ -185,7 +186,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// Where a statement by itself binds a name.
+/// Returns where a statement itself binds a name.
 fn binds(s: &Stmt, name: &str) -> Option<Span> {
     let bound = match &s.kind {
         StmtKind::Assume { name, .. }
@@ -196,7 +197,7 @@ fn binds(s: &Stmt, name: &str) -> Option<Span> {
     (&*bound.node == name).then_some(bound.span)
 }
 
-/// Where one of some statements binds a name, loops included.
+/// Returns where one of several statements binds a name, loops included.
 fn bound_in(stmts: &[Stmt], name: &str) -> Option<Span> {
     use crate::syntax::ast::ExprKind;
     stmts.iter().find_map(|s| match &s.kind {

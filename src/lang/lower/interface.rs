@@ -1,7 +1,6 @@
-//! What a program wants from outside: its parameters and data, without lowering it.
+//! The interface of a program: its parameters and data, found without lowering it.
 
-use crate::lang::builtins::Table;
-use crate::lang::builtins::data::Options;
+ use crate : : lang : : builtins : : Table ; use crate::lang::builtins::data::Options;
 use crate::lang::load::Loaded;
 use crate::syntax::ast::{ExprKind, ItemKind};
 use crate::syntax::print_expr;
@@ -9,7 +8,7 @@ use crate::syntax::print_expr;
 /// A `param`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamItem {
-    /// Its name, with the namespace of an included file before a slash.
+    /// Its name, prefixed by the namespace of an included file and a slash.
     pub name: String,
     /// The declared type.
     pub ty: Option<String>,
@@ -24,18 +23,18 @@ pub struct ParamItem {
 pub struct DataItem {
     /// Its name.
     pub name: String,
-    /// Its kind: as declared, or the kind its default reads.
+    /// Its kind: as declared, or the kind that its default reads.
     pub ty: Option<String>,
     /// Whether it has a default.
     pub has_default: bool,
-    /// How its default says that files are to be read; another file in its place is read
-    /// alike.
+    /// The reading options of its default; a file that replaces it is read in the same
+    /// way.
     pub options: Options,
     /// The help text.
     pub help: Option<String>,
 }
 
-/// What a program wants from outside.
+/// The parameters and data of a program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Interface {
     /// Its parameters, in order.
@@ -44,16 +43,16 @@ pub struct Interface {
     pub data: Vec<DataItem>,
 }
 
-/// Reads a program's interface off its text.
-pub fn inspect(loaded: &Loaded, builtins: &Table) -> Interface {
+/// Returns a program's interface, from its text.
+pub fn inspect(loaded: &Loaded , builtins : & Table ) -> Interface {
     let mut found = Interface::default();
     if !loaded.units.is_empty() {
-        unit(loaded, builtins, 0, "", &mut found);
+        unit(loaded,  builtins , 0, "", &mut found);
     }
     found
 }
 
-fn unit(loaded: &Loaded, builtins: &Table, index: usize, prefix: &str, found: &mut Interface) {
+fn unit(loaded: &Loaded , builtins : & Table , index: usize, prefix: &str, found: &mut Interface) {
     let unit_ = &loaded.units[index];
     for (i, item) in unit_.program.items.iter().enumerate() {
         match &item.kind {
@@ -73,9 +72,9 @@ fn unit(loaded: &Loaded, builtins: &Table, index: usize, prefix: &str, found: &m
                     },
                     _ => None,
                 });
-                // What is wrong with options is said when the program is lowered.
+                // Errors in options are reported when the program is lowered.
                 let options =
-                    read.as_ref().and_then(|(kind, args)| builtins.options(kind, args).ok());
+                    read.as_ref().and_then(|(kind, args)| builtins . options(kind, args).ok());
                 found.data.push(DataItem {
                     name: format!("{prefix}{}", d.name.node),
                     ty: d.ty.as_ref().map(|t| t.node.to_string()).or(read.map(|(kind, _)| kind)),
@@ -87,8 +86,8 @@ fn unit(loaded: &Loaded, builtins: &Table, index: usize, prefix: &str, found: &m
             ItemKind::Include { alias, .. } => {
                 if let Some(inner) = unit_.includes.get(i).copied().flatten() {
                     match alias {
-                        Some(a) => unit(loaded, builtins, inner, &format!("{}/", a.node), found),
-                        None => unit(loaded, builtins, inner, prefix, found),
+                        Some(a) => unit(loaded,  builtins , inner, &format!("{}/", a.node), found),
+                        None => unit(loaded,  builtins , inner, prefix, found),
                     }
                 }
             }

@@ -4,8 +4,7 @@ use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
 use super::types::{accepts, declared, shown};
 use super::{AddHint, Export, Lowerer, Pending, Plan, Report, Typed};
 use crate::diag::{IntoDiagnostic, nearest};
-use crate::lang::builtins::Type;
-use crate::lang::builtins::data::Options;
+use crate::lang::builtins::Type; use crate : : lang : : builtins : : data: : Options;
 use crate::lang::code::{BlockKind, Op};
 use crate::lang::value::{Closure, Value};
 use crate::syntax::ast::{
@@ -14,10 +13,10 @@ use crate::syntax::ast::{
 use crate::syntax::parse_expr;
 use std::sync::Arc;
 
-/// The types a parameter may have.
+/// The possible types of a parameter.
 const TYPES: [&str; 5] = ["number", "int", "bool", "string", "array"];
 
-/// The name by which a later `forget` can remove an item.
+/// Returns the name by which a later `forget` can remove an item.
 fn forgettable(item: &Item) -> Option<&crate::syntax::ast::Name> {
     let ItemKind::Stmt(s) = &item.kind else { return None };
     match &s.kind {
@@ -32,7 +31,7 @@ impl Lowerer<'_> {
     pub fn unit(&mut self, index: usize) {
         let loaded = self.loaded;
         let unit = &loaded.units[index];
-        // Named functions first: they may be called before they are written.
+        // Named functions come first, since they may be called before they are written.
         for item in &unit.program.items {
             if let ItemKind::Fn(f) = &item.kind {
                 self.declare(f);
@@ -92,7 +91,7 @@ impl Lowerer<'_> {
                         e.hint_also("rename one of them");
                     }
                 }
-                // A plan of an included file is that file's own.
+                // A plan of an included file belongs to that file, and is ignored here.
                 ItemKind::Infer { name, body } if index == 0 => {
                     let name = name.as_ref().map(|n| Arc::clone(&n.node));
                     self.plans.push(Plan { name, body: body.clone().into() });
@@ -112,7 +111,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The items that a later `forget` removes, and the `forget` statements themselves.
+    /// Returns the items that a later `forget` removes, and the `forget` statements
+    /// themselves.
     fn forgotten(&mut self, items: &[Item]) -> Vec<usize> {
         let mut gone = Vec::new();
         for (i, item) in items.iter().enumerate() {
@@ -152,7 +152,7 @@ impl Lowerer<'_> {
         gone
     }
 
-    /// Makes the block of a named function, so that it can be called.
+    /// Creates the block of a named function, so that it can be called.
     fn declare(&mut self, f: &FnDecl) {
         let block = self.function_block(Arc::clone(&f.name.node), &f.lambda);
         self.bind(&f.name, Meaning::Function(block), Type::Function);
@@ -163,7 +163,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// An empty function block.
+    /// Creates an empty function block.
     pub fn function_block(&mut self, name: Arc<str>, lambda: &Lambda) -> u32 {
         let params: Arc<[Arc<str>]> =
             lambda.params.iter().map(|p| Arc::clone(&p.name.node)).collect();
@@ -177,7 +177,7 @@ impl Lowerer<'_> {
         self.new_block(BlockKind::Function { name, params, required })
     }
 
-    /// Fills a function's block.
+    /// Lowers a function's body into its block.
     pub fn function_body(&mut self, block: u32, lambda: &Lambda) {
         self.scopes.push(Scope::new(block, ScopeKind::Function));
         self.bodies.push(Body::default());
@@ -203,7 +203,7 @@ impl Lowerer<'_> {
         self.scopes.pop();
     }
 
-    /// The bodies of all named functions.
+    /// Lowers the bodies of all named functions.
     pub fn function_bodies(&mut self) {
         for p in std::mem::take(&mut self.pending) {
             let outer = std::mem::replace(&mut self.module, p.module);
@@ -261,7 +261,7 @@ impl Lowerer<'_> {
         );
     }
 
-    /// The value of `--set name=text`.
+    /// Lowers the value of `--set name=text`.
     fn set_value(&mut self, name: &str, text: &str, ty: Type) -> Typed {
         let file = self.map.add(&format!("--set {name}"), text);
         if ty == Type::Str && !text.starts_with('"') {
@@ -281,7 +281,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// A number that is known must be whole where that is asked for.
+    /// Reports a constant that is not a whole number, if the type requires one.
     fn check_whole(
         &mut self,
         value: Typed,
@@ -314,10 +314,9 @@ impl Lowerer<'_> {
     fn data(&mut self, d: &Declaration, folder: &str) {
         let name = self.global_name(&d.name);
         if let Some(t) = &d.ty
-            && self.code.builtins.kind(&t.node).is_none()
-        {
-            let builtins = Arc::clone(&self.code.builtins);
-            let near = nearest(&t.node, builtins.kinds()).map(str::to_owned);
+            && self . code . builtins . kind(   &t.node)
+         . is_none ( ) {
+             let builtins = Arc : : clone ( & self . code . builtins ) ; let near = nearest(&t.node, builtins .kinds()).map(str::to_owned);
             let e = self.error(
                 format!("there is no data of type `{}`", t.node),
                 t.span,
@@ -327,16 +326,16 @@ impl Lowerer<'_> {
                 Some(n) => e.hint_also(format!("did you mean `{n}`?")),
                 None => e.hint_also(format!(
                     "types are {}",
-                    builtins.kinds().collect::<Vec<_>>().join(", ")
+                    builtins .kinds().collect::<Vec<_>>().join(", ")
                 )),
             }
         }
         let value = match (self.inputs.data.get(&*name).cloned(), &d.default) {
             (Some(v), default) => {
-                // The file was read with the default's options.
+                // The file was read with the options of the default.
                 if let Some(ExprKind::Call { callee, args }) = default.as_ref().map(|e| &e.kind)
                     && let ExprKind::Var(kind) = &callee.kind
-                    && self.code.builtins.kind(kind).is_some()
+                    && self . code . builtins . kind( kind ).is_some(   )
                 {
                     self.options(kind, args.get(1..).unwrap_or_default());
                 }
@@ -356,13 +355,13 @@ impl Lowerer<'_> {
         self.bind_value(&d.name, value);
     }
 
-    /// `csv("file")` and the like, or any expression.
+    /// Lowers `csv("file")` and the like, or any expression.
     fn data_default(&mut self, e: &Expr, folder: &str) -> Typed {
         if let ExprKind::Call { callee, args } = &e.kind
             && let ExprKind::Var(kind) = &callee.kind
-            && self.code.builtins.kind(kind).is_some()
+            && self . code . builtins . kind( kind ).is_some(   )
         {
-            if let (true, Some(v)) = (args.is_empty(), self.without_file(kind)) {
+            if let (true, Some(v)) = (args.is_empty(), self .without_file(kind)) {
                 return self.constant(v);
             }
             let Some((arg, rest)) = args.split_first() else {
@@ -391,32 +390,27 @@ impl Lowerer<'_> {
         self.expr(e)
     }
 
-    /// The value of a data item of a kind that is given no file.
-    fn without_file(&self, kind: &str) -> Option<Value> {
-        self.code.builtins.kind(kind)?.format.as_ref()?.without_file()
-    }
-
-    /// How a data item's file is to be read, from the arguments after its path.
-    fn options(&mut self, kind: &str, args: &[crate::syntax::ast::Arg]) -> Option<Options> {
+    /// Parses the reading options of a data item's file from the arguments that follow
+    /// its path.
+    fn  without_file ( & self , kind : & str ) - > Option < Value > { self . code . builtins . kind ( kind ) ? . format . as_ref ( ) ? . without_file ( ) } fn options(&mut self, kind: &str, args: &[crate::syntax::ast::Arg]) -> Option<Options> {
         let (i, fault) = match self.code.builtins.options(kind, args) {
             Ok(options) => return Some(options),
             Err(e) => e,
         };
         let span = args.get(i)?.value.span;
-        let builtins = Arc::clone(&self.code.builtins);
-        self.error(
+         let builtins = Arc : : clone ( & self . code . builtins ) ; self.error(
             fault.message,
             span,
-            if builtins.has_options(kind) { "not an option" } else { "not expected" },
+            if builtins .has_options(kind) { "not an option" } else { "not expected" },
         )
         .hints
         .extend(fault.hint);
         None
     }
 
-    /// `--set` and `--observe` names that no file declares.
+    /// Reports `--set` and `--observe` names that no file declares.
     pub fn unused_inputs(&mut self) {
-        let interface = super::inspect(self.loaded, &self.code.builtins);
+        let interface = super::inspect(self.loaded , & self . code . builtins );
         let params: Vec<&str> = interface.params.iter().map(|p| p.name.as_str()).collect();
         let items: Vec<&str> = interface.data.iter().map(|d| d.name.as_str()).collect();
         let mut unknown = Vec::new();
@@ -444,7 +438,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// The type of a literal; anything where it is not one.
+/// Returns the type of a literal; `Any` if it is not one.
 fn literal_type(e: &Expr) -> Type {
     match &e.kind {
         ExprKind::Num(_) => Type::Num,

@@ -1,15 +1,15 @@
-//! Lowering: from syntax trees to [`Code`], with every name, argument, tag and address
+//! Lowering from syntax trees to [`Code`], with all names, arguments, tags and addresses
 //! checked.
 //!
-//! Blocks nest as the text does; a name becomes a slot of its block. The top level comes
+//! Blocks nest as in the text; a name becomes a slot of its block. The top level comes
 //! first, then the bodies of named functions, which see every top-level name, then the
-//! inference blocks, which see all that came before. Nothing is evaluated here but the
-//! defaults of `param` and `data` given by the host.
+//! inference blocks, which see everything before them. Nothing is evaluated here except
+//! the defaults of `param` and `data` given by the host.
 //!
-//! One file a concern: `scope` names and sites, `items` the top level, `stmt` statements,
-//! `draw` random choices and containers, `expr` expressions, `call` calls, `plan`
-//! inference blocks, `select` selections, `types` what can be told of types, `hints` what
-//! to say of unknown names.
+//! There is one file per concern: `scope` names and sites, `items` the top level, `stmt`
+//! statements, `draw` random choices and containers, `expr` expressions, `call` calls,
+//! `plan` inference blocks, `select` selections, `types` static types, `hints`
+//! suggestions for unknown names, `interface` parameters and data.
 
 mod call;
 mod draw;
@@ -39,26 +39,27 @@ use rustc_hash::FxHashMap;
 use scope::{Body, Module, Scope};
 use std::sync::Arc;
 
-/// Reads a file of data: its kind (`image`, `csv`, …), its path as written, the folder of
-/// the program, how it is to be read.
+/// Reads a data file, given its kind (`image`, `csv`, …), its path as written, the folder
+/// of the program, and the reading options.
 pub type ReadData<'a> = &'a dyn Fn(&str, &str, &str, &Options) -> Result<Value, Fault>;
 
-/// What a program is given from outside.
+/// The external inputs of a program.
 pub struct Inputs<'a> {
     /// The built-ins it sees.
     pub builtins: Arc<Table>,
     /// `--set name=value`, the value as text.
     pub sets: &'a [(String, String)],
-    /// `data` items that are given, by name.
+    /// The `data` items that are given, by name.
     pub data: IndexMap<String, Value>,
-    /// How `data d = csv("file")` reads.
+    /// The reader for `data d = csv("file")`.
     pub read: ReadData<'a>,
-    /// Whether a `data` item without a value is an error; not when a program is only
+    /// Whether a `data` item without a value is an error; false when a program is only
     /// checked.
     pub needs_data: bool,
-    /// Values for arguments left out: of a built-in by full name, an argument by name.
+    /// Default values for omitted arguments, by full name of the built-in and name of the
+    /// argument.
     pub defaults: FxHashMap<(String, String), Value>,
-    /// What is to run although nothing asks for it.
+    /// What runs even if nothing depends on it.
     pub eager: Eager,
 }
 
@@ -102,10 +103,10 @@ pub struct Compiled {
     pub exports: Vec<Export>,
 }
 
-/// Lowers a loaded program. The text of `--set` values goes to `map` too.
+/// Lowers a loaded program. The texts of `--set` values are added to `map`.
 ///
 /// # Errors
-/// Everything that is wrong with it, in the order of the text; settings first.
+/// All errors of the program, in the order of the text; those about settings come first.
 pub fn compile(
     loaded: &Loaded,
     inputs: Inputs,
@@ -142,7 +143,7 @@ pub fn compile(
     l.inference();
     l.unused_inputs();
     if !l.errors.is_empty() {
-        // What has no place is about the command line: it comes first.
+        // Errors without a location are about the command line; they come first.
         l.errors.sort_by_key(|d| d.labels.first().map(|l| (l.span.file.0, l.span.start)));
         l.errors.dedup();
         return Err(l.errors);
@@ -152,7 +153,7 @@ pub fn compile(
     Ok(Compiled { code: Arc::new(l.code), plans: l.plans, reports: l.reports, exports: l.exports })
 }
 
-/// A named function whose body waits until all top-level names are known.
+/// A named function whose body is lowered when all top-level names are known.
 struct Pending {
     module: usize,
     block: BlockId,
@@ -167,9 +168,9 @@ struct Lowerer<'a> {
     errors: Vec<Diagnostic>,
     modules: Vec<Module>,
     module: usize,
-    /// The lexical blocks around what is being lowered; the first is the top level.
+    /// The enclosing lexical blocks; the first is the top level.
     scopes: Vec<Scope>,
-    /// The function bodies around it; the first is the top level.
+    /// The enclosing function bodies; the first is the top level.
     bodies: Vec<Body>,
     pending: Vec<Pending>,
     plans: Vec<Plan>,
@@ -178,11 +179,11 @@ struct Lowerer<'a> {
     exports: Vec<Export>,
     used_sets: Vec<String>,
     used_data: Vec<String>,
-    /// First segments of addresses: what a selection may begin with.
+    /// First segments of addresses, with which a selection may begin.
     roots: IndexSet<Arc<str>>,
 }
 
-/// An operand and what is known of its type.
+/// An operand and its static type.
 #[derive(Clone, Copy, Debug)]
 struct Typed {
     at: Operand,
@@ -201,12 +202,12 @@ impl Lowerer<'_> {
         &mut self.errors[last]
     }
 
-    /// The block being filled.
+    /// Returns the block being built.
     fn block(&self) -> BlockId {
         self.scopes.last().map_or(0, |s| s.block)
     }
 
-    /// Adds an operation to the block being filled.
+    /// Appends an operation to the block being built.
     fn push(&mut self, op: Op, span: Span) -> Slot {
         let block = self.block();
         self.code.blocks[block as usize].push(op, span)
@@ -223,12 +224,13 @@ impl Lowerer<'_> {
         Typed { at: self.code.constant(v), ty }
     }
 
-    /// What stands for something that could not be lowered: an error was reported.
+    /// Returns a placeholder for something that could not be lowered and whose error was
+    /// reported.
     fn nothing(&mut self) -> Typed {
         Typed { at: self.code.constant(Value::Unit), ty: super::builtins::Type::Any }
     }
 
-    /// The name under which a name of the current module appears in reports.
+    /// Returns the name under which a name of the current module appears in reports.
     fn global_name(&self, name: &Name) -> Arc<str> {
         match &self.modules[self.module].prefix {
             Some(p) => Arc::from(format!("{p}/{}", name.node)),
@@ -237,7 +239,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// A hint added in place.
+/// Adds hints and labels to a diagnostic in place.
 trait AddHint {
     fn hint_also(&mut self, hint: impl Into<String>);
     fn point_at(&mut self, span: Span, text: &str);
@@ -253,7 +255,7 @@ impl AddHint for Diagnostic {
     }
 }
 
-/// The text of a spanned string.
+/// Returns the text of a spanned string.
 fn text(s: &Spanned<Arc<str>>) -> Arc<str> {
     Arc::clone(&s.node)
 }

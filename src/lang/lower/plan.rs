@@ -1,5 +1,5 @@
-//! Inference blocks, user kernels, reports and exports: checked in full, and the model's
-//! expressions in them lowered.
+//! Inference blocks, user kernels, reports and exports: all checks, and the lowering of
+//! the model expressions in them.
 
 use super::types::shown;
 use super::{AddHint, Lowerer};
@@ -8,7 +8,7 @@ use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind};
 use crate::syntax::span::Span;
 use std::sync::Arc;
 
-/// What surrounds a statement of an inference block.
+/// The context of a statement of an inference block.
 #[derive(Clone, Default)]
 struct Around {
     /// Variables of the block.
@@ -19,7 +19,7 @@ struct Around {
 }
 
 impl Lowerer<'_> {
-    /// Checks everything that is not the model.
+    /// Checks everything except the model.
     pub fn inference(&mut self) {
         self.module = 0;
         for f in self.code.freezes.clone() {
@@ -149,7 +149,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// A number of times, or a weight.
+    /// Checks a number of repetitions, or a weight.
     fn count(&mut self, e: &Expr, around: &Around) {
         match &e.kind {
             ExprKind::Str(_) | ExprKind::Bool(_) | ExprKind::Array(_) | ExprKind::Record(_) => {
@@ -166,7 +166,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// A kernel applied to a selection.
+    /// Checks a kernel applied to a selection.
     fn kernel(&mut self, e: &Expr, around: &Around) {
         let ExprKind::Call { callee, args } = &e.kind else {
             self.error("expected a kernel", e.span, "not a call of a kernel")
@@ -256,7 +256,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The arguments of a name of inference blocks, by their types.
+    /// Checks the arguments of a built-in of inference blocks, by their types.
     fn inference_args(
         &mut self,
         b: &crate::lang::builtins::Builtin,
@@ -334,7 +334,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// An expression that the inference block itself evaluates: names must be known.
+    /// Checks an expression that the inference block itself evaluates: its names must be
+    /// known.
     fn plan_expr(&mut self, e: &Expr, around: &Around) {
         match &e.kind {
             ExprKind::Var(name) => {
@@ -404,7 +405,8 @@ impl Lowerer<'_> {
         .hint_also("bind it in the model, let name = …;, and use the name here");
     }
 
-    /// An expression of the model that draws are made of: a slot of the top level.
+    /// Lowers an expression of the model, recorded with every draw, to a slot of the top
+    /// level.
     fn query(&mut self, e: &Expr) {
         if let ExprKind::Call { callee, args } = &e.kind
             && let ExprKind::Var(name) = &callee.kind
@@ -427,7 +429,7 @@ impl Lowerer<'_> {
         self.code.queries.insert(e.span, value.at);
     }
 
-    /// `summary(@x)`, `best(view)`, or an expression of the model.
+    /// Checks `summary(@x)`, `best(view)`, or an expression of the model.
     fn reported(&mut self, e: &Expr) {
         if let ExprKind::Call { callee, args } = &e.kind
             && let ExprKind::Var(name) = &callee.kind

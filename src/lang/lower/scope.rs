@@ -1,5 +1,5 @@
-//! Names, lexical blocks and sites: which slot a name means, and what a place adds to
-//! addresses.
+//! Names, lexical blocks and sites: the slot that a name refers to, and what a place in
+//! the text adds to addresses.
 
 use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::Type;
@@ -10,10 +10,10 @@ use indexmap::IndexMap;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// What a name stands for.
+/// What a name refers to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Meaning {
-    /// A constant, or a slot of the block the name is bound in.
+    /// A constant, or a slot of the block in which the name is bound.
     Value(Operand),
     /// A named function.
     Function(BlockId),
@@ -35,7 +35,7 @@ pub(super) enum ScopeKind {
     Root,
     Function,
     Branch,
-    /// A pass of the `for` at a slot of the block around it.
+    /// A pass of the `for` in a slot of the enclosing block.
     Loop {
         var: Arc<str>,
         at: Slot,
@@ -48,7 +48,7 @@ pub(super) struct Scope {
     pub block: BlockId,
     pub kind: ScopeKind,
     pub names: IndexMap<Arc<str>, Binding>,
-    /// Elements of containers drawn here: container, keys as written, slot.
+    /// Elements of containers that are drawn here: container, keys as written, slot.
     pub drawn: Vec<(Arc<str>, String, Slot)>,
 }
 
@@ -58,17 +58,17 @@ impl Scope {
     }
 }
 
-/// What is counted and remembered for one function body: addresses are relative to it.
+/// The counters and tags of one function body; addresses are relative to it.
 #[derive(Debug, Default)]
 pub(super) struct Body {
-    /// The bindings around the present expression, outermost first.
+    /// The bindings around the current expression, outermost first.
     pub prefix: Vec<Arc<str>>,
-    /// How often a name occurred under a prefix.
+    /// The number of occurrences of a name under a prefix.
     counts: FxHashMap<(Vec<Arc<str>>, Arc<str>), u32>,
-    /// Tags of the `assume` around, by index of their name.
+    /// Tags of the enclosing `assume`, by index of their name.
     pub tags: Vec<SiteTag>,
-    /// Which occurrence of its name a container is, by block and slot: its elements share
-    /// it, wherever they are drawn.
+    /// The occurrence of a container's name, by block and slot: its elements share it,
+    /// wherever they are drawn.
     pub containers: FxHashMap<(u32, Slot), u32>,
 }
 
@@ -77,13 +77,13 @@ pub(super) struct Body {
 pub(super) struct Module {
     pub names: IndexMap<Arc<str>, Binding>,
     pub namespaces: FxHashMap<Arc<str>, Namespace>,
-    /// What its names are called from outside.
+    /// The namespace under which its names are visible from outside.
     pub prefix: Option<Arc<str>>,
-    /// The module of the table of built-ins whose names it sees.
+    /// The module of the table of built-ins whose names are visible in it.
     pub native: Option<Arc<str>>,
 }
 
-/// What `ns` in `ns.name` stands for.
+/// What `ns` in `ns.name` refers to.
 #[derive(Clone, Debug)]
 pub(super) struct Namespace {
     pub module: usize,
@@ -91,7 +91,7 @@ pub(super) struct Namespace {
 }
 
 impl Lowerer<'_> {
-    /// A name's meaning, and how many blocks out it is bound.
+    /// Returns a name's meaning, and how many blocks out it is bound.
     pub fn lookup(&self, name: &str) -> Option<(Binding, u16)> {
         for (up, scope) in self.scopes.iter().rev().enumerate() {
             let names = if scope.kind == ScopeKind::Root {
@@ -106,17 +106,17 @@ impl Lowerer<'_> {
         None
     }
 
-    /// An operand seen from `up` blocks further in.
+    /// Returns an operand as seen from `up` blocks further in.
     pub fn reach(o: Operand, up: u16) -> Operand {
         match o {
             Operand::Local(slot) if up > 0 => Operand::Outer { up, slot },
-            // Another name for something further out still.
+            // Another name for an operand still further out.
             Operand::Outer { up: further, slot } => Operand::Outer { up: further + up, slot },
             o => o,
         }
     }
 
-    /// Every name visible here, for hints.
+    /// Returns every name visible here, for hints.
     pub fn visible(&self) -> Vec<Arc<str>> {
         let mut names: Vec<Arc<str>> =
             self.scopes.iter().flat_map(|s| s.names.keys().cloned()).collect();
@@ -149,8 +149,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Binds a value at the innermost block; at the top level the inference blocks see it
-    /// too.
+    /// Binds a value in the innermost block; at the top level it is also visible in the
+    /// inference blocks.
     pub fn bind_value(&mut self, name: &Name, value: Typed) {
         self.bind(name, Meaning::Value(value.at), value.ty);
         if self.scopes.len() == 1 {
@@ -167,7 +167,7 @@ impl Lowerer<'_> {
         &mut self.bodies[last]
     }
 
-    /// Lowers something below a binding's name.
+    /// Lowers something below the name of a binding.
     pub fn below<T>(&mut self, name: &Arc<str>, f: impl FnOnce(&mut Self) -> T) -> T {
         self.note_root(name);
         self.body().prefix.push(Arc::clone(name));
@@ -176,20 +176,21 @@ impl Lowerer<'_> {
         result
     }
 
-    /// Remembers a name that addresses may begin with.
+    /// Records a name that addresses may begin with.
     fn note_root(&mut self, name: &Arc<str>) {
         if self.bodies.len() == 1 && self.body().prefix.is_empty() {
             self.roots.insert(Arc::clone(name));
         }
     }
 
-    /// A site below the present bindings.
+    /// Creates a site below the current bindings.
     pub fn site(&mut self, name: &Arc<str>, own_tags: Vec<SiteTag>, carried: u32) -> u32 {
         let occurrence = self.next_occurrence(name);
         self.site_of(name, occurrence, own_tags, carried)
     }
 
-    /// How often a name has now occurred below the present bindings.
+    /// Counts one more occurrence of a name below the current bindings, and returns the
+    /// count.
     pub fn next_occurrence(&mut self, name: &Arc<str>) -> u32 {
         let body = self.body();
         let count = body.counts.entry((body.prefix.clone(), Arc::clone(name))).or_insert(0);
@@ -197,7 +198,7 @@ impl Lowerer<'_> {
         *count
     }
 
-    /// A site below the present bindings, as an occurrence of its name.
+    /// Creates a site below the current bindings, for a given occurrence of its name.
     pub fn site_of(
         &mut self,
         name: &Arc<str>,
@@ -224,7 +225,7 @@ impl Lowerer<'_> {
         self.code.sites.len() as u32 - 1
     }
 
-    /// The index of a tag's name.
+    /// Returns the index of a tag's name.
     pub fn tag_index(&mut self, name: &Arc<str>) -> u32 {
         if let Some(i) = self.code.tags.iter().position(|t| t == name) {
             return i as u32;
@@ -233,7 +234,7 @@ impl Lowerer<'_> {
         self.code.tags.len() as u32 - 1
     }
 
-    /// Tags added by the `assume` around what `f` lowers.
+    /// Lowers with `f` under the tags of an enclosing `assume`.
     pub fn with_tags<T>(&mut self, tags: Vec<SiteTag>, f: impl FnOnce(&mut Self) -> T) -> T {
         let depth = self.body().tags.len();
         self.body().tags.extend(tags);
@@ -242,8 +243,8 @@ impl Lowerer<'_> {
         result
     }
 
-    /// The loops of the present function around the innermost block, outermost first:
-    /// index into scopes.
+    /// Returns the loops of the current function around the innermost block, outermost
+    /// first, by index into scopes.
     pub fn loops_here(&self) -> Vec<usize> {
         let mut loops = Vec::new();
         for (i, s) in self.scopes.iter().enumerate().rev() {

@@ -1,4 +1,4 @@
-//! Selections of choices: the addresses and tags in them must occur in the program.
+//! Selections of choices; the addresses and tags in them must occur in the program.
 
 use super::{AddHint, Lowerer};
 use crate::diag::nearest;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 const BUILT_IN: [&str; 4] = ["continuous", "discrete", "gaussian", "finite"];
 
 impl Lowerer<'_> {
-    /// Checks a selection; `names` are variables it may use.
+    /// Checks a selection; `names` are variables that it may use.
     pub fn selection(&mut self, e: &Expr, names: &[Arc<str>]) {
         match &e.kind {
             ExprKind::Address(a) => self.address(a, e.span, names),
@@ -80,7 +80,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Checks that an address begins with a name that has choices.
+    /// Checks that an address begins with a name under which there are choices.
     pub fn address(&mut self, a: &Address, span: Span, names: &[Arc<str>]) {
         for s in &a.segments {
             for k in &s.keys {
@@ -96,7 +96,7 @@ impl Lowerer<'_> {
         let Some(first) = a.segments.first() else { return };
         let SegmentName::Name(name) = &first.name else { return };
         if self.roots.contains(name) {
-            // Segments further in must occur somewhere below.
+            // The other segments must occur somewhere in the program.
             for s in &a.segments[1..] {
                 if let SegmentName::Name(n) = &s.name
                     && !self

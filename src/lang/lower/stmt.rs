@@ -10,7 +10,7 @@ use crate::syntax::ast::{Bind, Body, Expr, ExprKind, Name, Stmt, StmtKind, Tag};
 use std::sync::Arc;
 
 impl Lowerer<'_> {
-    /// Lowers a body's statements and gives its value.
+    /// Lowers a body's statements and returns its value.
     pub fn body_of(&mut self, body: &Body) -> Option<Typed> {
         for s in &body.stmts {
             self.stmt(s);
@@ -148,8 +148,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Records a name of the main program with every draw, unless its plan says what to
-    /// collect.
+    /// Records a name of the main program with every draw, unless its plan determines
+    /// what to collect.
     pub fn recorded(&mut self, name: &Arc<str>, value: Operand) {
         if self.modules[self.module].prefix.is_none() {
             self.code.assumed.push((Arc::clone(name), value));
@@ -180,7 +180,7 @@ impl Lowerer<'_> {
         self.scopes.pop();
     }
 
-    /// A distribution: a family called here, or a value.
+    /// Lowers a distribution: a direct call of a family, or a value.
     pub fn dist_spec(&mut self, e: &Expr, observed: bool) -> DistSpec {
         if let Some((builtin, args)) = self.family_call(e) {
             return DistSpec::Family { builtin, args };
@@ -220,7 +220,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The tags of a choice; values may be variables in scope.
+    /// Lowers the tags of a choice; their values may be variables in scope.
     pub fn tags(&mut self, tags: &[Tag]) -> Vec<SiteTag> {
         tags.iter()
             .map(|t| {
@@ -231,8 +231,8 @@ impl Lowerer<'_> {
             .collect()
     }
 
-    /// A tag's value: a name that is bound is that variable, any other word stands for
-    /// itself.
+    /// Lowers a tag's value: a bound name is that variable, and any other word is a
+    /// string.
     fn tag_value(&mut self, e: &Expr) -> Operand {
         match &e.kind {
             ExprKind::Var(word) if self.lookup(word).is_none() => {
@@ -242,8 +242,8 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The tags of an `assume`: its choices may lie anywhere below, so that values must
-    /// be literal.
+    /// Lowers the tags of an `assume`: its choices may be anywhere below, so values must
+    /// be literals.
     fn constant_tags(&mut self, tags: &[Tag]) -> Vec<SiteTag> {
         let made = self.tags(tags);
         for (t, tag) in made.iter().zip(tags) {

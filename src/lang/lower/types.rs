@@ -1,10 +1,10 @@
-//! What can be told of types before a run: enough to catch a wrong argument where it is
-//! written, never a wrong alarm.
+//! Static types: enough to report a wrong argument where it is written, without false
+//! alarms.
 
 use crate::lang::builtins::Type;
 use crate::lang::value::Value;
 
-/// The type of a value.
+/// Returns the type of a value.
 pub(super) fn of_value(v: &Value) -> Type {
     match v {
         Value::Num(_) => Type::Num,
@@ -20,7 +20,7 @@ pub(super) fn of_value(v: &Value) -> Type {
     }
 }
 
-/// Whether a value that looks like `got` can be what is `wanted`.
+/// Whether a value of static type `got` may be of type `wanted`.
 pub(super) fn accepts(wanted: Type, got: Type) -> bool {
     use Type::*;
     match (wanted, got) {
@@ -28,13 +28,13 @@ pub(super) fn accepts(wanted: Type, got: Type) -> bool {
         (Num | Int, Num | Int | Nums) => true,
         (Nums, Num | Int | Nums | Array) => true,
         (Array, Array | Nums) => true,
-        // Objects are told apart when they run: their names are for people.
+        // Objects are distinguished at run time: their names are for users only.
         (Object(_), Object(_)) | (Object(_), Covariance) | (Covariance, Object(_)) => true,
         (a, b) => a == b,
     }
 }
 
-/// A type with its article, for messages.
+/// Returns a type with its article, for messages.
 pub(super) fn shown(t: Type) -> String {
     let s = t.to_string();
     match s.chars().next() {
@@ -47,7 +47,7 @@ pub(super) fn shown(t: Type) -> String {
     }
 }
 
-/// The type a `param` or function parameter declares.
+/// Returns the type that a `param` or function parameter declares.
 pub(super) fn declared(name: &str) -> Option<Type> {
     Some(match name {
         "any" => Type::Any,

@@ -1,8 +1,8 @@
-//! Recording a tape: each step is told in the order of evaluation, and becomes one
+//! Recording of a tape: each step is recorded in the order of evaluation, as one
 //! operation or a few.
 //!
-//! `None` from a method means that a tape cannot do this step; whoever records then
-//! leaves the program to be run as it is.
+//! A method returns `None` if a tape cannot represent the step; the caller then has to
+//! run the program itself.
 
 use super::form::{Form, Made};
 use super::op::Op;
@@ -16,23 +16,23 @@ use crate::num::Column;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// A tape in the making.
+/// A tape under construction.
 #[derive(Debug, Default)]
 pub struct Builder {
     values: Vec<f64>,
     inputs: Vec<Input>,
     ops: Vec<Op>,
-    /// Whether incremental functions go on from where they were in the last run.
+    /// Whether incremental functions start from their evaluation in the last run.
     keeps: bool,
 }
 
 impl Builder {
-    /// A tape with nothing on it.
+    /// Creates an empty tape.
     pub fn new(keeps: bool) -> Builder {
         Builder { keeps, ..Builder::default() }
     }
 
-    /// The tape of all that was told.
+    /// Returns the tape of everything recorded.
     pub fn finish(self) -> Tape {
         let adjoints = vec![0.0; self.values.len()];
         let (values, inputs, ops) = (self.values, self.inputs, self.ops);
@@ -45,8 +45,8 @@ impl Builder {
         at
     }
 
-    /// A value that lies in the buffer, now with these numbers; `None` if it has anything
-    /// but numbers in it.
+    /// Allocates a value in the buffer, initialised with these numbers; `None` if it
+    /// contains anything but numbers.
     pub fn place(&mut self, now: &Value) -> Option<Form> {
         Some(match now {
             Value::Num(x) => {
@@ -67,14 +67,14 @@ impl Builder {
         })
     }
 
-    /// Makes a placed value, or a part of it, the image of the next coordinates under a
-    /// support.
+    /// Declares that a placed value, or a part of it, is the image of the next
+    /// coordinates under a support.
     pub fn input(&mut self, support: Support, form: Form) {
         let dimension = support.free_dim();
         self.inputs.push(Input { support, form, dimension });
     }
 
-    /// The numbers of a form: one, or several in a row.
+    /// Returns the numbers of a form: a single one, or several in a row.
     fn column(&mut self, form: &Form) -> Option<Column> {
         match form {
             Form::Num(at) => Some(Column { at: *at, step: 0, live: true }),
@@ -97,7 +97,7 @@ impl Builder {
         }
     }
 
-    /// The result of a built-in, which now is `now`.
+    /// Records a call of a built-in, whose current result is `now`.
     pub fn call(&mut self, builtin: &Builtin, args: Vec<Form>, now: &Value) -> Option<Form> {
         if args.iter().all(Form::is_fixed) {
             return Some(Form::Fixed(now.clone()));
@@ -131,7 +131,7 @@ impl Builder {
             });
             return Some(out);
         }
-        // What takes long to make is better made once.
+        // Results that are expensive to build are better built once.
         let cheap = match now {
             Value::Object(_) => now.downcast::<CovarianceValue>().is_some(),
             Value::Bool(_) | Value::Dist(_) | Value::Str(_) => true,
@@ -141,7 +141,7 @@ impl Builder {
         cheap.then(|| Form::Made(Arc::new(Made { builtin: builtin.clone(), args: args.into() })))
     }
 
-    /// The call told last may go on from this evaluation.
+    /// The last recorded call may start from this evaluation.
     pub fn start_from(&mut self, evaluation: &Arc<Before>) {
         if let Some(Op::Call { before, .. }) = self.ops.last_mut() {
             *before = Some(Arc::clone(evaluation));
@@ -168,8 +168,8 @@ impl Builder {
         }
     }
 
-    /// Pairs as the built-ins do: two arrays need equal lengths, anything else goes with
-    /// every element.
+    /// Pairs elements as the built-ins do: two arrays need equal lengths, and anything
+    /// else is paired with every element.
     fn binary(&mut self, f: &'static Binary, x: &Form, y: &Form, now: &Value) -> Option<Form> {
         let flat = |form: &Form| {
             matches!(
@@ -203,7 +203,7 @@ impl Builder {
         Some(Form::Num(out))
     }
 
-    /// A fixed matrix times a vector.
+    /// The product of a fixed matrix and a vector.
     fn matrix(&mut self, args: &[Form]) -> Option<Form> {
         let [Form::Fixed(Value::List(list)), Form::Array(x, width)] = args else { return None };
         let rows = self.values.len();
@@ -219,7 +219,7 @@ impl Builder {
         Some(Form::Array(out, list.len()))
     }
 
-    /// An array of these elements.
+    /// Records an array of these elements.
     pub fn array(&mut self, all: Vec<Form>) -> Option<Form> {
         if all.iter().all(Form::is_fixed) {
             return Some(Form::Fixed(Value::from_elements(
@@ -243,7 +243,7 @@ impl Builder {
         Form::Array(out, n)
     }
 
-    /// What indexing with these keys picks.
+    /// Records indexing with these keys.
     pub fn index(&mut self, base: &Form, keys: &[Value]) -> Option<Form> {
         let Some((key, rest)) = keys.split_first() else { return Some(base.clone()) };
         let within = |x: f64| (x >= 0.0 && x == libm::trunc(x)).then_some(x as usize);
@@ -264,7 +264,7 @@ impl Builder {
         self.index(&picked, rest)
     }
 
-    /// From here on the tape holds only where this value is what it is now.
+    /// From here on, the tape is valid only while this value equals its current one.
     pub fn guard(&mut self, form: &Form, now: &Value) -> Option<()> {
         if !form.is_fixed() {
             self.ops.push(Op::Guard { form: form.clone(), value: now.clone() });
@@ -272,7 +272,7 @@ impl Builder {
         Some(())
     }
 
-    /// A log weight.
+    /// Records a log weight.
     pub fn factor(&mut self, weight: &Form) -> Option<()> {
         match *weight {
             Form::Num(x) => self.ops.push(Op::Factor { x }),
@@ -282,8 +282,8 @@ impl Builder {
         Some(())
     }
 
-    /// The log density of a value under the distribution that a family gives for these
-    /// arguments, which now is `dist`.
+    /// Records the log density of a value under the distribution that a family gives for
+    /// these arguments, which currently is `dist`.
     pub fn family(
         &mut self,
         builtin: &Builtin,
@@ -295,7 +295,7 @@ impl Builder {
         if x.is_fixed() && args.iter().all(Form::is_fixed) {
             return Some(());
         }
-        // Of `iid(d, n)`, d is what moves.
+        // In `iid(d, n)`, only d varies.
         let inner = match (dist, args.first()) {
             (Dist::Iid(_), Some(Form::Made(m))) if args[1..].iter().all(Form::is_fixed) => {
                 Some(Arc::clone(m))
@@ -315,7 +315,8 @@ impl Builder {
         self.score(dist, x.clone(), observed)
     }
 
-    /// The log density of a value under a distribution or likelihood, which now is `now`.
+    /// Records the log density of a value under a distribution or likelihood, which
+    /// currently is `now`.
     pub fn distribution(
         &mut self,
         dist: &Form,
@@ -343,10 +344,11 @@ impl Builder {
         Some(())
     }
 
-    /// Numbers under a mixture.
+    /// Records the log density of numbers under a mixture.
     fn mixture(&mut self, dist: &Dist, params: &[Form], x: &Form, observed: bool) -> Option<()> {
         let (Dist::Mixture(d), [weights, components]) = (dist, params) else { return None };
-        // As with other distributions of a number, many observed values are independent.
+        // As with other distributions of a number, several observed values are
+        // independent.
         if !observed && x.len().is_some() {
             return None;
         }
@@ -366,21 +368,21 @@ impl Builder {
         Some(())
     }
 
-    /// Numbers under one family.
+    /// Records the log density of numbers under one family.
     fn density(&mut self, dist: &Dist, params: &[Form], x: &Form, observed: bool) -> Option<()> {
         let n = x.len().unwrap_or(1);
         let fits = match (dist.elements(), x.len()) {
             (Some(elements), Some(n)) => elements == n,
             (Some(_), None) => false,
-            // Many observed values under one distribution of a number are independent.
+            // Several observed values under one distribution of a number are independent.
             (None, len) => observed || len.is_none(),
         };
         let fixed = params.iter().all(Form::is_fixed);
         let own_columns = params
             .iter()
             .all(|p| p.len().is_none_or(|len| len == n && matches!(dist, Dist::Product(_))));
-        // A truth value is no number to any other family, nor a number a truth value, but
-        // for 1 and 0.
+        // Only `flip` takes booleans; other families take numbers, and `flip` takes the
+        // numbers 0 and 1 only.
         let kind = match one_of(dist) {
             Dist::Flip(_) => matches!(x, Form::Fixed(v) if is_bools(v) || is_zeros_and_ones(v)),
             _ => !matches!(x, Form::Fixed(v) if is_bools(v)),
@@ -399,12 +401,12 @@ impl Builder {
     }
 }
 
-/// The distribution of the first element.
+/// Returns the distribution of the first element.
 fn one_of(dist: &Dist) -> Dist {
     dist.element(0)
 }
 
-/// Whether a value is a truth value, or an array of them.
+/// Whether a value is a boolean, or an array of booleans.
 fn is_bools(v: &Value) -> bool {
     match v {
         Value::Bool(_) => true,
@@ -413,7 +415,7 @@ fn is_bools(v: &Value) -> bool {
     }
 }
 
-/// Whether a value is 1 or 0, or an array of them.
+/// Whether a value is 1 or 0, or an array of these.
 fn is_zeros_and_ones(v: &Value) -> bool {
     let truth = |x: &f64| *x == 0.0 || *x == 1.0;
     match v {
@@ -423,7 +425,7 @@ fn is_zeros_and_ones(v: &Value) -> bool {
     }
 }
 
-/// Whether a value has nothing but numbers in it.
+/// Whether a value contains only numbers.
 fn numeric(v: &Value) -> bool {
     match v {
         Value::Num(_) | Value::Array(_) => true,

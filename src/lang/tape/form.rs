@@ -1,4 +1,4 @@
-//! What a tape knows of a value: where its numbers are, or how it is made.
+//! Forms: where the numbers of a value are on a tape, or how it is computed.
 
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
@@ -11,18 +11,18 @@ use std::sync::Arc;
 /// A value on a tape.
 #[derive(Clone, Debug)]
 pub enum Form {
-    /// One that depends on nothing the tape starts from.
+    /// A value that does not depend on the inputs of the tape.
     Fixed(Value),
-    /// The number at a place of the buffer.
+    /// The number at an index of the buffer.
     Num(usize),
-    /// So many numbers from a place on.
+    /// An array of numbers in the buffer: its start and length.
     Array(usize, usize),
-    /// An array of anything else.
+    /// An array of other forms.
     List(Arc<[Form]>),
     /// A record.
     Record(Arc<[(Arc<str>, Form)]>),
-    /// The result of a call that has no place in the buffer (a truth value, a
-    /// distribution, a covariance): made when it is needed.
+    /// The result of a call that is not stored in the buffer (a boolean, a distribution,
+    /// a covariance) and is computed when it is needed.
     Made(Arc<Made>),
 }
 
@@ -34,7 +34,7 @@ pub struct Made {
 }
 
 impl Form {
-    /// Whether it depends on nothing the tape starts from.
+    /// Whether it does not depend on the inputs of the tape.
     pub fn is_fixed(&self) -> bool {
         match self {
             Form::Fixed(_) => true,
@@ -44,12 +44,12 @@ impl Form {
         }
     }
 
-    /// The value, if it is fixed.
+    /// Returns the value, if it is fixed.
     pub fn fixed(&self) -> Option<Value> {
         self.is_fixed().then(|| self.value(&[])).flatten()
     }
 
-    /// The number of elements, for arrays.
+    /// Returns the number of elements, for arrays.
     pub(super) fn len(&self) -> Option<usize> {
         match self {
             Form::Fixed(v @ (Value::Array(_) | Value::List(_))) => v.len(),
@@ -59,7 +59,7 @@ impl Form {
         }
     }
 
-    /// Element `i` of an array.
+    /// Returns element `i` of an array.
     pub fn element(&self, i: usize) -> Option<Form> {
         match self {
             Form::Fixed(v) => v.element(i).map(Form::Fixed),
@@ -69,7 +69,7 @@ impl Form {
         }
     }
 
-    /// Element `i` of an array, or the field at that place of a record.
+    /// Returns element `i` of an array, or field `i` of a record.
     pub fn position(&self, i: usize) -> Option<Form> {
         match self {
             Form::Fixed(Value::Record(r)) => r.get_index(i).map(|(_, v)| Form::Fixed(v.clone())),
@@ -78,7 +78,7 @@ impl Form {
         }
     }
 
-    /// A field of a record.
+    /// Returns a field of a record.
     pub(super) fn field(&self, name: &str) -> Option<Form> {
         match self {
             Form::Fixed(Value::Record(r)) => r.get(name).cloned().map(Form::Fixed),
@@ -87,7 +87,7 @@ impl Form {
         }
     }
 
-    /// The value, from the numbers in the buffer; `None` if a call fails.
+    /// Returns the value, from the numbers in the buffer; `None` if a call fails.
     pub(super) fn value(&self, buffer: &[f64]) -> Option<Value> {
         Some(match self {
             Form::Fixed(v) => v.clone(),
@@ -104,7 +104,7 @@ impl Form {
         })
     }
 
-    /// Puts a value of this form into the buffer; false if it is of another form.
+    /// Writes a value of this form into the buffer; false if it has another form.
     pub(super) fn write(&self, buffer: &mut [f64], value: &Value) -> bool {
         match (self, value) {
             (Form::Num(at), Value::Num(x)) => {
@@ -127,7 +127,7 @@ impl Form {
         }
     }
 
-    /// Calls `f` with the place of each number, in order.
+    /// Calls `f` with the index of each number, in order.
     pub(super) fn each_place(&self, f: &mut impl FnMut(usize)) {
         match self {
             Form::Num(at) => f(*at),
@@ -138,7 +138,7 @@ impl Form {
         }
     }
 
-    /// The adjoint of a value that lies in the buffer.
+    /// Returns the adjoint of a value that is stored in the buffer.
     pub(super) fn adjoint(&self, adjoints: &[f64]) -> Adjoint {
         match self {
             Form::Num(at) => Adjoint::Num(adjoints[*at]),
@@ -151,8 +151,8 @@ impl Form {
         }
     }
 
-    /// Adds an adjoint to those of the numbers this is made of; false if a derivative is
-    /// not known.
+    /// Adds an adjoint to those of the numbers that this is computed from; false if a
+    /// derivative is not known.
     pub(super) fn vjp(&self, by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
         if by.is_zero() || self.is_fixed() {
             return true;
@@ -188,8 +188,8 @@ impl Form {
         }
     }
 
-    /// Passes the derivatives by the parameters of a distribution, and by a covariance
-    /// among them, on to what it was made of.
+    /// Propagates the derivatives with respect to the parameters of a distribution, and
+    /// to a covariance among its arguments, to the numbers it is computed from.
     pub(super) fn vjp_dist(
         &self,
         dist: &Dist,
@@ -220,7 +220,7 @@ impl Form {
     }
 }
 
-/// The arguments of a call and its result.
+/// Returns the arguments of a call and its result.
 pub(super) fn call(
     builtin: &Builtin,
     args: &[Form],
@@ -232,8 +232,8 @@ pub(super) fn call(
     Some((values, value))
 }
 
-/// The result of a call, of an incremental function from where it was in the last run if
-/// the tape keeps that.
+/// Returns the result of a call; an incremental function starts from its evaluation in
+/// the last run, if the tape keeps that.
 pub(super) fn call_from(
     builtin: &Builtin,
     args: &[Form],
@@ -253,7 +253,7 @@ pub(super) fn call_from(
     }
 }
 
-/// Passes the adjoint of a call's result, which is this value, on to its arguments.
+/// Propagates the adjoint of a call's result, which is `value`, to its arguments.
 pub(super) fn vjp_call(
     builtin: &Builtin,
     args: &[Form],

@@ -1,16 +1,16 @@
-//! Tapes: the straight line of arithmetic that leads from some numbers to a log density,
-//! recorded once and run many times.
+//! Tapes: a straight-line program from some numbers to a log density, recorded once and
+//! run many times.
 //!
-//! A tape keeps every number in one buffer and every derivative in another of the same
-//! layout; running it forwards or backwards allocates nothing where all operations are
+//! A tape keeps all numbers in one buffer and all derivatives in another of the same
+//! layout. Running it forwards or backwards allocates nothing if all operations are
 //! arithmetic on numbers and arrays, and densities of numbers. Other operations call the
-//! built-in itself, and its vector-Jacobian product. It knows nothing of traces:
-//! [`Builder`] is told what to compute, in order.
+//! built-in itself, and its vector-Jacobian product. A tape is independent of traces: a
+//! [`Builder`] receives the operations in order.
 //!
-//! Invariant: the same functions on the same numbers as the program, and scores summed
-//! exactly, so that a density is that of the program to the last bit. What a tape cannot
-//! tell (a parameter outside its domain, a condition that turned out otherwise) it says,
-//! and the program itself has to be run.
+//! Invariant: it applies the same functions to the same numbers as the program, and sums
+//! scores exactly, so that a density equals that of the program to the last bit. If it
+//! cannot evaluate a point (a parameter outside its domain, a condition with another
+//! outcome), it reports that, and the program itself must be run.
 
 mod build;
 mod form;
@@ -24,7 +24,7 @@ use crate::lang::value::Value;
 use crate::num::ExactSum;
 use op::Op;
 
-/// What the scores on a tape add up to.
+/// The sums of the scores on a tape.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScoreSums {
     /// The log prior of the choices on the tape.
@@ -35,8 +35,8 @@ pub struct ScoreSums {
     pub jacobian: ExactSum,
 }
 
-/// Numbers that a tape starts from: a value that is the image of unconstrained
-/// coordinates under its support.
+/// An input of a tape: a value that is the image of unconstrained coordinates under its
+/// support.
 #[derive(Debug)]
 struct Input {
     support: Support,
@@ -56,13 +56,13 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// What the scores added up to when it was last run.
+    /// Returns the sums of the scores at its last run.
     pub fn sums(&self) -> &ScoreSums {
         &self.sums
     }
 
-    /// Runs it where its inputs have these values, by their number, and gives the
-    /// coordinates. False where it cannot tell what the program does there.
+    /// Runs it with these values of its inputs, given by their number, and returns the
+    /// coordinates in `y`. False if it cannot evaluate the program there.
     pub fn stand(&mut self, mut value: impl FnMut(usize) -> Value, y: &mut Vec<f64>) -> bool {
         self.sums = ScoreSums::default();
         y.clear();
@@ -82,8 +82,8 @@ impl Tape {
         self.forward()
     }
 
-    /// Runs it at a point of unconstrained space. False where it cannot tell what the
-    /// program does there.
+    /// Runs it at a point of unconstrained space. False if it cannot evaluate the program
+    /// there.
     pub fn run(&mut self, y: &[f64]) -> bool {
         self.sums = ScoreSums::default();
         let mut rest = y;
@@ -109,7 +109,7 @@ impl Tape {
         self.forward()
     }
 
-    /// The values of the inputs at a point of unconstrained space, in order.
+    /// Returns the values of the inputs at a point of unconstrained space, in order.
     pub fn images(&self, y: &[f64]) -> impl Iterator<Item = Datum> {
         let mut rest = y;
         self.inputs.iter().map(move |input| {
@@ -124,9 +124,9 @@ impl Tape {
         self.ops.iter_mut().all(|op| op.forward(values, sums))
     }
 
-    /// The derivatives, by the coordinates at which it was last run, of the log prior
-    /// plus `power` times the log likelihood plus the log Jacobians. False where one is
-    /// not known.
+    /// Computes the derivatives, with respect to the coordinates `y` at which it was last
+    /// run, of the log prior plus `power` times the log likelihood plus the log
+    /// Jacobians. False if one is not known.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         out.clear();
         self.adjoints.clear();

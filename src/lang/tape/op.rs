@@ -10,20 +10,21 @@ use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// An operation: it reads numbers that lie before those it writes.
+/// An operation; the numbers it reads precede those it writes.
 #[derive(Debug)]
 pub(super) enum Op {
-    /// A function of one number and its slope, of x and y, element by element.
+    /// A function of one number x with value y, and its slope as a function of x and y,
+    /// element by element.
     Unary { f: fn(f64) -> f64, slope: fn(f64, f64) -> f64, x: usize, out: usize, n: usize },
-    /// A function of two.
+    /// A function of two numbers, element by element.
     Binary { f: &'static Binary, x: Column, y: Column, out: usize, n: usize },
-    /// A function of an array that gives one number.
+    /// A reduction of an array to one number.
     Reduce { f: &'static Reduction, x: usize, n: usize, out: usize },
-    /// A fixed matrix, row by row from `rows` on, times a vector.
+    /// The product of a fixed matrix, stored row by row from `rows` on, and a vector.
     Matrix { rows: usize, x: usize, width: usize, out: usize, n: usize },
-    /// Numbers from anywhere side by side.
+    /// Numbers gathered from anywhere into an array.
     Gather { from: Box<[usize]>, out: usize },
-    /// A call of any built-in whose result is of a form that lies in the buffer.
+    /// A call of any built-in whose result is stored in the buffer.
     Call {
         builtin: Builtin,
         args: Box<[Form]>,
@@ -31,7 +32,7 @@ pub(super) enum Op {
         before: Option<Arc<Before>>,
         keeps: bool,
     },
-    /// What must be as it was when the tape was recorded.
+    /// A value that must be the same as when the tape was recorded.
     Guard { form: Form, value: Value },
     /// The log densities of numbers.
     Density {
@@ -48,7 +49,7 @@ pub(super) enum Op {
 }
 
 impl Op {
-    /// Runs it; false if that cannot be told from here.
+    /// Runs it; false if the tape cannot evaluate the program here.
     pub fn forward(&mut self, v: &mut [f64], sums: &mut ScoreSums) -> bool {
         match self {
             Op::Unary { f, x, out, n, .. } => {
@@ -99,7 +100,7 @@ impl Op {
         }
     }
 
-    /// Passes adjoints back; false if a derivative is not known.
+    /// Propagates adjoints backwards; false if a derivative is not known.
     pub fn reverse(&self, v: &[f64], g: &mut [f64], power: f64, scratch: &mut Vec<f64>) -> bool {
         let weight = |observed: bool| if observed { power } else { 1.0 };
         match self {
@@ -162,10 +163,10 @@ impl ScoreSums {
     }
 }
 
-/// Adds the log density of a value; false if it has none.
+/// Adds the log density of a value; false if it is undefined.
 fn score(dist: &Value, x: &Value, observed: bool, sum: &mut ExactSum) -> bool {
     let found = match dist {
-        // What is drawn as one choice has one density, also where it is an array.
+        // A value drawn as one choice has one density, even if it is an array.
         Value::Dist(d) if !observed && d.elements().is_none() => {
             x.to_datum().map(|x| density::Score::One(d.log_density_stored(&x)))
         }
@@ -200,7 +201,8 @@ fn vjp_score(
     by_x.scale(weight);
     params.iter_mut().for_each(|p| *p *= weight);
     let stored = value.to_datum()?;
-    // What is observed is the value, however a choice would be stored.
+    // The observed datum is the value itself, even if a choice would be stored
+    // non-centred.
     let scored: Dist = if observed { Dist::clone(d).centred() } else { Dist::clone(d) };
     let by_matrix = |a: &crate::lang::builtins::Args| {
         let mut by = density::by_matrix(a, &scored, &density::by_factor(&scored, &stored, &[])?)?;

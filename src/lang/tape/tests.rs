@@ -1,4 +1,4 @@
-//! Tapes told by hand against closed forms.
+//! Tapes recorded by hand against closed forms.
 
 use super::*;
 use crate::dist::Dist;
@@ -13,7 +13,7 @@ fn normal(mean: f64, sd: f64) -> Dist {
     Dist::Normal(crate::dist::Normal::new(mean, sd).unwrap())
 }
 
-/// `s ~ gamma-like positive number; observe normal([1, 2] * s, s) = [0.5, 0.7]`, told
+/// `s ~ gamma-like positive number; observe normal([1, 2] * s, s) = [0.5, 0.7]`, recorded
 /// with the values for s = 2.
 fn told(guarded: bool) -> Tape {
     let (table, mut b) = (Table::default(), Builder::default());
@@ -59,7 +59,7 @@ fn densities_and_gradients_are_those_of_the_formula() {
         let slope = (density(y + 1e-6) - density(y - 1e-6)) / 2e-6;
         assert!((g[0] - slope).abs() < 1e-6, "{g:?} at {y}, by differences {slope}");
     }
-    // Standing at a value is being at its coordinate.
+    // The coordinates of a given value are returned.
     let mut y = Vec::new();
     assert!(tape.stand(|_| Value::Num(1.5), &mut y));
     assert_eq!(y, [libm::log(1.5)]);

@@ -85,7 +85,7 @@ impl Graph {
         self.finish_child(code, n)
     }
 
-    /// Whether a condition that is evaluated holds.
+    /// Whether an evaluated condition holds.
     fn holds(&self, code: &Code, n: NodeId, cond: Operand) -> Result<bool, Failure> {
         match self.value(code, self.nodes[n as usize].frame, cond) {
             Value::Bool(b) => Ok(*b),
@@ -187,7 +187,7 @@ impl Graph {
         self.finish_child(code, n)
     }
 
-    /// Lets the old child frame go and makes a new one; its result is not held yet.
+    /// Detaches the old child frame and creates a new one, whose result is not held yet.
     fn replace_child(&mut self, code: &Code, n: NodeId, child: Frame) -> Result<(), Failure> {
         self.let_side_go(code, n);
         let frame = self.make_frame(code, child)?;
@@ -310,7 +310,7 @@ impl Graph {
         Ok(self.finish(code, n, Value::Memo(NodeRef { node: n, version })))
     }
 
-    /// A call through `mem`: finds or makes the entry of its arguments.
+    /// Evaluates a call through `mem`: finds or creates the entry for its arguments.
     fn call_memo(
         &mut self,
         code: &Code,
@@ -377,7 +377,7 @@ impl Graph {
         Ok(self.finish(code, n, value))
     }
 
-    /// Counts one more call of an entry, made if it is new.
+    /// Adds a call to an entry, which is created if it is new.
     fn enter_memo(
         &mut self,
         code: &Code,
@@ -406,8 +406,8 @@ impl Graph {
                     return Err(self.type_error(code, n, "not a `mem` function".into()));
                 };
                 let home = self.nodes[memo as usize].frame;
-                // What the key stands for: calls with 0 and -0 are one entry, and which
-                // of them came first must not show.
+                // The values that the key stands for: calls with 0 and -0 share one
+                // entry, and the result must not depend on which came first.
                 let values: Arc<[Value]> = match key {
                     Key::List(keys) if values.len() != 1 => {
                         keys.iter().map(Key::to_value).collect()
@@ -436,7 +436,7 @@ impl Graph {
         Ok(new.0)
     }
 
-    /// Counts one call of an entry less; an entry without calls goes at the end of the
+    /// Removes a call from an entry; an entry without calls is dropped at the end of the
     /// update.
     pub(crate) fn leave_memo(&mut self, memo: NodeId, key: &Key) {
         let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
@@ -449,7 +449,7 @@ impl Graph {
         self.note(Entry::Memo(memo, key.clone(), Some(old)));
     }
 
-    /// Drops an entry that is still without calls.
+    /// Drops an entry that still has no calls.
     pub(crate) fn drop_idle(&mut self, code: &Code, memo: NodeId, key: &Key) {
         let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
         let Some(&(frame, 0)) = m.entries.get(key) else { return };
@@ -459,12 +459,12 @@ impl Graph {
     }
 }
 
-/// Which argument each parameter takes: `None` when that is the order written, without
-/// gaps.
+/// Returns the argument that each parameter takes; `None` if that is the written order,
+/// without gaps.
 ///
 /// # Errors
-/// Too many arguments, too few, one given twice, an unknown keyword: a message for the
-/// user.
+/// A message for the user if there are too many or too few arguments, one is given twice,
+/// or a keyword is unknown.
 pub(crate) fn match_names<'a>(
     name: &str,
     params: &[Arc<str>],
@@ -505,7 +505,7 @@ pub(crate) fn count(n: usize, what: &str) -> String {
 }
 
 impl Block {
-    /// The name and parameters, for functions.
+    /// Returns the name, parameters and number of required parameters, for functions.
     pub fn signature(&self) -> Option<(&str, &[Arc<str>], usize)> {
         match &self.kind {
             BlockKind::Function { name, params, required } => Some((name, params, *required)),

@@ -1,4 +1,4 @@
-//! Random choices: drawn when first asked for, absorbing or changed after that.
+//! Random choices: drawn when first needed, and absorbing or changed after that.
 
 use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
@@ -42,8 +42,8 @@ impl Graph {
                 self.set_deps(n, deps);
                 return Ok(self.finish_unchanged(code, n));
             }
-            // Marking stops at numbers: what reads this one was not told that it may
-            // become something else.
+            // Invalidation stops at plain numbers, so the users of this one were not
+            // invalidated for a change of its form.
             let was_told =
                 self.nodes[n as usize].flags & TARGET != 0 || self.may_be_redrawn(code, n);
             if !moved && !was_told {
@@ -82,7 +82,7 @@ impl Graph {
         operands.iter().any(changed)
     }
 
-    /// The hash that a keyed choice is known by.
+    /// Returns the address hash of a keyed choice.
     fn own_hash(&self, n: NodeId) -> Option<u64> {
         match self.nodes[n as usize].side.as_deref() {
             Some(Side::Choice(c)) => c.hash,
@@ -90,7 +90,7 @@ impl Graph {
         }
     }
 
-    /// The distribution of a draw or observation whose parameters are evaluated.
+    /// Returns the distribution of a draw or observation whose parameters are evaluated.
     pub(crate) fn make_dist(
         &self,
         code: &Code,
@@ -105,7 +105,7 @@ impl Graph {
         }
     }
 
-    /// Makes the distribution of a draw or observation, or tells the node to wait for.
+    /// Returns the distribution of a draw or observation, or else the node to wait for.
     pub(crate) fn dist_now(
         &self,
         code: &Code,
@@ -118,7 +118,7 @@ impl Graph {
         Ok(self.dist_of_values(code, n, spec, &values))
     }
 
-    /// The distribution with these parameters.
+    /// Returns the distribution with these parameters.
     pub(crate) fn dist_of_values(
         &self,
         code: &Code,
@@ -162,7 +162,7 @@ impl Graph {
         Ok(self.own_keyed_hash(code, frame, site, &own))
     }
 
-    /// The hash of a choice's address.
+    /// Returns the hash of a choice's address.
     pub(crate) fn choice_hash(&self, code: &Code, n: NodeId) -> u64 {
         if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref()
             && let Some(h) = c.hash
@@ -175,7 +175,7 @@ impl Graph {
         }
     }
 
-    /// A first value: from the constraints or from the prior.
+    /// Gives a choice its first value, from the constraints or the prior.
     fn draw_fresh(
         &mut self,
         code: &Code,
@@ -243,7 +243,7 @@ impl Graph {
         Ok(value)
     }
 
-    /// A draw from the prior.
+    /// Draws from the prior.
     fn drawn_now(&self, code: &Code, n: NodeId, dist: &Dist, hash: u64) -> Result<Datum, Failure> {
         if dist.is_improper() && !self.starting {
             return Err(self.improper(code, n, dist));
@@ -271,8 +271,8 @@ impl Graph {
     }
 
     /// Re-scores a choice under its distribution and applies the pending changes. False
-    /// when its form no longer fits (as many elements, as many dimensions): then it is
-    /// drawn anew.
+    /// if its form no longer fits (number of elements or dimensions); it must then be
+    /// resampled.
     fn update_choice(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<bool, Failure> {
         if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref()
             && c.elements != NONE
@@ -369,7 +369,7 @@ impl Graph {
         Ok(true)
     }
 
-    /// The same for a choice of many elements.
+    /// [`Graph::update_choice`] for a choice of several elements.
     fn update_elements(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<(), Failure> {
         let hash = self.choice_hash(code, n);
         let Some(Side::Choice(side)) = self.nodes[n as usize].side.as_deref() else {
@@ -440,7 +440,7 @@ impl Graph {
         Ok(())
     }
 
-    /// The stored form of a choice.
+    /// Returns the stored form of a choice.
     pub(crate) fn stored(&self, n: NodeId) -> Option<Datum> {
         match self.nodes[n as usize].side.as_deref() {
             Some(Side::Choice(ChoiceSide { stored: Some(s), .. })) => Some(s.clone()),
@@ -455,11 +455,11 @@ impl Graph {
         )
     }
 
-    /// Takes a choice that nothing asks for out of the score and the register.
+    /// Removes a choice that nothing depends on from the score and the register.
     pub(crate) fn retire_choice(&mut self, code: &Code, n: NodeId) {
         self.vanished += 1;
         if self.nodes[n as usize].flags & IMPROPER != 0 {
-            // Nothing draws it again: with no way back, the update weighs nothing.
+            // It cannot be drawn again: the update is irreversible and has zero weight.
             self.drawn.add(f64::INFINITY);
         }
         let hash = self.choice_hash(code, n);
@@ -505,7 +505,7 @@ impl Graph {
     }
 }
 
-/// Element `i` of a drawn array.
+/// Returns element `i` of a drawn array.
 fn element(d: &Datum, i: usize) -> Option<Datum> {
     match d {
         Datum::Vec(xs) => xs.get(i).map(|x| Datum::Num(*x)),
@@ -514,13 +514,14 @@ fn element(d: &Datum, i: usize) -> Option<Datum> {
     }
 }
 
-/// The hash of the address of element `i`.
+/// Returns the hash of the address of element `i`.
 pub(crate) fn element_hash(hash: u64, i: usize) -> u64 {
     Key::Num((i as f64).to_bits()).hash_into(hash)
 }
 
 impl Constraint {
-    /// The constraint in the stored form of a distribution; `None` if it does not fit.
+    /// Returns the constraint in the stored form of a distribution; `None` if it does not
+    /// fit.
     fn whole(&self, dist: &Dist) -> Option<Datum> {
         match self {
             Constraint::Stored(d) => Some(d.clone()),

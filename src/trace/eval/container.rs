@@ -11,13 +11,13 @@ use indexmap::IndexMap;
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
-/// Where an element's value is.
+/// The location of an element's value.
 enum Place {
     Node(NodeId),
     Constant(Operand),
 }
 
-/// The outcome of looking for an element.
+/// The outcome of a search for an element.
 enum Found {
     Place(Place),
     Missing,
@@ -25,7 +25,7 @@ enum Found {
 }
 
 impl Graph {
-    /// Finds out which keys a container has and where their draws are.
+    /// Determines the keys of a container and the draws of its elements.
     pub(super) fn evaluate_container(
         &mut self,
         code: &Code,
@@ -78,7 +78,7 @@ impl Graph {
         Ok(self.finish(code, n, Value::Container(NodeRef { node: n, version })))
     }
 
-    /// Walks the loops of a source and enters each key.
+    /// Walks the loops of a source and adds each key.
     #[allow(clippy::too_many_arguments)]
     fn walk(
         &mut self,
@@ -146,12 +146,12 @@ impl Graph {
         Ok(None)
     }
 
-    /// Finds the element of a container with a key.
+    /// Finds the element of a container for a key.
     fn find(&mut self, code: &Code, container: NodeId, keys: &[Key]) -> Result<Found, Failure> {
         match self.nodes[container as usize].side.as_deref() {
             Some(Side::Loop(l)) => {
                 let [key] = keys else { return Ok(Found::Missing) };
-                // Results of a map over names answer to names and to positions.
+                // Results of a map over names can be indexed by name and by position.
                 let pass =
                     l.keys.find(key).or_else(|| key.as_index().filter(|i| *i < l.keys.len()));
                 let Some(pass) = pass else { return Ok(Found::Missing) };
@@ -180,7 +180,7 @@ impl Graph {
         }
     }
 
-    /// The draw of an element.
+    /// Returns the draw of an element.
     fn element_node(
         &mut self,
         code: &Code,
@@ -197,7 +197,7 @@ impl Graph {
         Ok(self.frames[frame as usize].base + source.draw)
     }
 
-    /// The result of a pass of a `map`.
+    /// Returns the location of the result of a pass of a `map`.
     fn map_result(&mut self, code: &Code, owner: NodeId, pass: usize) -> Result<Place, Failure> {
         let f = self.pass_frame(code, owner, pass)?;
         let result = code.blocks[self.frames[f as usize].block as usize].result;
@@ -207,7 +207,7 @@ impl Graph {
         })
     }
 
-    /// Reads all elements of the container in the slot before.
+    /// Reads all elements of the container in the preceding slot.
     pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let container = n - 1;
         if self.nodes[container as usize].state != State::Clean {
@@ -294,7 +294,7 @@ impl Graph {
         self.finish_made(code, n, value)
     }
 
-    /// The entries of a container whose keys are those of its one loop.
+    /// Returns the entries of a container whose keys are those of its single loop.
     fn single_loop_entries(
         &self,
         code: &Code,
@@ -347,7 +347,7 @@ impl Graph {
                     return self.need(code, container);
                 }
                 if matches!(rest[0], Value::Array(_) | Value::List(_)) {
-                    // Many elements at once: read the container as a whole.
+                    // Several elements at once: read the container as a whole.
                     if self.nodes[container as usize + 1].state != State::Clean {
                         return self.need(code, container + 1);
                     }
@@ -391,8 +391,8 @@ impl Graph {
         Ok(self.finish(code, n, value))
     }
 
-    /// The element of a container that a node read before, if container and keys are what
-    /// they were.
+    /// Returns the element of a container that a node read before, if container and keys
+    /// are unchanged.
     fn element_read_before(
         &self,
         code: &Code,
@@ -413,7 +413,7 @@ impl Graph {
         (same && deps.len() == 1 && deps[0] != r.node + 1).then(|| deps[0])
     }
 
-    /// How many keys an element of a container has.
+    /// Returns the number of keys of an element of a container.
     pub(crate) fn key_width(&self, code: &Code, container: NodeId) -> usize {
         match self.op(code, container) {
             Op::Container { sources, .. } => sources[0].keys.len(),
@@ -460,7 +460,8 @@ impl Graph {
     }
 }
 
-/// Numbers in order, then everything else.
+/// Compares keys: numbers numerically and before all other kinds, the rest by their
+/// `Ord`.
 fn compare_keys(a: &[Key], b: &[Key]) -> std::cmp::Ordering {
     for (x, y) in a.iter().zip(b) {
         let order = match (x, y) {

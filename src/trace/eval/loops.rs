@@ -1,4 +1,4 @@
-//! `for`, `map` and `fold`: one frame a pass, made when something asks for it.
+//! `for`, `map` and `fold`: one frame per pass, created on demand.
 
 use crate::lang::code::{BlockKind, Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
@@ -13,7 +13,7 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Graph {
-    /// The element a pass is for.
+    /// Evaluates the element of a pass.
     pub(super) fn evaluate_item(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let frame = &self.frames[self.nodes[n as usize].frame as usize];
         let (owner, pass) = (frame.owner, frame.pass as usize);
@@ -27,7 +27,7 @@ impl Graph {
         Ok(self.finish(code, n, value))
     }
 
-    /// The running value of a `fold` before a pass.
+    /// Evaluates the running value of a `fold` before a pass.
     pub(super) fn evaluate_accumulator(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let frame = &self.frames[self.nodes[n as usize].frame as usize];
         let (owner, pass) = (frame.owner, frame.pass as usize);
@@ -184,7 +184,8 @@ impl Graph {
         let (from, operand) = match passes.checked_sub(1) {
             None => (frame, Some(init)),
             Some(last) => {
-                // All passes exist, so that a change finds its way to the next one.
+                // All passes must exist, so that a change propagates from each to the
+                // next.
                 self.make_all_passes(code, n)?;
                 let f = self.pass_frame(code, n, last)?;
                 (f, code.blocks[self.frames[f as usize].block as usize].result)
@@ -236,7 +237,7 @@ impl Graph {
         }
     }
 
-    /// Sets or updates the passes of a loop: passes whose key stays keep their frame.
+    /// Sets or updates the passes of a loop; passes whose key persists keep their frame.
     #[allow(clippy::too_many_arguments)]
     fn set_loop(
         &mut self,
@@ -301,7 +302,7 @@ impl Graph {
         if let Some(Side::Loop(_)) = self.nodes[n as usize].side.as_deref()
             && !matches!(self.op(code, n), Op::Fold { .. })
         {
-            // The reference with the new version is the value; consumers see that the
+            // The value is a reference with the new version, so that users see that the
             // structure changed.
             let node = &mut self.nodes[n as usize];
             node.value = Value::Container(NodeRef { node: n, version });
@@ -326,7 +327,7 @@ impl Graph {
         Ok(())
     }
 
-    /// The frame of a pass, made if nothing has asked for it before.
+    /// Returns the frame of a pass, which is created on first use.
     pub(crate) fn pass_frame(
         &mut self,
         code: &Code,
@@ -379,8 +380,8 @@ impl Graph {
     }
 }
 
-/// Keys for `for`: the elements themselves where they are numbers, strings or bools; else
-/// the index.
+/// Returns the keys for `for`: the elements themselves if they are numbers, strings or
+/// bools, otherwise the index.
 fn for_keys(items: &Value) -> Result<Keys, Fault> {
     match items {
         Value::Array(xs) => {
@@ -402,8 +403,8 @@ fn for_keys(items: &Value) -> Result<Keys, Fault> {
     }
 }
 
-/// Keys for `map` and `fold`: the elements where they are distinct strings, a record's
-/// names, else the index.
+/// Returns the items and keys for `map` and `fold`: the elements if they are distinct
+/// strings, a record's names, otherwise the index.
 fn map_keys(xs: &Value) -> Result<(Value, Keys), Fault> {
     match xs {
         Value::Array(v) => Ok((xs.clone(), Keys::Range { start: 0, len: v.len() })),

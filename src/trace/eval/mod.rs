@@ -1,4 +1,4 @@
-//! Evaluating one node, by the kind of its operation. One file a family.
+//! Evaluation of one node, by kind of operation; one file per family of operations.
 
 mod call;
 pub(crate) mod choice;
@@ -18,7 +18,7 @@ use crate::lang::value::{Closure, Value};
 use smallvec::SmallVec;
 
 impl Graph {
-    /// One attempt at the operation of a node.
+    /// Makes one attempt to run the operation of a node.
     pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         match self.op(code, n) {
@@ -87,12 +87,12 @@ impl Graph {
         }
     }
 
-    /// The node to wait for before an operand can be read.
+    /// Returns the node to wait for before an operand can be read.
     pub(super) fn unready(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
         self.resolve(frame, o).filter(|n| self.nodes[*n as usize].state != State::Clean)
     }
 
-    /// Waits for operands; `None` when all are ready.
+    /// Waits for operands; `None` if all are ready.
     pub(super) fn await_all(
         &mut self,
         code: &Code,
@@ -129,8 +129,8 @@ impl Graph {
         Ok(None)
     }
 
-    /// The values of operands, containers read as arrays or records, or the node to wait
-    /// for before they can be read.
+    /// Returns the values of operands, with containers read as arrays or records, or else
+    /// the node to wait for.
     pub(crate) fn inputs<'a>(
         &'a self,
         code: &'a Code,
@@ -165,8 +165,8 @@ impl Graph {
         Ok(values)
     }
 
-    /// The value of an operand with a container read as an array or record; what was read
-    /// for that goes to `deps`.
+    /// Returns the value of an operand, with a container read as an array or record;
+    /// nodes read for that are added to `deps`.
     pub(super) fn plain<'a>(
         &'a self,
         code: &'a Code,
@@ -183,7 +183,8 @@ impl Graph {
         }
     }
 
-    /// Calls a built-in at a node: an incremental function from where it was.
+    /// Calls a built-in at a node; an incremental function continues from its previous
+    /// evaluation.
     pub(super) fn apply_at(
         &self,
         n: NodeId,
@@ -222,21 +223,21 @@ impl Graph {
         self.fail(code, n, f.kind, f.message, f.hint)
     }
 
-    /// An error of the wrong type at a node.
+    /// Builds a type error at a node.
     pub(super) fn type_error(&self, code: &Code, n: NodeId, message: String) -> Failure {
         self.fail(code, n, FaultKind::Type, message, None)
     }
 }
 
-/// What a call gave.
+/// The result of a call.
 pub(super) enum Made {
     Value(Value),
-    /// With what to start from next time.
+    /// With the data from which the next evaluation starts.
     Kept(Before),
 }
 
 impl Made {
-    /// The value alone.
+    /// Returns the value alone.
     pub fn into_value(self) -> Value {
         match self {
             Made::Value(value) => value,

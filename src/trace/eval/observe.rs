@@ -1,4 +1,4 @@
-//! Observations and factors: what conditions the trace.
+//! Observations and factors, which condition the trace.
 
 use crate::lang::code::{Code, DistSpec, Op, Operand};
 pub(crate) use crate::lang::density::Score;
@@ -21,7 +21,7 @@ impl Graph {
     ) -> Result<Poll, Failure> {
         let frame = self.nodes[n as usize].frame;
         let mut deps = Deps::new();
-        // Of a view, it draws a picture.
+        // Observing a view renders a picture.
         if matches!(spec, DistSpec::Value(_)) {
             self.spent.count_large();
         }
@@ -54,7 +54,7 @@ impl Graph {
         Ok(self.finish(code, n, Value::Unit))
     }
 
-    /// Keeps the total of an observation's elements.
+    /// Stores the total of an observation's elements.
     fn set_total(&mut self, n: NodeId, sum: ExactSum) {
         match self.nodes[n as usize].side.as_deref_mut() {
             Some(Side::Total(t)) => {
@@ -65,7 +65,7 @@ impl Graph {
         }
     }
 
-    /// Scores an observation, or tells the node to wait for.
+    /// Scores an observation, or returns the node to wait for.
     fn observation_score(
         &self,
         code: &Code,
@@ -83,7 +83,7 @@ impl Graph {
         Ok(self.score_of_values(code, n, spec, &values, observed))
     }
 
-    /// The score of an observation with these parameters.
+    /// Returns the score of an observation with these parameters.
     pub(crate) fn score_of_values(
         &self,
         code: &Code,
@@ -113,7 +113,8 @@ impl Graph {
         density::score(&dist, observed).map_err(|f| self.fault(code, n, f))
     }
 
-    /// The log density of an observation's coarse surrogate: never part of the joint.
+    /// Returns the log density of an observation's coarse surrogate, which is never part
+    /// of the joint.
     pub(crate) fn surrogate_score(
         &mut self,
         code: &Code,
@@ -183,7 +184,7 @@ impl Graph {
         Ok(self.finish(code, n, Value::Unit))
     }
 
-    /// Takes an observation's or factor's score back.
+    /// Removes an observation's or factor's score from the likelihood.
     pub(crate) fn retire_score(&mut self, n: NodeId) {
         let mut likelihood = std::mem::take(&mut self.likelihood);
         self.take_score(n, &mut likelihood);
@@ -199,7 +200,7 @@ impl Graph {
         }
     }
 
-    /// Takes an observation's or factor's score out of a sum.
+    /// Subtracts an observation's or factor's score from a sum.
     pub(crate) fn take_score(&self, n: NodeId, from: &mut ExactSum) {
         let node = &self.nodes[n as usize];
         match node.side.as_deref() {

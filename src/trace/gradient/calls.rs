@@ -1,5 +1,5 @@
-//! How derivatives pass through calls of built-ins: written as such, called as values,
-//! mapped over elements.
+//! Vector-Jacobian products of calls of built-ins: direct calls, calls of function
+//! values, and maps over elements.
 
 use super::Reverse;
 use crate::lang::adjoint::Adjoint;
@@ -11,7 +11,7 @@ use crate::trace::propagate::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
-    /// A call written as such.
+    /// Propagates an adjoint through a direct call.
     pub(super) fn vjp_builtin(
         &mut self,
         n: NodeId,
@@ -26,7 +26,8 @@ impl Reverse<'_> {
         self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)
     }
 
-    /// A call of a built-in that is a value; false if the node is none.
+    /// Propagates an adjoint through a call of a built-in function value; false if the
+    /// node is not such a call.
     pub(super) fn vjp_called(&mut self, n: NodeId, by: &Adjoint) -> Result<bool, Failure> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
@@ -35,7 +36,7 @@ impl Reverse<'_> {
         };
         let Value::Builtin(i) = g.value(self.code, frame, *f) else { return Ok(false) };
         let builtin = self.code.builtins.get(*i);
-        // It was matched when it was called.
+        // The names were matched before, when it was called.
         let Ok(order) = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())) else {
             return Ok(false);
         };
@@ -58,7 +59,7 @@ impl Reverse<'_> {
         Ok(true)
     }
 
-    /// A built-in applied to each element.
+    /// Propagates an adjoint through a built-in applied to each element.
     pub(super) fn vjp_mapped(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
@@ -92,7 +93,7 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// The adjoints of a call's arguments, which come from these operands.
+    /// Returns the adjoints of a call's arguments, which come from these operands.
     fn by_call(
         &self,
         n: NodeId,
@@ -112,7 +113,7 @@ impl Reverse<'_> {
         }
     }
 
-    /// Hands out the adjoints of a call's arguments.
+    /// Adds the adjoints of a call's arguments to the nodes they come from.
     pub(super) fn give_arguments(
         &mut self,
         n: NodeId,

@@ -1,11 +1,11 @@
-//! Gradients of the log joint density by chosen choices: reverse mode over the trace.
+//! Gradients of the log joint density with respect to selected choices: reverse mode over
+//! the trace.
 //!
-//! The nodes between the choices and what they are scored by are put in an order in which
-//! operands come first; derivatives then flow from the scores back through that order.
-//! Structure is taken as it is: which branch is taken, how many choices there are, what a
-//! discrete choice is. Built-ins bring their own vector-Jacobian products
-//! ([`crate::lang::builtins`]), distributions and likelihoods their gradients, supports
-//! those of their transforms.
+//! The nodes between the choices and the scores are sorted so that operands come first;
+//! adjoints then flow from the scores back through that order. Structure is held fixed:
+//! which branch is taken, how many choices there are, the values of discrete choices.
+//! Built-ins provide their vector-Jacobian products ([`crate::lang::builtins`]),
+//! distributions and likelihoods their gradients, and supports those of their transforms.
 
 mod calls;
 mod record;
@@ -30,7 +30,7 @@ use smallvec::SmallVec;
 /// Nodes that a value is computed from.
 type Inputs = SmallVec<[NodeId; 8]>;
 
-/// Whether a node's value depends on a choice that the gradient is by.
+/// Whether a node's value depends on a target of the gradient.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Mark {
     Unseen,
@@ -48,20 +48,21 @@ pub(super) struct Reverse<'a> {
     /// The active nodes, operands first.
     order: Vec<NodeId>,
     adjoints: FxHashMap<NodeId, Adjoint>,
-    /// The weight of the log density that is being differentiated, and that times the
-    /// power of the likelihood.
+    /// The weight of the log density that is being differentiated, and that weight times
+    /// the power of the likelihood.
     weight: f64,
     power: f64,
 }
 
 impl Graph {
-    /// The gradient, by the unconstrained coordinates of the targets one after the other,
-    /// of the log prior plus `power` times the log likelihood plus the log Jacobians of
-    /// the transforms, with a weight for each score. Discrete targets have no
-    /// coordinates.
+    /// Appends to `out` the gradient, with respect to the unconstrained coordinates of
+    /// the targets one after the other, of the log prior plus `power` times the log
+    /// likelihood plus the log Jacobians of the transforms, with a weight for each score.
+    /// Discrete targets have no coordinates.
     ///
     /// # Errors
-    /// A dependence on a target that has no derivative, with the operation that has none.
+    /// If a score depends on a target through an operation without a derivative; the
+    /// error names the operation.
     pub fn gradient(
         &self,
         code: &Code,
@@ -105,8 +106,8 @@ impl Graph {
             targets.iter().map(|t| (t.node, None)).collect();
         while let Some(n) = pass.order.pop() {
             let by = pass.adjoints.remove(&n).unwrap_or_default();
-            // A likelihood may leave out some of its arguments: that matters if these
-            // depend on a target.
+            // A likelihood may have no derivative for some of its arguments; that matters
+            // only if these depend on a target.
             let in_parts = matches!(
                 (&self.nodes[n as usize].value, &by),
                 (Value::Likelihood(_), Adjoint::List(_))
@@ -132,7 +133,7 @@ impl Graph {
     fn own(&self, code: &Code, n: NodeId, mut by: Adjoint) -> Option<TargetAdjoint> {
         let (dist, stored) = (self.dist_of(code, n)?, self.stored(n)?);
         if dist.is_stored_whitened() {
-            // The value moves with the noise, which has a density of its own.
+            // The value moves with the noise, which has its own density.
             let mut g = dist.from_noncentred_vjp(&by.numbers(stored.len()?))?;
             g.iter_mut().zip(dist.gradient_stored(&stored)?.x).for_each(|(g, own)| *g += own);
             by = Adjoint::Array(g);
@@ -141,7 +142,7 @@ impl Graph {
     }
 }
 
-/// A choice and the derivative by its stored form.
+/// A choice and the derivative with respect to its stored form.
 struct TargetAdjoint {
     dist: Dist,
     stored: Datum,
@@ -149,7 +150,7 @@ struct TargetAdjoint {
 }
 
 impl TargetAdjoint {
-    /// Appends the derivatives by the unconstrained coordinates of a target.
+    /// Appends the derivatives with respect to the unconstrained coordinates of a target.
     fn free_gradient(&self, t: Target, out: &mut Vec<f64>) {
         let of = |dist: &Dist, stored: &Datum, by: &Adjoint, out: &mut Vec<f64>| {
             let support = dist.stored_support();
@@ -172,7 +173,7 @@ impl TargetAdjoint {
     }
 }
 
-/// The numbers of an adjoint one after the other.
+/// Appends the numbers of an adjoint, flattened.
 fn flatten(by: &Adjoint, n: usize, out: &mut Vec<f64>) {
     match by {
         Adjoint::Num(g) => out.push(*g),
@@ -186,9 +187,9 @@ fn flatten(by: &Adjoint, n: usize, out: &mut Vec<f64>) {
 }
 
 impl<'a> Reverse<'a> {
-    /// Whether a node's value depends on a target; if so it is put in order.
+    /// Whether a node's value depends on a target; if so, it is appended to the order.
     fn visit(&mut self, root: NodeId) -> bool {
-        // A node, its inputs, how many of them are done, whether it is active by now.
+        // A node, its inputs, how many of them are done, and whether it is active so far.
         let mut stack: Vec<(NodeId, Inputs, usize, bool)> = Vec::new();
         self.open(root, &mut stack);
         while let Some((n, inputs, next, active)) = stack.last_mut() {
@@ -227,7 +228,7 @@ impl<'a> Reverse<'a> {
         }
     }
 
-    /// The node that holds an operand's value; containers are read as a whole.
+    /// Returns the node that holds an operand's value; a container is read as a whole.
     fn source(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
         let n = self.graph.resolve(frame, o)?;
         Some(match &self.graph.nodes[n as usize].value {
@@ -236,7 +237,7 @@ impl<'a> Reverse<'a> {
         })
     }
 
-    /// The values of a call's arguments.
+    /// Returns the values of a call's arguments.
     fn values(&self, frame: FrameId, args: &[Operand]) -> SmallVec<[&'a Value; 8]> {
         let (graph, code) = (self.graph, self.code);
         args.iter().map(|a| graph.plain(code, frame, *a, &mut Deps::new())).collect()

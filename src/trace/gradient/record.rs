@@ -1,10 +1,10 @@
 //! Recording the log density as a function of some choices on a tape
 //! ([`crate::lang::tape`]).
 //!
-//! What an update of the choices may reach is marked as an update would mark it; those
-//! nodes, operands first, are told to the tape. Structure is taken as it is: where it
-//! hangs on something that moves, the tape holds a guard that tells when it is no longer
-//! so, or there is no tape at all. It is not an evaluation: nothing in the trace changes.
+//! The nodes that an update of the choices may reach are found by invalidation, as in an
+//! update, and recorded on the tape, operands first. Structure is held fixed: where it
+//! depends on something that moves, the tape has a guard that detects a change, or there
+//! is no tape at all. Nothing is evaluated, and the trace does not change.
 
 use super::{Inputs, Reverse};
 use crate::dist::Dist;
@@ -18,11 +18,11 @@ use crate::trace::node::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 impl Graph {
-    /// The nodes that an update of these choices may run.
+    /// Returns the nodes that an update of these choices may run.
     fn reached(&mut self, code: &Code, targets: &[Target]) -> Vec<NodeId> {
         let before = self.begin();
         for (i, t) in targets.iter().enumerate() {
-            // Elements of one choice come one after the other.
+            // Elements of one choice are adjacent.
             if i == 0 || targets[i - 1].node != t.node {
                 self.invalidate_target(code, t.node);
             }
@@ -37,8 +37,8 @@ impl Graph {
         all
     }
 
-    /// The log density by the unconstrained coordinates of the targets, one after the
-    /// other; `None` where it cannot be told in a straight line.
+    /// Records the log density as a function of the unconstrained coordinates of the
+    /// targets, one after the other; `None` if it is not a straight-line program.
     pub fn record(&mut self, code: &Code, targets: &[Target]) -> Option<Tape> {
         let reached = self.reached(code, targets);
         let view = Reverse {
@@ -72,7 +72,7 @@ struct Recorder<'a> {
     reached: FxHashSet<NodeId>,
     /// The values of the choices that move.
     placed: FxHashMap<NodeId, Form>,
-    /// The forms of the nodes told so far.
+    /// The forms of the nodes recorded so far.
     forms: FxHashMap<NodeId, Form>,
     tape: Builder,
 }
@@ -101,7 +101,7 @@ impl Recorder<'_> {
         Some(())
     }
 
-    /// Tells a node, after all that it reads.
+    /// Records a node, after everything it reads.
     fn visit(&mut self, root: NodeId) -> Option<()> {
         if self.forms.contains_key(&root) {
             return Some(());
@@ -129,7 +129,7 @@ impl Recorder<'_> {
         Some(())
     }
 
-    /// All that a node's value, score or structure is taken from.
+    /// Returns all nodes from which a node's value, score or structure is derived.
     fn reads(&self, n: NodeId) -> Inputs {
         let mut all = self.view.inputs(n, true);
         self.view.graph.each_dep(self.view.code, n, |d, _| all.push(d));
@@ -155,7 +155,7 @@ impl Recorder<'_> {
         all.iter().map(|o| self.operand(frame, *o)).collect()
     }
 
-    /// The form of the one node whose value is handed on.
+    /// Returns the form of the single node whose value is passed through.
     fn handed_on(&self, n: NodeId) -> Option<Form> {
         match &self.view.inputs(n, false)[..] {
             [] => Some(Form::Fixed(self.value(n).clone())),
@@ -164,7 +164,7 @@ impl Recorder<'_> {
         }
     }
 
-    /// Tells the tape what a node does. `None` where it cannot.
+    /// Records the operation of a node; `None` if that is not possible.
     fn tell(&mut self, n: NodeId) -> Option<Form> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
@@ -198,7 +198,7 @@ impl Recorder<'_> {
                         let (source, keys) = self.view.indexed(n)?;
                         self.tape.index(&self.form(source), &keys)
                     }
-                    // What a constant gives at keys that stay.
+                    // An element of a constant at fixed keys.
                     None => Some(Form::Fixed(now)),
                 }
             }
@@ -244,7 +244,7 @@ impl Recorder<'_> {
                 false => None,
             },
             Op::Map { f, .. } if !self.operand(frame, *f).is_fixed() => None,
-            // Its passes are told one by one.
+            // Its passes are recorded one by one.
             Op::Map { .. } if matches!(side, Some(Side::Loop(_))) => Some(Form::Fixed(now)),
             Op::Map { f, over, .. } => {
                 let Value::Builtin(i) = graph.value(code, frame, *f) else { return None };
@@ -283,8 +283,8 @@ impl Recorder<'_> {
                 self.tape.factor(&weight)?;
                 Some(Form::Fixed(now))
             }
-            // Loops over what moves, functions and containers whose structure hangs on
-            // it.
+            // Loops over values that move, and functions and containers whose structure
+            // depends on them.
             _ => None,
         }
     }
@@ -294,7 +294,7 @@ impl Recorder<'_> {
         self.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
     }
 
-    /// A call of a function of the program, whose frame stays.
+    /// A call of a function of the program, whose frame is fixed.
     fn tell_call(&mut self, n: NodeId) -> Option<Form> {
         match self.view.graph.nodes[n as usize].side.as_deref() {
             Some(Side::MemoCall(c)) if c.deps.iter().any(|d| !self.form(*d).is_fixed()) => None,
@@ -314,13 +314,13 @@ impl Recorder<'_> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
         let dist = graph.dist_of(code, n)?;
-        // White noise is scored by itself, and the value moves with the parameters.
+        // White noise is scored itself, and the value moves with the parameters.
         if dist.is_stored_whitened() || !self.operands(frame, keys).iter().all(Form::is_fixed) {
             return None;
         }
         let params = self.operands(frame, spec.operands());
         let moves = params.iter().any(|p| !p.is_fixed());
-        // A support that moves takes values along, or leaves them outside.
+        // If the support moves, values move with it or end up outside.
         if moves && !has_fixed_support(&dist, &params) {
             return None;
         }
@@ -349,12 +349,12 @@ impl Recorder<'_> {
     }
 }
 
-/// Whether a distribution whose parameters move has a support that stays.
+/// Whether a distribution whose parameters move has a fixed support.
 fn has_fixed_support(dist: &Dist, params: &[Form]) -> bool {
     match dist {
         d if !d.has_moving_support() => true,
         Dist::HalfCauchy(_) => params.first().is_some_and(Form::is_fixed),
-        // The bounds come last, also in `truncated(normal(m, s), lo, hi)`.
+        // The bounds are the last parameters, also in `truncated(normal(m, s), lo, hi)`.
         Dist::TruncatedNormal(_) => params.iter().rev().take(2).all(Form::is_fixed),
         Dist::Truncated(d) => {
             let (bounds, base) = (params.iter().rev().take(2).all(Form::is_fixed), params.first());

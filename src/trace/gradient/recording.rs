@@ -1,8 +1,9 @@
-//! A recorded density and the state of the trace it belongs to.
+//! A recorded density, and the state of the trace for which it is valid.
 //!
-//! It holds as long as nothing else changes the trace: every commit counts up the trace's
-//! revision, and who moves only the choices that the density is a function of says so
-//! ([`Recording::moved`]). A clone of a trace has an identity of its own.
+//! A recording is valid as long as nothing else changes the trace: every commit
+//! increments the trace's revision, and code that moves only the choices that the density
+//! is a function of reports that ([`Recording::moved`]). A clone of a trace has its own
+//! identity.
 
 use crate::lang::tape::{ScoreSums, Tape};
 use crate::num::ExactSum;
@@ -17,14 +18,15 @@ pub struct Recording {
     targets: Vec<Target>,
     identity: Arc<()>,
     revision: u64,
-    /// What the scores add up to in the state the trace is in.
+    /// The sums of scores in the state to which densities are relative.
     start: ScoreSums,
 }
 
 impl Trace {
     /// Records the log density as a function of the unconstrained coordinates of some
-    /// continuous choices, to be worked out many times without proposals; `None` where
-    /// that cannot be told in a straight line. [`Recording::begin`] comes first.
+    /// continuous choices, to be evaluated many times without proposals; `None` if it
+    /// cannot be recorded as a straight-line program. [`Recording::begin`] must be called
+    /// before it is evaluated.
     pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
         let tape = self.graph.record(&self.code, targets)?;
@@ -41,19 +43,19 @@ impl Trace {
 }
 
 impl Recording {
-    /// Whether it is of the state that a trace is in.
+    /// Whether it is valid for the current state of a trace.
     pub fn holds(&self, trace: &Trace) -> bool {
         self.revision == trace.graph.revision && Arc::ptr_eq(&self.identity, &trace.identity)
     }
 
-    /// Goes on after a commit that moved these choices and nothing else.
+    /// Marks it as valid after a commit that moved only its choices.
     pub fn moved(&mut self, trace: &Trace) {
         self.revision = trace.graph.revision;
     }
 
-    /// Takes the state the trace is in as what densities are relative to, and gives its
-    /// coordinates. False if it cannot be told what the program does there: then a
-    /// condition has changed since.
+    /// Makes the current state of the trace the one to which densities are relative, and
+    /// returns its coordinates in `y`. False if the recording does not cover that state,
+    /// because a guarded condition has changed.
     pub fn begin(&mut self, trace: &Trace, y: &mut Vec<f64>) -> bool {
         let targets = &self.targets;
         let now = |i: usize| {
@@ -68,8 +70,8 @@ impl Recording {
         told
     }
 
-    /// What a proposal of these coordinates would weigh; `None` if only a proposal can
-    /// tell.
+    /// Returns the weight of a proposal of these coordinates; `None` if only an actual
+    /// proposal can give it.
     pub fn weigh(&mut self, y: &[f64]) -> Option<Weight> {
         if !self.tape.run(y) {
             return None;
@@ -88,17 +90,18 @@ impl Recording {
         })
     }
 
-    /// The changes that make these coordinates the state, appended to a list.
+    /// Appends the changes that move the state to these coordinates.
     pub fn changes(&self, y: &[f64], out: &mut Vec<(Target, Change)>) {
         out.extend(self.targets.iter().copied().zip(self.tape.images(y).map(Change::Set)));
     }
 
-    /// The log Jacobian of the state that densities are relative to.
+    /// Returns the log Jacobian in the state to which densities are relative.
     pub fn log_jacobian(&self) -> f64 {
         self.start.jacobian.value()
     }
 
-    /// [`Trace::gradient`] where it was last run. False if a derivative is not known.
+    /// [`Trace::gradient`] at the coordinates of the last run. False if a derivative is
+    /// not known.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         self.tape.gradient(y, power, out)
     }

@@ -1,4 +1,4 @@
-//! Derivatives of what a trace is scored by: choices under their priors, observations,
+//! Derivatives of the scores of a trace: choices under their priors, observations,
 //! factors.
 
 use super::{Inputs, Reverse};
@@ -13,13 +13,13 @@ use crate::trace::propagate::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
-    /// The nodes that the score of a choice, observation or factor is computed from, but
-    /// for the choice itself.
+    /// Returns the nodes that the score of a choice, observation or factor is computed
+    /// from, except the choice itself.
     pub(super) fn score_inputs(&self, n: NodeId) -> Inputs {
         let mut all = Inputs::new();
         let frame = self.graph.nodes[n as usize].frame;
         match self.graph.op(self.code, n) {
-            // The density of white noise is the same whatever it is the noise of.
+            // The density of white noise does not depend on the choice's parameters.
             Op::Draw { .. } if self.graph.is_whitened(n) => {}
             Op::Draw { dist, .. } => self.dist_inputs(n, dist, &mut all),
             Op::Observe { dist, value, .. } => {
@@ -34,7 +34,7 @@ impl Reverse<'_> {
         all
     }
 
-    /// Derivatives of one score.
+    /// Adds the derivatives of one score to the adjoints of its inputs.
     pub(super) fn vjp_score(&mut self, n: NodeId) -> Result<(), Failure> {
         let (g, code) = (self.graph, self.code);
         let frame = g.nodes[n as usize].frame;
@@ -45,7 +45,7 @@ impl Reverse<'_> {
                 let Some(stored) = g.stored(n) else { return Ok(()) };
                 let own = self.is_active(n);
                 if g.is_whitened(n) {
-                    // Added where the noise's own derivative is made.
+                    // It is added together with the derivative through the noise.
                     return Ok(());
                 }
                 let Some((mut by_x, mut params)) =
@@ -87,7 +87,8 @@ impl Reverse<'_> {
                 }
                 self.give_params(n, spec, &dist, params)?;
                 if let Some(x) = observed.to_datum() {
-                    // What is observed is the value, however a choice would be stored.
+                    // The observed datum is the value itself, even if a choice would be
+                    // stored non-centred.
                     self.give_matrix(n, spec, &dist.centred(), &x, &[], self.power)?;
                 }
             }
@@ -96,8 +97,8 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// Hands the derivatives by a distribution's parameters to what they were computed
-    /// from.
+    /// Adds the derivatives with respect to a distribution's parameters to the nodes they
+    /// were computed from.
     pub(super) fn give_params(
         &mut self,
         n: NodeId,
@@ -122,8 +123,8 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// Hands the derivatives by a covariance or a factor of one, `weight` times, to what
-    /// it was computed from; [`density::by_arguments`] leaves it out.
+    /// Adds `weight` times the derivatives with respect to a covariance, or a factor of
+    /// one, to the node it was computed from; [`density::by_arguments`] omits them.
     pub(super) fn give_matrix(
         &mut self,
         n: NodeId,
@@ -146,7 +147,8 @@ impl Reverse<'_> {
         };
         by.iter_mut().for_each(|g| *g *= weight);
         let by = match spec {
-            // Behind the parameters: what makes the distribution takes them apart.
+            // They follow the parameters; the call that makes the distribution separates
+            // them.
             DistSpec::Value(_) => {
                 let mut all = vec![0.0; dist.param_count()];
                 all.append(&mut by);
@@ -163,9 +165,9 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// The adjoints of the arguments of a distribution that is a value: its parameters,
-    /// and behind them the factor of its covariance. `wanted` says whether an argument
-    /// leads anywhere.
+    /// Returns the adjoints of the arguments of a distribution value from those of its
+    /// parameters, which are followed by those of the factor of its covariance. `wanted`
+    /// tells whether the adjoint of an argument is used.
     pub(super) fn by_distribution(
         &self,
         n: NodeId,
@@ -183,8 +185,8 @@ impl Reverse<'_> {
         if let Some(p) = pulled.get_mut(i) {
             *p = match factor {
                 _ if !wanted(i) => Adjoint::Zero,
-                // Within a distribution of several, such as `iid`, which hands out
-                // parameters only.
+                // It is part of a distribution of several, such as `iid`, which
+                // propagates parameters only.
                 [] => Adjoint::Unknown,
                 _ => density::by_matrix(a, dist, factor).ok_or_else(|| self.no_matrix(n, dist))?,
             };

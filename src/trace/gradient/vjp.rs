@@ -1,4 +1,4 @@
-//! How derivatives pass from a node to what it is computed from, by the kind of its
+//! How adjoints propagate from a node to the nodes it is computed from, by kind of
 //! operation.
 
 use super::{Inputs, Reverse};
@@ -13,7 +13,7 @@ use crate::trace::propagate::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {
-    /// The nodes whose values a node's value is computed from. Of a target: those that
+    /// Returns the nodes that a node's value is computed from. For a target: those that
     /// move its support.
     pub(super) fn inputs(&self, n: NodeId, target: bool) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
@@ -46,7 +46,7 @@ impl Reverse<'_> {
                 Some(Side::Child(c)) if c.result != NONE => all.push(self.whole(c.result)),
                 Some(Side::MemoCall(c)) if c.result != NONE => all.push(self.whole(c.result)),
                 Some(Side::Loop(l)) if l.result != NONE => all.push(self.whole(l.result)),
-                // A built-in called as a value.
+                // A built-in function value was called.
                 Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => {
                     all.extend(deps.iter().map(|d| self.whole(*d)))
                 }
@@ -75,7 +75,7 @@ impl Reverse<'_> {
         }
     }
 
-    /// Passes an adjoint on.
+    /// Propagates an adjoint to the inputs of a node.
     pub(super) fn vjp(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
@@ -136,7 +136,7 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// The alternative that a selection reads.
+    /// Returns the alternative that a selection takes.
     pub(super) fn taken(&self, n: NodeId) -> Option<Operand> {
         let Op::Select { then, otherwise, .. } = self.graph.op(self.code, n) else { return None };
         Some(if self.graph.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise })
@@ -148,8 +148,8 @@ impl Reverse<'_> {
         self.give_node(source, whole);
     }
 
-    /// What a parameter of a pass gets: the node, and which of its elements unless all of
-    /// it.
+    /// Returns the source of a parameter of a pass: the node, and the index of the
+    /// element, or `None` if the parameter gets the whole value.
     pub(super) fn passed(&self, n: NodeId) -> Option<(NodeId, Option<usize>)> {
         let g = self.graph;
         let f = &g.frames[g.nodes[n as usize].frame as usize];
@@ -179,8 +179,8 @@ impl Reverse<'_> {
         Some((self.source(home, over)?, Some(f.pass as usize)))
     }
 
-    /// Where an index ends up: the node whose plain value the last keys pick from, and
-    /// those keys.
+    /// Returns the source of an index: the node whose plain value the last keys select
+    /// from, and those keys.
     pub(super) fn indexed(&self, n: NodeId) -> Option<(NodeId, SmallVec<[Value; 2]>)> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
@@ -225,8 +225,8 @@ impl Reverse<'_> {
         Ok(())
     }
 
-    /// The nodes with the elements of a container read as a whole; `None` if some are
-    /// constants.
+    /// Returns the nodes of the elements of a container that is read as a whole; `None`
+    /// if some elements are constants.
     pub(super) fn gathered(&self, n: NodeId) -> Option<Inputs> {
         let g = self.graph;
         let Some(Side::Deps(deps)) = g.nodes[n as usize].side.as_deref() else { return None };
@@ -254,8 +254,9 @@ impl Reverse<'_> {
         self.give_params(n, dist, &d, by)
     }
 
-    /// The part of a target's adjoint that goes to what moves its support or its
-    /// realisation; changes nothing in its own.
+    /// Propagates the part of a target's adjoint that goes to the parameters which move
+    /// its support or its value (if stored as white noise); the target's own adjoint is
+    /// unchanged.
     pub(super) fn vjp_support(
         &mut self,
         n: NodeId,
@@ -281,8 +282,8 @@ impl Reverse<'_> {
         }
     }
 
-    /// x(y) moves with the bounds while y stays: the derivative by the distribution's
-    /// parameters.
+    /// x(y) moves with the bounds while y is fixed: returns the derivative with respect
+    /// to the distribution's parameters.
     fn by_bounds(
         &self,
         n: NodeId,

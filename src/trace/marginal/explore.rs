@@ -1,11 +1,12 @@
-//! Finding what choices reach: which of them share a score and which scores those are, at
-//! one place of the rest.
+//! Exploration: which choices share a score, and which scores those are, at one point of
+//! the other choices.
 //!
-//! A partition of the choices is right if no score reads choices of two groups, in any
-//! joint state. To know that, it is enough to look at every joint value of each group
-//! once, whatever the other groups are at: a score that reads only its group there takes
-//! the same course under all values of the others ([`super::reads`]). A look at which a
-//! score reads two groups makes them one, and all is looked at again.
+//! A partition of the choices is valid if no score reads choices of two groups, in any
+//! joint state. To check that, it is enough to evaluate every joint value of each group
+//! once, whatever the values of the other groups: a score that reads only its own group
+//! there behaves in the same way for all values of the others ([`super::reads`]). If a
+//! score reads two groups under some assignment, the groups are merged and the
+//! exploration starts again.
 
 use super::partition::Partition;
 use super::reads::{Found, Label, Reader};
@@ -16,25 +17,25 @@ use crate::trace::node::*;
 use crate::trace::{Change, Draws, Target, Trace, TraceResult, Weight};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// The most joint values of one group.
+/// The maximum number of joint values of one group.
 const MOST_VALUES: usize = 1000;
 
-/// What looking at the joint values showed.
+/// The result of exploring the joint values.
 pub(crate) enum Explored {
-    /// Every one has the same choices.
+    /// All joint values have the same choices.
     Elimination(Elimination),
     /// These changes make choices appear or vanish.
     Structure(Vec<(Target, Change)>),
-    /// The program has no value here whatever the choices are, there are choices that it
-    /// never asks for, or they have other values.
+    /// The program fails here whatever the values of the choices, some choices are never
+    /// needed, or the supports are different.
     Nowhere,
 }
 
-/// Which choices are asked for in some look.
+/// The choices that are needed under some assignment.
 #[derive(Default)]
 struct Asked {
     by_scores: FxHashSet<NodeId>,
-    /// By choice: those that its distribution is made from.
+    /// By choice: the choices that its distribution depends on.
     by_choice: FxHashMap<NodeId, FxHashSet<NodeId>>,
 }
 
@@ -46,8 +47,8 @@ impl Asked {
         }
     }
 
-    /// Whether all of these are asked for by scores, or by choices that are, in some look
-    /// each.
+    /// Whether each of these is needed, under some assignment, by a score or by a choice
+    /// that is needed.
     fn has_all(&self, choices: &[Target]) -> bool {
         let mut all = self.by_scores.clone();
         let mut open: Vec<NodeId> = all.iter().copied().collect();
@@ -59,12 +60,13 @@ impl Asked {
     }
 }
 
-/// The joint values of the groups, and in which look each was.
+/// The joint values of the groups, and the assignment in which each occurred.
 struct Table {
     groups: Vec<Group>,
     /// By choice: its group.
     group_of: Vec<usize>,
-    /// By group: the next value, and one that the program has a value for.
+    /// By group: the next value to evaluate, and a value at which the program does not
+    /// fail.
     next: Vec<usize>,
     fine: Vec<Option<usize>>,
     looks: Vec<Vec<usize>>,
@@ -93,8 +95,8 @@ impl Table {
         Ok(t)
     }
 
-    /// A value for each group, of which at least one has not been looked at; `None` if
-    /// all have.
+    /// Returns a value for each group, at least one of them not evaluated yet; `None` if
+    /// all have been.
     fn next(&self) -> Option<Vec<usize>> {
         let open = |i: &usize| self.next[*i] < self.groups[*i].values;
         let value = |i: usize| if open(&i) { self.next[i] } else { self.fine[i].unwrap_or(0) };
@@ -102,7 +104,7 @@ impl Table {
         (any || self.looks.is_empty()).then(|| (0..self.groups.len()).map(value).collect())
     }
 
-    /// The program has a value there.
+    /// Records an assignment at which the program does not fail.
     fn enter(&mut self, look: Vec<usize>) {
         for (i, v) in look.iter().enumerate() {
             if self.next[i] == *v {
@@ -114,10 +116,11 @@ impl Table {
         self.looks.push(look);
     }
 
-    /// A group cannot have its value of a look; false if it can have none.
+    /// Records that a group cannot have its value in an assignment; false if no possible
+    /// value remains.
     fn leave_out(&mut self, group: usize, look: &[usize]) -> bool {
-        // One that the program had a value for under others is an evaluation that the
-        // partition does not cover.
+        // If the value was possible with other values of the other groups, the partition
+        // does not cover this failure.
         let open = self.next[group] == look[group];
         self.next[group] += usize::from(open);
         open && (self.next[group] < self.groups[group].values || self.fine[group].is_some())
@@ -125,14 +128,14 @@ impl Table {
 }
 
 impl Trace {
-    /// Looks at the joint values of choices at a place, which these changes lead to;
-    /// `strict` if there may be choices that nothing asks for. A proposal may be pending
-    /// afterwards.
+    /// Evaluates the joint values of the choices at a point, to which the changes `at`
+    /// lead. With `strict`, choices may exist that nothing needs. A proposal may be
+    /// pending afterwards.
     ///
     /// # Errors
-    /// If one of them is not finite there, if the choices that there are depend on one in
-    /// a way that cannot be undone, or if too many depend on each other; those of the
-    /// program.
+    /// If the possible values of a choice depend on other choices, if which other choices
+    /// exist depends on one in a way that cannot be undone, or if too many depend on each
+    /// other; or if the program fails.
     pub(crate) fn explore(
         &mut self,
         at: &[(Target, Change)],
@@ -216,8 +219,8 @@ impl Trace {
         }
     }
 
-    /// Proposes changes; where the program has no value, what the evaluation that failed
-    /// depends on.
+    /// Proposes changes; if the program fails, returns what the failed evaluation depends
+    /// on.
     fn attempt(
         &mut self,
         changes: &[(Target, Change)],
@@ -244,8 +247,8 @@ impl Trace {
                     None => Ok(Err(label)),
                 }
             }
-            // A choice that stays, in a frame that goes, and the same choice in the frame
-            // that comes instead.
+            // A held choice exists in a frame that is removed, and again in the frame
+            // that replaces it.
             Err(e) if e.kind == FaultKind::Duplicate => {
                 let refused = self.check_held(m.sites[0]).err();
                 self.graph.rollback(&self.code, before);
@@ -260,7 +263,7 @@ impl Trace {
             && self.graph.dist_of(&self.code, n).is_some_and(|d| d.is_improper())
     }
 
-    /// Whether a frame goes of which a choice is to stay, or a loop that has some.
+    /// Fails if a detached frame contains a held choice, or a loop around one.
     fn check_held(&self, t: Target) -> TraceResult<()> {
         let g = &self.graph;
         let stays = |f: &FrameId| {

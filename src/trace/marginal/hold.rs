@@ -1,5 +1,5 @@
-//! Choices that stay although nothing may ask for them: the components of a mixture that
-//! no label points at now.
+//! Choices that are kept although nothing may depend on them, such as the components of a
+//! mixture that no label currently selects.
 
 use super::Marginal;
 use super::explore::Explored;
@@ -11,28 +11,29 @@ use crate::trace::node::*;
 use crate::trace::{Change, Draws, Selection, Target, Trace, TraceResult};
 use rustc_hash::FxHashSet;
 
-/// Why a step cannot be made where what was drawn for it changes what it needs.
+/// Why a step is impossible: choices drawn for it change which choices it needs.
 const BY_CHANCE: &str = "which choices it needs depends on choices drawn during the step";
 
-/// What stays until [`Trace::let_go`].
+/// Everything kept until [`Trace::let_go`].
 #[derive(Debug, Default)]
 pub(crate) struct Held {
     nodes: Vec<NodeId>,
-    /// The loops that they are in: their frames stay too.
+    /// The loops around the choices, whose frames are kept too.
     loops: Vec<NodeId>,
-    /// Entries of functions with `mem`, by frame: those that choices are in.
+    /// The entries of `mem` functions that contain choices, by frame.
     frames: Vec<FrameId>,
     entries: Vec<(NodeId, Key)>,
 }
 
 impl Trace {
-    /// Finds what the choices of a selection reach, for a kernel that moves those of
-    /// another. Choices that only other values of the first ones ask for are drawn from
-    /// their prior given the rest and stay, as do those that there are, until
-    /// [`Trace::let_go`]; they may be in the selections too.
+    /// Finds everything that the choices of `sites` reach, for a kernel that moves those
+    /// of `moving`. Choices that only other values of the former depend on are drawn from
+    /// their prior given the rest. They and the existing choices are kept until
+    /// [`Trace::let_go`], and may be members of the selections too.
     ///
     /// # Errors
-    /// As [`Trace::explore`]; the trace is then as it was.
+    /// If a choice of `sites` does not have finitely many values, and as
+    /// [`Trace::explore`]; the trace is then unchanged.
     pub(crate) fn marginalise(
         &mut self,
         sites: Selection,
@@ -70,7 +71,7 @@ impl Trace {
             match self.explore(&[], drawn, &mut m, draws)? {
                 Explored::Elimination(elimination) => {
                     self.rollback();
-                    // Elsewhere others may be asked for.
+                    // Other choices may be needed at other points.
                     if elimination.structure_moves && held.nodes.is_empty() {
                         self.hold_all(held)?;
                     }
@@ -101,8 +102,8 @@ impl Trace {
         Ok(m)
     }
 
-    /// Goes back to the choices as they were, and draws from their prior there those that
-    /// came up elsewhere.
+    /// Restores the original choices, and resamples from their prior the choices that
+    /// appeared at other values.
     fn draw_others(
         &mut self,
         site: Target,
@@ -113,8 +114,8 @@ impl Trace {
         let others = self.all_targets().iter().filter(|t| !there.contains(&t.node));
         let mut changes = original.to_vec();
         changes.extend(others.map(|t| (*t, Change::Resample)));
-        // The same stream: where the priors are the same, so is what is drawn, and what
-        // is asked for because of it.
+        // The stream is the same, so if the priors are the same, the draws and the
+        // choices that depend on them are too.
         let w = self.propose(&changes, draws)?;
         if w.appeared + w.vanished > 0 {
             return Err(self.cannot_sum(site, BY_CHANCE));
@@ -123,7 +124,7 @@ impl Trace {
         Ok(())
     }
 
-    /// Enters the choices that there are now.
+    /// Adds the current members of the selections.
     fn take_up(&self, m: &mut Marginal, sites: Selection, moving: Selection) -> TraceResult<()> {
         let not = |t: &Target| {
             self.cannot_sum(*t, "it is not a discrete choice with finitely many values")
@@ -178,8 +179,8 @@ impl Trace {
         }
     }
 
-    /// Holds the loops and the entries of functions with `mem` that a choice is in, as
-    /// who reads it or calls them does.
+    /// Holds the loops and the entries of `mem` functions that contain a choice, as code
+    /// that reads or calls them would.
     fn hold_frames(&mut self, n: NodeId, held: &mut Held) {
         let mut f = self.graph.nodes[n as usize].frame;
         while self.graph.frames[f as usize].owner != NONE {
@@ -206,10 +207,10 @@ impl Trace {
         }
     }
 
-    /// Lets choices go that were held: those nothing asks for vanish.
+    /// Releases held choices; those that nothing depends on vanish.
     ///
     /// # Errors
-    /// Those of the program.
+    /// If the program fails.
     pub(crate) fn let_go(&mut self, held: Held) -> TraceResult<()> {
         self.rollback();
         if held.nodes.is_empty() {

@@ -1,11 +1,11 @@
-//! Finite choices that are summed out: which scores each of them reaches, and the parts
-//! of the log joint that follow.
+//! Finite choices that are summed out: which scores depend on each of them, and the
+//! resulting parts of the log joint.
 //!
-//! Choices that no score has in common are summed one by one; those that share one are a
+//! Choices without a common score are summed independently; those that share one form a
 //! group, whose joint values are enumerated. The log joint is then a base plus one term
-//! for each group, so that the log of its sum over all joint values of all choices is the
-//! base plus, for each group, a log-sum-exp over the values of that group alone. Not
-//! here: what the sums are for.
+//! per group, so the log of its sum over all joint values of all choices is the base
+//! plus, for each group, a log-sum-exp over the values of that group alone. How the sums
+//! are used is up to the kernels.
 
 mod explore;
 mod hold;
@@ -25,31 +25,33 @@ use reads::{Label, Reader};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// Choices that are summed out, and what is known of them where a step begins.
+/// Choices that are summed out, and the facts found about them at the start of a step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Marginal {
-    /// The choices with their values, of which each support consists.
+    /// The choices, and the values of the support of each.
     sites: Vec<Target>,
     values: Vec<Vec<Datum>>,
     supports: Vec<Support>,
     /// The choices that the kernel moves.
     moving: Vec<NodeId>,
     partition: Partition,
-    /// How a place is looked at that has the structure of the one where the step begins.
+    /// The elimination for all points with the same structure as the start of the step.
     pub elimination: Arc<Elimination>,
 }
 
-/// The groups of the choices, and which looks at a place show all that there is to see.
+/// The groups of the choices, and the assignments whose evaluations cover all their joint
+/// values.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Elimination {
     groups: Vec<Group>,
-    /// By look: the joint value of each group, by its number.
+    /// By assignment: the joint value of each group, by its number.
     pub looks: Vec<Vec<usize>>,
-    /// By score, or by the node that observations and factors are below: its group.
+    /// The group of each score, and of each node that has observations and factors below
+    /// it.
     reached: FxHashMap<NodeId, usize>,
     owners: FxHashMap<NodeId, usize>,
-    /// Whether this holds for the place alone, since what is read depends on choices that
-    /// the kernel moves.
+    /// Whether this is valid at a single point only, because what is read depends on
+    /// choices that the kernel moves.
     pub structure_moves: bool,
     /// Whether the distributions of the choices depend on choices that the kernel moves.
     values_move: bool,
@@ -61,16 +63,15 @@ struct Group {
     sites: Vec<usize>,
     scores: Vec<NodeId>,
     owners: Vec<NodeId>,
-    /// How many joint values they have.
+    /// The number of joint values.
     values: usize,
-    /// By joint value: the look in which it is seen first; `None` if the program has no
-    /// value there.
+    /// By joint value: the first assignment in which it occurs; `None` if the program
+    /// fails at that value.
     seen: Vec<Option<usize>>,
 }
 
 impl Marginal {
-    /// The changes that put each group at a joint value, given by its number, appended to
-    /// a list.
+    /// Appends the changes that set each group to a joint value, given by its number.
     fn put(&self, groups: &[Group], values: &[usize], out: &mut Vec<(Target, Change)>) {
         for (g, value) in groups.iter().zip(values) {
             let mut rest = *value;
@@ -82,7 +83,8 @@ impl Marginal {
         }
     }
 
-    /// The same by these sums.
+    /// Appends the changes that set each group of an elimination to a joint value, given
+    /// by its number.
     pub fn changes(
         &self,
         elimination: &Elimination,
@@ -94,15 +96,15 @@ impl Marginal {
 }
 
 impl Elimination {
-    /// By group: in which look each joint value is seen first.
+    /// By group: the first assignment in which each joint value occurs.
     pub fn seen(&self) -> impl Iterator<Item = &[Option<usize>]> {
         self.groups.iter().map(|g| &g.seen[..])
     }
 }
 
 impl Trace {
-    /// Whether what is read, and so which choices there are, depends on choices of a
-    /// kind, as far as this state shows.
+    /// Whether what is read, and thus which choices exist, depends on choices of a kind,
+    /// as far as the current state shows.
     pub(crate) fn structure_depends_on(&self, kind: ChoiceKind) -> bool {
         let selector = Selector::Kind(kind);
         let moving =
@@ -115,7 +117,7 @@ impl Trace {
         reader.found.structure_moves
     }
 
-    /// The group that a score belongs to.
+    /// Returns the group that a score belongs to.
     pub(crate) fn group_of(&self, elimination: &Elimination, score: u32) -> Option<usize> {
         if let Some(group) = elimination.reached.get(&score) {
             return Some(*group);
@@ -134,22 +136,22 @@ impl Trace {
         found
     }
 
-    /// Whether the choices have the values in the present state that they have elsewhere,
-    /// also in that of a pending proposal.
+    /// Whether the choices have the same supports in the current state (including a
+    /// pending proposal) as at the start of the step.
     pub(crate) fn has_same_values(&self, m: &Marginal) -> bool {
         !m.elimination.values_move || self.moved_support(m).is_none()
     }
 
-    /// The first choice whose values are others in the present state.
+    /// Returns the first choice whose support differs in the current state.
     fn moved_support(&self, m: &Marginal) -> Option<Target> {
         let moved =
             |(t, s): &(&Target, &Support)| self.dist(**t).is_none_or(|d| d.stored_support() != **s);
         m.sites.iter().zip(&m.supports).find(moved).map(|(t, _)| *t)
     }
 
-    /// The parts of the log prior plus `power` times the log likelihood in the present
-    /// state, also that of a pending proposal: the base, and in `terms` what each group
-    /// reaches.
+    /// Splits the log prior plus `power` times the log likelihood in the current state
+    /// (including a pending proposal): returns the base, and in `terms` the part of each
+    /// group.
     pub(crate) fn parts(&self, elimination: &Elimination, power: f64, terms: &mut Vec<f64>) -> f64 {
         let tempered = |prior: &ExactSum, likelihood: &ExactSum| {
             prior.value() + if power == 0.0 { 0.0 } else { power * likelihood.value() }

@@ -1,20 +1,20 @@
-//! Which choices are summed out together: a partition that only ever gets coarser.
+//! Which choices are summed out together: a partition that only becomes coarser.
 
 /// Groups of the numbers below some bound (union-find).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Partition {
     parent: Vec<u32>,
-    /// How many joins made it coarser.
+    /// The number of joins that made it coarser.
     joins: usize,
 }
 
 impl Partition {
-    /// The same groups with more members, each of the new ones alone.
+    /// Adds members up to `len`, each in its own group.
     pub fn grow(&mut self, len: usize) {
         self.parent.extend(self.parent.len() as u32..len as u32);
     }
 
-    /// The least member of a group.
+    /// Returns the least member of a group.
     pub fn root(&self, mut i: u32) -> u32 {
         while self.parent[i as usize] != i {
             i = self.parent[i as usize];
@@ -22,7 +22,7 @@ impl Partition {
         i
     }
 
-    /// Makes the groups of two members one.
+    /// Merges the groups of two members.
     pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
@@ -31,7 +31,7 @@ impl Partition {
         }
     }
 
-    /// Changes whenever the partition does.
+    /// A count that changes whenever the partition does.
     pub fn joins(&self) -> usize {
         self.joins
     }

@@ -1,11 +1,10 @@
-//! What scores read of some choices, in one state, also in that of a pending proposal.
+//! Which of the choices each score reads, in one state (including a pending proposal).
 //!
-//! An evaluation takes its course by what it reads: where that stays, so do its course
-//! and its value, whatever the rest of the trace is. So two choices are independent given
-//! the rest if no score reads both of them, in any state that they may be in. What a
-//! score reads is found by following operands from it, never by looking for changes: a
-//! value that comes out the same for two values of a choice says nothing about a third
-//! one.
+//! What an evaluation reads determines its course: if that is unchanged, so are its
+//! course and its value, whatever the rest of the trace is. So two choices are
+//! independent given the rest if no score reads both of them, in any state that they may
+//! be in. What a score reads is found by following its operands, never by comparing
+//! values: a value that is equal for two values of a choice may differ for a third.
 
 use super::partition::Partition;
 use crate::lang::code::{Callee, Code, Op, Operand};
@@ -16,11 +15,11 @@ use smallvec::SmallVec;
 
 type Inputs = SmallVec<[NodeId; 8]>;
 
-/// What a value depends on.
+/// The choices that a value depends on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Label {
-    /// One of the choices that are summed out, which stands for its group; [`NONE`] if
-    /// there is none.
+    /// One of the summed-out choices, which represents its group; [`NONE`] if there is
+    /// none.
     pub site: u32,
     /// Whether it depends on a choice that the kernel moves.
     pub moves: bool,
@@ -28,7 +27,7 @@ pub(super) struct Label {
 
 const NOTHING: Label = Label { site: NONE, moves: false };
 
-/// How far a node has been followed.
+/// The progress of following a node.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Visit {
     Not,
@@ -41,25 +40,28 @@ enum Visit {
 pub(super) struct Found {
     /// Scores that depend on a choice: the node, and one choice of the group.
     pub scores: Vec<(NodeId, u32)>,
-    /// Nodes whose observations and factors come and go with a choice, or have other
-    /// places in each state and depend on one: the choice.
+    /// Nodes that contain observations and factors which depend on a choice, and which
+    /// exist for some of its values only or are other nodes in each state; with that
+    /// choice.
     pub owners: FxHashMap<NodeId, u32>,
-    /// The choices that observations and factors ask for.
+    /// The choices that observations and factors depend on.
     pub asked: Vec<NodeId>,
     /// Whether what is read depends on choices that the kernel moves.
     pub structure_moves: bool,
     /// Whether the distributions of choices that are summed out depend on choices that
     /// the kernel moves.
     pub values_move: bool,
-    /// Whether observations are made in a function with `mem`: any choice may decide
-    /// about those.
+    /// Whether observations are made in a `mem` function: any choice may decide whether
+    /// they exist.
     pub anywhere: bool,
-    /// Whether observations come and go in a way that is not followed.
+    /// Whether the existence of observations depends on choices in a way that is not
+    /// tracked.
     pub unclear: bool,
 }
 
 impl Found {
-    /// What is below a node depends on a choice: all such choices are in one group.
+    /// Records that what is below a node depends on a choice; all such choices are in one
+    /// group.
     pub fn own(&mut self, owner: NodeId, site: u32, partition: &mut Partition) {
         let first = *self.owners.entry(owner).or_insert(site);
         partition.join(first, site);
@@ -89,8 +91,8 @@ impl<'a> Reader<'a> {
         Reader { graph, code, own, partition, seen, labels, found: Found::default() }
     }
 
-    /// Follows every score; choices that are read by one of them are in one group from
-    /// then on. `choices` are those of the trace.
+    /// Follows every score, and merges the groups of choices that one score reads.
+    /// `choices` are those of the trace.
     pub fn read_all(&mut self, choices: impl Iterator<Item = NodeId>) {
         for n in 0..self.graph.nodes.len() as NodeId {
             if self.graph.nodes[n as usize].state == State::Clean
@@ -100,14 +102,14 @@ impl<'a> Reader<'a> {
             }
         }
         let asked = self.found.asked.len();
-        // Choices that stay although nothing asks for them have scores as well.
+        // Held choices have scores too, even if nothing depends on them.
         for n in choices {
             self.visit(n);
         }
         self.found.asked.truncate(asked);
     }
 
-    /// The choices that the distribution of a choice is made from.
+    /// Returns the choices that the distribution of a choice depends on.
     pub fn origins(&self, n: NodeId) -> Vec<NodeId> {
         let (mut open, mut seen, mut found) = (self.inputs(n), FxHashSet::default(), Vec::new());
         while let Some(d) = open.pop() {
@@ -121,7 +123,7 @@ impl<'a> Reader<'a> {
         found
     }
 
-    /// What the nodes depend on that were being evaluated when an evaluation failed.
+    /// Returns what the nodes on the stack of a failed evaluation depend on.
     pub fn read_failed(&mut self, stack: &[NodeId]) -> Label {
         let mut label = NOTHING;
         for n in stack {
@@ -137,8 +139,7 @@ impl<'a> Reader<'a> {
         label
     }
 
-    /// Follows what runs although nothing asks for it: an observation, a factor, or what
-    /// they are in.
+    /// Follows an effect: an observation, a factor, or a node that contains some.
     fn read_effect(&mut self, n: NodeId) {
         let read = self.visit(n);
         let (placed, owner) = self.placed(n);
@@ -161,7 +162,7 @@ impl<'a> Reader<'a> {
         Label { site: a.site.min(b.site), moves: a.moves || b.moves }
     }
 
-    /// What a node's value depends on.
+    /// Returns what a node's value depends on.
     fn visit(&mut self, root: NodeId) -> Label {
         if self.seen[root as usize] != Visit::Not {
             return self.labels[root as usize];
@@ -193,7 +194,7 @@ impl<'a> Reader<'a> {
         self.labels[root as usize]
     }
 
-    /// What the value of a node depends on whose inputs depend on this.
+    /// Returns what the value of a node depends on, given what its inputs depend on.
     fn ended(&mut self, n: NodeId, read: Label) -> Label {
         if !matches!(self.graph.op(self.code, n), Op::Draw { .. }) {
             if read.moves && !self.found.structure_moves {
@@ -209,12 +210,12 @@ impl<'a> Reader<'a> {
         if score.site != NONE {
             self.found.scores.push((n, score.site));
         }
-        // A choice keeps its value whatever its distribution becomes, but for white
-        // noise, which is seen through it.
+        // A choice keeps its value whatever its distribution becomes, except white noise,
+        // whose value depends on its parameters.
         if self.graph.is_whitened(n) { score } else { own }
     }
 
-    /// What a node's value is computed from, in all ways, and its structure.
+    /// Returns all nodes that a node's value or structure is computed from.
     fn inputs(&self, n: NodeId) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
         g.each_dep(self.code, n, |d, _| all.push(d));
@@ -234,7 +235,7 @@ impl<'a> Reader<'a> {
         all
     }
 
-    /// What decides which nodes a node reads, and what is there because of it.
+    /// Returns what decides which nodes a node reads, and which of them exist.
     fn decided(&mut self, n: NodeId) -> Label {
         let mut all = Inputs::new();
         self.graph.deciders(self.code, n, |d| all.push(d));
@@ -246,16 +247,16 @@ impl<'a> Reader<'a> {
         label
     }
 
-    /// What decides that a node is there, and the outermost node around it that a choice
-    /// decides about, also one that moves: frames that are made for a proposal have other
-    /// nodes in each.
+    /// Returns what decides whether a node exists, and the outermost node around it for
+    /// which a choice, summed out or moving, decides that: frames created for a proposal
+    /// have other nodes each time.
     fn placed(&mut self, n: NodeId) -> (Label, Option<NodeId>) {
         let (mut label, mut outermost, mut in_memo) = (NOTHING, None, false);
         let mut owner = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
         while owner != NONE {
             let mut decided = self.decided(owner);
             if matches!(self.graph.op(self.code, owner), Op::Mem { .. }) {
-                // Its entries are there for calls that may be anywhere: every choice may
+                // Its entries exist for calls that may be anywhere, so every choice may
                 // decide.
                 self.found.anywhere = true;
                 decided.site = 0;
@@ -274,8 +275,8 @@ impl<'a> Reader<'a> {
 }
 
 impl Graph {
-    /// The nodes whose values decide which other nodes a node reads, and which frames it
-    /// has.
+    /// Calls `f` with the nodes whose values decide which other nodes a node reads, and
+    /// which frames it has.
     pub(in crate::trace) fn deciders(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId)) {
         let node = &self.nodes[n as usize];
         let mut operand = |o: &Operand| {
@@ -291,7 +292,7 @@ impl Graph {
             }
             Op::Mem { f, .. } => operand(f),
             Op::Draw { keys, .. } => keys.iter().for_each(operand),
-            // The elements of arrays are not nodes, those of containers are.
+            // The elements of arrays are not nodes; those of containers are.
             Op::Index { keys, .. } if node.side.is_some() => keys.iter().for_each(operand),
             Op::Call { callee: Callee::Value(v), .. } => operand(v),
             _ => {}
