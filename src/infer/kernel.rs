@@ -63,7 +63,7 @@ impl StepContext {
 pub struct Outcome {
     /// Proposals made.
     pub proposals: u32,
-    /// Those that were accepted.
+    /// Those accepted.
     pub accepted: u32,
     /// Those rejected because the program is undefined there (a scale that is not
     /// positive, a matrix that cannot be factored).

@@ -84,7 +84,7 @@ pub fn observed(trace: &Trace) -> Replication {
 /// One replication of a state.
 ///
 /// # Errors
-/// What goes wrong while observations are drawn.
+/// If an observation cannot be drawn.
 pub fn replication(trace: &Trace, draws: Draws) -> Result<Replication, Box<RunError>> {
     let drawn = trace.replicate(draws)?;
     let addresses: rustc_hash::FxHashMap<u64, Address> =
@@ -168,7 +168,7 @@ impl Predictive {
     /// The replications so far, by chain.
     ///
     /// # Errors
-    /// The first thing that went wrong while observations were drawn.
+    /// The first error in drawing observations.
     pub fn draws(&self) -> Result<Vec<Vec<Replication>>, Box<RunError>> {
         let take = |c: &Mutex<Chain>| {
             let c = c.lock().unwrap_or_else(PoisonError::into_inner);

@@ -17,8 +17,8 @@ use crate::syntax::span::Span;
 use crate::trace::{Draws, Trace, TraceResult};
 use std::sync::Arc;
 
-/// Likelihood-free Metropolis-Hastings around a kernel that leaves the prior invariant
-/// and is reversible.
+/// Likelihood-free Metropolis-Hastings with a reversible inner kernel that leaves the
+/// prior invariant.
 pub struct Abc {
     kernel: Box<dyn Kernel>,
     eps: f64,

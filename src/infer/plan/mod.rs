@@ -83,7 +83,7 @@ pub struct Progress {
     pub steps: AtomicU64,
     /// The best log joint density of any chain, as bits of an `f64`.
     pub best: AtomicU64,
-    /// Chains that have found where to start.
+    /// Chains that have an initial state.
     pub started: AtomicU32,
     /// Chains that are in warm-up.
     pub warming: AtomicU32,
