@@ -1,5 +1,5 @@
-//! The best state of each chain so far, warm-up included: what there is to show of a run,
-//! while it goes on and when it has ended.
+//! The best state of each chain so far, including warm-up, to show during and after a
+//! run.
 
 use super::callback::Callback;
 use super::plan::Progress;
@@ -9,33 +9,33 @@ use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// States between draws are looked at every so many steps, after the first few: a state
-/// costs as much to keep as it has choices.
+/// After the first few steps, states between draws are examined every `EVERY` steps: the
+/// cost of keeping a state is proportional to its number of choices.
 const EVERY: u64 = 8;
 
-/// A state worth keeping.
+/// A state that is the best so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BestState {
-    /// Its log joint density, the likelihood in full whatever the chain is annealed to.
+    /// Its log joint density at the full likelihood, even if the chain is annealed.
     pub log_joint: f64,
-    /// The steps before it, warm-up included.
+    /// The number of steps before it, including warm-up.
     pub step: u64,
     /// Its choices.
     pub choices: Vec<(u64, Constraint)>,
 }
 
-/// Keeps the best state of each chain; [`Progress::best`] is kept up to date as well. The
-/// chains' draws stay as they are.
+/// Keeps the best state of each chain, and updates [`Progress::best`]. The chains' draws
+/// are not affected.
 #[derive(Debug)]
 pub struct BestSoFar {
     chains: Vec<Mutex<Option<Arc<BestState>>>>,
-    /// The log joint densities of `chains`, as bits, to be looked at without waiting.
+    /// The log joint densities of `chains`, as bits, which can be read without locking.
     known: Vec<AtomicU64>,
     progress: Arc<Progress>,
 }
 
 impl BestSoFar {
-    /// Of so many chains of a run.
+    /// For a run of `chains` chains.
     pub fn new(chains: u32, progress: &Arc<Progress>) -> BestSoFar {
         BestSoFar {
             chains: (0..chains).map(|_| Mutex::default()).collect(),
@@ -44,13 +44,13 @@ impl BestSoFar {
         }
     }
 
-    /// The best state of all chains, if any has made steps.
+    /// The best state of all chains; `None` before the first step.
     pub fn state(&self) -> Option<Arc<BestState>> {
         let each = (0..self.chains.len()).filter_map(|c| self.of_chain(c));
         each.max_by(|a, b| a.log_joint.total_cmp(&b.log_joint))
     }
 
-    /// The best state of one chain, by its number from 0, if it has made steps.
+    /// The best state of one chain, numbered from 0; `None` before its first step.
     pub fn of_chain(&self, chain: usize) -> Option<Arc<BestState>> {
         self.chains.get(chain)?.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -119,7 +119,7 @@ mod tests {
         let posterior = model.run(&options, 2, 1).unwrap();
         let drawn = posterior.scalars().into_iter().find(|q| q.0 == "log_joint").unwrap().1;
         let state = best.state().unwrap();
-        // The density is greatest at 100/101; of hundreds of states one is near it.
+        // The density is greatest at 100/101; one of hundreds of states is near it.
         let greatest = model_density(100.0 / 101.0);
         assert!(state.log_joint <= greatest && state.log_joint > greatest - 0.01, "{state:?}");
         assert!(drawn.iter().all(|l| *l <= state.log_joint), "no draw is better");

@@ -1,4 +1,4 @@
-//! From the calls people write in inference blocks to kernels.
+//! Builds kernels from their calls in inference blocks.
 
 use super::expr::{PlanEnv, evaluate};
 use super::host_kernel::build_host_kernel;
@@ -19,17 +19,17 @@ use crate::syntax::span::Span;
 use crate::trace::Selector;
 use std::sync::Arc;
 
-/// A kernel, and what tells it from others: calls written alike that mean the same
-/// choices are one kernel, so that what is learnt in a warm-up serves the loops after it.
+/// A kernel, and the signature that identifies it: calls with the same text and the same
+/// choices share one kernel, so that what it adapts in warm-up is used by later loops.
 pub(super) struct Built {
     pub kernel: Box<dyn Kernel>,
     pub signature: String,
 }
 
-/// Builds the kernel of a call. Choices that the program froze are left out.
+/// Builds the kernel of a call. Choices that the program froze are excluded.
 ///
 /// # Errors
-/// What is wrong with it, at its place.
+/// What is wrong with the call, with its position.
 pub(super) fn build(
     e: &Expr,
     frozen: &Selector,
@@ -107,7 +107,7 @@ pub(super) fn build(
     }
     let mut scope = scope(&first.value, env)?;
     scope.selector = without(scope.selector, frozen);
-    // The text says it all, unless it has names in it.
+    // The printed call identifies the arguments, unless it contains names.
     let given: Vec<Value> = match is_constant(e) {
         true => Vec::new(),
         false => args[1..].iter().filter_map(|a| evaluate(&a.value, env).ok()).collect(),
@@ -186,7 +186,7 @@ fn marginal(
 /// The values of the parameters of a declared kernel, by name.
 ///
 /// # Errors
-/// If one is missing, or fails.
+/// If an argument is missing, or its evaluation fails.
 pub(super) fn arguments(
     k: &KernelDecl,
     args: &[Arg],
@@ -202,7 +202,7 @@ pub(super) fn arguments(
     k.params.iter().enumerate().map(one).collect()
 }
 
-/// A positive number that a kernel takes besides its selection, if it is given.
+/// A positive numeric argument of a kernel, if it is given.
 fn positive(
     e: Option<&Expr>,
     kernel: &str,
@@ -216,7 +216,7 @@ fn positive(
     }
 }
 
-/// A switch that a kernel takes besides its selection; off unless given.
+/// A boolean argument of a kernel; false unless given.
 fn truth(e: Option<&Expr>, name: &str, env: &mut PlanEnv) -> Result<bool, Box<RunError>> {
     let Some(e) = e else { return Ok(false) };
     match evaluate(e, env)? {
@@ -225,7 +225,7 @@ fn truth(e: Option<&Expr>, name: &str, env: &mut PlanEnv) -> Result<bool, Box<Ru
     }
 }
 
-/// A whole number that a kernel takes besides its selection.
+/// A whole-number argument of a kernel.
 fn whole(
     e: Option<&Expr>,
     name: &str,
@@ -246,7 +246,7 @@ fn whole(
     }
 }
 
-/// Whether a call means the same whenever it is reached: it reads no names.
+/// Whether a call means the same whenever it is executed: it contains no names.
 pub(super) fn is_constant(e: &Expr) -> bool {
     let arguments = |args: &[Arg]| args.iter().all(|a| is_constant(&a.value));
     match &e.kind {

@@ -1,4 +1,4 @@
-//! Callbacks: what sees the steps and draws of a run's chains, and may end the run.
+//! Callbacks: observe the steps and draws of a run's chains, and may end the run.
 
 use super::state::{StateError, pack, unpack};
 use crate::trace::{Draws, Trace};
@@ -7,23 +7,23 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Sees the state of a chain after each step and at each recorded draw.
-/// [`Callbacks`] makes one of closures, or of several others.
+/// Observes the state of a chain after each step and at each recorded draw. [`Callbacks`]
+/// combines closures and other callbacks.
 pub trait Callback: fmt::Debug + Send + Sync {
-    /// A draw of a chain has been recorded, and `trace` is its state. Values that no
-    /// observation depends on are drawn with `draws`. A callback leaves the state as it
-    /// is, unless it exists to change it ([`super::calibration::geweke()`]): the chain
+    /// Called when a draw of a chain has been recorded; `trace` is the state. Values that
+    /// no observation depends on are drawn with `draws`. A callback must not change the
+    /// state, unless that is its purpose ([`super::calibration::geweke()`]): the chain
     /// continues from the state that the callback leaves. Draws of one chain come in
     /// order, chains in any order.
     fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws);
 
-    /// What the callback has gathered of a chain, for a checkpoint.
+    /// What the callback has gathered from a chain, for a checkpoint.
     fn save(&self, chain: u32) -> Vec<u8> {
         let _ = chain;
         Vec::new()
     }
 
-    /// Restores what was gathered of a chain.
+    /// Restores what was gathered from a chain.
     ///
     /// # Errors
     /// If the bytes are not those of [`Callback::save`].
@@ -35,26 +35,26 @@ pub trait Callback: fmt::Debug + Send + Sync {
         }
     }
 
-    /// A chain has made `steps` steps, and `trace` is its state.
+    /// Called when a chain has made `steps` steps; `trace` is its state.
     fn step(&self, chain: u32, steps: u64, trace: &Trace) {
         let _ = (chain, steps, trace);
     }
 
-    /// Asked between steps: whether all chains of the run are to end.
+    /// Whether all chains of the run should end; called between steps.
     fn is_over(&self) -> bool {
         false
     }
 }
 
-/// After a step: the chain, how many steps it has made, its state.
+/// Called after a step with the chain, the number of its steps so far and its state.
 type OnStep = dyn Fn(u32, u64, &Trace) -> ControlFlow<()> + Send + Sync;
-/// At a draw: the chain, its state.
+/// Called at a draw with the chain and its state.
 type OnDraw = dyn Fn(u32, &mut Trace) -> ControlFlow<()> + Send + Sync;
 
-/// Closures and other callbacks as one, for
+/// Combines closures and other callbacks into one, for
 /// [`RunOptions::callback`](super::RunOptions::callback). A closure ends the run by
-/// `ControlFlow::Break`; the run keeps its draws. Closures are called from the chains'
-/// threads.
+/// returning `ControlFlow::Break`; the run keeps its draws. Closures are called from the
+/// chains' threads.
 ///
 /// ```
 /// use pcadlang::infer::Callbacks;
@@ -99,7 +99,7 @@ impl fmt::Debug for Callbacks {
 }
 
 impl Callbacks {
-    /// Without any callback.
+    /// No callbacks.
     pub fn new() -> Callbacks {
         Callbacks::default()
     }
@@ -111,8 +111,8 @@ impl Callbacks {
         self
     }
 
-    /// Adds a closure that is called after each step of a chain with the chain, its steps
-    /// so far and its state.
+    /// Adds a closure that is called after each step of a chain with the chain, the
+    /// number of its steps so far and its state.
     #[must_use]
     pub fn on_step(
         mut self,
@@ -123,7 +123,7 @@ impl Callbacks {
     }
 
     /// Adds a closure that is called at each draw with the chain and its state, which it
-    /// leaves as it is.
+    /// must not change.
     #[must_use]
     pub fn on_draw(
         mut self,

@@ -1,5 +1,5 @@
-//! Chains side by side: each has its own streams, so the number of threads changes
-//! nothing but the time.
+//! Runs chains in parallel. Each has its own random streams, so the number of threads
+//! affects only the run time.
 
 use super::draws::Sink;
 use super::init::draw_once;
@@ -11,9 +11,9 @@ use crate::trace::Limits;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Runs chains `0 .. chains` of a plan; `sinks` has one sink a chain. All chains run to
-/// their end even if one fails. A limit of time is for all of them together: with more
-/// chains than threads each gets its share of what is left once the data are ready.
+/// Runs chains `0 .. chains` of a plan; `sinks` has one sink per chain. All chains run to
+/// their end even if one fails. A time limit applies to all of them together: with more
+/// chains than threads, each gets its part of what is left once the data are ready.
 pub fn run_chains(
     code: &Arc<Code>,
     plan: &[KStmt],
@@ -32,9 +32,10 @@ pub fn run_chains(
     in_parallel(threads, work, run)
 }
 
-/// The time of each of so many rounds of chains. What is worked out once, such as the
-/// people in a photograph, is so before the chains begin, or else the first of each
-/// thread would pay for it and have less time than those after it.
+/// The time limit of a chain, when chains run in `rounds` rounds. Values that are
+/// computed once, such as the people in a photograph, are computed before the chains
+/// begin; otherwise the first chain of each thread would pay for them and have less time
+/// than later ones.
 fn share(code: &Arc<Code>, options: &RunOptions, time: Duration, rounds: u32) -> Duration {
     if rounds == 1 {
         return time;

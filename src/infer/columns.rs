@@ -1,5 +1,5 @@
-//! The columns of recorded draws: names and shapes, and how draws with fewer columns fit
-//! among those with more.
+//! The columns of recorded draws: names, shapes, and how draws with fewer columns are
+//! fitted to those with more.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
@@ -10,12 +10,12 @@ use std::collections::HashMap;
 pub enum Shape {
     /// One.
     Scalar,
-    /// A fixed number of them, maybe none.
+    /// A fixed number of them, which may be 0.
     Vector(usize),
 }
 
 impl Shape {
-    /// The count of numbers.
+    /// How many numbers it holds.
     pub fn len(self) -> usize {
         match self {
             Shape::Scalar => 1,
@@ -23,7 +23,7 @@ impl Shape {
         }
     }
 
-    /// Whether it holds nothing.
+    /// Whether it holds no numbers.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
@@ -51,13 +51,13 @@ impl Column {
     }
 }
 
-/// The count of numbers in a row.
+/// How many numbers a row holds.
 pub fn width(columns: &[Column]) -> usize {
     columns.iter().map(|c| c.shape.len()).sum()
 }
 
-/// The columns of two lists, those of the first in their order and then the others. Of
-/// columns with one name the longer is taken.
+/// Merges two lists of columns: those of the first in their order, then the others. If
+/// both have a column, its shape is the longer one.
 pub fn merged(a: &[Column], b: &[Column]) -> Vec<Column> {
     let mut all: IndexMap<&str, Shape> = IndexMap::new();
     for c in a.iter().chain(b) {
@@ -69,12 +69,12 @@ pub fn merged(a: &[Column], b: &[Column]) -> Vec<Column> {
     all.into_iter().map(|(name, shape)| Column { name: name.into(), shape }).collect()
 }
 
-/// Where the numbers of a row are found in a row with fewer columns.
+/// Maps the numbers of a row to their positions in a row with other columns.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout(Vec<Option<usize>>);
 
 impl Layout {
-    /// From rows of some columns to rows of others, by their names.
+    /// Maps rows of the columns `from` to rows of the columns `to`, by name.
     pub fn new(from: &[Column], to: &[Column]) -> Layout {
         let mut begin = 0;
         let mut places: HashMap<&str, std::ops::Range<usize>> = HashMap::new();
@@ -89,12 +89,12 @@ impl Layout {
         Layout(to.iter().flat_map(place).collect())
     }
 
-    /// Whether rows stay as they are, if they have so many numbers.
+    /// Whether rows of `width` numbers remain unchanged.
     pub fn is_same(&self, width: usize) -> bool {
         self.0.len() == width && self.0.iter().enumerate().all(|(i, from)| *from == Some(i))
     }
 
-    /// The row in the other columns; NaN where it has nothing.
+    /// The row in the new columns, with NaN for numbers that it lacks.
     pub fn apply(&self, values: &[f64]) -> Vec<f64> {
         let value =
             |from: &Option<usize>| from.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN);
@@ -124,7 +124,7 @@ mod tests {
         let row = Layout::new(&more, &all).apply(&[5.0, 6.0, 7.0, 8.0, 9.0]);
         assert!(row[0].is_nan() && row[1..] == [5.0, 6.0, 7.0, 9.0, 8.0]);
         assert!(Layout::new(&all, &all).is_same(6) && !Layout::new(&all, &few).is_same(6));
-        // A number that is a list in other draws is its first element.
+        // A scalar that is a list in other draws becomes the list's first element.
         assert_eq!(
             merged(&[Column::scalar("x")], &[Column::vector("x", 1)]),
             [Column::vector("x", 1)]

@@ -1,15 +1,15 @@
-//! The plan of a program without an `infer` block, chosen by the kinds of its choices and
-//! printed so that it can be copied.
+//! The plan of a program without an `infer` block. It depends on the kinds of the
+//! program's choices, and is printed so that it can be copied.
 
 use crate::trace::{ChoiceKind, Selector, Trace};
 
-/// The plan for a program, as program text, by the choices that some draws from its prior
-/// make: another draw may ask for choices that the first does not.
+/// The plan for a program, as program text, from the choices of several draws from its
+/// prior: another draw may have choices that the first one lacks.
 ///
-/// Where the density has a gradient, `nuts` moves all continuous choices together and a
-/// sweep of `gibbs` the finite ones; the rest is left to kernels that need no slope.
-/// `nuts` and sweeps stay within one structure: where that depends on choices of theirs,
-/// kernels that take one at a time change it.
+/// If the density has a gradient, `nuts` moves all continuous choices together and a
+/// sweep of `gibbs` the finite ones; other choices are left to kernels without gradients.
+/// `nuts` and sweeps stay within one structure: if the structure depends on their
+/// choices, single-site kernels are added that can change it.
 pub fn default_plan(draws: &mut [Trace]) -> String {
     let mut count = |kind| {
         let of = |trace: &mut Trace| {
@@ -33,7 +33,7 @@ pub fn default_plan(draws: &mut [Trace]) -> String {
     }
 }
 
-/// Whether the density has a derivative by its continuous choices.
+/// Whether the density is differentiable with respect to the continuous choices.
 fn has_gradient(trace: &mut Trace) -> bool {
     let selection = trace.select(&Selector::Kind(ChoiceKind::Continuous));
     let targets = trace.targets(selection).to_vec();

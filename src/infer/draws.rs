@@ -1,8 +1,8 @@
-//! What inference hands out: draws, one row at a time, and what the kernels did.
+//! The output of inference: draws, one row at a time, and statistics of the kernels.
 //!
-//! Plain data and the [`Sink`] they flow into; where draws go (a file, memory, a progress
-//! line) is the sink's business. Invariant: the values of every row have the length
-//! [`width`] of the columns announced last.
+//! Draws flow into a [`Sink`], which decides where they go (a file, memory, a progress
+//! line). Invariant: the number of values of every row is the [`width`] of the columns
+//! announced last.
 
 use super::Checkpoint;
 pub use super::columns::{Column, Layout, Shape, merged, width};
@@ -17,47 +17,48 @@ pub struct DrawRow {
     pub chain: u32,
     /// The draw within the chain, from 0.
     pub draw: u64,
-    /// Kernel applications before it, warm-up included.
+    /// Kernel applications before it, including warm-up.
     pub step: u64,
-    /// Natural log of the joint density, up to a constant if the likelihood is.
+    /// The natural logarithm of the joint density, up to a constant if the likelihood is
+    /// unnormalised.
     pub log_joint: f64,
     /// The part of it from the random choices.
     pub log_prior: f64,
     /// The part of it from the observations.
     pub log_likelihood: f64,
-    /// Accepted proposals per proposal since the draw before it; NaN if there was none.
+    /// The acceptance rate since the previous draw; NaN if there were no proposals.
     pub acceptance: f64,
-    /// Divergent trajectories since the draw before it.
+    /// Divergent trajectories since the previous draw.
     pub divergent: u64,
-    /// The columns, flattened.
+    /// The values of the columns, flattened.
     pub values: Vec<f64>,
 }
 
 /// Where the draws of one chain go.
 pub trait Sink: Send {
-    /// Announces the columns: before the first draw, and again when a draw has more than
-    /// those before it. Then each of the earlier columns is among the new ones, maybe
-    /// longer; earlier draws have NaN for what they lack ([`Layout`]).
+    /// Announces the columns, before the first draw and again when a draw has more of
+    /// them. Each earlier column is then among the new ones, possibly longer; earlier
+    /// draws have NaN for what they lack ([`Layout`]).
     ///
     /// # Errors
     /// If they cannot be written.
     fn columns(&mut self, columns: &[Column]) -> io::Result<()>;
 
-    /// Takes a draw.
+    /// Receives a draw.
     ///
     /// # Errors
     /// If it cannot be written.
     fn draw(&mut self, row: &DrawRow) -> io::Result<()>;
 
-    /// The chain has ended after `steps` kernel applications and `warmup` before them, in
-    /// `seconds` of wall time.
+    /// Called when the chain has ended after `steps` kernel applications, with `warmup`
+    /// before them, in `seconds` of wall time.
     ///
     /// # Errors
-    /// If that cannot be written.
+    /// If the sink cannot write this.
     fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()>;
 
-    /// The checkpoint to go on from, asked for once, before all else; the draws before it
-    /// are the sink's already.
+    /// The checkpoint to resume from; called once, before all other methods. The sink
+    /// already has the draws before it.
     ///
     /// # Errors
     /// If there is one that cannot be read.
@@ -65,22 +66,22 @@ pub trait Sink: Send {
         Ok(None)
     }
 
-    /// Whether it keeps checkpoints.
+    /// Whether the sink stores checkpoints.
     fn takes_checkpoints(&self) -> bool {
         false
     }
 
-    /// Keeps a checkpoint: all draws before it must outlive it.
+    /// Stores a checkpoint. All draws before it must be stored as durably.
     ///
     /// # Errors
-    /// If it cannot be written; the one before it must be kept then.
+    /// If it cannot be written; the previous one must then be kept.
     fn checkpoint(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {
         let _ = checkpoint;
         Ok(())
     }
 }
 
-/// Takes draws and forgets them: for chains that a watch looks at.
+/// Discards draws, for chains that are observed by a callback.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Discard;
 
@@ -98,7 +99,7 @@ impl Sink for Discard {
     }
 }
 
-/// What a kernel did in a chain, or in all of them.
+/// Statistics of a kernel in a chain, or in all of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KernelStats {
     /// The kernel as the program writes it.
@@ -107,23 +108,23 @@ pub struct KernelStats {
     pub proposals: u64,
     /// Those accepted.
     pub accepted: u64,
-    /// Wall time in it, in seconds.
+    /// Wall time spent in it, in seconds.
     pub seconds: f64,
-    /// Those rejected because the program has no value there (a domain error).
+    /// Those rejected because the program is undefined there (a domain error).
     pub failed: u64,
-    /// Trajectories on which the energy was not kept (Hamiltonian kernels).
+    /// Divergent trajectories (Hamiltonian kernels).
     #[serde(default)]
     pub divergent: u64,
-    /// The step size after warm-up (Hamiltonian kernels): of several chains the mean.
+    /// The step size after warm-up (Hamiltonian kernels); over several chains, the mean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step_size: Option<f64>,
-    /// The log of the evidence, from kernels that estimate it: of several chains that of
-    /// the mean estimate.
+    /// The log of the evidence, from kernels that estimate it; over several chains, the
+    /// log of the mean estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_evidence: Option<f64>,
 }
 
-/// What single-site kernels did to one choice in a chain, or in all of them.
+/// Statistics of single-site kernels at one choice, in a chain or in all of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SiteStats {
     /// Its address.
@@ -135,12 +136,12 @@ pub struct SiteStats {
 }
 
 impl SiteStats {
-    /// Accepted proposals per proposal; `None` if there was none.
+    /// The acceptance rate; `None` if there were no proposals.
     pub fn acceptance(&self) -> Option<f64> {
         (self.proposals > 0).then(|| self.accepted as f64 / self.proposals as f64)
     }
 
-    /// The choices of several chains, added up by address, in order of first appearance.
+    /// Sums the statistics of several chains by address, in order of first appearance.
     pub fn total<'a>(stats: impl IntoIterator<Item = &'a SiteStats>) -> Vec<SiteStats> {
         let mut sum: indexmap::IndexMap<&str, SiteStats> = indexmap::IndexMap::new();
         for s in stats {
@@ -154,7 +155,7 @@ impl SiteStats {
 }
 
 impl KernelStats {
-    /// Adds what a step did, and the time it took.
+    /// Adds the outcome of a step, and the time it took.
     #[doc(hidden)]
     pub fn add(&mut self, outcome: &super::Outcome, time: std::time::Duration) {
         let add = |a: &mut u64, b: u32| *a = a.saturating_add(b.into());
@@ -165,12 +166,13 @@ impl KernelStats {
         self.seconds += time.as_secs_f64();
     }
 
-    /// Accepted proposals per proposal; `None` if there was none.
+    /// The acceptance rate; `None` if there were no proposals.
     pub fn acceptance(&self) -> Option<f64> {
         (self.proposals > 0).then(|| self.accepted as f64 / self.proposals as f64)
     }
 
-    /// The kernels of several chains, added up by name, in order of first appearance.
+    /// Sums the statistics of several chains by kernel name, in order of first
+    /// appearance.
     #[doc(hidden)]
     pub fn total<'a>(stats: impl IntoIterator<Item = &'a KernelStats>) -> Vec<KernelStats> {
         let mut sum: indexmap::IndexMap<&str, KernelStats> = indexmap::IndexMap::new();

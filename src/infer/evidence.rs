@@ -1,5 +1,4 @@
-//! What chains that do not agree say of the evidence of where each of them is: gathered
-//! draw by draw.
+//! The evidence of the modes that disagreeing chains are in, gathered draw by draw.
 
 use super::callback::Callback;
 use super::diagnostics::{Clouds, LogEvidence, log_density, log_evidence, shares};
@@ -12,36 +11,36 @@ use std::hash::{Hash, Hasher};
 use std::sync::{Mutex, PoisonError};
 
 /// The most choices of a program whose modes are weighed, and the most configurations of
-/// a chain that are kept apart.
+/// a chain that are distinguished.
 const MOST: (usize, usize) = (256, 32);
 /// The standard error in nats up to which an evidence counts as known.
 const KNOWN: f64 = 3.0;
-/// All draws up to the first number, and then each of so many, are looked at.
+/// All of the first draws up to this number are used, and then every n-th.
 const LOOKED_AT: (u64, u64) = (1000, 8);
 
-/// Watches the draws of some chains.
+/// Gathers the draws of chains, as a run's callback.
 #[derive(Debug, Default)]
 pub struct Evidence(Vec<Mutex<Gathered>>);
 
-/// A chain's draws by configuration: which choices there are, and the values of the
-/// discrete ones.
+/// A chain's draws by configuration: the set of choices and the values of the discrete
+/// ones.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Gathered {
-    /// Draws so far, and those of them that were looked at.
+    /// Draws so far, and the number of them that were used.
     draws: u64,
     looked: u64,
     clouds: BTreeMap<u64, Clouds>,
 }
 
 impl Evidence {
-    /// Of so many chains.
+    /// For a run of `chains` chains.
     pub fn new(chains: u32) -> Evidence {
         Evidence((0..chains).map(|_| Mutex::default()).collect())
     }
 
-    /// What the draws of these chains, by their numbers from 0, say of the mode that they
-    /// are in: of the configuration that they are in most, over the share of draws in it.
-    /// `None` from too few draws, or of more choices than is worth the time.
+    /// Estimates the evidence of the mode that these chains, numbered from 0, are in:
+    /// that of their most frequent configuration, divided by the fraction of draws in it.
+    /// `None` if there are too few draws, or too many choices to be worth the time.
     pub fn of(&self, chains: &[usize]) -> Option<Weighed> {
         let chains = chains.iter().filter_map(|c| self.0.get(*c));
         let locked: Vec<_> =
@@ -64,18 +63,19 @@ impl Evidence {
     }
 }
 
-/// What is known of a mode.
+/// The estimates for a mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighed {
     /// Its evidence, if it can be estimated.
     pub evidence: Option<LogEvidence>,
-    /// Its evidence but for how wide it is.
+    /// Its mean log density: the evidence without the term for the mode's width.
     pub density: LogEvidence,
 }
 
 impl Weighed {
-    /// The probabilities of some modes: by their evidences, if all are known to within
-    /// [`KNOWN`], or else as if all were equally wide.
+    /// The probabilities of modes: by their evidences if all are known to within
+    /// [`KNOWN`], else as if all modes were equally wide. The flag says whether the
+    /// evidences are known.
     pub fn probabilities(all: &[Weighed]) -> (Vec<f64>, bool) {
         let known =
             all.iter().map(|w| w.evidence.filter(|e| e.error <= KNOWN)).collect::<Option<Vec<_>>>();
@@ -142,9 +142,9 @@ mod tests {
     use crate::{Model, RunOptions};
     use std::sync::Arc;
 
-    /// Chains that begin in either of two modes and cannot leave: shares are those of the
-    /// masses, 0.3 and 0.7 times what the observation leaves, whatever the number of
-    /// chains in each.
+    /// Chains that start in either of two modes and cannot leave: the modes'
+    /// probabilities are proportional to their masses, 0.3 and 0.7 times the likelihood
+    /// of the observation, whatever the number of chains in each.
     #[test]
     fn modes_that_chains_cannot_leave_have_their_shares() {
         let model = Model::from_text(
@@ -166,8 +166,8 @@ mod tests {
         assert!(!near.is_empty() && !far.is_empty(), "{near:?} {far:?}");
         let weighed = [&near, &far].map(|m| evidence.of(m).unwrap());
         let each = weighed.map(|w| w.evidence.unwrap());
-        // Of all distributions of a covariance a Gaussian has the most entropy: what is
-        // not one has a little too much evidence.
+        // Of all distributions with a given covariance, a Gaussian has the greatest
+        // entropy: other distributions are given a little too much evidence.
         let truth = libm::log(0.5 / std::f64::consts::PI.sqrt()) - 0.25 * 0.09;
         let over = each[0].value - truth - libm::log(0.3);
         assert!(over > 0.0 && over < 0.2, "{each:?} {truth}");

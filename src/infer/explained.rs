@@ -1,5 +1,4 @@
-//! What a plan says of a model's choices: which of its kernels select them. Nothing is
-//! run.
+//! Which kernels of a plan select which choices, without running it.
 
 use super::expr::PlanEnv;
 use super::plan::call;
@@ -11,16 +10,18 @@ use crate::syntax::print_expr;
 use crate::trace::{Draws, Selector, Trace};
 use std::sync::Arc;
 
-/// A kernel of a plan.
+/// A kernel of a plan, and the choices it selects.
 #[derive(Clone, Debug)]
 pub struct Selecting {
-    /// As it is written.
+    /// The call as written.
     pub kernel: String,
-    /// What it may move; where that depends on variables of the plan, everything.
+    /// The choices it may move; all of them if the selection depends on variables of the
+    /// plan.
     pub selector: Selector,
 }
 
-/// The kernels of a plan, those of warm-up too, each once, in the order of the plan.
+/// The kernels of a plan, including those of warm-up, each once, in the order of the
+/// plan.
 pub fn selecting(code: &Arc<Code>, plan: &[KStmt], trace: &mut Trace) -> Vec<Selecting> {
     let mut found = Vec::new();
     let env = PlanEnv {
@@ -40,7 +41,7 @@ struct Reader<'a, 'e> {
     code: &'a Code,
     env: PlanEnv<'e>,
     found: &'a mut Vec<Selecting>,
-    /// Declared kernels being read: one may call itself.
+    /// The declared kernels being read, as one may call itself.
     within: Vec<Arc<str>>,
 }
 
@@ -74,8 +75,8 @@ impl Reader<'_, '_> {
             self.within.pop();
             return;
         }
-        // Kernels without a selection move everything; those that hold others, what these
-        // do.
+        // A kernel without a selection moves everything. A kernel that wraps others moves
+        // what they move.
         let mut selected = false;
         for arg in args {
             let inside = call(&arg.value).is_some_and(|(inner, args)| {
@@ -98,7 +99,7 @@ impl Reader<'_, '_> {
         }
     }
 
-    /// What a declared kernel, called by `e`, proposes itself.
+    /// Adds what a declared kernel, called by `e`, proposes itself.
     fn moved(&mut self, e: &Expr, body: &[KStmt]) {
         for statement in body {
             match &statement.kind {

@@ -1,5 +1,5 @@
-//! Expressions of inference blocks: counts, weights, conditions. They see the block's own
-//! variables, the model's top-level names, and what is known of the run.
+//! Expressions of inference blocks: counts, weights and conditions. They can use the
+//! block's own variables, the model's top-level names, and the state of the run.
 
 use super::selection::{fail, fault};
 use crate::lang::builtins::{Args, Builtin, Kind};
@@ -12,7 +12,7 @@ use crate::syntax::ast::{BinaryOp, Expr, ExprKind, UnaryOp};
 use crate::trace::{Address, Draws, Trace};
 use std::sync::Arc;
 
-/// What an expression can see.
+/// The environment in which an expression is evaluated.
 pub(crate) struct PlanEnv<'a> {
     pub code: &'a Arc<Code>,
     pub trace: &'a mut Trace,
@@ -21,15 +21,15 @@ pub(crate) struct PlanEnv<'a> {
     pub draws: Draws,
     pub started: Instant,
     pub steps: u64,
-    /// In a map of a kernel, which reads nothing else of the state: choices with values
-    /// in place of those they have.
+    /// In a map of a kernel: the values of choices in place of their present ones.
+    /// Nothing else of the state may be read then.
     pub moved: Option<&'a [(Address, Value)]>,
 }
 
 /// Evaluates an expression.
 ///
 /// # Errors
-/// What goes wrong, at its place.
+/// What went wrong, with its position.
 pub(crate) fn evaluate(e: &Expr, env: &mut PlanEnv) -> Result<Value, Box<RunError>> {
     match &e.kind {
         ExprKind::Num(x) => Ok(Value::Num(*x)),
@@ -105,8 +105,8 @@ pub(crate) fn evaluate(e: &Expr, env: &mut PlanEnv) -> Result<Value, Box<RunErro
                 args.iter().map(|a| evaluate(&a.value, env)).collect();
             let values = values?;
             let called = known(name, e, env)?;
-            // As many as it has, those left out as nothing: keywords may change the
-            // order.
+            // One value per parameter, `Unit` if it is omitted. Keyword arguments may
+            // change the order.
             let order = called.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)));
             let order = order.map_err(|message| fail(e.span, message))?;
             let placed: Vec<&Value> =
@@ -183,7 +183,7 @@ fn unsupported(e: &Expr) -> Box<RunError> {
     fail(e.span, "this expression cannot be used in an inference block".into())
 }
 
-/// The name of the built-in behind an operator.
+/// The name of the built-in that implements an operator.
 fn operator(op: BinaryOp) -> &'static str {
     match op {
         BinaryOp::Add => "+",

@@ -1,5 +1,5 @@
-//! `force @a = v`: sets a choice at the start of a chain; it keeps its prior score and
-//! may be proposed again.
+//! `force @a = v`: sets a choice at the start of a chain. Its prior score is kept, and
+//! kernels may change it.
 
 use super::plan::RunOptions;
 use super::selection::fail;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Applies the program's `force` statements in order.
 ///
 /// # Errors
-/// If an address is not that of one choice, or the value does not fit it.
+/// If an address does not name exactly one choice, or the value does not fit it.
 pub(crate) fn apply(
     code: &Arc<Code>,
     trace: &mut Trace,
@@ -28,7 +28,7 @@ pub(crate) fn apply(
     put(&code.forces, trace, draws)
 }
 
-/// Applies some `force` statements of the trace's program.
+/// Applies `force` statements of the trace's program.
 ///
 /// # Errors
 /// As [`apply`].
@@ -70,7 +70,8 @@ pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(
     Ok(())
 }
 
-/// The address an address literal stands for, if it has no wildcards or computed keys.
+/// The address that an address literal denotes; `None` if it has wildcards or computed
+/// keys.
 pub(crate) fn literal(a: &ast::Address) -> Option<Address> {
     let mut segments = Vec::with_capacity(a.segments.len());
     for s in &a.segments {

@@ -1,4 +1,4 @@
-//! Kernels that a host brings: their calls in inference blocks, and what makes them.
+//! Kernels that a host defines: their calls in inference blocks, and their constructors.
 
 use super::build::{Built, build, without};
 use super::expr::{PlanEnv as Env, evaluate};
@@ -13,7 +13,7 @@ use crate::syntax::ast::{Arg, Expr};
 use crate::syntax::print_expr;
 use crate::trace::Selector;
 
-/// The call of a host's kernel in an `infer` block, its arguments evaluated.
+/// A call of a host's kernel in an `infer` block, with its arguments evaluated.
 pub struct KernelCall<'a> {
     args: Args<'a>,
     scopes: Vec<Option<SiteSelection>>,
@@ -21,15 +21,15 @@ pub struct KernelCall<'a> {
 }
 
 impl KernelCall<'_> {
-    /// The arguments that are values: numbers, truth values and the like.
+    /// The arguments that are plain values, such as numbers and truth values.
     pub fn args(&self) -> &Args<'_> {
         &self.args
     }
 
-    /// The choices that argument `i` selects; what the program froze is left out.
+    /// The choices that argument `i` selects, without those that the program froze.
     ///
     /// # Errors
-    /// If it is no selection.
+    /// If the argument is not a selection.
     pub fn scope(&self, i: usize) -> Result<SiteSelection, Fault> {
         self.scopes
             .get(i)
@@ -38,11 +38,11 @@ impl KernelCall<'_> {
             .ok_or_else(|| self.args.wrong(i, "a selection such as @**"))
     }
 
-    /// The kernel that argument `i` is, for one that applies others; it can be taken
+    /// The kernel passed as argument `i`, for kernels that apply others. It can be taken
     /// once.
     ///
     /// # Errors
-    /// If it is no kernel.
+    /// If the argument is not a kernel.
     pub fn kernel(&mut self, i: usize) -> Result<Box<dyn Kernel>, Fault> {
         let found = self.kernels.get_mut(i).and_then(Option::take);
         found.ok_or_else(|| self.args.wrong(i, "a kernel such as mh(@**)"))
@@ -51,7 +51,7 @@ impl KernelCall<'_> {
 
 type Make = dyn Fn(&mut KernelCall) -> Result<Box<dyn Kernel>, Fault> + Send + Sync;
 
-/// What makes a host's kernel from its call: what stands behind its entry in the table of
+/// Constructs a host's kernel from its call; stored with its entry in the table of
 /// built-ins.
 pub(crate) struct KernelMaker(Box<Make>);
 
@@ -66,7 +66,7 @@ impl KernelMaker {
 /// Builds the kernel of a call.
 ///
 /// # Errors
-/// What is wrong with it, at its place.
+/// What is wrong with the call, with its position.
 pub(super) fn build_host_kernel(
     e: &Expr,
     (builtin, maker): (&Builtin, &State),

@@ -1,4 +1,4 @@
-//! Starts: traces of positive probability, and what to say when there is none.
+//! Initial states: traces of positive probability, and an explanation when none is found.
 
 use super::build::arguments;
 use super::expr::{PlanEnv, evaluate};
@@ -21,16 +21,16 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How a chain starts: with the best of so many draws from the prior, by log joint
+/// How a chain starts: from the best of a number of draws from the prior, by log joint
 /// density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
-    /// Draws of positive probability that are tried.
+    /// The number of draws of positive probability.
     pub draws: u64,
-    /// How many of the best are kept: more than one begin a population that anneals in
-    /// warm-up.
+    /// How many of the best are kept: with more than one, warm-up begins with a
+    /// population that anneals.
     pub keep: usize,
-    /// No further draws are tried after this, if one was found.
+    /// A time limit: once a draw has succeeded, no further ones are made after it.
     pub within: Option<Duration>,
 }
 
@@ -40,19 +40,19 @@ impl Default for Start {
     }
 }
 
-/// How often a draw from the prior may have no probability before that is an error.
+/// How many draws from the prior may have zero probability before that is an error.
 const RETRIES: u64 = 1000;
 
 /// Why a chain cannot start.
 #[derive(Debug, Clone)]
 pub enum StartError {
-    /// The program fails.
+    /// The program failed.
     Run(Box<RunError>),
-    /// Every draw tried has probability zero.
+    /// Every draw had probability zero.
     Impossible(NoStart),
 }
 
-/// What has no probability in the last draw that was tried.
+/// What has zero probability in the last draw.
 #[derive(Debug, Clone, Default)]
 pub struct NoStart {
     /// Observations and factors first, then choices.
@@ -67,9 +67,9 @@ pub struct NoStart {
 pub struct ZeroTerm {
     /// Its address.
     pub address: Address,
-    /// Its place in the program.
+    /// Its position in the program.
     pub span: Span,
-    /// What is observed there that its distribution cannot give.
+    /// An observed value outside of the support of its distribution.
     pub outside: Option<String>,
 }
 
@@ -79,11 +79,10 @@ impl fmt::Display for NoStart {
     }
 }
 
-/// The first of so many attempts at drawing from a prior that leads where the program has
-/// a value.
+/// Returns the first of at most `most` draws that does not fail with a recoverable error.
 ///
 /// # Errors
-/// The last attempt's, or the first that is not a matter of the values drawn.
+/// The last attempt's error, or the first one that is not recoverable.
 pub(crate) fn attempts<T>(
     most: u64,
     mut draw: impl FnMut(u64) -> TraceResult<T>,
@@ -97,19 +96,19 @@ pub(crate) fn attempts<T>(
     }
 }
 
-/// Draws from the prior and keeps nothing, for what is worked out once and kept by the
-/// data: a failure is for the chains to tell.
+/// Draws from the prior and discards the draw, so that values which are computed once and
+/// cached with the data are ready. An error is ignored: the chains will report it.
 pub(super) fn draw_once(code: &Arc<Code>, seed: u64, limits: Limits) {
     let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: 0, substream: 0 };
     let _ = Trace::simulate(Arc::clone(code), draws, limits);
 }
 
-/// The traces a chain starts with, the best first: as many as are to be kept, or fewer if
-/// fewer draws succeed.
+/// The traces a chain starts with, the best first: `how.keep` of them, or fewer if fewer
+/// draws succeed.
 ///
 /// # Errors
-/// If the program fails, or if no draw has positive probability within the bounded
-/// retries.
+/// If the program fails, or if no draw has positive probability within a bounded number
+/// of attempts.
 pub fn starts(
     code: &Arc<Code>,
     seed: u64,
@@ -120,7 +119,8 @@ pub fn starts(
     starts_from(code, (seed, chain), how, None, limits)
 }
 
-/// The same, each draw moved by what a kernel of the program proposes there.
+/// As [`starts`], but each draw is moved to what a kernel of the program proposes from
+/// it.
 pub(crate) fn starts_from(
     code: &Arc<Code>,
     (seed, chain): (u64, u32),
@@ -133,7 +133,7 @@ pub(crate) fn starts_from(
         let draws = Draws { key, step: attempt, substream: 0 };
         let mut trace = Trace::simulate(Arc::clone(code), draws, limits.clone())?;
         let Some(from) = from else { return Ok(Some(trace)) };
-        // Steps of the plan count from 0: this is apart from all of them.
+        // Steps of the plan count from 0: this part is distinct from all of them.
         let at = StepContext::new(seed, chain, attempt).within(u64::MAX - 1);
         Ok(from.leap(&mut trace, &at)?.map(|()| trace))
     };
@@ -143,8 +143,8 @@ pub(crate) fn starts_from(
     for attempt in 0..how.draws.saturating_add(RETRIES) {
         let draw = drawn(attempt);
         if attempt == 0 {
-            // What is made ready once, such as a photograph that is looked at, is no
-            // draw.
+            // One-time preparation, such as the analysis of a photograph, does not count
+            // against the time limit.
             begun = Instant::now();
         }
         match draw {
@@ -165,7 +165,7 @@ pub(crate) fn starts_from(
         if found > 0 && (limits.stop.is_asked() || late()) || found == 0 && attempt + 1 >= RETRIES {
             break;
         }
-        // Failures cost attempts too, once there is something to start from.
+        // Once there is a state to start from, failed attempts count as draws too.
         if found >= how.draws || (found > 0 && attempt + 1 >= how.draws) {
             break;
         }
@@ -178,7 +178,7 @@ pub(crate) fn starts_from(
     }
 }
 
-/// Which terms of a trace have no probability.
+/// The terms of a trace that have zero probability.
 fn explain(t: &Trace) -> NoStart {
     let mut outside: HashMap<Address, String> = t.outside_support().into_iter().collect();
     let zero = t.impossible().into_iter();
@@ -194,9 +194,9 @@ fn explain(t: &Trace) -> NoStart {
     }
 }
 
-/// What the `init` statement of a plan asks for. Where there is a limit of time, a
-/// quarter of it: as much as is left to warm-up. And the kernel whose proposals it takes,
-/// if it takes any.
+/// Reads the `init` statement of a plan: how to start, and the kernel it proposes from
+/// (`from = …`), if any. Under a time limit it gets a quarter of that, as much as it
+/// leaves to warm-up.
 pub(crate) fn start_of(
     code: &Arc<Code>,
     plan: &[KStmt],
@@ -247,7 +247,7 @@ pub(crate) fn start_of(
     }
 }
 
-/// The kernel of the program that a start is proposed by.
+/// The declared kernel in the `from` argument of `best_of`.
 fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<ProgramKernel, ChainError> {
     let wrong = || {
         let mut wrong = fail(e.span, "`from` takes a kernel declared in the program".into());

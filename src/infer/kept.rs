@@ -1,5 +1,5 @@
-//! Whole states of chains at some of their draws: what any picture, mesh or quantity can
-//! be made from when a run has ended.
+//! Complete states of chains at some of their draws, from which pictures, meshes and
+//! other quantities can be computed after a run.
 
 use super::callback::Callback;
 use super::state::{StateError, pack, unpack};
@@ -7,7 +7,7 @@ use crate::trace::{Draws, SavedTrace, Trace};
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, PoisonError};
 
-/// A state that was kept.
+/// A state that was kept, with its chain and draw.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeptTrace {
     /// The chain, from 1.
@@ -28,26 +28,26 @@ struct Chain {
     kept: Vec<KeptTrace>,
 }
 
-/// Keeps the states of some draws at even distances: when there is no room, every other
-/// one is let go, and from then on every second draw is kept, every fourth, and so on.
+/// Keeps the states of draws at regular intervals. When there is no more room, every
+/// second one is dropped and the interval doubles.
 #[derive(Debug)]
 pub struct KeptTraces {
     program: String,
-    /// The most that are kept of a chain.
+    /// The most states kept per chain.
     room: usize,
     chains: Vec<Mutex<Chain>>,
 }
 
 impl KeptTraces {
-    /// At most so many of all chains together; `program` is the hash that their states
-    /// are known by.
+    /// Keeps at most `most` states of all chains together. `program` is the hash of the
+    /// program that the saved states carry.
     pub fn new(chains: u32, most: usize, program: &str) -> KeptTraces {
         let chain = || Mutex::new(Chain { draws: 0, every: 1, kept: Vec::new() });
         let room = most.div_ceil(chains.max(1) as usize);
         KeptTraces { program: program.into(), room, chains: (0..chains).map(|_| chain()).collect() }
     }
 
-    /// What is kept of all chains, chain by chain.
+    /// The states kept of all chains, chain by chain.
     pub fn all(&self) -> Vec<KeptTrace> {
         let of = |c: &Mutex<Chain>| c.lock().unwrap_or_else(PoisonError::into_inner).kept.clone();
         self.chains.iter().flat_map(of).collect()

@@ -1,4 +1,4 @@
-//! What a kernel is: one step of a chain that leaves the posterior invariant.
+//! The interface of kernels: one step of a chain that leaves the posterior invariant.
 
 use super::state::StateError;
 use crate::lang::error::RunError;
@@ -8,7 +8,7 @@ use crate::trace::{Draws, Selection, Selector, Target, Trace, TraceResult, Weigh
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Where in a chain a step is, and what randomness it may use.
+/// The position of a step in a chain, and the randomness it may use.
 #[derive(Clone, Copy, Debug)]
 pub struct StepContext {
     /// The seed of the run.
@@ -19,29 +19,30 @@ pub struct StepContext {
     pub step: u64,
     /// Whether kernels may adapt (inside `warmup`).
     pub adapting: bool,
-    /// The power of the likelihood: 1 but for annealed burn-in.
+    /// The power of the likelihood: 1 except in annealed warm-up.
     pub power: f64,
-    /// Which member of a sweep a step is for (see [`Kernel::sweep`]).
+    /// Which member of a sweep the step moves (see [`Kernel::sweep`]).
     pub member: usize,
-    /// Tells steps within a step apart (see [`StepContext::within`]); 0 for the step itself.
+    /// Distinguishes steps within a step (see [`StepContext::within`]); 0 for the step
+    /// itself.
     pub part: u64,
 }
 
 impl StepContext {
-    /// A step of the posterior itself, outside of warm-up.
+    /// A step at the full likelihood, outside of warm-up.
     pub fn new(seed: u64, chain: u32, step: u64) -> Self {
         StepContext { seed, chain, step, adapting: false, power: 1.0, member: 0, part: 0 }
     }
 
-    /// The randomness of values drawn inside the trace; `substream` tells alternatives of one
-    /// step apart.
+    /// The randomness of values drawn inside the trace; `substream` distinguishes
+    /// alternatives within one step.
     pub fn draws(&self, substream: u64) -> Draws {
         let key = StreamKey::new(self.seed, self.chain, Purpose::VALUES);
         let substream = if self.part == 0 { substream } else { mix(self.part, substream) };
         Draws { key, step: self.step, substream }
     }
 
-    /// The place of a step that is part `i` of this one, with randomness of its own.
+    /// The context of part `i` of this step, with independent randomness.
     pub fn within(&self, i: u64) -> StepContext {
         StepContext { part: mix(self.part, i + 1), member: 0, ..*self }
     }
@@ -51,7 +52,7 @@ impl StepContext {
         StreamKey::new(self.seed, self.chain, Purpose::KERNEL).stream(self.step, 0, self.part)
     }
 
-    /// The log weight of an update with the likelihood raised to the power.
+    /// The log weight of an update, with the likelihood raised to the power.
     pub fn tempered(&self, w: &Weight) -> f64 {
         w.tempered(self.power)
     }
@@ -64,23 +65,23 @@ pub struct Outcome {
     pub proposals: u32,
     /// Those accepted.
     pub accepted: u32,
-    /// Those rejected because the program has no value there (a scale that is not
-    /// positive, a matrix that will not factor).
+    /// Those rejected because the program is undefined there (a scale that is not
+    /// positive, a matrix that cannot be factored).
     pub failed: u32,
-    /// Trajectories on which the energy was not kept.
+    /// Divergent trajectories: those with a very large energy error.
     pub divergent: u32,
-    /// The choice all of it was about, of a kernel that takes one at a time.
+    /// The choice that the step was about, for single-site kernels.
     #[serde(skip)]
     pub site: Option<Target>,
 }
 
 impl Outcome {
-    /// One proposal.
+    /// One proposal, accepted or rejected.
     pub fn one(accepted: bool) -> Self {
         Outcome { proposals: 1, accepted: u32::from(accepted), ..Default::default() }
     }
 
-    /// Adds what another step did.
+    /// Adds the counts of another step.
     pub fn add(&mut self, other: Outcome) {
         let add = |a: &mut u32, b: u32| *a = a.saturating_add(b);
         add(&mut self.proposals, other.proposals);
@@ -89,7 +90,7 @@ impl Outcome {
         add(&mut self.divergent, other.divergent);
     }
 
-    /// The same, about one choice.
+    /// The same outcome, attributed to one choice.
     #[must_use]
     pub fn at(self, target: Target) -> Self {
         Outcome { site: Some(target), ..self }
@@ -106,14 +107,14 @@ pub trait Kernel: Send {
     /// Its name in tables.
     fn name(&self) -> String;
 
-    /// Begins a sweep, if the kernel goes through its choices in turn: how many steps it
-    /// has. [`StepContext::member`] tells which of them a step is.
+    /// Begins a sweep, if the kernel visits its choices in turn, and returns the number
+    /// of steps. [`StepContext::member`] says which of them a step is.
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
         let _ = trace;
         None
     }
 
-    /// The step size of its trajectories, for Hamiltonian kernels.
+    /// The step size of the trajectories of Hamiltonian kernels.
     #[doc(hidden)]
     fn step_size(&self) -> Option<f64> {
         None
@@ -124,17 +125,17 @@ pub trait Kernel: Send {
         None
     }
 
-    /// What it has learnt and remembers beside the state it moved last, for a checkpoint;
-    /// nothing, if each step is a function of the state alone.
+    /// What the kernel has adapted and remembers, beside the state it moved last, for a
+    /// checkpoint; empty if each step is a function of the state alone.
     fn save(&self, trace: &Trace) -> Vec<u8> {
         let _ = trace;
         Vec::new()
     }
 
-    /// Takes up what [`Kernel::save`] of a kernel made the same way gave.
+    /// Restores the bytes of [`Kernel::save`] of a kernel with the same arguments.
     ///
     /// # Errors
-    /// If these are no such bytes.
+    /// If the bytes are not such a state.
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
         match state {
             [] => Ok(()),
@@ -145,12 +146,12 @@ pub trait Kernel: Send {
     /// Moves the trace by one step.
     ///
     /// # Errors
-    /// Errors of the program that are not a matter of the proposed values.
+    /// Errors of the program that do not depend on the proposed values.
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome>;
 }
 
-/// One step of a kernel inside another: a whole sweep where it goes through its choices
-/// in turn.
+/// Makes one step of a kernel inside another kernel: a whole sweep if it visits its
+/// choices in turn.
 pub(crate) fn inner_step(
     kernel: &mut dyn Kernel,
     trace: &mut Trace,
@@ -170,15 +171,15 @@ pub enum Pick {
     /// All of them.
     #[default]
     All,
-    /// One of them at random (`one(sel)`).
+    /// One of them, chosen uniformly at random (`one(sel)`).
     One,
     /// Each in turn, in the order of the program (`each(sel)`): a sweep of as many steps.
-    /// Moves that would change what is selected are rejected, so that the order does not
-    /// depend on the outcome of the steps.
+    /// Moves that would change the members of the selection are rejected, so that the
+    /// order does not depend on the outcomes of the steps.
     Each,
 }
 
-/// What a kernel works on: a selection, as a whole or one member at a time.
+/// The choices that a kernel works on: a selection, as a whole or one member at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteSelection {
     /// The choices.
@@ -188,14 +189,14 @@ pub struct SiteSelection {
 }
 
 impl SiteSelection {
-    /// One or each of the choices at a time: one, if nothing is said.
+    /// Restricts the kernel to one choice per step: [`Pick::All`] becomes [`Pick::One`].
     pub(crate) fn single(self) -> Self {
         let pick = if self.pick == Pick::All { Pick::One } else { self.pick };
         SiteSelection { pick, ..self }
     }
 }
 
-/// A scope registered with a trace.
+/// A site selection registered with a trace.
 #[derive(Clone, Debug)]
 pub(crate) struct Registered {
     pub scope: SiteSelection,
@@ -204,7 +205,7 @@ pub(crate) struct Registered {
     sweep: Option<Sweep>,
 }
 
-/// The order of a sweep and the members it is of.
+/// The members of a sweep, as a set and in order.
 #[derive(Clone, Debug)]
 struct Sweep {
     of: Arc<Vec<Target>>,
@@ -216,12 +217,12 @@ impl Registered {
         Registered { scope, selection: None, sweep: None }
     }
 
-    /// No choices.
+    /// An empty selection.
     pub fn nothing() -> Self {
         Registered::new(SiteSelection { selector: Selector::Nothing, pick: Pick::All })
     }
 
-    /// The selection in this kernel's trace.
+    /// The selection in this trace, registered on first use.
     pub fn selection(&mut self, trace: &mut Trace) -> Selection {
         match &self.selection {
             Some((of, s)) if Arc::ptr_eq(of, trace.identity()) => *s,
@@ -233,7 +234,8 @@ impl Registered {
         }
     }
 
-    /// How many steps a sweep over the members is, if steps are parts of sweeps.
+    /// The number of steps of a sweep over the members; `None` if the kernel does not
+    /// sweep.
     pub fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
         if self.scope.pick != Pick::Each {
             return None;
@@ -247,8 +249,8 @@ impl Registered {
         Some(self.sweep.as_ref().map_or(0, |s| s.order.len()))
     }
 
-    /// One member: picked uniformly, with how many there are, or the one a sweep has come
-    /// to.
+    /// One member: chosen uniformly, with the number of candidates, or the one that the
+    /// sweep has reached, with 1.
     pub fn pick(
         &mut self,
         trace: &mut Trace,
@@ -266,8 +268,8 @@ impl Registered {
         (!targets.is_empty()).then(|| (targets[rng.index(targets.len())], targets.len()))
     }
 
-    /// The members a step works on, and what picking them costs: the log of the number of
-    /// ways.
+    /// The members that a step moves, and minus the log probability of choosing them: the
+    /// log of the number of candidates.
     pub fn members(
         &mut self,
         trace: &mut Trace,
@@ -284,8 +286,9 @@ impl Registered {
         }
     }
 
-    /// What picking the same members costs in the proposed state: single-site picking
-    /// pays the ratio of the numbers, a sweep cannot go on among other members.
+    /// Minus the log probability of choosing the same members in the proposed state.
+    /// Single-site choice contributes the ratio of the numbers of candidates to the
+    /// acceptance ratio; a sweep whose members change is rejected.
     pub fn reverse_selection(&self, trace: &Trace) -> f64 {
         let Some((_, selection)) = self.selection else { return 0.0 };
         match (self.scope.pick, &self.sweep) {
@@ -296,20 +299,19 @@ impl Registered {
     }
 }
 
-/// The Metropolis-Hastings test. A ratio that is NaN, which would be a rejection, is a
-/// mistake of the kernel.
+/// The Metropolis-Hastings test. The ratio must not be NaN: that is a bug of the kernel.
 pub(crate) fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
     debug_assert!(!log_ratio.is_nan());
     let u = rng.open_uniform();
     log_ratio >= 0.0 || libm::log(u) < log_ratio
 }
 
-/// Keeps or undoes the pending proposal. NaN is a rejection.
+/// Accepts or rejects the pending proposal. NaN counts as a rejection.
 pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     accept_or_reject(trace, if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio }, rng)
 }
 
-/// The same for kernels that never ask about NaN.
+/// As [`decide`], for kernels whose ratio is never NaN.
 pub(crate) fn accept_or_reject(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     let accepted = accepts(log_ratio, rng);
     if accepted {
@@ -320,7 +322,7 @@ pub(crate) fn accept_or_reject(trace: &mut Trace, log_ratio: f64, rng: &mut Stre
     Outcome::one(accepted)
 }
 
-/// Separates proposals that lead where the program has no value from failures of the
+/// Separates proposals at which the program is undefined (`None`) from failures of the
 /// program.
 pub fn recoverable<T>(result: TraceResult<T>) -> TraceResult<Option<T>> {
     match result {

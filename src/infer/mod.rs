@@ -1,4 +1,4 @@
-//! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of
+//! Inference: kernels, plans, chains and diagnostics. Depends on traces, and not on
 //! pictures.
 
 #![doc = include_str!("guide.md")]

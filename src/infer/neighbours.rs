@@ -1,7 +1,7 @@
-//! What `knn` proposes from: the latents of scenes whose pictures look like the observed
-//! one, and who finds them.
+//! The proposals of `knn`: the latents of scenes whose pictures look like the observed
+//! one, and the interface that finds them.
 //!
-//! It knows no pictures and no files: those who do implement [`Banks`].
+//! This module does not depend on pictures or files: code that does implements [`Banks`].
 
 use crate::dist::Datum;
 use crate::trace::{Target, Trace};
@@ -9,14 +9,14 @@ use rustc_hash::FxHashMap;
 use std::fmt;
 use std::sync::Arc;
 
-/// Where a choice was in a scene of a bank.
+/// The value of a choice in a scene of a bank.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Latent {
     /// The stored value of a discrete choice.
     Discrete(Datum),
-    /// Where a continuous choice was in the unconstrained space, under the support it had
-    /// there. A proposal from it is then the same in every state, also where a support
-    /// depends on other choices.
+    /// The coordinates of a continuous choice in the unconstrained space, under the
+    /// support it had in that scene. A proposal from them is thus the same in every
+    /// state, even if the support depends on other choices.
     Free(Vec<f64>),
 }
 
@@ -24,7 +24,8 @@ pub enum Latent {
 pub type Latents = FxHashMap<u64, Latent>;
 
 impl Latent {
-    /// That of a choice of a trace; `None` if it is neither discrete nor has coordinates.
+    /// The latent of a choice of a trace; `None` if it is neither discrete nor has
+    /// coordinates.
     pub fn of(trace: &Trace, t: Target) -> Option<Latent> {
         match trace.free(t) {
             Some((y, _)) if y.is_empty() => None,
@@ -33,7 +34,7 @@ impl Latent {
         }
     }
 
-    /// Those of all choices of a trace.
+    /// The latents of all choices of a trace.
     pub fn all(trace: &Trace) -> Latents {
         let targets = trace.all_targets().iter();
         targets.filter_map(|t| Some((trace.address_hash(*t), Latent::of(trace, *t)?))).collect()
@@ -43,22 +44,22 @@ impl Latent {
 /// The nearest neighbours of an observation.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
-    /// Their latents.
+    /// The latents of each neighbour.
     pub entries: Vec<Latents>,
-    /// The standard deviation of each unconstrained coordinate over scenes of all kinds.
+    /// The standard deviation of each unconstrained coordinate over the scenes of `among`
+    /// (see [`Neighbours::new`]).
     spreads: FxHashMap<u64, Vec<f64>>,
 }
 
 impl Neighbours {
-    /// Neighbours among scenes of all kinds, whose spread tells the scale of each
-    /// coordinate: a draw from the prior will do, and nothing where none is at hand. What
-    /// is found need not be right: a bad neighbour costs acceptance, never correctness.
+    /// Neighbours, with the scale of each coordinate taken from the scenes `among`: draws
+    /// from the prior, or an empty slice if there are none. The neighbours need not be
+    /// right: a bad neighbour lowers the acceptance rate, but the kernel stays correct.
     pub fn new(entries: Vec<Latents>, among: &[Latents]) -> Neighbours {
         Neighbours { spreads: spreads(among), entries }
     }
 
-    /// The standard deviation of a coordinate over scenes of all kinds; 1 where it is not
-    /// known.
+    /// The standard deviation of a coordinate over scenes in general; 1 if it is unknown.
     pub(crate) fn spread(&self, hash: u64, coordinate: usize) -> f64 {
         let known = self.spreads.get(&hash).and_then(|s| s.get(coordinate)).copied();
         known.filter(|s| *s > 0.0).unwrap_or(1.0)
@@ -71,8 +72,9 @@ impl Neighbours {
     }
 }
 
-/// Standard deviations by coordinate over the scenes that have the choice in its most
-/// frequent form: 0 for fewer than two.
+/// Standard deviations by coordinate, over the scenes in which the choice is continuous;
+/// 0 for fewer than two. Scenes in which a choice has another number of coordinates than
+/// in the first one are skipped.
 fn spreads(scenes: &[Latents]) -> FxHashMap<u64, Vec<f64>> {
     let mut sums: FxHashMap<u64, (f64, Vec<[f64; 2]>)> = FxHashMap::default();
     for scene in scenes {
@@ -83,7 +85,7 @@ fn spreads(scenes: &[Latents]) -> FxHashMap<u64, Vec<f64>> {
                 continue;
             }
             *n += 1.0;
-            // Welford's update: stable for far-off means.
+            // Welford's update, which is stable for means far from 0.
             for ([mean, square], y) in moments.iter_mut().zip(y) {
                 let d = y - *mean;
                 *mean += d / *n;
@@ -97,17 +99,17 @@ fn spreads(scenes: &[Latents]) -> FxHashMap<u64, Vec<f64>> {
         .collect()
 }
 
-/// Finds the neighbours of what a run observes.
+/// Finds the neighbours of a run's observations.
 pub trait Banks: fmt::Debug + Send + Sync {
-    /// The `k` scenes of a bank whose pictures are most like the observed one. Asked once
-    /// a kernel and chain, so an answer should be kept.
+    /// Returns the `k` scenes of a bank whose pictures are most like the observed one.
+    /// Called once per kernel and chain, so implementations should cache the answer.
     ///
     /// # Errors
-    /// Why the bank cannot be used here, for people.
+    /// Why the bank cannot be used here, as a message for users.
     fn neighbours(&self, bank: &str, k: usize) -> Result<Arc<Neighbours>, String>;
 }
 
-/// The same neighbours whatever the bank is called.
+/// Returns the same neighbours for any bank.
 impl Banks for Neighbours {
     fn neighbours(&self, _bank: &str, k: usize) -> Result<Arc<Neighbours>, String> {
         let entries = self.entries.iter().take(k).cloned().collect();

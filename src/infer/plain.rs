@@ -1,4 +1,4 @@
-//! Values of plans that are plain data, and can be written down.
+//! Values of plans that are plain data, and can be serialised.
 
 use crate::lang::value::Value;
 use serde::{Deserialize, Serialize};
@@ -17,8 +17,8 @@ pub(crate) enum Plain {
 }
 
 impl Plain {
-    /// A value as plain data; `None` if it is more than that: a function, a distribution,
-    /// an object.
+    /// The value as plain data; `None` if it contains anything else, such as a function,
+    /// a distribution or an object.
     pub fn of(value: &Value) -> Option<Plain> {
         Some(match value {
             Value::Unit => Plain::Unit,
@@ -35,7 +35,7 @@ impl Plain {
         })
     }
 
-    /// The value.
+    /// Converts back to a value.
     pub fn value(&self) -> Value {
         match self {
             Plain::Unit => Value::Unit,

@@ -1,31 +1,32 @@
 //! A population of states that shrinks to one while the likelihood is annealed.
 //!
-//! Far from the posterior a single annealed chain ends in whichever mode drew it first. A
-//! population explores several: its members move in turn under the same kernels, and as
-//! the power of the likelihood rises from b to b', each gains a weight of likelihood^(b' -
-//! b), as in population annealing (Hukushima & Iba 2003) and sequential Monte Carlo
-//! samplers (Del Moral, Doucet & Jasra 2006). The number falls geometrically as the power
-//! rises, so that those who are left get more of the time; offspring are drawn by weight
-//! when a third of the members has to go, and not before: after few steps likelihoods say
-//! more of how a member began than of where it is going. It belongs to warm-up: the
-//! states it goes through are not draws.
+//! A single annealed chain that starts far from the posterior ends in whichever mode
+//! attracted it first. A population explores several: its members take turns under the
+//! same kernels, and as the power of the likelihood rises from b to b', each gains a
+//! weight of likelihood^(b' - b), as in population annealing (Hukushima & Iba 2003) and
+//! sequential Monte Carlo samplers (Del Moral, Doucet & Jasra 2006). The number of
+//! members falls geometrically during the annealing, so that the remaining ones get more
+//! of the time. Offspring are resampled by weight only when a third of the members has to
+//! go: after few steps, likelihoods depend more on where a member began than on where it
+//! is going. The population belongs to warm-up: its states are not draws.
 
 use super::resampling::systematic;
 use crate::rng::Stream;
 use crate::trace::{Constraint, Draws, Trace, TraceResult};
 use serde::{Deserialize, Serialize};
 
-/// Steps a member makes before it is the next one's turn: enough that going over, a full
-/// update, costs little beside them.
+/// Steps a member makes before it is the next one's turn: enough that switching members,
+/// a full update, costs little in comparison.
 const LEG: u64 = 16;
 
 type State = Vec<(u64, Constraint)>;
 
-/// A state, its log-likelihood, and the log of the weight it has gained since offspring
-/// were drawn.
+/// A state, its log-likelihood, and the log of the weight it has gained since the last
+/// resampling.
 type Member = (State, f64, f64);
 
-/// Some members; the chain's trace is in the one whose turn it is.
+/// The members of a population; the chain's trace is in the state of the one whose turn
+/// it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Population {
     members: Vec<Member>,
@@ -36,7 +37,7 @@ pub(crate) struct Population {
 }
 
 impl Population {
-    /// One member a trace; the chain must be in the first.
+    /// One member per trace; the chain must be in the state of the first.
     pub fn new(traces: &[Trace]) -> Self {
         let members: Vec<_> = match traces {
             [_] => Vec::new(),
@@ -45,17 +46,17 @@ impl Population {
         Population { first: members.len(), members, turn: 0, steps: 0, power: None }
     }
 
-    /// Whether it is one that can be gone on with; what was read may not be.
+    /// Whether the population is valid; one read from a checkpoint may not be.
     pub fn fits(&self) -> bool {
         (self.members.is_empty() || self.turn < self.members.len()) && self.steps < 1 << 60
     }
 
-    /// Called after each step of the annealing, with the share of it that is done and the
-    /// power that belongs to it. Gives the power of the next step: it stays the same
+    /// Called after each step of the annealing, with the completed fraction of it and the
+    /// corresponding power. Returns the power of the next step, which stays the same
     /// until every member has had its turn.
     ///
     /// # Errors
-    /// Those of the program.
+    /// Errors of the program.
     pub fn advance(
         &mut self,
         trace: &mut Trace,
@@ -87,10 +88,11 @@ impl Population {
         Ok(self.power.unwrap_or(power))
     }
 
-    /// Ends with one member, taken at the full power, as the state of the chain.
+    /// Reduces the population to one member, chosen by weight at the full power, which
+    /// becomes the state of the chain.
     ///
     /// # Errors
-    /// Those of the program.
+    /// Errors of the program.
     pub fn finish(&mut self, trace: &mut Trace, draws: Draws, rng: &mut Stream) -> TraceResult<()> {
         if self.members.len() > 1 {
             self.keep(trace);
@@ -102,21 +104,22 @@ impl Population {
         Ok(())
     }
 
-    /// The state of the chain, as that of the member whose turn it is.
+    /// Stores the state of the chain as that of the member whose turn it is.
     fn keep(&mut self, trace: &Trace) {
         let member = &mut self.members[self.turn];
         (member.0, member.1) = (trace.constraints(), trace.log_likelihood());
     }
 
-    /// What members gain when the power of the likelihood rises by so much.
+    /// Adds the log weights that members gain when the power of the likelihood rises by
+    /// `step`.
     fn weigh(&mut self, step: f64) {
-        // Nobody gains at an equal power, though 0 times infinity is NaN.
+        // At an equal power the gain is 0, but 0 times infinity is NaN.
         if step != 0.0 {
             self.members.iter_mut().for_each(|m| m.2 += step * m.1);
         }
     }
 
-    /// Draws so many offspring by weight.
+    /// Resamples `left` offspring by weight.
     fn resample(&mut self, left: usize, rng: &mut Stream) {
         let top = self.members.iter().map(|m| m.2).fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = match top {
@@ -154,7 +157,8 @@ mod tests {
             p.weigh(0.75);
             p.resample(10, &mut rng);
             assert_eq!([0, 1, 2, 3].map(|i| offspring(&p, i)), [1, 6, 3, 0]);
-            // At an equal power everyone has the same chance, and the number may fall.
+            // At an equal power all members have the same probability, and their number
+            // may fall.
             let mut p = population(&[-1e300, 5.0, 700.0, 0.0]);
             p.weigh(0.0);
             p.resample(2, &mut rng);
@@ -172,8 +176,8 @@ mod tests {
         assert_eq!(p.members.len(), 2);
     }
 
-    /// Twelve members thin out to eight, five, three, two and one as the power rises, not
-    /// one by one.
+    /// Twelve members are reduced to eight, five, three, two and one as the power rises,
+    /// not one by one.
     #[test]
     fn members_go_by_thirds() {
         let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 0;").unwrap();

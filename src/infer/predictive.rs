@@ -1,11 +1,11 @@
-//! Predictive checks: what would be observed again, in draws from the prior or the
-//! posterior, against what is observed.
+//! Predictive checks: data replicated from the prior or the posterior are compared with
+//! the observed data.
 //!
-//! Every observation that has a sampler is drawn anew in each state
-//! ([`Trace::replicate`]); what has none is named. Observations that differ only in the
-//! keys of their addresses (those of a loop) count as one, of many numbers. Compared are
-//! test statistics: Gelman, Meng & Stern, "Posterior predictive assessment of model
-//! fitness" (1996). Not here: judging.
+//! In each state, every observation that has a sampler is redrawn ([`Trace::replicate`]);
+//! the others are listed. Observations that differ only in the keys of their addresses
+//! (those of a loop) are grouped as one observation with several numbers. The comparison
+//! uses test statistics: Gelman, Meng & Stern, "Posterior predictive assessment of model
+//! fitness" (1996). Judging the results is left to the caller.
 
 use super::calibration::simulate::{replicating, state};
 use super::callback::Callback;
@@ -21,21 +21,22 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The test statistics.
 pub const STATISTICS: [&str; 4] = ["mean", "sd", "min", "max"];
 
-/// What is said of an observation in one draw.
+/// The numbers of one observation in one state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
     /// Its address without keys.
     pub name: String,
-    /// The numbers, by address and element.
+    /// The numbers, in order of address and element.
     pub numbers: Vec<f64>,
 }
 
-/// What would be observed in one state.
+/// Replicated observations, or the observed ones in the same form.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Replication {
     /// The observations, by address.
     pub groups: Vec<Group>,
-    /// Those without a sampler, with what they are; those whose values are no numbers.
+    /// Observations without a sampler or without numeric values, each with a description
+    /// of what it is.
     pub silent: Vec<(String, String)>,
 }
 
@@ -46,8 +47,8 @@ impl Replication {
     }
 }
 
-/// Mean, standard deviation (over n - 1), least and greatest of the numbers that are
-/// finite; NaN where there are too few.
+/// Mean, standard deviation (over n - 1), minimum and maximum of the finite numbers; NaN
+/// if there are too few.
 pub fn statistics(numbers: &[f64]) -> [f64; 4] {
     let (mut n, mut mean, mut squares) = (0.0, 0.0, 0.0);
     let (mut low, mut high) = (f64::NAN, f64::NAN);
@@ -63,8 +64,8 @@ pub fn statistics(numbers: &[f64]) -> [f64; 4] {
     [if n > 0.0 { mean } else { f64::NAN }, sd, low, high]
 }
 
-/// The share of replicated statistics above the observed one, equal ones counting half;
-/// NaN where nothing can be compared.
+/// The fraction of replicated statistics above the observed one, with equal ones counting
+/// half; NaN if there is nothing to compare.
 pub fn tail(observed: f64, replicated: &[f64]) -> f64 {
     let known: Vec<f64> = replicated.iter().copied().filter(|x| !x.is_nan()).collect();
     if known.is_empty() || observed.is_nan() {
@@ -75,7 +76,7 @@ pub fn tail(observed: f64, replicated: &[f64]) -> f64 {
     (above + 0.5 * same) / known.len() as f64
 }
 
-/// What a trace observes, in the same form as its replications.
+/// The observed data of a trace, in the same form as its replications.
 pub fn observed(trace: &Trace) -> Replication {
     grouped(trace.observed().into_iter().map(|o| (o.address, o.value)).collect())
 }
@@ -83,7 +84,7 @@ pub fn observed(trace: &Trace) -> Replication {
 /// One replication of a state.
 ///
 /// # Errors
-/// What goes wrong while observations are drawn.
+/// If an observation cannot be drawn.
 pub fn replication(trace: &Trace, draws: Draws) -> Result<Replication, Box<RunError>> {
     let drawn = trace.replicate(draws)?;
     let addresses: rustc_hash::FxHashMap<u64, Address> =
@@ -129,7 +130,7 @@ fn keyless(address: &Address) -> String {
 /// Replications of `count` states drawn from the prior.
 ///
 /// # Errors
-/// If no state can be drawn, or observations cannot.
+/// If no state can be drawn, or its observations cannot.
 pub fn prior(
     code: &Arc<Code>,
     seed: u64,
@@ -144,8 +145,8 @@ pub fn prior(
     in_parallel(threads.max(1), (0..count).collect(), one).into_iter().collect()
 }
 
-/// Replications of every recorded draw of some chains, as a run's watch. Clones share
-/// them.
+/// Gathers a replication of every recorded draw, as a run's callback. Clones share the
+/// replications.
 #[derive(Clone, Debug)]
 pub struct Predictive {
     seed: u64,
@@ -159,7 +160,7 @@ struct Chain {
 }
 
 impl Predictive {
-    /// For so many chains of a run with this seed.
+    /// For `chains` chains of a run with this seed.
     pub fn new(chains: u32, seed: u64) -> Predictive {
         Predictive { seed, chains: (0..chains).map(|_| Mutex::default()).collect() }
     }
@@ -167,7 +168,7 @@ impl Predictive {
     /// The replications so far, by chain.
     ///
     /// # Errors
-    /// The first thing that went wrong while observations were drawn.
+    /// The first error in drawing observations.
     pub fn draws(&self) -> Result<Vec<Vec<Replication>>, Box<RunError>> {
         let take = |c: &Mutex<Chain>| {
             let c = c.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! Recording draws: which columns there are, and flattening values into them.
+//! Records draws: determines the columns, and flattens values into them.
 
 use super::draws::{Column, Shape, merged};
 use crate::lang::code::Code;
@@ -7,20 +7,20 @@ use crate::lang::value::Value;
 use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind};
 use crate::trace::{Draws, Trace};
 
-/// What is recorded with every draw.
+/// The columns recorded with every draw.
 #[derive(Debug)]
 pub(crate) struct Recorder {
     collects: bool,
     columns: Vec<Column>,
-    /// The observations of the first draw: the hash of each one's address, and how many
-    /// values it observes.
+    /// The observations of the first draw: the hash of each one's address, and its number
+    /// of values.
     observed: Option<Vec<(u64, usize)>>,
 }
 
-/// The column of the log density of each observed value, as Stan's programs and ArviZ
-/// call it.
+/// The column of the log densities of the observed values, under the name that Stan
+/// programs and ArviZ use.
 pub const POINTWISE: &str = "log_lik";
-/// So many observed values get one each.
+/// The most observed values for which log densities are recorded.
 pub const MOST_POINTS: usize = 1000;
 
 impl Recorder {
@@ -29,7 +29,7 @@ impl Recorder {
         Recorder { collects: plan.iter().any(collects), columns: Vec::new(), observed: None }
     }
 
-    /// Whether the plan says itself what to collect.
+    /// Whether the plan says what to collect.
     pub fn collects(&self) -> bool {
         self.collects
     }
@@ -39,12 +39,12 @@ impl Recorder {
         &self.columns
     }
 
-    /// Takes up the columns of a checkpoint.
+    /// Restores the columns of a checkpoint.
     pub fn set_columns(&mut self, columns: Vec<Column>) {
         self.columns = columns;
     }
 
-    /// The values to record: what is collected (or everything assumed), and the
+    /// The values to record: those collected (or else everything assumed), and the
     /// predictions.
     pub fn values(
         &self,
@@ -82,18 +82,18 @@ impl Recorder {
         Ok(names.into_iter().zip(trace.query(&operands, draws)?).collect())
     }
 
-    /// The observations that there are log densities of.
+    /// The observations whose log densities are recorded.
     pub fn observed(&self) -> &Option<Vec<(u64, usize)>> {
         &self.observed
     }
 
-    /// Takes them up from a checkpoint.
+    /// Restores the observations of a checkpoint.
     pub fn set_observed(&mut self, observed: Option<Vec<(u64, usize)>>) {
         self.observed = observed;
     }
 
-    /// Adds the log density of each observed value, if there are not too many of them;
-    /// NaN where others are observed than in the first draw.
+    /// Adds the log density of each observed value, unless there are too many of them;
+    /// NaN if other values are observed than in the first draw.
     pub fn add_pointwise(&mut self, trace: &Trace, values: &mut Vec<(String, Value)>) {
         let is_first = self.columns.is_empty();
         if values.iter().any(|(name, _)| name == POINTWISE) || !is_first && self.observed.is_none()
@@ -113,9 +113,9 @@ impl Recorder {
         values.push((POINTWISE.into(), Value::array(scores)));
     }
 
-    /// One number a column, NaN where a column has none in this draw; and whether the
-    /// draw has more than the draws before it, for which columns came. Numbers, bools,
-    /// arrays and records of them are kept, anything else is left out.
+    /// Returns the row of a draw, with NaN for columns that it lacks, and whether columns
+    /// were added or extended for it. Numbers, bools, and arrays and records of them are
+    /// recorded; other values are left out.
     pub fn row(&mut self, values: &[(String, Value)]) -> (Vec<f64>, bool) {
         let (row, fits) = self.flatten(values);
         if fits {
@@ -128,7 +128,7 @@ impl Recorder {
         (self.flatten(values).0, self.columns != before)
     }
 
-    /// The row, and whether all of the values are in it.
+    /// The row, and whether it holds all of the values.
     fn flatten(&self, values: &[(String, Value)]) -> (Vec<f64>, bool) {
         let mut row = Vec::new();
         let (mut found, mut fits) = (0, true);
@@ -164,7 +164,7 @@ fn add_columns(name: &str, v: &Value, columns: &mut Vec<Column>) {
     }
 }
 
-/// How many columns a value has.
+/// The number of columns of a value.
 fn leaves(v: &Value) -> usize {
     match v {
         Value::Num(_) | Value::Bool(_) | Value::Array(_) | Value::List(_) => 1,
@@ -173,7 +173,7 @@ fn leaves(v: &Value) -> usize {
     }
 }
 
-/// The value of a column, looking into records by the names between slashes.
+/// The value of a column: parts of its name between slashes are fields of records.
 fn find<'a>(values: &'a [(String, Value)], column: &str) -> Option<&'a Value> {
     values.iter().find_map(|(name, v)| {
         let rest = column.strip_prefix(name.as_str())?;
@@ -198,8 +198,8 @@ fn flatten(v: &Value, out: &mut Vec<f64>) {
     }
 }
 
-/// What a collected expression is called: `log_joint()` without its parentheses, anything
-/// else as written.
+/// The name of a collected expression: a call without arguments loses its parentheses
+/// (`log_joint()`), anything else is as written.
 fn column_name(e: &Expr) -> String {
     match &e.kind {
         ExprKind::Call { callee, args } if args.is_empty() => column_name(callee),

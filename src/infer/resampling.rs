@@ -1,10 +1,10 @@
-//! Systematic resampling (Kitagawa 1996): each member gets the whole number of offspring
-//! next to its share.
+//! Systematic resampling (Kitagawa 1996): each member gets one of the two whole numbers
+//! of offspring next to its expected number.
 
 use crate::rng::Stream;
 
-/// Which member each of `places` offspring comes from, in order. Weights are at least 0
-/// and not all 0.
+/// The parent of each of `places` offspring, in order. Weights are nonnegative, and not
+/// all of them are zero.
 pub(crate) fn systematic(weights: &[f64], places: usize, rng: &mut Stream) -> Vec<usize> {
     let spacing = weights.iter().sum::<f64>() / places as f64;
     let (mut at, mut reached) = (rng.uniform() * spacing, 0.0);
@@ -16,7 +16,7 @@ pub(crate) fn systematic(weights: &[f64], places: usize, rng: &mut Stream) -> Ve
             at += spacing;
         }
     }
-    // Rounding may leave the last place empty.
+    // Rounding errors may leave the last place empty.
     chosen.resize(places, weights.len() - 1);
     chosen
 }

@@ -1,4 +1,4 @@
-//! From the selections people write to [`Selector`]s.
+//! Reads selections from program text into [`Selector`]s.
 
 use super::expr::{PlanEnv, evaluate};
 use super::kernel::{self, Pick};
@@ -11,7 +11,7 @@ use crate::trace::{
 };
 use std::sync::Arc;
 
-/// Reads a selection, with `one(…)` or `each(…)` around it or not.
+/// Reads a selection, optionally inside `one(…)` or `each(…)`.
 ///
 /// # Errors
 /// If the expression is not a selection, or a computed key fails.
@@ -24,7 +24,7 @@ pub(crate) fn scope(e: &Expr, env: &mut PlanEnv) -> Result<kernel::SiteSelection
     Ok(kernel::SiteSelection { selector: selector(e, env)?, pick: Pick::All })
 }
 
-/// Whether an argument is a selection, with `one(…)` or `each(…)` around it or not.
+/// Whether an argument is a selection, optionally inside `one(…)` or `each(…)`.
 pub(super) fn target(e: &Expr) -> bool {
     match &e.kind {
         ExprKind::Address(_) | ExprKind::TagSel { .. } => true,
@@ -43,8 +43,7 @@ fn pick(name: &str) -> Option<Pick> {
     }
 }
 
-/// Reads a selection as people write it, outside of inference blocks: what keys compute
-/// they compute in this trace.
+/// Reads a selection outside of inference blocks; computed keys are evaluated in `trace`.
 ///
 /// # Errors
 /// If the expression is not a selection, or a computed key fails.
@@ -95,7 +94,7 @@ fn tag(name: &Arc<str>, value: Option<&Arc<str>>) -> Selector {
     }
 }
 
-/// The key a tag's written value stands for: a number if it reads as one.
+/// The key denoted by a tag's value: a number if it parses as one.
 fn literal_key(text: &str) -> Key {
     match text.parse::<f64>().ok().and_then(Key::num) {
         Some(k) => k,
@@ -138,7 +137,7 @@ pub(crate) fn pattern(a: &ast::Address, env: &mut PlanEnv) -> Result<Pattern, Bo
     Ok(Pattern { segments })
 }
 
-/// Reads the address of one choice; keys may be computed.
+/// Reads the address of a single choice; keys may be computed.
 ///
 /// # Errors
 /// If it has wildcards, or a computed key fails or is not a key.
@@ -165,7 +164,7 @@ fn not_a_selection(span: Span) -> Box<RunError> {
     e
 }
 
-/// The error of a built-in at a place of a plan.
+/// The error of a built-in, with its position in a plan.
 pub(super) fn fault(span: Span, f: Fault) -> Box<RunError> {
     Box::new(RunError { hint: f.hint, ..*fail(span, f.message) })
 }

@@ -1,4 +1,4 @@
-//! Counting what single-site kernels do, by address. Not part of a step unless asked for
+//! Counts of the proposals of single-site kernels, by address. Off by default
 //! ([`super::RunOptions::sites`]).
 
 use super::draws::SiteStats;
@@ -6,15 +6,15 @@ use super::kernel::Outcome;
 use crate::trace::Trace;
 use rustc_hash::FxHashMap;
 
-/// Addresses that are counted: open universes have no end of them.
+/// The most addresses that are counted: open universes have unboundedly many.
 const MOST: usize = 1000;
 
-/// Counts by the hash of the address, which is spelt out when it is first seen.
+/// Counts by the hash of the address. The address is spelt out when it is first seen.
 #[derive(Debug, Default)]
 pub(super) struct Sites(FxHashMap<u64, SiteStats>);
 
 impl Sites {
-    /// Adds one step. A choice that took itself away in it is not counted.
+    /// Adds one step. A choice that vanished in that step is not counted.
     pub fn count(&mut self, trace: &Trace, outcome: &Outcome) {
         let Some(t) = outcome.site.filter(|t| trace.is_active(*t)) else { return };
         let hash = trace.address_hash(t);
@@ -32,12 +32,12 @@ impl Sites {
         self.0.iter().map(|(hash, stats)| (*hash, stats.clone())).collect()
     }
 
-    /// Takes up the counts of a checkpoint.
+    /// Restores the counts of a checkpoint.
     pub fn load(&mut self, list: Vec<(u64, SiteStats)>) {
         self.0 = list.into_iter().collect();
     }
 
-    /// The counts, by address.
+    /// The counts, sorted by address.
     pub fn into_stats(self) -> Vec<SiteStats> {
         let mut all: Vec<SiteStats> = self.0.into_values().collect();
         all.sort_by(|a, b| a.address.cmp(&b.address));
@@ -64,8 +64,8 @@ mod tests {
         let all = SiteStats::total(done.chains.iter().flat_map(|c| &c.sites));
         let names: Vec<&str> = all.iter().map(|s| &*s.address).collect();
         assert_eq!(names, ["@c", "@x/a", "@x/b", "@z[0]", "@z[1]"]);
-        // Every choice stays where it is when it is picked, so every proposal is at some
-        // address.
+        // Every choice still exists after a step that picks it, so every proposal counts
+        // at some address.
         let proposals: u64 = done.chains.iter().flat_map(|c| &c.kernels).map(|k| k.proposals).sum();
         assert_eq!(all.iter().map(|s| s.proposals).sum::<u64>(), proposals);
         assert!(all.iter().all(|s| s.acceptance().is_some_and(|a| a > 0.05 && a < 1.0)), "{all:?}");

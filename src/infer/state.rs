@@ -1,45 +1,45 @@
-//! What kernels remember, as bytes of a checkpoint.
+//! The state of kernels and callbacks, as bytes of a checkpoint.
 
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 
-/// Bytes that are not what a kernel, or a chain, wrote.
+/// Bytes that are not a valid state of the kernel, callback or chain that reads them.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct StateError(pub String);
 
 impl StateError {
-    /// A state of a form that cannot be.
+    /// A state that is invalid, with the reason.
     pub fn new(message: impl Into<String>) -> Self {
         StateError(message.into())
     }
 }
 
-/// Entries by key, so that equal states are equal bytes.
+/// Entries in order of their keys, so that equal states give equal bytes.
 pub(crate) fn in_order<K: Ord + Copy, T>(map: &FxHashMap<K, T>) -> BTreeMap<K, &T> {
     map.iter().map(|(key, value)| (*key, value)).collect()
 }
 
-/// A value as bytes (CBOR, RFC 8949: exact for all numbers, and its reader bounds how
-/// deep it goes).
+/// Serialises a value (as CBOR, RFC 8949, which is exact for all numbers and whose reader
+/// bounds the depth of nesting).
 pub(crate) fn pack<T: Serialize>(value: &T) -> Vec<u8> {
     let mut bytes = Vec::new();
-    // Writing to memory does not fail, and no type here refuses to be written.
+    // Writing to memory does not fail, and all types used here can be serialised.
     let _ = ciborium::into_writer(value, &mut bytes);
     bytes
 }
 
-/// The value that [`pack`] was given.
+/// Restores the value given to [`pack`].
 ///
 /// # Errors
-/// If it was not given one of this type.
+/// If the bytes are not those of a value of this type.
 pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError> {
     ciborium::from_reader(bytes).map_err(|e| StateError(e.to_string()))
 }
 
-/// Whether something holds, as a state that is read must.
+/// Checks a condition that a valid state satisfies.
 pub(crate) fn holds(condition: bool, what: &str) -> Result<(), StateError> {
     if condition {
         Ok(())
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn what_is_too_deep_is_refused() {
-        // Arrays of one array, a hundred thousand deep.
+        // Arrays of one element, nested a hundred thousand deep.
         let deep = vec![0x81; 100_000];
         assert!(unpack::<crate::dist::Datum>(&deep).is_err());
     }

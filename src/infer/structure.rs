@@ -1,16 +1,17 @@
-//! Choices that decide which others there are, and whether a run moved them.
+//! Finds choices that determine which other choices exist, and that a run hardly ever
+//! moved.
 
 use super::draws::SiteStats;
 use crate::trace::{Effect, Trace};
 
-/// Proposals of a choice before it is judged.
+/// The least number of proposals from which a choice is judged.
 const JUDGED: u64 = 100;
-/// The least fraction of them that is accepted where a choice moves.
+/// The acceptance rate from which a choice counts as moving.
 const MOVES: f64 = 0.01;
 
-/// The choices on which the structure of a state depends (whether others are there, and
-/// how many) and that the single-site kernels of a run hardly ever moved, with the
-/// fraction of proposals accepted.
+/// The choices that determine the structure of a state (whether other choices exist, and
+/// how many) and that the single-site kernels of a run hardly ever moved, with their
+/// acceptance rates.
 pub fn stuck_structure(state: &Trace, sites: &[SiteStats]) -> Vec<(String, f64)> {
     let stuck = |s: &SiteStats| s.acceptance().filter(|a| s.proposals >= JUDGED && *a < MOVES);
     let mut trace = None;

@@ -1,18 +1,19 @@
 //! Geweke's joint distribution test: "Getting it right: joint distribution tests of
 //! posterior simulators" (2004).
 //!
-//! The marginal-conditional simulator draws a state from the prior and data from it. The
-//! successive-conditional one lets the sampler move the state given the data, then draws
-//! the data anew given the state, by turns. Both have the same joint distribution if the
-//! sampler leaves the posterior invariant.
+//! The marginal-conditional simulator draws a state from the prior and data given the
+//! state. The successive-conditional one alternates between moving the state given the
+//! data with the sampler, and redrawing the data given the state. Both have the same
+//! joint distribution if the sampler leaves the posterior invariant.
 //!
-//! Every successive chain starts in a draw of the joint distribution, so no burn-in is
-//! waited for and slow chains are as good as fast ones, only less telling; chains are
-//! independent, so their means have an honest standard error whatever their
-//! autocorrelation. Numbers are compared by their place among the marginal draws (0 to
-//! 1): the means and the mean squares of places exist for heavy tails too, and see what
-//! those of the numbers see. The log joint density is among the numbers, read before data
-//! are redrawn: kernels that ignore the data keep every other number as it was.
+//! Every successive chain starts from a draw of the joint distribution, so it needs no
+//! burn-in, and the test is valid for chains that mix slowly, though less powerful.
+//! Chains are independent, so their means have a valid standard error whatever their
+//! autocorrelation. Numbers are compared by their position among the marginal draws (0 to
+//! 1): the mean and the mean square of positions exist for heavy tails too, and detect
+//! the same errors as those of the numbers. The log joint density is among the numbers,
+//! read before the data are redrawn: a kernel that ignores the data may leave the
+//! distributions of all other numbers unchanged.
 
 use super::quantities::{OF_DATA, Quantities, read_data};
 use super::sampler::Sampler;
@@ -27,26 +28,27 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Draws from the prior for each successive chain.
 const MARGINAL: u32 = 20;
 
-/// How the two simulators compare.
+/// The comparison of the two simulators.
 #[derive(Clone, Debug)]
 pub struct Geweke {
-    /// One row a quantity, by address; the log joint density and what is said of the data
-    /// last.
+    /// One row per quantity, by address; the log joint density and the statistics of the
+    /// data come last.
     pub rows: Vec<GewekeRow>,
-    /// Successive chains.
+    /// The number of successive chains.
     pub chains: usize,
-    /// Draws from the prior.
+    /// The number of draws from the prior.
     pub marginal: usize,
-    /// The fewest turns of a chain.
+    /// The smallest number of turns of a chain.
     pub turns: usize,
-    /// A z-score beyond this fails: [`FALSE_ALARMS`] over the number of scores, both
-    /// sides.
+    /// A larger absolute z-score fails. Its two-sided probability is [`FALSE_ALARMS`]
+    /// divided by the number of scores.
     pub threshold: f64,
-    /// Numbers of choices that were not looked at, because there are so many.
+    /// The number of components of choices that were not tested, because there are too
+    /// many.
     pub left_out: usize,
 }
 
-/// One quantity.
+/// The result for one quantity.
 #[derive(Clone, Debug)]
 pub struct GewekeRow {
     /// Its address.
@@ -55,9 +57,9 @@ pub struct GewekeRow {
     pub marginal: f64,
     /// The median over the successive chains.
     pub successive: f64,
-    /// The z-score of the means of places.
+    /// The z-score of the mean position.
     pub z_mean: f64,
-    /// The z-score of their mean squares.
+    /// The z-score of the mean square of positions.
     pub z_square: f64,
     /// Whether both are within the threshold.
     pub passes: bool,
@@ -87,7 +89,7 @@ pub fn geweke(
     first.windows(2).try_for_each(|w| same_data(&w[0], &w[1]))?;
     let quantities = Arc::new(Quantities::of(first.iter_mut().map(|t| &mut t.trace)));
     drop(first);
-    // The chains start in the first draws; these are others.
+    // The chains start from the first draws; the marginal ones are others.
     let marginal = each(settings, chains..chains * (1 + MARGINAL), |i| {
         simulate(code, settings, i).map(|mut s| read(&quantities, &mut s.trace))
     })?;
@@ -120,7 +122,7 @@ fn read(quantities: &Quantities, trace: &mut Trace) -> Vec<f64> {
     row
 }
 
-/// Redraws the data at every draw of a chain, and reads the state.
+/// Reads the state at every draw of a chain, and then redraws the data.
 #[derive(Debug)]
 struct Turns {
     code: Arc<Code>,
@@ -152,8 +154,9 @@ impl Callback for Turns {
 }
 
 impl Turns {
-    /// The first turn leaves what warm-up came to for a draw of the joint distribution,
-    /// with what kernels have learnt.
+    /// The first turn replaces the state after warm-up by a draw of the joint
+    /// distribution; what the kernels have adapted is kept. Later turns read the state
+    /// and redraw the data.
     fn turn(
         &self,
         chain: u32,
@@ -169,8 +172,8 @@ impl Turns {
             trace.commit();
             return Ok(None);
         }
-        // Before the data are drawn anew: afterwards they fit whatever the kernels came
-        // to, also if they never looked at the data.
+        // Read before the data are redrawn: afterwards they fit any state, even if the
+        // kernels ignored them.
         let reading = read(&self.quantities, trace);
         let drawn = trace.replicate(replicating(self.settings.seed, chain, turn))?;
         trace.set_observed(&drawn.values)?;
@@ -187,8 +190,8 @@ fn judged(
 ) -> Geweke {
     let tests = 2.0 * names.len() as f64;
     let z = inv_normal_cdf(1.0 - 0.5 * FALSE_ALARMS / tests);
-    // Student's quantile from the normal one (Abramowitz & Stegun 26.7.5): the error is
-    // estimated from the chains.
+    // Student's quantile from the normal one (Abramowitz & Stegun 26.7.5), since the
+    // error is estimated from the chains.
     let threshold = z + (z * z * z + z) / (4.0 * (successive.len() as f64 - 1.0));
     let row = |(q, name): (usize, String)| {
         let mut sorted: Vec<f64> = marginal.iter().filter_map(|r| r.get(q).copied()).collect();
@@ -230,7 +233,7 @@ fn judged(
     }
 }
 
-/// The share of sorted numbers below one, equal ones counting half.
+/// The fraction of sorted numbers below `x`, with equal ones counting half.
 fn place(sorted: &[f64], x: f64) -> f64 {
     let below = sorted.partition_point(|y| *y < x);
     let upto = sorted.partition_point(|y| *y <= x);
@@ -259,7 +262,7 @@ mod tests {
             let judged = judged((0..names).map(|i| i.to_string()).collect(), &draws[0], &draws, 0);
             let student = StudentsT::new(0.0, 1.0, chains as f64 - 1.0).unwrap();
             let exact = student.inverse_cdf(1.0 - 0.5 * FALSE_ALARMS / (2 * names) as f64);
-            // The quantile is approximated from the normal one, to the first order.
+            // The quantile is approximated from the normal one, to first order.
             let normal = inv_normal_cdf(1.0 - 0.5 * FALSE_ALARMS / (2 * names) as f64);
             assert!(judged.threshold > normal && judged.threshold <= exact, "{}", judged.threshold);
             assert!(

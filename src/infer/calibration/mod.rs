@@ -1,13 +1,13 @@
-//! Is what a sampler draws the posterior? Checks that need no posterior to compare with,
-//! only that data can be simulated.
+//! Tests whether a sampler draws from the posterior. They need no known posterior to
+//! compare with, only data that can be simulated.
 //!
 //! [`sbc()`] ranks true values among draws given data simulated from them (Talts et al.
-//! 2018); [`geweke()`] lets kernels and fresh data take turns and compares with the prior
+//! 2018); [`geweke()`] alternates kernels with fresh data and compares with the prior
 //! (Geweke 2004). Both take any [`Sampler`]: a plan of a program, or one kernel in a
-//! loop. Not here: running chains, printing.
+//! loop. Running chains and printing are left to other modules.
 //!
-//! Invariant: results are functions of program, sampler, seed and counts, not of the
-//! number of threads.
+//! Invariant: results are functions of the program, sampler, seed and counts, and do not
+//! depend on the number of threads.
 
 mod geweke;
 mod quantities;
@@ -23,11 +23,11 @@ use super::parallel::in_parallel;
 use super::plan::ChainError;
 use crate::trace::Limits;
 
-/// The probability that a right sampler fails a check, over all quantities together
+/// The probability that a correct sampler fails a check, over all quantities together
 /// (Bonferroni).
 pub const FALSE_ALARMS: f64 = 1e-3;
 
-/// The fewest replicates that say anything.
+/// The fewest replicates that are informative.
 pub const FEWEST: usize = 20;
 
 /// Counts and settings of a check.
@@ -35,15 +35,15 @@ pub const FEWEST: usize = 20;
 pub struct Settings {
     /// Data sets (`sbc`) or chains (`geweke`); at least [`FEWEST`].
     pub replicates: usize,
-    /// The seed: same seed, same result.
+    /// The seed; the same seed gives the same result.
     pub seed: u64,
-    /// Threads that replicates are shared among.
+    /// The number of threads.
     pub threads: usize,
-    /// Kernel applications of each chain after warm-up. Without it what the plan says;
-    /// `sbc` then runs longer where a few first chains come to fewer independent draws
-    /// than it ranks.
+    /// Kernel applications of each chain after warm-up. If `None`, the plan's number;
+    /// `sbc` then runs longer chains if the effective sample size of a few pilot chains
+    /// is too small.
     pub steps: Option<u64>,
-    /// Bounds on what the program may build.
+    /// Limits on what the program may build.
     pub limits: Limits,
 }
 
@@ -53,12 +53,12 @@ impl Default for Settings {
     }
 }
 
-/// Why a check says nothing.
+/// Why a check has no result.
 #[derive(Debug)]
 pub enum CalibrationError {
-    /// Data cannot be simulated from the program: the reason.
+    /// Data cannot be simulated from the program, for this reason.
     NotSimulable(String),
-    /// Too little to go by: what to do.
+    /// There are too few replicates or draws; the message says what to do.
     TooFew(String),
     /// A chain failed.
     Chain(ChainError),
@@ -76,8 +76,8 @@ impl From<Box<crate::lang::error::RunError>> for CalibrationError {
     }
 }
 
-/// Does the same for each index, on some threads; results in order, the first error if
-/// there is one.
+/// Calls a function for each index, on several threads. Returns the results in order, or
+/// the first error.
 fn each<T: Send>(
     settings: &Settings,
     indices: std::ops::Range<u32>,

@@ -1,27 +1,27 @@
-//! The numbers that are looked at in a state: its choices by address, and the log joint
+//! The numbers of a state that are tested: its choices by address, and the log joint
 //! density.
 //!
 //! Invariant: a reading has one number for each name. A choice that a state does not have
-//! reads as -infinity: below every value, which makes it as good a function of the state
-//! as any, where choices come and go.
+//! reads as -infinity, below every value, so that readings are functions of the state
+//! even if choices come and go.
 
 use crate::trace::{Selector, Trace};
 use indexmap::IndexMap;
 
-/// The most numbers of choices that are looked at: those that most states have.
+/// The most numbers of choices that are tested: those that most states have.
 const MOST: usize = 100;
 
 #[derive(Debug)]
 pub(super) struct Quantities {
     places: IndexMap<(u64, usize), usize>,
-    /// What each is called.
+    /// The name of each number.
     pub names: Vec<String>,
-    /// How many there are beyond [`MOST`].
+    /// How many further numbers there are, beyond [`MOST`].
     pub left_out: usize,
 }
 
 impl Quantities {
-    /// The numbers of some states.
+    /// Collects the numbers that occur in several states.
     pub fn of<'a>(traces: impl Iterator<Item = &'a mut Trace>) -> Quantities {
         let mut found = IndexMap::new();
         for trace in traces {
@@ -54,7 +54,7 @@ impl Quantities {
         Quantities { places, names, left_out }
     }
 
-    /// The numbers of a state.
+    /// Reads the numbers of a state.
     pub fn read(&self, trace: &mut Trace) -> Vec<f64> {
         let mut out = vec![f64::NEG_INFINITY; self.names.len()];
         let all = trace.select(&Selector::All);
@@ -76,11 +76,11 @@ impl Quantities {
     }
 }
 
-/// What is said of data: the mean and the mean square of all observed numbers that are
-/// finite.
+/// The statistics of the data: the mean and the mean square of all observed numbers that
+/// are finite.
 pub(super) const OF_DATA: [&str; 2] = ["mean of the data", "mean square of the data"];
 
-/// These numbers of a state; -infinity where nothing observed is a number.
+/// The statistics of a state's data; -infinity if no observed value is numeric.
 pub(super) fn read_data(trace: &Trace) -> [f64; 2] {
     let (mut n, mut sums) = (0.0, [0.0; 2]);
     for o in trace.observed() {

@@ -1,4 +1,4 @@
-//! What is checked: something that runs a chain and shows its states.
+//! The interface of samplers that are tested: they run a chain and report its states.
 
 use crate::infer::callback::Callback;
 use crate::infer::draws::Discard;
@@ -11,11 +11,11 @@ use crate::syntax::ast::KStmt;
 use crate::trace::{Draws, Limits};
 use std::sync::Arc;
 
-/// Something that draws from the posterior of a program.
+/// A sampler of the posterior of a program.
 pub trait Sampler: Sync {
-    /// Runs a chain and shows its states, one draw after the other, to `callback`, which may
-    /// put the chain in another state. `steps` bounds the kernel applications after
-    /// warm-up, in place of the sampler's own number. Gives how many there were.
+    /// Runs a chain and passes its states, draw by draw, to `callback`, which may replace
+    /// the state of the chain. `steps` is the number of kernel applications after
+    /// warm-up, in place of the sampler's own. Returns the number made.
     ///
     /// # Errors
     /// If the chain cannot start or fails.
@@ -28,11 +28,11 @@ pub trait Sampler: Sync {
     ) -> Result<u64, ChainError>;
 }
 
-/// The plan of a program.
+/// A sampler that runs the plan of a program.
 pub struct PlanSampler<'a> {
     /// The statements of its `infer` block.
     pub plan: &'a [KStmt],
-    /// Seed, warm-up, limits; steps and watch are the check's.
+    /// Seed, warm-up and limits; steps and callback are set by the check.
     pub options: RunOptions,
     /// Counts steps, and ends chains early when cancelled.
     pub progress: &'a Progress,
@@ -56,17 +56,18 @@ impl Sampler for PlanSampler<'_> {
     }
 }
 
-/// One kernel in a loop, starting from a draw from the prior: for kernels of one's own.
+/// A sampler that applies one kernel in a loop from a draw from the prior, for custom
+/// kernels.
 pub struct KernelSampler<F> {
-    /// Makes the kernel of a chain.
+    /// Constructs the kernel of a chain.
     pub kernel: F,
     /// The seed.
     pub seed: u64,
-    /// Applications before the first draw, in which it may adapt.
+    /// Applications before the first draw, in which the kernel may adapt.
     pub warmup: u64,
     /// Applications between draws; at least 1.
     pub every: u64,
-    /// Draws, where the check asks for no number of steps.
+    /// The number of draws, if the check does not set the number of steps.
     pub draws: u64,
 }
 

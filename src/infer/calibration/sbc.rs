@@ -1,10 +1,10 @@
 //! Simulation-based calibration: Talts, Betancourt, Simpson, Vehtari & Gelman,
 //! "Validating Bayesian inference algorithms with simulation-based calibration" (2018).
 //!
-//! A true state is drawn from the prior, data from it, and the sampler run on the data.
-//! If it draws from the posterior, the rank of a true number among nearly independent
-//! draws is uniform, whatever the number. The log joint density is ranked too: it sees
-//! errors of the data's part that no single choice shows (Modrák et al. 2023).
+//! A true state is drawn from the prior and data from that state, and the sampler is run
+//! on the data. If it draws from the posterior, the rank of each true number among nearly
+//! independent draws is uniform. The log joint density is ranked too: it reveals errors
+//! in the use of the data that no single choice shows (Modrák et al. 2023).
 
 use super::quantities::Quantities;
 use super::sampler::Sampler;
@@ -17,50 +17,51 @@ use crate::num::chi_square_tail;
 use crate::trace::{Draws, Trace};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Ranks that a true value can have among the draws kept: one more than those.
+/// The number of possible ranks of a true value: one more than the draws kept.
 pub const RANKS: usize = 20;
-/// Chains that are looked at to see how long the others have to be.
+/// The number of pilot chains, which determine how long the others have to be.
 const PILOTS: u32 = 8;
-/// How much longer than it says a plan is run at most.
+/// The largest factor by which chains are lengthened.
 const LONGEST: f64 = 64.0;
-/// The share of chains that may have fewer independent draws than are ranked.
+/// The fraction of chains that may have fewer independent draws than are ranked.
 const SHORT: f64 = 0.1;
 
-/// What the ranks say.
+/// The result of the check.
 #[derive(Clone, Debug)]
 pub struct Sbc {
-    /// One row a quantity, by address; the log joint density last.
+    /// One row per quantity, by address; the log joint density comes last.
     pub rows: Vec<SbcRow>,
-    /// Data sets.
+    /// The number of data sets.
     pub replicates: usize,
-    /// Bins that the ranks are counted in.
+    /// The number of bins of the ranks.
     pub bins: usize,
-    /// A quantity fails below this probability: [`FALSE_ALARMS`] over the number of
-    /// quantities.
+    /// A quantity fails if its p-value is below this: [`FALSE_ALARMS`] divided by the
+    /// number of quantities.
     pub threshold: f64,
     /// Kernel applications of the longest chain after warm-up.
     pub steps: u64,
-    /// Numbers of choices that were not looked at, because there are so many.
+    /// The number of components of choices that were not tested, because there are too
+    /// many.
     pub left_out: usize,
 }
 
-/// One quantity.
+/// The result for one quantity.
 #[derive(Clone, Debug)]
 pub struct SbcRow {
     /// Its address.
     pub name: String,
-    /// How often its rank was in each bin.
+    /// The number of ranks in each bin.
     pub counts: Vec<u32>,
-    /// Pearson's statistic.
+    /// Pearson's chi-square statistic.
     pub chi_square: f64,
-    /// The probability of one as large if the ranks are uniform.
+    /// The probability of a statistic at least as large if the ranks are uniform.
     pub p: f64,
-    /// The fewest independent draws of a chain.
+    /// The smallest effective sample size of a chain.
     pub least_ess: f64,
     /// Whether more than a tenth of the chains had fewer independent draws than are
-    /// ranked: then ranks pile up at both ends also where the kernels are right.
+    /// ranked: ranks then pile up at both ends even if the kernels are correct.
     pub is_short: bool,
-    /// Whether the ranks may well be uniform.
+    /// Whether the ranks are consistent with uniform ones.
     pub passes: bool,
 }
 
@@ -115,7 +116,7 @@ pub fn sbc(
     Ok(judged(&quantities, &done))
 }
 
-/// The rank of a true value, and how many independent draws there were.
+/// The rank of a true value, and the effective sample size of its chain.
 struct Ranked {
     rank: usize,
     ess: f64,
@@ -134,7 +135,7 @@ impl Callback for Collect {
     }
 }
 
-/// Ranks true values among draws far apart; among equal ones the place is drawn.
+/// Ranks true values among widely spaced draws; the rank among equal ones is random.
 fn ranked(
     truth: &[f64],
     rows: &[Vec<f64>],
@@ -163,7 +164,7 @@ fn ranked(
     Ok(truth.iter().enumerate().map(one).collect())
 }
 
-/// The same order with finite numbers.
+/// Replaces infinite numbers by finite ones, in the same order.
 fn finite(series: Vec<f64>) -> Vec<f64> {
     let known = || series.iter().copied().filter(|x| x.is_finite());
     let (low, high) = (known().fold(0.0, f64::min) - 1.0, known().fold(0.0, f64::max) + 1.0);
@@ -183,7 +184,7 @@ fn finite(series: Vec<f64>) -> Vec<f64> {
 
 fn judged(quantities: &Quantities, done: &[(u64, Vec<Ranked>)]) -> Sbc {
     let replicates = done.len();
-    // At least five expected in each bin.
+    // At least five ranks are expected in each bin.
     let bins = [10, 5, 4].into_iter().find(|b| replicates >= 5 * b).unwrap_or(2);
     let threshold = FALSE_ALARMS / quantities.names.len() as f64;
     let row = |(q, name): (usize, &String)| {

@@ -1,9 +1,9 @@
-//! States and data drawn from the joint distribution of a program: choices from the
-//! prior, then every observation from its own distribution given them.
+//! Draws states and data from the joint distribution of a program: choices from the
+//! prior, then every observation from its own distribution given the choices.
 //!
-//! A program that is no such distribution is refused, with what stands in the way: a
+//! A program that does not define such a distribution is refused, with the reason: a
 //! factor, a likelihood without a sampler, an improper prior, frozen choices,
-//! observations that are there or not by chance, observed values that depend on choices.
+//! observations whose existence is random, or observed values that depend on choices.
 
 use super::{CalibrationError, Settings};
 use crate::infer::plan::ChainError;
@@ -14,17 +14,16 @@ use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Draws, Limits, Observation, Selector, Trace};
 use std::sync::Arc;
 
-/// How often a draw from the prior may lead where the program has no value before that is
-/// an error.
+/// How many draws from the prior may be undefined before that is an error.
 const RETRIES: u64 = 1000;
 
 /// A state with data drawn from it.
 pub(super) struct Simulated {
-    /// The state, its observations replaced by the data.
+    /// The state, with its observations replaced by the data.
     pub trace: Trace,
     /// The data, by the hash of the observation's address.
     pub data: Arc<Observed>,
-    /// What the program itself observes.
+    /// The program's own observations.
     given: Vec<Observation>,
 }
 
@@ -33,7 +32,7 @@ pub(in crate::infer) fn replicating(seed: u64, index: u32, step: u64) -> Draws {
     Draws { key: StreamKey::new(seed, index, Purpose::REPLICATE), step, substream: 0 }
 }
 
-/// Draws a state and data.
+/// Draws a state and its data.
 pub(super) fn simulate(
     code: &Arc<Code>,
     settings: &Settings,
@@ -43,9 +42,8 @@ pub(super) fn simulate(
     with_data(trace, settings, index)
 }
 
-/// Draws a state from the prior. Where the program has no value (a scale that is not
-/// positive) the prior has no mass: kernels reject such states, so they are drawn again
-/// here.
+/// Draws a state from the prior. The prior has no mass where the program is undefined (a
+/// scale that is not positive): kernels reject such states, so they are redrawn here.
 pub(in crate::infer) fn state(
     code: &Arc<Code>,
     limits: Limits,
@@ -99,8 +97,8 @@ fn with_data(
     Ok(Simulated { trace, data: Arc::new(drawn.values.into_iter().collect()), given })
 }
 
-/// Refuses programs whose set of observations, or what they observe, is a matter of
-/// chance: `a` and `b` are two draws.
+/// Refuses programs whose set of observations or observed values is random: `a` and `b`
+/// are two draws.
 pub(super) fn same_data(a: &Simulated, b: &Simulated) -> Result<(), CalibrationError> {
     let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
     for (x, y) in [(a, b), (b, a)] {
@@ -113,7 +111,7 @@ pub(super) fn same_data(a: &Simulated, b: &Simulated) -> Result<(), CalibrationE
                         o.address
                     ));
                 }
-                // Objects are equal only if they are the same one.
+                // Objects are equal only if they are identical.
                 Some(p) if !p.value.same(&o.value) && !matches!(p.value, Value::Object(_)) => {
                     return refuse(format!(
                         "the value observed by {} depends on random choices, so it is not data",

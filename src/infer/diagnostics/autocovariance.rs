@@ -1,5 +1,5 @@
-//! The autocovariance of a chain at every lag, by the fast Fourier transform: O(n log n),
-//! for chains that mix badly need all lags.
+//! The autocovariance of a chain at every lag, by the fast Fourier transform in O(n log
+//! n): chains that mix badly need all lags.
 
 use super::chains::mean;
 use std::f64::consts::PI;

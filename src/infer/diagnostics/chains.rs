@@ -1,7 +1,7 @@
-//! A rectangle of draws, chain after chain, and the moments the diagnostics need.
+//! A rectangle of draws, chain by chain, and the moments that the diagnostics need.
 
-/// Draws of several chains of one length, in a unit that suits them: squares and fourth
-/// powers of draws of any size are then numbers.
+/// Draws of several chains of equal length, scaled so that squares and fourth powers of
+/// draws of any size neither overflow nor underflow.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chains {
     values: Vec<f64>,
@@ -10,8 +10,7 @@ pub(super) struct Chains {
 }
 
 impl Chains {
-    /// Copies the draws; `None` if there are fewer than four in a chain, or one is not
-    /// finite.
+    /// Copies the draws; `None` if a chain has fewer than four, or a draw is not finite.
     pub fn new<C: AsRef<[f64]>>(chains: &[C]) -> Option<Chains> {
         let draws = chains.iter().map(|c| c.as_ref().len()).min()?;
         let mut values: Vec<f64> =
@@ -25,7 +24,7 @@ impl Chains {
         })
     }
 
-    /// What the draws are given in: a power of 2.
+    /// The unit of the scaled draws: a power of 2.
     pub fn unit(&self) -> f64 {
         self.unit
     }
@@ -45,12 +44,12 @@ impl Chains {
         &self.values
     }
 
-    /// Chain by chain.
+    /// Iterates over the chains.
     pub fn iter(&self) -> impl Iterator<Item = &[f64]> {
         self.values.chunks_exact(self.draws)
     }
 
-    /// The first and the last half of each chain as chains of their own; the middle draw
+    /// Splits each chain into its first and last half as separate chains; the middle draw
     /// of an odd number is left out.
     pub fn split(&self) -> Chains {
         let half = self.draws / 2;
@@ -60,7 +59,7 @@ impl Chains {
         Chains { values, draws: half, ..*self }
     }
 
-    /// The same chains with every draw replaced.
+    /// The same chains with a function applied to every draw.
     pub fn map(&self, f: impl Fn(f64) -> f64) -> Chains {
         self.with_values(self.values.iter().map(|&x| f(x)).collect())
     }
@@ -72,19 +71,19 @@ impl Chains {
     }
 }
 
-/// The power of 2 at or below the largest of these numbers, so that dividing by it is
-/// exact; 1 if there is none.
+/// The largest power of 2 that is at most the largest absolute value, so that division by
+/// it is exact; 1 if there is none.
 pub(super) fn unit(x: &[f64]) -> f64 {
     let largest = x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     if largest > 0.0 && largest.is_finite() { libm::ldexp(1.0, libm::ilogb(largest)) } else { 1.0 }
 }
 
-/// The mean; NaN of nothing.
+/// The mean; NaN for an empty slice.
 pub(super) fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len() as f64
 }
 
-/// The unbiased variance, over n - 1; NaN of fewer than two.
+/// The unbiased variance, over n - 1; NaN for fewer than two numbers.
 pub(super) fn variance(x: &[f64]) -> f64 {
     let m = mean(x);
     x.iter().map(|v| (v - m) * (v - m)).sum::<f64>() / (x.len() as f64 - 1.0)

@@ -1,4 +1,4 @@
-//! Effective sample sizes: how many independent draws would tell as much.
+//! Effective sample sizes: the number of independent draws with the same precision.
 //!
 //! Geyer's initial monotone sequence over the autocorrelations of all chains together
 //! (Vehtari et al. 2021, section 3.2), on rank-normalised draws for the bulk and on
@@ -9,19 +9,19 @@ use super::chains::{Chains, mean, unit, variance};
 use super::normal_scores::normal_scores;
 use super::quantile::quantile;
 
-/// Effective sample size for the bulk of the distribution: of the rank-normalised, split
-/// chains. NaN if it cannot be said (see the module).
+/// Effective sample size for the bulk of the distribution, from the rank-normalised,
+/// split chains. NaN if it is undefined (see the module).
 pub fn ess_bulk<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| bulk(&c))
 }
 
-/// Effective sample size for the tails: the smaller one of those for the 5 % and the 95 %
-/// quantile.
+/// Effective sample size for the tails: the smaller of those for the 5 % and 95 %
+/// quantiles.
 pub fn ess_tail<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| tail(&c))
 }
 
-/// Effective sample size for the mean: of the split chains as they are.
+/// Effective sample size for the mean, from the split chains without rank normalisation.
 pub fn ess_mean<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| ess(&c.split()))
 }
@@ -47,7 +47,8 @@ fn of_quantile(chains: &Chains, p: f64) -> f64 {
     ess(&chains.map(|x| f64::from(u8::from(x <= q))).split())
 }
 
-/// The effective sample size of chains taken as they are; constant ones count in full.
+/// The effective sample size of the given chains, without splitting; constant chains
+/// count in full.
 pub(super) fn ess(chains: &Chains) -> f64 {
     let (count, n) = (chains.count() as f64, chains.draws());
     let total = count * n as f64;
@@ -65,7 +66,7 @@ pub(super) fn ess(chains: &Chains) -> f64 {
     }
     let rho = |lag: usize| 1.0 - (within - covariance(lag)) / pooled;
 
-    // Geyer's initial positive sequence: pairs of neighbouring lags as long as their sum
+    // Geyer's initial positive sequence: pairs of neighbouring lags, as long as their sum
     // is positive.
     let (mut even, mut odd) = (1.0, rho(1));
     let mut rhos = vec![even, odd];
@@ -78,7 +79,7 @@ pub(super) fn ess(chains: &Chains) -> f64 {
             rhos.extend([0.0, 0.0]);
         }
     }
-    // The last pair is left out of the sum, but for its even member where that is
+    // The last pair is left out of the sum, except for its even member if that is
     // positive.
     let used = rhos.len() - 2;
     let last_even = if even > 0.0 { even } else { rhos[used] };
@@ -97,6 +98,6 @@ pub(super) fn ess(chains: &Chains) -> f64 {
     total / tau
 }
 
-/// The decimal resolution of a double, in the unit of the draws: a smaller spread counts
-/// as none.
+/// The decimal resolution of a double, in the unit of the draws: draws with a smaller
+/// range count as constant.
 const RESOLUTION: f64 = 1e-15;

@@ -1,26 +1,28 @@
 //! The evidence of a mode, from the draws of chains that stay in it.
 //!
 //! log Z = E[log density] + entropy, both over the mode. The mean is that of the draws;
-//! the entropy is a Gaussian's of their covariance. Draws that stay near a mode are often
-//! fewer than the choices, so their correlations are shrunk towards none (Schäfer &
+//! the entropy is that of a Gaussian with their covariance. There are often fewer draws
+//! near a mode than choices, so their correlations are shrunk towards zero (Schäfer &
 //! Strimmer 2005, "A shrinkage approach to large-scale covariance matrix estimation",
-//! target D), counting autocorrelated draws for what they are worth. Exact for Gaussian
-//! modes and many draws. Chains that have not yet been everywhere in their mode are too
-//! narrow, by dozens of nats where there are dozens of choices: the error says so, and
-//! modes are better told apart by their densities then.
+//! target D), with the effective number of draws in place of the actual one. Exact for
+//! Gaussian modes and many draws. Chains that have not yet explored their mode are too
+//! narrow, by dozens of nats if there are dozens of choices: the error reflects this, and
+//! modes are then better distinguished by their densities.
 
 use nalgebra::{Cholesky, DMatrix};
 use serde::{Deserialize, Serialize};
 
-/// Fewer draws than this say nothing of a mode.
+/// The fewest draws that are informative about a mode.
 const FEWEST: u64 = 8;
-/// Chains that are still on their way widen by this much more, for all that is known.
+/// The further widening expected of chains that have not explored their mode, as a
+/// multiple of the widening from blocks of draws to all draws.
 const WIDER: f64 = 3.0;
-/// Draws of all evidences from their errors, over which the shares are averaged.
+/// The number of samples of the evidences within their errors, over which the modes'
+/// probabilities are averaged.
 const AVERAGED: u64 = 1000;
 
-/// Draws of one chain: their log densities, means, covariance, and how far each is like
-/// the one before.
+/// Moments of a chain's draws: mean and squared deviations of the log densities, means
+/// and products of the coordinates, and the steps from each draw to the next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Cloud {
     count: u64,
@@ -30,11 +32,11 @@ struct Cloud {
     products: Vec<f64>,
     first: Vec<f64>,
     last: Vec<f64>,
-    /// Sums of the squares of the steps from each draw to the next (von Neumann 1941).
+    /// Sums of the squared differences between successive draws (von Neumann 1941).
     steps: Vec<f64>,
 }
 
-/// A log evidence, and the standard error that so many draws leave.
+/// A log evidence, and the standard error due to the number of draws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogEvidence {
     /// The logarithm of the integral of the density over the mode.
@@ -44,8 +46,8 @@ pub struct LogEvidence {
 }
 
 impl Cloud {
-    /// Takes the next draw (Welford 1962). All draws have as many coordinates; one that
-    /// is not finite is left out.
+    /// Adds the next draw (Welford 1962). All draws have the same number of coordinates;
+    /// a draw that is not finite is left out.
     fn add(&mut self, y: &[f64], log_density: f64) {
         let fits = self.count == 0 || y.len() == self.mean.len();
         if !fits || !log_density.is_finite() || y.iter().any(|x| !x.is_finite()) {
@@ -75,7 +77,7 @@ impl Cloud {
         self.log[1] += d * (log_density - self.log[0]);
     }
 
-    /// One block of one after the other.
+    /// Joins a block and the block after it.
     fn joined(parts: &[Cloud]) -> Cloud {
         let [a, b] = parts else { return parts.first().cloned().unwrap_or_default() };
         let (n, m) = (a.count as f64, b.count as f64);
@@ -97,8 +99,8 @@ impl Cloud {
         joined
     }
 
-    /// What the draws are worth: the median over the coordinates, each taken for an
-    /// autoregression of first order.
+    /// The effective number of draws: the median over the coordinates, with each modelled
+    /// as a first-order autoregression.
     fn effective(&self) -> f64 {
         let n = self.count as f64;
         let one = |i: usize| {
@@ -111,19 +113,19 @@ impl Cloud {
     }
 }
 
-/// The draws of one chain in the unconstrained space, in two to four blocks of the same
-/// length, of which the last may not be full: what they say alone tells whether the chain
-/// has seen its mode.
+/// The draws of one chain in the unconstrained space, in two to four blocks of equal
+/// length, of which the last may not be full. Comparing a block with all of them shows
+/// whether the chain has explored its mode.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clouds {
     blocks: Vec<Cloud>,
-    /// The draws of a full block: a power of two times [`FEWEST`].
+    /// The number of draws of a full block: a power of two times [`FEWEST`].
     length: u64,
 }
 
 impl Clouds {
-    /// Takes the next draw of the chain, in so many coordinates as the others; one that
-    /// is not finite is left out.
+    /// Adds the next draw of the chain, with the same number of coordinates as the
+    /// others; a draw that is not finite is left out.
     pub fn add(&mut self, y: &[f64], log_density: f64) {
         self.length = self.length.max(FEWEST);
         if self.blocks.last().is_none_or(|b| b.count >= self.length) {
@@ -144,7 +146,7 @@ impl Clouds {
     }
 }
 
-/// What some draws say of log density and entropy together.
+/// The mean log density and the entropy of a set of draws.
 struct Gaussian {
     log: f64,
     log_variance: f64,
@@ -180,8 +182,8 @@ impl Gaussian {
     }
 }
 
-/// The entropy of a Gaussian of a sample covariance, from so many independent draws.
-/// `None` where a coordinate never moved.
+/// The entropy of a Gaussian with a sample covariance of `effective` independent draws.
+/// `None` if a coordinate never moved.
 fn entropy(d: usize, effective: f64, covariance: impl Fn(usize, usize) -> f64) -> Option<f64> {
     let sd: Vec<f64> = (0..d).map(|i| covariance(i, i).sqrt()).collect();
     if sd.iter().any(|s| !s.is_normal()) {
@@ -203,17 +205,18 @@ fn entropy(d: usize, effective: f64, covariance: impl Fn(usize, usize) -> f64) -
     }
     let factor = Cholesky::new(correlations)?;
     let freedom = effective - 1.0;
-    // The log of a sample variance is too small by this much on average: log(x) -
-    // digamma(x) at half the freedom.
+    // The expected bias of the log of a sample variance, which is too small: log(x) -
+    // digamma(x) at x = freedom / 2.
     let bias = 1.0 / freedom + 1.0 / (3.0 * freedom * freedom);
     let each = 0.5 * (libm::log(2.0 * std::f64::consts::PI) + 1.0 + bias);
     let log = |i: usize| each + libm::log(sd[i]) + libm::log(factor.l_dirty()[(i, i)]);
     Some((0..d).map(log).sum())
 }
 
-/// The evidence of a mode from chains that stay in it. Its error is that of so many
-/// draws, and of chains that are still on their way: blocks of their draws are narrower
-/// then than all of them. `None` from too few draws, or where a coordinate never moved.
+/// The evidence of a mode from chains that stay in it. Its error has two parts: that of
+/// the number of draws, and that of chains which have not explored the mode, whose blocks
+/// of draws are narrower than all draws together. `None` if there are too few draws, or a
+/// coordinate never moved.
 pub fn log_evidence(chains: &[&Clouds]) -> Option<LogEvidence> {
     let blocks: Vec<&Cloud> = chains.iter().flat_map(|c| &c.blocks).collect();
     let all = Gaussian::of(&blocks)?;
@@ -228,8 +231,8 @@ pub fn log_evidence(chains: &[&Clouds]) -> Option<LogEvidence> {
     (value.is_finite() && error.is_finite()).then_some(LogEvidence { value, error })
 }
 
-/// The mean log density of chains, with the error of taking modes for equally wide: their
-/// entropies in so many dimensions differ by about the square root of these. `None`
+/// The mean log density of chains, which ranks modes as if all were equally wide. The
+/// error is that of this assumption: entropies in d dimensions differ by about √d. `None`
 /// without draws.
 pub fn log_density(chains: &[&Clouds]) -> Option<LogEvidence> {
     let blocks: Vec<&Cloud> = chains.iter().flat_map(|c| &c.blocks).collect();
@@ -239,8 +242,7 @@ pub fn log_density(chains: &[&Clouds]) -> Option<LogEvidence> {
     Some(LogEvidence { value, error: dimensions.sqrt() })
 }
 
-/// The share of each mode in all of them, averaged over what their evidences may be given
-/// their errors.
+/// The probability of each mode, averaged over the errors of the evidences.
 pub fn shares(all: &[LogEvidence]) -> Vec<f64> {
     let mut rng = crate::rng::StreamKey::new(0, 0, crate::rng::Purpose::KERNEL).stream(0, 0, 0);
     let mut shares = vec![0.0; all.len()];
@@ -260,8 +262,9 @@ mod tests {
     use super::*;
     use crate::rng::{Purpose, StreamKey};
 
-    /// Draws of a normal distribution in `d` dimensions about `at`, of mass `log_mass`:
-    /// neighbours correlate by `r`, and each draw is like the one before by `lag`.
+    /// Draws of a normal distribution of mass exp(log_mass) in `d` dimensions about `at`:
+    /// neighbouring coordinates have correlation `r`, successive draws autocorrelation
+    /// `lag`.
     fn cloud(
         seed: u64,
         (d, n): (usize, usize),
@@ -298,8 +301,8 @@ mod tests {
         let wide = cloud(1, (3, 4000), (5.0, 2.0), 0.9, 0.0, -7.0);
         let e = log_evidence(&[&wide]).unwrap();
         assert!((e.value + 7.0).abs() < 0.05 && e.error < 0.05, "{e:?}");
-        // Two chains of the same mode, autocorrelated: what they are worth is about a
-        // fifth.
+        // Two autocorrelated chains of the same mode: the effective number of draws is
+        // about a fifth of the actual one.
         let two = [2, 3].map(|s| cloud(s, (3, 4000), (5.0, 2.0), 0.9, 0.7, -7.0));
         let worth: f64 = two[0].blocks.iter().map(Cloud::effective).sum();
         assert!((worth / 4000.0 - 0.3 / 1.7).abs() < 0.03, "{worth}");
@@ -336,7 +339,8 @@ mod tests {
 
     #[test]
     fn chains_still_on_their_way_have_an_error_that_says_so() {
-        // A random walk in 30 dimensions: twice as long is wider by log(2) / 2 in each.
+        // A random walk in 30 dimensions: one that is twice as long is wider by log(2) /
+        // 2 in each.
         let walk = log_evidence(&[&cloud(9, (30, 400), (0.0, 1.0), 0.0, 0.9999, 0.0)]).unwrap();
         let there = log_evidence(&[&cloud(9, (30, 4000), (0.0, 1.0), 0.0, 0.0, 0.0)]).unwrap();
         assert!(
@@ -361,15 +365,15 @@ mod tests {
 
     #[test]
     fn few_draws_in_many_dimensions_are_unbiased_to_their_error() {
-        // Neighbours by 0.5: 39 of 780 correlations. 30 such modes of 60 autocorrelated
-        // draws each.
+        // Neighbours are correlated by 0.5: 39 of 780 correlations. 30 such modes with 60
+        // autocorrelated draws each.
         let all: Vec<f64> = (0..30)
             .map(|s| log_evidence(&[&cloud(s, (40, 60), (0.0, 0.1), 0.5, 0.4, 3.0)]).unwrap())
             .map(|e| (e.value - 3.0) / e.error)
             .collect();
         let mean = all.iter().sum::<f64>() / 30.0;
-        // The bias is what shrinking leaves out of the correlations, at most 39 * 0.14
-        // nats; an error is 1.3 nats.
+        // The bias is due to the shrinkage of the correlations, at most 39 * 0.14 nats;
+        // the error is 1.3 nats.
         assert!(mean > -1.0 && mean < 4.5, "{mean}");
     }
 
@@ -381,7 +385,7 @@ mod tests {
         let each = [&narrow, &wide].map(|c| log_evidence(&[c]).unwrap());
         let s = shares(&each);
         assert!((s[0] - 1.0 / 3.0).abs() < 0.02 && (s[0] + s[1] - 1.0).abs() < 1e-12, "{s:?}");
-        // Errors make them more even, not less.
+        // Errors make the probabilities more even, not less.
         let sure =
             |error| shares(&[LogEvidence { value: 0.0, error }, LogEvidence { value: 3.0, error }]);
         assert!((sure(0.0)[1] - 0.9526).abs() < 1e-3 && sure(4.0)[1] < 0.8 && sure(4.0)[1] > 0.6);

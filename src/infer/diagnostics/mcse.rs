@@ -1,5 +1,5 @@
-//! Monte Carlo standard errors: how far an estimate from the chains may be off for want
-//! of draws.
+//! Monte Carlo standard errors: the error of an estimate due to the finite number of
+//! draws.
 
 use super::chains::{Chains, mean, variance};
 use super::ess::ess;
@@ -10,7 +10,7 @@ pub fn mcse_mean<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
 }
 
 /// Standard error of the standard deviation, by the delta method on the squared
-/// deviations (Kenney & Keeping 1951, as in ArviZ). NaN of constant chains.
+/// deviations (Kenney & Keeping 1951, as in ArviZ). NaN for constant chains.
 pub fn mcse_sd<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| of_sd(&c))
 }

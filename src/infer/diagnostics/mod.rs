@@ -3,14 +3,15 @@
 //!
 //! After Vehtari, Gelman, Simpson, Carpenter and Bürkner, "Rank-normalization, folding,
 //! and localization: an improved R-hat for assessing convergence of MCMC" (Bayesian
-//! Analysis 16:2, 2021), with the choices ArviZ 0.23 makes where the paper leaves one;
-//! the numbers agree with `arviz.summary`, but do not depend on the unit of draws, as its
-//! error of the standard deviation does below 1e-7. Not here: drawing, judging, printing.
+//! Analysis 16:2, 2021), with the choices of ArviZ 0.23 where the paper leaves one open.
+//! The numbers agree with `arviz.summary`, but do not depend on the unit of the draws,
+//! unlike its error of the standard deviation below 1e-7. Drawing, judging and printing
+//! are left to other modules.
 //!
 //! Draws are given as one slice per chain, all of one length (longer ones are cut to the
-//! shortest). What cannot be said is NaN: fewer than four draws, a draw that is not
-//! finite, R-hat of a single chain, anything over constant chains but their mean and
-//! effective sample size.
+//! shortest). Undefined results are NaN: those of fewer than four draws or of draws that
+//! are not finite, R-hat of a single chain, and everything over constant chains except
+//! their mean and effective sample size.
 
 mod autocovariance;
 mod chains;

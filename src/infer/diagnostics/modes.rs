@@ -1,19 +1,20 @@
-//! Chains that agree with each other, where not all do.
+//! Groups of chains that agree with each other, if not all chains do.
 //!
-//! Two chains agree if the split R-hat of the two of them is low for every quantity;
-//! groups are what agreement connects. A group is a place where chains stay (a mode, if
-//! they are long enough), not a share of probability: chains fall where they start.
+//! Two chains agree if the split R-hat of the pair is low for every quantity; groups are
+//! the connected components of agreement. A group is a region where chains stay (a mode,
+//! if they are long enough). Its size is not a probability: it depends on where the
+//! chains started.
 
 use super::r_hat;
 
-/// Two chains with a split R-hat above this are at different places: their means are more
+/// Two chains with a split R-hat above this are in different modes: their means are more
 /// than about one and a half standard deviations apart (or one is much wider), which slow
-/// mixing about one place seldom gives.
+/// mixing within one mode seldom causes.
 const APART: f64 = 1.3;
 
 /// Groups of chains, by number: each in order, the largest group first, then by first
-/// chain. `quantities[quantity][chain]` are draws. One group where all agree; none
-/// without chains.
+/// chain. `quantities[quantity][chain]` are draws. If all chains agree there is one
+/// group; without chains there are no groups.
 pub fn modes(quantities: &[&[Vec<f64>]]) -> Vec<Vec<usize>> {
     let chains = quantities.iter().map(|q| q.len()).max().unwrap_or(0);
     let mut group: Vec<usize> = (0..chains).collect();
@@ -40,7 +41,8 @@ fn agree(a: Option<&Vec<f64>>, b: Option<&Vec<f64>>) -> bool {
     let (Some(a), Some(b)) = (a, b) else { return true };
     let r = r_hat(&[a, b]);
     if r.is_nan() {
-        // Too short to be told apart, or constant: then at one place or at two.
+        // Chains that are too short to be distinguished are taken to agree; constant
+        // chains agree if their values are equal.
         return a.len() < 4
             || b.len() < 4
             || a.first().map(|x| x.to_bits()) == b.first().map(|x| x.to_bits());
@@ -56,7 +58,7 @@ mod tests {
     fn chain(seed: u64, centre: f64, n: usize) -> Vec<f64> {
         let mut rng = StreamKey::new(seed, 0, Purpose(99)).stream(0, 0, 0);
         let mut x = 0.0;
-        // Autocorrelated: about 7 draws in one independent draw.
+        // Autocorrelated: about 7 draws are worth one independent draw.
         (0..n)
             .map(|_| {
                 x = 0.75 * x + (1.0f64 - 0.75 * 0.75).sqrt() * rng.standard_normal();
@@ -81,7 +83,7 @@ mod tests {
         assert_eq!(modes(&[&x]), [vec![0, 2], vec![1]]);
         let short = vec![vec![1.0, 2.0], vec![9.0, 8.0]];
         assert_eq!(modes(&[&short]), [vec![0, 1]]);
-        // One is enough to say nothing.
+        // A single short chain is enough for the comparison to be uninformative.
         let uneven = vec![vec![1.0, 2.0], vec![9.0; 60]];
         assert_eq!(modes(&[&uneven]), [vec![0, 1]]);
     }

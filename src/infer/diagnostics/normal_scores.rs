@@ -1,10 +1,10 @@
-//! Rank normalisation: draws replaced by the normal quantiles of their ranks, which makes
-//! the diagnostics sound for heavy tails (Vehtari et al. 2021, equation 14).
+//! Rank normalisation: replaces draws by the normal quantiles of their ranks, which makes
+//! the diagnostics valid for heavy tails (Vehtari et al. 2021, equation 14).
 
 use super::chains::Chains;
 
-/// Each draw's normal score z = Φ⁻¹((r - 3/8) / (S + 1/4)), r its rank among all S draws;
-/// ties share their mean rank.
+/// The normal score z = Φ⁻¹((r - 3/8) / (S + 1/4)) of each draw, with r its rank among
+/// all S draws; ties share their mean rank.
 pub(super) fn normal_scores(chains: &Chains) -> Chains {
     let x = chains.values();
     let mut order: Vec<usize> = (0..x.len()).collect();
@@ -35,8 +35,8 @@ fn normal_quantile(p: f64) -> f64 {
     if q < 0.0 { -x } else { x }
 }
 
-/// A rational function: coefficients of numerator and denominator from the highest power
-/// down.
+/// A rational function, with the coefficients of numerator and denominator from the
+/// highest power down.
 fn ratio([num, den]: &[[f64; 8]; 2], r: f64) -> f64 {
     let horner = |c: &[f64; 8]| c.iter().fold(0.0, |acc, c| acc * r + c);
     horner(num) / horner(den)
@@ -115,11 +115,11 @@ mod tests {
 
     #[test]
     fn quantiles_invert_the_distribution_function() {
-        // From both tails through all three branches: p = erfc(-x / √2) / 2.
+        // From tail to tail through all three branches: p = erfc(-x / √2) / 2.
         for i in -800..=800 {
             let x = f64::from(i) / 100.0;
             let p = libm::erfc(-x / std::f64::consts::SQRT_2) / 2.0;
-            // Near p = 1 the spacing of doubles limits what can come back.
+            // Near p = 1 the spacing of doubles limits the accuracy of the inverse.
             let spacing = f64::EPSILON * p / (libm::exp(-x * x / 2.0) / 2.506_628_274_631_000_7);
             assert!(
                 (normal_quantile(p) - x).abs() <= 1e-13 + 4.0 * spacing,

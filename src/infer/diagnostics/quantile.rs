@@ -1,7 +1,7 @@
 //! Sample quantiles.
 
 /// The quantile at `p` in [0, 1] by linear interpolation between order statistics (R's
-/// type 7, numpy's default); NaN of nothing, or if a draw is NaN.
+/// type 7, numpy's default); NaN for an empty slice, or if a draw is NaN.
 pub fn quantile(x: &[f64], p: f64) -> f64 {
     if x.iter().any(|v| v.is_nan()) {
         return f64::NAN;
@@ -11,7 +11,7 @@ pub fn quantile(x: &[f64], p: f64) -> f64 {
     quantile_sorted(&sorted, p)
 }
 
-/// As [`quantile`], of draws already in ascending order.
+/// As [`quantile`], for draws already in ascending order.
 pub fn quantile_sorted(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let at = last as f64 * p.clamp(0.0, 1.0);
@@ -19,13 +19,13 @@ pub fn quantile_sorted(sorted: &[f64], p: f64) -> f64 {
     let (lo, hi) = (sorted[below], sorted[(below + 1).min(last)]);
     let share = at - below as f64;
     // Between equal values there is nothing to interpolate, and rounding must not lead
-    // outside.
+    // outside of them.
     if lo == hi || share == 0.0 {
         lo
     } else if (hi - lo).is_finite() {
         lo + share * (hi - lo)
     } else {
-        // Too far apart for a difference, or infinitely far.
+        // The difference overflows, or is infinite.
         (1.0 - share) * lo + share * hi
     }
 }

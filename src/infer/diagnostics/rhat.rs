@@ -4,9 +4,9 @@ use super::chains::{Chains, mean, variance};
 use super::normal_scores::normal_scores;
 use super::quantile::quantile;
 
-/// Rank-normalised split R-hat: the larger one of bulk and folded R-hat (Vehtari et al.
-/// 2021, section 4.1). Near 1 when the chains agree; above 1.01 they do not yet. NaN for
-/// a single chain, or if it cannot be said (see the module).
+/// Rank-normalised split R-hat: the larger of bulk and folded R-hat (Vehtari et al. 2021,
+/// section 4.1). Near 1 if the chains agree; above 1.01 they have not converged. NaN for
+/// a single chain, or if it is undefined (see the module).
 pub fn r_hat<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     Chains::new(chains).map_or(f64::NAN, |c| rank_normalised(&c))
 }
@@ -18,12 +18,12 @@ pub(super) fn rank_normalised(chains: &Chains) -> f64 {
     let median = quantile(chains.values(), 0.5);
     let bulk = plain(&normal_scores(&chains.split()));
     let folded = plain(&normal_scores(&chains.map(|x| (x - median).abs()).split()));
-    // Of folded draws that do not vary nothing is said; the bulk's word stands.
+    // If the folded draws do not vary, their R-hat is NaN and the bulk's is used.
     if folded > bulk { folded } else { bulk }
 }
 
-/// √(marginal variance / within-chain variance) (Gelman & Rubin 1992); NaN of chains that
-/// are all constant, whose variances are rounding errors.
+/// √(marginal variance / within-chain variance) (Gelman & Rubin 1992); NaN if all chains
+/// are constant, as their variances are rounding errors.
 fn plain(chains: &Chains) -> f64 {
     if chains.iter().all(|c| c.windows(2).all(|w| w[0] == w[1])) {
         return f64::NAN;

@@ -1,12 +1,12 @@
-//! Everything about one quantity in one struct.
+//! All diagnostics of one quantity in one struct.
 
 use super::chains::{Chains, mean, unit, variance};
 use super::quantile::quantile_sorted;
 use super::{ess, mcse, rhat};
 use serde::{Deserialize, Serialize};
 
-/// What the chains say of one scalar quantity. What cannot be said is NaN; JSON has
-/// `null` for it.
+/// The summary of one scalar quantity over the chains. Undefined entries are NaN, and
+/// `null` in JSON.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// The mean of all draws.
@@ -42,8 +42,8 @@ pub struct Summary {
 }
 
 /// Summarises one scalar quantity, `chains[chain][draw]`. Moments and quantiles need no
-/// minimum of draws and take chains of different lengths in full; a NaN draw makes all of
-/// them NaN.
+/// minimum number of draws and use chains of different lengths in full; a NaN draw makes
+/// all of them NaN.
 pub fn summary<C: AsRef<[f64]>>(chains: &[C]) -> Summary {
     let mut all: Vec<f64> = chains.iter().flat_map(|c| c.as_ref()).copied().collect();
     let nan = all.iter().any(|x| x.is_nan());
@@ -68,7 +68,7 @@ pub fn summary<C: AsRef<[f64]>>(chains: &[C]) -> Summary {
     }
 }
 
-/// Numbers that may be NaN or infinite, as `null`, for JSON has no such numbers.
+/// Serialises numbers that are NaN or infinite as `null`, since JSON has no such numbers.
 mod nullable {
     use serde::{Deserialize, Deserializer, Serializer};
 

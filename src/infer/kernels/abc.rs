@@ -1,12 +1,12 @@
 //! `abc(move, eps)`: approximate Bayesian computation by Markov chain Monte Carlo
 //! (Marjoram et al. 2003).
 //!
-//! The kernel inside proposes as if nothing were observed; then everything observed is
-//! drawn anew from its own distribution, and the proposal stays if what was drawn is near
-//! enough to what is observed. The densities of the observations play no part. The chain
-//! draws from the prior given that simulated data come within `eps`: the posterior, as
-//! `eps` goes to 0. The distance is the root mean square of the differences between the
-//! observed numbers and the drawn ones.
+//! The inner kernel proposes as if nothing were observed. Then all observations are
+//! redrawn from their own distributions, and the proposal is accepted if the simulated
+//! data are close enough to the observed data. The densities of the observations play no
+//! part. The chain draws from the prior given that simulated data come within `eps` of
+//! the observed data: the posterior, as `eps` goes to 0. The distance is the root mean
+//! square of the differences between the observed and the simulated numbers.
 
 use crate::infer::kernel::{Kernel, Outcome, StepContext};
 use crate::infer::selection::fail;
@@ -17,31 +17,32 @@ use crate::syntax::span::Span;
 use crate::trace::{Draws, Trace, TraceResult};
 use std::sync::Arc;
 
-/// Likelihood-free Metropolis-Hastings around a kernel that leaves the prior invariant
-/// and is reversible.
+/// Likelihood-free Metropolis-Hastings with a reversible inner kernel that leaves the
+/// prior invariant.
 pub struct Abc {
     kernel: Box<dyn Kernel>,
     eps: f64,
-    /// The distance at which the present state was accepted: above `eps` until a state
-    /// comes near enough.
+    /// The distance at which the present state was accepted. It is above `eps` until a
+    /// state comes close enough.
     distance: f64,
-    /// What it is a distance from.
+    /// The data that it is a distance from.
     observed: Option<Arc<Observed>>,
-    /// Whether the distance is a checkpoint's, and from what is observed in the next
-    /// step.
+    /// Whether the distance comes from a checkpoint; it then refers to the data that the
+    /// trace observes at the next step.
     loaded: bool,
     span: Span,
 }
 
 impl Abc {
-    /// A kernel and the largest distance. `span` is where errors point.
+    /// `kernel` is the inner kernel, `eps` the largest distance; `span` is the position
+    /// that errors refer to.
     pub fn new(kernel: Box<dyn Kernel>, eps: f64, span: Span) -> Self {
         Abc { kernel, eps, distance: f64::INFINITY, observed: None, loaded: false, span }
     }
 }
 
-/// One step of the kernel inside under the prior, kept if data drawn in the new state are
-/// within `eps`; `distance` is that of the present state.
+/// Makes one step of the inner kernel under the prior, and keeps it if data simulated in
+/// the new state are within `eps`; `distance` is that of the present state.
 pub(super) fn step_within(
     kernel: &mut dyn Kernel,
     trace: &mut Trace,
@@ -67,7 +68,7 @@ pub(super) fn step_within(
     Ok(Outcome { accepted: u32::from(near), proposals: 1, ..inner })
 }
 
-/// How far data drawn in this state are from those observed.
+/// Returns the distance between data simulated in this state and the observed data.
 pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f64> {
     let replicate = trace.replicate(draws)?;
     if let Some((address, what)) = replicate.silent.first() {
@@ -98,7 +99,7 @@ pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f
     Ok(if distance.is_nan() { f64::INFINITY } else { distance })
 }
 
-/// The numbers in a value; false if there is anything else in it.
+/// Collects the numbers in a value; false if it contains anything else.
 fn numbers(v: &Value, out: &mut Vec<f64>) -> bool {
     match v {
         Value::Num(x) => out.push(*x),
@@ -132,7 +133,7 @@ impl Kernel for Abc {
         }
         let same = self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements()));
         if !same {
-            // Other data than the distance is from.
+            // The distance refers to other data.
             trace.rollback();
             self.distance = match self.observed {
                 Some(_) => simulate(trace, at.within(3).draws(0), self.span)?,
@@ -140,7 +141,7 @@ impl Kernel for Abc {
             };
             self.observed = Some(Arc::clone(trace.replacements()));
         }
-        // Until a state is near enough, any that is nearer will do.
+        // Until a state is close enough, any closer one is accepted.
         let eps = if self.distance > self.eps { self.distance } else { self.eps };
         step_within(&mut *self.kernel, trace, at, (&mut self.distance, eps), self.span)
     }

@@ -1,13 +1,14 @@
 //! `abc(move, eps, particles)`: approximate Bayesian computation by sequential Monte
-//! Carlo with tolerances that fall (Del Moral, Doucet & Jasra 2012), as a proposal.
+//! Carlo with decreasing tolerances (Del Moral, Doucet & Jasra 2012), as a proposal.
 //!
-//! Particles drawn from the prior, each with data drawn from it, are kept while those
-//! data are within the tolerance; copies fill the places of the others, and all move by
-//! the kernel inside as `abc` does. The product of the shares that were kept estimates
-//! without bias how probable data within `eps` are, so accepting one of the last
-//! particles with the ratio of the estimates leaves the prior given such data invariant
-//! for any number of particles (see `particles.rs`). The tolerances are found in the
-//! first run, so that half of the particles are kept at each, and stay as they are.
+//! Particles drawn from the prior, each with simulated data, are kept if those data are
+//! within the tolerance; copies of them replace the others, and all are moved by the
+//! inner kernel as in `abc`. The product of the fractions kept is an unbiased estimate of
+//! the probability that simulated data come within `eps`. Accepting one of the final
+//! particles with the ratio of these estimates therefore leaves the prior given such data
+//! invariant for any number of particles (see `particles.rs`). The tolerances are chosen
+//! in the first run, such that half of the particles are kept at each, and are fixed from
+//! then on.
 
 use super::abc::{simulate, step_within};
 use super::particles::{Independent, Prior, Way};
@@ -23,21 +24,22 @@ const MOST: usize = 1000;
 /// Particle independent Metropolis-Hastings without likelihoods.
 pub type AbcSmc = Independent<Closer>;
 
-/// The distance that data may have falls to `eps`.
+/// Lowers the largest distance of simulated data to `eps`.
 pub struct Closer {
     kernel: Box<dyn Kernel>,
     eps: f64,
     particles: usize,
-    /// How often each particle moves at each tolerance.
+    /// The number of moves of each particle at each tolerance.
     moves: u32,
     span: Span,
-    /// Falling, the last one `eps`; found in the first run.
+    /// Decreasing tolerances, of which the last is `eps`; chosen in the first run.
     tolerances: Vec<f64>,
 }
 
 impl AbcSmc {
-    /// A kernel, the largest distance, the numbers of particles and of their moves at
-    /// each tolerance; frozen choices are not drawn anew. `span` is where errors point.
+    /// The inner kernel, the largest distance, and the numbers of particles and of their
+    /// moves at each tolerance; frozen choices are not redrawn. `span` is the position
+    /// that errors refer to.
     pub fn new(
         kernel: Box<dyn Kernel>,
         eps: f64,
@@ -116,8 +118,8 @@ impl Way for Closer {
     }
 }
 
-/// The tolerance that keeps half of the particles, or as many as there are below the
-/// present one.
+/// The tolerance that keeps half of the particles, or else the largest one below the
+/// present tolerance among that half.
 fn next_tolerance(distances: &[f64], present: f64) -> f64 {
     let mut sorted = distances.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -133,8 +135,8 @@ mod tests {
     fn tolerances_keep_half_and_fall() {
         assert_eq!(next_tolerance(&[3.0, 1.0, 4.0, 2.0], f64::INFINITY), 2.0);
         assert_eq!(next_tolerance(&[2.0, 1.0, 2.0, 2.0], 2.0), 1.0);
-        // Nothing is nearer, or nothing is comparable: what remains is the last
-        // tolerance.
+        // If no particle is closer, or none is comparable, only the final tolerance
+        // remains.
         assert_eq!(next_tolerance(&[2.0; 4], 2.0), 0.0);
         assert_eq!(next_tolerance(&[f64::INFINITY; 4], f64::INFINITY), 0.0);
     }

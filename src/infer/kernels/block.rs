@@ -1,20 +1,20 @@
-//! Blocked Metropolis-Hastings from the prior: q_block of Kulkarni et al. 2014, section 3.
+//! Blocked Metropolis-Hastings from the prior: q_block (Kulkarni et al. 2014, section 3).
 
 use crate::infer::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
 use crate::trace::{Trace, TraceResult};
 
-/// `block(sel)`: draws all selected choices anew from their priors, together. Choices
-/// that appear or vanish in consequence pay for themselves, so the selection may change
-/// with the state.
+/// `block(sel)`: proposes all selected choices jointly from their priors. Choices that
+/// appear or vanish as a result are accounted for in the acceptance ratio, so the
+/// selection may change with the state.
 #[derive(Clone, Debug)]
 pub struct Block {
     scope: Registered,
 }
 
 impl Block {
-    /// The kernel for these choices.
+    /// A kernel for these choices.
     pub fn new(scope: SiteSelection) -> Self {
         Block { scope: Registered::new(scope) }
     }

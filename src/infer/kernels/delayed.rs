@@ -1,13 +1,13 @@
 //! `delayed(move, at)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate
 //! transitions (Liu 2001, section 9.4.3).
 //!
-//! Beside the chain's trace there is a twin, in which the coarse surrogates of the
-//! observations at `at` stand in their place. The kernel inside moves the twin, its own
-//! test and proposal ratio included; only what it accepts goes to the chain's trace,
-//! where the ratio (fine change / coarse change) decides. Any kernel that is reversible
-//! under the surrogate leaves the posterior invariant in this way, whatever the surrogate
-//! says, as long as it is possible wherever the observation is. The observation itself is
-//! evaluated for what the first stage lets through, and for nothing else.
+//! Beside the chain's trace there is a second one, in which the coarse surrogates of the
+//! observations at `at` replace them. The inner kernel moves the surrogate trace, with
+//! its own acceptance test; only moves that it accepts are proposed to the chain's trace,
+//! where the ratio (fine change / coarse change) decides. With any inner kernel that is
+//! reversible under the surrogate this leaves the posterior invariant, however poor the
+//! surrogate is, as long as it has positive density wherever the observation has. The
+//! observation itself is evaluated only for moves that pass the first stage.
 
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
 use crate::infer::selection::fail;
@@ -16,10 +16,10 @@ use crate::lang::error::RunError;
 use crate::syntax::span::Span;
 use crate::trace::{Selector, Trace, TraceResult};
 
-/// Two-stage acceptance around a reversible kernel.
+/// Two-stage acceptance with a reversible inner kernel.
 pub struct Delayed {
     kernel: Box<dyn Kernel>,
-    /// The observations whose surrogates decide first.
+    /// The observations whose surrogates are used in the first stage.
     observations: Selector,
     span: Span,
     /// The trace under the surrogates.
@@ -27,12 +27,13 @@ pub struct Delayed {
 }
 
 impl Delayed {
-    /// A kernel, and the observations that have surrogates. `span` is where errors point.
+    /// `observations` are those that have surrogates; `span` is the position that errors
+    /// refer to.
     pub fn new(kernel: Box<dyn Kernel>, observations: Selector, span: Span) -> Self {
         Delayed { kernel, observations, span, surrogate: None }
     }
 
-    /// Brings the twin to the present state.
+    /// Moves the surrogate trace to the present state.
     fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Trace> {
         trace.rollback();
         let mut surrogate = match self.surrogate.take() {
@@ -64,7 +65,7 @@ impl Delayed {
     }
 }
 
-/// The log prior and the log likelihood at a power.
+/// The log prior plus the log likelihood raised to a power.
 fn tempered(trace: &Trace, power: f64) -> f64 {
     let likelihood = if power == 0.0 { 0.0 } else { power * trace.log_likelihood() };
     trace.log_prior() + likelihood
@@ -84,7 +85,7 @@ impl Kernel for Delayed {
     }
 
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
-        // What goes wrong shows in the step.
+        // Errors are reported by the step.
         self.follow(trace).ok()?;
         self.kernel.sweep(self.surrogate.as_mut()?)
     }
@@ -109,8 +110,8 @@ impl Kernel for Delayed {
                 } else {
                     w.log_joint - (1.0 - at.power) * w.log_likelihood
                 };
-                // Choices that only the observation asks for stay as they are: nothing
-                // here would pay for others.
+                // Choices that only the observation depends on must not change: the ratio
+                // does not account for new ones.
                 let same = trace.lacks(surrogate).is_none()
                     && trace.beyond(surrogate) == beyond
                     && !trace.takes_away(&beyond);

@@ -1,10 +1,10 @@
-//! Random walks in the unconstrained space, with scales learnt in warm-up.
+//! Random walks in the unconstrained space, with scales adapted in warm-up.
 //!
-//! A continuous choice moves by a Gaussian step of its image under the transform of its
-//! support; the step is taken in the coordinates of the state, the new value is read in
-//! those of the proposed state, and the log Jacobians of both are in the ratio. That is
-//! right also for a support that depends on another choice of the block. A finite
-//! discrete choice moves to another of its values, an unbounded integer by a few units.
+//! A continuous choice moves by a Gaussian step in the unconstrained space. The step is
+//! taken in the coordinates of the present state, the new value is read in those of the
+//! proposed state, and the ratio includes the log Jacobians of both. This is correct also
+//! for a support that depends on another choice of the block. A finite discrete choice
+//! moves to another of its values, an unbounded integer by a few units.
 
 use super::shape::{MOST, Shape};
 use crate::dist::{Datum, Support};
@@ -18,11 +18,11 @@ use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 
-/// The acceptance rates aimed at in one dimension and in many (Roberts & Rosenthal 2001).
+/// The target acceptance rates in one dimension and in many (Roberts & Rosenthal 2001).
 const ONE_D: f64 = 0.44;
 const MANY_D: f64 = 0.234;
 
-/// The logarithm of the largest scale that is learnt, and less that of the smallest.
+/// The bound on the absolute logarithm of adapted scales.
 const FARTHEST: f64 = 350.0;
 
 /// `drift(sel, scale)`: a random walk in the unconstrained space.
@@ -31,9 +31,10 @@ pub struct Drift {
     scope: Registered,
     initial: f64,
     adaptive: bool,
-    /// By address when one choice moves at a time; under 0 when all move together.
+    /// By address if one choice moves at a time; under 0 if all move together.
     scales: FxHashMap<u64, Scale>,
-    /// By address: the spread of each choice in the unconstrained space, for joint moves.
+    /// By address: the standard deviation of each choice in the unconstrained space, for
+    /// joint moves.
     spreads: FxHashMap<u64, Spread>,
     /// By the hash of their addresses: the shape of choices that move together.
     shapes: FxHashMap<u64, Shape>,
@@ -77,19 +78,19 @@ impl Spread {
 
 /// The part of the proposal ratio that is known before the update.
 struct Move {
-    /// None for a choice that has only one value.
+    /// `None` for a choice that has only one value.
     change: Option<Change>,
-    /// The log density of the move by itself: less the log number of values it could have
-    /// gone to, or the log Jacobian at the old point.
+    /// The log density of the move by itself: minus the log of the number of values it
+    /// could have moved to, or the log Jacobian at the old point.
     old_term: f64,
-    /// For a choice of finitely many values: the one it had.
+    /// The old value of a choice with finitely many values.
     finite: Option<Datum>,
     dimensions: usize,
 }
 
 impl Move {
-    /// The log density of the move back, without what [`crate::trace::Weight`] has;
-    /// `None` if there is no way back.
+    /// The log density of the reverse move, without the terms of
+    /// [`crate::trace::Weight`]; `None` if the move cannot be reversed.
     fn back(&self, trace: &Trace, t: Target) -> Option<f64> {
         let values = trace.dist(t)?.stored_support().finite_values();
         match (&self.finite, values) {
@@ -104,7 +105,7 @@ impl Move {
 }
 
 impl Drift {
-    /// The kernel for these choices. Without a scale it is learnt in warm-up.
+    /// A kernel for these choices. Without a scale, one is adapted in warm-up.
     pub fn new(scope: SiteSelection, scale: Option<f64>) -> Self {
         Drift {
             scope: Registered::new(scope),
@@ -116,8 +117,8 @@ impl Drift {
         }
     }
 
-    /// A move of a choice that is at `free` in the unconstrained space, along `step`
-    /// where that is given.
+    /// Proposes a move of a choice that is at `free` in the unconstrained space, along
+    /// `step` if that is given.
     fn propose_one(
         trace: &Trace,
         t: Target,
@@ -139,9 +140,9 @@ impl Drift {
                 dimensions,
             });
         }
-        // Now and then a much longer or shorter step: chains leave narrow places and
-        // settle in wide ones. The length does not depend on the state, so the proposal
-        // stays symmetric.
+        // The scale is itself random, with occasional much longer or shorter steps, so
+        // that chains leave narrow modes and settle in wide ones. It does not depend on
+        // the state, so the proposal remains symmetric.
         let scale = scale * libm::exp(rng.standard_normal());
         for v in &mut y {
             *v += scale * rng.standard_normal();
@@ -160,7 +161,8 @@ impl Drift {
             .entry(key)
             .or_insert_with(|| Scale { log: libm::log(self.initial), steps: 0.0 });
         s.steps += 1.0;
-        // Not below a twentieth: an annealed warm-up moves the target all the time.
+        // The gain is at least a twentieth, since the target changes throughout an
+        // annealed warm-up.
         let gain = libm::pow(s.steps, -0.6).max(0.05);
         s.log += gain * (f64::from(u8::from(accepted)) - aim) * 2.0;
         s.log = s.log.clamp(-FARTHEST, FARTHEST);
@@ -232,9 +234,9 @@ impl Kernel for Drift {
         let shape = joint.then(|| shape_key(trace, &targets, &frees));
         let dimension: usize = frees.iter().flatten().map(|(y, _)| y.len()).sum();
         let along = shape.and_then(|k| self.shapes.get(&k)).and_then(|s| s.step(&mut rng));
-        // A shape of another size can only be one that was read.
+        // A shape of another size can only come from a checkpoint.
         let along = along.filter(|a| a.len() == dimension);
-        // Of uneven length, independent of the state.
+        // A random length, independent of the state.
         let length = if along.is_some() { libm::exp(0.5 * rng.standard_normal()) } else { 1.0 };
         for (t, free) in targets.iter().zip(frees) {
             let size = free.as_ref().map_or(0, |(y, _)| y.len());
@@ -263,8 +265,8 @@ impl Kernel for Drift {
             Some(w) => {
                 let mut ratio =
                     at.tempered(&w) + w.log_jacobian + ways - self.scope.reverse_selection(trace);
-                // A choice that vanishes goes whatever its move was, and comes back from
-                // its prior.
+                // A choice that vanishes does so whatever its move was, and reappears
+                // from its prior.
                 for (t, m) in moves.iter().filter(|(t, _)| !trace.was_removed(*t)) {
                     ratio += m.back(trace, *t).unwrap_or(f64::NEG_INFINITY) - m.old_term;
                 }
@@ -282,7 +284,7 @@ impl Kernel for Drift {
     }
 }
 
-/// What tells the shapes of different sets of choices apart.
+/// The key of the shape of a set of choices.
 fn shape_key(trace: &Trace, targets: &[Target], frees: &[Option<(Vec<f64>, f64)>]) -> u64 {
     let one = |h, (t, free): (&Target, &Option<(Vec<f64>, f64)>)| {
         mix(mix(h, trace.address_hash(*t)), free.as_ref().map_or(0, |(y, _)| y.len() as u64))
@@ -291,8 +293,8 @@ fn shape_key(trace: &Trace, targets: &[Target], frees: &[Option<(Vec<f64>, f64)>
 }
 
 impl Drift {
-    /// Learns the spreads and the shape of what moves together, from where the chain is
-    /// now.
+    /// Adapts the standard deviations and the shape of the choices that move together to
+    /// the present state.
     fn learn(&mut self, trace: &mut Trace, at: &StepContext) {
         let selection = self.scope.selection(trace);
         let targets = trace.targets(selection);

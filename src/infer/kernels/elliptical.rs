@@ -1,10 +1,10 @@
 //! Elliptical slice sampling (Murray, Adams & MacKay 2010, figure 2) of choices with
 //! Gaussian priors.
 //!
-//! It works on the white noise behind the choices, so that any mean and covariance will
-//! do, also those that depend on choices of the same block. Points at which choices
-//! appear or vanish count as outside the slice: the kernel moves within the present
-//! structure, and leaves the posterior given that structure invariant.
+//! The kernel works on the white noise of the choices, so that any mean and covariance
+//! are supported, also those that depend on choices of the same block. Points at which
+//! choices appear or vanish count as outside the slice: the kernel moves within the
+//! present structure, and leaves the posterior given that structure invariant.
 
 use crate::dist::Datum;
 use crate::infer::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, recoverable};
@@ -13,7 +13,8 @@ use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use std::f64::consts::TAU;
 
-/// After this many shrinkings the bracket is narrower than the numbers can tell.
+/// After this many shrinkage steps the bracket is narrower than the floating-point
+/// resolution.
 const MAX_SHRINKS: u32 = 200;
 
 /// `elliptical(sel)`: slice sampling along an ellipse through the state and a draw from
@@ -24,13 +25,13 @@ pub struct Elliptical {
 }
 
 impl Elliptical {
-    /// The kernel for these choices.
+    /// A kernel for these choices.
     pub fn new(scope: SiteSelection) -> Self {
         Elliptical { scope: Registered::new(scope) }
     }
 }
 
-/// The white noise behind a choice.
+/// The white noise that determines a choice.
 fn noise(trace: &Trace, t: Target) -> Option<Vec<f64>> {
     let dist = trace.dist(t)?;
     let stored = trace.stored(t)?;

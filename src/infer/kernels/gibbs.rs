@@ -1,10 +1,10 @@
 //! Gibbs updates of finite discrete choices by enumeration, in log space.
 //!
-//! While no value makes other choices appear or vanish, the new value comes from its
-//! exact conditional. Otherwise each value's weight is that of the one draw of what
-//! appears with it, and the move is a multiple-try Metropolis step (Liu, Liang & Wong 2000)
-//! with one try a value: the weights around the new state, with fresh draws for all
-//! values but the old one, make the ratio.
+//! If no value makes other choices appear or vanish, the new value comes from its exact
+//! conditional. Otherwise the weight of a value is that of a single draw of the choices
+//! that appear with it, and the move is a multiple-try Metropolis step as in Liu, Liang &
+//! Wong (2000), with one try per value: the acceptance ratio uses the weights around the
+//! new state, with fresh draws for all values but the old one.
 
 use crate::dist::{Datum, Dist};
 use crate::infer::kernel::{
@@ -14,19 +14,19 @@ use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use crate::trace::{Change, Enumeration, Target, Trace, TraceResult};
 
-/// `gibbs(sel)`: draws one choice from its distribution given all else.
+/// `gibbs(sel)`: draws one choice from its distribution given all others.
 #[derive(Clone, Debug)]
 pub struct Gibbs {
     scope: Registered,
-    /// The values of the choice, their log weights, those relative to the largest: kept
-    /// from step to step so that nothing is allocated.
+    /// The values of the choice, their log weights, and the weights relative to the
+    /// largest; kept between steps to avoid allocations.
     values: Vec<Datum>,
     log: Vec<f64>,
     weights: Vec<f64>,
     enumeration: Enumeration,
 }
 
-/// What weighing the values of a choice showed.
+/// Properties of the weighed values of a choice.
 #[derive(Clone, Copy, Debug, Default)]
 struct Weighed {
     /// Whether any of them changes the set of choices.
@@ -37,7 +37,7 @@ struct Weighed {
 }
 
 impl Gibbs {
-    /// The kernel for one of these choices at a time.
+    /// A kernel for one of these choices at a time.
     pub fn new(scope: SiteSelection) -> Self {
         let scope = Registered::new(scope.single());
         Gibbs {
@@ -49,8 +49,8 @@ impl Gibbs {
         }
     }
 
-    /// The log weights of all values relative to the state with value `old`, without
-    /// updates; `None` if it takes those.
+    /// Computes the log weights of all values, relative to the state with value `old`,
+    /// without updating the trace; `None` if that needs updates.
     fn weigh_beside(
         &mut self,
         trace: &Trace,
@@ -76,8 +76,9 @@ impl Gibbs {
         Ok(told.then_some(weighed))
     }
 
-    /// The same by updates. `ways` is what picking the choice in that state costs, and
-    /// the lane of value `i` is `first_substream + i`.
+    /// As [`Gibbs::weigh_beside`], by updates. `ways` is minus the log probability of
+    /// picking the choice in the present state; value `i` uses the substream
+    /// `first_substream + i`.
     fn weigh(
         &mut self,
         trace: &mut Trace,
@@ -151,7 +152,7 @@ impl Kernel for Gibbs {
         }
         if forward.pending != Some(chosen) {
             let change = [(target, Change::Set(self.values[chosen].clone()))];
-            // The same lane: the same draws as when it was weighed.
+            // The same substream gives the same draws as when the value was weighed.
             if recoverable(trace.propose(&change, at.draws(chosen as u64)))?.is_none() {
                 return Ok(outcome);
             }
@@ -167,8 +168,8 @@ impl Kernel for Gibbs {
         let ways = self.scope.reverse_selection(trace);
         self.weigh(trace, at, target, chosen, (ways, self.values.len() as u64))?;
         trace.rollback();
-        // The old state itself stands for the old value: its weight back is minus its
-        // weight forth.
+        // The old state itself represents the old value: its weight relative to the new
+        // state is minus the weight of the forward move.
         self.log[old] = -forth;
         if accepts(log_forward - forth - log_sum_exp(&self.log), &mut rng) {
             outcome.accepted = 1;
@@ -181,8 +182,8 @@ impl Kernel for Gibbs {
     }
 }
 
-/// An index with probability proportional to exp(log[i]), of which at least one is not
-/// zero.
+/// Draws an index with probability proportional to exp(log[i]), at least one of which is
+/// not zero.
 fn sample_log(log: &[f64], weights: &mut Vec<f64>, rng: &mut Stream) -> usize {
     let max = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     weights.clear();
@@ -197,8 +198,8 @@ mod tests {
     use crate::model::Model;
     use crate::trace::{ChoiceKind, Selector};
 
-    /// Where all values lead to the same choices, and where one of them has a choice of
-    /// its own.
+    /// One program whose choices do not depend on the value, and one in which one of the
+    /// values has an additional choice.
     #[test]
     fn a_step_is_one_proposal_accepted_where_the_value_changes() {
         let texts = [

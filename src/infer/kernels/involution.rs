@@ -1,20 +1,21 @@
-//! Kernels of a program that map choices to others by a rule: involutive
+//! Kernels of a program that map choices deterministically: involutive
 //! Metropolis-Hastings (Tierney 1998; Neklyudov et al. 2020; Cusumano-Towner, Lew &
 //! Mansinghka 2020).
 //!
-//! The body of the kernel draws auxiliary variables (`propose u ~ d;`) and gives new
-//! values of choices and auxiliary variables (`propose @x = e; propose u = e;`; an
-//! auxiliary variable without one stays). The map must be its own inverse: at each move
-//! it is played again where it led, and has to lead back. The log ratio has the log
-//! absolute determinant of its Jacobian over the numbers among choices and auxiliary
-//! variables, found by differences of fourth order. So that these see everything, the
-//! body reads choices by `value(@x)` alone.
+//! The body of the kernel draws auxiliary variables (`propose u ~ d;`) and assigns new
+//! values to choices and auxiliary variables (`propose @x = e; propose u = e;`; an
+//! auxiliary variable without an assignment keeps its value). The map must be its own
+//! inverse: at each move it is evaluated again at its result, and must return to the
+//! original values. The log ratio includes the log absolute determinant of its Jacobian
+//! over the numbers among choices and auxiliary variables, computed by fourth-order
+//! finite differences. For these to capture all dependencies, the body must read choices
+//! by `value(@x)` only.
 //!
-//! Beside the map, choices may be proposed by distributions (`propose @y ~ d`), which
-//! read the state before: as if the new value were an auxiliary variable that changes
-//! places with the old one, which has a Jacobian of one. The density of the way back is
-//! that of the old value in the play on the new state. The map must not read what is
-//! proposed beside it, or does not return.
+//! Beside the map, choices may be proposed from distributions (`propose @y ~ d`), which
+//! read the state before the move: this is equivalent to an auxiliary variable that is
+//! swapped with the old value, with a Jacobian of one. The density of the reverse move is
+//! that of the old value when the body is executed in the new state. The map must not
+//! read choices that are proposed beside it, or it is not an involution.
 
 use super::program_kernel::{
     Image, Played, ProgramKernel, Source, log_density, log_volume, sampled, values,
@@ -27,10 +28,11 @@ use crate::lang::value::Value;
 use crate::trace::{Address, Change, Target, Trace, TraceResult};
 use nalgebra::DMatrix;
 
-/// How far from where it began the map may lead back to, relative to the numbers.
+/// The largest deviation from the original values that the map may return with, relative
+/// to the values.
 const TOLERANCE: f64 = 1e-6;
 
-/// A choice or an auxiliary variable, with its value and what that becomes.
+/// A choice or an auxiliary variable, with its value and its image.
 struct Mapped {
     choice: Option<(Address, Target)>,
     old: Value,
@@ -38,7 +40,8 @@ struct Mapped {
     is_continuous: bool,
 }
 
-/// What a play maps: choices in the order of the body, then all auxiliary variables.
+/// What an execution maps: choices in the order of the body, then all auxiliary
+/// variables.
 fn mapped(played: &Played, trace: &Trace) -> Vec<Mapped> {
     let mut all = Vec::new();
     for (image, new) in &played.images {
@@ -61,7 +64,7 @@ fn mapped(played: &Played, trace: &Trace) -> Vec<Mapped> {
     all
 }
 
-/// The numbers in a value, one after the other.
+/// The numbers in a value, concatenated.
 fn numbers(v: &Value) -> Vec<f64> {
     match v {
         Value::Num(x) => vec![*x],
@@ -81,7 +84,7 @@ fn with_numbers(v: &Value, numbers: &mut impl Iterator<Item = f64>) -> Value {
     }
 }
 
-/// Whether two values are the same but for rounding.
+/// Whether two values are equal up to rounding.
 fn near(a: &Value, b: &Value) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE * (1.0 + a.abs().max(b.abs()));
     match (a, b) {
@@ -94,7 +97,7 @@ fn near(a: &Value, b: &Value) -> bool {
 }
 
 impl ProgramKernel {
-    /// One step by a map.
+    /// Makes one step by a map.
     pub(super) fn involve(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         trace.rollback();
         let mut rng = at.stream();
@@ -144,8 +147,8 @@ impl ProgramKernel {
         let log_forth = forth.log_density_of(&drawn) + log_density(&forth.all, &new);
         let ratio = at.tempered(&w) + log_back - log_forth + log_jacobian + volume
             - log_volume(trace, &forth.all);
-        // A place that the auxiliary variables cannot lead back from is refused, whatever
-        // the map does there.
+        // If the reverse density is zero, the move is rejected whatever the map does
+        // there.
         let wrong = wrong.filter(|_| log_back > f64::NEG_INFINITY);
         if wrong.is_none() && back.is_ok() && accepts(ratio, &mut rng) {
             return Ok(Outcome::one(true));
@@ -158,7 +161,7 @@ impl ProgramKernel {
         }
     }
 
-    /// What is wrong if the map does not lead back to where it began.
+    /// The error if the map does not return to the original values.
     fn does_not_return(&self, forth: &[Mapped], back: &[Mapped]) -> Option<Box<RunError>> {
         let same = |(f, b): (&Mapped, &Mapped)| {
             f.choice.as_ref().map(|c| c.1) == b.choice.as_ref().map(|c| c.1)
@@ -240,7 +243,7 @@ impl ProgramKernel {
     }
 }
 
-/// Whether there is something in a value that is not a number.
+/// Whether a value contains a NaN.
 fn has_nan(x: &Datum) -> bool {
     match x {
         Datum::Num(x) => x.is_nan(),

@@ -2,23 +2,23 @@
 //! Metropolis-Hastings from a kernel density estimate over the latents of K scenes whose
 //! pictures look like the observed one.
 //!
-//! The proposal is a mixture, drawn for all selected choices at once: with a tenth the
-//! prior, else one of the K scenes and one of two widths. A continuous choice is then
-//! normal about the scene's value in the unconstrained space, a discrete one is the
-//! scene's or (one time in ten) drawn from its prior; one that the scene has not, or has
-//! in another form, is drawn from its prior. The density of the whole mixture, at the
-//! proposed and at the present state, is in the ratio, so the posterior is right whatever
-//! the scenes are.
+//! The proposal is a mixture, drawn for all selected choices jointly: with probability a
+//! tenth the prior, otherwise one of the K scenes with one of two widths. A continuous
+//! choice is then normal about the scene's value in the unconstrained space; a discrete
+//! one is the scene's value or, with probability a tenth, drawn from its prior. A choice
+//! that the scene lacks or has in another form is drawn from its prior. The acceptance
+//! ratio has the density of the whole mixture, at the proposed and at the present state,
+//! so the posterior is correct whatever the scenes are.
 //!
-//! Structure: choices that appear are drawn from the prior and pay for themselves, as do
-//! those that vanish, whatever was proposed for them. Choices that stay are selected
-//! before and after alike, since that is decided when they appear; so the mixture is over
-//! the same choices in both directions. If one of them changes its form (its number of
-//! coordinates, or from discrete to continuous), the proposal is rejected, in both
-//! directions alike.
+//! Structure: choices that appear are drawn from the prior and, like those that vanish,
+//! are accounted for in the acceptance ratio, whatever was proposed for them. Choices
+//! that persist are selected both before and after, since selection is decided when a
+//! choice appears; so the mixture is over the same choices in both directions. If one of
+//! them changes its form (its number of coordinates, or from discrete to continuous), the
+//! proposal is rejected, in either direction.
 //!
-//! Densities are kept relative to the prior's, which cancels what
-//! [`Weight::log_weight`](crate::trace::Weight) has of it.
+//! Densities are relative to the prior's, which cancels the prior terms of
+//! [`Weight::log_weight`](crate::trace::Weight).
 
 use crate::dist::{Datum, Support};
 use crate::infer::kernel::{
@@ -32,15 +32,17 @@ use rustc_hash::FxHashMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// The share of the prior in the mixture: with it the proposal reaches all the posterior
-/// does.
+/// The weight of the prior in the mixture, so that the proposal covers the support of the
+/// posterior.
 const PRIOR: f64 = 0.1;
-/// How often a discrete choice is drawn from its prior although the scene has a value.
+/// The probability that a discrete choice is drawn from its prior although the scene has
+/// a value.
 const REDRAWN: f64 = 0.1;
-/// Widths of the components, in units of the rule's: about the neighbours, and close to
-/// one.
+/// The widths of the components relative to the bandwidth: one for the region of the
+/// neighbours, one close to a single neighbour.
 const WIDTHS: [f64; 2] = [1.0, 0.25];
-/// The least bandwidth, in units of the coordinate's spread over scenes of all kinds.
+/// The smallest bandwidth, relative to the coordinate's standard deviation over scenes of
+/// all kinds.
 const FLOOR: f64 = 0.05;
 
 /// `knn(sel, bank, k)`: an independence proposal from the latents of the nearest
@@ -53,13 +55,14 @@ pub struct Knn {
 }
 
 impl Knn {
-    /// The kernel for these choices and neighbours. Without neighbours it is `block`.
+    /// A kernel for these choices and neighbours. Without neighbours it is equivalent to
+    /// `block`.
     pub fn new(scope: SiteSelection, neighbours: Arc<Neighbours>) -> Self {
         let bandwidths = bandwidths(&neighbours);
         Knn { scope: Registered::new(scope), neighbours, bandwidths }
     }
 
-    /// The components besides the prior: scenes, in each width.
+    /// The components other than the prior: each scene with each width.
     fn components(&self) -> impl Iterator<Item = Component<'_>> {
         let count = self.neighbours.entries.len();
         (0..count * WIDTHS.len()).map(|i| self.component(i))
@@ -69,7 +72,7 @@ impl Knn {
         Component { kernel: self, scene: i / WIDTHS.len(), width: WIDTHS[i % WIDTHS.len()] }
     }
 
-    /// The log density of the mixture at these places, less that of the prior.
+    /// The log density of the mixture at these values, minus that of the prior.
     fn log_density(&self, places: &[Place]) -> f64 {
         let prior = if places.iter().any(|p| p.improper) { f64::NEG_INFINITY } else { 0.0 };
         let count = self.neighbours.entries.len() * WIDTHS.len();
@@ -83,7 +86,7 @@ impl Knn {
         log_sum_exp(&terms)
     }
 
-    /// What happens to each choice, from a component picked at random.
+    /// Draws the change of each choice from a random component.
     fn draw(&self, places: &[Place], rng: &mut Stream) -> Vec<Change> {
         let count = self.neighbours.entries.len() * WIDTHS.len();
         if count == 0 || rng.uniform() < PRIOR {
@@ -95,7 +98,8 @@ impl Knn {
 }
 
 /// The bandwidth of each coordinate: Silverman's rule (1986, equation 3.28) over the
-/// neighbours, and at least a share of its spread over scenes of all kinds.
+/// neighbours, and at least a fraction of its standard deviation over scenes of all
+/// kinds.
 fn bandwidths(n: &Neighbours) -> FxHashMap<u64, Vec<f64>> {
     let rule = 1.06 * libm::pow(n.entries.len().max(1) as f64, -0.2);
     let local = n.local();
@@ -106,7 +110,7 @@ fn bandwidths(n: &Neighbours) -> FxHashMap<u64, Vec<f64>> {
     local.into_iter().map(|(h, sds)| (h, widths(h, sds))).collect()
 }
 
-/// A choice in a state: what the mixture asks about it.
+/// The properties of a choice in a state that the mixture depends on.
 struct Place {
     hash: u64,
     form: Form,
@@ -127,7 +131,7 @@ enum Form {
         jacobian: f64,
         angles: Vec<bool>,
     },
-    /// In part discrete: always drawn from the prior.
+    /// Partly discrete: always drawn from the prior.
     Mixed,
 }
 
@@ -153,7 +157,7 @@ impl Place {
         })
     }
 
-    /// Whether the mixture means the same by it in another state.
+    /// Whether the mixture is defined in the same way for this choice in another state.
     fn is_alike(&self, other: &Place) -> bool {
         match (&self.form, &other.form) {
             (Form::Discrete { .. }, Form::Discrete { .. }) | (Form::Mixed, Form::Mixed) => true,
@@ -163,7 +167,7 @@ impl Place {
     }
 }
 
-/// Whether every part of a support is continuous; notes which of its coordinates are
+/// Whether every part of a support is continuous; records which of its coordinates are
 /// angles.
 fn is_continuous(support: &Support, angles: &mut Vec<bool>) -> bool {
     match support {
@@ -182,7 +186,7 @@ fn is_continuous(support: &Support, angles: &mut Vec<bool>) -> bool {
     true
 }
 
-/// A scene and a width.
+/// A component of the mixture: a scene and a width.
 struct Component<'a> {
     kernel: &'a Knn,
     scene: usize,
@@ -222,8 +226,8 @@ impl Component<'_> {
         }
     }
 
-    /// The log density of what [`Component::draw`] draws, at the choice's value, less
-    /// that of the prior.
+    /// The log density of [`Component::draw`] at the choice's value, minus that of the
+    /// prior.
     fn log_density(&self, place: &Place) -> f64 {
         match (self.latent(place), &place.form) {
             (Some(Latent::Discrete(x)), Form::Discrete { value, .. }) => {
@@ -253,14 +257,14 @@ fn log_normal(x: f64, sd: f64) -> f64 {
     -0.5 * z * z - libm::log(sd) - 0.5 * libm::log(TAU)
 }
 
-/// The log density of a normal number taken round the circle.
+/// The log density of a normal distribution wrapped around the circle.
 fn log_wrapped(x: f64, sd: f64) -> f64 {
     if sd > 9.0 {
-        // Uniform to the last bit: what is left of its first harmonic is exp(-sd^2 / 2).
+        // Uniform to the last bit: the amplitude of the first harmonic is exp(-sd^2 / 2).
         return -libm::log(TAU);
     }
     let nearest = x - TAU * libm::round(x / TAU);
-    // Beyond nine standard deviations there is nothing left to add.
+    // Terms beyond nine standard deviations are negligible.
     let turns = libm::ceil((9.0 * sd + PI) / TAU) as i32;
     let terms: Vec<f64> =
         (-turns..=turns).map(|k| log_normal(nearest + TAU * f64::from(k), sd)).collect();
@@ -302,8 +306,8 @@ impl Kernel for Knn {
             after.push(new);
         }
         ratio += self.log_density(&before) - self.log_density(&after);
-        // An impossible state is none to go to; infinite terms of both signs would make
-        // it NaN, which is a rejection too.
+        // A state of zero density is rejected, also if infinite terms of both signs made
+        // the ratio NaN.
         if w.log_joint == f64::NEG_INFINITY {
             ratio = f64::NEG_INFINITY;
         }

@@ -1,5 +1,5 @@
-//! The proposal against slow references: its density integrates to 1, and is that of what
-//! it draws.
+//! Compares the proposal with slow references: its density integrates to 1, and is the
+//! density of its draws.
 
 use super::*;
 use crate::infer::Pick;
@@ -21,7 +21,7 @@ fn places(t: &Trace) -> Vec<Place> {
     t.all_targets().iter().map(|c| Place::of(t, *c).unwrap()).collect()
 }
 
-/// The trace with its only choice at another value.
+/// The trace with another value of its only choice.
 fn at(t: &Trace, x: Datum) -> Trace {
     let hash = t.address_hash(t.all_targets()[0]);
     let values = [(hash, Constraint::Stored(x))];
@@ -77,8 +77,8 @@ fn masses_of_discrete_choices_sum_to_one() {
     assert!((q.iter().sum::<f64>() - 1.0).abs() < 1e-14);
 }
 
-/// The mixture is over all choices together, not one by one: two scenes, two numbers,
-/// compared with the sum written out.
+/// The mixture is over all choices jointly and not one by one: two scenes and two
+/// numbers, compared with the sum written out.
 #[test]
 fn the_mixture_is_joint() {
     let t =
@@ -113,8 +113,8 @@ fn the_mixture_is_joint() {
     assert!((q - mixture.ln()).abs() < 1e-12, "{q}, {}", mixture.ln());
 }
 
-/// What is drawn has the density that is claimed: shares of draws in bins against the
-/// integral over them.
+/// Draws follow the claimed density: fractions of draws in bins against the integral over
+/// each bin.
 #[test]
 fn draws_follow_the_density() {
     let text = "assume x ~ uniform(0, 1); observe normal(x, 1) = 0;";
@@ -164,7 +164,7 @@ fn wide_normals_round_the_circle_are_uniform() {
         let got = log_wrapped(x, sd);
         assert!((got - expected).abs() < 1e-3, "{x} {sd}: {got}, {expected}");
     }
-    // The density of a circle's numbers sums to one for any spread.
+    // The density on the circle integrates to one for any standard deviation.
     for sd in [0.3, 1.0, 2.0, 5.0] {
         let n = 2000;
         let total: f64 =

@@ -6,14 +6,14 @@ use crate::infer::kernel::{
 };
 use crate::trace::{Change, Trace, TraceResult};
 
-/// `mh(sel)`: draws one choice anew from its prior, given the rest.
+/// `mh(sel)`: proposes one choice from its prior, given the rest.
 #[derive(Clone, Debug)]
 pub struct Mh {
     scope: Registered,
 }
 
 impl Mh {
-    /// The kernel for one of these choices at a time.
+    /// A kernel for one of these choices at a time.
     pub fn new(scope: SiteSelection) -> Self {
         Mh { scope: Registered::new(scope.single()) }
     }

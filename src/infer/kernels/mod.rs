@@ -1,4 +1,4 @@
-//! The kernels, one file each.
+//! The kernels, one per file.
 
 mod abc;
 mod abc_smc;

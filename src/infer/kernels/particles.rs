@@ -1,7 +1,7 @@
-//! What kernels of particles share: states drawn from the prior, and the acceptance of a
-//! whole state by estimates of the evidence (particle independent Metropolis-Hastings:
-//! Andrieu, Doucet & Holenstein 2010, section 2.4.2). Not here: how particles go from the
-//! prior to the posterior.
+//! The common part of particle kernels: states drawn from the prior, and acceptance of
+//! complete states by estimates of the evidence (particle independent
+//! Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2). How particles
+//! move from the prior to the target is left to each kernel.
 
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accepts};
 use crate::infer::selection::fail;
@@ -13,11 +13,11 @@ use crate::syntax::span::Span;
 use crate::trace::{Constraint, Selector, Trace, TraceResult};
 use std::sync::Arc;
 
-/// A way for particles from the prior to where they are wanted.
+/// How particles move from the prior to their target.
 pub(super) trait Way {
     fn name(&self) -> &'static str;
 
-    /// Forgets what was learnt from other data.
+    /// Forgets what was adapted to other data.
     fn forget(&mut self);
 
     /// See [`Kernel::save`].
@@ -26,8 +26,8 @@ pub(super) trait Way {
     /// See [`Kernel::load`].
     fn load(&mut self, state: &[u8]) -> Result<(), StateError>;
 
-    /// Draws particles and leads them there; gives them and the log of the evidence's
-    /// estimate.
+    /// Draws particles and moves them to the target. Returns them and the log of the
+    /// evidence estimate.
     fn lead(
         &mut self,
         prior: &Prior,
@@ -36,37 +36,38 @@ pub(super) trait Way {
     ) -> TraceResult<(Vec<Trace>, f64)>;
 }
 
-/// Nothing was estimated yet.
+/// No estimates so far.
 const NO_ESTIMATES: (u64, f64) = (0, f64::NEG_INFINITY);
 
-/// Where particles are drawn from.
+/// Draws particles.
 pub(super) struct Prior {
-    /// Choices that are not drawn anew.
+    /// Choices that are not redrawn.
     frozen: Selector,
 }
 
-/// Whole states, accepted with the ratio of the estimates of the evidence that they come
-/// with.
+/// Proposes complete states, accepted with the ratio of the evidence estimates that they
+/// come with.
 pub struct Independent<W> {
     way: W,
     prior: Prior,
     span: Span,
-    /// The state that was accepted last: its log joint density and the log of the
-    /// evidence's estimate.
+    /// The last accepted state: its log joint density and the log of its evidence
+    /// estimate.
     accepted: Option<(f64, f64)>,
-    /// What was observed then.
+    /// The data observed then.
     observed: Option<Arc<Observed>>,
-    /// Whether all this is a checkpoint's, and of what is observed in the next step.
+    /// Whether the fields above come from a checkpoint; they then refer to the data that
+    /// the trace observes at the next step.
     loaded: bool,
-    /// How many estimates there were, and the log of their sum.
+    /// The number of estimates, and the log of their sum.
     estimates: (u64, f64),
 }
 
 impl Prior {
-    /// Particles; what is frozen stays.
+    /// Draws particles; frozen choices keep their values.
     ///
     /// # Errors
-    /// Those of the program.
+    /// Errors of the program.
     pub fn draw(
         &self,
         trace: &mut Trace,
@@ -86,18 +87,18 @@ impl Prior {
 
 #[allow(private_bounds)]
 impl<W: Way> Independent<W> {
-    /// For particles that go this way; frozen choices are not drawn anew. `span` is where
-    /// errors point.
+    /// For particles that move in this way; frozen choices are not redrawn. `span` is the
+    /// position that errors refer to.
     pub(super) fn by(way: W, frozen: Selector, span: Span) -> Self {
         let (prior, estimates) = (Prior { frozen }, NO_ESTIMATES);
         Independent { way, prior, span, accepted: None, observed: None, loaded: false, estimates }
     }
 
-    /// Begins a step; true if it is the first of all or the first under other data, whose
-    /// estimates start anew.
+    /// Begins a step. Returns true if it is the first of all, or the first with other
+    /// data, for which the estimates start again.
     ///
     /// # Errors
-    /// If the state is not the one that was accepted last.
+    /// If the state is not the one that was last accepted.
     fn begin(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<bool> {
         trace.rollback();
         if std::mem::take(&mut self.loaded) {
@@ -126,7 +127,7 @@ impl<W: Way> Independent<W> {
         Ok(false)
     }
 
-    /// Takes one of the particles as the new state, or stays.
+    /// Accepts one of the particles as the new state, or rejects.
     fn decide(
         &mut self,
         trace: &mut Trace,
@@ -139,7 +140,7 @@ impl<W: Way> Independent<W> {
         self.estimates = (count.saturating_add(1), log_sum_exp(&[log_sum, log_evidence]));
         let ratio = match self.accepted {
             Some((_, old)) => log_evidence - old,
-            // The first state is a start like any other.
+            // The first state is accepted, as an initial state.
             None if log_evidence > f64::NEG_INFINITY => 0.0,
             None => f64::NEG_INFINITY,
         };

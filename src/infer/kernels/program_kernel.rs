@@ -1,13 +1,13 @@
-//! Kernels that programs declare: Metropolis-Hastings with proposals of their own.
+//! Kernels declared by programs: Metropolis-Hastings with custom proposals.
 //!
-//! The body is played on the present state and draws from each `propose @x ~ d` as it
-//! comes; then all choices change at once. The density of the way back is found by
-//! replay: the body is played again on the new state, with the old values as what it
-//! would have to draw, and with the same auxiliary variables (`propose u ~ d`), so that
-//! each value of these is a proposal of its own. A choice that is stored as white noise
-//! is proposed by its value, which the noise follows. Bodies with maps are moves of their
-//! own: see `involution.rs`. Every expression reads the state the play began in, never a
-//! value proposed in it.
+//! The body is executed on the present state and draws from each `propose @x ~ d` in
+//! turn; then all choices change at once. The density of the reverse move is computed by
+//! replay: the body is executed on the new state, with the old values as the ones to be
+//! drawn, and with the same auxiliary variables (`propose u ~ d`), so that each value of
+//! these defines a proposal. A choice that is stored as white noise is proposed by its
+//! value, from which the noise follows. Bodies with maps are handled in `involution.rs`.
+//! Every expression reads the state in which the execution began, never a value proposed
+//! in it.
 
 use crate::dist::{Datum, Dist};
 use crate::infer::expr::{PlanEnv, evaluate};
@@ -21,7 +21,7 @@ use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, KernelDecl};
 use crate::trace::{Address, Change, Draws, Target, Trace, TraceResult};
 use std::sync::Arc;
 
-/// A kernel of the program, with its arguments.
+/// A kernel declared by the program, with its arguments.
 #[derive(Clone, Debug)]
 pub(crate) struct ProgramKernel {
     code: Arc<Code>,
@@ -30,29 +30,29 @@ pub(crate) struct ProgramKernel {
     started: Instant,
 }
 
-/// One `propose` of a play.
+/// A choice that an execution proposes.
 pub(super) struct Proposed {
     address: Address,
     pub target: Target,
     dist: Dist,
 }
 
-/// An auxiliary variable of a play.
+/// An auxiliary variable of an execution.
 pub(super) struct Drawn {
     name: Arc<str>,
     pub dist: Dist,
     pub value: Value,
 }
 
-/// What a map gives a value to.
+/// What a map assigns a new value to.
 #[derive(Clone, PartialEq)]
 pub(super) enum Image {
     Choice(Address, Target),
-    /// One of those drawn.
+    /// The auxiliary variable with this index in [`Played::drawn`].
     Auxiliary(usize),
 }
 
-/// What a play came to.
+/// The result of an execution of the body.
 #[derive(Default)]
 pub(super) struct Played {
     pub all: Vec<Proposed>,
@@ -61,7 +61,7 @@ pub(super) struct Played {
 }
 
 impl Played {
-    /// The log density of drawing these values of its auxiliary variables.
+    /// The log density of drawing these values of the auxiliary variables.
     pub(super) fn log_density_of(&self, values: &[Value]) -> f64 {
         let one = |(d, v): (&Drawn, &Value)| match v.to_datum() {
             Some(x) if d.dist.support().fits(&x) => d.dist.log_density(&x),
@@ -75,7 +75,7 @@ impl Played {
 pub(super) enum Source<'a> {
     Drawn(&'a mut Stream),
     Given(&'a [Value]),
-    /// Given, where the map alone is asked for and not what is proposed beside it.
+    /// Given, when only the map is evaluated and proposals beside it are skipped.
     Moved(&'a [Value]),
 }
 
@@ -91,8 +91,8 @@ impl ProgramKernel {
         ProgramKernel { code, declared, arguments, started }
     }
 
-    /// What the body proposes in a state; in a map, with values in place of those that
-    /// choices have there.
+    /// Executes the body in a state. For a map, `moved` has values of choices that
+    /// replace those in the state.
     pub(super) fn play(
         &self,
         trace: &mut Trace,
@@ -109,8 +109,8 @@ impl ProgramKernel {
         Ok(play.played)
     }
 
-    /// What the body proposes in the state that is pending, if it reads nothing of it but
-    /// choices: then the state need not be taken up to be asked, nor left again.
+    /// Executes the body in the pending state, if it depends on no part of that state but
+    /// the proposed choices: the state then need not be committed and reverted.
     fn way_back(
         &self,
         trace: &mut Trace,
@@ -127,11 +127,11 @@ impl ProgramKernel {
         self.play(trace, at, Source::Given(auxiliaries), Some(&moved)).ok()
     }
 
-    /// A jump to what the body proposes, whatever the densities say: a start. `None`
-    /// where the program has no value there.
+    /// Moves the trace to a proposal of the body without an acceptance test, for initial
+    /// states. `None` if the program is undefined there.
     ///
     /// # Errors
-    /// As [`Kernel::step`], and if the body has a map, which only leads from one state to
+    /// As [`Kernel::step`], and if the body has a map, which only maps one state to
     /// another.
     pub fn leap(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Option<()>> {
         if maps(&self.declared.body) {
@@ -160,7 +160,7 @@ struct Play<'a> {
 }
 
 impl Play<'_> {
-    /// What expressions can see.
+    /// The environment of expressions.
     fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> PlanEnv<'b> {
         let (code, started) = (&self.own.code, self.own.started);
         PlanEnv {
@@ -246,7 +246,7 @@ impl Play<'_> {
         Ok(())
     }
 
-    /// Draws an auxiliary variable, or takes the value it is given.
+    /// Draws an auxiliary variable, or uses the given value.
     fn auxiliary(
         &mut self,
         name: &Arc<str>,
@@ -294,7 +294,7 @@ impl Play<'_> {
         }
     }
 
-    /// What a map gives a new value to.
+    /// Reads what a map assigns a new value to.
     fn image(
         &self,
         target: &Expr,
@@ -320,7 +320,7 @@ impl Play<'_> {
         drawn.map(Image::Auxiliary).ok_or_else(not)
     }
 
-    /// A choice that can be proposed.
+    /// Finds a choice that can be proposed.
     fn choice(
         &self,
         target: &Expr,
@@ -340,7 +340,7 @@ impl Play<'_> {
     }
 }
 
-/// Whether a kernel proposes values itself, rather than applying others.
+/// Whether a kernel proposes values itself, instead of applying other kernels.
 pub(crate) fn proposes(body: &[KStmt]) -> bool {
     body.iter().any(|s| match &s.kind {
         KStmtKind::Propose { .. } | KStmtKind::Map { .. } => true,
@@ -351,7 +351,7 @@ pub(crate) fn proposes(body: &[KStmt]) -> bool {
     })
 }
 
-/// Whether a kernel maps choices by a rule.
+/// Whether a kernel contains a map.
 fn maps(body: &[KStmt]) -> bool {
     body.iter().any(|s| match &s.kind {
         KStmtKind::Map { .. } => true,
@@ -360,12 +360,12 @@ fn maps(body: &[KStmt]) -> bool {
     })
 }
 
-/// What choices are now, as the program sees them.
+/// The present values of choices, as the program sees them.
 pub(super) fn values(trace: &Trace, all: &[Proposed]) -> Vec<Option<Datum>> {
     all.iter().map(|p| trace.value(p.target).to_datum()).collect()
 }
 
-/// Values drawn for all choices that are proposed, and the changes to them.
+/// Draws values for all proposed choices; returns them and the changes.
 pub(super) fn sampled(
     all: &[Proposed],
     rng: &mut Stream,
@@ -377,8 +377,8 @@ pub(super) fn sampled(
     all.iter().map(draw).unzip()
 }
 
-/// The log of how much larger a volume of values is than that of the white noise they are
-/// stored as, over all of these choices.
+/// The log Jacobian of the transform from the stored white noise to the values, summed
+/// over these choices.
 pub(super) fn log_volume(trace: &Trace, all: &[Proposed]) -> f64 {
     let one = |p: &Proposed| {
         let dist = trace.dist(p.target).filter(Dist::is_stored_whitened)?;
@@ -388,7 +388,8 @@ pub(super) fn log_volume(trace: &Trace, all: &[Proposed]) -> f64 {
     all.iter().filter_map(one).sum()
 }
 
-/// The log density of drawing these values; what a proposal cannot draw has none.
+/// The log density of drawing these values; -infinity if a value is outside of a
+/// proposal's support.
 pub(super) fn log_density(all: &[Proposed], values: &[Option<Datum>]) -> f64 {
     let one = |(p, x): (&Proposed, &Option<Datum>)| match x {
         Some(x) if p.dist.support().fits(x) => p.dist.log_density(x),
@@ -444,7 +445,7 @@ impl Kernel for ProgramKernel {
         {
             return Ok(accept_or_reject(trace, ratio(trace, Some(back)), &mut rng));
         }
-        // The replay asks the new state, which must not be pending for that.
+        // The replay reads the new state, which must be committed for that.
         let removed = trace.removed();
         trace.commit();
         let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), None))?;

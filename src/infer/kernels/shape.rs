@@ -1,21 +1,21 @@
-//! The shape of a posterior as a random walk learns it in warm-up: a covariance in the
+//! The shape of a posterior as a random walk adapts to it in warm-up: a covariance in the
 //! unconstrained space (Haario, Saksman & Tamminen 2001), from windows of states that
-//! double in length, so that the way to the posterior is forgotten.
+//! double in length, so that states before convergence are forgotten.
 
 use crate::rng::Stream;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// The first window.
+/// The length of the first window, in states.
 const WINDOW: u32 = 100;
-/// The most coordinates whose covariances are worth learning.
+/// The most coordinates whose covariance is worth estimating.
 pub(super) const MOST: usize = 64;
 
-/// A covariance being learnt, and the factor of the last one.
+/// The running covariance of a window, and the Cholesky factor of the previous window's.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Shape {
     mean: Vec<f64>,
-    /// Sums of products of deviations, the lower triangle by rows.
+    /// Sums of products of deviations: the lower triangle by rows.
     products: Vec<f64>,
     count: u32,
     window: u32,
@@ -29,14 +29,14 @@ impl Shape {
         Shape { mean: vec![0.0; dimensions], products, count: 0, window, factor: None }
     }
 
-    /// Whether its parts have the sizes they must have; those that were read may not.
+    /// Whether the parts have consistent sizes; those read from a checkpoint may not.
     pub fn fits(&self) -> bool {
         let d = self.mean.len();
         let factor = self.factor.as_ref().is_none_or(|f| (f.nrows(), f.ncols()) == (d, d));
         d <= MOST && self.products.len() == d * (d + 1) / 2 && factor
     }
 
-    /// Learns from a state.
+    /// Adds a state to the window.
     pub fn add(&mut self, y: &[f64]) {
         self.count = self.count.saturating_add(1);
         let n = f64::from(self.count);
@@ -52,8 +52,8 @@ impl Shape {
         }
     }
 
-    /// Ends a window: its covariance, drawn a little towards its diagonal, is the shape
-    /// from now on.
+    /// Ends a window: its covariance, shrunk slightly towards its diagonal, is used as
+    /// the shape from now on.
     fn close(&mut self) {
         let (d, n) = (self.mean.len(), f64::from(self.count));
         let covariance = DMatrix::from_fn(d, d, |i, j| {
@@ -68,8 +68,8 @@ impl Shape {
         *self = Shape { window: longer, factor: self.factor.take(), ..Shape::new(d) };
     }
 
-    /// A step drawn in this shape, of unit scale; `None` before the first window has
-    /// ended.
+    /// Draws a step of this shape, of unit scale; `None` before the end of the first
+    /// window.
     pub fn step(&self, rng: &mut Stream) -> Option<Vec<f64>> {
         let factor = self.factor.as_ref()?;
         let z: Vec<f64> = (0..factor.nrows()).map(|_| rng.standard_normal()).collect();
@@ -102,7 +102,7 @@ mod tests {
         assert!((moment(0, 1) - 2.85).abs() < 0.15, "{}", moment(0, 1));
     }
 
-    /// The covariance of few states in many dimensions would be near to singular.
+    /// The unshrunk covariance of few states in many dimensions would be nearly singular.
     #[test]
     fn the_first_shape_in_many_dimensions_is_near_that_of_the_states() {
         let mut rng = StreamKey::new(2, 0, Purpose::KERNEL).stream(0, 0, 0);

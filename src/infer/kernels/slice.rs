@@ -1,9 +1,9 @@
 //! `slice(sel, width, doubling)`: slice sampling of one number at a time (Neal 2003,
 //! section 4): an interval around the present point by stepping out (figure 3) or
-//! doubling (figures 4 and 6), then shrinkage (figure 5).
+//! doubling (figures 4 and 6), followed by shrinkage (figure 5).
 //!
-//! Each coordinate of the unconstrained space is moved in turn. A place where the program
-//! has no value, or where choices appear or vanish, counts as outside the slice, so the
+//! Each coordinate of the unconstrained space is moved in turn. A point at which the
+//! program is undefined, or choices appear or vanish, counts as outside the slice, so the
 //! kernel moves within the present structure.
 
 use crate::infer::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, recoverable};
@@ -12,14 +12,14 @@ use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
 
-/// At most so many widths are stepped out, shared at random between both sides, which
-/// keeps the kernel reversible.
+/// The most widths of stepping out, divided at random between both sides, which keeps the
+/// kernel reversible.
 const STEPS_OUT: u32 = 32;
 
-/// An interval doubles at most so often.
+/// The most doublings of an interval.
 const DOUBLINGS: u32 = 16;
 
-/// An interval that has shrunk so often holds nothing but the present point.
+/// After this many shrinkage steps an interval contains only the present point.
 const SHRINKS: u32 = 200;
 
 /// Univariate slice sampling.
@@ -28,14 +28,14 @@ pub struct Slice {
     scope: Registered,
     width: Option<f64>,
     doubling: bool,
-    /// By address and coordinate: widths learnt in warm-up, with the number of moves they
-    /// are from.
+    /// By address and coordinate: widths adapted in warm-up, with the number of moves
+    /// they are based on.
     learnt: FxHashMap<(u64, usize), (f64, f64)>,
 }
 
 impl Slice {
-    /// The kernel for these choices, with a width in the unconstrained space, or else
-    /// widths that are learnt; the interval doubles or steps out.
+    /// A kernel for these choices, with a width in the unconstrained space, or adapted
+    /// widths if it is `None`. The interval doubles or steps out.
     pub fn new(scope: SiteSelection, width: Option<f64>, doubling: bool) -> Self {
         Slice { scope: Registered::new(scope), width, doubling, learnt: FxHashMap::default() }
     }
@@ -44,8 +44,8 @@ impl Slice {
         self.width.unwrap_or_else(|| self.learnt.get(&key).map_or(1.0, |(w, _)| *w))
     }
 
-    /// Towards three times the mean distance moved: two points drawn from an interval are
-    /// a third of its length apart.
+    /// Adapts a width towards three times the mean distance moved: two random points of
+    /// an interval are on average a third of its length apart.
     fn learn(&mut self, key: (u64, usize), moved: f64) {
         let (width, count) = self.learnt.entry(key).or_insert((1.0, 0.0));
         *count += 1.0;
@@ -65,8 +65,8 @@ struct Line<'a> {
 }
 
 impl Line<'_> {
-    /// The log density at a place, less that of the present point; the place is then
-    /// pending.
+    /// The log density at a point relative to that of the present one; the point is
+    /// pending afterwards.
     fn log_density(&mut self, x: f64) -> TraceResult<f64> {
         let mut y = self.y.clone();
         y[self.coordinate] = x;
@@ -83,7 +83,7 @@ impl Line<'_> {
         self.y[self.coordinate]
     }
 
-    /// Moves along the line; gives how far.
+    /// Moves along the line; returns the distance.
     fn step(&mut self, width: f64, doubling: bool, rng: &mut Stream) -> TraceResult<f64> {
         let here = self.here();
         let level = libm::log(rng.open_uniform());
@@ -109,7 +109,7 @@ impl Line<'_> {
         Ok(0.0)
     }
 
-    /// Widens an interval at each end until that is outside the slice (figure 3).
+    /// Widens an interval at each end until the end is outside the slice (figure 3).
     fn step_out(
         &mut self,
         (mut left, mut right): (f64, f64),
@@ -155,9 +155,9 @@ impl Line<'_> {
         Ok((left, right))
     }
 
-    /// Whether doubling from `x` could have come to this interval: it would not have
-    /// stopped at one of those that halving towards `x` goes through (figure 6). If so,
-    /// `x` is pending.
+    /// Whether doubling from `x` could have led to this interval: it must not have
+    /// stopped at any of the intervals that halving towards `x` passes through (figure
+    /// 6). If so, `x` is pending.
     fn leads_back(
         &mut self,
         x: f64,
@@ -208,7 +208,7 @@ impl Kernel for Slice {
         let mut outcome = Outcome { site, ..Default::default() };
         for target in targets {
             let mut coordinate = 0;
-            // Read anew for each coordinate: the one before has moved.
+            // Read again for each coordinate, as the previous one has moved.
             while let Some((y, jacobian)) =
                 trace.free_to_move(target).filter(|(y, _)| coordinate < y.len())
             {

@@ -1,13 +1,14 @@
-//! `smc(move, particles)`: annealed sequential Monte Carlo (Del Moral, Doucet & Jasra 2006)
-//! as a proposal.
+//! `smc(move, particles)`: a proposal by annealed sequential Monte Carlo, as in Del
+//! Moral, Doucet & Jasra (2006).
 //!
-//! Particles drawn from the prior are weighed and resampled as the power of the
-//! likelihood rises from 0 to 1, and move by the kernel inside in between. The product of
-//! the mean weights estimates the evidence without bias; accepting one of the last
-//! particles with the ratio of the new estimate to the old (particle independent
+//! Particles drawn from the prior are weighted and resampled as the power of the
+//! likelihood rises from 0 to 1, and moved by the inner kernel in between. The product of
+//! the mean weights is an unbiased estimate of the evidence. Accepting one of the final
+//! particles with the ratio of the new estimate to the old one (particle independent
 //! Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2) leaves the
-//! posterior exactly invariant for any number of particles. The powers are found in the
-//! first run, so that half of the weights count at each, and stay as they are.
+//! posterior exactly invariant for any number of particles. The powers are chosen in the
+//! first run, such that the effective sample size is half the number of particles at
+//! each, and are fixed from then on.
 
 use super::particles::{Independent, Prior, Way};
 use crate::infer::kernel::{Kernel, StepContext, inner_step};
@@ -17,26 +18,28 @@ use crate::num::log_sum_exp;
 use crate::syntax::span::Span;
 use crate::trace::{Selector, Trace, TraceResult};
 
-/// The most powers: a likelihood that needs more has no support where the prior has.
+/// The most powers: a likelihood that needs more has practically no overlap with the
+/// prior.
 const MOST_POWERS: usize = 1000;
 
-/// Log weights beyond this are weighed below the largest.
+/// If the largest log weight exceeds this in absolute value, weights are computed
+/// relative to it.
 const LARGE: f64 = 1e9;
 
-/// Particle independent Metropolis-Hastings around a kernel.
+/// Particle independent Metropolis-Hastings with annealed particles.
 pub type Smc = Independent<Annealed>;
 
-/// The power of the likelihood rises from 0 to 1.
+/// Raises the power of the likelihood from 0 to 1.
 pub struct Annealed {
     kernel: Box<dyn Kernel>,
     particles: usize,
-    /// The powers of the likelihood, the last one 1; found in the first run.
+    /// The powers of the likelihood, of which the last is 1; chosen in the first run.
     powers: Vec<f64>,
 }
 
 impl Smc {
-    /// So many particles, moved by a kernel; frozen choices are not drawn anew. `span` is
-    /// where errors point.
+    /// `particles` particles, moved by a kernel; frozen choices are not redrawn. `span`
+    /// is the position that errors refer to.
     pub fn new(kernel: Box<dyn Kernel>, particles: usize, frozen: Selector, span: Span) -> Self {
         Independent::by(Annealed { kernel, particles, powers: Vec::new() }, frozen, span)
     }
@@ -84,7 +87,7 @@ impl Way for Annealed {
             let step = self.powers[rung] - power;
             power = self.powers[rung];
             rung += 1;
-            // What is impossible has no weight at any power.
+            // A state of zero likelihood has zero weight at any power.
             let gain = |l: &f64| {
                 if *l == f64::NEG_INFINITY || l.is_nan() { f64::NEG_INFINITY } else { step * l }
             };
@@ -112,11 +115,11 @@ impl Way for Annealed {
     }
 }
 
-/// The power at which half of the particles would count (by the effective number of equal
-/// weights), by bisection.
+/// The power at which the effective sample size is half the number of particles, by
+/// bisection.
 fn next_power(likelihoods: &[f64], power: f64) -> f64 {
-    // Beside those that are large the logarithm of their number would be lost: they are
-    // taken below the largest.
+    // Next to large values the logarithm of their number would be lost to rounding, so
+    // they are taken relative to the largest.
     let most =
         likelihoods.iter().copied().filter(|l| l.is_finite()).fold(f64::NEG_INFINITY, f64::max);
     let from = if most.abs() > LARGE { most } else { 0.0 };
@@ -143,8 +146,8 @@ fn next_power(likelihoods: &[f64], power: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Likelihoods so far apart that no power tells them by half of the particles: the
-    /// next one is above all the same.
+    /// The likelihoods are so far apart that no power gives an effective sample size of
+    /// half: the next power must rise nevertheless.
     #[test]
     fn powers_rise_whatever_the_likelihoods_are() {
         for power in [0.0, 1e-3, 0.5, 1.0 - 1e-10] {

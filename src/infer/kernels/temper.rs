@@ -1,35 +1,35 @@
 //! `temper(move)`: replica exchange over powers of the likelihood (Geyer 1991; Hukushima
 //! & Nemoto 1996).
 //!
-//! Beside the chain's own state there are replicas that see the likelihood raised to
-//! lower powers, so that they cross between modes. Each step moves every replica by the
-//! kernel inside, then neighbours swap states with the Metropolis ratio, the even pairs
-//! and the odd ones in turn (Okabe et al. 2001). In warm-up the ladder is spaced so that
-//! neighbours swap about as often everywhere (Miasojedow, Moulines & Vihola 2013).
+//! Beside the chain's own state there are replicas whose likelihood is raised to lower
+//! powers, so that they cross between modes. Each step moves every replica by the inner
+//! kernel, and then neighbours swap states with the Metropolis ratio, alternating between
+//! even and odd pairs (Okabe et al. 2001). In warm-up the powers are adapted so that all
+//! neighbours swap about equally often (Miasojedow, Moulines & Vihola 2013).
 
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accepts, inner_step};
 use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::trace::{Constraint, Trace, TraceResult};
 
-/// The rate of swaps aimed at: the best one for many temperatures (Kone & Kofke 2005).
+/// The target swap rate: the optimum for many temperatures (Kone & Kofke 2005).
 const AIM: f64 = 0.234;
 
-/// Replica exchange around a kernel.
+/// Replica exchange with an inner kernel.
 pub struct Temper {
-    /// The kernel of each level, the chain's own first.
+    /// The kernel of each level; level 0 is the chain's own.
     kernels: Vec<Box<dyn Kernel>>,
     /// The states of the levels after the first.
     replicas: Vec<Trace>,
-    /// Those of them that a checkpoint had, until the first step.
+    /// The replicas of a checkpoint, until the first step.
     saved: Vec<Vec<(u64, Constraint)>>,
-    /// The logarithms of the gaps between the log powers of neighbours.
+    /// The logarithms of the differences between neighbours' log powers.
     gaps: Vec<f64>,
     rounds: u64,
 }
 
 impl Temper {
-    /// One level a kernel; the powers fall geometrically from 1 to `hottest` until
-    /// warm-up finds better ones.
+    /// One level per kernel. The powers fall geometrically from 1 to `hottest` until
+    /// warm-up adapts them.
     pub fn new(kernels: Vec<Box<dyn Kernel>>, hottest: f64) -> Self {
         let pairs = kernels.len().saturating_sub(1);
         let gap = (-libm::log(hottest) / pairs.max(1) as f64).max(1e-6);
@@ -42,7 +42,7 @@ impl Temper {
         }
     }
 
-    /// The powers of the levels, the chain's own first.
+    /// The powers of the levels; the chain's own comes first.
     pub fn powers(&self) -> Vec<f64> {
         let mut log = 0.0;
         let lower = self.gaps.iter().map(|g| {
@@ -52,7 +52,7 @@ impl Temper {
         std::iter::once(1.0).chain(lower).collect()
     }
 
-    /// Learns from the probability of a swap.
+    /// Adapts the gap of a pair to the probability of its swap.
     fn adapt(&mut self, pair: usize, probability: f64) {
         let gain = libm::pow(self.rounds as f64 / 2.0 + 1.0, -0.6).max(0.01);
         self.gaps[pair] = (self.gaps[pair] + gain * (probability - AIM)).clamp(-12.0, 4.0);
@@ -113,7 +113,7 @@ impl Kernel for Temper {
             let (low, high) = self.replicas.split_at_mut(pair);
             let (colder, hotter) = (low.last_mut().unwrap_or(&mut *trace), &mut high[0]);
             let rise = hotter.log_likelihood() - colder.log_likelihood();
-            // Of two impossible states neither is better.
+            // If both states have zero likelihood, they are not swapped.
             let rise = if rise.is_nan() { f64::NEG_INFINITY } else { rise };
             let ratio = at.power * (powers[pair] - powers[pair + 1]) * rise;
             let swapped = accepts(ratio, &mut rng);

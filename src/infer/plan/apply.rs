@@ -1,4 +1,4 @@
-//! Applying kernels: one call, step by step, and choices among calls.
+//! Applies kernels: one call, step by step, and the arms of `mix`.
 
 use super::place::Doing;
 use super::runner::{Flow, Instance, Runner};
@@ -15,11 +15,10 @@ use crate::syntax::ast::{Arg, Expr, ExprKind, KernelDecl, MixArm};
 use smallvec::SmallVec;
 use std::sync::atomic::Ordering;
 
-/// The most kernels of a chain: arguments that change without end would fill the memory.
+/// The most kernels of a chain: arguments that keep changing would fill the memory.
 const MOST: usize = 10_000;
 
-/// How deep statements and declared kernels may be within each other: a kernel may call
-/// itself.
+/// The deepest nesting of statements and declared kernels, as a kernel may call itself.
 const MOST_NESTED: usize = 200;
 
 impl Runner<'_> {
@@ -50,8 +49,8 @@ impl Runner<'_> {
         arms.get(arm).map_or(Ok(Flow::Next), |a| self.apply(&a.kernel, Some(arm), doing))
     }
 
-    /// Applies a kernel, or another statement that looks like a call; in a `mix` it is
-    /// one of the arms.
+    /// Applies a kernel, or another statement that has the form of a call; `arm` is its
+    /// index in a `mix`.
     pub(super) fn apply(
         &mut self,
         e: &Expr,
@@ -82,7 +81,7 @@ impl Runner<'_> {
             Doing::Kernel { steps, done, .. } => (steps, done),
             _ => (0, Outcome::default()),
         };
-        // A kernel that does not go through its choices in turn makes one step.
+        // A kernel that does not sweep over its choices makes one step.
         let members =
             self.instances[i].kernel.as_mut().and_then(|k| k.sweep(&mut self.trace)).unwrap_or(1);
         let mut over = steps > 0 && self.is_over();
@@ -102,7 +101,7 @@ impl Runner<'_> {
         Ok(if over || self.is_over() { Flow::End } else { Flow::Next })
     }
 
-    /// Applies a kernel that the program declares from other kernels.
+    /// Applies a kernel that the program declares in terms of other kernels.
     fn apply_declared(
         &mut self,
         e: &Expr,
@@ -126,7 +125,7 @@ impl Runner<'_> {
         flow
     }
 
-    /// One step of a kernel.
+    /// Makes one step of a kernel.
     fn step(&mut self, i: usize, member: usize) -> Result<Outcome, ChainError> {
         let at = StepContext { member, ..self.at() };
         let Some(kernel) = &mut self.instances[i].kernel else { return Ok(Outcome::default()) };
@@ -142,7 +141,7 @@ impl Runner<'_> {
         Ok(outcome)
     }
 
-    /// The kernel a call stands for: one that is known, or a new one.
+    /// Returns the index of the kernel that a call denotes: a known one, or a new one.
     fn instance(&mut self, e: &Expr, place: usize) -> Result<usize, ChainError> {
         let (frozen, options) = (self.frozen.clone(), self.options);
         let mut built = build(e, &frozen, options, &mut self.env())?;

@@ -1,4 +1,5 @@
-//! Banks in plans: which ones a plan names, and the neighbours a kernel gets from them.
+//! Banks in plans: which ones a plan names, and the neighbours that a kernel gets from
+//! them.
 
 use super::{RunOptions, argument, call};
 use crate::infer::expr::{PlanEnv, evaluate};
@@ -9,13 +10,14 @@ use crate::lang::value::Value;
 use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind};
 use std::sync::Arc;
 
-/// Neighbours, if a kernel does not say how many.
+/// The number of neighbours, if a kernel does not specify it.
 const K: usize = 10;
-/// More neighbours than this tell nothing that the prior does not.
+/// The most neighbours: more of them are no more informative than the prior.
 const MOST: f64 = 10_000.0;
 
-/// Finds what a plan's kernels will ask for, so that a bank that cannot be used is an
-/// error before the chain begins. Banks whose names are computed wait for their turn.
+/// Looks up the neighbours that a plan's kernels will need, so that an unusable bank is
+/// an error before the chain begins. Banks whose names are computed are looked up when
+/// their kernel is built.
 ///
 /// # Errors
 /// As [`neighbours`].
@@ -60,7 +62,7 @@ fn find(
     }
 }
 
-/// The neighbours that a call of `knn` asks for.
+/// Looks up the neighbours for a call of `knn`.
 ///
 /// # Errors
 /// If its arguments are wrong, or the bank cannot be used.

@@ -1,9 +1,9 @@
-//! Checkpoints: all that a chain goes on from, so that its draws are those it would have
-//! made without a break.
+//! Checkpoints: all the state that a chain needs to resume, with the same draws as
+//! without the interruption.
 //!
-//! What is not here is a function of what is and of the program: a trace runs again from
-//! its choices, with scores that are equal bit for bit and lists of choices in the same
-//! order; random streams are told by step and address; caches fill again.
+//! Everything else is a function of that state and of the program: a trace is re-run from
+//! its choices, with bit-for-bit equal scores and lists of choices in the same order;
+//! random streams are determined by step and address; caches are rebuilt.
 
 use super::place::{Doing, Place};
 use super::runner::{Instance, Runner};
@@ -22,13 +22,13 @@ use std::time::Duration;
 
 type State = Vec<(u64, Constraint)>;
 
-/// No chain gets so far.
+/// A bound on counts: no chain gets this far.
 const MOST: u64 = 1 << 60;
 /// The most numbers that are recorded with a draw.
 const MOST_NUMBERS: usize = 10_000_000;
 
-/// The state of a chain at a step, and all it needs to go on. Of use with the same
-/// program, plan, data and seed only; what keeps it sees to that.
+/// The state of a chain at a step, with all it needs to resume. Valid only with the same
+/// program, plan, data and seed; the code that stores it must check that.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
     seed: u64,
@@ -64,8 +64,8 @@ struct SavedKernel {
 }
 
 impl Checkpoint {
-    /// That of a chain now, in the middle of a statement that is as far as `doing` says;
-    /// `None` if there is more than plain data among its variables.
+    /// The checkpoint of a chain now, inside a statement that has got as far as `doing`;
+    /// `None` if any of its variables is not plain data.
     pub(super) fn of(r: &Runner, doing: Option<Doing>) -> Option<Checkpoint> {
         let plain = |(name, v): &(Arc<str>, _)| Some((Arc::clone(name), Plain::of(v)?));
         let variables = r.variables.iter().map(plain).collect::<Option<_>>()?;
@@ -108,15 +108,15 @@ impl Checkpoint {
         })
     }
 
-    /// As bytes.
+    /// Serialises the checkpoint.
     pub fn to_bytes(&self) -> Vec<u8> {
         pack(self)
     }
 
-    /// From the bytes of [`Checkpoint::to_bytes`].
+    /// Reads the bytes of [`Checkpoint::to_bytes`].
     ///
     /// # Errors
-    /// If they are others.
+    /// If the bytes are not a valid checkpoint.
     pub fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, StateError> {
         let c: Checkpoint = unpack(bytes)?;
         let sizes =
@@ -134,32 +134,33 @@ impl Checkpoint {
         self.chain
     }
 
-    /// The draws it has made.
+    /// The number of draws so far.
     pub fn draws(&self) -> u64 {
         self.draws
     }
 
-    /// What is recorded with each of them; empty before the first.
+    /// The columns of a draw; empty before the first one.
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// Its steps, warm-up included.
+    /// The number of steps, including warm-up.
     pub fn steps(&self) -> u64 {
         self.step
     }
 
-    /// Whether its plan is done.
+    /// Whether the plan is finished.
     pub fn is_finished(&self) -> bool {
         self.finished
     }
 }
 
 impl<'a> Runner<'a> {
-    /// A chain that goes on from a checkpoint.
+    /// A chain that resumes from a checkpoint.
     ///
     /// # Errors
-    /// If it is of another seed or chain, or the program fails with its choices.
+    /// If the checkpoint belongs to another seed or chain, or the program fails with its
+    /// choices.
     pub fn resume(
         code: &'a Arc<Code>,
         plan: &[KStmt],

@@ -28,28 +28,29 @@ use std::time::Duration;
 /// Bounds and settings of a run.
 #[derive(Clone, Debug)]
 pub struct RunOptions {
-    /// The seed: same seed, same draws.
+    /// The seed; the same seed gives the same draws.
     pub seed: u64,
     /// Kernel applications per chain after warm-up, in place of the outermost `repeat`'s
     /// count.
     pub steps: Option<u64>,
-    /// Kernel applications per chain in warm-up, in place of what the program says.
+    /// Kernel applications per chain in warm-up, in place of the program's count.
     pub warmup: Option<u64>,
-    /// Time in all; the run ends at the next step. At most half of it goes to warm-up.
+    /// The time limit of the whole run, which ends at the next step. At most half of it
+    /// goes to warm-up.
     pub time: Option<Duration>,
-    /// False: every update re-runs the whole program.
+    /// If false, every update re-runs the whole program.
     pub incremental: bool,
-    /// Bounds on what the program may build.
+    /// Limits on what the program may build.
     pub limits: Limits,
-    /// What is called at steps and draws.
+    /// Called at steps and draws.
     pub callback: Option<Arc<dyn Callback>>,
-    /// Who finds the neighbours that `knn` proposes from.
+    /// Finds the neighbours that `knn` proposes from.
     pub banks: Option<Arc<dyn Banks>>,
-    /// Whether to count what single-site kernels do by address; it costs a few percent of
-    /// a fast step.
+    /// Whether to count the proposals of single-site kernels by address; this costs a few
+    /// percent of a fast step.
     pub sites: bool,
     /// Whether to record the log density of each observed value with every draw, as the
-    /// column `log_lik`, where there are at most 1000.
+    /// column `log_lik`, if there are at most 1000 of them.
     pub pointwise: bool,
 }
 
@@ -70,46 +71,47 @@ impl Default for RunOptions {
     }
 }
 
-/// What is shared between the chains and whoever watches them.
+/// State shared between the chains and the code that monitors them.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Set to end the run at the next step, or after a while in the middle of one.
+    /// Set it to end the run at the next step, or after a while in the middle of one.
     pub cancelled: Arc<AtomicBool>,
-    /// Counted up to have every chain hand a [`Checkpoint`] to its sink at the next step.
-    /// One that ends before its plan does hands one over in any case.
+    /// Increment it to make every chain pass a [`Checkpoint`] to its sink at the next
+    /// step. A chain that ends before its plan does passes one in any case.
     pub checkpoints: AtomicU64,
     /// Steps of all chains.
     pub steps: AtomicU64,
-    /// The best log joint density of any chain, as bits.
+    /// The best log joint density of any chain, as bits of an `f64`.
     pub best: AtomicU64,
-    /// Chains that have found where to start.
+    /// Chains that have an initial state.
     pub started: AtomicU32,
     /// Chains that are in warm-up.
     pub warming: AtomicU32,
     /// Chains that have ended.
     pub ended: AtomicU32,
-    /// Passes of the outermost loop that a chain began last, and how many it is to make.
+    /// The pass of an outermost loop that a chain began last, and the number of passes of
+    /// that loop.
     pub pass: AtomicU64,
     /// See `pass`.
     pub passes: AtomicU64,
 }
 
-/// What a chain leaves.
+/// The result of a chain.
 #[derive(Debug)]
 pub struct ChainResult {
-    /// Its last state.
+    /// The last state.
     pub last: Trace,
-    /// The choices of its best recorded draw, and its log joint density.
+    /// The choices of the best recorded draw, with its log joint density.
     pub best: Option<(f64, Vec<(u64, Constraint)>)>,
-    /// Kernel applications after and in warm-up.
+    /// Kernel applications after warm-up, and in it.
     pub steps: u64,
     /// See `steps`.
     pub warmup: u64,
-    /// Draws recorded.
+    /// The number of draws recorded.
     pub draws: u64,
     /// What the kernels did.
     pub kernels: Vec<KernelStats>,
-    /// What single-site kernels did, by address, if that was asked for.
+    /// What single-site kernels did, by address, if [`RunOptions::sites`] is set.
     pub sites: Vec<SiteStats>,
     /// Wall time.
     pub seconds: f64,
@@ -118,13 +120,13 @@ pub struct ChainResult {
 /// Why a chain ended early.
 #[derive(Debug)]
 pub enum ChainError {
-    /// It could not start.
+    /// The chain could not start.
     Start(StartError),
     /// The program failed.
     Run(Box<RunError>),
     /// The draws could not be written.
     Sink(std::io::Error),
-    /// A checkpoint cannot be gone on from.
+    /// The chain cannot resume from the checkpoint.
     Checkpoint(StateError),
 }
 
@@ -140,11 +142,11 @@ impl From<Box<RunError>> for ChainError {
     }
 }
 
-/// Runs one chain of a plan, or goes on with it from the checkpoint that its sink has.
+/// Runs one chain of a plan, or resumes it from the checkpoint of its sink.
 ///
 /// # Errors
-/// If it cannot start, the program fails, the sink does, or the checkpoint is of another
-/// plan.
+/// If the chain cannot start, the program or the sink fails, or the checkpoint belongs to
+/// another plan.
 pub(crate) fn run_chain(
     code: &Arc<Code>,
     plan: &[KStmt],
@@ -170,12 +172,12 @@ pub(crate) fn run_chain(
     run_among(code, plan, options, progress, sink, (chain, started), begun)
 }
 
-/// Runs a plan from a state there is, in place of a start of its own; what the program
-/// forces is not forced again. Streams of random numbers belong to seed, chain and step:
-/// two runs from one state need different chains.
+/// Runs a plan from a given state, in place of a start from the prior; `force` statements
+/// of the program are not applied again. Streams of random numbers are determined by
+/// seed, chain and step: two runs from one state need different chain numbers.
 ///
 /// # Errors
-/// If the program fails, or the sink does.
+/// If the program or the sink fails.
 pub fn run_from(
     code: &Arc<Code>,
     plan: &[KStmt],
@@ -193,15 +195,15 @@ pub fn run_from(
     run_among(code, plan, options, progress, sink, (chain, started), vec![trace])
 }
 
-/// The options of a chain that hears in the middle of an evaluation, too, that it should
-/// end.
+/// The options of a chain, with limits by which it can also be stopped in the middle of
+/// an evaluation.
 fn stoppable(options: &RunOptions, progress: &Progress) -> RunOptions {
     let stop =
         options.limits.stop.clone().or(Arc::clone(&progress.cancelled)).or_within(options.time);
     RunOptions { limits: Limits { stop, ..options.limits.clone() }, ..options.clone() }
 }
 
-/// Runs a plan from the best of some states.
+/// Runs a plan from the best of several states.
 fn run_among(
     code: &Arc<Code>,
     plan: &[KStmt],
@@ -221,7 +223,7 @@ fn run_among(
     done
 }
 
-/// The name and arguments of a call.
+/// The name and arguments of a call of a named function.
 pub(super) fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
     match &e.kind {
         ExprKind::Call { callee, args } => match &callee.kind {
@@ -232,7 +234,7 @@ pub(super) fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
     }
 }
 
-/// An argument by its name or place.
+/// Finds an argument by name or position.
 pub(super) fn argument<'a>(
     args: &'a [crate::syntax::ast::Arg],
     place: usize,

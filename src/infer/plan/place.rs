@@ -1,5 +1,5 @@
-//! Where in a plan a chain is, statement within statement: what it takes to leave and to
-//! come back.
+//! The position of a chain in its plan, as nested statements: what a checkpoint needs to
+//! resume there.
 
 use super::super::kernel::Outcome;
 use super::super::plain::Plain;
@@ -9,11 +9,11 @@ use std::sync::Arc;
 /// A statement of a body that is being run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Place {
-    /// Which one.
+    /// Its index in the body.
     pub statement: usize,
-    /// How many variables there were when it began.
+    /// The number of variables when it began.
     pub depth: usize,
-    /// How far it is.
+    /// How far it has got.
     pub doing: Doing,
 }
 
@@ -28,35 +28,35 @@ impl Place {
     }
 }
 
-/// How far a statement is.
+/// How far a statement has got.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) enum Doing {
-    /// It begins.
+    /// It is at its beginning.
     #[default]
     Begins,
-    /// A loop is at a pass.
+    /// A loop, in one of its passes.
     Loop {
         /// The pass, from 0.
         pass: u64,
-        /// Of so many.
+        /// The number of passes.
         of: u64,
         /// The step of the chain at which the loop began.
         first: u64,
     },
-    /// A loop over items is at one of them.
+    /// A loop over items, at one of them.
     Items {
         /// The item, from 0.
         item: usize,
-        /// All of them; `None` if they are more than plain data.
+        /// All items; `None` if they are not all plain data.
         all: Option<Arc<[Plain]>>,
     },
-    /// A kernel has made some of its steps.
+    /// A kernel that has made some of its steps.
     Kernel {
-        /// The arm of a `mix` that it is.
+        /// The index of its arm, if it is in a `mix`.
         arm: Option<usize>,
-        /// So many.
+        /// The number of steps made.
         steps: usize,
-        /// What they did.
+        /// What those steps did.
         done: Outcome,
     },
 }

@@ -1,4 +1,4 @@
-//! A chain at work on a plan, statement by statement.
+//! Runs a plan on a chain, statement by statement.
 
 use super::checkpoint::Checkpoint;
 use super::place::{Doing, Place};
@@ -28,18 +28,18 @@ use std::sync::atomic::Ordering;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flow {
     Next,
-    /// `stop`: the enclosing loop ends.
+    /// `stop`: ends the enclosing loop.
     Stop,
-    /// The run ends: steps or time used up, or cancelled.
+    /// Ends the run: steps or time used up, or cancelled.
     End,
 }
 
-/// A kernel that has run, what tells it from others, and what it did.
+/// A kernel that has run, the signature that identifies it, and what it did.
 pub(super) struct Instance {
     pub signature: String,
-    /// `None` if a checkpoint had it and it was not asked for since.
+    /// `None` if it comes from a checkpoint and has not been used since.
     pub kernel: Option<Box<dyn Kernel>>,
-    /// What a checkpoint knows of it, until it is asked for.
+    /// The kernel's state in the checkpoint, until it is first used.
     pub saved: Vec<u8>,
     pub stats: KernelStats,
 }
@@ -66,7 +66,8 @@ pub(super) struct Runner<'a> {
     pub trace: Trace,
     pub variables: Vec<(Arc<str>, Value)>,
     pub instances: Vec<Instance>,
-    /// By the place of a call that always means the same: its kernel.
+    /// The index of the kernel of each call whose arguments are constant, by the call's
+    /// position.
     pub calls: FxHashMap<usize, usize>,
     pub sites: Sites,
     pub recorder: Recorder,
@@ -80,16 +81,16 @@ pub(super) struct Runner<'a> {
     pub population: Population,
     pub best: Option<(f64, Vec<(u64, Constraint)>)>,
     pub draws: u64,
-    /// Proposals, those accepted and divergences up to the last draw.
+    /// Proposals, accepted proposals and divergences up to the last draw.
     pub counted: [u64; 3],
     /// The statements being run, the outermost first.
     pub path: Vec<Place>,
-    /// Where a checkpoint says to go on, the outermost first; empty once the chain is
-    /// there.
+    /// Where a checkpoint resumes, the outermost statement first; empty once the chain
+    /// has got there.
     pub way: VecDeque<Place>,
-    /// Whether the plan is done.
+    /// Whether the plan is finished.
     pub finished: bool,
-    /// The checkpoints asked for so far.
+    /// The number of checkpoints requested so far.
     pub asked: u64,
 }
 
@@ -138,12 +139,12 @@ impl<'a> Runner<'a> {
     /// Runs the plan to its end.
     ///
     /// # Errors
-    /// If the program fails, or the sink does.
+    /// If the program or the sink fails.
     pub fn run(mut self, plan: &[KStmt]) -> Result<ChainResult, ChainError> {
         if !self.finished {
             let flow = match self.body(plan) {
-                // A step that took too long is given up: draws and checkpoints from
-                // before it stay.
+                // A step that was stopped in the middle is abandoned: the draws and
+                // checkpoints before it remain.
                 Err(ChainError::Run(e)) if e.kind == FaultKind::Stopped && self.draws > 0 => {
                     self.way.clear();
                     Flow::End
@@ -161,7 +162,7 @@ impl<'a> Runner<'a> {
                 self.keep(None)?;
             }
         }
-        // What looks at the last state afterwards takes its own time.
+        // Later uses of the last state are not subject to the run's time limit.
         self.trace.set_limits(Limits { stop: Stop::default(), ..self.options.limits.clone() });
         let seconds = self.started.elapsed().as_secs_f64();
         let (steps, warmup) = (self.step - self.warmup_steps, self.warmup_steps);
@@ -188,7 +189,7 @@ impl<'a> Runner<'a> {
         Draws { key, step: self.step, substream: 0 }
     }
 
-    /// What expressions can see.
+    /// The environment of expressions.
     pub fn env(&mut self) -> PlanEnv<'_> {
         let draws = self.predictive();
         let (started, steps) = (self.started, self.step);
@@ -220,7 +221,7 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Applies the program's `freeze`.
+    /// Applies the program's `freeze` statements.
     pub fn freeze(&mut self) -> Result<(), ChainError> {
         for f in &self.code.freezes {
             let s = selector(f, &mut self.env())?;
@@ -232,8 +233,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Runs statements one after the other, from the one where a checkpoint says to go
-    /// on.
+    /// Runs statements in order, starting where a checkpoint resumes.
     pub fn body(&mut self, stmts: &[KStmt]) -> Result<Flow, ChainError> {
         let level = self.path.len();
         let mut back = self.way.pop_front();
@@ -259,14 +259,14 @@ impl<'a> Runner<'a> {
         Ok(Flow::Next)
     }
 
-    /// Says how far the present statement is.
+    /// Records how far the present statement has got.
     pub fn note(&mut self, doing: Doing) {
         if let Some(place) = self.path.last_mut() {
             place.doing = doing;
         }
     }
 
-    /// Goes back to the variables there were when the present statement began.
+    /// Drops the variables that were added since the present statement began.
     pub fn leave(&mut self) {
         let depth = self.path.last().map_or(0, |p| p.depth);
         self.variables.truncate(depth);
@@ -277,7 +277,7 @@ impl<'a> Runner<'a> {
             KStmtKind::Warmup { count, body } => self.warmup(count, body, doing),
             KStmtKind::Repeat { count, body } => self.repeat(count, body, doing),
             KStmtKind::Every { count, body } => {
-                // Going on within it, it is known to be its turn.
+                // When resuming within the body, it is known to be due.
                 if !self.way.is_empty() {
                     return self.body(body);
                 }
@@ -341,7 +341,8 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Where a loop of `count` passes is: at its first, or where a checkpoint says.
+    /// The pass, the number of passes and the first step of a loop: at its beginning, or
+    /// where a checkpoint resumes.
     pub fn passes(&mut self, count: &Expr, doing: Doing) -> Result<(u64, u64, u64), ChainError> {
         match doing {
             Doing::Loop { pass, of, first } => Ok((pass, of, first)),
@@ -368,7 +369,7 @@ impl<'a> Runner<'a> {
         Ok(Flow::Next)
     }
 
-    /// One pass of a loop.
+    /// Runs one pass of a loop.
     pub fn pass(
         &mut self,
         (i, of, first): (u64, u64, u64),
@@ -394,14 +395,14 @@ impl<'a> Runner<'a> {
         flow
     }
 
-    /// Whether somebody ended the run: its progress, whose flag is among those of the
-    /// limits, or who watches it.
+    /// Whether the run was cancelled: by its progress, whose flag is among those of the
+    /// limits, or by its callback.
     pub fn is_cancelled(&self) -> bool {
         self.options.limits.stop.is_set()
             || self.options.callback.as_ref().is_some_and(|w| w.is_over())
     }
 
-    /// Whether the run, or the warm-up, has used up what it was given.
+    /// Whether the run, or its warm-up, has used up its steps or time.
     pub fn is_over(&self) -> bool {
         if self.is_cancelled() {
             return true;
@@ -417,9 +418,9 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Hands over a checkpoint, if the sink wants any: of the present statement begun, or
-    /// as far as `doing` says. A chain whose plan holds more than plain data in its
-    /// variables has none.
+    /// Passes a checkpoint to the sink, if it takes any: at the beginning of the present
+    /// statement, or as far in it as `doing` says. A chain with variables that are not
+    /// plain data has no checkpoints.
     pub fn keep(&mut self, doing: Option<Doing>) -> Result<(), ChainError> {
         if !self.sink.takes_checkpoints() {
             return Ok(());
@@ -471,6 +472,6 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// The variables a loop keeps for `every` and `anneal`; not names a program can write.
+/// Variables of loops, read by `every` and `anneal`; programs cannot write these names.
 pub(super) const PASS: &str = "#pass";
 pub(super) const PASSES: &str = "#passes";

@@ -1,4 +1,4 @@
-//! Warm-up: loops whose draws are thrown away, in which kernels learn and the likelihood
+//! Warm-up: loops whose draws are discarded, in which kernels adapt and the likelihood
 //! may be annealed.
 
 use super::ChainError;
@@ -21,8 +21,8 @@ impl Runner<'_> {
         self.in_warmup = true;
         self.progress.warming.fetch_add(1, Ordering::Relaxed);
         let mut flow = Flow::Next;
-        // More passes than the program says only if they get somewhere: a loop without
-        // kernels would never end.
+        // More passes than the program says are made only while they make steps: a loop
+        // without kernels would never end.
         let unbounded = self.options.warmup.is_some();
         while i < passes || unbounded && (i == 0 || self.step > first) {
             flow = self.pass((i, passes, first), body)?;
@@ -73,8 +73,8 @@ impl Runner<'_> {
             Some((_, Value::Num(x))) => *x,
             _ => 0.0,
         };
-        // With a time limit, by the clock: the steps are recorded, and a replay by steps
-        // counts passes instead.
+        // Under a time limit the schedule follows the clock. The number of steps is
+        // recorded, and a replay by steps counts passes instead.
         let share = match (self.options.warmup, self.options.time) {
             (Some(n), _) => self.step as f64 / (n.max(1) as f64),
             (None, Some(t)) => {

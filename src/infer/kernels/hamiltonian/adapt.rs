@@ -1,6 +1,6 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
-//! 2014, section 3.2) and a diagonal metric from the variances of windows that double in
-//! length, as in Stan.
+//! 2014, section 3.2), and a diagonal metric from the variances over windows that double
+//! in length, as in Stan.
 
 use super::system::{self, Point, System};
 use crate::infer::state::{StateError, holds};
@@ -9,35 +9,37 @@ use crate::trace::TraceResult;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Dual averaging's constants, as in Stan.
+/// The constants of dual averaging, as in Stan.
 const GAMMA: f64 = 0.05;
 const T0: f64 = 10.0;
 const KAPPA: f64 = 0.75;
 
-/// The logarithms of the shortest and the longest step that is learnt.
+/// The logarithms of the smallest and largest adapted step size.
 const SHORTEST: f64 = -350.0;
 const LONGEST: f64 = 10.0;
 
-/// The first step is found by so many doublings, a density that is flat having no step
-/// that is too long, or by so many halvings.
+/// Bounds on the search for the first step size: a flat density has no step that is too
+/// long, so doublings are limited.
 const DOUBLINGS: u32 = 40;
 const HALVINGS: u32 = 400;
 
-/// The first states are left out of variances; then comes the first window.
+/// The number of initial states that are excluded from the variances, and the length of
+/// the first window.
 const BURN: u32 = 30;
 const WINDOW: u32 = 25;
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Adaptation {
-    /// The mean acceptance aimed at.
+    /// The target acceptance rate.
     target: f64,
     /// What the metric belongs to: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
     pub inverse_mass: Vec<f64>,
-    /// By address, what windows ended with: choices that go and come back have theirs
-    /// again, so that after warm-up the metric is a function of what choices there are.
+    /// By address, the variances from the last windows. Choices that disappear and
+    /// reappear get theirs again, so that after warm-up the metric is a function of the
+    /// set of choices.
     learnt: BTreeMap<u64, Vec<f64>>,
-    /// A step size that was given; else it is learnt.
+    /// A given step size; adapted if `None`.
     fixed: Option<f64>,
     step: f64,
     averaged: f64,
@@ -47,8 +49,8 @@ pub(super) struct Adaptation {
     seen: u32,
     window_end: u32,
     window: u32,
-    /// The states of this window, by address: choices that go and come back are counted
-    /// on.
+    /// The states of this window, by address; choices that disappear and reappear
+    /// continue to be counted.
     states: BTreeMap<u64, Moments>,
 }
 
@@ -73,8 +75,8 @@ impl Moments {
         }
     }
 
-    /// The variances, drawn towards a small one, as Stan does, for few states; one state
-    /// has none.
+    /// The variances, shrunk towards a small value if there are few states, as in Stan;
+    /// `None` for fewer than two states.
     fn variances(&self) -> Option<Vec<f64>> {
         let n = self.count;
         let variance = |s: &f64| (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
@@ -102,10 +104,10 @@ impl Adaptation {
         }
     }
 
-    /// Takes the place of one that was made the same way.
+    /// Restores the state of an adaptation with the same arguments.
     ///
     /// # Errors
-    /// If the sizes of what was read do not fit together.
+    /// If the sizes of its parts are inconsistent.
     pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
         let n = read.inverse_mass.len();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
@@ -115,7 +117,7 @@ impl Adaptation {
         Ok(())
     }
 
-    /// The step size to use now, found by trial when there is none yet.
+    /// The step size to use now, found by trial if there is none yet.
     pub fn step(
         &mut self,
         system: &mut System,
@@ -124,8 +126,8 @@ impl Adaptation {
         rng: &mut Stream,
     ) -> TraceResult<f64> {
         if system.signature() != self.signature {
-            // Step size and windows go on over all structures: where these change every
-            // few steps they would otherwise learn nothing.
+            // Step size and windows continue across changes of structure: if it changed
+            // every few steps they would otherwise never adapt.
             self.signature = system.signature().to_vec();
             self.inverse_mass = self.metric();
         }
@@ -144,7 +146,7 @@ impl Adaptation {
         self.fixed.or(Some(learnt)).filter(|s| *s > 0.0)
     }
 
-    /// Learns from a transition: its mean acceptance and where it ended.
+    /// Adapts to a transition: its mean acceptance probability and its end point.
     pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
         self.rounds += 1.0;
         let weight = 1.0 / (self.rounds + T0);
@@ -173,29 +175,32 @@ impl Adaptation {
             self.close();
             self.window = self.window.saturating_mul(2);
             self.window_end = self.seen.saturating_add(self.window);
-            // The step is learnt anew for the new metric, from about where it was.
+            // The step size is adapted again for the new metric, starting from its
+            // present value.
             self.mean_log = libm::log(10.0 * self.averaged);
             (self.bias, self.rounds) = (0.0, 0.0);
             self.step = self.averaged;
         }
     }
 
-    /// Ends a window: its variances are the metric of the choices that it saw twice.
+    /// Ends a window: its variances become the metric of the choices that it saw at least
+    /// twice.
     fn close(&mut self) {
         let seen = std::mem::take(&mut self.states);
         self.learnt.extend(seen.into_iter().filter_map(|(hash, m)| Some((hash, m.variances()?))));
         self.inverse_mass = self.metric();
     }
 
-    /// The inverse masses of the choices there are: what windows ended with, or 1.
+    /// The inverse masses of the present choices: the variances of previous windows, or 1
+    /// for those without.
     fn metric(&self) -> Vec<f64> {
         let known =
             |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
         self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect()
     }
 
-    /// Doubles or halves the step until one leapfrog step is accepted half of the time
-    /// (algorithm 4).
+    /// Doubles or halves the step size until the acceptance probability of one leapfrog
+    /// step crosses 0.8 (algorithm 4, with Stan's bound).
     fn restart(&mut self, system: &mut System, here: &Point, rng: &mut Stream) -> TraceResult<()> {
         let mut step = if self.averaged > 0.0 {
             self.averaged

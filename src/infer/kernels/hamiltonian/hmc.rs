@@ -9,16 +9,16 @@ use crate::trace::TraceResult;
 /// algorithm.
 pub type Hmc = Hamiltonian<Leaps>;
 
-/// So many leapfrog steps, accepted or rejected as a whole.
+/// A fixed number of leapfrog steps, accepted or rejected as a whole.
 #[derive(Clone, Debug)]
 pub struct Leaps(u32);
 
 impl Hmc {
-    /// The kernel for these choices, with so many leapfrog steps and a step size, or else
-    /// one that is learnt.
+    /// A kernel for these choices with `steps` leapfrog steps. The step size is adapted
+    /// if it is `None`.
     pub fn new(scope: SiteSelection, steps: u32, step: Option<f64>) -> Self {
-        // The best acceptance of long trajectories, and of Langevin steps (Roberts &
-        // Rosenthal 1998, Beskos et al. 2013).
+        // The optimal acceptance rates of Langevin steps and of long trajectories
+        // (Roberts & Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };
         Hamiltonian::along(Leaps(steps.max(1)), scope, target, step)
     }
@@ -31,8 +31,8 @@ impl Trajectory for Leaps {
 
     fn walk(&self, path: &mut Path) -> TraceResult<End> {
         let Path { system, here, step, inverse_mass, rng } = path;
-        // Of uneven length, so that no trajectory comes back to where it began again and
-        // again.
+        // A random length, so that trajectories do not keep returning to their starting
+        // point.
         let step = *step * (0.9 + 0.2 * rng.uniform());
         let mut point = system.launch(here, inverse_mass, rng);
         let energy = system::kinetic(&point, inverse_mass);

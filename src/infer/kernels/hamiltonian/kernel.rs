@@ -1,5 +1,5 @@
-//! What kernels that follow trajectories share: choices, what is summed out, adaptation,
-//! memory.
+//! The common part of kernels that follow trajectories: choices, marginalisation,
+//! adaptation and memory.
 
 use super::adapt::Adaptation;
 use super::summed::with_alternatives;
@@ -10,15 +10,15 @@ use crate::rng::Stream;
 use crate::trace::{Marginal, Selector, Trace, TraceResult};
 use std::sync::Arc;
 
-/// How a kernel goes through the space.
+/// How a kernel follows a trajectory.
 pub(super) trait Trajectory {
     fn name(&self) -> &'static str;
 
-    /// Goes from a place to another that leaves the density invariant.
+    /// Moves from one point to another by a transition that leaves the density invariant.
     fn walk(&self, path: &mut Path) -> TraceResult<End>;
 }
 
-/// What a trajectory goes by.
+/// The inputs of a trajectory.
 pub(super) struct Path<'s, 'a> {
     pub system: &'s mut System<'a>,
     pub here: &'s Point,
@@ -27,19 +27,20 @@ pub(super) struct Path<'s, 'a> {
     pub rng: &'s mut Stream,
 }
 
-/// Where a trajectory led.
+/// The end of a trajectory.
 #[derive(Default)]
 pub(super) struct End {
-    /// The place that was drawn, if it is another.
+    /// The point that was drawn, if it is a new one.
     pub to: Option<Arc<Point>>,
-    /// The mean acceptance along the way, which the step size is learnt from.
+    /// The mean acceptance probability along the trajectory, from which the step size is
+    /// adapted.
     pub acceptance: f64,
-    /// Whether the way came to where the program has no value.
+    /// Whether the trajectory reached a point where the program is undefined.
     pub failed: bool,
     pub divergent: bool,
 }
 
-/// A kernel of Hamiltonian dynamics that goes along trajectories of one kind.
+/// A kernel of Hamiltonian dynamics, with trajectories of one kind.
 #[derive(Clone, Debug)]
 pub struct Hamiltonian<T> {
     trajectory: T,
@@ -51,8 +52,8 @@ pub struct Hamiltonian<T> {
 }
 
 impl<T> Hamiltonian<T> {
-    /// For these choices: the mean acceptance aimed at, and a step size, or else one that
-    /// is learnt.
+    /// For these choices: `target` is the target acceptance rate; the step size is
+    /// adapted if it is `None`.
     pub(super) fn along(
         trajectory: T,
         scope: SiteSelection,
@@ -69,7 +70,7 @@ impl<T> Hamiltonian<T> {
         }
     }
 
-    /// The same with these finite choices summed out of the density that it sees.
+    /// The same kernel with these finite choices summed out of its density.
     #[must_use]
     pub fn summing_out(self, choices: Selector) -> Self {
         Hamiltonian {

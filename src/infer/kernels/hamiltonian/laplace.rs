@@ -5,22 +5,23 @@ use crate::rng::Stream;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
-/// Curvatures outside this range count as its ends: flat and inverted directions, which
-/// are not those of a mode, are as wide as 4.
+/// Curvatures are clamped to this range: flat and inverted directions, which a mode does
+/// not have, get a standard deviation of 4.
 const CURVATURES: (f64, f64) = (1.0 / 16.0, 1e12);
 
-/// A normal distribution in as many dimensions as its mean has.
+/// A multivariate normal distribution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Laplace {
     pub mean: Vec<f64>,
-    /// The principal axes, one after the other.
+    /// The principal axes, concatenated.
     axes: Vec<f64>,
     /// The standard deviations along them.
     spreads: Vec<f64>,
 }
 
 impl Laplace {
-    /// At a mode, with minus the second derivatives of the log density there, row by row.
+    /// The approximation at a mode; `curvature` is minus the Hessian of the log density
+    /// there, row by row.
     pub fn new(mean: Vec<f64>, curvature: &[f64]) -> Option<Laplace> {
         let n = mean.len();
         if curvature.len() != n * n || curvature.iter().any(|c| !c.is_finite()) {
@@ -47,7 +48,7 @@ impl Laplace {
         &self.axes[i * n..(i + 1) * n]
     }
 
-    /// How many standard deviations a place is off, squared.
+    /// The squared Mahalanobis distance of a point from the mean.
     pub fn distance(&self, y: &[f64]) -> f64 {
         let off = DVector::from_iterator(y.len(), y.iter().zip(&self.mean).map(|(y, m)| y - m));
         let along = |i: usize| {
@@ -56,12 +57,12 @@ impl Laplace {
         (0..self.spreads.len()).map(|i| along(i) * along(i)).sum()
     }
 
-    /// The log density at a place.
+    /// The log density at a point.
     pub fn log_density(&self, y: &[f64]) -> f64 {
         -0.5 * self.distance(y) - self.log_volume()
     }
 
-    /// A draw.
+    /// Draws a sample.
     pub fn sample(&self, rng: &mut Stream) -> Vec<f64> {
         let mut y = self.mean.clone();
         for (i, spread) in self.spreads.iter().enumerate() {
@@ -71,7 +72,7 @@ impl Laplace {
         y
     }
 
-    /// Whether the numbers are those of such a distribution; what was read may not be.
+    /// Whether the parts are consistent; those read from a checkpoint may not be.
     pub fn is_sound(&self) -> bool {
         let n = self.mean.len();
         let finite = self.mean.iter().chain(&self.axes).all(|x| x.is_finite());

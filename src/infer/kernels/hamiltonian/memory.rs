@@ -1,10 +1,10 @@
-//! What a Hamiltonian kernel keeps from step to step: the tape of the density, and places
-//! to be used again.
+//! What a Hamiltonian kernel keeps between steps: the tape of the density, and points and
+//! lists for reuse.
 //!
-//! A tape belongs to one state of a trace but for the kernel's own choices. Where other
+//! A tape is valid for one state of a trace, up to the kernel's own choices. If other
 //! kernels move the trace in between, or every step moves other choices, it has to be
-//! recorded again, which costs about as much as two gradients: where that does not pay,
-//! the kernel goes on without for a while. None of this changes a result but in the last
+//! recorded again, which costs about as much as two gradients. If that does not pay off,
+//! the kernel works without a tape for a while. This affects results only in the last
 //! bits of gradients.
 
 use super::system::Point;
@@ -13,19 +13,19 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The longest wait, in steps, before the next recording is tried.
+/// The longest wait, in steps, before the next attempt at recording.
 const LONGEST: u32 = 1024;
-/// A tape that is run fewer times than this was not worth recording.
+/// The fewest evaluations for which a tape was worth recording.
 const WORTH: u32 = 3;
 
-/// The choices of a step and the places of their coordinates.
+/// The choices of a step and the indices of their coordinates.
 #[derive(Debug)]
 pub(super) struct Layout {
-    /// All choices that were asked for, also those that do not move.
+    /// All selected choices, including those that do not move.
     asked: Vec<Target>,
     pub targets: Vec<Target>,
     ranges: Vec<Range<usize>>,
-    /// By choice: its address and how many coordinates it has.
+    /// For each choice, its address and number of coordinates.
     pub signature: Vec<(u64, usize)>,
 }
 
@@ -48,26 +48,26 @@ impl Layout {
         self.ranges.last().map_or(0, |r| r.end)
     }
 
-    /// The proposal of these coordinates, appended to a list.
+    /// Appends the proposal of these coordinates to a list.
     pub fn changes(&self, y: &[f64], out: &mut Vec<(Target, Change)>) {
         let free = |r: &Range<usize>| Change::Free(y.get(r.clone()).unwrap_or_default().to_vec());
         out.extend(self.targets.iter().copied().zip(self.ranges.iter().map(free)));
     }
 }
 
-/// What a checkpoint knows of a tape that there was.
+/// What a checkpoint records about the tape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 enum Kept {
     #[default]
     None,
-    /// One of the state the trace was in.
+    /// There was a tape of the trace's state.
     Present,
-    /// One of an earlier state.
+    /// There was a tape of an earlier state.
     Past,
 }
 
-/// How often tapes are recorded, which comes back with a checkpoint: the last bits of
-/// gradients hang on it.
+/// The state of the recording policy. It is part of checkpoints because the last bits of
+/// gradients depend on it.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Habits {
     runs: u32,
@@ -76,13 +76,14 @@ pub(super) struct Habits {
     kept: Kept,
 }
 
-/// What a kernel keeps.
+/// The data kept between steps.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     tape: Option<(Recording, Arc<Layout>)>,
-    /// How often the tape was run.
+    /// How many times the tape was evaluated.
     runs: u32,
-    /// How many recordings are left out, and how many were the last time.
+    /// The number of recordings still to be skipped, and the number skipped the last
+    /// time.
     wait: u32,
     waited: u32,
     kept: Kept,
@@ -91,7 +92,7 @@ pub(super) struct Memory {
     lists: Vec<Arc<Vec<f64>>>,
 }
 
-/// Another chain begins with nothing.
+/// A clone, for another chain, starts empty.
 impl Clone for Memory {
     fn clone(&self) -> Self {
         Memory::default()
@@ -99,7 +100,7 @@ impl Clone for Memory {
 }
 
 impl Memory {
-    /// What a checkpoint needs to know.
+    /// The state for a checkpoint.
     pub fn habits(&self, trace: &Trace) -> Habits {
         let kept = match &self.tape {
             None if self.kept == Kept::Present && !trace.is_new() => Kept::Past,
@@ -110,14 +111,14 @@ impl Memory {
         Habits { runs: self.runs, wait: self.wait, waited: self.waited, kept }
     }
 
-    /// Goes on from a checkpoint.
+    /// Restores the state of a checkpoint.
     pub fn with(habits: Habits) -> Memory {
         let Habits { runs, wait, waited, kept } = habits;
         Memory { runs, wait, waited, kept, ..Memory::default() }
     }
 
-    /// Takes up the tape of the last step, if it is still of this state and these
-    /// choices, and gives the coordinates.
+    /// Uses the tape of the last step, if it is still valid for this state and these
+    /// choices, and fills in the coordinates.
     pub fn stand(
         &mut self,
         trace: &Trace,
@@ -129,10 +130,10 @@ impl Memory {
         holds.then(|| Arc::clone(layout))
     }
 
-    /// Records a tape, if that has paid so far; false if there is none.
+    /// Records a tape, if that has paid off so far; false if there is no tape.
     pub fn record(&mut self, trace: &mut Trace, layout: &Arc<Layout>, y: &mut Vec<f64>) -> bool {
         let kept = std::mem::take(&mut self.kept);
-        // One that a checkpoint had is no new one.
+        // Re-recording a tape that a checkpoint had does not count as a new recording.
         if kept != Kept::Present || !trace.is_new() {
             if self.tape.take().is_some() || kept != Kept::None {
                 if self.runs < WORTH { self.back_off() } else { (self.wait, self.waited) = (0, 0) }
@@ -152,45 +153,46 @@ impl Memory {
         told
     }
 
-    /// Gives up a tape that cannot tell what is asked of it.
+    /// Drops a tape that cannot evaluate what is needed.
     pub fn give_up(&mut self) {
         if self.tape.take().is_some() {
             self.back_off();
         }
     }
 
-    /// The next try comes later, and ever later.
+    /// Delays the next attempt, by ever longer waits.
     fn back_off(&mut self) {
         self.waited = self.waited.saturating_mul(2).clamp(1, LONGEST);
         self.wait = self.waited;
     }
 
-    /// Goes on after a commit of these choices.
+    /// Updates the tape after a commit of these choices.
     pub fn moved(&mut self, trace: &Trace) {
         if let Some((tape, _)) = &mut self.tape {
             tape.moved(trace);
         }
     }
 
-    /// What a proposal of these coordinates would weigh; `None` if only a proposal can
-    /// tell.
+    /// The weight of a proposal of these coordinates; `None` if only a proposal can
+    /// determine it.
     pub fn weigh(&mut self, y: &[f64]) -> Option<Weight> {
         self.runs = self.runs.saturating_add(1);
         self.tape.as_mut().and_then(|(tape, _)| tape.weigh(y))
     }
 
-    /// The gradient where the tape was last run; false if it is not known.
+    /// The gradient at the last point at which the tape was evaluated; false if it is
+    /// unknown.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         self.tape.as_mut().is_some_and(|(tape, _)| tape.gradient(y, power, out))
     }
 
-    /// The log Jacobian of the state the trace is in.
+    /// The log Jacobian at the state of the trace.
     pub fn log_jacobian(&self) -> f64 {
         self.tape.as_ref().map_or(0.0, |(tape, _)| tape.log_jacobian())
     }
 
-    /// The changes that make these coordinates the state: values, where a tape knows
-    /// them, so that nothing is allocated for them.
+    /// The changes that set these coordinates: values, if a tape knows them, to avoid
+    /// allocations.
     pub fn changes(&mut self, y: &[f64], taped: bool, layout: &Layout) -> &[(Target, Change)] {
         self.changes.clear();
         match &self.tape {
@@ -200,18 +202,17 @@ impl Memory {
         &self.changes
     }
 
-    /// A place to fill in, that nothing else refers to.
+    /// A point to fill in, to which there is no other reference.
     pub fn point(&mut self) -> Arc<Point> {
         unused(&mut self.points)
     }
 
-    /// Remembers a place, so that it can be used again when nothing refers to it any
-    /// more.
+    /// Keeps a point for reuse once there is no other reference to it.
     pub fn keep(&mut self, point: &Arc<Point>) {
         self.points.push(Arc::clone(point));
     }
 
-    /// A list of these numbers.
+    /// A list of these numbers, reusing memory.
     pub fn numbers(&mut self, from: impl Iterator<Item = f64>) -> Arc<Vec<f64>> {
         let mut list = unused(&mut self.lists);
         if let Some(list) = Arc::get_mut(&mut list) {
@@ -223,7 +224,7 @@ impl Memory {
     }
 }
 
-/// One that nothing else refers to, taken out of a pool; a new one if there is none.
+/// Takes an entry without other references out of a pool, or creates one.
 fn unused<T: Default>(pool: &mut Vec<Arc<T>>) -> Arc<T> {
     match pool.iter().position(|p| Arc::strong_count(p) == 1) {
         Some(i) => pool.swap_remove(i),

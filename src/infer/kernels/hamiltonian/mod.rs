@@ -1,11 +1,11 @@
 //! Hamiltonian dynamics on the unconstrained coordinates of continuous choices.
 //!
-//! The potential is minus the log joint density and the log Jacobians of the transforms;
-//! its gradient is taken through the trace. Acceptance uses the density itself, so that a
-//! wrong or jumping gradient costs acceptance, never correctness: the leapfrog map is
-//! volume-preserving and reversible for any force that depends on position alone. A place
-//! where the program has no value, where choices appear or vanish, or where the density
-//! is 0 has infinite energy.
+//! The potential is minus the sum of the log joint density and the log Jacobians of the
+//! transforms; its gradient is computed through the trace. Acceptance uses the density
+//! itself, so that a wrong or discontinuous gradient lowers the acceptance rate, but the
+//! kernel stays correct: the leapfrog map is volume-preserving and reversible for any
+//! force that depends on position alone. A point at which the program is undefined,
+//! choices appear or vanish, or the density is 0 has infinite energy.
 
 mod adapt;
 mod hmc;
@@ -28,6 +28,5 @@ use kernel::{End, Path, Trajectory};
 use memory::Memory;
 use system::{Point, System};
 
-/// By how much the energy may be off before a trajectory counts as divergent (Stan's
-/// bound).
+/// The energy error from which a trajectory counts as divergent (Stan's bound).
 const DIVERGENT: f64 = 1000.0;

@@ -1,11 +1,11 @@
-//! `modes(sel)`: independent Metropolis-Hastings from the Laplace approximations of modes
-//! that were found before.
+//! `modes(sel)`: independence Metropolis-Hastings from the Laplace approximations of
+//! modes that were found before.
 //!
-//! The first step looks for modes. From then on the mixture of their approximations is
-//! fixed, so that proposing from it is exact whatever it misses: what it misses is only
-//! visited by other kernels. In warm-up that step also takes the chain to one of the
-//! modes, drawn by their evidence: so it begins where the mass is, and not where it
-//! happened to climb.
+//! The first step searches for modes. From then on the mixture of their approximations is
+//! fixed, so that proposing from it is exact even if modes were missed: those are visited
+//! by other kernels only. In warm-up the first step also moves the chain to one of the
+//! modes, drawn by their evidence: the chain then begins where the mass is, and not in
+//! the mode it happened to climb to.
 
 use super::laplace::Laplace;
 use super::optimize::{Past, ascend};
@@ -19,28 +19,29 @@ use crate::rng::Stream;
 use crate::trace::{Change, Constraint, Selector, Target, Trace, TraceResult};
 use serde::{Deserialize, Serialize};
 
-/// The step of the differences that curvatures are taken from.
+/// The step of the finite differences for curvatures.
 const STEP: f64 = 1e-4;
-/// Modes that are this much less likely than the best, in nats, are left out; and at most
-/// so many are kept.
+/// Modes that are this much less likely than the best, in nats, are dropped; and the most
+/// modes that are kept.
 const BEHIND: f64 = 30.0;
 const MOST: usize = 6;
-/// Climbs whose heights differ by less, in nats, and whose places by less along each
-/// coordinate, are of the same mode.
+/// Climbs belong to the same mode if their heights differ by less, in nats, and each of
+/// their coordinates by less.
 const SAME: (f64, f64) = (1e-6, 1e-2);
-/// How many steps the choices climb that climb first.
+/// The number of steps of the choices that climb first.
 const FIRST: u32 = 8;
-/// How many steps the chain climbs from a mode of surrogates towards that of the
+/// The number of steps of the chain from a mode under surrogates towards that of the
 /// observations themselves.
 const LAST: u32 = 40;
-/// The share of a run's time after which a search ends with what it has: draws need the
-/// rest.
+/// The fraction of a run's time after which a search ends with what it has: draws need
+/// the rest.
 const SEARCH: f64 = 0.75;
-/// The share of proposals that go to all modes alike: evidence is an estimate.
+/// The fraction of proposals that is divided equally among the modes, since the evidence
+/// is an estimate.
 const ALIKE: f64 = 0.1;
 
-/// A mode: values of the discrete choices, a Gaussian for the others, the log of its
-/// share.
+/// A mode: the values of the discrete choices, a Gaussian for the others, and the log of
+/// its weight.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Mode {
     discrete: Vec<Datum>,
@@ -48,11 +49,11 @@ struct Mode {
     log_share: f64,
 }
 
-/// What was found, and for which choices.
+/// The modes that were found, and for which choices.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Found {
-    /// By choice: its address, and how many free coordinates it has; none of those that
-    /// are discrete.
+    /// For each choice, its address and number of unconstrained coordinates; 0 for
+    /// discrete ones.
     signature: Vec<(u64, usize)>,
     modes: Vec<Mode>,
 }
@@ -64,14 +65,15 @@ pub struct Modes {
     tries: u32,
     keep: u32,
     steps: u32,
-    /// What climbs alone in each draw.
+    /// The choices that climb alone in each draw.
     first: Option<Registered>,
-    /// The observations whose surrogates the search goes by.
+    /// The observations whose surrogates the search uses.
     coarse: Selector,
     found: Option<Found>,
 }
 
-/// The selected choices of a state: which are discrete, and where the others are.
+/// The selected choices of a state: the values of discrete ones, and the coordinates of
+/// the others.
 struct Here {
     signature: Vec<(u64, usize)>,
     targets: Vec<Target>,
@@ -104,7 +106,7 @@ impl Here {
         Some(here)
     }
 
-    /// What leads to another place of the same choices.
+    /// The changes that lead to another point of the same choices.
     fn changes(&self, discrete: &[Datum], mut y: &[f64]) -> Vec<(Target, Change)> {
         let mut discrete = discrete.iter();
         let mut changes = Vec::with_capacity(self.targets.len());
@@ -121,7 +123,7 @@ impl Here {
 }
 
 impl Found {
-    /// The log density of proposing a place.
+    /// The log density of proposing a point.
     fn log_density(&self, discrete: &[Datum], y: &[f64]) -> f64 {
         let near = self.modes.iter().filter(|m| m.discrete == discrete);
         let logs: Vec<f64> = near.map(|m| m.log_share + m.about.log_density(y)).collect();
@@ -141,7 +143,7 @@ impl Found {
         one.or(self.modes.last())
     }
 
-    /// From modes with the logs of their evidence.
+    /// Builds the mixture from modes with the logs of their evidence.
     fn new(signature: Vec<(u64, usize)>, mut modes: Vec<Mode>) -> Found {
         let most = modes.iter().map(|m| m.log_share).fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = modes.iter().map(|m| libm::exp(m.log_share - most)).sum();
@@ -155,10 +157,10 @@ impl Found {
 
 type State = Vec<(u64, Constraint)>;
 
-/// A climb that is under way.
+/// A climb in progress.
 struct Climb {
     state: State,
-    /// Where the choices are.
+    /// The values and coordinates of the choices.
     discrete: Vec<Datum>,
     y: Vec<f64>,
     /// The log density in the unconstrained space.
@@ -171,7 +173,8 @@ impl Climb {
         Climb { state, discrete: Vec::new(), y: Vec::new(), height, past: Past::new() }
     }
 
-    /// Whether it ended where a higher one did: modes that mirror each other are as high.
+    /// Whether it ended at the same mode as a higher climb. Modes that are mirror images
+    /// have equal heights but other coordinates.
     fn is_that_of(&self, higher: &Climb) -> bool {
         higher.height - self.height < SAME.0
             && self.discrete == higher.discrete
@@ -181,8 +184,8 @@ impl Climb {
 }
 
 impl Modes {
-    /// For these choices: among so many draws from the prior, so many climb, by at most
-    /// so many steps.
+    /// For these choices: of `tries` draws from the prior, the best `keep` climb, by at
+    /// most `steps` steps.
     pub fn new(scope: SiteSelection, tries: u32, keep: u32, steps: u32) -> Self {
         Modes {
             scope: Registered::new(scope),
@@ -195,21 +198,21 @@ impl Modes {
         }
     }
 
-    /// With choices that climb alone in each draw, some steps, before draws are compared.
+    /// Adds choices that climb alone in each draw, for some steps, before draws are
+    /// compared.
     #[must_use]
     pub fn climbing_first(self, first: Option<SiteSelection>) -> Self {
         Modes { first: first.map(Registered::new), ..self }
     }
 
-    /// With observations in whose place their coarse surrogates stand while modes are
-    /// looked for.
+    /// Adds observations that are replaced by their coarse surrogates during the search.
     #[must_use]
     pub fn by_surrogates_of(self, coarse: Selector) -> Self {
         Modes { coarse, ..self }
     }
 
-    /// The likeliest of some draws of the choices; in warm-up the present state is among
-    /// them.
+    /// The draws of the choices with the highest likelihood; in warm-up the present state
+    /// is among them.
     fn starts(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Vec<Climb>> {
         let mut best = Vec::new();
         if at.adapting {
@@ -239,9 +242,9 @@ impl Modes {
         Ok(best.into_iter().map(|(state, likely)| Climb::new(state, likely)).collect())
     }
 
-    /// The ends of climbs, the highest first. Half of them go on after a quarter of the
-    /// steps, and a quarter after half of them (successive halving: Jamieson & Talwalkar
-    /// 2016).
+    /// The ends of climbs, the highest first. Half of them continue after a quarter of
+    /// the steps, and a quarter of them after half of the steps (successive halving:
+    /// Jamieson & Talwalkar 2016).
     fn tops(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Vec<Climb>> {
         let mut climbs = self.starts(trace, at)?;
         let mut gone = 0;
@@ -264,7 +267,8 @@ impl Modes {
                 (c.state, c.height) = (trace.constraints(), trace.log_joint() + log_jacobian);
             }
             if round == 0 {
-                // Where they begin is not as high as where they would have ended.
+                // Climbs that were not begun are dropped: their initial heights are not
+                // comparable.
                 climbs.truncate(climbed);
             }
             climbs.sort_by(|a, b| b.height.total_cmp(&a.height));
@@ -274,7 +278,7 @@ impl Modes {
         Ok(climbs)
     }
 
-    /// Looks for modes, and in warm-up leaves the trace in one of them.
+    /// Searches for modes, and in warm-up leaves the trace in one of them.
     fn begin(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
         let coarse = if self.coarse == Selector::Nothing {
             None
@@ -287,14 +291,14 @@ impl Modes {
         trace.propose_choices_of(&surrogate)?;
         trace.commit();
         if at.adapting {
-            // The mode is the surrogates'; the observations' own is near it.
+            // The mode is that of the surrogates; that of the observations is near it.
             let (targets, _) = self.scope.members(trace, at, &mut at.stream());
             climb(trace, &StepContext { power: 1.0, ..*at }, &targets, LAST, &mut Past::new())?;
         }
         Ok(())
     }
 
-    /// Looks for modes of a trace, and in warm-up leaves it in one of them.
+    /// Searches for modes of a trace, and in warm-up leaves it in one of them.
     fn search(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
         let at = &StepContext { power: 1.0, ..*at };
         let begun = trace.constraints();
@@ -346,7 +350,8 @@ impl Modes {
     }
 }
 
-/// Takes the continuous ones of some choices so many steps up; without a slope they stay.
+/// Moves the continuous choices among `targets` uphill by `steps` steps; without a
+/// gradient they stay.
 fn climb(
     trace: &mut Trace,
     at: &StepContext,
@@ -362,7 +367,7 @@ fn climb(
     Ok(())
 }
 
-/// The Gaussian about a mode, where the trace is.
+/// The Laplace approximation at the present state of the trace.
 fn curved(
     trace: &mut Trace,
     at: &StepContext,
@@ -434,7 +439,7 @@ impl Kernel for Modes {
         let ways =
             found.log_density(&here.discrete, &here.y) - found.log_density(&mode.discrete, &y);
         let ratio = at.tempered(&w) + w.log_jacobian - here.log_jacobian + ways;
-        // Where no mode leads, there is no way back.
+        // If no mode leads to a state, there is no reverse move.
         Ok(accept_or_reject(
             trace,
             if ratio.is_nan() { f64::NEG_INFINITY } else { ratio },

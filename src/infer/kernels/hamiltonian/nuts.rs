@@ -1,6 +1,6 @@
 //! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial
 //! sampling over the trajectory and the generalised stopping rule, checked across
-//! subtrees too (Betancourt 2017; as Stan has it).
+//! subtrees as well (Betancourt 2017; as in Stan).
 
 use super::{DIVERGENT, End, Hamiltonian, Path, Point, System, Trajectory, system};
 use crate::infer::kernel::SiteSelection;
@@ -12,18 +12,18 @@ use std::sync::Arc;
 /// The No-U-Turn sampler.
 pub type Nuts = Hamiltonian<Doubling>;
 
-/// A trajectory that doubles until it turns, at most so many times.
+/// A trajectory that doubles until it turns, at most this many times.
 #[derive(Clone, Debug)]
 pub struct Doubling(u32);
 
 impl Nuts {
-    /// The kernel for these choices; a trajectory doubles at most `max_depth` times.
+    /// A kernel for these choices; a trajectory doubles at most `max_depth` times.
     pub fn new(scope: SiteSelection, max_depth: u32) -> Self {
         Hamiltonian::along(Doubling(max_depth), scope, 0.8, None)
     }
 }
 
-/// A stretch of a trajectory, in the order in which it was made.
+/// A segment of a trajectory, in the order in which it was computed.
 struct Tree {
     first: Arc<Point>,
     last: Arc<Point>,
@@ -31,11 +31,11 @@ struct Tree {
     sum: Arc<Vec<f64>>,
     proposal: Arc<Point>,
     log_weight: f64,
-    /// Whether it turns back on itself, or diverges.
+    /// Whether it makes a U-turn or diverges.
     stop: bool,
 }
 
-/// What a transition needs besides the tree.
+/// The state of a transition beside the tree.
 struct Walk<'s, 'a> {
     system: &'s mut System<'a>,
     mass: &'s [f64],
@@ -49,7 +49,7 @@ struct Walk<'s, 'a> {
 }
 
 impl Walk<'_, '_> {
-    /// A tree of one place.
+    /// A tree of one point.
     fn leaf(&mut self, point: Arc<Point>, log_weight: f64) -> Tree {
         let sum = self.system.numbers(point.momentum.iter().copied());
         Tree {
@@ -62,7 +62,7 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// A tree of 2^depth leaps from an end; `None` when the very first leaves the space.
+    /// A tree of 2^depth leapfrog steps from an end; `None` if one of them diverges.
     fn grow(&mut self, depth: u32, from: &Point) -> TraceResult<Option<Tree>> {
         if depth == 0 {
             return self.leap(from);
@@ -93,7 +93,8 @@ impl Walk<'_, '_> {
         Ok(Some(self.leaf(point, log_weight)))
     }
 
-    /// Two stretches, the second made after the first, in the same direction of time.
+    /// Joins two segments, the second computed after the first in the same direction of
+    /// time.
     fn join(&mut self, inner: Tree, outer: Tree, proposal: Arc<Point>, log_weight: f64) -> Tree {
         let turns = turning(&inner.first, &outer.last, &inner.sum, &outer.sum)
             || turning(&inner.first, &outer.first, &inner.sum, &outer.first.momentum)
@@ -104,16 +105,16 @@ impl Walk<'_, '_> {
     }
 }
 
-/// Whether one end no longer moves along the way, whose momenta sum up to two sums
-/// together.
+/// Whether the velocity at one of the ends no longer points along the sum of the momenta,
+/// which is given as two partial sums.
 fn turning(a: &Point, b: &Point, some: &[f64], more: &[f64]) -> bool {
     let along =
         |v: &[f64]| v.iter().zip(some.iter().zip(more)).map(|(v, (s, t))| v * (s + t)).sum::<f64>();
-    // Also of NaN.
+    // Also true for NaN.
     !(along(&a.velocity) > 0.0 && along(&b.velocity) > 0.0)
 }
 
-/// The same stretch run through the other way.
+/// The same segment in reverse order.
 fn reversed(mut t: Tree) -> Tree {
     std::mem::swap(&mut t.first, &mut t.last);
     t
@@ -131,7 +132,7 @@ impl Trajectory for Doubling {
         let energy = system::kinetic(&start, mass) - here.log_density;
         let mut walk =
             Walk { system, mass, step, energy, acceptance: 0.0, leaps: 0.0, divergent: false, rng };
-        // In the order of time: `first` is the past.
+        // In order of time: `first` is the earliest point.
         let mut tree = walk.leaf(start, 0.0);
         let mut moved = false;
         for depth in 0..self.0 {
@@ -142,8 +143,8 @@ impl Trajectory for Doubling {
             if new.stop {
                 break;
             }
-            // Biased towards the new half, which keeps the target (Betancourt 2017,
-            // A.3.2).
+            // Biased towards the new half, which leaves the target invariant (Betancourt
+            // 2017, A.3.2).
             let take = walk.rng.uniform() < libm::exp(new.log_weight - tree.log_weight);
             let log_weight = log_sum_exp(&[tree.log_weight, new.log_weight]);
             let proposal = Arc::clone(if take { &new.proposal } else { &tree.proposal });
@@ -151,7 +152,7 @@ impl Trajectory for Doubling {
             tree = if forward {
                 walk.join(tree, new, proposal, log_weight)
             } else {
-                // Both as seen by someone going back in time, and turned round again.
+                // Joined in reverse order of time, and reversed again.
                 reversed(walk.join(reversed(tree), new, proposal, log_weight))
             };
             if tree.stop {

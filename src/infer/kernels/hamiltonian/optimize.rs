@@ -1,8 +1,9 @@
 //! `optimize(sel)`: climbs to a mode by L-BFGS (Nocedal & Wright 2006, algorithm 7.4)
 //! with a backtracking line search.
 //!
-//! Not a sampler: for a start, or an answer in a hurry. The mode is that of the density
-//! in the unconstrained space, where the other kernels of this family move.
+//! This is not a sampler, but provides an initial state or a quick estimate. The mode is
+//! that of the density in the unconstrained space, in which the other kernels of this
+//! family move.
 
 use super::{Memory, Point, System};
 use crate::infer::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext};
@@ -11,10 +12,10 @@ use crate::trace::{Trace, TraceResult};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// How many of the last steps the curvature is taken from.
+/// The number of previous steps from which the curvature is estimated.
 const MEMORY: usize = 8;
 
-/// Gradient ascent with curvature.
+/// Gradient ascent with estimated curvature.
 #[derive(Clone, Debug)]
 pub struct Optimize {
     scope: Registered,
@@ -29,11 +30,11 @@ pub(super) struct Pair {
     change: Vec<f64>,
 }
 
-/// The last steps of a climb, which go on counting when it is interrupted.
+/// The last steps of a climb, which remain valid if it is interrupted.
 pub(super) type Past = VecDeque<Pair>;
 
 impl Optimize {
-    /// The kernel for these choices, with at most so many steps.
+    /// A kernel for these choices, with at most `steps` steps.
     pub fn new(scope: SiteSelection, steps: u32) -> Self {
         Optimize { scope: Registered::new(scope), steps, memory: Memory::default() }
     }
@@ -43,7 +44,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The direction of ascent: the gradient times the inverse curvature of the last steps.
+/// The direction of ascent: the gradient times the inverse curvature from the last steps.
 fn direction(gradient: &[f64], past: &Past) -> Vec<f64> {
     let mut q = gradient.to_vec();
     let mut shares = Vec::with_capacity(past.len());
@@ -66,7 +67,7 @@ fn direction(gradient: &[f64], past: &Past) -> Vec<f64> {
     q
 }
 
-/// A point up along a direction that gains enough (Armijo's rule), trying ever shorter
+/// Finds a point along a direction that gains enough (Armijo's rule), with ever shorter
 /// steps.
 fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option<Arc<Point>>> {
     let slope = dot(along, &from.gradient);
@@ -82,7 +83,8 @@ fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option
     Ok(None)
 }
 
-/// The place that so many steps up from another lead to; `past` is of the steps before.
+/// Returns the point reached by at most `steps` steps uphill; `past` has the steps
+/// before.
 pub(super) fn ascend(
     system: &mut System,
     begun: &Arc<Point>,
@@ -160,15 +162,15 @@ mod tests {
     use crate::model::Model;
     use crate::trace::{Draws, Selector};
 
-    /// -2 |y|^2 has the gradient -4 y: one step along an axis shows how steep the hill is
-    /// in all directions.
+    /// -2 |y|^2 has the gradient -4 y: one step along an axis determines the curvature in
+    /// all directions.
     #[test]
     fn the_direction_leads_to_the_top_of_a_round_hill() {
         let past = VecDeque::from([Pair { step: vec![1.0, 0.0], change: vec![4.0, 0.0] }]);
         assert_eq!(direction(&[8.0, 4.0], &past), [2.0, 1.0]);
     }
 
-    /// The gradient points across a ridge, where the last steps know the way along it.
+    /// The gradient points across a ridge, while the last steps point along it.
     #[test]
     fn a_narrow_ridge_takes_few_steps() {
         let text =
@@ -186,7 +188,7 @@ mod tests {
         }
     }
 
-    /// So little curvature promises so much that no share of it leads up: then the
+    /// The curvature is so small that no fraction of the proposed step leads uphill: the
     /// gradient alone does.
     #[test]
     fn a_slope_that_is_almost_straight_is_climbed_by_its_gradient() {

@@ -1,14 +1,14 @@
-//! Densities and forces with finite choices summed out, and their draw from the
+//! Densities and gradients with finite choices summed out, and their draw from the
 //! conditional afterwards.
 //!
-//! A place is looked at until every group of choices was at each of its joint values
-//! ([`Elimination::looks`]), all groups at a value of theirs at a time. The force is the mean,
-//! over the conditional of the choices, of that of the log joint. Drawing the choices
-//! from that conditional at the end leaves the joint density of both invariant. Choices
-//! that only other values ask for (a component of a mixture that no label points at) are
-//! drawn from their prior for the time of the move, and forgotten after it. A place where
-//! other choices than those would be asked for has no density, from wherever it is
-//! reached.
+//! A point is evaluated several times ([`Elimination::looks`]), each time with every
+//! group of choices at one of its joint values, until each group has been at all of its
+//! joint values. The force is the mean of the log joint density's gradient over the
+//! conditional of the choices. Drawing the choices from that conditional at the end
+//! leaves the joint density of both invariant. Choices that exist only for other values
+//! (a component of a mixture that no label points at) are drawn from their prior for the
+//! duration of the move, and removed after it. A point that needs any further choices has
+//! no density, from wherever it is reached.
 
 use super::{Point, System};
 use crate::infer::kernel::{Outcome, StepContext, recoverable};
@@ -24,26 +24,26 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct Summed {
     marginal: Marginal,
-    /// The changes that lead back to where the system began, what was seen and the log
+    /// The changes that lead back to where the system began, and the evaluation and log
     /// density there.
     start: Vec<(Target, Change)>,
     begun: Option<View>,
     origin: f64,
-    /// What was seen last, and where.
+    /// The last evaluation, and its point.
     last: Option<(Vec<f64>, View)>,
 }
 
-/// A place with all choices that are summed out at each of their values.
+/// A point evaluated with the summed-out choices at each of their values.
 #[derive(Debug)]
 struct View {
     elimination: Arc<Elimination>,
     log_density: f64,
-    /// By group and joint value: the log probability given the place.
+    /// By group and joint value: the log probability given the point.
     conditional: Vec<Vec<f64>>,
 }
 
-/// Makes a step with all choices there that the values of what is summed out ask for, and
-/// gives it what that is.
+/// Makes a step while all choices exist that any value of the summed-out choices
+/// requires, and passes the marginalisation to it.
 pub(super) fn with_alternatives(
     (sites, moving): (Selection, Selection),
     trace: &mut Trace,
@@ -60,8 +60,8 @@ pub(super) fn with_alternatives(
 }
 
 impl System<'_> {
-    /// Sums choices out from now on, and fills in the force at the present place; false
-    /// if the density has no slope there then.
+    /// Sums choices out from now on, and fills in the force at the present point; false
+    /// if there is no finite density and gradient.
     pub(super) fn sum_out(&mut self, marginal: Marginal, point: &mut Point) -> TraceResult<bool> {
         let here = |t: &Target| Some((*t, Change::Set(self.trace.stored(*t)?)));
         let start = self.layout.targets.iter().filter_map(here).collect();
@@ -77,7 +77,7 @@ impl System<'_> {
         Ok(there)
     }
 
-    /// Goes to a place, with the groups at joint values.
+    /// Proposes a point with the groups at these joint values.
     fn put(
         &mut self,
         elimination: &Elimination,
@@ -92,7 +92,7 @@ impl System<'_> {
         Ok(w.filter(|w| w.appeared + w.vanished == 0))
     }
 
-    /// Looks at a place. `None` where there is no density.
+    /// Evaluates a point; `None` if it has no density.
     fn view(&mut self, at: &[(Target, Change)]) -> TraceResult<Option<View>> {
         let Some(summed) = &mut self.summed else { return Ok(None) };
         let known = Arc::clone(&summed.marginal.elimination);
@@ -101,7 +101,7 @@ impl System<'_> {
         {
             return Ok(Some(view));
         }
-        // What is read there may be something else.
+        // The structure at the point may be different.
         let Some(summed) = &mut self.summed else { return Ok(None) };
         match self.trace.explore(at, true, &mut summed.marginal, self.at.draws(0))? {
             Explored::Elimination(elimination) => self.look(elimination.into(), at),
@@ -109,8 +109,8 @@ impl System<'_> {
         }
     }
 
-    /// Looks at a place by sums that hold there. `None` if they do not, or if there is no
-    /// density.
+    /// Evaluates a point with an elimination that may not be valid there; `None` if it is
+    /// not, or if there is no density.
     fn look(
         &mut self,
         elimination: Arc<Elimination>,
@@ -151,9 +151,9 @@ impl System<'_> {
         Ok(log_density.is_finite().then_some(View { elimination, log_density, conditional }))
     }
 
-    /// The log density and force at a place, with the choices summed out; which of their
-    /// values is pending is of no account. What was seen there; `None` where there is no
-    /// density or no slope.
+    /// Fills in the log density and force at a point with the choices summed out,
+    /// whichever of their values are pending. Returns the evaluation; `None` if there is
+    /// no finite density or gradient.
     fn evaluate_summed(&mut self, point: &mut Point) -> TraceResult<Option<View>> {
         let at = self.memory.changes(&point.y, false, &self.layout).to_vec();
         let Some(view) = self.view(&at)? else { return Ok(None) };
@@ -164,7 +164,7 @@ impl System<'_> {
         let (elimination, layout) = (Arc::clone(&view.elimination), Arc::clone(&self.layout));
         let mut part = Vec::with_capacity(point.y.len());
         for (k, values) in elimination.looks.iter().enumerate().rev() {
-            // The last look is pending.
+            // The last evaluation is still pending.
             if k + 1 < elimination.looks.len() && self.put(&elimination, &at, values)?.is_none() {
                 return Ok(None);
             }
@@ -178,7 +178,7 @@ impl System<'_> {
             self.trace.weighted_gradient(&layout.targets, self.at.power, &weight, &mut part)?;
             point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g += p);
         }
-        // Each look has the Jacobians in it, and one is enough.
+        // Each evaluation includes the Jacobians, which count only once.
         part.clear();
         self.trace.weighted_gradient(&layout.targets, self.at.power, &|_| 0.0, &mut part)?;
         let more = elimination.looks.len() as f64 - 1.0;
@@ -186,7 +186,7 @@ impl System<'_> {
         Ok(point.gradient.iter().all(|g| g.is_finite()).then_some(view))
     }
 
-    /// Whether there is a density and a slope at a place, which are filled in.
+    /// Fills in the log density and force at a point; false if they do not exist.
     pub(super) fn goes_summed(&mut self, point: &mut Point) -> TraceResult<bool> {
         let view = self.evaluate_summed(point)?;
         let there = view.is_some();
@@ -196,8 +196,8 @@ impl System<'_> {
         Ok(there)
     }
 
-    /// Makes a place, or the one it began in, the state of the trace, with the choices
-    /// drawn from their conditional there.
+    /// Makes a point, or the initial one, the state of the trace, with the choices drawn
+    /// from their conditional there.
     pub(super) fn finish_summed(mut self, to: Option<&Point>) -> TraceResult<bool> {
         let mut rng = self.at.within(0).stream();
         let at = match (to, &mut self.summed) {
@@ -231,7 +231,7 @@ fn bits(y: &[f64]) -> impl Iterator<Item = u64> {
     y.iter().map(|x| x.to_bits())
 }
 
-/// A value drawn with these log probabilities.
+/// Draws an index with these log probabilities.
 fn draw(log: &[f64], rng: &mut Stream) -> usize {
     let probabilities: Vec<f64> = log.iter().map(|l| libm::exp(*l)).collect();
     rng.weighted(&probabilities, 1.0)

@@ -1,10 +1,8 @@
-//! The dynamical system behind a trace: positions, densities and forces, and leapfrog
-//! steps.
+//! The dynamical system of a trace: positions, densities and forces, and leapfrog steps.
 //!
-//! Densities and forces come from a tape of the trace where there is one (see
-//! [`super::memory`]), else from pending proposals and reverse passes through the trace:
-//! the same densities to the last bit. What a transition ends with is a proposal either
-//! way.
+//! Densities and forces come from a tape of the trace if there is one (see
+//! [`super::memory`]), otherwise from pending proposals and reverse passes through the
+//! trace, with bit-for-bit equal densities. A transition ends with a proposal either way.
 
 use super::memory::{Layout, Memory};
 use super::summed::Summed;
@@ -14,7 +12,7 @@ use crate::rng::Stream;
 use crate::trace::{Marginal, Target, Trace, TraceResult};
 use std::sync::Arc;
 
-/// A place with its log density and force, and how it is passed through.
+/// A position with its log density and force, and the momentum at it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Point {
     pub y: Vec<f64>,
@@ -22,29 +20,28 @@ pub(super) struct Point {
     pub momentum: Vec<f64>,
     /// The momentum times the inverse mass.
     pub velocity: Vec<f64>,
-    /// The log density in the unconstrained space, less that of the state the trace is
-    /// in.
+    /// The log density in the unconstrained space, relative to that of the trace's state.
     pub log_density: f64,
 }
 
-/// A trace as a system; proposals are pending until [`System::finish_at`].
+/// A trace as a dynamical system; proposals are pending until [`System::finish_at`].
 pub(super) struct System<'a> {
     pub(super) trace: &'a mut Trace,
     pub(super) at: &'a StepContext,
     pub(super) memory: &'a mut Memory,
     pub(super) layout: Arc<Layout>,
-    /// Whether the memory has a tape of the state the trace is in.
+    /// Whether the memory has a tape of the trace's state.
     taped: bool,
     jacobian: f64,
     pub(super) summed: Option<Summed>,
 }
 
 impl<'a> System<'a> {
-    /// The continuous ones of some choices, and where they are, with others summed out.
-    /// `None` if there are no continuous ones, or the density there has no slope.
+    /// The continuous choices among `all`, their position, and the choices to sum out.
+    /// `None` if there are no continuous choices, or the density has no gradient there.
     ///
     /// # Errors
-    /// An operation that has no derivative; choices that cannot be summed out.
+    /// If an operation has no derivative, or choices cannot be summed out.
     pub fn begin(
         trace: &'a mut Trace,
         at: &'a StepContext,
@@ -105,8 +102,8 @@ impl<'a> System<'a> {
         self.layout.dimensions()
     }
 
-    /// The addresses of the choices, and how many coordinates each has: what a metric
-    /// belongs to.
+    /// The addresses of the choices and their numbers of coordinates, which identify a
+    /// metric.
     pub fn signature(&self) -> &[(u64, usize)] {
         &self.layout.signature
     }
@@ -116,8 +113,7 @@ impl<'a> System<'a> {
         self.trace.gradient(&self.layout.targets, self.at.power, &mut point.gradient)
     }
 
-    /// The log density and force at a place that was filled in. False where there is
-    /// none.
+    /// Fills in the log density and force at a point; false if they do not exist.
     fn evaluate(&mut self, point: &mut Point) -> TraceResult<bool> {
         if point.y.iter().any(|x| !x.is_finite()) {
             return Ok(false);
@@ -142,7 +138,7 @@ impl<'a> System<'a> {
         Ok(point.gradient.iter().all(|g| g.is_finite()))
     }
 
-    /// Proposes a place: its log density, `None` where there is none.
+    /// Proposes a point and returns its log density; `None` if it has none.
     fn propose(&mut self, y: &[f64], as_values: bool) -> TraceResult<Option<f64>> {
         let changes = self.memory.changes(y, as_values, &self.layout);
         let Some(w) = recoverable(self.trace.propose(changes, self.at.draws(0)))? else {
@@ -152,7 +148,7 @@ impl<'a> System<'a> {
         Ok((w.appeared + w.vanished == 0 && log_density.is_finite()).then_some(log_density))
     }
 
-    /// The log density and force at a place. `None` where there is none.
+    /// The log density and force at a point; `None` if they do not exist.
     pub fn go(&mut self, y: impl Iterator<Item = f64>) -> TraceResult<Option<Arc<Point>>> {
         let mut shared = self.memory.point();
         let Some(point) = Arc::get_mut(&mut shared) else { return Ok(None) };
@@ -163,7 +159,7 @@ impl<'a> System<'a> {
         Ok(there.then_some(shared))
     }
 
-    /// One leapfrog step with these inverse masses.
+    /// Makes one leapfrog step with these inverse masses.
     pub fn leapfrog(
         &mut self,
         from: &Point,
@@ -187,7 +183,7 @@ impl<'a> System<'a> {
         Ok(there.then_some(shared))
     }
 
-    /// The same place with a momentum drawn for these inverse masses.
+    /// The same point with a momentum drawn for these inverse masses.
     pub fn launch(&mut self, here: &Point, inverse_mass: &[f64], rng: &mut Stream) -> Arc<Point> {
         let mut shared = self.memory.point();
         if let Some(point) = Arc::get_mut(&mut shared) {
@@ -203,13 +199,13 @@ impl<'a> System<'a> {
         shared
     }
 
-    /// A list of numbers to fill in.
+    /// A list of these numbers.
     pub fn numbers(&mut self, from: impl Iterator<Item = f64>) -> Arc<Vec<f64>> {
         self.memory.numbers(from)
     }
 
-    /// Makes a place the state of the trace, or leaves it where it was; draws what was
-    /// summed out.
+    /// Makes a point the state of the trace, or leaves the trace where it was; draws the
+    /// choices that were summed out.
     pub fn finish_at(mut self, to: Option<&Point>) -> TraceResult<bool> {
         if self.summed.is_some() {
             return self.finish_summed(to);
@@ -218,7 +214,7 @@ impl<'a> System<'a> {
             self.trace.rollback();
             return Ok(false);
         };
-        // The Jacobian does not matter any more, whether there is a density does.
+        // The value of the density no longer matters, only whether it is positive.
         let there = self.propose(&point.y, self.taped)?.is_some();
         if there {
             self.trace.commit();
