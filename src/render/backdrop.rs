@@ -5,9 +5,9 @@
 //! pieces tested there are tested again, and the difference is reported as a [`Change`].
 //! So the cost of a picture depends on what moves, not on the size of the scene.
 //!
-//! Invariant: as for [`super::layers`], contours are those of drawing everything at once,
-//! bit for bit. This relies on the depth tests being monotone, in `f64` too: a piece
-//! hidden by another mesh or at a smaller depth range stays hidden with both.
+//! Invariant: as for [`super::layers`], contours are those of a full drawing, bit for
+//! bit. This relies on the depth tests being monotone, in `f64` too: a piece hidden by
+//! another mesh or at a smaller depth range stays hidden with both.
 
 mod dynamic_mesh;
 mod static_layer;
@@ -24,10 +24,10 @@ use crate::geom::{Instance, Mesh, MeshesMark, Solid};
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
 
-/// Solids of fewer meshes are drawn at once, since each mesh is likely to have moved.
+/// Solids of fewer meshes are drawn in full, since each mesh is likely to have moved.
 const FEWEST: usize = 3;
 
-/// Limit on a backdrop's memory, in pieces; scenes of more pieces are drawn at once.
+/// Limit on a backdrop's memory, in pieces; scenes of more pieces are drawn in full.
 const MOST_PIECES: usize = 1 << 19;
 
 /// After this many drawings in which most meshes counted as moving, all of them count as

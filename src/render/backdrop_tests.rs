@@ -1,4 +1,4 @@
-//! Backdrops against drawing everything at once, bit for bit, and what they skip drawing.
+//! Backdrops against full drawings, bit for bit, and what they skip drawing.
 
 use super::*;
 use crate::geom::Affine;
@@ -198,7 +198,7 @@ fn what_is_outside_or_behind_costs_no_drawing() {
         assert_eq!(bits(&seen), bits(&wanted));
         assert!(wanted.len() > Contours::drawn(&fixed, &camera).len());
     }
-    // Drawing at once also skips meshes outside of the picture.
+    // A full drawing also skips meshes outside of the picture.
     let before = work::work();
     let lonely = Contours::drawn(&ball.placed(at(9.0, 1.0)), &camera);
     let spent = work::work() - before;

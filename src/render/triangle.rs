@@ -334,7 +334,7 @@ mod tests {
         assert_eq!(count, wanted);
     }
 
-    /// Whole, in part of the picture, and where there are bitmap.
+    /// Filled whole, in part of the picture, and at marked pixels.
     #[test]
     fn triangles_are_filled_as_by_their_runs() {
         let mut random = Uniform(3);
