@@ -47,9 +47,9 @@ impl Followed {
         }
     }
 
-    /// Draws a solid, and compares the picture and its change with everything drawn at
-    /// once. Returns whether the backdrop drew it, and whether the change continued from
-    /// the last one.
+    /// Draws a solid, and compares the picture and its change with a full drawing.
+    /// Returns whether the backdrop drew it, and whether the change continued from the
+    /// last one.
     fn check(&mut self, solid: &Solid, camera: &Camera) -> [bool; 2] {
         let Some(change) = self.backdrop.draw(solid, camera, &mut self.tools) else {
             return [false; 2];

@@ -60,7 +60,8 @@ pub enum Projection {
 /// image, up in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Position in scene units; for a parallel projection, a point of the plane of depth 0.
+    /// Position in scene units; for a parallel projection, a point of the plane of depth
+    /// 0.
     pub eye: DVec3,
     /// Unit vector to the right of the image.
     pub right: DVec3,
