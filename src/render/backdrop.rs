@@ -1,13 +1,13 @@
-//! Contours of a scene most of which stands still. The meshes that have not moved make a
-//! **backdrop**: its depth, and its pieces of contour that it does not hide itself, by
-//! the pixels that they look at. When one of the others moves, depth is composed anew
-//! where it was and is, and only the pieces that look there are looked at again; what
-//! came and went is told as a [`Change`]. So a picture costs what moves, not what is in
-//! it.
+//! Contours of a scene in which most meshes are stationary. The stationary meshes form a
+//! **backdrop**: their depth image, and the pieces of contour that they do not hide
+//! themselves, indexed by the pixels at which the pieces' visibility is tested. When
+//! another mesh moves, depth is recomposed only where that mesh was and is, only the
+//! pieces tested there are tested again, and the difference is reported as a [`Change`].
+//! So the cost of a picture depends on what moves, not on the size of the scene.
 //!
-//! Invariant: as for [`super::layers`], contours are those drawn at once, bit for bit.
-//! That rests on looks being monotone: what another mesh or a smaller depth range hides
-//! stays hidden with both, in `f64` too.
+//! Invariant: as for [`super::layers`], contours are those of a full drawing, bit for
+//! bit. This relies on the depth tests being monotone, in `f64` too: a piece hidden by
+//! another mesh or at a smaller depth range stays hidden with both.
 
 mod dynamic_mesh;
 mod static_layer;
@@ -24,49 +24,51 @@ use crate::geom::{Instance, Mesh, MeshesMark, Solid};
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
 
-/// A solid of fewer meshes is drawn at once: each is likely to have moved.
+/// Solids of fewer meshes are drawn in full, since each mesh is likely to have moved.
 const FEWEST: usize = 3;
 
-/// Memory of a backdrop, in pieces; a scene of more is drawn at once.
+/// Limit on a backdrop's memory, in pieces; scenes of more pieces are drawn in full.
 const MOST_PIECES: usize = 1 << 19;
 
-/// How many drawings later a scene of which most moved is looked at again.
+/// After this many drawings in which most meshes counted as moving, all of them count as
+/// stationary again.
 const PATIENCE: u32 = 1024;
 
-/// A drawing's contours: those of what moves, and what the rest have more and less than
-/// in the drawing before, by the same thread in the same picture.
+/// The contours of a drawing: all pieces of the moving meshes, and the difference of the
+/// stationary meshes' pieces from the previous drawing in the same picture by the same
+/// thread.
 #[derive(Debug)]
 pub struct Change {
-    /// Stands for the contours before; another one, that nobody has, where everything
-    /// came.
+    /// Identifies the previous contours. If the drawing started over, a new identity that
+    /// nobody holds; `gone` and `come` are then empty.
     pub from: Arc<()>,
-    /// Stands for the contours now.
+    /// Identifies the current contours.
     pub to: Arc<()>,
-    /// Pieces of what stands still that are no longer seen.
+    /// Pieces of stationary meshes that are no longer visible.
     pub gone: Contours,
-    /// Pieces of what stands still that were not seen before.
+    /// Pieces of stationary meshes that have become visible.
     pub come: Contours,
-    /// All pieces that are seen of what moves.
+    /// All visible pieces of the moving meshes.
     pub moving: Contours,
-    /// How many pieces are seen now.
+    /// Number of visible pieces now, of all meshes.
     pub count: usize,
 }
 
-/// A mesh of the solid, as it was drawn last.
+/// A mesh of the solid, as last drawn.
 struct Leaf {
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     moves: bool,
 }
 
-/// A list of meshes of the solid that was drawn last, and the number of its first one.
+/// A list of meshes of the last drawn solid, and the index of its first mesh.
 struct Known {
     list: MeshesMark,
     first: usize,
     count: usize,
 }
 
-/// A scene in the picture of one camera.
+/// The state of one camera's picture, kept from drawing to drawing.
 pub(super) struct Backdrop {
     camera: [u64; 17],
     lists: Vec<Known>,
@@ -75,51 +77,52 @@ pub(super) struct Backdrop {
     static_layer: Option<StaticLayer>,
     depth: Vec<f32>,
     extent: f64,
-    /// Drawings since most of it moved.
+    /// Drawings in a row in which most meshes counted as moving; see [`PATIENCE`].
     waited: u32,
     at: Arc<()>,
-    /// How many pieces are seen of what stands still, and of all.
+    /// Number of visible pieces: of the stationary meshes, and of all.
     shown: usize,
     count: usize,
-    // Kept for their memory.
+    // Scratch memory, reused.
     scratch: Layer,
     rows: Vec<f32>,
     pixels: Vec<u32>,
     areas: Vec<Area>,
-    /// By pixel of an area: whether looks there are to be made again.
+    /// By pixel of an area: whether the depth tests there must be repeated.
     again: Vec<u8>,
-    /// How many meshes there were when there were too many pieces.
+    /// Number of meshes when building last failed because of too many pieces.
     refused: Option<usize>,
 }
 
-/// A thread's scenes, the one drawn last in front.
+/// A thread's scenes, the one drawn last first.
 #[derive(Default)]
 struct Backdrops {
     scenes: Vec<Backdrop>,
     tools: Tools,
 }
 
-/// Pictures that a thread keeps a scene of: several cameras, or several sizes.
+/// Number of pictures that a thread keeps a scene for: several cameras, or several sizes.
 const PICTURES: usize = 4;
 
 thread_local! {
     static BACKDROPS: RefCell<Backdrops> = RefCell::default();
 }
 
-/// The contours of a solid most of which stands still, and with them what has changed;
-/// `None` for one that is better drawn in another way.
+/// The contours of a solid most of which is stationary; `None` if it is better drawn in
+/// another way.
 pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
     with_scene(solid, camera, |scene, tools| {
         scene.draw(solid, camera, tools).map(|_| scene.contours(camera))
     })
 }
 
-/// As [`contours`], only what has changed.
+/// As [`contours`], but returns the change only.
 pub(super) fn change(solid: &Solid, camera: &Camera) -> Option<Change> {
     with_scene(solid, camera, |scene, tools| scene.draw(solid, camera, tools))
 }
 
-/// Works on the scene in a camera's picture.
+/// Runs `work` on the scene of a camera's picture, which is made if missing. `None` for
+/// solids of few meshes.
 fn with_scene<T>(
     solid: &Solid,
     camera: &Camera,
@@ -144,7 +147,7 @@ fn with_scene<T>(
 }
 
 impl Backdrop {
-    /// Nothing drawn yet.
+    /// A backdrop without meshes; nothing is drawn yet.
     pub fn new(camera: &Camera) -> Backdrop {
         Backdrop {
             camera: camera_bits(camera),
@@ -167,8 +170,9 @@ impl Backdrop {
         }
     }
 
-    /// Brings it up to date; `None` for solids that are better drawn in another way: of
-    /// few meshes, or most of which have moved.
+    /// Updates the backdrop to a solid and returns the change. `None` if the solid is
+    /// better drawn in another way: most of its meshes have moved, or it has too many
+    /// pieces.
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<Change> {
         let count = solid.mesh_count();
         let changed = self.find_changed(solid);
@@ -231,8 +235,8 @@ impl Backdrop {
         }
         static_layer.sort_pieces(camera, extent, known)?;
         if self.dynamic.iter().any(|m| !m.now.is_whole()) {
-            // What was hidden, or did not matter, need not be so with another depth
-            // range.
+            // Layers that were skipped as hidden, or drawn inexactly where it did not
+            // matter, may not be valid at another depth range.
             let mut dynamic = self.dynamic.iter_mut().peekable();
             for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
                 if let Some(dynamic_mesh) = dynamic.next_if(|m| m.leaf == leaf) {
@@ -243,7 +247,7 @@ impl Backdrop {
         self.begin(camera)
     }
 
-    /// The contours that it shows.
+    /// Returns all visible contours, in the order of the meshes.
     pub fn contours(&self, camera: &Camera) -> Contours {
         let mut out = Contours::with_room(camera, self.count);
         let mut dynamic = self.dynamic.iter().peekable();
@@ -257,15 +261,15 @@ impl Backdrop {
         out
     }
 
-    /// Forgets what has moved.
+    /// Forgets which meshes have moved: all count as stationary again.
     fn forget(&mut self) {
         self.dynamic.clear();
         self.leaves.iter_mut().for_each(|leaf| leaf.moves = false);
         (self.static_layer, self.waited, self.refused) = (None, 0, None);
     }
 
-    /// The meshes that are not as they were drawn last; what is known of the solid
-    /// becomes that of this one.
+    /// Returns the meshes that differ from those drawn last, with their indices, and
+    /// records the meshes of this solid.
     fn find_changed<'a>(&mut self, solid: &'a Solid) -> Vec<(usize, &'a Instance)> {
         let (mut changed, mut first, mut lists) = (Vec::new(), 0, 0);
         for meshes in solid.lists() {
@@ -316,7 +320,8 @@ impl Backdrop {
         changed
     }
 
-    /// Draws all meshes, those that stand still and the others.
+    /// Draws all meshes: the stationary ones into a new static layer, each of the others
+    /// into its own layer. `None` if there are too many pieces.
     fn build(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<()> {
         let mut static_layer = StaticLayer::new(camera);
         let (whole, width) = (Area::whole(camera), camera.width as usize);
@@ -340,7 +345,7 @@ impl Backdrop {
         Some(())
     }
 
-    /// Composes the whole picture and looks at everything.
+    /// Composes the whole picture and tests all pieces.
     fn begin(&mut self, camera: &Camera) -> Option<Change> {
         let Backdrop { static_layer, dynamic, depth, extent, .. } = self;
         let static_layer = static_layer.as_mut()?;
@@ -360,7 +365,7 @@ impl Backdrop {
         Some(self.change(camera, Arc::default(), [none(), none()]))
     }
 
-    /// The change to what is there now.
+    /// The change to the current state, from the one that `from` identifies.
     fn change(&mut self, camera: &Camera, from: Arc<()>, [gone, come]: [Contours; 2]) -> Change {
         let mut moving =
             Contours::with_room(camera, self.dynamic.iter().map(|m| m.seen.len()).sum());
@@ -369,8 +374,8 @@ impl Backdrop {
         Change { from, to: self.at.clone(), gone, come, moving, count: self.count }
     }
 
-    /// Composes the picture where some have moved, and looks again where they were and
-    /// are.
+    /// Recomposes the picture where meshes have moved, and repeats the depth tests where
+    /// they were and are.
     fn step(
         &mut self,
         camera: &Camera,
@@ -421,9 +426,10 @@ impl Backdrop {
                         let lists =
                             now.iter().zip(before).zip(static_layer.iter().zip(nearest)).zip(again);
                         for (((now, before), (static_layer, nearest)), again) in lists {
-                            // Where something is so near that all looks of the backdrop end at
-                            // it, a change means nothing; where there is a mover, what is seen
-                            // may also change with the depth range.
+                            // Where both depths are nearer than `nearest`, every test of the
+                            // backdrop fails before and after, so the change does not matter.
+                            // Where a dynamic mesh is in front, results may also change with the
+                            // depth range.
                             let hidden = (now < nearest) & (before < nearest);
                             *again = u8::from(
                                 !hidden

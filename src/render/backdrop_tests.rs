@@ -1,12 +1,11 @@
-//! Backdrops against drawing everything at once, bit for bit, and what they leave
-//! undrawn.
+//! Backdrops against full drawings, bit for bit, and what they skip drawing.
 
 use super::*;
 use crate::geom::Affine;
 use crate::render::testing::{Uniform, cuboid, lathe, solid, sphere};
 use glam::{DVec3, Vec3};
 
-/// A ball, a box, an open or a closed lathe.
+/// A ball, a box, or an open or closed lathe.
 fn shape(random: &mut Uniform) -> Solid {
     let profile = [(0.5, -0.8), (0.7, -0.1), (0.4, 0.6)];
     match (random.next() * 4.0) as u32 {
@@ -23,12 +22,12 @@ fn somewhere(random: &mut Uniform, reach: f64, size: f64) -> Affine {
     Affine::new(at(reach), at(2.0), DVec3::splat(size))
 }
 
-/// One picture and what a follower of its changes has counted.
+/// A backdrop, and the pieces that a follower of its changes has collected.
 struct Followed {
     backdrop: Backdrop,
     tools: Tools,
     at: Arc<()>,
-    /// The pieces now of what stands still, in some order, by their bits.
+    /// The current pieces of the stationary meshes as bits, in some order.
     pieces: Vec<[u32; 5]>,
 }
 
@@ -48,8 +47,9 @@ impl Followed {
         }
     }
 
-    /// Draws, and holds the picture and its change against everything drawn at once.
-    /// Whether it was done by the backdrop, and by a change.
+    /// Draws a solid, and compares the picture and its change with a full drawing.
+    /// Returns whether the backdrop drew it, and whether the change continued from the
+    /// last one.
     fn check(&mut self, solid: &Solid, camera: &Camera) -> [bool; 2] {
         let Some(change) = self.backdrop.draw(solid, camera, &mut self.tools) else {
             return [false; 2];
@@ -91,7 +91,7 @@ fn backdrops_give_what_is_drawn_at_once() {
             camera.projection =
                 crate::render::Projection::Orthographic { units_per_pixel, cx: 30.0, cy: 40.0 };
         } else if round % 3 == 2 {
-            // The near plane cuts some.
+            // The near plane cuts some meshes.
             camera.eye.z = 1.4;
         }
         let count = 4 + 6 * round as usize;
@@ -103,7 +103,7 @@ fn backdrops_give_what_is_drawn_at_once() {
         let mut followers = Followed::new(&camera);
         for step in 0..60 {
             let before = solids.clone();
-            // Far, near, and out of the picture; now and then something else moves, too.
+            // Far, near, and out of the picture; now and then another mesh moves as well.
             let (k, reach) = ((random.next() * moving as f64) as usize, [0.05, 0.8, 3.0][step % 3]);
             solids[k] = shapes[k].placed(somewhere(&mut random, reach, 0.5));
             if step % 20 == 19 {
@@ -179,10 +179,10 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     assert_eq!((outside.drawn, outside.outside, outside.hidden), (0, 1, 0));
     let behind = took(at(0.0, -1.5));
     assert_eq!((behind.drawn, behind.outside, behind.hidden), (0, 0, 1));
-    // It comes out again, and is there.
+    // It moves out again, and is visible.
     assert_eq!(took(at(0.0, 1.0)).drawn, 1);
-    // Where the eye is within its reach, nobody can say that it is hidden: corners in
-    // front of the near plane are not all of it.
+    // Around the camera's position, a mesh cannot be known to be hidden: its corners
+    // beyond the near plane are not all of it.
     let beam = |x: f64| {
         cuboid(Vec3::new(0.1, 0.1, 6.0)).placed(Affine::new(
             DVec3::new(x, 0.0, 3.0),
@@ -198,7 +198,7 @@ fn what_is_outside_or_behind_costs_no_drawing() {
         assert_eq!(bits(&seen), bits(&wanted));
         assert!(wanted.len() > Contours::drawn(&fixed, &camera).len());
     }
-    // Drawn at once, too, nothing is drawn of what is outside.
+    // A full drawing also skips meshes outside of the picture.
     let before = work::work();
     let lonely = Contours::drawn(&ball.placed(at(9.0, 1.0)), &camera);
     let spent = work::work() - before;
@@ -237,8 +237,8 @@ fn odd_placements_are_as_drawn_at_once() {
 #[test]
 fn what_looks_out_from_behind_a_wall_is_seen_on_every_side() {
     let camera = Camera::default_for(64, 64);
-    // In the picture the wall reaches 15 pixels from the middle, and the ball behind it 5
-    // from its own.
+    // In the picture the wall extends 15 pixels from the middle, and the ball behind it 5
+    // pixels from its centre.
     let (wall, inside) = (cuboid(Vec3::new(1.0, 1.0, 0.2)), cuboid(Vec3::splat(0.1)));
     let fixed = Solid::group(&[wall, inside.clone(), inside]);
     let ball = sphere(16, 9);
@@ -269,14 +269,13 @@ fn what_only_the_depth_range_decides_is_told_anew_behind_what_stays_as_deep() {
     };
     let flat =
         |half: f32, x: f32, z: f32| solid(square(half, x, z).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
-    // In the middle at depth 8, and to both sides at 7, which is the least.
+    // In the middle at depth 8, and on both sides at 7, the least depth.
     let fixed = Solid::group(&[flat(0.3, 0.0, 0.0), flat(0.2, 1.6, 1.0), flat(0.2, -1.6, 1.0)]);
-    // A shield, and behind it what is farthest off: stretched, the shield stays where it
-    // is.
+    // A shield, and behind it the farthest square: stretching leaves the shield in place.
     let corners = [square(1.0, 0.0, 0.0), square(0.1, 0.0, -1.0)].concat();
     let shield = solid(corners, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
-    // Nearer than the middle by this, it hides that where 0.006 of the depth range and
-    // 1e-6 of the depth are less.
+    // The shield is nearer than the middle by this much, and hides it where 0.006 of the
+    // depth range plus 1e-6 of the depth is less.
     let nearer = 0.006 * 2.0045 + 8e-6;
     let mut followed = Followed::new(&camera);
     for (step, range) in [1.8, 2.0, 2.009, 2.0, 2.009].into_iter().enumerate() {

@@ -1,10 +1,10 @@
-//! Many scenes at once, for banks of proposals and populations, whose members do not wait
-//! for one another.
+//! Drawing many scenes at once, for banks of proposals and populations, whose members do
+//! not wait for one another.
 //!
-//! [`BatchRenderer`] is where another device would take over: what it is given are shared
-//! meshes with flat lists of vertices, what it gives back is one set of flat lists for
-//! all scenes. Invariant: a scene's contours do not depend on the others, on their order,
-//! or on the number of threads: they are those of [`Contours::of`].
+//! [`BatchRenderer`] is the interface for other devices: its input is shared meshes with
+//! flat lists of vertices, its output is one set of flat lists for all scenes. Invariant:
+//! a scene's contours do not depend on the other scenes, on their order, or on the number
+//! of threads: they are those of [`Contours::of`].
 
 use super::{Camera, Contours};
 use crate::geom::Solid;
@@ -13,20 +13,20 @@ use crate::platform::threads::Pool;
 /// A scene to be drawn.
 ///
 /// Its meshes ([`Solid::instances`]) are triangle lists: `positions` and `normals` are
-/// three `f32` a vertex without gaps, scene units, y up; `triangles` three `u32` indices
-/// each, counter-clockwise seen from outside; placements are `f64`, columns first, from
-/// the mesh's coordinates to the world's. Scenes share meshes: the same `Arc` is the same
-/// data, and a device that keeps what it was given can tell by the address as long as it
-/// holds the `Arc`.
+/// three `f32` per vertex without gaps, in scene units, y up; `triangles` are three `u32`
+/// indices each, counter-clockwise as seen from outside; placements are `f64`, column by
+/// column, from the mesh's coordinates to the world's. Scenes share meshes: the same
+/// `Arc` is the same data, so a device may cache meshes by address as long as it holds
+/// the `Arc`.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What is seen.
+    /// The solid to be drawn.
     pub solid: Solid,
-    /// By whom, at the size of the picture.
+    /// The camera, at the size of the picture.
     pub camera: Camera,
 }
 
-/// The contours of many scenes: those of scene `i` are the entries `ends[i - 1]..ends[i]`
+/// The contours of many scenes. Those of scene `i` are the entries `ends[i - 1]..ends[i]`
 /// of each list (from 0 for the first). All are `f32`, in pixels of the scene's picture,
 /// x to the right and y down, as in [`Contours`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,9 +35,9 @@ pub struct ContourBatch {
     pub x: Vec<f32>,
     /// Middle of each piece, from the top edge.
     pub y: Vec<f32>,
-    /// Unit tangent, to the right.
+    /// Unit tangent, component to the right.
     pub tx: Vec<f32>,
-    /// Unit tangent, downwards.
+    /// Unit tangent, downward component.
     pub ty: Vec<f32>,
     /// Length of each piece.
     pub length: Vec<f32>,
@@ -47,10 +47,10 @@ pub struct ContourBatch {
     pub sizes: Vec<[u32; 2]>,
 }
 
-/// Pieces of contour in some lists, borrowed.
+/// Borrowed lists of pieces of contour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourSlice<'a> {
-    /// As in [`Contours`], each of the same length.
+    /// As in [`Contours`]; all lists have the same length.
     pub x: &'a [f32],
     /// As in [`Contours`].
     pub y: &'a [f32],
@@ -77,7 +77,7 @@ impl ContourBatch {
         self.len() == 0
     }
 
-    /// The contours of a scene; none at all if there is no such scene.
+    /// The contours of a scene; empty if there is no such scene.
     pub fn scene(&self, i: usize) -> ContourSlice<'_> {
         let past = self.ends.get(i).copied().unwrap_or_default();
         let first = i.checked_sub(1).and_then(|i| self.ends.get(i)).copied().unwrap_or_default();
@@ -110,20 +110,20 @@ impl ContourBatch {
 
 /// Draws the contours of many scenes.
 pub trait BatchRenderer: Sync {
-    /// The contours of each scene, in the order given: to the bit those of
-    /// [`Contours::of`] on the processor; another device may differ by rounding, and says
-    /// by how much.
+    /// The contours of each scene, in the order given: on the CPU, those of
+    /// [`Contours::of`] bit for bit; another device may differ by rounding, and must
+    /// document by how much.
     fn contours(&self, scenes: &[Scene]) -> ContourBatch;
 }
 
-/// Draws on so many of the processor's cores.
+/// Draws on several cores of the CPU.
 pub struct Cores {
     pool: Pool,
 }
 
 impl Cores {
-    /// On so many threads (0: as many as there are cores), which stay until this is
-    /// dropped, with what they keep for drawing.
+    /// Starts a number of threads (0: one for each core). They live until this is
+    /// dropped, and so do their drawing caches.
     pub fn new(threads: usize) -> Cores {
         Cores { pool: Pool::new(threads) }
     }

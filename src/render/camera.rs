@@ -1,4 +1,5 @@
-//! The camera: where it stands, how it projects, and the same view at another image size.
+//! The camera: its position and orientation, its projection, and the same view at another
+//! image size.
 //!
 //! It is not a lens model (no distortion) and holds no exposure. Invariant of every
 //! camera made here: the axes are orthonormal and right-handed (`right x up = -forward`),
@@ -8,7 +9,7 @@
 use glam::DVec3;
 use thiserror::Error;
 
-/// Why a camera cannot be made.
+/// Why a camera cannot be constructed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CameraError {
     /// The text is not JSON.
@@ -46,9 +47,9 @@ pub enum Projection {
     Orthographic {
         /// Scene units that one pixel shows.
         units_per_pixel: f64,
-        /// The eye's pixel, from the left edge.
+        /// The camera position's pixel, from the left edge.
         cx: f64,
-        /// The eye's pixel, from the top edge.
+        /// The camera position's pixel, from the top edge.
         cy: f64,
     },
 }
@@ -59,7 +60,8 @@ pub enum Projection {
 /// image, up in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Position in scene units; for a parallel projection, a point of the plane of depth 0.
+    /// Position in scene units; for a parallel projection, a point of the plane of depth
+    /// 0.
     pub eye: DVec3,
     /// Unit vector to the right of the image.
     pub right: DVec3,
@@ -79,11 +81,12 @@ impl Camera {
     /// The longest image side in pixels.
     pub const MAX_SIDE: u32 = 16384;
 
-    /// Depth (scene units) in front of which nothing is drawn, in either projection.
+    /// The near plane: nothing at less than this depth (scene units) is drawn, in either
+    /// projection.
     pub const NEAR: f64 = 1e-3;
 
     /// The default camera: a pinhole at (0, 0, 8) looking along -z, whose longer side
-    /// shows 4.4 units at z = 0. Sides of 0 pixels count as 1, longer ones than
+    /// shows 4.4 units at z = 0. Sides of 0 pixels count as 1, sides longer than
     /// [`Camera::MAX_SIDE`] as that.
     pub fn default_for(width: u32, height: u32) -> Camera {
         let (width, height) = (width.clamp(1, Self::MAX_SIDE), height.clamp(1, Self::MAX_SIDE));
@@ -125,7 +128,7 @@ impl Camera {
     }
 
     /// The pixel position of a scene point and its depth: the distance along the viewing
-    /// axis, in scene units. At a depth of 0 or less a pinhole's position has no meaning
+    /// axis, in scene units. At a depth of 0 or less a pinhole's position is meaningless
     /// (it may be infinite or NaN).
     pub fn project(&self, point: DVec3) -> (f64, f64, f64) {
         let from = point - self.eye;
@@ -140,8 +143,8 @@ impl Camera {
         }
     }
 
-    /// The derivative by a scene point of a function of where it is in the picture, from
-    /// that by its two pixel coordinates.
+    /// The derivative of a function of a scene point's image position with respect to the
+    /// point, from that with respect to its two pixel coordinates.
     pub fn vjp_point(&self, point: DVec3, [by_x, by_y]: [f64; 2]) -> DVec3 {
         let from = point - self.eye;
         let (x, y, depth) = (from.dot(self.right), from.dot(self.up), from.dot(self.forward));
@@ -157,7 +160,7 @@ impl Camera {
         }
     }
 
-    /// The scene point at a pixel position and depth; undoes [`Camera::project`].
+    /// The scene point at a pixel position and depth; the inverse of [`Camera::project`].
     pub fn unproject(&self, x_px: f64, y_px: f64, depth: f64) -> DVec3 {
         let (x, y) = match self.projection {
             Projection::Pinhole { focal_px, cx, cy } => {

@@ -4,7 +4,8 @@
 //! (triples), `image` (width and height in pixels), `principal_point` (pixels), and
 //! `focal_px` or `units_per_pixel`. A missing `principal_point` is the image centre; a
 //! missing `position` of an orthographic camera is 8 units before the origin. Other keys
-//! are ignored. Not a general scene format. What is read is always a valid [`Camera`].
+//! are ignored. This is not a general scene format. The result is always a valid
+//! [`Camera`].
 
 use super::{Camera, CameraError, Projection};
 use glam::DVec3;
@@ -13,15 +14,15 @@ use serde_json::{Map, Value, json};
 /// Distance of an orthographic camera without a position, in scene units.
 const DEFAULT_DISTANCE: f64 = 8.0;
 
-/// Largest magnitude of any number read.
+/// Largest accepted magnitude of a number.
 const LARGEST: f64 = 1e12;
 
 impl Camera {
-    /// Reads a camera file's text.
+    /// Parses the text of a camera file.
     ///
     /// # Errors
-    /// The text is not a JSON object, or a needed key is missing or cannot be used; the
-    /// error names the key.
+    /// The text is not a JSON object, or a required key is missing or its value cannot be
+    /// used; the error names the key.
     pub fn from_json(text: &str) -> Result<Camera, CameraError> {
         let document: Value =
             serde_json::from_str(text).map_err(|e| CameraError::Json(e.to_string()))?;
@@ -70,7 +71,7 @@ impl Camera {
         Ok(Camera { eye, right, up: right.cross(forward), forward, width, height, projection })
     }
 
-    /// The camera as a JSON text that [`Camera::from_json`] reads back.
+    /// The camera as JSON text that [`Camera::from_json`] reads back.
     pub fn to_json(&self) -> String {
         let mut map = Map::new();
         let (model, key, value, cx, cy) = match self.projection {
@@ -90,7 +91,7 @@ impl Camera {
     }
 }
 
-/// The numbers of an array, all finite and of a sane size.
+/// The numbers of an array; `None` unless all are at most [`LARGEST`] in magnitude.
 fn numbers(value: &Value) -> Option<Vec<f64>> {
     value.as_array()?.iter().map(|v| v.as_f64().filter(|x| x.abs() <= LARGEST)).collect()
 }

@@ -1,8 +1,8 @@
-//! Which triangles of a mesh may show in a picture, or at its marked pixels, and drawing
-//! those.
+//! Finding the triangles of a mesh that may show in a picture, or at its marked pixels,
+//! and drawing them.
 //!
-//! Nothing is decided by branches that could not be foretold: lists are written
-//! branch-free, and triangles set up many at a time.
+//! Unpredictable branches are avoided: lists are written branch-free, and triangles are
+//! set up many at a time.
 
 use super::coverage::is_turned;
 use super::pixel_bitmap::PixelBitmap;
@@ -14,7 +14,7 @@ use super::triangle::{Plane, is_flat, keep_all, put_face};
 use crate::geom::{Patches, Topology};
 use glam::Vec4;
 
-/// The triangles of meshes that have pixels' centres between their corners, with where.
+/// The triangles of a mesh whose bounding boxes contain pixel centres, with these boxes.
 /// Reused from picture to picture.
 #[derive(Default)]
 pub(super) struct Candidates {
@@ -25,8 +25,9 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// Those of one mesh all of whose vertices are in view, but for backs that need not
-    /// be drawn; with bitmap, those that reach some.
+    /// Finds the candidates of a mesh whose vertices are all beyond the near plane,
+    /// without back faces that need not be drawn; with a set of marked pixels, only those
+    /// whose bounding boxes contain some.
     #[inline(always)]
     fn find(
         &mut self,
@@ -64,7 +65,7 @@ impl Candidates {
         }
     }
 
-    /// Adds the candidates among some triangles, of which the first one is face `first`.
+    /// Adds the candidates among some triangles, the first of which is face `first`.
     #[inline(always)]
     fn add(
         &mut self,
@@ -87,8 +88,8 @@ impl Candidates {
         }
     }
 
-    /// Each is written down, and written over unless it counts: a branch could not be
-    /// foretold.
+    /// Writes an entry that the next one overwrites unless it counts: a branch would be
+    /// unpredictable.
     #[inline(always)]
     fn put(&mut self, face: u32, extent: Extent, counts: bool) {
         if let (Some(f), Some(e)) =
@@ -99,9 +100,9 @@ impl Candidates {
         self.count += usize::from(counts);
     }
 
-    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area.
-    /// With `FACES`, `seen` gets the face of each pixel where a triangle was nearer, and
-    /// everything is wanted.
+    /// Merges a mesh's triangles into the rows of an area, keeping the nearer value. With
+    /// `FACES`, all pixels must be wanted, and `seen` gets the face at each pixel where a
+    /// triangle is nearer.
     #[inline(always)]
     pub fn fill<const FACES: bool>(
         &mut self,
@@ -153,8 +154,8 @@ impl Candidates {
                             return;
                         }
                         if let Some(least) = wanted.least(at) {
-                            // A triangle without area covers nothing, whatever its rounded
-                            // corners say.
+                            // A triangle without area covers nothing, even if its rounded corners
+                            // have an area.
                             if *flat
                                 .get_or_insert_with(|| is_flat(&vertices.corners(topology, face)))
                             {

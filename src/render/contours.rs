@@ -2,7 +2,7 @@
 //! oriented pieces.
 //!
 //! A smooth silhouette is the zero set of (interpolated vertex normal . direction to the
-//! eye) inside each face, so it moves smoothly with the pose and does not follow the
+//! camera) inside each face, so it moves smoothly with the pose and does not follow the
 //! mesh's edges. Texture and shading edges are not contours here. Invariant: the five
 //! lists have one entry per piece, all finite, positions inside the image, tangents of
 //! unit length.
@@ -16,17 +16,17 @@ use crate::geom::Solid;
 use std::cell::RefCell;
 
 /// Visible contour pieces in an image. A piece's object side lies to the right of its
-/// tangent as seen in the image (outward is `(ty, -tx)`); creases that show both their
-/// faces, and boundaries, have an arbitrary sense.
+/// tangent as seen in the image (outward is `(ty, -tx)`); creases with both faces
+/// visible, and boundaries, have an arbitrary orientation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contours {
     /// Middle of each piece, pixels from the left edge.
     pub x: Vec<f32>,
     /// Middle of each piece, pixels from the top edge.
     pub y: Vec<f32>,
-    /// Unit tangent, to the right.
+    /// Unit tangent, component to the right.
     pub tx: Vec<f32>,
-    /// Unit tangent, downwards.
+    /// Unit tangent, downward component.
     pub ty: Vec<f32>,
     /// Length of each piece in pixels, at most 1.5.
     pub length: Vec<f32>,
@@ -45,7 +45,7 @@ struct Scratch {
     /// Pieces, hidden or not.
     pieces: Vec<Piece>,
     hidden: Vec<bool>,
-    /// Number of pieces seen the last time.
+    /// Number of visible pieces the last time.
     found: usize,
 }
 
@@ -54,23 +54,22 @@ thread_local! {
 }
 
 impl Contours {
-    /// The contours of a solid, seen in a camera's image. Draws its own depth image; of a
-    /// solid of several meshes, only what this thread has not drawn lately.
+    /// The contours of a solid in a camera's image. Draws its own depth image; for a
+    /// solid of several meshes, only what this thread has not drawn recently.
     pub fn of(solid: &Solid, camera: &Camera) -> Contours {
         backdrop::contours(solid, camera)
             .or_else(|| layers::contours(solid, camera))
             .unwrap_or_else(|| Contours::drawn(solid, camera))
     }
 
-    /// As [`Contours::of`], everything drawn anew.
+    /// As [`Contours::of`], but draws everything.
     pub(super) fn drawn(solid: &Solid, camera: &Camera) -> Contours {
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
             hidden.clear();
             hidden.resize(pieces.len(), true);
-            // Most pieces are seen by their first look: only the others take a second
-            // one.
+            // Most pieces pass their first test: only the others need the second one.
             for side in 0..2 {
                 let pixels = || {
                     hidden
@@ -101,8 +100,8 @@ impl Contours {
         })
     }
 
-    /// As [`Contours::of`], with the depth image of the same solid and camera drawn
-    /// before.
+    /// As [`Contours::of`], with the depth image of the same solid and camera already
+    /// drawn.
     pub(super) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
@@ -113,14 +112,14 @@ impl Contours {
         })
     }
 
-    /// No pieces yet, and room for about as many as were `found` the last time.
+    /// No pieces yet, with room for about as many as were `found` the last time.
     pub(super) fn with_room(camera: &Camera, found: usize) -> Contours {
         let room = || Vec::with_capacity(found + found / 8 + 16);
         let (width, height) = (camera.width, camera.height);
         Contours { x: room(), y: room(), tx: room(), ty: room(), length: room(), width, height }
     }
 
-    /// Adds a piece that is seen.
+    /// Adds a visible piece.
     #[inline]
     pub(super) fn push(&mut self, piece: &Piece) {
         self.x.push(piece.x);
@@ -150,7 +149,7 @@ impl Contours {
         self.x.len()
     }
 
-    /// Whether nothing is in view.
+    /// Whether there are no pieces.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }
@@ -169,7 +168,7 @@ fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
 }
 
 impl Scratch {
-    /// Projects a solid and finds its pieces of contour, hidden or not.
+    /// Projects a solid and extracts its pieces of contour, hidden or not.
     fn trace(&mut self, solid: &Solid, camera: &Camera) -> DepthRange {
         work::count(|work| work.whole += 1);
         let range = project(solid, camera, &mut self.projected);
@@ -196,7 +195,8 @@ impl Scratch {
     }
 }
 
-/// The contours of the pieces that are seen, where there were so many before.
+/// The contours of the visible pieces; `found` is their number the last time, and is
+/// updated.
 fn seen<'a>(
     pieces: impl Iterator<Item = &'a Piece>,
     camera: &Camera,

@@ -102,7 +102,7 @@ fn a_body_in_front_hides_contours() {
     let alone = Contours::of(&large, &camera).total_length();
     let both = Contours::of(&Solid::group(&[small.clone(), large.clone()]), &camera).total_length();
     assert!((both - alone).abs() < 1.0);
-    // In front of it, the small one's outline shows in full.
+    // In front, the small one's outline is visible in full.
     let small = small.placed(place([0.0, 0.0, 3.0], [0.0; 3], 1.0));
     let wanted = alone + Contours::of(&small, &camera).total_length();
     let both = Contours::of(&Solid::group(&[small, large]), &camera).total_length();

@@ -1,23 +1,24 @@
 //! Which pixels a triangle covers, exactly.
 //!
-//! Corners are rounded to 1/1024 of a pixel and edges worked out in integers, so
+//! Corners are rounded to 1/1024 of a pixel and edge functions evaluated in integers, so
 //! triangles that share an edge neither overlap nor leave gaps, at any size: a pixel
-//! belongs to a triangle when its centre is inside, centres on an edge go to the triangle
-//! to the right of or below it (the top-left rule). Any triangle is told here, by runs;
-//! small ones of whole meshes are told by [`super::simd_raster`].
+//! belongs to a triangle if its centre is inside, and centres on an edge go to the
+//! triangle to the right of or below it (the top-left rule). This module handles any
+//! triangle, by runs; [`super::simd_raster`] handles small ones of meshes that the near
+//! plane does not cut.
 
 use super::crossing::{Crossing, Int};
 use super::place::{BITS, Extent, Place, UNIT, is_near};
 use super::project::Point;
 
-/// Corners are kept inside this, in units.
+/// Corner coordinates are clamped to this, in units.
 const FARTHEST: i64 = 1 << 60;
-/// The pixels of a triangle.
+/// The pixels that a triangle covers.
 pub(super) struct Coverage {
     places: [Place; 3],
-    /// Whether they lie clockwise as seen in the image.
+    /// Whether the corners are clockwise as seen in the image.
     clockwise: bool,
-    /// Columns and rows, from the first one to that past the last one.
+    /// Columns and rows, each from the first to one past the last.
     pub columns: [usize; 2],
     pub rows: [usize; 2],
 }
@@ -28,20 +29,20 @@ fn centre(pixel: usize) -> i32 {
     (pixel as i32) << BITS
 }
 
-/// A corner in units, also where its place cannot hold it.
+/// A corner in units, even if its rounded position was clamped.
 fn units(place: Place, point: &Point) -> [i64; 2] {
     let [x, y, ..] = place.to_array();
     if is_near(place) {
         return [x, y].map(|v| (v * UNIT as f32) as i64);
     }
-    // In single precision, which is all that is kept of most points.
+    // In single precision, in which most points are stored.
     [point.x, point.y].map(|v| {
         let v = (f64::from(v as f32) - 0.5) * f64::from(UNIT);
         ((v + if v < 0.0 { -0.5 } else { 0.5 }) as i64).clamp(-FARTHEST, FARTHEST)
     })
 }
 
-/// Which way round near places lie in the image: above 0 clockwise, below
+/// Orientation of near positions in the image: positive for clockwise, negative for
 /// counter-clockwise, 0 without area.
 #[inline(always)]
 fn turn([a, b, c]: [Place; 3]) -> f64 {
@@ -51,14 +52,14 @@ fn turn([a, b, c]: [Place; 3]) -> f64 {
     b[0] * c[1] - b[1] * c[0]
 }
 
-/// The same for places of which some are not near.
+/// The same for positions of which some were clamped.
 #[inline(never)]
 fn far_turn(places: &[Place; 3], points: &[Point; 3]) -> f64 {
     let [a, b, c] = std::array::from_fn(|i| units(places[i], &points[i]).map(i128::from));
     ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum() as f64
 }
 
-/// Whether corners are known to turn that way, as [`Coverage::new`] has it.
+/// Whether corners are known to have the orientation `back`, as in [`Coverage::new`].
 #[inline(always)]
 pub(super) fn is_turned(places: [Place; 3], back: f64) -> bool {
     let [a, b, c] = places;
@@ -66,9 +67,9 @@ pub(super) fn is_turned(places: [Place; 3], back: f64) -> bool {
 }
 
 impl Coverage {
-    /// `None` when there are no pixels. With `back`, also when it turns that way:
-    /// clockwise in the image if above 0, the other way if below. The corners as they
-    /// are, `points`, count only where they are far out.
+    /// `None` for a triangle without area, or with the orientation `back`: clockwise in
+    /// the image if positive, counter-clockwise if negative, neither if 0. The unrounded
+    /// corners, `points`, are used only if a rounded one was clamped.
     #[inline(always)]
     pub fn new(
         places: [Place; 3],
@@ -86,28 +87,28 @@ impl Coverage {
         Some(Coverage { places, clockwise: turn > 0.0, columns, rows })
     }
 
-    /// Edges as functions that are not negative inside: value at a pixel's centre, change
-    /// by column, change by row.
+    /// Edge functions, which are not negative inside: value at a pixel's centre, change
+    /// per column, change per row.
     #[inline(always)]
     fn edges<N: Int>(&self, corners: [[N; 2]; 3], [x, y]: [N; 2]) -> [[N; 3]; 3] {
         let (zero, one, unit) = (N::from(0), N::from(1), N::from(UNIT));
-        // Counter-clockwise, every edge runs the other way. No branches: they could not
-        // be foretold.
+        // A counter-clockwise triangle's edges run the other way. Branch-free, since a
+        // branch would be unpredictable.
         let way = N::from(2 * i32::from(self.clockwise) - 1);
         std::array::from_fn(|i| {
             let (p, q) = (corners[i], corners[(i + 1) % 3]);
             let (dx, dy) = ((q[0] - p[0]) * way, (q[1] - p[1]) * way);
-            // Left and top edges have the centres on them.
+            // Centres on left and top edges count as inside.
             let has = (dy < zero) | ((dy == zero) & (dx > zero));
             let at = dx * (y - p[1]) - dy * (x - p[0]) + N::from(i32::from(has)) - one;
             [at, (zero - dy) * unit, dx * unit]
         })
     }
 
-    /// Calls `draw` for every row's run of pixels: row, first column, the column past the
-    /// last one.
+    /// Calls `draw` for every row's run of pixels: row, first column, one past the last
+    /// column.
     pub fn runs(&self, points: &[Point; 3], draw: impl FnMut(usize, usize, usize)) {
-        // Products of two differences must fit.
+        // Products of two differences must fit into the integer type.
         let corners: [[i64; 2]; 3] = std::array::from_fn(|i| units(self.places[i], &points[i]));
         let near = corners.as_flattened().iter().all(|v| v.abs() < 1 << 29);
         if near {

@@ -1,9 +1,9 @@
-//! Where the edges of a triangle cross rows of pixels, in whole numbers and without a
-//! division for each row.
+//! Where the edges of a triangle cross rows of pixels, in integers and without a division
+//! for each row.
 
 use std::cmp::Ordering;
 
-/// Whole numbers of some width.
+/// Integers of some width.
 pub(super) trait Int:
     Copy
     + Ord
@@ -15,7 +15,7 @@ pub(super) trait Int:
     /// The quotient by a positive number, rounded down, and the remainder.
     fn divided(self, by: Self) -> (Self, Self);
 
-    /// As an index; it is one.
+    /// Converts to an index; the number must be a valid one.
     fn index(self) -> usize;
 }
 
@@ -35,13 +35,13 @@ macro_rules! int {
 
 int!(i32, i64, i128);
 
-/// Where an edge crosses a row, kept by quotient and remainder so that rows need no
+/// Where an edge crosses a row, kept as quotient and remainder so that rows need no
 /// division.
 pub(super) struct Crossing<N> {
-    /// Which side is inside: to the right (1), to the left (-1), or one of both whole
-    /// rows (0).
+    /// Which side is inside: the right (1), the left (-1), or the whole row or none of it
+    /// (0).
     side: i32,
-    /// The edge's function where the row begins, divided by its change from column to
+    /// The edge function where the row begins, divided by the magnitude of its change per
     /// column, which is `by`.
     at: (N, N),
     per_row: (N, N),
@@ -49,8 +49,8 @@ pub(super) struct Crossing<N> {
 }
 
 impl<N: Int> Crossing<N> {
-    /// Of an edge's function: value where the first row begins, change by column, change
-    /// by row.
+    /// From an edge function: value where the first row begins, change per column, change
+    /// per row.
     pub fn new([at, by_column, by_row]: [N; 3]) -> Crossing<N> {
         let zero = N::from(0);
         let (side, by) = match by_column.cmp(&zero) {
@@ -61,7 +61,7 @@ impl<N: Int> Crossing<N> {
         Crossing { side, at: at.divided(by), per_row: by_row.divided(by), by }
     }
 
-    /// Keeps of a row's columns those inside, and goes on to the next row.
+    /// Narrows a row's columns to those inside, and advances to the next row.
     pub fn narrow(&mut self, from: &mut N, to: &mut N) {
         let (zero, one) = (N::from(0), N::from(1));
         match self.side {

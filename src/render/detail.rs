@@ -1,24 +1,24 @@
-//! How fine a mesh must be in a picture: the coarsest version that shows every vertex
-//! within so many pixels of where it is.
+//! The level of detail of a mesh in a picture: the coarsest version that shows every
+//! vertex within a given number of pixels of its true position.
 //!
 //! The choice depends on the solid, the camera and that number alone. Meshes that reach
-//! behind the eye, or have no coarser versions, stay as they are.
+//! behind the camera, or have no coarser versions, stay unchanged.
 
 use super::{Camera, Projection};
 use crate::geom::{Coarse, Instance, Solid};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// A solid as a picture shows it.
+/// A solid as shown in a picture.
 pub(super) struct Drawn {
-    /// It, some of its meshes coarser.
+    /// The solid, with some of its meshes replaced by coarser ones.
     pub solid: Solid,
     coarse: Vec<Option<Arc<Coarse>>>,
 }
 
 impl Drawn {
-    /// The solid, nowhere off by more than `detail` pixels; 0 (or less, or NaN) is the
-    /// solid itself.
+    /// The solid, nowhere off by more than `detail` pixels; 0 (or less, or NaN) leaves it
+    /// unchanged.
     pub fn new(solid: &Solid, camera: &Camera, detail: f64) -> Drawn {
         if detail <= 0.0 || detail.is_nan() {
             return Drawn { solid: solid.clone(), coarse: Vec::new() };
@@ -35,8 +35,8 @@ impl Drawn {
         Drawn { solid: Solid::of(solid.instances().iter().zip(&coarse).map(one).collect()), coarse }
     }
 
-    /// From derivatives by the vertices of what is drawn to those by the solid's own: 0
-    /// for those that are not drawn.
+    /// Maps derivatives with respect to the vertices of what is drawn to those with
+    /// respect to the solid's own vertices: 0 for vertices that are not drawn.
     pub fn by_vertices_of(&self, solid: &Solid, by_vertex: Vec<DVec3>) -> Vec<DVec3> {
         if self.coarse.is_empty() {
             return by_vertex;
@@ -59,16 +59,16 @@ impl Drawn {
     }
 }
 
-/// How far (the mesh's units) a vertex of an instance may be from where it is to be off
-/// by so many pixels at most, wherever in the picture it is and whichever way; `None` for
-/// one that reaches behind the eye.
+/// How far, in the mesh's units, a vertex of an instance may be from its true position so
+/// that it is off by at most `pixels` pixels, anywhere in the picture and in any
+/// direction; `None` for an instance that reaches behind the camera.
 fn allowed(instance: &Instance, camera: &Camera, pixels: f64) -> Option<f64> {
     let (centre, radius) = instance.ball()?;
     let nearest = (centre - camera.eye).dot(camera.forward) - radius;
     let most = match camera.projection {
         Projection::Pinhole { focal_px, cx, cy } => {
-            // Towards the corners of a picture what moves along the line of sight's axis
-            // moves in the picture, too.
+            // Towards the corners of a picture, motion along the camera's axis also moves
+            // a point in the picture.
             let side = |c: f64, size: u32| c.abs().max((f64::from(size) - c).abs());
             let slant = side(cx, camera.width).hypot(side(cy, camera.height)) / focal_px;
             focal_px / nearest * (1.0 + slant * slant).sqrt()
@@ -86,7 +86,7 @@ mod tests {
     use crate::render::testing::lathe;
     use crate::render::{Channels, Contours, Frame, View};
 
-    /// A lathe, a mesh as from a file, and a thing without coarser versions.
+    /// A lathe, a mesh as if from a file, and a solid without coarser versions.
     fn group() -> Solid {
         let y: Vec<f64> = (0..25).map(|i| f64::from(i) / 12.0 - 1.0).collect();
         let r = y.iter().map(|y| 0.5 + 0.1 * libm::sin(5.0 * y)).collect();
@@ -123,7 +123,7 @@ mod tests {
             near[0] < triangles(&solid)[0] && far[0] < near[0] && far[1] < triangles(&solid)[1]
         );
         assert_eq!(far[2], triangles(&solid)[2], "nothing is known about this one");
-        // Around the eye nothing is made coarser.
+        // Meshes around the camera are not made coarser.
         assert_eq!(shown(40.0, 1.0), triangles(&solid));
         let parallel = Camera {
             projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 64.0, cy: 64.0 },
@@ -180,8 +180,8 @@ mod tests {
             let plain = contours.vjp(&drawn.solid, &camera, &by);
             let sum = |all: &[DVec3]| all.iter().map(|g| g.length_squared()).sum::<f64>();
             assert!(sum(&found) > 0.0 && (sum(&found) - sum(&plain)).abs() < 1e-9 * sum(&plain));
-            // Turned round the middle of the picture, the same pieces go round it, as do
-            // the vertices that they come from.
+            // When the solid rotates about the middle of the picture, so do the pieces
+            // and the vertices that they come from.
             let (cx, cy) = (48.0, 48.0);
             let along = |(p, g): (DVec3, &DVec3)| {
                 let from = p - camera.eye;

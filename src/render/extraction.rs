@@ -1,9 +1,9 @@
 //! The pieces of contour of one mesh, hidden or not: silhouettes, creases and boundaries,
-//! cut to the image.
+//! clipped to the image.
 //!
-//! It knows neither the other meshes of the solid nor the depth image; `visibility` says
-//! which pieces are seen. Invariant: every piece is finite, inside the image, at most 1.5
-//! pixels long, and a function of mesh, placement and camera alone.
+//! The other meshes of the solid and the depth image are not used; `visibility` decides
+//! which pieces are visible. Invariant: every piece is finite, inside the image, at most
+//! 1.5 pixels long, and a function of mesh, placement and camera alone.
 
 use super::Camera;
 use super::project::{Fronts, Lens, Placement, Point, Vertices, beyond_near};
@@ -12,37 +12,38 @@ use super::simd::vectorised;
 use super::visibility::{Image, Look, Piece};
 use crate::geom::{Edge, Mesh};
 
-/// Whether a point is in view.
+/// Whether a point is usable and beyond the near plane.
 fn usable(p: &Point) -> bool {
     p.nearness < f64::INFINITY
 }
 
-/// Where on the surface a piece comes from: a share of a segment between two points of a
-/// face or edge. What silhouettes do besides moving with these points is said in
-/// [`super::silhouette_derivative`].
+/// Where on the surface a piece comes from: a fraction of a segment between two points of
+/// a face or edge. [`super::silhouette_derivative`] describes how silhouettes move
+/// besides following these points.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Origin {
-    /// Vertices of the mesh; of an edge, its second one twice.
+    /// Vertices of the mesh; for an edge, the second one twice.
     pub corners: [u32; 3],
-    /// The segment's ends, as shares of the corners.
+    /// The segment's ends, as weights of the corners.
     pub ends: [[f64; 3]; 2],
-    /// The piece's middle on the segment's image, 0 at the first end and 1 at the second.
+    /// The position of the piece's middle on the segment's image, 0 at the first end and
+    /// 1 at the second.
     pub at: f64,
-    /// Its share of the segment's image.
+    /// The fraction of the segment's image that the piece covers.
     pub share: f64,
     /// Whether the piece's tangent goes from the segment's first end to its second.
     pub forward: bool,
 }
 
-/// What tracing needs room for. Reused from mesh to mesh.
+/// Scratch memory for the extraction. Reused from mesh to mesh.
 #[derive(Default)]
 pub(super) struct Room {
     fronts: Fronts,
     crossed: Crossed,
 }
 
-/// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices`
-/// are its own in the image.
+/// Calls `out` for every piece of a mesh, in the order of its faces and then its edges.
+/// `vertices` are the mesh's own in the image.
 pub(super) fn extract_mesh(
     mesh: &Mesh,
     placement: &Placement,
@@ -56,7 +57,7 @@ pub(super) fn extract_mesh(
     fronts.find(mesh, placement);
     let lens = Lens::new(camera);
     let mut tracer = Extractor { mesh, placement, vertices, open: true, lens, image, size, out };
-    // Through holes too small to be seen nothing is seen.
+    // Nothing can be seen through holes that are too small to be visible.
     let hole =
         |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
     tracer.open = mesh.topology.edges.open() && mesh.topology.edges.lines().any(hole);
@@ -72,11 +73,11 @@ pub(super) fn extract_mesh(
     tracer.edges();
 }
 
-/// Lines of edges, holes say, that are less than this high and wide together, in pixels,
-/// are left out.
+/// Lines of edges, such as the rims of holes, are left out if their width plus height is
+/// less than this, in pixels.
 const SPECK: f32 = 0.1;
 
-/// The length in pixels from which on segments are divided.
+/// Segments of this length or longer, in pixels, are divided.
 const LONGEST: f64 = 1.5;
 
 /// A segment's corners and ends, as in [`Origin`].
@@ -86,7 +87,8 @@ struct Extractor<'a, F> {
     mesh: &'a Mesh,
     placement: &'a Placement,
     vertices: &'a Vertices<'a>,
-    /// Whether the mesh has boundaries that can be seen, so that insides of faces may be.
+    /// Whether the mesh has visible boundaries, so that the insides of faces may be
+    /// visible.
     open: bool,
     lens: Lens,
     image: Image,
@@ -96,7 +98,7 @@ struct Extractor<'a, F> {
 }
 
 impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
-    /// Pieces of some silhouettes.
+    /// Makes the pieces of a batch of silhouettes.
     #[inline(always)]
     fn silhouettes(&mut self, batch: &silhouette::Batch, count: usize) {
         for i in 0..count.min(silhouette::MOST) {
@@ -113,7 +115,7 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
             };
             if length < LONGEST && self.inside(&a) && self.inside(&b) && batch.depth[i].is_finite()
             {
-                // Nearly all are one piece.
+                // Nearly all segments are a single piece.
                 let piece = self.image.piece(middle, batch.depth[i], tangent, length, &look, false);
                 let (corners, ends) = (batch.corners[i], batch.weights(i));
                 let forward = (b.x - a.x) * tangent[0] + (b.y - a.y) * tangent[1] > 0.0;
@@ -132,7 +134,7 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         }
     }
 
-    /// Pieces of creases and boundaries.
+    /// Makes the pieces of creases and boundaries.
     fn edges(&mut self) {
         for line in self.mesh.topology.edges.lines() {
             if !self.is_speck(line) {
@@ -146,7 +148,7 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         self.vertices.whole && self.vertices.span(line.iter().flat_map(|e| e.vertices)) < SPECK
     }
 
-    /// A crease or boundary edge.
+    /// Makes the pieces of a crease or boundary edge.
     fn edge(&mut self, vertices: [u32; 2], faces: [u32; 2]) {
         let Extractor { mesh, placement, vertices: points, open, .. } = *self;
         let [Some(from), Some(to)] = vertices.map(|v| mesh.positions.get(v as usize)) else {
@@ -165,8 +167,8 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         let (mut any_front, mut side) = (false, 0.0f64);
         for face in faces {
             let Some(face) = mesh.topology.triangles.get(face as usize) else { continue };
-            // The corner off the edge; the vertices of a crease are split, so positions
-            // are compared.
+            // The corner opposite to the edge; the vertices of a crease are split, so
+            // positions are compared.
             let opposite = face
                 .iter()
                 .find(|&&v| mesh.positions.get(v as usize).is_some_and(|p| p != from && p != to));
@@ -207,7 +209,7 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         }
     }
 
-    /// A difference of nearness at a point as a difference of depth, at least 0.
+    /// Converts a difference of nearness at a point to a difference of depth, at least 0.
     fn in_depth(&self, nearness: f64, at: &Point) -> f64 {
         let depth =
             if self.lens.pinhole { nearness / (at.nearness * at.nearness) } else { nearness };
@@ -220,7 +222,7 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         p.x >= 0.0 && p.y >= 0.0 && p.x <= self.size[0] && p.y <= self.size[1]
     }
 
-    /// Clips a segment of some length to the image and divides it.
+    /// Clips a segment to the image and divides it into pieces.
     #[allow(clippy::too_many_arguments)]
     fn cut(
         &mut self,

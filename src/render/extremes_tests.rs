@@ -1,5 +1,5 @@
-//! Triangles no mesh should have, pictures with and without wide instructions, and depth
-//! at a few pixels against depth at all.
+//! Degenerate triangles, pictures with and without wide instructions, and depth at a few
+//! pixels against the full depth image.
 
 use super::simd::portable;
 use super::testing::{Uniform, cuboid, lathe, solid, sphere};
@@ -22,7 +22,7 @@ fn camera(random: &mut Uniform, round: usize) -> Camera {
             camera.projection =
                 Projection::Orthographic { units_per_pixel: 0.03, cx: 40.0, cy: 50.0 }
         }
-        // The near plane cuts some.
+        // The near plane cuts some meshes.
         1 => camera.eye.z = random.between(-0.5, 1.5),
         _ => {}
     }
@@ -86,7 +86,7 @@ fn depth_at_a_few_pixels_is_depth_at_all() {
     assert!(pieces > 20_000, "{pieces}");
 }
 
-/// A mesh as it is, whatever its numbers.
+/// A mesh without any checks of its numbers.
 fn raw(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Solid {
     let normals = vec![Vec3::Z; positions.len()];
     let topology = Topology {
@@ -109,7 +109,7 @@ fn triangles_that_are_none_leave_no_trace() {
         assert!(plain.mask().filter(|m| *m).count() > 300);
         let positions: Vec<Vec3> = good.iter().copied().chain(odd).collect();
         let mut triangles = vec![[0, 1, 2]];
-        // Corners that cannot be used, points, lines, and vertices that are not there.
+        // Unusable corners, points, lines, and vertices that do not exist.
         triangles.extend((3..7).flat_map(|v| [[v, 0, 1], [1, v, 2], [v, v, v]]));
         triangles.extend([[0, 7, 8], [7, 8, 1], [0, 9, 1], [0, 1, 99], [u32::MAX, 1, 2]]);
         let frame = Frame::render(&raw(positions.clone(), triangles.clone()), &camera, channels);
@@ -126,8 +126,8 @@ fn slivers_and_enormous_triangles_keep_their_depth() {
     let camera = Camera::default_for(128, 100);
     let mut drawn = 0;
     for round in 0..2000 {
-        // From a thousandth of a pixel to ten thousand pictures, the smaller side down to
-        // nothing.
+        // From a thousandth of a pixel to ten thousand pictures, with the smaller side
+        // down to nearly 0.
         let size = libm::pow(10.0, random.between(-4.0, 4.5));
         let thin = libm::pow(10.0, random.between(-9.0, 0.0));
         let mut v = |s: f64| {

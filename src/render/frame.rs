@@ -1,8 +1,8 @@
 //! Depth, part and normal of what a camera sees, one value per pixel centre.
 //!
 //! No anti-aliasing, no colours (see `shade`). Invariant: `depth` has `width * height`
-//! entries, row by row from the top, finite exactly where something is seen; the other
-//! channels have as many entries or, when not asked for, none.
+//! entries, row by row from the top, finite exactly where something is visible; the other
+//! channels have as many entries, or none if they were not requested.
 
 use super::candidates::Candidates;
 use super::project::{Lens, Placement, Point, Projected, project};
@@ -34,20 +34,20 @@ pub struct Frame {
     pub depth: Vec<f32>,
     /// Part number; `u16::MAX` off the object. Empty when only depth was drawn.
     pub part: Vec<u16>,
-    /// Unit normal in the camera's frame (x right, y up, z towards the camera), turned to
-    /// the side that is seen; zero off the object. Empty when only depth was drawn.
+    /// Unit normal in the camera's frame (x right, y up, z towards the camera), on the
+    /// visible side of the surface; zero off the object. Empty when only depth was drawn.
     pub normal: Vec<[f32; 3]>,
 }
 
 thread_local! {
-    /// Projected vertices, what may be drawn and how it is shaded, reused from frame to
-    /// frame.
+    /// Scratch memory reused from frame to frame: projected vertices, candidate triangles
+    /// and shading.
     static SCRATCH: RefCell<(Projected, Candidates, Shading)> = RefCell::default();
 }
 
 impl Frame {
-    /// Draws a solid. Back faces are drawn too, but for bodies that hide their own;
-    /// triangles with a vertex that is not finite are left out.
+    /// Draws a solid. Back faces are drawn too, except those of bodies known to hide
+    /// them; triangles with a vertex that is not finite are left out.
     pub fn render(solid: &Solid, camera: &Camera, channels: Channels) -> Frame {
         SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
             Ok(mut scratch) => Frame::draw(solid, camera, channels, &mut scratch),
@@ -55,7 +55,7 @@ impl Frame {
         })
     }
 
-    /// Whether a pixel shows the object, row by row.
+    /// Whether each pixel shows the object, row by row.
     pub fn mask(&self) -> impl Iterator<Item = bool> + '_ {
         self.depth.iter().map(|d| d.is_finite())
     }
@@ -94,7 +94,7 @@ pub(super) fn depth_of(pinhole: bool, nearness: f32) -> f32 {
     if pinhole { 1.0 / nearness } else { -nearness }
 }
 
-/// Nearness to depth, in place.
+/// Converts nearness to depth, in place.
 pub(super) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
     let pinhole = Lens::new(camera).pinhole;
     vectorised(
@@ -107,8 +107,8 @@ pub(super) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
     );
 }
 
-/// Nearness, parts and normals of all meshes. The nearest face of each pixel comes first,
-/// its normal after that and once.
+/// Draws nearness, parts and normals of all meshes. For each mesh, the nearest face of
+/// each pixel is found first, so that the normal is computed once per pixel.
 fn draw_all(
     solid: &Solid,
     camera: &Camera,
@@ -179,16 +179,15 @@ const NOWHERE: u32 = u32::MAX;
 /// mesh.
 #[derive(Default)]
 struct Shading {
-    /// The face of each pixel, where the mesh is nearest.
+    /// The face at each pixel where the mesh is nearest.
     faces: Vec<u32>,
-    /// Where the slope of each face is, if it is known.
+    /// The index in `slopes` of each face, [`NOWHERE`] if its slope is not computed yet.
     known: Vec<u32>,
     slopes: Vec<Slope>,
 }
 
 impl Shading {
-    /// Forgets what was seen in an area, which no later mesh may look beyond, and all
-    /// slopes.
+    /// Clears all slopes, and the faces in an area; the mesh must lie inside that area.
     fn begin(&mut self, pixels: usize, faces: usize, width: usize, area: &Area) {
         self.faces.resize(pixels, NOWHERE);
         for row in self.faces.chunks_exact_mut(width).take(area.bottom).skip(area.top) {
@@ -199,7 +198,7 @@ impl Shading {
         self.slopes.clear();
     }
 
-    /// The slope of a face, worked out the first time it is asked for.
+    /// The slope of a face, computed on first use.
     #[inline]
     fn slope(&mut self, face: u32, new: impl Fn(u32) -> Slope) -> &Slope {
         let known = &mut self.known[face as usize];
@@ -220,7 +219,8 @@ struct Slope {
 }
 
 impl Slope {
-    /// Of a triangle with corners at some points, which are weighted means of the face's.
+    /// For a triangle with the given corners, which are weighted means of the face's
+    /// corners.
     fn new(
         mesh: &Mesh,
         placement: &Placement,
@@ -230,7 +230,7 @@ impl Slope {
         weights: [[f64; 3]; 3],
     ) -> Slope {
         let area = area(points);
-        // Counter-clockwise in the scene is a negative area in the image, whose y runs
+        // Counter-clockwise in the scene is a negative area in the image, where y points
         // down.
         let turn = if (area < 0.0) != placement.mirrored { 1.0 } else { -1.0 };
         let corner = |v: u32| {
@@ -252,15 +252,15 @@ impl Slope {
         Slope { first: na, by_column, by_row, corner: [a.x, a.y] }
     }
 
-    /// At a place in the image.
+    /// The normal at a position in the image.
     #[inline(always)]
     fn at(&self, x: f64, y: f64) -> DVec3 {
         self.first + self.by_row * (y - self.corner[1]) + self.by_column * (x - self.corner[0])
     }
 }
 
-/// A unit normal that does not point away from the eye: interpolated normals can lean a
-/// little beyond the outline, and are then pulled back to a right angle.
+/// A unit normal that does not point away from the camera: interpolated normals can lean
+/// slightly beyond the outline, and are then projected back to a right angle.
 fn seen_normal(n: Vec3, to_eye: Vec3) -> [f32; 3] {
     let v = to_eye.normalize();
     let mut n = n.normalize_or(v);

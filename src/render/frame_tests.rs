@@ -75,7 +75,7 @@ fn sphere_depth_and_normals_are_analytic() {
         projection: Projection::Orthographic { units_per_pixel: 0.04, cx: 60.0, cy: 50.0 },
         ..camera
     });
-    // Another place, turned, and an off-centre principal point.
+    // Another position, rotated, and an off-centre principal point.
     let forward = DVec3::new(-0.5, 0.3, -1.0).normalize();
     let right = forward.cross(DVec3::Y).normalize();
     check_sphere(&Camera {
@@ -132,7 +132,7 @@ fn triangles_across_the_near_plane_are_cut() {
             }
         }
     }
-    // Seen from below, the normal is the other way round.
+    // Seen from below, the normal is reversed.
     let below = floor.placed(Affine::new(DVec3::new(0.0, 2.0, 0.0), DVec3::ZERO, DVec3::ONE));
     let frame = render(&below, &camera);
     assert!(Vec3::from_array(frame.normal[2 * 40 + 20]).distance(Vec3::NEG_Y) < 1e-4);
@@ -228,7 +228,8 @@ fn mirrored_and_flat_solids_keep_facing_normals() {
     assert!(flat.normal.iter().flatten().all(|v| v.is_finite()));
 }
 
-/// Draws each case's mesh with its true affine and compares with the depth it came with.
+/// Draws each case's mesh with its true affine and compares the result with the stored
+/// depth.
 #[test]
 fn the_data_set_is_drawn_as_it_was_made() {
     for (name, folder) in cases() {
@@ -281,7 +282,7 @@ fn the_data_set_is_drawn_as_it_was_made() {
     }
 }
 
-/// Prefixes of the same random solids never change pixels outside the image or panic.
+/// Random poses never panic, and give positive depth and finite normals.
 #[test]
 fn random_poses_never_panic() {
     let mut random = Uniform(5);
@@ -298,7 +299,8 @@ fn random_poses_never_panic() {
     }
 }
 
-/// Bodies that hide their own backs are drawn without them; nothing else may come of it.
+/// Bodies known to hide their own back faces are drawn without them; the depth must not
+/// change.
 #[test]
 fn a_body_without_its_backs_looks_the_same() {
     use crate::geom::{Caps, Profile, lathe, sphere};
@@ -321,7 +323,7 @@ fn a_body_without_its_backs_looks_the_same() {
             DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s))
         };
         let (at, turn, scale) = (place(1.0), place(3.0), place(1.5));
-        // Some stand across the near plane or round the eye.
+        // Some lie across the near plane or around the camera.
         let at = if round % 5 == 0 { camera.eye + at } else { at };
         let mesh = &bodies[round % 2];
         let mut plain = mesh.clone();
@@ -337,7 +339,7 @@ fn a_body_without_its_backs_looks_the_same() {
     assert!(drawn > 20_000, "{drawn}");
 }
 
-/// What is seen at each pixel by way of every triangle's runs: instance and face.
+/// The face visible at each pixel, from the runs of every triangle: instance and face.
 fn by_runs(solid: &Solid, camera: &Camera) -> Vec<Option<(usize, usize)>> {
     let mut projected = Projected::default();
     project(solid, camera, &mut projected);
@@ -357,7 +359,7 @@ fn by_runs(solid: &Solid, camera: &Camera) -> Vec<Option<(usize, usize)>> {
     seen
 }
 
-/// The nearest face of each pixel is that of all triangles drawn one by one, and the
+/// The nearest face of each pixel is that of drawing all triangles one by one, and the
 /// normal is that face's: many meshes, large and small triangles, mirrored ones, open and
 /// closed, pictures narrower than the lanes.
 #[test]

@@ -1,10 +1,12 @@
-//! Where one contour passes behind another, and how long it is there when they move.
+//! Where one contour passes behind another, and how its visible length changes when they
+//! move.
 //!
-//! A contour that goes on unseen behind a nearer one ends at the crossing of their
+//! A contour that continues unseen behind a nearer one ends at the crossing of their
 //! images. When the nearer one moves by v and the farther by w, the end moves along the
-//! farther by (v - w) . n / (t . n), with t its tangent and n the normal of the nearer.
-//! No use of the depth image: what is seen is known, and a nearer piece that faces the
-//! end is looked for. Invariant: the order of what is added is that of the pieces.
+//! farther by (v - w) . n / (t . n), with t the tangent of the farther and n the normal
+//! of the nearer. The depth image is not used: which pieces are visible is known, and the
+//! nearer piece at the end is searched for. Invariant: contributions are added in the
+//! order of the pieces.
 
 use super::Camera;
 use super::extraction::Origin;
@@ -12,31 +14,31 @@ use super::project::{Lens, Vertices};
 use super::vjp::Extracted;
 use rustc_hash::FxHashMap;
 
-/// How far from the last piece seen the nearer contour may be, in pixels: looks go 1.2
-/// pixels aside and are answered by whole pixels.
+/// How far from the last visible piece the nearer contour may be, in pixels: depth tests
+/// are 1.2 pixels to the side and read whole pixels.
 const REACH: f64 = 3.0;
 
-/// The least sine between two contours that cross. Ends on contours that nearly coincide
-/// run along them faster than is of use.
+/// The least sine of the angle between two contours that cross. Where contours nearly
+/// coincide, the end runs along them too fast to be useful.
 const LEAST: f64 = 0.3;
 
-/// Hidden stretches shorter than this come and go with the pixels they are looked at by,
-/// and have no ends that move. Pixels.
+/// Hidden stretches shorter than this, in pixels, come and go with the pixels at which
+/// they are tested; the motion of their ends is ignored.
 const SHORT: f64 = 3.0;
 
-/// The most pieces walked over to measure a stretch.
+/// The most pieces followed to measure a stretch.
 const MOST: usize = 64;
 
 /// The height of a band of pieces, in pixels.
 const BAND: f64 = 4.0;
 
-/// What the end of a segment lies on: a vertex, or an edge between two, by their places
-/// in the image, which parts that share a seam have in common.
+/// What the end of a segment lies on: a vertex, or an edge between two, identified by
+/// positions in the image, which parts that share a seam have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct End([u64; 2]);
 
 impl End {
-    /// Of both ends of a segment.
+    /// Those of both ends of a segment.
     pub fn both(origin: &Origin, vertices: &Vertices<'_>) -> [End; 2] {
         let place = |v: u32| {
             let p = vertices.point(v);
@@ -54,12 +56,12 @@ impl End {
     }
 }
 
-/// For each piece, the one that follows at its end against its tangent, and the one at
-/// its end along it.
+/// For each piece, its neighbour at the end against its tangent, and the one at the end
+/// along it.
 type Links = Vec<[Option<usize>; 2]>;
 
-/// The derivatives by each piece, with those by the lengths of contours passed on to what
-/// hides their ends.
+/// The derivatives with respect to each piece, with those with respect to the lengths of
+/// contours passed on to the pieces that hide their ends.
 pub(super) fn moved_ends(
     extracted: &[Extracted<'_>],
     camera: &Camera,
@@ -89,7 +91,7 @@ pub(super) fn moved_ends(
             else {
                 continue;
             };
-            // What is added lies at the end of the piece, half its length from the
+            // The added length lies at the end of the piece, half its length from the
             // middle.
             let by = by_length + 0.5 * (gx * tangent[0] + gy * tangent[1]);
             let across = tangent[0] * nx + tangent[1] * ny;
@@ -113,12 +115,12 @@ fn end(t: &Extracted<'_>, side: usize) -> [f64; 2] {
     ]
 }
 
-/// Which pieces follow each other.
+/// Finds the neighbours of each piece.
 fn links(extracted: &[Extracted<'_>]) -> Links {
     let mut links: Links = vec![[None; 2]; extracted.len()];
     let mut join = |[(i, a), (j, b)]: [(usize, usize); 2]| {
         let (p, q) = (end(&extracted[i], a), end(&extracted[j], b));
-        // Silhouettes on both sides of a crease end on it in different places.
+        // Silhouettes on both sides of a crease end on it at different positions.
         if i != j && (p[0] - q[0]).abs() + (p[1] - q[1]).abs() < 0.05 {
             (links[i][a], links[j][b]) = (Some(j), Some(i));
         }
@@ -150,7 +152,8 @@ fn links(extracted: &[Extracted<'_>]) -> Links {
     links
 }
 
-/// Whether the hidden stretch that begins with a piece, coming from another, ends soon.
+/// Whether the hidden stretch that begins with piece `first`, coming from `from`, is
+/// short.
 fn is_short(extracted: &[Extracted<'_>], links: &Links, first: usize, from: usize) -> bool {
     let (mut before, mut at, mut length) = (from, first, 0.0);
     for _ in 0..MOST {
@@ -169,9 +172,9 @@ fn is_short(extracted: &[Extracted<'_>], links: &Links, first: usize, from: usiz
     false
 }
 
-/// The pieces that are seen, by bands of the image.
+/// The visible pieces, by horizontal bands of the image.
 struct Bands {
-    /// Where each band begins in `pieces`, and at the end its length.
+    /// Where each band begins in `pieces`, followed by the length of `pieces`.
     start: Vec<usize>,
     pieces: Vec<usize>,
 }
@@ -194,8 +197,8 @@ impl Bands {
         Bands { start, pieces }
     }
 
-    /// The piece behind whose contour another one ends that goes on with a tangent, and
-    /// its normal.
+    /// The nearer piece at which a contour becomes hidden, if it continues from the piece
+    /// `of` along a tangent, and the nearer piece's normal.
     fn nearer(
         &self,
         extracted: &[Extracted<'_>],
@@ -205,7 +208,8 @@ impl Bands {
     ) -> Option<(usize, [f64; 2])> {
         let half = 0.5 * f64::from(of.piece.length);
         let (x, y) = (f64::from(of.piece.x) + half * tx, f64::from(of.piece.y) + half * ty);
-        // At least a pixel's size nearer: not what follows on the same surface.
+        // At least a pixel's size nearer, so that it is not the continuation on the same
+        // surface.
         let lens = Lens::new(camera);
         let pixel = if lens.pinhole { of.piece.depth / lens.scale } else { 1.0 / lens.scale };
         let last = self.start.len().saturating_sub(2);
@@ -222,8 +226,8 @@ impl Bands {
             let (kx, ky) = (f64::from(p.tx), f64::from(p.ty));
             let (nx, ny) = (ky, -kx);
             let across = tx * nx + ty * ny;
-            // Into the nearer object, whose outside is along the normal; edges have no
-            // such sense.
+            // The tangent must lead into the nearer object, whose outside is along the
+            // normal; edges have no such orientation.
             if (if p.edge { across.abs() } else { -across }) < LEAST {
                 continue;
             }

@@ -1,13 +1,13 @@
-//! Ends of contours behind others, against differences of drawn contours.
+//! Ends of contours behind others, against finite differences of drawn contours.
 
 use crate::geom::{Affine, Solid};
 use crate::render::testing::{along, cuboid, sphere, weighted};
 use crate::render::{Camera, Contours, Projection};
 use glam::{DVec3, Vec3};
 
-/// Slopes of a weighted length of contour by shifts and a turn of the nearer of two
-/// solids and a shift of the farther: by differences of some pixels, as derived, and as
-/// derived with pieces held fast.
+/// Slopes of a weighted length of contour with respect to translations and a rotation of
+/// the nearer of two solids and a translation of the farther: by differences over some
+/// pixels, by the derivatives, and by the derivatives with fixed pieces.
 fn slopes(near: &Solid, far: &Solid, camera: &Camera) -> Vec<[f64; 3]> {
     let at = |p: [f64; 4]| {
         let nearer = Affine::new(
@@ -25,7 +25,7 @@ fn slopes(near: &Solid, far: &Solid, camera: &Camera) -> Vec<[f64; 3]> {
         [contours.vjp(&here, camera, &by), contours.vjp_fixed(&here, camera, &by)];
     let one = |k: usize| {
         let moved = |h: f64| at(std::array::from_fn(|i| if i == k { h } else { 0.0 }));
-        // Pieces come and go one by one: over many the steps even out.
+        // Pieces come and go one by one, which averages out over many steps.
         let steps: Vec<f64> = (1..=20).map(|i| 0.006 * f64::from(i)).collect();
         let sum = |h: f64| weighted(&Contours::of(&moved(h), camera)).0;
         let rise: f64 = steps.iter().map(|h| h * (sum(*h) - sum(-h))).sum();
@@ -55,9 +55,9 @@ fn what_moves_in_front_hides_and_reveals() {
 
 #[test]
 fn a_plate_before_a_bar_hides_as_much_as_it_moves() {
-    // Contours of a bar along x, a turned plate over its end: the edge's crossing with a
-    // line along x moves with the plate along x, and by tan of the turn when the plate
-    // moves along y.
+    // Contours of a bar along x, with a rotated plate over its end: the crossing of the
+    // plate's edge with a line along x moves with the plate along x, and by tan of the
+    // rotation when the plate moves along y.
     let mut camera = Camera::default_for(192, 192);
     camera.projection = Projection::Orthographic { units_per_pixel: 0.02, cx: 96.0, cy: 96.0 };
     let (bar, plate) = (cuboid(Vec3::new(0.9, 0.3, 0.1)), cuboid(Vec3::new(0.5, 0.7, 0.05)));
@@ -76,8 +76,8 @@ fn a_plate_before_a_bar_hides_as_much_as_it_moves() {
     let here = at(0.0, 0.0);
     let contours = Contours::of(&here, &camera);
     let by = contours.vjp(&here, &camera, &vec![[0.0, 0.0, 1.0, 0.0]; contours.len()]);
-    // Looked at straight, a bar has two lines along x that go on behind the plate, on
-    // each of its faces that can be told apart.
+    // Seen straight on, a bar has two lines along x that continue behind the plate, on
+    // each of its faces that can be distinguished.
     let lines = along(&by, &at(-1e-6, 0.0), &at(1e-6, 0.0), 2e-6) * 0.02;
     assert!((lines - lines.round()).abs() < 1e-3 && lines >= 2.0, "{lines}");
     let up = along(&by, &at(0.0, -1e-6), &at(0.0, 1e-6), 2e-6) * 0.02;

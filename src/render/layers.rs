@@ -1,12 +1,12 @@
-//! What each mesh of a solid adds to the picture, kept from drawing to drawing: its depth
-//! in a rectangle, its pieces of contour before any is hidden, its depth range. When one
-//! part of a body has moved, the others are not drawn again; the picture is composed
-//! anew, the nearest layer at each pixel, only where layers came or went, and of the
-//! other layers' pieces only those of layers that look there are looked at again.
+//! The contribution of each mesh of a solid to the picture, kept from drawing to drawing:
+//! its depth in a rectangle, its pieces of contour before any is hidden, its depth range.
+//! When one part of a body has moved, the others are not drawn again. The picture is
+//! recomposed, with the nearest layer at each pixel, only where layers came or went, and
+//! the pieces of another layer are tested again only if some of them are tested there.
 //!
 //! Invariant: a layer is a function of mesh, placement and camera alone, and 1 / q falls
-//! as q grows, in `f32` too, so the nearest of the layers' depths is the depth drawn at
-//! once, and the contours are those drawn at once, bit for bit.
+//! as q grows, in `f32` too, so the nearest of the layers' depths is the depth of a full
+//! drawing, and the contours are those of a full drawing, bit for bit.
 
 use super::candidates::Candidates;
 use super::contours::Contours;
@@ -21,20 +21,20 @@ use crate::geom::{Affine, Instance, Mesh, Solid};
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
 
-/// A solid of fewer meshes is drawn at once: each is likely to have moved.
+/// Solids of fewer meshes are drawn in full, since each mesh is likely to have moved.
 const FEWEST: usize = 3;
 
-/// A solid of more meshes is drawn at once: two drawings would not fit.
+/// Solids of more meshes are drawn in full, since two drawings would not fit.
 const MOST: usize = SLOTS / 2;
 
-/// The most layers kept by a thread.
+/// The most layers kept per thread.
 const SLOTS: usize = 128;
 
-/// The most memory kept by a thread's layers after a drawing. A solid that could need
-/// more by itself is drawn at once.
+/// The most memory that a thread's layers keep after a drawing. Solids that could need
+/// more by themselves are drawn in full.
 const BYTES: usize = 32 << 20;
 
-/// What one mesh adds to a picture.
+/// The contribution of one mesh to a picture.
 #[derive(Default)]
 pub(super) struct Layer {
     pub area: Area,
@@ -42,30 +42,30 @@ pub(super) struct Layer {
     depth: Vec<f32>,
     pub range: DepthRange,
     pub pieces: Vec<Piece>,
-    /// Holds all pixels that the pieces look at.
+    /// Contains all pixels at which the pieces are tested.
     pub looks: Area,
-    /// The pieces seen in the picture it was shown in last.
+    /// The pieces visible in the picture that last showed the layer.
     seen: Contours,
-    /// Where depth was wanted. Kept for its memory.
+    /// Where exact depth was needed. Kept to reuse its memory.
     exact: Vec<u8>,
 }
 
-/// What a layer is drawn before, by pixel of the picture: where all of a mesh is nearer
-/// than this, it does not matter how near it is.
+/// By pixel of the picture, the depth behind a mesh: where all of the mesh is nearer than
+/// this, its exact depth does not matter.
 pub(super) type Behind<'a> = &'a [f32];
 
-/// A layer and what it belongs to.
+/// A layer, with the mesh, placement and camera that it belongs to.
 struct Slot {
-    /// Held weakly, so that a mesh that is gone can be told and its address is not used
-    /// again.
+    /// A weak reference, so that a dropped mesh is detected and its address is not
+    /// reused.
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     camera: [u64; 17],
     /// The drawing that used it last.
     used: u64,
-    /// The drawing in which it was last told which of its pieces are seen.
+    /// The last drawing for which `layer.seen` is valid; 0 for none.
     seen_at: u64,
-    /// The drawing that made it, and the slot: no two layers have the same.
+    /// The drawing that made the layer, and its slot: unique to each layer.
     made: (u64, usize),
     layer: Layer,
 }
@@ -73,7 +73,7 @@ struct Slot {
 /// A layer in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Shown {
-    /// Its slot.
+    /// The index of its slot.
     at: usize,
     /// As in [`Slot`].
     made: (u64, usize),
@@ -101,7 +101,7 @@ struct Layers {
     projected: Projected,
     candidates: Candidates,
     room: Room,
-    /// Number of pieces seen the last time.
+    /// Number of visible pieces in the last drawing.
     found: usize,
 }
 
@@ -110,7 +110,7 @@ thread_local! {
 }
 
 /// The contours of a solid, composed of layers; `None` for solids that are better drawn
-/// at once.
+/// in full.
 pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
     let count = solid.mesh_count();
     let most_bytes = camera.pixels().saturating_mul(count).saturating_mul(size_of::<f32>());
@@ -129,7 +129,7 @@ impl Layers {
         let mut out = Contours::with_room(camera, self.found);
         for shown in &self.shown {
             let Some(slot) = self.slots.get_mut(shown.at) else { continue };
-            // 0 is never, also in the first drawing.
+            // 0 means never, in the first drawing too.
             let seen_before = slot.seen_at > 0 && slot.seen_at + 1 >= self.clock;
             let layer = &mut slot.layer;
             if !(same_range && seen_before)
@@ -152,7 +152,7 @@ impl Layers {
         Some(out)
     }
 
-    /// Brings the depth picture and the list of layers in it up to date.
+    /// Updates the depth picture and the list of layers in it.
     fn compose(&mut self, solid: &Solid, camera: &Camera) -> DepthRange {
         self.clock += 1;
         self.dirty.clear();
@@ -172,7 +172,7 @@ impl Layers {
                     && slot.affine == affine
                     && slot.camera == eye
             };
-            // Most often it is where it was.
+            // Usually the layer is in the same slot as before.
             let before = self.shown.get(i).copied();
             let kept =
                 before.map(|shown| shown.at).filter(|&at| self.slots.get(at).is_some_and(is_it));
@@ -216,8 +216,8 @@ impl Layers {
         range
     }
 
-    /// Draws a layer and says where it is: in the place of one whose mesh is gone, in a
-    /// new place, or in that of the one that was not used for longest.
+    /// Draws a layer and returns its slot: that of a dropped mesh, a new one, or the
+    /// least recently used one.
     fn draw(
         &mut self,
         instance: &Instance,
@@ -252,8 +252,8 @@ impl Layers {
         at
     }
 
-    /// Frees layers until they keep to their limit: of meshes that are gone, then those
-    /// not used for longest.
+    /// Frees layers until they are within the memory limit: first those of dropped
+    /// meshes, then the least recently used ones.
     fn trim(&mut self) {
         while self.bytes > BYTES {
             let age = |slot: &Slot| if slot.mesh.strong_count() == 0 { 0 } else { slot.used };
@@ -265,21 +265,21 @@ impl Layers {
     }
 }
 
-/// What of a mesh there is to be seen.
+/// How much of a mesh can be visible.
 pub(super) enum Sight<'a> {
-    /// All that it has.
+    /// All of it.
     Whole,
-    /// It stands before something.
+    /// All of it; what is behind it is known.
     Before(Behind<'a>),
     /// Nothing.
     Hidden,
 }
 
 impl Layer {
-    /// Draws a mesh alone, as its depth range and the pixels it reaches ask for. Where
-    /// something is known of what is behind it, depth is exact where its pieces look and
-    /// where it may matter to what is behind; elsewhere it may be told farther than it
-    /// is, but not so far that it would matter.
+    /// Draws a mesh alone. `sight` decides how much of it can be visible, from its depth
+    /// range and the area that it covers. In front of something known, depth is exact
+    /// where the mesh's own pieces are tested and where it may matter to what is behind;
+    /// elsewhere it may be too large, but not by so much that it would matter.
     pub fn draw<'a>(
         &mut self,
         instance: &Instance,
@@ -301,7 +301,8 @@ impl Layer {
             work::count(|work| work.outside += 1);
             return;
         }
-        // The depth range of a mesh that the near plane cuts says nothing of what is cut.
+        // If the near plane cuts the mesh, its depth range does not include the cut
+        // itself.
         let sight = if vertices.whole { sight(&self.range, &self.area) } else { Sight::Whole };
         if let Sight::Hidden = sight {
             work::count(|work| work.hidden += 1);
@@ -333,8 +334,8 @@ impl Layer {
         to_depth(camera, &mut self.depth);
     }
 
-    /// Where the depth of its pixels has to be known: where own pieces look, and where
-    /// its farthest point is not nearer than what is behind.
+    /// Finds where exact depth is needed: where the mesh's own pieces are tested, and
+    /// where its farthest point is not nearer than what is behind.
     fn find_exact(&mut self, camera: &Camera, behind: Behind<'_>, farthest: f32) {
         let Layer { area, exact, pieces, .. } = self;
         let (columns, width) = (area.right - area.left, camera.width as usize);
@@ -366,7 +367,7 @@ impl Layer {
         }
     }
 
-    /// Puts what is nearer than the picture into it, in some area.
+    /// Merges the layer into an area of the picture, keeping the nearer depth.
     #[inline(always)]
     pub fn show(&self, picture: &mut [f32], width: usize, within: &Area) {
         let area = self.area.common(within);
@@ -394,8 +395,8 @@ impl Layer {
 }
 
 impl Area {
-    /// Leaves out those without pixels. Where much has changed, areas overlap: then one
-    /// around them all is less.
+    /// Removes areas without pixels. If the areas overlap so much that a single one
+    /// around all of them has fewer pixels than their sum, replaces them by that one.
     pub(super) fn join(areas: &mut Vec<Area>) {
         areas.retain(|area| area.pixels() > 0);
         let around = areas.iter().fold(Area::default(), |all, area| all.with(area));
@@ -405,14 +406,14 @@ impl Area {
         }
     }
 
-    /// A rectangle with all pixels that pieces look at.
+    /// A rectangle that contains all pixels at which pieces are tested.
     fn looked_at(pieces: &[Piece], camera: &Camera) -> Area {
         let ends = |side: u32, at: fn(&Piece) -> f32| {
             let (low, high) =
                 pieces.iter().map(at).fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
                     (low.min(v), high.max(v))
                 });
-            // What lies outside looks at the nearest pixel inside.
+            // Positions outside of the image are tested at the nearest pixel inside.
             let (reach, last) = (BESIDE as f32 + 1.0, side as f32 - 1.0);
             let index = |v: f32| v.max(0.0).min(last) as usize;
             if pieces.is_empty() { (0, 0) } else { (index(low - reach), index(high + reach) + 1) }

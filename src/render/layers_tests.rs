@@ -1,12 +1,13 @@
-//! Layers against drawing everything at once, bit for bit, over sequences of changes; and
-//! their limits.
+//! Layers against full drawings, bit for bit, over sequences of changes; and their
+//! limits.
 
 use super::*;
 use crate::render::testing::{Uniform, cuboid, lathe, sphere};
 use crate::render::{Channels, Frame};
 use glam::{DVec3, Vec3};
 
-/// A mesh in posed coordinates: a ball, a box, an open or a closed lathe, somewhere.
+/// A mesh in posed coordinates: a ball, a box, or an open or closed lathe, at a random
+/// placement.
 fn part(random: &mut Uniform) -> Arc<Mesh> {
     let at = |random: &mut Uniform, s: f64| {
         DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s))
@@ -32,7 +33,7 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
-/// The layers' picture and contours are those drawn at once.
+/// Checks that the layers' picture and contours are those of a full drawing.
 fn check(layers: &mut Layers, solid: &Solid, camera: &Camera) {
     let (got, wanted) = (layers.contours(solid, camera).unwrap(), Contours::drawn(solid, camera));
     assert_eq!(got, wanted);
@@ -54,7 +55,7 @@ fn layers_give_what_is_drawn_at_once() {
             camera.projection =
                 Projection::Orthographic { units_per_pixel: 0.05, cx: 30.0, cy: 40.0 };
         } else if round % 3 == 2 {
-            // The near plane cuts some.
+            // The near plane cuts some meshes.
             camera.eye.z = 0.4;
         }
         let mut meshes: Vec<_> = (0..3 + round).map(|_| part(&mut random)).collect();
@@ -90,15 +91,14 @@ fn what_did_not_move_is_not_drawn_again() {
     let camera = Camera::default_for(64, 64);
     let mut layers = Layers::default();
     let mut meshes: Vec<_> = (0..22).map(|_| part(&mut random)).collect();
-    // Two of one mesh share a layer.
+    // Two instances of one mesh share a layer.
     meshes[21] = meshes[20].clone();
     check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
     assert_eq!(layers.slots.len(), 21);
     let first = layers.shown.clone();
     check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
     assert_eq!(layers.shown, first);
-    // A step that is not taken, many times: the layer of a mesh that is gone is used
-    // again.
+    // A step that is not taken, many times: the slot of the dropped mesh is reused.
     for _ in 0..300 {
         let old = std::mem::replace(&mut meshes[3], part(&mut random));
         check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
@@ -108,7 +108,7 @@ fn what_did_not_move_is_not_drawn_again() {
     }
     check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
     assert_eq!(layers.shown, first);
-    // Another place and another camera are other layers.
+    // Another placement and another camera need other layers.
     let by = Affine::new(DVec3::new(0.0, 1e-12, 0.0), DVec3::ZERO, DVec3::ONE);
     check(&mut layers, &group(&meshes, by), &camera);
     assert_eq!(layers.slots.len(), 22 + 20);
@@ -190,8 +190,8 @@ fn a_mesh_between_the_centres_of_pixels_has_contours_as_soon_as_it_is_there() {
     let mut meshes = vec![cube(0.4, -1.0), cube(0.4, 1.0)];
     let others = Contours::drawn(&group(&meshes, Affine::IDENTITY), &camera).len();
     meshes.push(cube(0.02, 0.0));
-    // A pixel is 0.09 wide, and four of them meet in the middle. The depth range stays as
-    // it is.
+    // A pixel is 0.09 wide, and four of them meet in the middle. The depth range stays
+    // the same.
     for half in [0.02, 0.015, 0.01, 0.025] {
         meshes[2] = cube(half, 0.0);
         check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);

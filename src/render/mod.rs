@@ -1,7 +1,7 @@
-//! Drawing on the processor: cameras, depth frames, contours, and simple shaded pictures.
+//! Drawing on the CPU: cameras, depth frames, contours, and simple shaded pictures.
 //!
-//! Not here: meshes and transforms (`geom`), comparing pictures (`vision`). Nothing in
-//! this module draws random numbers, and the same input gives the same output on every
+//! Meshes and transforms are in `geom`, the comparison of pictures in `vision`. Nothing
+//! in this module draws random numbers, and the same input gives the same output on every
 //! machine.
 
 mod backdrop;

@@ -1,23 +1,25 @@
-//! How a silhouette moves with the surface: sums over the pixels that a solid covers, by
-//! its vertices.
+//! How a silhouette moves with the surface: derivatives of sums over the pixels that a
+//! solid covers, with respect to its vertices.
 //!
-//! Where the outline moves outward it takes in what lies beside it, as much as its length
-//! times its motion. Pixels are in or out, so this is the slope of a sum whose steps are
-//! evened out, not of the steps. The outline is taken from the contours: where a coarse
-//! mesh reaches pixels beyond its smooth silhouette, that piece of it is missed.
+//! Where the outline moves outwards, the sum gains the values beside it, in proportion to
+//! the outline's length times its motion. Pixels are either in or out, so the sum is a
+//! step function; these are the slopes of the sum with its steps smoothed out. The
+//! outline is taken from the contours: where a coarse mesh covers pixels beyond its
+//! smooth silhouette, that part of it is missed.
 
 use super::{Contours, View};
 use glam::DVec3;
 
-/// How far beside a piece to look for the background, in pixels.
+/// Distance from a piece at which to test for the background, in pixels.
 const BESIDE: f64 = 1.2;
 
 impl View {
     /// The derivatives of the sum of `gain` over the pixels that show the solid, in the
-    /// picture whose longer side has `size` pixels, by each vertex of the solid's meshes
-    /// in turn, in world coordinates. `gain` has a number for each pixel, row by row.
+    /// picture whose longer side has `size` pixels, with respect to each vertex of the
+    /// solid's meshes in turn, in world coordinates. `gain` has a number for each pixel,
+    /// row by row.
     pub fn vjp_mask(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
-        // Drawn before the contours, which then use it.
+        // Drawn before the contours, which then reuse it.
         let frame = self.depth(size);
         let contours = self.contours(size);
         let by_piece: Vec<[f64; 4]> = (0..contours.len())
@@ -35,7 +37,7 @@ impl View {
     }
 }
 
-/// The direction to the background, if piece `i` is of the outline.
+/// The direction towards the background, if piece `i` is part of the outline.
 fn outward(c: &Contours, depth: &[f32], i: usize) -> Option<[f64; 2]> {
     let [x, y, tx, ty] = [&c.x, &c.y, &c.tx, &c.ty].map(|list| f64::from(list[i]));
     let shown = |sign: f64| {
@@ -52,7 +54,7 @@ fn outward(c: &Contours, depth: &[f32], i: usize) -> Option<[f64; 2]> {
     }
 }
 
-/// The bilinear value between pixels' centres.
+/// The value interpolated bilinearly between pixel centres.
 fn between(values: &[f64], width: u32, height: u32, x: f64, y: f64) -> f64 {
     let (w, h) = (width as usize, height as usize);
     let (u, v) = ((x - 0.5).clamp(0.0, (w - 1) as f64), (y - 0.5).clamp(0.0, (h - 1) as f64));
@@ -96,8 +98,8 @@ mod tests {
     #[test]
     fn sums_over_silhouettes_change_as_predicted() {
         const SIZE: u32 = 192;
-        // A smooth gain, and pictures coarse enough that a difference of some pixels
-        // tells the slope.
+        // A smooth gain, and pictures coarse enough that a difference over some pixels
+        // gives the slope.
         let gain: Vec<f64> = (0..SIZE * SIZE)
             .map(|i| {
                 let (x, y) = (f64::from(i % SIZE), f64::from(i / SIZE));
@@ -132,9 +134,9 @@ mod tests {
                 let (along, gross) =
                     (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
                 let slope = (sum(&moved(0.04)) - sum(&moved(-0.04))) / 0.08;
-                // What is gained on one side is mostly lost on the other. Pixels are in
-                // or out: of the outline's 300, some 20 more or fewer by chance, each
-                // bringing about 1 to 3, over a difference of 0.08.
+                // Gains on one side mostly cancel losses on the other. Pixels are either
+                // in or out: of the outline's 300, about 20 more or fewer are covered by
+                // chance, each worth about 1 to 3, over a difference of 0.08.
                 assert!(
                     (along - slope).abs() < 0.03 * gross + 400.0,
                     "number {k}: {along} {slope} of {gross}"

@@ -1,36 +1,38 @@
-//! Marked pixels of an image, so kept that a rectangle without bitmap is quickly told.
+//! A set of pixels of an image, with a fast test of whether a rectangle contains any of
+//! them.
 
 use super::Camera;
 use super::simd::vectorised;
 
-/// Marks at pixels. Reused from image to image.
+/// A set of pixels. Reused from image to image.
 #[derive(Default)]
 pub(super) struct PixelBitmap {
-    /// A bit for each pixel, row by row, and one word more.
+    /// A bit for each pixel, row by row, and at least one spare word.
     words: Vec<u64>,
-    /// For each pixel the side of the smallest square that holds a mark and has the pixel
-    /// in its upper left corner, [`FAR`] if that is larger than [`SIDE`]. There are
-    /// columns more at the right and a row below.
+    /// For each pixel, the side of the smallest square with the pixel in its upper left
+    /// corner that contains a set pixel; [`FAR`] if that is larger than [`SIDE`]. Padded
+    /// with columns on the right and a row below.
     reach: Vec<u8>,
-    /// Entries of `reach` in a row.
+    /// Entries of `reach` per row.
     stride: usize,
-    /// Some of a row, to read from while another is written.
+    /// A copy of part of a row, read while the row is written.
     read: Vec<u8>,
-    /// The first and last columns and rows of bitmap; none if the first one is the larger.
+    /// The first and last column, and row, with a set pixel; empty if the first is the
+    /// larger.
     columns: [usize; 2],
     rows: [usize; 2],
     width: u32,
 }
 
-/// The largest side of a square that is told by one look.
+/// The largest side of a square that a single entry of `reach` answers for.
 const SIDE: usize = 16;
-/// Rows are worked on in as many pixels, which makes whole vectors of them.
+/// Rows are processed in multiples of this many pixels, which makes whole vectors.
 const WIDE: usize = 64;
-/// More than that.
+/// Stands for any side larger than [`SIDE`].
 const FAR: u8 = SIDE as u8 + 1;
 
 impl PixelBitmap {
-    /// Removes all bitmap, for a camera's image.
+    /// Removes all pixels and resizes to a camera's image.
     pub fn clear(&mut self, camera: &Camera) {
         self.width = camera.width;
         self.stride = (camera.width as usize).next_multiple_of(WIDE) + WIDE;
@@ -41,7 +43,7 @@ impl PixelBitmap {
         self.reach.resize(self.stride * (camera.height as usize + 1), FAR);
     }
 
-    /// Marks a pixel of the image.
+    /// Adds a pixel of the image.
     #[inline]
     pub fn set(&mut self, pixel: u32) {
         let [row, column] = [pixel / self.width, pixel % self.width].map(|v| v as usize);
@@ -56,7 +58,7 @@ impl PixelBitmap {
         }
     }
 
-    /// To be called when all bitmap are set, before rectangles are asked for.
+    /// Must be called after the last pixel is set, before rectangles are tested.
     pub fn finish(&mut self) {
         let PixelBitmap {
             reach, stride, read, columns: [left, right], rows: [top, bottom], ..
@@ -64,7 +66,7 @@ impl PixelBitmap {
         if *top > *bottom {
             return;
         }
-        // Whole vectors of entries, and as many more as a look reaches.
+        // Whole vectors of entries, and [`SIDE`] more that are only read.
         let (first, stride) = (left.saturating_sub(SIDE) / WIDE * WIDE, *stride);
         let count = (*right + 1 - first).next_multiple_of(WIDE);
         let columns = first..first + count + SIDE;
@@ -79,8 +81,8 @@ impl PixelBitmap {
                     let (Some(own), Some(below)) = (own, below.get(columns.clone())) else {
                         return;
                     };
-                    // A square is one pixel and, a side shorter, those to the right,
-                    // below, and both.
+                    // A square is its first pixel, and the squares one shorter that begin
+                    // to the right, below and diagonally.
                     for ((own, down), corner) in
                         own[..count].iter_mut().zip(&below[..count]).zip(&below[1..])
                     {
@@ -99,12 +101,12 @@ impl PixelBitmap {
         );
     }
 
-    /// All bitmap, 64 pixels at a time.
+    /// The bits of all pixels, 64 per word.
     pub fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// The bitmap of some pixels in a row, at most 64, as bits.
+    /// The bits of up to 64 consecutive pixels.
     #[inline(always)]
     pub fn window(&self, from: usize, count: usize) -> u64 {
         let Some([low, high]) = self.words.get(from / 64..).and_then(|m| m.first_chunk()) else {
@@ -115,8 +117,8 @@ impl PixelBitmap {
         if count < 64 { word & ((1 << count) - 1) } else { word }
     }
 
-    /// Whether there may be a mark in some columns and rows, of which there may be none:
-    /// false where the square around them that begins with them has none.
+    /// Whether a rectangle, which may be empty, may contain a set pixel: false only if
+    /// the square with the same upper left corner that covers it contains none.
     #[inline(always)]
     pub fn may_hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
         let side = right.wrapping_sub(left).max(bottom.wrapping_sub(top));
@@ -124,12 +126,12 @@ impl PixelBitmap {
         (usize::from(reach) <= side) | (side > SIDE)
     }
 
-    /// Whether there is a mark in some columns and rows, of which there are some.
+    /// Whether a rectangle that is not empty contains a set pixel.
     #[inline(always)]
     pub fn hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
         let (columns, rows) = (right - left, bottom - top);
-        // Three squares in a line, at both ends and in the middle, cover what is at most
-        // three times as long as wide.
+        // Three squares in a line, at both ends and in the middle, cover a rectangle that
+        // is at most three times as long as wide.
         let side = columns.min(rows);
         let (across, down) = (columns - side, rows - side);
         if side > SIDE || across + down > 2 * side {
@@ -142,7 +144,7 @@ impl PixelBitmap {
             | near(at + across + down * self.stride)
     }
 
-    /// As [`PixelBitmap::hold`], for any rectangle, by squares of some side.
+    /// As [`PixelBitmap::hold`], for any rectangle, covered by squares of a given side.
     #[inline(never)]
     fn hold_long(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2], side: usize) -> bool {
         (top..bottom).step_by(side).any(|y| {

@@ -1,28 +1,28 @@
-//! Positions in the image rounded to 1/1024 of a pixel, and the rectangle of pixels
-//! between some.
+//! Image positions rounded to 1/1024 of a pixel, and the pixels in bounding boxes of such
+//! positions.
 //!
-//! Invariant: places are exact in single precision, so what is worked out from them does
-//! not depend on the order.
+//! Invariant: rounded positions are exact in single precision, so results computed from
+//! them do not depend on the order of operations.
 
 use glam::{Vec4, Vec4Swizzles};
 
-/// Units of a rounded position in a pixel, as a power of two.
+/// Base-2 logarithm of [`UNIT`].
 pub(super) const BITS: u32 = 10;
-/// Units of a rounded position in a pixel.
+/// Units of rounded positions per pixel.
 pub(super) const UNIT: i32 = 1 << BITS;
 
 /// A position relative to the centre of the first pixel, rounded to 1/1024 of a pixel: x,
-/// y, -x, -y, so that least and greatest are found in one go. Exact in single precision;
-/// what is [`BOUND`] or farther out is kept there.
+/// y, -x, -y, so that a single minimum gives least and greatest coordinates. Exact in
+/// single precision; clamped to [`BOUND`].
 pub(super) type Place = Vec4;
 
 /// Beyond any image, in pixels.
 const BOUND: f32 = 16384.0;
 
-/// A coordinate in pixels, relative to the centre of the first one, rounded.
+/// Rounds a coordinate in pixels, relative to the centre of the first pixel.
 #[inline(always)]
 pub(super) fn rounded(v: f64) -> f32 {
-    // Added and taken away, it leaves the nearest whole number.
+    // Adding and subtracting this rounds to the nearest integer.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     let (v, bound) = (v - 0.5, f64::from(BOUND));
     let v = if v > -bound { v } else { -bound };
@@ -30,29 +30,29 @@ pub(super) fn rounded(v: f64) -> f32 {
     (((v * f64::from(UNIT) + WHOLE) - WHOLE) / f64::from(UNIT)) as f32
 }
 
-/// The place of a position in pixels.
+/// Rounds a position in pixels.
 #[inline(always)]
 pub(super) fn place(x: f64, y: f64) -> Place {
     let (x, y) = (rounded(x), rounded(y));
     Vec4::new(x, y, -x, -y)
 }
 
-/// The columns and rows of pixels between some places, from the first one to that past
-/// the last one: left, top, right, bottom, as the lowest bits of numbers in single
-/// precision, which is how they come about.
+/// The columns and rows of pixels in a bounding box, each from the first to one past the
+/// last: left, top, right, bottom. Kept in the lowest bits of single-precision numbers,
+/// which is how they are computed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Extent(Vec4);
 
-/// The lowest bits of a sum with this are the nearest whole number, up to 16 of them.
+/// Adding this to a number leaves the nearest integer in the lowest 16 bits of the sum.
 const LOW_BITS: f32 = 8_388_608.0;
 
 impl Extent {
-    /// The pixels of an image whose centres lie between the places with these least
-    /// coordinates, as far as columns and rows tell. `size` is width and height, twice.
+    /// The pixels of an image whose centres lie in the bounding box with these least
+    /// coordinates. `size` is width and height, twice.
     #[inline(always)]
     pub fn between(least: Place, size: Vec4) -> Extent {
-        // Whole numbers in these units are centres: upwards for the first one, downwards
-        // and one more for the one past the last.
+        // Integers in these units are centres: rounded up for the first one; rounded
+        // down, plus one, for the one past the last.
         const ALMOST: f32 = (UNIT - 1) as f32 / UNIT as f32;
         let at = least * Vec4::new(1.0, 1.0, -1.0, -1.0) + Vec4::new(ALMOST, ALMOST, 1.0, 1.0);
         let at = at.max(Vec4::ZERO).min(size);
@@ -60,19 +60,19 @@ impl Extent {
         Extent(nearest - Vec4::select((nearest - LOW_BITS).cmpgt(at), Vec4::ONE, Vec4::ZERO))
     }
 
-    /// That of a triangle.
+    /// The extent of a triangle.
     #[inline(always)]
     pub fn around([a, b, c]: [Place; 3], size: Vec4) -> Extent {
         Extent::between(a.min(b).min(c), size)
     }
 
-    /// Whether there are no pixels.
+    /// Whether it contains no pixels.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.0.cmplt(self.0.zwxy()).bitmask() & 0b11 != 0b11
     }
 
-    /// Columns and rows.
+    /// Columns and rows, each from the first to one past the last.
     #[inline(always)]
     pub fn ends(&self) -> [[usize; 2]; 2] {
         let [left, top, right, bottom] = self.0.to_array().map(|v| usize::from(v.to_bits() as u16));
@@ -86,8 +86,8 @@ pub(super) fn size(width: u32, height: u32) -> Vec4 {
     Vec4::new(width, height, width, height)
 }
 
-/// Whether a place, or the least coordinates of some, are not kept from being farther
-/// out.
+/// Whether a position, or the least coordinates of several, are within the bounds, so
+/// that nothing was clamped.
 #[inline(always)]
 pub(super) fn is_near(least: Place) -> bool {
     least.cmpgt(Vec4::splat(-BOUND)).all()
@@ -98,8 +98,8 @@ mod tests {
     use super::*;
     use crate::render::testing::Uniform;
 
-    /// First and past-the-last pixel whose centres lie between two rounded coordinates,
-    /// in double precision.
+    /// The first pixel whose centre lies between two rounded coordinates, and one past
+    /// the last, in double precision.
     fn between(least: f64, most: f64, side: u32) -> [usize; 2] {
         let inside = |v: f64| v.clamp(0.0, f64::from(side)) as usize;
         [inside(least.ceil()), inside(most.floor() + 1.0)]

@@ -1,9 +1,9 @@
-//! Vertices in camera and image coordinates, the common ground of the rasteriser and the
-//! contours.
+//! Vertices in camera and image coordinates, shared by the rasteriser and the extraction
+//! of contours.
 //!
-//! Camera coordinates: x right, y up, z towards the camera, eye at the origin. `nearness`
-//! is 1 / depth for a pinhole and -depth for a parallel projection: linear over the image
-//! inside a triangle, larger is nearer in both.
+//! Camera coordinates: x right, y up, z towards the camera, which is at the origin.
+//! `nearness` is 1 / depth for a pinhole and -depth for a parallel projection: linear
+//! over the image inside a triangle, and larger for nearer points in both.
 
 use super::place::{Extent, Place, place, rounded};
 use super::simd::vectorised;
@@ -12,26 +12,26 @@ use super::{Camera, Projection};
 use crate::geom::{Affine, Mesh, Run, Solid, Topology};
 use glam::{DMat3, DVec3, Vec3};
 
-/// Vertices worked on at a time: loops over them are long enough to be told from code
-/// that is written out, and short enough for the nearest cache.
+/// Vertices processed at a time: enough that loops over them are not fully unrolled, and
+/// few enough for the first-level cache.
 const LANES: usize = 64;
 
-/// Coordinates beyond this (scene units) mark a vertex as unusable.
+/// Vertices with a coordinate beyond this (scene units) are unusable.
 const HUGE: f64 = 1e9;
 
-/// A place in the image.
+/// A point in the image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     /// Pixels from the left edge.
     pub x: f64,
     /// Pixels from the top edge.
     pub y: f64,
-    /// See the module's head.
+    /// See the module documentation.
     pub nearness: f64,
 }
 
 impl Point {
-    /// In single precision, as vertices are kept.
+    /// Rounds to single precision, in which vertices are stored.
     #[inline]
     pub fn single(self) -> Point {
         let [x, y, nearness] = [self.x, self.y, self.nearness].map(|v| f64::from(v as f32));
@@ -39,7 +39,7 @@ impl Point {
     }
 }
 
-/// The image side of a camera.
+/// A camera's projection from camera coordinates to the image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lens {
     pub pinhole: bool,
@@ -61,7 +61,7 @@ impl Lens {
         }
     }
 
-    /// The image of a point in camera coordinates, in front of the near plane.
+    /// Projects a point in camera coordinates that is beyond the near plane.
     #[inline(always)]
     pub fn point(&self, p: DVec3) -> Point {
         let depth = -p.z;
@@ -77,8 +77,8 @@ impl Lens {
     }
 }
 
-/// The part of a segment in camera coordinates that lies beyond the near plane, if there
-/// is some.
+/// The part of a segment in camera coordinates that is beyond the near plane; `None` if
+/// there is none.
 pub(super) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> {
     let near = -Camera::NEAR;
     if from.z > near && to.z > near {
@@ -93,17 +93,17 @@ pub(super) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> 
     Some([from, to])
 }
 
-/// An instance's way into camera coordinates.
+/// The transform from an instance's mesh to camera coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placement {
     m: DMat3,
     t: DVec3,
-    /// Cofactors of `m` times the sign of its determinant: takes outward normals to
+    /// Cofactors of `m` times the sign of its determinant: maps outward normals to
     /// outward normals.
     cofactor: DMat3,
-    /// Whether the instance is mirrored, so that its faces turn the other way round.
+    /// Whether the instance is mirrored, which reverses the winding of its faces.
     pub mirrored: bool,
-    /// `facing = n . (view - bend * p)` in the mesh's own coordinates.
+    /// `facing = n . (view - bend * p)` in the mesh's coordinates.
     view: DVec3,
     bend: f64,
 }
@@ -126,20 +126,21 @@ impl Placement {
         Placement { m, t, cofactor, mirrored: sign < 0.0, view, bend }
     }
 
-    /// A mesh point in camera coordinates.
+    /// Transforms a point of the mesh to camera coordinates.
     #[inline(always)]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.m * p + self.t
     }
 
-    /// A mesh normal in camera coordinates, outward, not of unit length.
+    /// Transforms a normal of the mesh to camera coordinates: outward, not of unit
+    /// length.
     #[inline(always)]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.cofactor * n
     }
 }
 
-/// Nearest and farthest depth of the usable vertices in front of the near plane.
+/// Nearest and farthest depth of the usable vertices beyond the near plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DepthRange {
     pub near: f64,
@@ -153,31 +154,32 @@ impl Default for DepthRange {
 }
 
 impl DepthRange {
-    /// Of no vertices.
+    /// The range of no vertices.
     pub const EMPTY: DepthRange = DepthRange { near: f64::INFINITY, far: f64::NEG_INFINITY };
 
-    /// The extent, 0 when nothing is in front of the camera.
+    /// The extent, 0 if there are no vertices.
     pub fn extent(&self) -> f64 {
         (self.far - self.near).max(0.0)
     }
 
-    /// Of these vertices and others.
+    /// The range of the vertices of both.
     pub fn and(&self, other: &DepthRange) -> DepthRange {
         DepthRange { near: self.near.min(other.near), far: self.far.max(other.far) }
     }
 }
 
-/// The vertices of meshes in the image, in single precision: positions to 1e-7 of their
-/// distance from the image's corner, nearness to 1e-7 of itself. Rounded positions
-/// ([`Place`]) come from double precision. Lists are reused, so that nothing is allocated
-/// once they have grown.
+/// The vertices of meshes in the image, in single precision: positions are accurate to
+/// 1e-7 of their distance from the image's corner, nearness to 1e-7 of itself. Rounded
+/// positions ([`Place`]) are computed in double precision. Buffers are reused, so nothing
+/// is allocated once they have grown.
 #[derive(Default)]
 pub(super) struct Projected {
     x: Vec<f32>,
     y: Vec<f32>,
     nearness: Vec<f32>,
     places: Vec<Place>,
-    /// Where the vertices of each mesh end, and whether all of them may be used.
+    /// Where the vertices of each mesh end, and whether all of them are usable and beyond
+    /// the near plane.
     meshes: Vec<(usize, bool)>,
 }
 
@@ -188,7 +190,7 @@ pub(super) struct Vertices<'a> {
     y: &'a [f32],
     nearness: &'a [f32],
     places: &'a [Place],
-    /// Whether every vertex is in front of the near plane.
+    /// Whether every vertex is usable and beyond the near plane.
     pub whole: bool,
 }
 
@@ -198,7 +200,7 @@ impl Projected {
         self.meshes.clear();
     }
 
-    /// The vertices of the mesh that was projected as number `i`.
+    /// The vertices of the `i`-th mesh that was added.
     pub fn mesh(&self, i: usize) -> Vertices<'_> {
         let first = i.checked_sub(1).and_then(|i| self.meshes.get(i)).map_or(0, |m| m.0);
         let (past, whole) = self.meshes.get(i).copied().unwrap_or((first, true));
@@ -211,7 +213,7 @@ impl Projected {
         }
     }
 
-    /// Projects the vertices of one mesh, after those of the meshes before.
+    /// Projects the vertices of one mesh and appends them.
     pub fn add(&mut self, mesh: &Mesh, placement: &Placement, lens: &Lens) -> DepthRange {
         let first = self.meshes.last().map_or(0, |m| m.0);
         let needed = first + mesh.positions.len().next_multiple_of(LANES);
@@ -241,7 +243,7 @@ impl Projected {
         lens: &Lens,
     ) -> Extents {
         let mut extents = Extents { near: f64::INFINITY, far: f64::NEG_INFINITY, whole: true };
-        // By value, so that it is plain that nothing written changes them.
+        // Copies, so that the compiler knows that no write changes them.
         let (Placement { m, t, .. }, lens) = (*placement, Lens { pinhole: PINHOLE, ..*lens });
         let rows = [0, 1, 2].map(|r| [m.x_axis[r], m.y_axis[r], m.z_axis[r], t[r]]);
         let lists = groups(&mut self.x[first..])
@@ -255,7 +257,7 @@ impl Projected {
             let mut inside = true;
             for i in 0..LANES {
                 let [vx, vy, vz] = rows.map(|[a, b, c, t]| px[i] * a + py[i] * b + pz[i] * c + t);
-                // Written so that NaN fails it.
+                // Written so that it is false for NaN.
                 inside &= (vx.abs() < HUGE)
                     & (vy.abs() < HUGE)
                     & (vz.abs() < HUGE)
@@ -292,23 +294,23 @@ impl Projected {
     }
 }
 
-/// A list in groups, the last one cut off.
+/// A list in groups of [`LANES`], without the incomplete last one.
 #[inline(always)]
 fn groups<T>(list: &mut [T]) -> std::slice::IterMut<'_, [T; LANES]> {
     list.as_chunks_mut().0.iter_mut()
 }
 
-/// What was seen of the vertices.
+/// Depth range and usability of the vertices processed so far.
 struct Extents {
     /// Least and greatest depth.
     near: f64,
     far: f64,
-    /// Whether all are in view.
+    /// Whether all are usable and beyond the near plane.
     whole: bool,
 }
 
 impl Extents {
-    /// A vertex of which it is not known whether it is in view.
+    /// Projects a vertex that may be unusable or not beyond the near plane.
     #[inline(never)]
     fn odd(&mut self, lens: &Lens, p: DVec3) -> Point {
         if !(p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE) {
@@ -329,8 +331,7 @@ impl Vertices<'_> {
         self.x.len()
     }
 
-    /// The rounded positions of a triangle's corners; `None` if there are no such
-    /// vertices.
+    /// The rounded positions of a triangle's corners; `None` if a vertex does not exist.
     #[inline(always)]
     pub fn places(&self, corners: &[u32; 3]) -> Option<[Place; 3]> {
         match corners.map(|v| self.places.get(v as usize)) {
@@ -339,14 +340,14 @@ impl Vertices<'_> {
         }
     }
 
-    /// Width and height together of what lies around some vertices, in pixels.
+    /// Width plus height of the bounding box of some vertices, in pixels.
     pub fn span(&self, of: impl Iterator<Item = u32>) -> f32 {
         let places = of.filter_map(|v| self.places.get(v as usize));
         let least = places.fold(Place::INFINITY, |a, b| a.min(*b));
         -(least.x + least.y + least.z + least.w)
     }
 
-    /// The least coordinates of some rounded positions.
+    /// The least coordinates of the rounded positions in some runs.
     #[inline(always)]
     pub fn least(&self, of: &[Run]) -> Place {
         let places = of.iter().filter_map(|run| self.places.get(run.range())).flatten();
@@ -358,13 +359,13 @@ impl Vertices<'_> {
         self.places.iter().fold(Place::INFINITY, |a, b| a.min(*b))
     }
 
-    /// The least nearness of all.
+    /// The least nearness of all vertices.
     pub fn least_nearness(&self) -> f32 {
         self.nearness.iter().fold(f32::INFINITY, |a, b| a.min(*b))
     }
 
-    /// Whether all of the mesh is behind the eye, or beside the picture by half a pixel
-    /// at least: it covers no pixel and has no contour there.
+    /// Whether the whole mesh is behind the camera, or beside the picture by at least
+    /// half a pixel, so that it covers no pixel and has no contours there.
     pub fn outside(&self, camera: &Camera) -> bool {
         if !self.whole {
             return self.nearness.iter().all(|n| *n == f32::INFINITY);
@@ -374,7 +375,7 @@ impl Vertices<'_> {
         left > width || top > height || -right < -1.0 || -bottom < -1.0
     }
 
-    /// A triangle ready to be drawn, if it is to be: see [`Triangle::new`].
+    /// Sets up a triangle to be drawn; `None` as for [`Triangle::new`].
     #[inline(always)]
     pub fn triangle(
         &self,
@@ -387,15 +388,15 @@ impl Vertices<'_> {
         Triangle::new(corners.map(|v| self.point(v)), self.places(corners)?, extent, back)
     }
 
-    /// Where the corners of a triangle are.
+    /// The corners of a triangle in the image.
     #[inline(always)]
     pub fn corners(&self, topology: &Topology, face: u32) -> [Point; 3] {
         let corners = topology.triangles.get(face as usize).copied().unwrap_or_default();
         corners.map(|v| self.point(v))
     }
 
-    /// Where a vertex is; of one that is not in view, nearness is infinite (behind the
-    /// near plane) or NaN (not usable).
+    /// A vertex in the image. If it cannot be drawn, its nearness is infinite (not beyond
+    /// the near plane) or NaN (unusable).
     #[inline(always)]
     pub fn point(&self, v: u32) -> Point {
         let at = |list: &[f32]| list.get(v as usize).map_or(f64::NAN, |x| f64::from(*x));
@@ -403,7 +404,7 @@ impl Vertices<'_> {
     }
 }
 
-/// Projects every vertex of a solid, instance after instance.
+/// Projects every vertex of a solid, instance by instance.
 pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Projected) -> DepthRange {
     out.clear();
     let lens = Lens::new(camera);
@@ -412,19 +413,19 @@ pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Projected) -> De
     })
 }
 
-/// Which vertices of a mesh show their front. Reused from mesh to mesh.
+/// Which vertices of a mesh face the camera. Reused from mesh to mesh.
 #[derive(Default)]
 pub(super) struct Fronts {
-    /// Positive where the outward normal faces the eye, zero at right angles to the line
-    /// of sight; linear in the position.
+    /// Positive where the outward normal points towards the camera, zero where it is
+    /// perpendicular to the line of sight; linear in the position.
     pub facing: Vec<f64>,
-    /// 1 where it is not negative, else 0; there are [`Run::MOST`] more entries than
+    /// 1 where `facing` is not negative, else 0; has [`Run::MOST`] more entries than
     /// vertices.
     pub front: Vec<u8>,
 }
 
 impl Fronts {
-    /// Those of a mesh.
+    /// Computes both for a mesh.
     pub fn find(&mut self, mesh: &Mesh, placement: &Placement) {
         let Fronts { facing, front } = self;
         let count = mesh.positions.len().min(mesh.normals.len());
@@ -457,7 +458,7 @@ impl Fronts {
     }
 }
 
-/// Vectors in groups, the last one filled up with its last vector.
+/// Vectors in groups of [`LANES`], the last group padded with its last vector.
 struct Groups<'a> {
     whole: &'a [[Vec3; LANES]],
     last: [Vec3; LANES],
@@ -479,7 +480,7 @@ impl<'a> Groups<'a> {
     }
 }
 
-/// The coordinates of vectors one by one, in double precision.
+/// The coordinates of vectors as one array per axis, in double precision.
 #[inline(always)]
 fn coordinates(vectors: &[Vec3; LANES]) -> [[f64; LANES]; 3] {
     let mut out = [[0.0; LANES]; 3];

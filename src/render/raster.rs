@@ -1,8 +1,8 @@
-//! The rasteriser: the triangles of a solid, cut at the near plane, and the picture of
-//! their nearness.
+//! The rasteriser: cuts the triangles of a solid at the near plane and draws their
+//! nearness.
 //!
-//! It does no shading and keeps no state. Which pixels a triangle covers is said in
-//! [`super::triangle`].
+//! It does no shading and keeps no state. [`super::triangle`] documents which pixels a
+//! triangle covers.
 
 use super::Camera;
 use super::candidates::Candidates;
@@ -15,7 +15,7 @@ use super::triangle::Triangle;
 use crate::geom::{Mesh, Solid};
 use glam::DVec3;
 
-/// What a triangle is, besides its corners in the image.
+/// Where a triangle comes from.
 pub(super) struct Source {
     /// Index of the instance in the solid.
     pub instance: usize,
@@ -23,11 +23,11 @@ pub(super) struct Source {
     pub face: usize,
 }
 
-/// Weights of a triangle that was not cut.
+/// Corner weights of a triangle that was not cut.
 pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Calls `draw` for each triangle that may touch the image, cut at the near plane.
-/// `projected` is that of [`project`].
+/// `projected` must come from [`project`].
 pub(super) fn each_triangle(
     solid: &Solid,
     camera: &Camera,
@@ -48,7 +48,7 @@ pub(super) fn each_triangle(
     }
 }
 
-/// As [`each_triangle`] for one mesh: `draw` gets the face.
+/// As [`each_triangle`] for one mesh; `draw` gets the face's index.
 fn mesh_triangles(
     mesh: &Mesh,
     placement: &Placement,
@@ -72,8 +72,8 @@ fn mesh_triangles(
     }
 }
 
-/// Which way triangles turn that need not be drawn, as [`Triangle::new`] has it. With the
-/// eye outside, the faces of a body that are turned away are hidden by others.
+/// The orientation of triangles that need not be drawn, as in [`Triangle::new`]. Seen
+/// from outside, the back faces of a closed body are hidden by its other faces.
 /// Counter-clockwise in the scene is counter-clockwise in the image, unless mirrored.
 fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
     match mesh.topology.encloses && vertices.whole {
@@ -83,9 +83,9 @@ fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
     }
 }
 
-/// The triangles of a mesh with vertices that are not in front of the near plane. `draw`
-/// gets the face, and the weights of its three corners at each corner of the triangle:
-/// other than the identity where the near plane cut it.
+/// Calls `draw` for the triangles of a mesh whose vertices are not all beyond the near
+/// plane. `draw` gets the face and, for each corner of the triangle, the weights of the
+/// face's three corners: the identity unless the near plane cut it.
 pub(super) fn cut_triangles(
     mesh: &Mesh,
     placement: &Placement,
@@ -118,8 +118,8 @@ pub(super) fn cut_triangles(
     }
 }
 
-/// The part of a triangle beyond the near plane as a polygon of at most four corners,
-/// each as weights.
+/// The part of a triangle beyond the near plane, as a polygon of at most four corners
+/// given by weights, and their number.
 fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
     let mut out = [[0.0; 3]; 4];
     let mut n = 0;
@@ -134,8 +134,8 @@ fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
             push(WHOLE[i]);
         }
         if (beyond[i] >= 0.0) != (beyond[j] >= 0.0) {
-            // From the far end in both of the faces that share the edge: the same point
-            // in both.
+            // Interpolated from the far end in both faces that share the edge, so that
+            // both get the same point.
             let (far, near) = if beyond[i] >= 0.0 { (i, j) } else { (j, i) };
             let u = beyond[far] / (beyond[far] - beyond[near]);
             let mut w = [0.0; 3];
@@ -147,7 +147,7 @@ fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
     (out, n)
 }
 
-/// Draws nearness alone into `buffer` (row by row, refilled here) and returns the depth
+/// Draws nearness alone into `buffer` (row by row, cleared here) and returns the depth
 /// range of the vertices.
 pub(super) fn draw_nearness(
     solid: &Solid,
@@ -178,20 +178,20 @@ pub(super) fn draw_nearness(
     range
 }
 
-/// Where the nearness of a mesh is wanted.
+/// Where the exact nearness of a mesh is needed.
 #[derive(Clone, Copy)]
 pub(super) enum Wanted<'a> {
     /// Everywhere.
     All,
-    /// At marked pixels of the whole image; nothing is said of others.
+    /// At the marked pixels of the whole image; the values of others are unspecified.
     Marked(&'a PixelBitmap),
-    /// At those pixels of an area, a byte each, that are not 0; at others that the mesh
-    /// covers, anything from this least nearness on.
+    /// At the pixels of an area whose byte is not 0; at other pixels that the mesh
+    /// covers, any value not below this least nearness will do.
     Exact(&'a [u8], f32),
 }
 
 impl<'a> Wanted<'a> {
-    /// The bitmap, if there are some.
+    /// The set of marked pixels, if there is one.
     #[inline(always)]
     pub fn bitmap(self) -> Option<&'a PixelBitmap> {
         match self {
@@ -200,7 +200,7 @@ impl<'a> Wanted<'a> {
         }
     }
 
-    /// The least nearness, if that will do for all lanes from a pixel of the area on.
+    /// The least nearness, if it will do for all lanes that begin at a pixel of the area.
     #[inline(always)]
     pub fn least(self, at: usize) -> Option<f32> {
         match self {
@@ -213,7 +213,7 @@ impl<'a> Wanted<'a> {
     }
 }
 
-/// Draws the nearness of one mesh into `buffer` (the rows of the area, refilled here).
+/// Draws the nearness of one mesh into `buffer` (the rows of the area, cleared here).
 pub(super) fn draw_mesh(
     mesh: &Mesh,
     placement: &Placement,
@@ -228,8 +228,8 @@ pub(super) fn draw_mesh(
     fill_mesh(mesh, placement, camera, vertices, candidates, (area, wanted), buffer);
 }
 
-/// Keeps the nearer of one mesh and what is there, in the rows of an area; with bitmap,
-/// the area is the whole image.
+/// Merges the nearness of one mesh into the rows of an area, keeping the nearer value;
+/// with marked pixels, the area must be the whole image.
 pub(super) fn fill_mesh(
     mesh: &Mesh,
     placement: &Placement,
@@ -251,9 +251,9 @@ pub(super) fn fill_mesh(
     );
 }
 
-/// As [`fill_mesh`] for a mesh all of whose vertices are in front of the near plane and
-/// in the whole image, and `faces` gets the face of each pixel where this mesh is nearer
-/// than what was there.
+/// As [`fill_mesh`] in the whole image, for a mesh with all vertices beyond the near
+/// plane. Also writes the face into `faces` at each pixel where this mesh is nearer than
+/// `buffer`.
 pub(super) fn fill_faces(
     mesh: &Mesh,
     placement: &Placement,
@@ -286,8 +286,8 @@ impl Area {
         Area { left: 0, right: camera.width as usize, top: 0, bottom: camera.height as usize }
     }
 
-    /// All pixels that a mesh with these vertices can reach. The whole image if some of
-    /// them are behind the near plane or not usable and others are in view.
+    /// All pixels that a mesh with these vertices can cover. The whole image if only some
+    /// of them are usable and beyond the near plane.
     pub fn around(vertices: &Vertices<'_>, camera: &Camera) -> Area {
         if !vertices.whole {
             let any =
@@ -302,7 +302,7 @@ impl Area {
         Area { left, right, top, bottom }
     }
 
-    /// The smallest rectangle around two; one without pixels counts for nothing.
+    /// The smallest rectangle around both; one without pixels is ignored.
     pub fn with(&self, other: &Area) -> Area {
         match (self.pixels(), other.pixels()) {
             (_, 0) => *self,
@@ -316,7 +316,7 @@ impl Area {
         }
     }
 
-    /// What two have in common.
+    /// The intersection of two rectangles.
     #[inline]
     pub fn common(&self, other: &Area) -> Area {
         let (left, top) = (self.left.max(other.left), self.top.max(other.top));
@@ -325,7 +325,7 @@ impl Area {
         Area { left, right, top, bottom }
     }
 
-    /// Whether they have pixels in common.
+    /// Whether two rectangles have pixels in common.
     #[inline]
     pub fn meets(&self, other: &Area) -> bool {
         self.common(other).pixels() > 0

@@ -10,7 +10,7 @@ use image::{Rgb, RgbImage};
 /// The background's colour.
 const BACKGROUND: [u8; 3] = [246, 246, 243];
 
-/// Base colours of parts, repeated.
+/// Base colours of parts, used cyclically.
 const PARTS: [[f32; 3]; 6] = [
     [0.55, 0.66, 0.80],
     [0.86, 0.68, 0.46],
@@ -20,7 +20,7 @@ const PARTS: [[f32; 3]; 6] = [
     [0.76, 0.76, 0.62],
 ];
 
-/// A picture of a frame. A frame without normals is shown by depth alone (near is dark).
+/// Shades a frame. A frame without normals is shown by depth alone (near is dark).
 pub fn shade(frame: &Frame) -> RgbImage {
     let (mut near, mut far) = (f32::INFINITY, f32::NEG_INFINITY);
     for &d in frame.depth.iter().filter(|d| d.is_finite()) {
@@ -36,7 +36,7 @@ pub fn shade(frame: &Frame) -> RgbImage {
         }
         match (frame.normal.get(i), frame.part.get(i)) {
             (Some(n), Some(&part)) => {
-                // A little to the upper left of the camera, so that round things look
+                // Slightly to the upper left of the camera, so that round things look
                 // round.
                 let light = (0.95 * n[2] - 0.18 * n[0] + 0.25 * n[1]).max(0.0);
                 let shine = light.powi(24) * 0.18;
@@ -96,7 +96,7 @@ mod tests {
             shade(&frame).pixels().map(|p| p.0).collect::<Vec<_>>()
         };
         assert_eq!(grey(vec![1.0, 1.25, 2.0]), [[38_u8; 3], [83; 3], [217; 3]]);
-        // Where all is equally far.
+        // At the same depth everywhere.
         assert_eq!(grey(vec![3.0, 3.0, f32::INFINITY]), [[38; 3], [38; 3], BACKGROUND]);
     }
 }

@@ -1,24 +1,23 @@
 //! Smooth silhouettes: in each face that they cross, the zero set of the (interpolated)
-//! facing, many faces at a time.
+//! facing, for many faces at a time.
 
 use super::project::{Lens, Placement, Point, Vertices, beyond_near};
 use crate::geom::{Mesh, Patches, Run, Topology};
 use glam::DVec3;
 
-/// The same for what is left in the end, and for small meshes.
+/// As [`MOST`], for the last faces of a mesh and for small meshes.
 const FEW: usize = 16;
-/// Faces worked on at a time: so many, a number known beforehand, that loops over them
-/// become wide instructions.
+/// Faces processed at a time: a compile-time constant, so that loops over them are
+/// vectorised.
 pub(super) const MOST: usize = 64;
 
-/// As many bytes as vertices in the longest run, each 1.
+/// As many bytes as the longest run has vertices, each 1.
 const EACH: u128 = u128::MAX / 255;
 
 /// A number for each face.
 type Row = [f64; MOST];
 
-/// The faces that silhouettes cross, and what of them lies in each. Reused from mesh to
-/// mesh.
+/// The faces that silhouettes cross, and the segment in each. Reused from mesh to mesh.
 #[derive(Default)]
 pub(super) struct Crossed {
     faces: Vec<u32>,
@@ -26,31 +25,31 @@ pub(super) struct Crossed {
     batch: Batch,
 }
 
-/// Segments of silhouettes in the image, some faces at a time. Pairs are the two ends,
-/// threes of rows the axes.
+/// Segments of silhouettes in the image, for a batch of faces. Pairs are the two ends,
+/// triples of rows the axes.
 pub(super) struct Batch {
-    /// The vertices of each face; the first one's sign differs from the others'.
+    /// The vertices of each face; the sign of facing of the first one differs from the
+    /// others'.
     pub corners: [[u32; 3]; MOST],
     /// Whether there is a segment.
     pub there: [bool; MOST],
-    /// How far along the sides from the first corner the ends lie, as a share.
+    /// Where the ends lie along the sides from the first corner, as fractions.
     pub shares: [Row; 2],
     /// The ends in the image: x, y, nearness.
     pub ends: [[Row; 3]; 2],
-    /// Pixels.
+    /// In pixels.
     pub length: Row,
-    /// Unit vector from the first end to the second, turned so that outward lies to the
-    /// left of it.
+    /// Unit vector along the segment, oriented so that outward lies to its left.
     pub tangent: [Row; 2],
     /// Unit vector away from the surface.
     pub outward: [Row; 2],
     /// How much nearer than the silhouette the face reaches, in scene units.
     pub slack: Row,
-    /// Half way between the ends in the image.
+    /// Midpoint of the ends in the image.
     pub middle: [Row; 2],
-    /// Scene units, there.
+    /// Depth there, in scene units.
     pub depth: Row,
-    /// Position, normal and facing of the corners in the mesh's coordinates; the same
+    /// Position, normal and facing of the corners in the mesh's coordinates, and the
     /// corners in the image.
     positions: [[Row; 3]; 3],
     normals: [[Row; 3]; 3],
@@ -86,8 +85,9 @@ impl Default for Batch {
 }
 
 impl Crossed {
-    /// Calls `out` with the segments in all faces of a mesh, in their order, some at a
-    /// time, and how many there are; `facing` and whether it is not negative by vertex.
+    /// Calls `out` with the segments in all faces of a mesh, batch by batch in the order
+    /// of the faces, and the number of faces in each batch. By vertex, `facing` is given,
+    /// and in `front` whether it is not negative.
     #[inline(always)]
     pub fn each(
         &mut self,
@@ -114,7 +114,7 @@ impl Crossed {
         }
     }
 
-    /// Finds the faces whose corners do not all have the same sign.
+    /// Finds the faces whose corners do not all have the same sign of facing.
     #[inline(always)]
     fn find(&mut self, topology: &Topology, front: &[u8]) {
         let (triangles, patches) = (&topology.triangles, topology.patches.of(&topology.triangles));
@@ -141,8 +141,8 @@ impl Crossed {
                 let [Some(&a), Some(&b), Some(&c)] = corners.map(|v| front.get(v as usize)) else {
                     continue;
                 };
-                // Each is written down, and written over unless it counts: a branch could
-                // not be foretold.
+                // Written to an entry that the next face overwrites unless this one
+                // counts: a branch would be unpredictable.
                 if let Some(place) = faces.get_mut(count) {
                     *place = face as u32;
                 }
@@ -153,7 +153,7 @@ impl Crossed {
     }
 }
 
-/// The corners of a face from the one on that differs from the two others.
+/// The corners of a face, beginning with the one whose sign differs from the two others.
 #[inline(always)]
 fn first_odd(&[a, b, c]: &[u32; 3], front: &[u8]) -> [u32; 3] {
     let front = |v: u32| front.get(v as usize).copied().unwrap_or_default();
@@ -175,7 +175,7 @@ impl Batch {
         })
     }
 
-    /// The same as shares of the corners.
+    /// The same ends as weights of the corners.
     #[inline(always)]
     pub fn weights(&self, i: usize) -> [[f64; 3]; 2] {
         let [u, v] = [self.shares[0][i], self.shares[1][i]];
@@ -205,8 +205,8 @@ impl Batch {
         }
     }
 
-    /// Works out the segments in the first `N` faces, of which `count` are set; `whole`
-    /// if all of the mesh is in view.
+    /// Computes the segments in the first `N` faces, of which `count` are set; `whole` if
+    /// all of the mesh is beyond the near plane.
     #[inline(always)]
     fn work<const N: usize>(
         &mut self,
@@ -229,7 +229,8 @@ impl Batch {
         }
     }
 
-    /// Where the silhouettes cross the sides of the faces, in camera coordinates.
+    /// Computes where the silhouettes cross the sides of the faces, in camera
+    /// coordinates.
     #[inline(always)]
     fn cross<const N: usize>(&mut self, placement: &Placement) {
         let placement = *placement;
@@ -270,7 +271,7 @@ impl Batch {
         }
     }
 
-    /// Where the segments are in the image.
+    /// Projects the segments into the image.
     #[inline(always)]
     fn draw<const N: usize, const PINHOLE: bool>(&mut self, lens: &Lens) {
         let lens = Lens { pinhole: PINHOLE, ..*lens };
@@ -295,8 +296,8 @@ impl Batch {
             let (dx, dy) = (b.x - a.x, b.y - a.y);
             let long = (dx * dx + dy * dy).sqrt();
             let (tx, ty) = (dx / long, dy / long);
-            // The plane through the eye with this normal cuts the image in a line at
-            // right angles to (x, y) of it.
+            // The plane through the camera with this normal cuts the image in a line
+            // perpendicular to the normal's (x, y).
             let (nx, ny) = (normal[0][i], normal[1][i]);
             let size = (nx * nx + ny * ny).sqrt();
             let sound = size > 1e-12;
@@ -323,7 +324,8 @@ impl Batch {
         }
     }
 
-    /// Of a face that is not all in view it is not known how near it comes.
+    /// Clears the slack of faces that are not all beyond the near plane: it is not known
+    /// how near they come.
     fn no_slack_behind(&mut self, count: usize) {
         for i in 0..count {
             if !self.image.iter().all(|at| at[2][i] < f64::INFINITY) {

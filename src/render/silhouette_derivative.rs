@@ -1,9 +1,9 @@
-//! How smooth silhouettes slide over the faces of a mesh when those turn.
+//! How smooth silhouettes slide over the faces of a mesh when the faces rotate.
 //!
-//! A silhouette is where the interpolated normal is at right angles to the line of sight.
-//! On a smooth surface sliding does not show: the line of sight touches the surface
-//! there. A flat face it does not touch, so on coarse meshes sliding moves the contour
-//! across itself, too. Invariant: exact (but for `steady`) where the vertices move
+//! A silhouette is where the interpolated normal is perpendicular to the line of sight.
+//! On a smooth surface sliding is invisible: the line of sight is tangent to the surface
+//! there. It is not tangent to a flat face, so on coarse meshes sliding also moves the
+//! contour sideways. Invariant: exact (except for `steady`) where the vertices move
 //! together as a rigid body.
 
 use super::extraction::Origin;
@@ -11,23 +11,25 @@ use super::{Camera, Projection};
 use crate::geom::{Instance, Solid};
 use glam::{DMat3, DVec3};
 
-/// The angle between the normals of a face's corners, in radians, below which silhouettes
-/// are taken to slide less: a turn that moves limbs by about a pixel takes them over such
-/// faces and on to the next, and what one face adds another takes away.
+/// The angle between the normals of a face's corners, in radians, below which sliding is
+/// damped: a rotation that moves limbs by about a pixel takes silhouettes over such faces
+/// and on to the next, and what one face adds another takes away.
 pub(super) const STEADY: f64 = 0.1;
 
-/// Derivatives by the turns of normals, until they are taken to the vertices.
+/// Derivatives with respect to rotations of normals, collected before they are mapped to
+/// vertices.
 pub(super) struct SilhouetteDerivative {
-    /// By a turn of each vertex's normal about the axes, in world coordinates.
+    /// With respect to a rotation of each vertex's normal about the world axes.
     turns: Vec<DVec3>,
     /// The square of [`STEADY`].
     steady: f64,
-    /// What takes normals of the mesh that begins at a vertex along.
+    /// The first vertex of a mesh among all, and the matrix that transforms the mesh's
+    /// normals.
     normals: (usize, DMat3),
 }
 
 impl SilhouetteDerivative {
-    /// Of a solid with so many vertices.
+    /// For a solid with a number of vertices.
     pub fn new(vertices: usize, steady: f64) -> SilhouetteDerivative {
         SilhouetteDerivative {
             turns: vec![DVec3::ZERO; vertices],
@@ -36,8 +38,9 @@ impl SilhouetteDerivative {
         }
     }
 
-    /// Adds what one piece does, by the derivatives by its segment's ends; `out` begins
-    /// at its mesh's first vertex, `base` of all.
+    /// Adds the contribution of one piece, from the derivatives with respect to its
+    /// segment's ends. `out` begins at the first vertex of its mesh, which is number
+    /// `base` among all.
     pub fn add(
         &mut self,
         instance: &Instance,
@@ -48,7 +51,7 @@ impl SilhouetteDerivative {
         out: &mut [DVec3],
     ) {
         let [odd, others @ ..] = origin.corners;
-        // The ends of an edge are vertices: nothing slides.
+        // The ends of an edge are vertices and do not slide.
         if others[0] == others[1] {
             return;
         }
@@ -89,8 +92,8 @@ impl SilhouetteDerivative {
         }
     }
 
-    /// Adds to the derivatives by the vertices: a normal turns as the faces around it do,
-    /// by their areas.
+    /// Adds the derivatives with respect to the vertices: a normal rotates as the faces
+    /// around it do, weighted by their areas.
     pub fn vjp(&self, solid: &Solid, out: &mut [DVec3]) {
         let mut base = 0;
         let mut faces = Vec::new();
@@ -117,7 +120,7 @@ impl SilhouetteDerivative {
     }
 }
 
-/// A face that turns.
+/// A face whose corners' normals rotate.
 struct Face {
     corners: [u32; 3],
     /// The edge opposite to each corner.
@@ -146,15 +149,15 @@ impl Face {
         })
     }
 
-    /// Takes its share of the derivatives by the turns of its corners' normals to the
-    /// corners.
+    /// Maps this face's share of the derivatives with respect to the rotations of its
+    /// corners' normals to the corners.
     fn vjp(&self, turns: &[DVec3], areas: &[f64], out: &mut [DVec3]) {
         let by = |v: &u32| Some(*turns.get(*v as usize)? * (self.area / areas.get(*v as usize)?));
         let by: DVec3 = self.corners.iter().filter_map(by).sum();
         for (v, o) in self.corners.iter().zip(self.opposite) {
             if let Some(place) = out.get_mut(*v as usize) {
-                // A corner that rises tips the face about the opposite edge; one that
-                // moves along it turns the face in its plane.
+                // A corner that moves along the normal tips the face about the opposite
+                // edge; one that moves along that edge rotates the face in its plane.
                 *place += self.normal * (by.dot(o) / self.area)
                     - o * (by.dot(self.normal) / (2.0 * self.area));
             }

@@ -1,43 +1,43 @@
-//! The pixels of small triangles, nearly all of a fine mesh: many triangles set up at a
-//! time, eight pixels of a row told at a time.
+//! The pixels of small triangles, which are nearly all of a fine mesh: many triangles are
+//! set up at a time, and eight pixels of a row are tested at a time.
 //!
-//! The same pixels as by [`super::coverage`], whose edges these are in whole numbers of
-//! 32 bits.
+//! Gives the same pixels as [`super::coverage`]: the edge functions are the same, in
+//! 32-bit integers.
 
 use super::place::{Extent, Place, UNIT};
 use pulp::bytemuck::cast;
 use wide::{f32x8, i32x8};
 
-/// Pixels told at a time.
+/// Pixels tested at a time.
 pub(super) const LANES: usize = 8;
 /// Triangles set up at a time.
 const MOST: usize = 64;
-/// A triangle is small if it is less wide and high than this, in pixels.
+/// Triangles narrower and lower than this, in pixels, are small.
 const SMALL: f32 = 16.0;
 
-/// Some triangles with their edges as functions that are not negative inside. Reused from
-/// triangles to triangles.
+/// Triangles with their edge functions, which are not negative inside. Reused from batch
+/// to batch.
 pub(super) struct Batch {
     count: usize,
     faces: [u32; MOST],
     extents: [Extent; MOST],
-    /// The corners' coordinates by turns, relative to where the lanes begin in the first
-    /// row, in pixels.
+    /// The coordinates x and y of each corner in turn, in pixels relative to the first
+    /// lane of the first row.
     corners: [[f32; MOST]; 6],
-    /// Each edge's value there, its change by column, its change by row.
+    /// Each edge function's value there, its change per column, its change per row.
     edges: [[[i32; MOST]; 3]; 3],
     kinds: [Kind; MOST],
 }
 
-/// What is to be done with a triangle.
+/// How a triangle is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub(super) enum Kind {
-    /// It shows a back that need not be drawn, or has no area.
+    /// Not at all: it shows a back face that need not be drawn, or has no area.
     Nothing = 0,
-    /// Its pixels are told by lanes.
+    /// By lanes.
     Small = 1,
-    /// It is too large for that.
+    /// By runs, because it is too large for lanes.
     Large = 2,
 }
 
@@ -56,16 +56,17 @@ impl Default for Batch {
     }
 }
 
-/// Where the lanes of a triangle begin in a buffer that ends at column `right`.
+/// The column of a triangle's first lane in a buffer that ends at column `right`.
 #[inline(always)]
 fn start(extent: &Extent, right: usize) -> usize {
     extent.ends()[0][0].min(right - LANES)
 }
 
 impl Batch {
-    /// Calls `draw` with the faces of a list that cover pixels, each with how and its
-    /// index in the batch. `right` is the column past the last one of the buffer, at
-    /// least [`LANES`]; `back` as in [`Coverage::new`](super::coverage::Coverage::new).
+    /// Calls `draw` for the triangles of a list that may cover pixels: the batch, the
+    /// index in it, the face, its extent and how to draw it. `right` is the column past
+    /// the last one of the buffer, at least [`LANES`]; `back` as in
+    /// [`Coverage::new`](super::coverage::Coverage::new).
     #[inline(always)]
     pub fn each(
         &mut self,
@@ -112,11 +113,11 @@ impl Batch {
         self.count = i + 1;
     }
 
-    /// Works out the edges of all.
+    /// Computes the edge functions of all triangles.
     #[inline(always)]
     fn solve(&mut self, back: i32) {
-        // The lowest bits of a sum with this are the nearest whole number, also below
-        // zero.
+        // Adding this to a number, also to a negative one, leaves the nearest integer in
+        // the lowest bits of the sum.
         const LOW_BITS: f32 = 12_582_912.0;
         let Batch { corners: [ax, ay, bx, by, cx, cy], edges, kinds, .. } = self;
         let whole = |v: f32| {
@@ -131,13 +132,13 @@ impl Batch {
                 (x[p as usize].wrapping_sub(x[0])).wrapping_mul(y[q as usize].wrapping_sub(y[0]))
             };
             let turn = cross(1, 2).wrapping_sub(cross(2, 1));
-            // Counter-clockwise, every edge runs the other way.
+            // A counter-clockwise triangle's edges run the other way.
             let way = if turn > 0 { 1 } else { -1 };
             for (e, [at, by_column, by_row]) in edges.iter_mut().enumerate() {
                 let next = (e + 1) % 3;
                 let dx = x[next].wrapping_sub(x[e]).wrapping_mul(way);
                 let dy = y[next].wrapping_sub(y[e]).wrapping_mul(way);
-                // Left and top edges have the centres on them.
+                // Centres on left and top edges count as inside.
                 let has = (dy < 0) | ((dy == 0) & (dx > 0));
                 at[i] = dy
                     .wrapping_mul(x[e])
@@ -155,8 +156,8 @@ impl Batch {
         }
     }
 
-    /// Calls `draw` for each row of a small triangle, once or twice, with the lanes from
-    /// some column on: row, column, sign bits set outside of the triangle.
+    /// Calls `draw` for each row of a small triangle, once or twice: row, column of the
+    /// first lane, and lanes with the sign bit set outside of the triangle.
     #[inline(always)]
     pub fn rows(
         &self,
@@ -178,7 +179,7 @@ impl Batch {
                 draw(row, from, lanes[0] | lanes[1] | lanes[2]);
                 lanes = [lanes[0] + by_row[0], lanes[1] + by_row[1], lanes[2] + by_row[2]];
             }
-            // A second time for what is beyond the lanes.
+            // A second pass for columns beyond the first lanes.
             if from != begin || past - first <= LANES {
                 return;
             }
@@ -194,7 +195,7 @@ impl Batch {
     }
 }
 
-/// All bits of the lanes whose sign bit is set.
+/// Sets all bits of the lanes whose sign bit is set, and clears the others.
 #[inline(always)]
 pub(super) fn all_bits(signs: i32x8) -> f32x8 {
     cast(signs >> 31)
@@ -208,8 +209,8 @@ mod tests {
     use super::*;
     use crate::render::testing::Uniform;
 
-    /// The same pixels and the same numbers as by runs, several batches at once, with and
-    /// without backs.
+    /// The same pixels and numbers as by runs, over several batches, with and without
+    /// back faces.
     #[test]
     fn lanes_draw_what_runs_draw() {
         let mut random = Uniform(17);

@@ -1,8 +1,7 @@
-//! The depth of a few pixels: those that pieces of contour look at. The triangles that
-//! cover none of them are not drawn.
+//! Depth at selected pixels only: those at which pieces of contour are tested. Triangles
+//! that cover none of them are not drawn.
 //!
-//! Invariant: what is read of a pixel that was marked is what the whole depth image has
-//! there, bit for bit.
+//! Invariant: the depth of a marked pixel is that of the full depth image, bit for bit.
 
 use super::Camera;
 use super::candidates::Candidates;
@@ -17,14 +16,14 @@ use crate::geom::Solid;
 #[derive(Default)]
 pub(super) struct SparseDepth {
     bitmap: PixelBitmap,
-    /// Nearness, then depth; of no meaning where there is no mark.
+    /// Nearness, then depth; meaningless at unmarked pixels.
     depth: Vec<f32>,
     empty: f32,
     candidates: Candidates,
 }
 
 impl SparseDepth {
-    /// Removes all bitmap.
+    /// Removes all marks.
     pub fn clear(&mut self, camera: &Camera) {
         self.bitmap.clear(camera);
         if self.depth.len() < camera.pixels() {
@@ -42,8 +41,8 @@ impl SparseDepth {
         }
     }
 
-    /// Draws the solid at the marked pixels, and says what depth they have: entries of an
-    /// image of which the others mean nothing.
+    /// Draws the solid at the marked pixels and returns the depth image; its other
+    /// entries are meaningless.
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) -> &[f32] {
         let SparseDepth { bitmap, depth, candidates, .. } = self;
         bitmap.finish();

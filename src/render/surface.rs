@@ -1,9 +1,9 @@
-//! How depth moves with the surface: from derivatives by the depth at each pixel to
-//! derivatives by the vertices.
+//! How depth moves with the surface: from derivatives with respect to the depth at each
+//! pixel to derivatives with respect to the vertices.
 //!
-//! At a pixel the depth is where its line of sight meets the plane of the face that is
-//! seen; which face that is, is taken as it is. The motion of the outline is the business
-//! of [`View::vjp_mask`].
+//! The depth at a pixel is where its line of sight meets the plane of the visible face;
+//! the choice of that face is held fixed. [`View::vjp_mask`] accounts for the motion of
+//! the outline.
 
 use super::View;
 use super::project::{Projected, project};
@@ -11,9 +11,10 @@ use super::raster::{each_triangle, empty};
 use glam::DVec3;
 
 impl View {
-    /// The derivatives by each vertex of the solid's meshes in turn, in world
-    /// coordinates, from those by the depth at each pixel, row by row, of the picture
-    /// whose longer side has `size` pixels. What is not seen counts as 0.
+    /// The derivatives with respect to each vertex of the solid's meshes in turn, in
+    /// world coordinates, from those with respect to the depth at each pixel, row by row,
+    /// of the picture whose longer side has `size` pixels. Pixels that do not show the
+    /// solid are ignored.
     pub fn vjp_depth(&self, size: u32, by_depth: &[f64]) -> Vec<DVec3> {
         let (solid, camera) = (self.solid(), self.camera().scaled_to(size));
         let mut projected = Projected::default();
@@ -50,7 +51,7 @@ impl View {
             let normal = (b - a).cross(c - a);
             let slope = normal / normal.dot(ray);
             let hit = start + ray * slope.dot(a - start);
-            // The shares of the corners at the point that is seen.
+            // The barycentric coordinates of the visible point.
             let area = normal.length_squared();
             let share = |p: DVec3, q: DVec3| (p - hit).cross(q - hit).dot(normal) / area;
             let g = slope * *by;
@@ -74,8 +75,8 @@ mod tests {
 
     #[test]
     fn depth_moves_with_the_plane_of_the_face_that_is_seen() {
-        // On the plane z = x / 8, whose depth at a pixel grows by dx / 8 - dz where the
-        // line of sight is along -z.
+        // On the plane z = x / 8, whose depth at a pixel grows by dx / 8 - dz when it
+        // moves by (dx, 0, dz), where the line of sight is along -z.
         let corners = [
             Vec3::new(-2.0, -2.0, -0.25),
             Vec3::new(14.0, -2.0, 1.75),
@@ -85,8 +86,8 @@ mod tests {
         let pinhole = Camera::default_for(3, 3);
         let projection = Projection::Orthographic { units_per_pixel: 1.0, cx: 1.5, cy: 1.5 };
         let parallel = Camera { projection, ..pinhole };
-        // The middle pixel shows the origin, the one to the right of it (1, 0, 1 / 8):
-        // the shares of the corners there.
+        // The middle pixel shows the origin, the one to its right (1, 0, 1 / 8); `shares`
+        // are the barycentric coordinates there.
         for (camera, pixel, shares) in [
             (pinhole, 4, [0.625, 0.125, 0.25]),
             (parallel, 4, [0.625, 0.125, 0.25]),

@@ -91,8 +91,8 @@ impl Uniform {
         low + (high - low) * self.next()
     }
 
-    /// A triangle of about some size in an image of 40 x 30 pixels, or partly out of it;
-    /// `halves` puts corners on half pixels.
+    /// A triangle of about some size in an image of 40 x 30 pixels, or partly outside of
+    /// it; `halves` puts corners on half pixels.
     pub fn corners(&mut self, size: f64, halves: bool) -> [Point; 3] {
         let middle = [self.between(-2.0, 42.0), self.between(-2.0, 32.0)];
         std::array::from_fn(|_| {
@@ -105,8 +105,8 @@ impl Uniform {
     }
 }
 
-/// The folders of the object data set that hold a camera, with their names, sorted; none
-/// when it is not there.
+/// The folders of the object data set that contain a camera, with their names, sorted;
+/// empty if the data set is missing.
 pub fn cases() -> Vec<(String, PathBuf)> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let roots = ["../shared", "../../shared"].map(|at| root.join(at).join("data/objects"));
@@ -124,8 +124,8 @@ pub fn cases() -> Vec<(String, PathBuf)> {
     out
 }
 
-/// A sum over contours of their length, weighted by a smooth function of the place, and
-/// its derivatives by the pieces.
+/// The length of contours, weighted by a smooth function of position and summed, and its
+/// derivatives with respect to the pieces.
 pub fn weighted(c: &Contours) -> (f64, Vec<[f64; 4]>) {
     let one = |((x, y), length): ((&f32, &f32), &f32)| {
         let [x, y, length] = [x, y, length].map(|v| f64::from(*v));
@@ -137,8 +137,8 @@ pub fn weighted(c: &Contours) -> (f64, Vec<[f64; 4]>) {
     (all.iter().map(|a| a.0).sum(), all.iter().map(|a| a.1).collect())
 }
 
-/// The slope of something along a way, from its derivatives by the vertices and where
-/// those are before and after.
+/// The slope of a function along a motion of size `way`, from its derivatives with
+/// respect to the vertices and the solids before and after the motion.
 pub fn along(by_vertex: &[DVec3], before: &Solid, after: &Solid, way: f64) -> f64 {
     let moved = before.vertices().zip(after.vertices()).map(|(a, b)| (b - a) / way);
     by_vertex.iter().zip(moved).map(|(g, d)| g.dot(d)).sum()

@@ -1,8 +1,8 @@
-//! Triangles and the picture of their nearness.
+//! Drawing the nearness of triangles.
 //!
-//! Which pixels a triangle covers is said in [`super::coverage`], from rounded corners;
-//! nearness comes from the corners as they were. Eight pixels at a time or by runs: the
-//! same numbers.
+//! [`super::coverage`] decides which pixels a triangle covers, from rounded corners;
+//! nearness is computed from the unrounded ones. Drawing eight pixels at a time and
+//! drawing by runs give the same numbers.
 
 use super::coverage::Coverage;
 use super::pixel_bitmap::PixelBitmap;
@@ -14,14 +14,14 @@ use glam::Vec4;
 use pulp::bytemuck::cast;
 use wide::{f32x8, i32x8};
 
-/// A run of pixels in one row; nearness changes linearly from pixel to pixel.
+/// A run of pixels in one row, over which nearness is linear.
 pub(super) struct Run {
     pub row: usize,
     pub from: usize,
     pub to: usize,
     nearness: f32,
     step: f32,
-    /// The column that `nearness` is at.
+    /// The column at which `nearness` is given.
     origin: usize,
     limits: [f32; 2],
 }
@@ -34,7 +34,7 @@ impl Run {
     }
 }
 
-/// Comparisons that NaN fails are one instruction each, which `max` and `min` are not.
+/// Clamps. Comparisons that NaN fails are one instruction each, unlike `max` and `min`.
 #[inline(always)]
 fn within(q: f32, [lo, hi]: [f32; 2]) -> f32 {
     let q = if q > lo { q } else { lo };
@@ -43,21 +43,21 @@ fn within(q: f32, [lo, hi]: [f32; 2]) -> f32 {
 
 /// Nearness over a triangle, linear in the image.
 pub(super) struct Plane {
-    /// At the first column, in the row of the first corner.
+    /// The value at the first column, in the row of the first corner.
     first: f64,
-    /// Its change from row to row, and the first corner's.
+    /// Its change per row, and the first corner's y.
     by_row: f64,
     corner: f64,
-    /// Its change from column to column.
+    /// Its change per column.
     step: f32,
-    /// The column it begins at.
+    /// The first column.
     origin: usize,
     /// Least and greatest nearness of the corners.
     limits: [f32; 2],
 }
 
 impl Plane {
-    /// From some column on; `None` of a triangle without area.
+    /// Starts at a column; `None` for a triangle without area.
     #[inline(always)]
     pub fn new(points: &[Point; 3], column: usize) -> Option<Plane> {
         if is_flat(points) {
@@ -81,8 +81,9 @@ impl Plane {
         (self.first + self.by_row * (row as f64 + 0.5 - self.corner)) as f32
     }
 
-    /// Keeps the nearer of the lanes from a column of a row on and what is there, at `at`
-    /// in a buffer. Gives the lanes that are nearer, all of their bits set.
+    /// Writes the lanes that are inside the triangle and nearer than the buffer. The
+    /// lanes begin at column `from` of `row`, which is index `at` of the buffer. Returns
+    /// the lanes that were written, as all bits set.
     #[inline(always)]
     pub fn keep(
         &self,
@@ -106,7 +107,7 @@ impl Plane {
     }
 }
 
-/// Writes a face into the lanes that are nearer, at `at` in a buffer.
+/// Writes a face into the lanes set in `nearer`, which begin at index `at` of a buffer.
 #[inline(always)]
 pub(super) fn put_face(faces: &mut [u32], at: usize, face: u32, nearer: f32x8) {
     let Some(pixels) = faces.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
@@ -118,8 +119,7 @@ pub(super) fn put_face(faces: &mut [u32], at: usize, face: u32, nearer: f32x8) {
     }
 }
 
-/// Keeps the nearer of this and what is there, in the lanes of a triangle, at `at` in a
-/// buffer.
+/// As [`Plane::keep`], with the same nearness in all lanes.
 #[inline(always)]
 pub(super) fn keep_all(buffer: &mut [f32], at: usize, nearness: f32, outside: i32x8) {
     let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
@@ -142,7 +142,7 @@ pub(super) fn area([a, b, c]: &[Point; 3]) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
 
-/// One triangle, ready to be drawn.
+/// A triangle that is ready to be drawn.
 pub(super) struct Triangle {
     pub points: [Point; 3],
     coverage: Coverage,
@@ -162,7 +162,8 @@ impl Triangle {
         if extent.is_empty() { None } else { Triangle::new(points, places, extent, back) }
     }
 
-    /// `None` when it covers nothing, or shows a back as in [`Coverage::new`].
+    /// `None` if it covers nothing, or has the orientation `back` as in
+    /// [`Coverage::new`].
     #[inline(always)]
     pub fn new(
         points: [Point; 3],
@@ -173,7 +174,7 @@ impl Triangle {
         Triangle::covering(Coverage::new(places, || points, extent, back)?, points)
     }
 
-    /// `None` when it has no area.
+    /// `None` if it has no area.
     #[inline(always)]
     fn covering(coverage: Coverage, points: [Point; 3]) -> Option<Triangle> {
         let plane = Plane::new(&points, coverage.columns[0])?;
@@ -188,8 +189,9 @@ impl Triangle {
         });
     }
 
-    /// Keeps the nearer of the triangle and what is there, in the rows of an area; with
-    /// bitmap, at marked pixels at least, and the area is the whole image.
+    /// Merges the triangle into the rows of an area, keeping the nearer value. With a set
+    /// of marked pixels, only these are sure to be drawn, and the area must be the whole
+    /// image.
     pub fn keep(&self, buffer: &mut [f32], area: &Area, bitmap: Option<&PixelBitmap>) {
         match bitmap {
             Some(bitmap) => self.fill_some(buffer, area.right - area.left, bitmap),
@@ -197,8 +199,8 @@ impl Triangle {
         }
     }
 
-    /// As [`Triangle::keep`], in a buffer of some columns from `left` on and rows from
-    /// `top` on.
+    /// As [`Triangle::keep`], in a buffer of columns `left..right` and rows from `top`
+    /// on.
     #[inline(never)]
     pub fn fill(&self, buffer: &mut [f32], [left, right]: [usize; 2], top: usize) {
         let width = right - left;
@@ -218,7 +220,7 @@ impl Triangle {
         });
     }
 
-    /// As [`Triangle::fill`] in an area, with the face written where the triangle is
+    /// As [`Triangle::fill`] in an area, and writes the face where the triangle is
     /// nearer.
     #[inline(never)]
     pub fn fill_faces(&self, buffer: &mut [f32], (faces, face): (&mut [u32], u32), area: &Area) {
@@ -243,8 +245,8 @@ impl Triangle {
         });
     }
 
-    /// As [`Triangle::fill`] for a whole image of some columns, but pixels that are not
-    /// marked need not be drawn.
+    /// As [`Triangle::fill`] for a whole image of `width` columns, but pixels that are
+    /// not marked may be skipped.
     #[inline(never)]
     fn fill_some(&self, buffer: &mut [f32], width: usize, bitmap: &PixelBitmap) {
         self.runs(|run| {
@@ -260,7 +262,7 @@ impl Triangle {
     }
 }
 
-/// The places of the bits that are set.
+/// The indices of the bits that are set.
 #[inline(always)]
 pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
@@ -332,7 +334,7 @@ mod tests {
         assert_eq!(count, wanted);
     }
 
-    /// Whole, in part of the picture, and where there are bitmap.
+    /// Filled whole, in part of the picture, and at marked pixels.
     #[test]
     fn triangles_are_filled_as_by_their_runs() {
         let mut random = Uniform(3);

@@ -1,4 +1,4 @@
-//! A solid seen by a camera, with its frames and contours computed when first asked for.
+//! A solid seen by a camera, with its frames and contours computed on demand.
 //!
 //! Not a scene graph and not mutable: another pose is another `View`. Invariant: for one
 //! image size the frame, the depth and the contours are computed once, and every caller
@@ -10,14 +10,14 @@ use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Values by image size; few sizes are ever asked for, so a list is enough.
+/// Values by image size; few sizes are ever requested, so a list is enough.
 type BySize<T> = Mutex<Vec<(u32, Arc<T>)>>;
 
-/// A solid and the camera that looks at it. `Send` and `Sync`; share it in an `Arc`.
+/// A solid and the camera that sees it. `Send` and `Sync`; share it in an `Arc`.
 pub struct View {
     solid: Solid,
     camera: Camera,
-    /// By how many pixels contours and depth may be off.
+    /// Tolerance of contours and depth, in pixels.
     detail: f64,
     frames: BySize<Frame>,
     depths: BySize<Frame>,
@@ -31,9 +31,9 @@ impl View {
         View::with_detail(solid, camera, 0.0)
     }
 
-    /// A view whose contours and depth may show meshes coarser than they are, as long as
-    /// every vertex left out is within `detail` pixels of what is drawn, whatever the
-    /// size of the picture; 0 for meshes as they are.
+    /// A view whose contours and depth may show simplified meshes, as long as every
+    /// omitted vertex is within `detail` pixels of what is drawn, whatever the size of
+    /// the picture; 0 for the full meshes.
     pub fn with_detail(solid: Solid, camera: Camera, detail: f64) -> View {
         let (frames, depths, contours) = (Mutex::default(), Mutex::default(), Mutex::default());
         View { solid, camera, detail, frames, depths, contours, changes: Mutex::default() }
@@ -49,29 +49,29 @@ impl View {
         &self.camera
     }
 
-    /// By how many pixels contours and depth may be off.
+    /// Tolerance of contours and depth, in pixels.
     pub fn detail(&self) -> f64 {
         self.detail
     }
 
-    /// What contours and depth show in the picture whose longer side has `size` pixels (0
-    /// counts as 1).
+    /// The scene that contours and depth show in the picture whose longer side has `size`
+    /// pixels (0 counts as 1).
     pub fn scene(&self, size: u32) -> Scene {
         let camera = self.camera.scaled_to(size);
         Scene { solid: self.drawn(&camera).solid, camera }
     }
 
     /// All channels of the picture whose longer side has `size` pixels (0 counts as 1),
-    /// of meshes as they are.
+    /// with the full meshes.
     pub fn frame(&self, size: u32) -> Arc<Frame> {
         once(&self.frames, size, || {
             Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All)
         })
     }
 
-    /// A frame that has depth at least, in the picture whose longer side has `size`
-    /// pixels (0 counts as 1): cheaper than [`View::frame`], and contours of that size
-    /// that are asked for later use it.
+    /// A frame with depth at least, in the picture whose longer side has `size` pixels (0
+    /// counts as 1): cheaper than [`View::frame`], and reused by contours of that size
+    /// that are requested later.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
         self.frame_drawn(size).unwrap_or_else(|| {
             let camera = self.camera.scaled_to(size);
@@ -94,8 +94,9 @@ impl View {
         })
     }
 
-    /// What [`View::contours`] has more and less than those drawn last by this thread,
-    /// without making the list: in a scene most of which stands still; `None` for others.
+    /// The difference of [`View::contours`] from the contours that this thread drew last,
+    /// without building the list, in a scene most of which is stationary; `None` for
+    /// other scenes.
     pub fn change(&self, size: u32) -> Arc<Option<Change>> {
         once(&self.changes, size, || {
             let camera = self.camera.scaled_to(size);
@@ -103,28 +104,28 @@ impl View {
         })
     }
 
-    /// The vector-Jacobian product of [`View::contours`] by the solid's vertices:
-    /// [`Contours::vjp`], 0 for those that are not drawn.
+    /// The vector-Jacobian product of [`View::contours`] with respect to the solid's
+    /// vertices, as [`Contours::vjp`]; 0 for vertices that are not drawn.
     pub fn vjp_contours(&self, size: u32, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
         let camera = self.camera.scaled_to(size);
         let drawn = self.drawn(&camera);
         drawn.by_vertices_of(&self.solid, self.contours(size).vjp(&drawn.solid, &camera, by_piece))
     }
 
-    /// How many triangles contours and depth show in the picture whose longer side has
-    /// `size` pixels.
+    /// The number of triangles that contours and depth show in the picture whose longer
+    /// side has `size` pixels.
     pub fn triangles(&self, size: u32) -> usize {
         let drawn = self.drawn(&self.camera.scaled_to(size));
         drawn.solid.instances().iter().map(|i| i.mesh.topology.triangles.len()).sum()
     }
 
-    /// What contours and depth show of the solid.
+    /// The solid as contours and depth show it.
     pub(super) fn drawn(&self, camera: &Camera) -> Drawn {
         Drawn::new(&self.solid, camera, self.detail)
     }
 
-    /// A frame of all channels that can stand for depth, if it was drawn: that of meshes
-    /// as they are, so only if they are to be drawn so.
+    /// The frame of all channels, if it was drawn and can replace the depth frame: it
+    /// shows the full meshes, so only if depth does too.
     fn frame_drawn(&self, size: u32) -> Option<Arc<Frame>> {
         if self.detail > 0.0 { None } else { find(&lock(&self.frames), size) }
     }
@@ -144,8 +145,8 @@ fn find<T>(entries: &[(u32, Arc<T>)], size: u32) -> Option<Arc<T>> {
     entries.iter().find(|(at, _)| *at == size).map(|(_, value)| value.clone())
 }
 
-/// The entry of a size, computed under the lock when missing: a second thread waits
-/// rather than computing it again.
+/// The entry of a size, computed under the lock if missing: a second thread waits rather
+/// than computing it again.
 fn once<T>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> T) -> Arc<T> {
     let mut entries = lock(cache);
     if let Some(value) = find(&entries, size) {

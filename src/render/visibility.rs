@@ -1,40 +1,39 @@
-//! Whether a piece of contour can be seen, decided by looking at the depth image beside
-//! it.
+//! Whether a piece of contour is visible, decided by testing the depth image beside it.
 //!
-//! On a contour itself the depth image is ambiguous by a pixel, so the looks go about one
-//! pixel to the side. It is not an exact hidden-line method: things closer together than
-//! about a pixel may be confused. A look that leaves the image is answered by the nearest
-//! pixel inside. What a look needs besides the depth image and the object's depth range
-//! is worked out when the piece is made, so a piece can be kept and looked at again when
-//! something else has moved.
+//! On a contour itself the depth image is ambiguous by a pixel, so the tests read it
+//! about one pixel to the side. This is not an exact hidden-line method: surfaces closer
+//! together than about a pixel may be confused. A test outside of the image reads the
+//! nearest pixel inside. Everything that a test needs besides the depth image and the
+//! object's depth range is computed when the piece is made, so a piece can be kept and
+//! tested again when something else has moved.
 
 use super::project::DepthRange;
 
-/// How far beside a piece to look, in pixels.
+/// Distance from a piece to the positions tested, in pixels.
 pub(super) const BESIDE: f64 = 1.2;
 
-/// Depth tolerance as a share of the object's depth range.
+/// Depth tolerance as a fraction of the object's depth range.
 const TOLERANCE: f64 = 0.006;
 
-/// Largest slack for the slope of an edge's own faces, as a share of the depth range.
+/// Largest slack for the slope of an edge's own faces, as a fraction of the depth range.
 const EDGE_SLACK: f64 = 0.06;
 
-/// Largest slack for the extent of a silhouette's own face, as a share of the depth
+/// Largest slack for the extent of a silhouette's own face, as a fraction of the depth
 /// range.
 const SILHOUETTE_SLACK: f64 = 0.15;
 
-/// How a piece is looked at.
+/// On which sides a piece is tested.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Look {
-    /// Once, outward; `slack` is how much nearer (scene units) the piece's own face
-    /// reaches.
+    /// On the outward side only; `slack` is how much nearer (scene units) the piece's own
+    /// face reaches.
     Outward {
         /// Unit vector in the image.
         direction: [f64; 2],
         slack: f64,
     },
-    /// To both sides, of which one must be free; `slack` per side is how much nearer the
-    /// edge's own faces come there.
+    /// On both sides, at least one of which must be free; `slack` per side is how much
+    /// nearer the edge's own faces come there.
     BothSides {
         /// Unit vector in the image; the second side is the opposite one.
         direction: [f64; 2],
@@ -42,23 +41,23 @@ pub(super) enum Look {
     },
 }
 
-/// A look to one side of a piece.
+/// The depth test on one side of a piece.
 #[derive(Clone, Copy, Debug)]
 struct Side {
-    /// The pixel looked at, [`NOWHERE`] for a side that does not count.
+    /// The pixel tested; [`NOWHERE`] if this side is not tested.
     pixel: u32,
-    /// Whether the place looked at is inside the image.
+    /// Whether the position tested is inside the image.
     inside: bool,
-    /// How much nearer the piece's own faces reach, before it is held against the depth
-    /// range.
+    /// How much nearer the piece's own faces reach, before this is limited relative to
+    /// the depth range.
     slack: f64,
 }
 
-/// No pixel: there is one less than this in the largest buffer.
+/// No pixel: every image has fewer pixels than this.
 const NOWHERE: u32 = u32::MAX;
 
-/// A piece of contour that may be hidden: a function of its own part and the camera
-/// alone.
+/// A piece of contour that may be hidden; a function of its own mesh, placement and
+/// camera alone.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
     /// As in [`Contours`](super::Contours).
@@ -67,36 +66,36 @@ pub(super) struct Piece {
     pub tx: f32,
     pub ty: f32,
     pub length: f32,
-    /// A crease or boundary, not a smooth silhouette.
+    /// Whether it is a crease or boundary, not a smooth silhouette.
     pub edge: bool,
-    /// Scene units.
+    /// In scene units.
     pub depth: f64,
     sides: [Side; 2],
 }
 
-/// A look without its pixel: all that decides whether it is free, but the depth there and
-/// the depth range.
+/// A depth test without its pixel: everything that decides its result, except the depth
+/// there and the depth range.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Glance {
     depth: f64,
     slack: f64,
-    /// The piece that looks, by a number of whoever asked.
+    /// The piece tested, as numbered by the caller.
     pub piece: u32,
-    /// Which of its sides.
+    /// The side of the piece.
     pub side: u8,
     inside: bool,
     edge: bool,
 }
 
 impl Piece {
-    /// The pixel on the first or the second side that it looks at.
+    /// The pixel tested on the first or the second side.
     #[inline]
     pub fn pixel(&self, side: usize) -> Option<u32> {
         self.sides.get(side).map(|side| side.pixel).filter(|&pixel| pixel != NOWHERE)
     }
 
-    /// The look to the first or the second side, and the pixel that it looks at; `number`
-    /// is that of the piece.
+    /// The test on the first or the second side, and the pixel tested; `number` is the
+    /// caller's number of the piece.
     #[inline]
     pub fn glance(&self, side: u8, number: u32) -> Option<(u32, Glance)> {
         let Side { pixel, inside, slack } = *self.sides.get(usize::from(side))?;
@@ -106,7 +105,7 @@ impl Piece {
     }
 }
 
-/// Makes the pieces of an image.
+/// Makes the pieces of an image of a given size.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Image {
     width: usize,
@@ -121,7 +120,7 @@ impl Image {
             .then_some(Image { width: width as usize, height: height as usize })
     }
 
-    /// The look at the pixel that holds a position, or the nearest one.
+    /// The test at the pixel that contains a position, or at the nearest one.
     #[inline(always)]
     fn side(&self, x: f64, y: f64, slack: f64) -> Side {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
@@ -160,7 +159,7 @@ impl Image {
     }
 }
 
-/// A depth image to look into.
+/// A depth image to test pieces against.
 pub(super) struct Depths<'a> {
     depth: &'a [f32],
     tolerance: f64,
@@ -180,19 +179,20 @@ impl<'a> Depths<'a> {
         })
     }
 
-    /// Whether nothing beside the piece is nearer than its `depth` less the slack.
+    /// Whether the depth on this side is not nearer than the piece's `depth` less the
+    /// slack.
     #[inline]
     fn free(&self, side: &Side, depth: f64, most: f64) -> bool {
         f64::from(self.at(side.pixel as usize))
             >= self.threshold([depth, side.slack, most], side.inside)
     }
 
-    /// The least depth that leaves a piece free.
+    /// The least depth at which a test passes.
     #[inline]
     fn threshold(&self, [depth, slack, most]: [f64; 3], inside: bool) -> f64 {
         let slack = slack.min(most);
-        // Outside the image only the object itself can be looked at: be generous, its
-        // side may bend towards the eye.
+        // Outside of the image only the object itself can be tested: be lenient, as its
+        // side may bend towards the camera.
         let slack = if inside { slack } else { slack.max(10.0 * self.tolerance) };
         depth - slack - self.tolerance - 1e-6 * depth
     }
@@ -203,8 +203,8 @@ impl<'a> Depths<'a> {
         self.depth.get(pixel).copied().unwrap_or(f32::INFINITY)
     }
 
-    /// The least depth at its pixel that leaves a look free; the greater the depth range,
-    /// the less.
+    /// The least depth at its pixel for which a test passes; it falls as the depth range
+    /// grows.
     #[inline]
     pub fn least(&self, glance: &Glance) -> f64 {
         self.threshold(
@@ -213,27 +213,26 @@ impl<'a> Depths<'a> {
         )
     }
 
-    /// Whether a depth at its pixel leaves a look free.
+    /// Whether a test passes with a given depth at its pixel.
     #[inline]
     pub fn frees(&self, glance: &Glance, seen: f32) -> bool {
         f64::from(seen) >= self.least(glance)
     }
 
-    /// Less than the least depth that leaves any piece free of a mesh with this depth
-    /// range.
+    /// A depth below every depth at which a test of a mesh with this depth range passes.
     pub fn hiding(extent: f64, range: &DepthRange) -> f64 {
         range.near
             - (SILHOUETTE_SLACK.max(EDGE_SLACK) + TOLERANCE) * extent * 1.001
             - 2e-6 * range.far.abs()
     }
 
-    /// Whether a piece is seen.
+    /// Whether a piece is visible.
     #[inline]
     pub fn visible(&self, piece: &Piece) -> bool {
         self.visible_by(piece, 0) || self.visible_by(piece, 1)
     }
 
-    /// Whether a piece is seen by its look to the first or the second side.
+    /// Whether a piece passes its test on the first or the second side.
     #[inline]
     pub fn visible_by(&self, piece: &Piece, side: usize) -> bool {
         let most = self.most[usize::from(piece.edge)];

@@ -1,11 +1,11 @@
-//! How contours move with the surface: from derivatives by their pieces to derivatives by
-//! the vertices.
+//! How contours move with the surface: from derivatives with respect to their pieces to
+//! derivatives with respect to the vertices.
 //!
-//! A piece moves as the points of the surface do that make its segment. That is exact for
-//! creases; smooth silhouettes also slide over faces that turn (`silhouette_derivative`), and contours
-//! that pass behind others become longer or shorter there (`junctions`). Nothing is
-//! drawn: the pieces of the meshes are traced again, and those that were seen are told by
-//! their numbers.
+//! A piece moves with the points of the surface at the ends of its segment. That is exact
+//! for creases; smooth silhouettes also slide over faces that rotate
+//! (`silhouette_derivative`), and contours that pass behind others become longer or
+//! shorter there (`junctions`). Nothing is drawn: the pieces of the meshes are extracted
+//! again, and the visible ones are recognised by their values.
 
 use super::extraction::{Origin, Room, extract_mesh};
 use super::junctions::{End, moved_ends};
@@ -16,27 +16,28 @@ use super::{Camera, Contours};
 use crate::geom::{Instance, Solid};
 use glam::DVec3;
 
-/// A piece of contour, hidden or not, and where it comes from.
+/// A piece of contour, hidden or not, and its origin on the surface.
 pub(super) struct Extracted<'a> {
     pub piece: Piece,
     pub origin: Origin,
     /// What the ends of its segment lie on.
     pub ends: [End; 2],
-    /// Its number among those that are seen.
+    /// Its index among the visible pieces.
     pub seen: Option<usize>,
     instance: &'a Instance,
-    /// The instance's first vertex among all.
+    /// The index of the instance's first vertex among all.
     base: usize,
 }
 
 impl Contours {
     /// The vector-Jacobian product of [`Contours::of`] for the same solid and camera:
-    /// from the derivatives of something by each piece's x, y, length (pixels) and angle
-    /// (radians, from right to down) to those by each vertex of the solid's meshes in
-    /// turn, in world coordinates. Pieces beyond the end of `by_piece` count as 0.
+    /// from the derivatives of a function with respect to each piece's x, y, length
+    /// (pixels) and angle (radians, from right to down) to those with respect to each
+    /// vertex of the solid's meshes in turn, in world coordinates. Pieces beyond the end
+    /// of `by_piece` count as 0.
     ///
-    /// Normals are taken to turn as the faces around them do. Pieces that come and go by
-    /// themselves are not followed.
+    /// Normals are assumed to rotate with the faces around them. Pieces that appear or
+    /// disappear by themselves are not accounted for.
     pub fn vjp(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
         self.vjp_with(solid, camera, by_piece, STEADY)
     }
@@ -65,7 +66,7 @@ impl Contours {
         out
     }
 
-    /// As [`Contours::vjp`], with each piece held to its points of the surface.
+    /// As [`Contours::vjp`], with each piece fixed to its points of the surface.
     pub(super) fn vjp_fixed(
         &self,
         solid: &Solid,
@@ -110,7 +111,7 @@ impl Contours {
         }
     }
 
-    /// Whether piece `i` is this one.
+    /// Whether piece `i` equals this one, bit for bit.
     fn is(&self, i: usize, piece: &Piece) -> bool {
         let same = |list: &[f32], x: f32| list.get(i).is_some_and(|y| y.to_bits() == x.to_bits());
         same(&self.x, piece.x)
@@ -121,8 +122,8 @@ impl Contours {
     }
 }
 
-/// From the derivatives by a piece to those by the ends of its segment, in world
-/// coordinates.
+/// Maps the derivatives with respect to a piece to those with respect to the ends of its
+/// segment, in world coordinates.
 fn by_ends(
     t: &Extracted<'_>,
     camera: &Camera,
@@ -137,7 +138,7 @@ fn by_ends(
     let [(ax, ay, a_depth), (bx, by, b_depth)] = ends.map(|e| camera.project(e));
     let (dx, dy) = (bx - ax, by - ay);
     let length = (dx * dx + dy * dy).sqrt();
-    // A segment cut by the near plane has other ends.
+    // If the near plane cut the segment, these are not its ends.
     if !(a_depth >= Camera::NEAR && b_depth >= Camera::NEAR && length > 1e-9) {
         return None;
     }
@@ -151,7 +152,8 @@ fn by_ends(
     Some([vjp(ends[0], 1.0 - origin.at, -1.0), vjp(ends[1], origin.at, 1.0)])
 }
 
-/// From the derivatives by the ends of a segment to those by the vertices that hold them.
+/// Maps the derivatives with respect to the ends of a segment to those with respect to
+/// the vertices of its face or edge.
 fn vjp_ends(origin: &Origin, by_ends: &[DVec3; 2], out: &mut [DVec3]) {
     for (g, shares) in by_ends.iter().zip(origin.ends) {
         for (v, share) in origin.corners.into_iter().zip(shares) {
@@ -169,7 +171,8 @@ mod tests {
     use crate::render::testing::{Uniform, cuboid, lathe, sphere};
     use glam::Vec3;
 
-    /// Numbers of a piece in double precision, from the vertices in world coordinates.
+    /// A piece's position, length and angle in double precision, from the vertices in
+    /// world coordinates.
     fn piece(camera: &Camera, vertices: &[DVec3], base: usize, o: &Origin) -> [f64; 4] {
         let ends = o.ends.map(|w| {
             let at = o
@@ -202,7 +205,7 @@ mod tests {
         for camera in [Camera::default_for(96, 80), parallel] {
             let contours = Contours::of(&group, &camera);
             let mut rng = Uniform(3);
-            // Angles count by length: those of short pieces turn fast.
+            // Angles are weighted by length, as those of short pieces change fast.
             let one = |length: &f32| {
                 [1.0, 1.0, 1.0, f64::from(*length)].map(|by| by * (rng.next() - 0.5))
             };

@@ -1,30 +1,30 @@
-//! What drawing contours took, counted where it is done: each thread counts its own.
+//! Counts of the work that drawing contours took. Each thread has its own counts.
 
 use crate::geom::Mesh;
 use std::cell::Cell;
 use std::ops::Sub;
 
-/// What was drawn for contours, and what was not.
+/// What was drawn for contours, and what was skipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Pictures of which everything was drawn.
+    /// Pictures that were drawn completely.
     pub whole: u64,
-    /// Pictures of which only what had changed was drawn.
+    /// Pictures of which only the changes were drawn.
     pub partial: u64,
     /// Meshes that were drawn.
     pub drawn: u64,
-    /// Triangles of those.
+    /// Triangles of these meshes.
     pub triangles: u64,
-    /// Of these, triangles of bodies that hide their own backs, so that those turned away
-    /// were passed over.
+    /// Of these, triangles of bodies known to hide their own back faces, which are
+    /// skipped.
     pub closed: u64,
-    /// Meshes that were as they had been drawn before.
+    /// Meshes reused from an earlier drawing.
     pub kept: u64,
-    /// Meshes that lay outside of the picture: nothing of them was drawn.
+    /// Meshes outside of the picture, of which nothing was drawn.
     pub outside: u64,
-    /// Meshes that lay wholly behind others: nothing of them was drawn.
+    /// Meshes wholly behind others, of which nothing was drawn.
     pub hidden: u64,
-    /// Pixels of which the depth was composed anew.
+    /// Pixels whose depth was recomposed.
     pub pixels: u64,
 }
 
@@ -34,12 +34,12 @@ thread_local! {
     }) };
 }
 
-/// What this thread has drawn so far.
+/// The counts of this thread so far.
 pub fn work() -> Work {
     WORK.get()
 }
 
-/// Counts something.
+/// Updates this thread's counts.
 pub(super) fn count(add: impl FnOnce(&mut Work)) {
     let mut work = WORK.get();
     add(&mut work);
@@ -56,7 +56,7 @@ pub(super) fn drawn(mesh: &Mesh) {
     });
 }
 
-/// What was done between two moments.
+/// The work done between two moments.
 impl Sub for Work {
     type Output = Work;
 

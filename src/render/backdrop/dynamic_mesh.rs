@@ -1,4 +1,5 @@
-//! A mesh that moves before a backdrop: its layer where it is, and where it was before.
+//! A mesh that moves relative to a backdrop: its layer at the current and the previous
+//! placement.
 
 use super::static_layer::StaticLayer;
 use crate::geom::{Instance, Mesh};
@@ -12,7 +13,7 @@ use crate::render::raster::Area;
 use crate::render::visibility::Depths;
 use std::sync::{Arc, Weak};
 
-/// What drawing a layer needs room for.
+/// Scratch memory for drawing a layer.
 #[derive(Default)]
 pub struct Tools {
     pub projected: Projected,
@@ -20,25 +21,25 @@ pub struct Tools {
     pub room: Room,
 }
 
-/// A layer and whose it is.
+/// A layer, with the mesh and placement that it belongs to.
 #[derive(Default)]
 pub struct PlacedLayer {
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     pub layer: Layer,
-    /// What it was drawn before, if that left out some of it: what hides all of it, or
-    /// does not mind how near it is.
+    /// If something was left out, the static layer that it was drawn against: because
+    /// that layer hides all of it, or because exact depth did not matter in front of it.
     settled: Option<Arc<()>>,
 }
 
 impl PlacedLayer {
-    /// Whether it may be looked at before something else, too.
+    /// Whether nothing was left out, so that it is valid against any static layer.
     pub fn is_whole(&self) -> bool {
         self.settled.is_none()
     }
 }
 
-/// A mesh that has moved: its layer where it is, and where it was before.
+/// A mesh that has moved, with its layers at the current and the previous placement.
 #[derive(Default)]
 pub struct DynamicMesh {
     pub leaf: usize,
@@ -48,14 +49,14 @@ pub struct DynamicMesh {
 }
 
 impl DynamicMesh {
-    /// A mesh by its number, nowhere yet.
+    /// The mesh with an index, not drawn yet.
     pub fn new(leaf: usize) -> DynamicMesh {
         DynamicMesh { leaf, ..DynamicMesh::default() }
     }
 
-    /// Its layer is that of the instance from here on. Nothing is drawn of one that this
-    /// backdrop hides; if it is the only mover, its depth need only be known where it
-    /// matters.
+    /// Moves it to an instance's mesh and placement, drawing a layer unless the current
+    /// or the previous one fits. Nothing is drawn of a mesh that `behind` hides; if it is
+    /// the `only` dynamic mesh, its depth is exact only where that matters.
     pub fn move_to(
         &mut self,
         instance: &Instance,
@@ -98,7 +99,7 @@ impl DynamicMesh {
         }
     }
 
-    /// Tells which of its pieces are seen.
+    /// Determines which of its pieces are visible.
     pub fn look(&mut self, depths: &Depths<'_>) {
         self.seen.clear();
         let DynamicMesh { now, seen, .. } = self;

@@ -1,5 +1,5 @@
-//! What stands still: its depth, and its pieces of contour by the pixels that they look
-//! at.
+//! The stationary meshes of a scene: their depth, and their pieces of contour by the
+//! pixels at which they are tested.
 
 use crate::render::Camera;
 use crate::render::project::DepthRange;
@@ -7,48 +7,51 @@ use crate::render::raster::Area;
 use crate::render::visibility::{Depths, Glance, Piece};
 use std::sync::Arc;
 
-/// Half the width of the depth ranges that a backdrop is first made ready for,
-/// relatively.
+/// Relative half width of the first interval of depth ranges that a static layer is
+/// prepared for.
 const FIRST_WIDTH: f64 = 0.005;
 
-/// A bit for each side by which a piece is free.
+/// A bit for each side on which a piece passes its depth test.
 const FREE: u8 = 0b11;
-/// Whether the piece was told as shown.
+/// Set if the piece was last reported as shown.
 const SHOWN: u8 = 0b100;
 
-/// What stands still.
+/// The depth and contours of the stationary meshes.
 #[derive(Default)]
 pub struct StaticLayer {
     pub depth: Vec<f32>,
     pub range: DepthRange,
-    /// All pieces, with the number of their mesh.
+    /// All pieces, with the index of their mesh.
     pub pieces: Vec<(Piece, usize)>,
-    /// Stands for what it was settled for: for all below.
+    /// Identifies the preparation of all fields below; renewed by
+    /// [`StaticLayer::sort_pieces`].
     pub settled: Arc<()>,
-    /// The depth ranges of the scene for which the rest holds.
+    /// Least and greatest depth range of the scene for which the fields below are valid.
     extents: [f64; 2],
-    /// Half the width of those, relatively.
+    /// Half the relative width of this interval.
     width: f64,
     /// Pieces that the backdrop does not hide at the greatest of these depth ranges, with
-    /// the number of their mesh.
+    /// the index of their mesh.
     live: Vec<(Piece, usize)>,
-    /// Of each of those, which of its looks are free, and whether it is shown.
+    /// For each live piece, the sides on which it passes its test, and whether it is
+    /// shown: bits of [`FREE`] and [`SHOWN`].
     state: Vec<u8>,
-    /// Looks that the backdrop ends at the least of these depth ranges only, with the
-    /// least one at which it does not, in that order, and their pixels.
+    /// Tests that fail at the least of these depth ranges and pass at the greatest: the
+    /// least depth range at which the test passes, its index in `looks`, and its pixel;
+    /// sorted by the depth range.
     unsure: Vec<(f64, u32, u32)>,
-    /// By pixel: the least depth that leaves any look there free, whatever the depth
-    /// range.
+    /// By pixel: at a depth below this, all tests there fail, at any of these depth
+    /// ranges.
     pub nearest: Vec<f32>,
-    /// Where in `looks` those at each pixel begin.
+    /// Where the tests at each pixel begin in `looks`.
     start: Vec<u32>,
     looks: Vec<Glance>,
-    /// Pieces of which a look has changed.
+    /// Pieces with a test whose result has changed.
     touched: Vec<u32>,
 }
 
 impl StaticLayer {
-    /// Nothing in a picture.
+    /// The layer of an empty picture.
     pub fn new(camera: &Camera) -> StaticLayer {
         StaticLayer {
             depth: vec![f32::INFINITY; camera.pixels()],
@@ -57,11 +60,12 @@ impl StaticLayer {
         }
     }
 
-    /// Whether it hides all of a mesh with this depth range that covers pixels of an area
-    /// only, contours included.
+    /// Whether this layer hides a whole mesh, contours included, whose depth range is
+    /// `range` and whose pixels all lie in `area`.
     pub fn hides(&self, range: &DepthRange, area: &Area, camera: &Camera) -> bool {
         let (limit, width) = (Depths::hiding(self.extents[1], range), camera.width as usize);
-        // Pieces may lie, and look, a little beside the area.
+        // Pieces, and the pixels at which they are tested, may lie slightly outside of
+        // the area.
         const REACH: usize = 4;
         let (left, right) = (area.left.saturating_sub(REACH), (area.right + REACH).min(width));
         let rows =
@@ -73,14 +77,14 @@ impl StaticLayer {
                 .all(|row| self.depth.get(row).is_some_and(|row| row.iter().all(near)))
     }
 
-    /// Whether what is known of the pieces holds for a depth range.
+    /// Whether the sorted pieces are valid for a depth range.
     pub fn holds(&self, extent: f64) -> bool {
         let [least, most] = self.extents;
         least <= extent && extent <= most
     }
 
-    /// Sorts the pieces for depth ranges about this one; for more of them if it has been
-    /// done before.
+    /// Sorts the pieces for an interval of depth ranges around `extent`; with `again`,
+    /// for a wider interval than before.
     pub fn sort_pieces(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
         self.settled = Arc::default();
         self.width = if again { (2.0 * self.width).min(0.5) } else { self.width };
@@ -133,7 +137,7 @@ impl StaticLayer {
         Some(())
     }
 
-    /// Looks at everything; how many pieces are shown.
+    /// Tests all pieces and returns the number of those shown.
     pub fn look_at_all(&mut self, depths: &Depths<'_>) -> usize {
         let mut shown = 0;
         for ((piece, _), state) in self.live.iter().zip(&mut self.state) {
@@ -146,9 +150,9 @@ impl StaticLayer {
         shown
     }
 
-    /// Looks again at some pixels, and at whatever the depth range decides that was one
-    /// and is another; `changed` is told pieces that are shown no longer (false) or now
-    /// (true), each once.
+    /// Repeats the depth tests at some pixels, and those whose result depends on which of
+    /// two depth ranges (before and now) applies. Calls `changed` once for each piece
+    /// that is no longer shown (`false`) or newly shown (`true`).
     pub fn look_again(
         &mut self,
         depths: &Depths<'_>,
@@ -195,7 +199,7 @@ impl StaticLayer {
         }
     }
 
-    /// The pieces that are shown, with the number of their mesh.
+    /// The pieces that are shown, with the index of their mesh.
     pub fn shown(&self) -> impl Iterator<Item = &(Piece, usize)> {
         self.live
             .iter()
@@ -205,17 +209,17 @@ impl StaticLayer {
     }
 }
 
-/// The least number in single precision that is not less: `f64::from(x) < v` exactly if
+/// The least `f32` that is not less than `v`: `f64::from(x) < v` exactly if
 /// `x < rounded_up(v)`.
 fn rounded_up(v: f64) -> f32 {
     let rounded = v as f32;
     if f64::from(rounded) < v { rounded.next_up() } else { rounded }
 }
 
-/// The least number above the first of two positive ones at which a monotone condition
-/// holds, which holds at the second one and not at the first.
+/// The least number between two positive ones at which a monotone condition holds; it
+/// must fail at `low` and hold at `high`.
 fn first_true([low, high]: [f64; 2], holds: impl Fn(f64) -> bool) -> f64 {
-    // Positive numbers are in the order of their bits.
+    // Positive numbers are ordered as their bits.
     let (mut low, mut high) = (low.to_bits(), high.to_bits());
     while low + 1 < high {
         let middle = low + (high - low) / 2;
