@@ -3,8 +3,8 @@
 //! Lengths are percent of the image diagonal, so a score does not depend on resolution.
 //! In clutter, some wrong object often lies closer to the observed edges than the true
 //! one; use [`ContourRatio`](super::contour_ratio::ContourRatio) for photographs.
-//! Invariant: scores are finite and continuous in positions, and the score of the
-//! rendered contours is exactly independent of the order of the elements.
+//! Invariant: scores are finite and continuous in positions, and one-sided scores are
+//! exactly independent of the order of the elements.
 
 mod gradient;
 mod reverse;

@@ -170,14 +170,14 @@ pub struct Query {
 }
 
 impl Query {
-    /// Uses the features as they are.
+    /// Builds a query that compares features directly.
     pub fn new(features: Vec<f32>) -> Query {
         Query { weights: vec![1.0; features.len()], variants: vec![features] }
     }
 
-    /// Uses contours, also after small shifts (a twentieth of the longer side) and
-    /// scalings (a tenth), so that a scene of the right shape is found even if it is
-    /// slightly displaced.
+    /// Builds a query from contours that also compares them after small shifts (a
+    /// twentieth of the longer side) and scalings (a tenth), so that a scene of the right
+    /// shape is found even if it is slightly displaced.
     pub fn contours(strokes: &[Stroke]) -> Query {
         let turns = turns(strokes);
         let moved = |(dx, dy, scale): (f32, f32, f32)| {
@@ -187,8 +187,8 @@ impl Query {
         Query { variants: movements().map(moved).collect(), weights: vec![1.0; CONTOUR_FEATURES] }
     }
 
-    /// Uses keypoints, weighted by confidence, also after the same movements. Missing
-    /// ones are ignored.
+    /// Builds a query from keypoints, weighted by confidence, that also compares them
+    /// after the same movements. Missing ones are ignored.
     pub fn keypoints(
         points: &[Option<[f64; 2]>],
         confidence: &[f64],

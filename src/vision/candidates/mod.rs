@@ -1,14 +1,13 @@
 //! Regions of a photograph that may be objects of revolution (vases, bottles, cups,
 //! lamps), without learned weights.
 //!
-//! For clean contours without a photograph, they are the regions that the contours
-//! enclose. For a photograph:
+//! For clean contours without a photograph, the candidates are the regions that the
+//! contours enclose. For a photograph, segments and clusters of colour are merged into
+//! regions, and the most promising ones are cut out along edges. Regions are ranked by
+//! symmetry, contrast with their surroundings, and distance from the picture's border.
 //!
-//! Segments and clusters of colour are merged into regions, and the most promising ones
-//! are cut out along edges. Regions are ranked by symmetry, contrast with their
-//! surroundings, and distance from the picture's border. The result is a function of the
-//! picture alone, with the same bits on any machine. The use of the candidates, and
-//! anything in three dimensions, is elsewhere.
+//! The result is a function of the picture alone, with the same bits on any machine. The
+//! use of the candidates, and anything in three dimensions, is elsewhere.
 
 mod area;
 mod clusters;

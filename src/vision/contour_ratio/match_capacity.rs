@@ -1,9 +1,9 @@
 //! How much rendered contour observed edges can match. Edges in one small cell of the
 //! picture and of similar orientation form a group; the positive scores matched to a
 //! group are scaled down once the contour assigned to it is longer than `match_capacity`
-//! times the group's edges. Nothing is scored here. Invariant: sums per group are exact
-//! integers, so the order of assignments does not matter, and every matched score is a
-//! continuous function of the assigned lengths and scores.
+//! times the group's edges. The log ratios themselves are computed elsewhere. Invariant:
+//! sums per group are exact integers, so the order of assignments does not matter, and
+//! every matched score is a continuous function of the assigned lengths and scores.
 //!
 //! Edges are grouped, and not limited one by one, because a piece of contour at a coarse
 //! resolution is longer than an edge pixel.

@@ -17,8 +17,8 @@
 //!   or the list of results `[{"image_id": …, "keypoints": [x, y, v, …]}]`, with v = 0
 //!   for a joint that is missing and v above 1 counting as 1;
 //! * MediaPipe: `{"pose_landmarks": [33 of {"x", "y", "visibility"}]}`, also called
-//!   `"landmarks"`, also one such list per person; x and y as fractions of the image's width
-//!   and height.
+//!   `"landmarks"`, also one such list per person; x and y as fractions of the image's
+//!   width and height.
 //!
 //! `"width"` and `"height"`, beside `"keypoints"` or in COCO's `"images"`, give the size
 //! of the image in whose pixels the positions are.
