@@ -46,7 +46,7 @@ fn lab([fx, fy, fz]: [f64; 3]) -> [f64; 3] {
 /// Below this a straight line replaces the cube root.
 const STRAIGHT: f64 = 216.0 / 24389.0;
 
-/// The straight line below [`STRAIGHT`].
+/// The straight line below `STRAIGHT`.
 #[inline(always)]
 fn straight(t: f64) -> f64 {
     t * (841.0 / 108.0) + 4.0 / 29.0
