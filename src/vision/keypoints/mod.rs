@@ -98,7 +98,7 @@ impl Keypoints {
     /// Builds a set of keypoints in pixels.
     ///
     /// # Errors
-    /// If a name occurs twice, a position is not finite, or a confidence is outside 0 to 1.
+    /// If a name occurs twice, a position is not finite, or a confidence is not in 0..=1.
     pub fn new(points: Vec<Keypoint>) -> Result<Keypoints, KeypointsError> {
         for (i, p) in points.iter().enumerate() {
             if points[..i].iter().any(|q| q.name == p.name) {
