@@ -1,10 +1,10 @@
-//! The paper's stochastic comparator: how far the rendered contours lie from the observed
-//! ones, scored by a normal density. A likelihood without a sampler. Lengths are percent
-//! of the image diagonal, so a score does not depend on resolution. In clutter some wrong
-//! object often lies closer to the observed edges than the true one; for photographs use
-//! [`ContourRatio`](super::contour_ratio::ContourRatio). Invariant: scores are finite,
-//! continuous in positions, and those of the rendered contours exactly independent of the
-//! elements' order.
+//! The paper's stochastic comparator: the distance of the rendered contours from the
+//! observed ones, scored by a normal density. It is a likelihood without a sampler.
+//! Lengths are percent of the image diagonal, so a score does not depend on resolution.
+//! In clutter, some wrong object often lies closer to the observed edges than the true
+//! one; use [`ContourRatio`](super::contour_ratio::ContourRatio) for photographs.
+//! Invariant: scores are finite and continuous in positions, and one-sided scores are
+//! exactly independent of the order of the elements.
 
 mod gradient;
 mod reverse;
@@ -23,7 +23,7 @@ pub use self::reverse::{MOST_OBSERVED, Scratch};
 /// How distances become a score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mode {
-    /// One normal density at the mean distance: the paper's letter.
+    /// One normal density at the mean distance, as the paper states it.
     #[default]
     Mean,
     /// One normal density for every percent of the diagonal of contour length, each at
@@ -31,24 +31,24 @@ pub enum Mode {
     Sum,
 }
 
-/// What [`Chamfer`] can be told. The default is the paper's comparator.
+/// Options of [`Chamfer`]. The default is the paper's comparator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChamferOptions {
     /// Standard deviation of the distance, in percent of the diagonal, above 0. Default
     /// 0.4.
     pub sigma: f64,
-    /// Mean of the distances or a sum of scores. Default mean.
+    /// Whether to score the mean distance or to sum scores. Default mean.
     pub mode: Mode,
-    /// Also measure from the observed contours to the rendered ones: the distance is the
+    /// Also measures from the observed contours to the rendered ones: the distance is the
     /// mean of both directions' means (`Sum`: both directions' scores are added). Of more
-    /// than 512 observed points an even choice is measured. It assumes that the picture
-    /// holds nothing but the object: in clutter it prefers what lies near all of it.
-    /// Default off.
+    /// than 512 observed points, an even selection is used. This assumes that the picture
+    /// shows nothing but the object: in clutter it prefers objects that lie near all of
+    /// the clutter. Default off.
     pub symmetric: bool,
-    /// Distances count as this at most, in percent of the diagonal, above 0. Default
-    /// none.
+    /// Upper bound at which distances are truncated, in percent of the diagonal, above 0.
+    /// Default none.
     pub truncate: Option<f64>,
-    /// Adds this many percent of the diagonal per radian between the orientations, at
+    /// Cost of a difference in orientation, in percent of the diagonal per radian, at
     /// least 0. Default none.
     pub oriented: Option<f64>,
 }
@@ -65,10 +65,10 @@ impl Default for ChamferOptions {
     }
 }
 
-/// The distance that stands for "nothing in view": the whole diagonal, in percent.
+/// The distance used when nothing is in view: the whole diagonal, in percent.
 pub const NOTHING: f64 = 100.0;
 
-/// Observed contours, ready to be compared with many rendered ones.
+/// Observed contours, prepared for comparison with many rendered ones.
 #[derive(Debug, Clone)]
 pub struct Chamfer {
     options: ChamferOptions,
@@ -80,8 +80,8 @@ pub struct Chamfer {
     percent: f64,
 }
 
-/// Sums over one direction, in steps of 2^-32: exact, so what was added can be taken away
-/// again.
+/// Sums over one direction, in fixed-point steps of 2^-32: exact, so terms can be
+/// subtracted again.
 #[derive(Debug, Clone, Copy, Default)]
 struct Steps {
     length: i64,
@@ -89,7 +89,7 @@ struct Steps {
     second: i64,
 }
 
-/// Steps of a unit.
+/// Fixed-point steps per unit.
 const FIXED: f64 = (1u64 << 32) as f64;
 
 impl Steps {
@@ -108,8 +108,8 @@ impl Steps {
     }
 }
 
-/// What is known of rendered contours of which some may come and go, without those that
-/// move; it belongs to one comparator.
+/// The sums of the contours that do not move, kept between evaluations in which some
+/// contours appear or disappear. A tally belongs to one comparator.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     steps: Steps,
@@ -141,8 +141,8 @@ impl ChamferSums {
 }
 
 impl Chamfer {
-    /// Prepares the observed contours for frames of `width` x `height` pixels. An
-    /// observed map without contours is as far as can be from everything.
+    /// Prepares the observed contours for frames of `width` x `height` pixels. A map
+    /// without contours is at the largest distance from everything.
     ///
     /// # Errors
     /// A side outside 1 to 16384 pixels, an option out of its range, or a map whose lists
@@ -170,9 +170,9 @@ impl Chamfer {
         &self.options
     }
 
-    /// The distance in percent of the diagonal: the length-weighted mean of the observed
-    /// map's distances at the elements, averaged with the other direction's if symmetric.
-    /// With nothing in view, 100.
+    /// Returns the distance in percent of the diagonal: the length-weighted mean over the
+    /// elements of the distance to the observed contours, averaged with that of the other
+    /// direction if symmetric. With nothing in view it is 100.
     pub fn distance(&self, elements: &Elements<'_>) -> f64 {
         self.distance_with(elements, &mut Scratch::default())
     }
@@ -182,9 +182,9 @@ impl Chamfer {
         self.mean(self.forth(elements), self.back(elements, scratch))
     }
 
-    /// The log-likelihood. `Mean`: log normal(distance; 0, sigma). `Sum`: that of every
-    /// element's distance, times its length in percent of the diagonal; with nothing in
-    /// view, a diagonal's length at distance 100.
+    /// Returns the log-likelihood. `Mean`: log normal(distance; 0, sigma). `Sum`: the sum
+    /// of that of every element's distance times its length in percent of the diagonal;
+    /// with nothing in view, that of a diagonal's length of contour at distance 100.
     pub fn log_likelihood(&self, elements: &Elements<'_>) -> f64 {
         self.log_likelihood_with(elements, &mut Scratch::default())
     }
@@ -194,9 +194,9 @@ impl Chamfer {
         self.score(self.forth(elements), self.back(elements, scratch))
     }
 
-    /// [`Chamfer::log_likelihood`] of contours of which the tally may know those before:
-    /// the same, bit for bit, at the cost of what changed where it is not symmetric.
-    /// `whole` gives all of them.
+    /// Returns the [`Chamfer::log_likelihood`] after a change of the contours, bit for
+    /// bit. If the tally holds the state before the change, only the changes are counted
+    /// (unless symmetric); otherwise `whole` must give all contours.
     pub fn log_likelihood_after<'a>(
         &self,
         step: &ContourDelta<'_>,
@@ -256,8 +256,9 @@ impl Chamfer {
         self.options.truncate.map_or(d, |t| d.min(t))
     }
 
-    /// Distance at an element, and its derivatives per pixel of the frame and by the
-    /// angle of the tangent. Inlined, so that what is not asked for is not computed.
+    /// Returns the distance at an element, and its derivatives per pixel of the frame and
+    /// with respect to the angle of the tangent. Inlined, so that unused derivatives are
+    /// not computed.
     #[inline(always)]
     fn read(&self, e: &Element) -> (f32, [f32; 3]) {
         let corners = self.grid.corners(e.x, e.y);
@@ -283,7 +284,7 @@ impl Chamfer {
         steps.sums()
     }
 
-    /// Adds what elements bring, or takes it away.
+    /// Adds (`sign` 1) or subtracts (-1) the contributions of elements.
     fn count(&self, elements: &Elements<'_>, sign: i64, steps: &mut Steps) {
         let mut own = *steps;
         *steps = vectorised(
@@ -311,7 +312,7 @@ impl Chamfer {
         Some(sums)
     }
 
-    /// The cost in pixels of one channel's turn.
+    /// The cost in pixels of a difference of one orientation channel.
     fn turn(&self) -> f32 {
         (self.options.oriented.unwrap_or(0.0) * std::f64::consts::PI
             / CHANNELS as f64
@@ -319,8 +320,8 @@ impl Chamfer {
     }
 }
 
-/// The distance fields: one, or for every channel the least of distance plus orientation
-/// cost over the channels' edges.
+/// Computes the distance fields: a single one, or one per channel with the minimum over
+/// all edges of distance plus orientation cost.
 fn fields(grid: &Edges, oriented: Option<f64>) -> Vec<Vec<f32>> {
     let samples = grid.width as usize * grid.height as usize;
     let Some(cost) = oriented else {
@@ -329,8 +330,7 @@ fn fields(grid: &Edges, oriented: Option<f64>) -> Vec<Vec<f32>> {
         ];
     };
     let per_channel = (cost * std::f64::consts::PI / CHANNELS as f64) as f32;
-    // Distance and orientation of every channel's nearest edges, of those channels that
-    // have edges.
+    // Distance and orientation of the nearest edges of every channel that has edges.
     let mut nearest: [Option<(Vec<f32>, Vec<f32>)>; CHANNELS] = Default::default();
     side_by_side(&mut nearest, |k, out| {
         let found = grid.nearest(|e| e.turn.round() as usize % CHANNELS == k);
@@ -359,7 +359,7 @@ fn fields(grid: &Edges, oriented: Option<f64>) -> Vec<Vec<f32>> {
     fields
 }
 
-/// Samples of a piece.
+/// Samples per piece.
 const PIECE: usize = 2048;
 
 #[cfg(test)]

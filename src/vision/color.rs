@@ -1,33 +1,34 @@
-//! Colours: sRGB bytes, linear light, and CIE L*a*b* (D65). Not colour management:
-//! profiles in files are ignored and every picture is taken to be sRGB (IEC 61966-2-1).
+//! Colours: sRGB bytes, linear light, and CIE L*a*b* (D65). There is no colour
+//! management: profiles in files are ignored and every picture is assumed to be sRGB (IEC
+//! 61966-2-1).
 
 use crate::num::simd::vectorised;
 use std::sync::OnceLock;
 
-/// Linear light in 0..=1 of an sRGB value in 0..=1.
+/// Converts an sRGB value in 0..=1 to linear light in 0..=1.
 pub fn srgb_to_linear(v: f64) -> f64 {
     if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
 }
 
-/// sRGB value in 0..=1 of linear light in 0..=1.
+/// Converts linear light in 0..=1 to an sRGB value in 0..=1.
 pub fn linear_to_srgb(v: f64) -> f64 {
     if v <= 0.0031308 { v * 12.92 } else { 1.055 * libm::pow(v, 1.0 / 2.4) - 0.055 }
 }
 
-/// Linear light of every sRGB byte.
+/// Returns the linear light of every sRGB byte.
 pub fn linear_table() -> &'static [f32; 256] {
     static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
     TABLE.get_or_init(|| std::array::from_fn(|i| srgb_to_linear(i as f64 / 255.0) as f32))
 }
 
-/// sRGB byte of linear light; values outside 0..=1 are clamped.
+/// Converts linear light to an sRGB byte; values outside 0..=1 are clamped.
 pub fn linear_to_byte(v: f32) -> u8 {
     (linear_to_srgb(f64::from(v).clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
 }
 
-/// X, Y and Z of linear sRGB light relative to the D65 white of sRGB: the IEC 61966-2-1
-/// matrix, rows divided by the white point (its row sums), so greys have a* = b* = 0
-/// exactly.
+/// Returns X, Y and Z of linear sRGB light relative to the D65 white of sRGB: the IEC
+/// 61966-2-1 matrix with its rows divided by the white point (their sums), so that greys
+/// have exactly a* = b* = 0.
 #[inline(always)]
 fn linear_to_xyz(rgb: [f32; 3]) -> [f64; 3] {
     let [r, g, b] = [f64::from(rgb[0]), f64::from(rgb[1]), f64::from(rgb[2])];
@@ -35,34 +36,36 @@ fn linear_to_xyz(rgb: [f32; 3]) -> [f64; 3] {
     [row([0.4124, 0.3576, 0.1805]), row([0.2126, 0.7152, 0.0722]), row([0.0193, 0.1192, 0.9505])]
 }
 
-/// L*, a* and b* of the roots of X, Y and Z (CIE 15:2004, 8.2.1), in double precision.
+/// Returns L*, a* and b* from the cube roots of X, Y and Z (CIE 15:2004, 8.2.1), in
+/// double precision.
 #[inline(always)]
 fn lab([fx, fy, fz]: [f64; 3]) -> [f64; 3] {
     [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
 }
 
-/// Below this there is a straight line instead of a cube root.
+/// Below this a straight line replaces the cube root.
 const STRAIGHT: f64 = 216.0 / 24389.0;
 
-/// That line.
+/// The straight line below `STRAIGHT`.
 #[inline(always)]
 fn straight(t: f64) -> f64 {
     t * (841.0 / 108.0) + 4.0 / 29.0
 }
 
-/// CIE L*a*b* (L* in 0..=100) of linear sRGB light, relative to the D65 white of sRGB.
+/// Converts linear sRGB light to CIE L*a*b* (L* in 0..=100), relative to the D65 white of
+/// sRGB.
 pub fn linear_to_lab(rgb: [f32; 3]) -> [f32; 3] {
     let f = |t: f64| if t > STRAIGHT { libm::cbrt(t) } else { straight(t) };
     lab(linear_to_xyz(rgb).map(f)).map(|v| v as f32)
 }
 
-/// What a quick L*, a* or b* may be wrong by; many times what it is wrong by.
+/// Error bound of the fast L*, a* or b*; many times the actual error.
 const DOUBT: f64 = 1e-10;
 
-/// [`linear_to_lab`] of many colours, several at a time, to the last bit: roots are
-/// worked out to 14 digits, and where that leaves open which of two single precision
-/// numbers is the nearest, once in many thousand times and for exact greys, the plain way
-/// decides.
+/// Applies [`linear_to_lab`] to many colours, several at a time, with the same result to
+/// the last bit. Roots are computed to 14 digits; where that does not determine the
+/// nearest single precision number (once in many thousand colours, and for exact greys),
+/// the slow path decides.
 pub fn linear_to_labs(rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let mut out = vec![[f32::NAN; 3]; rgb.len()];
     vectorised(
@@ -77,7 +80,7 @@ pub fn linear_to_labs(rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
                     let (low, high) = ((v - DOUBT) as f32, (v + DOUBT) as f32);
                     if low == high { low } else { f32::NAN }
                 };
-                // Written out: maps of arrays are not always inlined.
+                // Not a `map` over an array, which is not always inlined.
                 let [x, y, z] = linear_to_xyz(*rgb);
                 let [l, a, b] = lab([f(x), f(y), f(z)]);
                 *out = [near(l), near(a), near(b)];
@@ -90,9 +93,9 @@ pub fn linear_to_labs(rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
     out
 }
 
-/// The cube root of a number between 1e-3 and 1e3, to 1e-14 of itself: a third of the
-/// logarithm, as floating point numbers hold it, and Halley's steps, each of which has
-/// three times as many digits right.
+/// Returns the cube root of a number between 1e-3 and 1e3 with a relative error of 1e-14.
+/// The first guess is a third of the logarithm, taken from the bits of the floating point
+/// number; each of Halley's steps triples the number of correct digits.
 #[inline(always)]
 fn quick_cbrt(t: f64) -> f64 {
     let third = (t as f32).to_bits() as i32 as f32 * (1.0 / 3.0) + 709_958_130.0;

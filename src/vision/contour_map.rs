@@ -1,12 +1,13 @@
-//! Contours of a picture as points with tangents and strengths: what a detector gives and
-//! what comparators take.
+//! Contours of a picture as points with tangents and strengths: the output of detectors
+//! and the input of comparators.
 
 use super::gradient::{principal, smoothed};
 use super::nms::{EdgePoint, ridge_offset};
 use super::thin::thinned;
 use image::{GrayImage, Luma};
 
-/// Contour points of a picture. The five lists have one length; all numbers are finite.
+/// Contour points of a picture. The five lists have the same length; all numbers are
+/// finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContourMap {
     /// Width of the picture, pixels.
@@ -17,12 +18,11 @@ pub struct ContourMap {
     pub x: Vec<f32>,
     /// Rows from the top, pixels (pixel centres at +0.5), within `0..=height`.
     pub y: Vec<f32>,
-    /// Unit tangents along the contour, x part; the sign of a tangent means nothing.
+    /// Unit tangents along the contour, x component; the sign of a tangent is arbitrary.
     pub tx: Vec<f32>,
-    /// Unit tangents along the contour, y part.
+    /// Unit tangents along the contour, y component.
     pub ty: Vec<f32>,
-    /// How sure the detector is, in `0..=1`; larger is surer, the scale is the
-    /// detector's.
+    /// Confidence of the detector, in `0..=1`; the scale depends on the detector.
     pub strength: Vec<f32>,
 }
 
@@ -51,7 +51,7 @@ impl ContourMap {
         self.strength.push(strength.clamp(0.0, 1.0));
     }
 
-    /// The map of edge points, with strengths made from their magnitudes.
+    /// Builds the map of edge points, with strengths computed from their magnitudes.
     pub(super) fn from_points(
         width: u32,
         height: u32,
@@ -65,11 +65,11 @@ impl ContourMap {
         map
     }
 
-    /// A ready contour map (bright = contour, 255 = strength 1). Lines thicker than a
-    /// pixel are thinned to their strongest, else middle, pixels; tangents come from the
-    /// strengths within about three pixels; points lie between pixels where the
-    /// brightness says so. Areas, which are not contours, shrink to lines in their
-    /// middle.
+    /// Reads a finished contour map (bright = contour, 255 = strength 1). Lines thicker
+    /// than a pixel are thinned to their strongest pixels, or to the middle ones among
+    /// equals; tangents come from the strengths within about three pixels; points have
+    /// sub-pixel positions according to the brightness. Filled areas, which are not
+    /// contours, shrink to lines in their middle.
     pub fn from_image(picture: &GrayImage) -> Self {
         let (width, height) = picture.dimensions();
         let mut map = ContourMap::new(width, height);
@@ -77,14 +77,14 @@ impl ContourMap {
         let bytes = &picture.as_raw()[..w * h];
         let left = thinned(width, height, bytes);
         let values: Vec<f32> = bytes.iter().map(|&b| f32::from(b) / 255.0).collect();
-        // The thin lines, a little widened, tell directions; the given brightness tells
-        // offsets.
+        // Directions come from the thinned lines, and offsets from the original
+        // brightness, slightly smoothed.
         let lines: Vec<f32> =
             values.iter().zip(&left).map(|(v, &l)| if l { *v } else { 0.0 }).collect();
         let soft = smoothed(width, height, &values, 0.7);
         for k in (0..w * h).filter(|&k| left[k]) {
             let (cx, cy) = (k % w, k / w);
-            // Spread of the line's points around this one, seen from it.
+            // Second moments of the line's points around this one.
             let mut spread = [0.0f32; 3];
             for j in cy.saturating_sub(3)..(cy + 4).min(h) {
                 for i in cx.saturating_sub(3)..(cx + 4).min(w) {
@@ -110,8 +110,8 @@ impl ContourMap {
         map
     }
 
-    /// A grey picture of the map's size: every pixel has the strength of the strongest
-    /// point in it, 255 for 1.
+    /// Returns a grey picture of the map's size, in which every pixel has the strength of
+    /// the strongest point in it (255 for 1).
     pub fn to_image(&self) -> GrayImage {
         let mut out = GrayImage::new(self.width, self.height);
         if self.width == 0 || self.height == 0 {
@@ -125,8 +125,8 @@ impl ContourMap {
         out
     }
 
-    /// The same points for a picture of another size (at least 1 x 1): places and
-    /// directions are scaled, their number stays.
+    /// Returns the same points for a picture of another size (at least 1 x 1), with
+    /// positions and directions scaled.
     pub fn scaled_to(&self, width: u32, height: u32) -> ContourMap {
         let (width, height) = (width.max(1), height.max(1));
         let (sx, sy) =

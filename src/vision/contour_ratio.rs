@@ -1,15 +1,16 @@
 //! Contours as a log-likelihood ratio: how much better each rendered piece explains the
-//! observed edges near it than the edges that its surroundings hold anyway. The default
-//! contour score for photographs; a pseudo-likelihood without a sampler, since
-//! neighbouring pieces are not independent (hence the weight). Everything but the credit
-//! is worked out when it is prepared, so an evaluation reads a table. Invariant: scores
-//! are finite, continuous in positions and orientations, and exactly independent of the
-//! elements' order.
+//! observed edges near it than the background density of edges around it does. This is
+//! the default contour score for photographs. It is a pseudo-likelihood, because
+//! neighbouring pieces are not independent (hence the weight), and it has no sampler.
+//! Everything except the match capacity is tabulated when the comparator is prepared, so
+//! an evaluation only reads a table. Invariant: scores are finite, continuous in
+//! positions and orientations, and exactly independent of the order of the elements.
 //!
 //! For a piece at distance d (percent of the diagonal) from the nearest observed edge of
-//! like orientation, `s = ln((0.75 f(d) + 0.25 b(d)) / b(d))`, where f is a half-normal
-//! density and b the density of that distance at the points of a window round the piece.
-//! A piece far from every edge gets ln 0.25; one in dense texture about 0.
+//! similar orientation, `s = ln((0.75 f(d) + 0.25 b(d)) / b(d))`, where f is a
+//! half-normal density and b the density of that distance over the points of a window
+//! around the piece. A piece far from every edge scores ln 0.25; one in dense texture
+//! about 0.
 
 mod background;
 mod gradient;
@@ -25,33 +26,35 @@ use crate::platform::threads::side_by_side;
 
 pub use self::match_capacity::Scratch;
 
-/// What [`ContourRatio`] can be told. Lengths are percent of the image diagonal. The
-/// defaults were chosen on ten pictures of 256 x 256 pixels.
+/// Options of [`ContourRatio`]. Lengths are percent of the image diagonal. The defaults
+/// were chosen on ten pictures of 256 x 256 pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContourRatioOptions {
-    /// Share of pieces that have an edge of their own, above 0 and below 1. Default 0.75.
+    /// Fraction of pieces that have a matching observed edge, above 0 and below 1.
+    /// Default 0.75.
     pub foreground: f64,
     /// Standard deviation of the half-normal distance of those pieces, above 0. Default
     /// 0.4.
     pub sd: f64,
-    /// Distances from here on count as "no edge near", above 0. Default 3.3.
+    /// Distances from this value on count as "no edge nearby", above 0. Default 3.3.
     pub truncate: f64,
-    /// Side of the window round a piece that tells the background, as a fraction of the
-    /// picture's sides, above 0 and at most
-    /// 2. Default 0.25.
+    /// Side of the window around a piece from which the background density is estimated,
+    /// as a fraction of the picture's sides, above 0 and at most 2. Default 0.25.
     pub window: f64,
-    /// How many times over an observed edge pays, above 0. Default 2.
+    /// Length of rendered contour that observed edges match at full score, as a multiple
+    /// of their own length, above 0. Default 2.
     pub credit: f64,
-    /// Power to which the ratio of `unit` of contour is taken, at least 0. Default 0.5.
+    /// Power to which the likelihood ratio of a `unit` of contour is raised, at least 0.
+    /// Default 0.5.
     pub weight: f64,
-    /// The length of contour that counts as one observation, above 0. Default 0.5524: two
+    /// Length of contour that counts as one observation, above 0. Default 0.5524: two
     /// pixels of a 256 x 256 picture.
     pub unit: f64,
-    /// With less contour in view than this (in percent of the diagonal, above 0), a
-    /// penalty sets in, linear in what is missing. Default 10.
+    /// Length of contour in view (percent of the diagonal, above 0) below which a penalty
+    /// applies, linear in the missing length. Default 10.
     pub least: f64,
-    /// The penalty with nothing in view, as the length of contour without any edge near
-    /// that scores as badly; at least 0. Default 1000: ten diagonals of it.
+    /// The penalty with nothing in view, as the length of contour far from every edge
+    /// that has the same score; at least 0. Default 1000: ten diagonals.
     pub nothing: f64,
 }
 
@@ -95,28 +98,28 @@ impl ContourRatioOptions {
     }
 }
 
-/// A place of the grid, for one orientation channel.
+/// A sample of the grid, for one orientation channel.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
     /// Log ratio of a piece here.
     score: f32,
-    /// The group of observed edges that pays for it, if the score is above 0.
+    /// The group of observed edges that it is matched to, if the score is above 0.
     group: u32,
 }
 
-/// Observed contours, ready to score many rendered ones.
+/// Observed contours, prepared for scoring many rendered ones.
 #[derive(Debug, Clone)]
 pub struct ContourRatio {
     options: ContourRatioOptions,
     grid: Edges,
-    /// Channel after channel, each as the grid.
+    /// The cells of one orientation channel after another, each laid out like the grid.
     cells: Vec<Cell>,
     capacity: MatchCapacity,
     /// Percent of the diagonal per pixel of the frame.
     percent: f64,
 }
 
-/// Fixed point for exact sums: steps per unit.
+/// Fixed-point steps per unit, for exact sums.
 const FIXED: f64 = (1u64 << 32) as f64;
 
 impl ContourRatio {
@@ -140,8 +143,8 @@ impl ContourRatio {
         let none = Cell { score: libm::log(1.0 - options.foreground) as f32, group: NO_GROUP };
         let mut cells = vec![none; samples * CHANNELS];
         side_by_side(cells.chunks_exact_mut(samples), |k, out| {
-            // A channel holds the edges within one channel's width: an element between
-            // two channels finds an edge of its own orientation in both.
+            // A channel holds the edges within one channel's width, so both channels next
+            // to an element's orientation contain an edge of that orientation.
             let near = |e: &Edge| turn_between(e.turn, k as f32) <= 1.0;
             let Some(nearest) = grid.nearest_within(options.truncate, near) else { return };
             let scores = scores(&grid, &nearest.distance, options);
@@ -161,10 +164,11 @@ impl ContourRatio {
         &self.options
     }
 
-    /// The weighted log-likelihood ratio; above 0 if the contours are better explained by
-    /// the rendered ones than by chance. With nothing in view it is not 0 but as bad as
-    /// `nothing` percent of contour that no edge supports: with the defaults -1254.9,
-    /// below any ordinary contour; from `least` percent of contour on nothing is added.
+    /// Returns the weighted log-likelihood ratio: above 0 if the rendered contours
+    /// explain the observed ones better than chance. With nothing in view it is that of
+    /// `nothing` percent of contour without a nearby edge (-1254.9 with the defaults),
+    /// which is below any ordinary contour; with at least `least` percent of contour in
+    /// view there is no penalty.
     pub fn log_likelihood(&self, elements: &Elements<'_>) -> f64 {
         self.log_likelihood_with(elements, &mut Scratch::default())
     }
@@ -176,9 +180,10 @@ impl ContourRatio {
         self.score(scratch)
     }
 
-    /// [`ContourRatio::log_likelihood`] of contours of which the scratch may know those
-    /// before: the same, bit for bit, at the cost of what changed. `whole` gives all of
-    /// them. A scratch belongs to one comparator.
+    /// Returns the [`ContourRatio::log_likelihood`] after a change of the contours, bit
+    /// for bit. If the scratch holds the state before the change, only the changes are
+    /// counted; otherwise `whole` must give all contours. A scratch belongs to one
+    /// comparator.
     pub fn log_likelihood_after<'a>(
         &self,
         step: &ContourDelta<'_>,
@@ -204,10 +209,10 @@ impl ContourRatio {
         score
     }
 
-    /// Adds what elements bring, or takes it away.
+    /// Adds (`sign` 1) or subtracts (-1) the contributions of elements.
     fn count(&self, elements: &Elements<'_>, sign: i64, scratch: &mut Scratch) {
         let samples = self.grid.width as usize * self.grid.height as usize;
-        // Exact in integers: sums of terms that are rounded one by one do not depend on
+        // Integer sums are exact: a sum of individually rounded terms does not depend on
         // their order.
         let (mut total, mut length) = (scratch.total, scratch.length);
         for e in elements.in_view() {
@@ -232,7 +237,7 @@ impl ContourRatio {
         (scratch.total, scratch.length) = (total, length);
     }
 
-    /// The score of what has been counted.
+    /// Returns the score of the elements counted so far.
     fn score(&self, scratch: &mut Scratch) -> f64 {
         let evidence = scratch.total as f64 / FIXED + scratch.score_matches(&self.capacity);
         let length = scratch.length as f64 / FIXED;

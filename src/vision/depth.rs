@@ -1,9 +1,9 @@
-//! Depth maps: distance of the surface seen at every pixel, and how likely an observed
-//! map is given a rendered one.
+//! Depth maps (distance of the visible surface at every pixel), and the likelihood of an
+//! observed map given a rendered one.
 //!
-//! A depth is a positive number in the scene's unit of length; `+inf` is background
-//! (nothing there) and NaN is missing (not measured). Missing pixels say nothing: whether
-//! a pixel is missing is taken to have nothing to do with the scene.
+//! A depth is a positive number in the scene's unit of length; `+inf` is background (no
+//! surface) and NaN is missing (not measured). Missing pixels are ignored: whether a
+//! pixel is missing is assumed to be independent of the scene.
 
 use super::error::{VisionError, read_bytes};
 use super::npy;
@@ -12,8 +12,8 @@ use crate::num::LN_SQRT_2PI;
 use crate::rng::Stream;
 use std::path::Path;
 
-/// A depth map, row by row. Every value is positive and finite, `+inf` (background) or
-/// NaN (missing).
+/// A depth map in row-major order. Every value is positive and finite, `+inf`
+/// (background) or NaN (missing).
 #[derive(Clone, Debug)]
 pub struct DepthMap {
     width: u32,
@@ -22,7 +22,7 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
-    /// A depth map; values of 0 and below become background.
+    /// Builds a depth map; values of 0 and below become background.
     pub fn new(width: u32, height: u32, mut data: Vec<f32>) -> Result<Self, VisionError> {
         if data.len() as u64 != u64::from(width) * u64::from(height) || data.is_empty() {
             return Err(VisionError::size(width, height, format!("{} pixels", data.len())));
@@ -41,13 +41,14 @@ impl DepthMap {
         self.height
     }
 
-    /// The depths, row by row.
+    /// The depths, in row-major order.
     pub fn data(&self) -> &[f32] {
         &self.data
     }
 
-    /// The map at another size (at least 1 x 1): every pixel is the one its centre falls
-    /// in, because means across the edge of an object are depths of nothing.
+    /// Returns the map at another size (at least 1 x 1). Every pixel takes the value of
+    /// the pixel that contains its centre, because averages across an object's edge are
+    /// not depths of any surface.
     pub fn resized(&self, width: u32, height: u32) -> DepthMap {
         let (width, height) = (width.max(1), height.max(1));
         let pick = |i: u32, from: u32, to: u32| {
@@ -72,7 +73,7 @@ pub fn load(path: &Path, scale: f64) -> Result<DepthMap, VisionError> {
     decode(&read_bytes(path, limits.max_bytes())?, scale, &limits).map_err(|e| e.in_file(path))
 }
 
-/// As [`load`], from the bytes of a file.
+/// Like [`load`], from the bytes of a file.
 pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, VisionError> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(VisionError::Range { name: "scale", rule: "positive", value: scale });
@@ -106,14 +107,14 @@ pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, Vis
     DepthMap::new(width, height, data)
 }
 
-/// How likely an observed depth map is given a rendered one. Per observed pixel:
+/// The likelihood of an observed depth map given a rendered one. Per observed pixel:
 ///
 /// * rendered at depth z: `(1 - outlier) Normal(z, sd) + outlier Q`;
 /// * rendered as background: `(1 - outlier) [background] + outlier Q`;
 /// * Q: background with probability 1/2, else a depth uniform over `range`.
 ///
-/// A density with respect to length plus a unit mass at "background"; it integrates to 1
-/// for every rendered map. Missing pixels count as 0.
+/// It is a density with respect to length plus a unit mass at "background"; it integrates
+/// to 1 for every rendered map. Missing pixels contribute 0.
 #[derive(Clone, Debug)]
 pub struct DepthLikelihood {
     observed: DepthMap,
@@ -123,9 +124,9 @@ pub struct DepthLikelihood {
 }
 
 impl DepthLikelihood {
-    /// The likelihood of `observed` at its own size: `sd` > 0 (unit of depth), `outlier`
-    /// strictly between 0 and 1, `range` of an outlier's depth, which has to hold all of
-    /// the observed depths.
+    /// Builds the likelihood of `observed` at its own size: `sd` > 0 (unit of depth),
+    /// `outlier` strictly between 0 and 1, and the `range` of an outlier's depth, which
+    /// must contain all observed depths.
     pub fn new(
         observed: &DepthMap,
         sd: f64,
@@ -150,18 +151,18 @@ impl DepthLikelihood {
         Ok(DepthLikelihood { observed: observed.clone(), sd, outlier, range })
     }
 
-    /// The same at the size that is rendered, once (nearest pixels).
+    /// Returns the likelihood at the rendered size (nearest pixels).
     pub fn resized(&self, width: u32, height: u32) -> Self {
         DepthLikelihood { observed: self.observed.resized(width, height), ..*self }
     }
 
-    /// The observed map at the size that is compared.
+    /// The observed map at the size of comparison.
     pub fn observed(&self) -> &DepthMap {
         &self.observed
     }
 
-    /// Log density of the observed map given rendered depths of the same size (`+inf`
-    /// where nothing is; never NaN).
+    /// Returns the log density of the observed map given rendered depths of the same size
+    /// (`+inf` for background; never NaN).
     pub fn log_likelihood(
         &self,
         rendered: &[f32],
@@ -178,8 +179,8 @@ impl DepthLikelihood {
             .sum())
     }
 
-    /// For each pixel the derivative of the log density by its rendered depth; 0 where
-    /// either is background.
+    /// Returns for each pixel the derivative of the log density with respect to its
+    /// rendered depth; 0 if either is background.
     pub fn slopes(&self, rendered: &[f32]) -> Vec<f64> {
         let slope = |(o, r): (&f32, &f32)| {
             let (o, r) = (f64::from(*o), f64::from(*r));
@@ -189,14 +190,15 @@ impl DepthLikelihood {
             let z = (o - r) / self.sd;
             let good = libm::log1p(-self.outlier) - 0.5 * z * z - libm::log(self.sd) - LN_SQRT_2PI;
             let share = libm::exp(good - self.log_density(o, r));
-            // Where nothing is left of the good part, z may be infinite.
+            // Where the responsibility of the normal part is 0, z may be infinite.
             if share > 0.0 { share * z / self.sd } else { 0.0 }
         };
         self.observed.data.iter().zip(rendered).map(slope).collect()
     }
 
-    /// For each pixel, how much the log density grows where the object covers it. Beside
-    /// the object it would have the depth of the pixel next to it; further away it is 0.
+    /// Returns for each pixel the increase of the log density if the object covers it. A
+    /// pixel beside the object takes the depth of an adjacent covered pixel; pixels
+    /// farther away have gain 0.
     pub fn gains(&self, rendered: &[f32]) -> Vec<f64> {
         let width = self.observed.width as usize;
         let depth = |i: usize| rendered.get(i).copied().filter(|r| r.is_finite());
@@ -211,7 +213,7 @@ impl DepthLikelihood {
         self.observed.data.iter().enumerate().map(gain).collect()
     }
 
-    /// Log density of an observed depth given a rendered one.
+    /// Returns the log density of an observed depth given a rendered one.
     fn log_density(&self, observed: f64, rendered: f64) -> f64 {
         let ln_half = libm::log(0.5 * self.outlier);
         if observed.is_nan() {
@@ -251,9 +253,9 @@ impl DepthLikelihood {
         }
     }
 
-    /// A depth map drawn given rendered depths of the same size; nothing is missing. Good
-    /// pixels are drawn from the normal distribution as it is, so a depth may come out
-    /// negative where `sd` is as large as the depths.
+    /// Samples a depth map given rendered depths of the same size, without missing
+    /// pixels. Inliers are drawn from the untruncated normal distribution, so a depth may
+    /// be negative if `sd` is as large as the depths.
     pub fn simulate(&self, rendered: &[f32], rng: &mut Stream) -> Result<Vec<f32>, VisionError> {
         self.check(rendered, self.observed.width, self.observed.height)?;
         let draw = |&r: &f32| {
@@ -287,8 +289,8 @@ mod tests {
     fn integrates_to_one() {
         let l = likelihood(vec![1.0]);
         for rendered in [2.0, f64::INFINITY] {
-            // Over the whole line: the normal part may leave the range, the uniform part
-            // is only inside it.
+            // Integrates over the range of depths only: the uniform part is inside it,
+            // and the normal part practically so.
             let background = libm::exp(l.log_density(f64::INFINITY, rendered));
             let step = 1e-4;
             let depths: f64 = (0..40000)
@@ -316,7 +318,7 @@ mod tests {
             + 0.9f64.ln()
             + (uniform + normal(30.0)).ln();
         assert!((got - want).abs() < 1e-9, "{got} {want}");
-        // Far off costs no more than an outlier, and stays finite.
+        // Outliers cost a bounded amount, and the result stays finite.
         assert!(l.log_likelihood(&[1e30, -1e30, 0.0, 0.0, 0.0, 1e38], 6, 1).unwrap().is_finite());
         assert!(l.log_likelihood(&[f32::NAN; 6], 6, 1).is_err());
         assert!(l.log_likelihood(&[1.0; 6], 3, 2).is_err());

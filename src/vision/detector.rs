@@ -1,6 +1,6 @@
-//! Contour detectors. One is built in, from gradients; those that files describe
-//! ([`super::FileDetector`]: structured forests, networks) and others can take its place
-//! behind the trait.
+//! Contour detectors. A gradient detector is built in; detectors from files
+//! ([`super::FileDetector`]: structured forests, networks) and others can replace it
+//! through the trait.
 
 use super::VisionError;
 use super::color::linear_to_labs;
@@ -10,28 +10,29 @@ use super::nms::{EdgePoint, hysteresis, suppress};
 use super::photo::Photo;
 use super::resize::fitted;
 
-/// Finds contours in photographs. The same photograph gives the same map, bit by bit.
+/// Detects contours in photographs. The map is a deterministic function of the
+/// photograph, bit by bit.
 pub trait ContourDetector {
-    /// The contours of a photograph. The map may be smaller than the photograph; it has
-    /// its shape.
+    /// Returns the contours of a photograph. The map may be smaller than the photograph
+    /// but has its aspect ratio.
     ///
     /// # Errors
-    /// If the detector cannot work on the photograph: a network may fail while it runs.
+    /// If the detector fails on the photograph, as a network may while it runs.
     fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError>;
 }
 
-/// Contours as maxima of the colour gradient in L*a*b*. It knows nothing of objects:
+/// Contours as maxima of the colour gradient in L*a*b*. It does not recognise objects:
 /// shadows and textures have edges too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GradientDetector {
-    /// Longer side of the picture worked on, pixels; smaller photographs keep their size.
+    /// Longer side of the working picture, pixels; smaller photographs keep their size.
     pub size: u32,
-    /// Standard deviation of the smoothing, pixels of the picture worked on.
+    /// Standard deviation of the smoothing, pixels of the working picture.
     pub sigma: f32,
     /// Points weaker than this are dropped. Thresholds are multiples of the picture's
     /// reference gradient.
     pub low: f32,
-    /// Points stronger than this are kept, and those hanging together with them.
+    /// Points stronger than this are kept, and points connected to them.
     pub high: f32,
 }
 
@@ -41,28 +42,28 @@ impl Default for GradientDetector {
     }
 }
 
-/// Gradients below this many units of L*a*b* a pixel are never contours: half a step of
+/// Gradients below this (units of L*a*b* per pixel) are never contours: half a step of
 /// 8-bit grey over a pixel.
 const FLOOR: f32 = 0.2;
-/// The part of the contour points that are weaker than the reference gradient.
+/// The fraction of the contour points that are weaker than the reference gradient.
 const REFERENCE_QUANTILE: f64 = 0.9;
-/// Reference gradient of a common photograph, units of L*a*b* a pixel. The reference is
-/// the geometric mean of this and the picture's own, so that a picture of weak edges
-/// alone keeps them, but as weaker ones.
+/// Reference gradient of a typical photograph, units of L*a*b* per pixel. The reference
+/// is the geometric mean of this and the picture's own, so that a picture with only weak
+/// edges keeps them, but with lower strength.
 const COMMON_REFERENCE: f32 = 4.0;
-/// How much more than lightness colour counts: shading and texture change lightness,
-/// other objects change colour.
+/// Weight of colour relative to lightness: shading and texture change lightness, other
+/// objects change colour.
 const COLOUR_WEIGHT: f32 = 2.0;
 
 impl ContourDetector for GradientDetector {
-    /// As [`contours`](GradientDetector::contours), which never fails.
+    /// See [`contours`](GradientDetector::contours), which never fails.
     fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError> {
         Ok(self.contours(photo))
     }
 }
 
 impl GradientDetector {
-    /// The contours of a photograph.
+    /// Returns the contours of a photograph.
     pub fn contours(&self, photo: &Photo) -> ContourMap {
         let (width, height) = fitted(photo.width(), photo.height(), self.size);
         let mut lab = linear_to_labs(&photo.linear(width, height).rgb);
@@ -75,7 +76,8 @@ impl GradientDetector {
     }
 }
 
-/// The magnitude below which the given part of the points lie; 1 without points.
+/// Returns the magnitude below which the given fraction of the points lies; 1 without
+/// points.
 fn quantile(points: &[EdgePoint], part: f64) -> f32 {
     let mut magnitudes: Vec<f32> = points.iter().map(|p| p.magnitude).collect();
     let at = (part * magnitudes.len().saturating_sub(1) as f64) as usize;
@@ -132,7 +134,7 @@ mod tests {
 
     #[test]
     fn weak_edges_are_kept_where_they_go_on_from_strong_ones() {
-        // The disc fades into its ground along its rim.
+        // The contrast of the disc fades along its rim.
         let n = 256;
         let faint = RgbImage::from_fn(n, n, |i, j| {
             let (x, y) = (i as f32 + 0.5 - 128.0, j as f32 + 0.5 - 128.0);

@@ -1,9 +1,9 @@
 //! The exact Euclidean distance transform: for every pixel the distance to the nearest
-//! set pixel, and which one that is. Felzenszwalb & Huttenlocher 2012, "Distance
-//! transforms of sampled functions", Theory of Computing 8, 415-428: lower envelopes of
-//! parabolas, rows after columns, linear time. Distances are between pixel centres, in
-//! pixels, exact up to one rounding. Of several set pixels as near, the leftmost counts,
-//! and of those in one column the upper.
+//! set pixel, and its index. Felzenszwalb & Huttenlocher 2012, "Distance transforms of
+//! sampled functions", Theory of Computing 8, 415-428: lower envelopes of parabolas,
+//! columns first and then rows, in linear time. Distances are between pixel centres, in
+//! pixels, exact up to one rounding. Among equally near set pixels the leftmost counts,
+//! and among those in one column the upper one.
 
 use crate::num::simd::vectorised;
 
@@ -14,26 +14,26 @@ pub struct DistanceMap {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Distances, pixels, row by row. Where no pixel is set, all are the map's diagonal.
+    /// Distances, pixels, in row-major order. If no pixel is set, all are the map's
+    /// diagonal.
     pub values: Vec<f32>,
-    /// Index (row * width + column) of a nearest set pixel; `u32::MAX` everywhere where
-    /// none is set.
+    /// Index (row * width + column) of a nearest set pixel; `u32::MAX` everywhere if no
+    /// pixel is set.
     pub nearest: Vec<u32>,
 }
 
-/// Signed rows to a column without set pixels: farther than any row is.
+/// Signed number of rows to the set pixel of a column that has none: more than any row's.
 const NOWHERE: i32 = i32::MAX / 2;
 
-/// For every pixel the nearest set pixel of its own column, as the number of rows down to
-/// it; of two as near the upper one.
+/// For every pixel the number of rows down to the nearest set pixel of its column; of two
+/// equally near ones, to the upper one.
 pub(super) struct Columns {
     width: usize,
     away: Vec<i32>,
 }
 
-/// Memory for one row after the other: the parabolas `(x - q)^2 + f(q)` of its lower
-/// envelope, from the left. Between columns they differ by the lines `h - 2 x q` with
-/// `h = q^2 + f(q)`.
+/// Buffers for one row at a time: the parabolas `(x - q)^2 + f(q)` of its lower envelope,
+/// from the left. Parabolas differ by the lines `h - 2 x q` with `h = q^2 + f(q)`.
 #[derive(Default)]
 pub(super) struct Envelope {
     q: Vec<f64>,
@@ -41,8 +41,8 @@ pub(super) struct Envelope {
 }
 
 impl Columns {
-    /// The columns of a map of `width` x `height` pixels, at least one; pixels beyond the
-    /// end of `set` are not set.
+    /// Scans the columns of a map of at least one pixel; pixels beyond the end of `set`
+    /// are not set.
     pub fn of(width: usize, height: usize, set: &[bool]) -> Self {
         let mut away = vec![0i32; width * height];
         let (mut above, mut below) = (vec![-NOWHERE; width], vec![NOWHERE; width]);
@@ -71,13 +71,13 @@ impl Columns {
         Columns { width, away }
     }
 
-    /// Tells `each` the nearest set pixel (column, rows down to it) of every pixel of a
-    /// row, from the left; of two as near the left one. It is not called where no pixel
-    /// of the map is set.
+    /// Calls `each` for every pixel of a row, from the left, with the nearest set pixel
+    /// (column, rows down to it); of two equally near ones with the left one. It is not
+    /// called if no pixel of the map is set.
     ///
     /// Parabolas on the lower envelope are corners of the lower convex hull of the points
-    /// `(q, h)`, so no place where two meet has to be worked out: all comparisons are of
-    /// whole numbers, exact in f64 for sides up to 2^17.
+    /// `(q, h)`, so intersections need not be computed: all comparisons are of integers,
+    /// which are exact in f64 for sides up to 2^17.
     pub fn nearest(
         &self,
         y: usize,
@@ -86,7 +86,7 @@ impl Columns {
     ) {
         let Some(away) = self.away.get(y * self.width..(y + 1) * self.width) else { return };
         let Envelope { q, h } = envelope;
-        // The last two are kept at hand.
+        // The last two points, kept in registers.
         let (mut before, mut last) = ((0.0, 0.0), (0.0, 0.0));
         q.clear();
         h.clear();
@@ -121,10 +121,9 @@ impl Columns {
         }
     }
 
-    /// As [`Columns::nearest`] with `None` for pixels from which no set pixel is within
-    /// `reach`, at most [`FARTHEST`]. Much faster where set pixels are dense or `reach`
-    /// is small: columns are looked at from near to far, those of many pixels side by
-    /// side.
+    /// Like [`Columns::nearest`], with `None` for pixels without a set pixel within
+    /// `reach`, at most [`FARTHEST`]. This is much faster if set pixels are dense or
+    /// `reach` is small: columns are visited from near to far, for many pixels at a time.
     pub fn within(
         &self,
         y: usize,
@@ -133,8 +132,8 @@ impl Columns {
         mut each: impl FnMut(Option<(usize, i32)>),
     ) {
         let Some(away) = self.away.get(y * self.width..(y + 1) * self.width) else { return };
-        // Squared distances, and below them where it is measured to: the least is the
-        // nearest, of several the leftmost.
+        // The high bits hold the squared distance and the low bits the column, so that
+        // the minimum is the nearest set pixel, and the leftmost of equally near ones.
         let most = reach as i32;
         let bits = (2 * most + 1).ilog2() + 1;
         row.clear();
@@ -171,16 +170,16 @@ impl Columns {
     }
 }
 
-/// The largest reach of [`Columns::within`], pixels: twice its square and its double fit
-/// into an `i32`.
+/// The maximum reach of [`Columns::within`], pixels: twice its square, shifted left by
+/// the bits of its double, fits into an `i32`.
 pub(super) const FARTHEST: usize = 500;
 
-/// Pixels that are worked on side by side.
+/// Number of pixels that are processed at a time.
 const SPAN: usize = 64;
 
-/// The distance transform of a map of `width` x `height` pixels; pixels beyond the end of
-/// `set` are not set. When no pixel is set, all distances are the diagonal and all
-/// `nearest` are `u32::MAX`.
+/// Computes the distance transform of a map of `width` x `height` pixels; pixels beyond
+/// the end of `set` are not set. If no pixel is set, all distances are the diagonal and
+/// all `nearest` are `u32::MAX`.
 pub fn distance_transform(width: u32, height: u32, set: &[bool]) -> DistanceMap {
     let (w, h) = (width as usize, height as usize);
     if w * h == 0 || !set.iter().take(w * h).any(|&s| s) {
@@ -206,11 +205,12 @@ pub fn distance_transform(width: u32, height: u32, set: &[bool]) -> DistanceMap 
 }
 
 impl DistanceMap {
-    /// The distance at a place in pixel coordinates (pixel centres at +0.5) and its
-    /// derivatives along x and y: bilinear between pixel centres. Beyond the outermost
-    /// centres it is the value at the nearest place between them plus the distance to
-    /// that place, so it is continuous everywhere. At coordinates that are not finite,
-    /// and in a map without pixels, it is the map's diagonal with derivatives 0.
+    /// Returns the distance at a position in pixel coordinates (pixel centres at +0.5)
+    /// and its derivatives along x and y, by bilinear interpolation between pixel
+    /// centres. Beyond the outermost centres it is the value at the nearest position
+    /// between them plus the distance to that position, so it is continuous everywhere.
+    /// At non-finite coordinates, and in a map without pixels, it is the map's diagonal
+    /// with derivatives 0.
     pub fn sample(&self, x: f32, y: f32) -> (f32, f32, f32) {
         let (w, h) = (self.width as usize, self.height as usize);
         if w == 0 || h == 0 || !x.is_finite() || !y.is_finite() {
@@ -337,7 +337,7 @@ mod tests {
         for _ in 0..2000 {
             let (x, y) = (s.uniform() as f32 * 24.0 - 6.0, s.uniform() as f32 * 21.0 - 6.0);
             let e = 1.0 / 256.0;
-            // A cell's border between the two samples has two derivatives.
+            // The derivative jumps at a cell border between the two samples.
             let crosses = |v: f32| ((v - 0.5 - e).floor() - (v - 0.5 + e).floor()) != 0.0;
             if crosses(x) || crosses(y) {
                 continue;

@@ -1,13 +1,14 @@
 //! Rendered contours as the comparators read them, and what the comparators have in
-//! common: percent of the diagonal, which elements are in view, and errors. It is not a
-//! renderer and knows no meshes. Invariant: an element that is not finite or lies out of
-//! the picture has weight 0, so NaN cannot enter a score.
+//! common: percent of the diagonal, which elements are in view, and errors. This is not a
+//! renderer and does not depend on meshes. Invariant: elements that are not finite or lie
+//! outside the picture have weight 0, so NaN cannot enter a score.
 
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Rendered contour pieces in a frame of `width` x `height` pixels; pixel (0, 0) has its
-/// centre at (0.5, 0.5), y down. If the slices differ in length, the shortest counts.
+/// Rendered pieces of contour in a frame of `width` x `height` pixels. The centre of
+/// pixel (0, 0) is (0.5, 0.5); y points down. If the slices differ in length, the
+/// shortest one counts.
 #[derive(Debug, Clone, Copy)]
 pub struct Elements<'a> {
     /// Horizontal positions of the pieces' middles, in pixels.
@@ -39,7 +40,7 @@ pub(super) struct Element {
     pub ty: f32,
     /// Length in pixels, above 0.
     pub length: f32,
-    /// How far it is in view: 1 inside, 0 from half a pixel outside the border, linear
+    /// The fraction in view: 1 inside, 0 from half a pixel outside the border, linear
     /// between.
     pub weight: f32,
     /// Its index in the slices.
@@ -57,12 +58,13 @@ impl Elements<'_> {
         self.x.len().min(self.y.len()).min(self.tx.len()).min(self.ty.len()).min(self.length.len())
     }
 
-    /// Whether there are none.
+    /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The elements that are finite, have a length, and are in view at least in part.
+    /// The elements that are finite, have a positive length, and are at least partly in
+    /// view.
     #[inline(always)]
     pub(super) fn in_view(&self) -> impl Iterator<Item = Element> {
         let (w, h) = (self.width as f32, self.height as f32);
@@ -77,8 +79,8 @@ impl Elements<'_> {
 }
 
 impl Elements<'_> {
-    /// The derivatives by an element's x and y of how far it is in view: in the half
-    /// pixel at the border, that of the nearest side.
+    /// Returns the derivatives of an element's weight with respect to its x and y: within
+    /// half a pixel of the border, those of the nearest side.
     pub(super) fn view_slope(&self, e: &Element) -> [f64; 2] {
         let (w, h) = (self.width as f32, self.height as f32);
         let sides = [(e.x, 0, 1.0), (w - e.x, 0, -1.0), (e.y, 1, 1.0), (h - e.y, 1, -1.0)];
@@ -92,46 +94,47 @@ impl Elements<'_> {
     }
 }
 
-/// From some rendered contours to others. Contours are told by the address of what stands
-/// for them.
+/// A change from one set of rendered contours to another. A set is identified by the
+/// address of its `Arc`.
 #[derive(Debug, Clone, Copy)]
 pub struct ContourDelta<'a> {
-    /// Stands for the contours before.
+    /// Identifies the contours before.
     pub from: &'a Arc<()>,
-    /// Stands for the contours now.
+    /// Identifies the contours now.
     pub to: &'a Arc<()>,
-    /// Those that are no longer there, besides what moves.
+    /// Contours that disappeared, excluding moving ones.
     pub gone: Elements<'a>,
-    /// Those that were not there before, besides what moves.
+    /// Contours that appeared, excluding moving ones.
     pub come: Elements<'a>,
-    /// All of what moves, told anew each time.
+    /// All moving contours; given in full at every step.
     pub moving: Elements<'a>,
-    /// How many there are now.
+    /// Number of elements now.
     pub count: usize,
 }
 
 impl ContourDelta<'_> {
-    /// Whether it begins at these contours, and is shorter than beginning from nothing.
+    /// Whether the step starts from the known contours and is shorter than starting from
+    /// scratch.
     pub(super) fn follows(&self, known: Option<&Arc<()>>) -> bool {
         self.gone.len() + self.come.len() < self.count
             && known.is_some_and(|known| Arc::ptr_eq(known, self.from))
     }
 
-    /// Whether it ends at these contours.
+    /// Whether the step ends at the known contours.
     pub(super) fn leads_to(&self, known: Option<&Arc<()>>) -> bool {
         known.is_some_and(|known| Arc::ptr_eq(known, self.to))
     }
 }
 
-/// Why a comparator could not be prepared or asked.
+/// Why a comparator could not be prepared or evaluated.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparatorError {
     /// The frame has no pixels or too many.
     #[error("cannot compare at {width} x {height} pixels: each side must be 1 to 16384 pixels")]
     Size {
-        /// Width asked for, in pixels.
+        /// Requested width, in pixels.
         width: u32,
-        /// Height asked for, in pixels.
+        /// Requested height, in pixels.
         height: u32,
     },
     /// An option is out of its range.
@@ -139,32 +142,32 @@ pub enum ComparatorError {
     Option {
         /// The option's name.
         option: &'static str,
-        /// What it may be.
+        /// The allowed values.
         range: &'static str,
     },
     /// The observed map's lists have different lengths.
     #[error("the observed contours are invalid: their lists differ in length")]
     Map,
-    /// A quantised picture whose labels do not fit it.
+    /// A quantised picture with unsuitable labels.
     #[error(
         "a colour-reduced picture needs one label per pixel, each below the number of colours, 1 to 256"
     )]
     Labels,
 }
 
-/// Length in pixels of the diagonal of a `width` x `height` picture.
+/// Returns the length in pixels of the diagonal of a `width` x `height` picture.
 pub(super) fn diagonal(width: u32, height: u32) -> f64 {
     let (w, h) = (f64::from(width), f64::from(height));
     (w * w + h * h).sqrt()
 }
 
-/// An error unless both sides are 1 to 16384.
+/// Returns an error unless both sides are 1 to 16384.
 pub(super) fn check_size(width: u32, height: u32) -> Result<(), ComparatorError> {
     let fine = |n: u32| (1..=16384).contains(&n);
     if fine(width) && fine(height) { Ok(()) } else { Err(ComparatorError::Size { width, height }) }
 }
 
-/// An error unless `value` is finite and `holds`.
+/// Returns an error unless `value` is finite and `holds` is true.
 pub(super) fn check(
     option: &'static str,
     range: &'static str,

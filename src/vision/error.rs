@@ -1,27 +1,27 @@
-//! What can go wrong with a picture or an array of pixels. Messages say what was wrong
-//! with the input, in the user's words.
+//! Errors of pictures and arrays of pixels. Messages describe the faulty input in the
+//! user's terms.
 
 use std::path::{Path, PathBuf};
 
-/// An error of reading or of comparing pictures.
+/// An error of reading or comparing pictures.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VisionError {
-    /// Something went wrong with a file.
+    /// An error in a file.
     #[error("{}: {source}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What went wrong.
+        /// The error.
         source: Box<VisionError>,
     },
-    /// The file is not there.
+    /// The file does not exist.
     #[error("no such file")]
     Missing,
     /// The file could not be read.
     #[error("cannot read the file: {0}")]
     Io(#[from] std::io::Error),
-    /// There are no bytes.
+    /// The file is empty.
     #[error("the file is empty")]
     Empty,
     /// The bytes are not those of a PNG or JPEG picture.
@@ -62,39 +62,38 @@ pub enum VisionError {
     /// A `.npy` file that cannot be used.
     #[error("not a usable .npy array: {0}")]
     Npy(String),
-    /// A file of a contour detector that cannot be used, or a detector that failed on a
-    /// picture.
+    /// An unusable contour detector file, or a detector that failed on a picture.
     #[error("{0}")]
     Detector(String),
-    /// Two pictures that should be of one size are not.
+    /// Two pictures that must have the same size do not.
     #[error("sizes differ: expected {expected_width} x {expected_height} pixels, got {got}")]
     Size {
         /// Width expected, pixels.
         expected_width: u32,
         /// Height expected, pixels.
         expected_height: u32,
-        /// What came instead.
+        /// The actual size.
         got: String,
     },
-    /// A parameter or a value out of its range.
+    /// A parameter or value out of its range.
     #[error("{name} must be {rule}, not {value}")]
     Range {
-        /// Which one.
+        /// Name of the parameter or value.
         name: &'static str,
-        /// What it must be.
+        /// The allowed range.
         rule: &'static str,
-        /// What it was.
+        /// The actual value.
         value: f64,
     },
 }
 
 impl VisionError {
-    /// The same error, with the file's name.
+    /// Wraps the error with the file's name.
     pub fn in_file(self, path: &Path) -> Self {
         VisionError::File { path: path.to_path_buf(), source: Box::new(self) }
     }
 
-    /// The error below the file's name.
+    /// Returns the underlying error, without the file's name.
     pub fn cause(&self) -> &VisionError {
         match self {
             VisionError::File { source, .. } => source.cause(),
@@ -102,13 +101,13 @@ impl VisionError {
         }
     }
 
-    /// Sizes that differ.
+    /// An error of differing sizes.
     pub(crate) fn size(expected_width: u32, expected_height: u32, got: impl Into<String>) -> Self {
         VisionError::Size { expected_width, expected_height, got: got.into() }
     }
 }
 
-/// All bytes of a file, at most `max_bytes`.
+/// Reads all bytes of a file of at most `max_bytes`.
 pub(crate) fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, VisionError> {
     let read = || {
         let found = std::fs::metadata(path).map_err(|e| match e.kind() {

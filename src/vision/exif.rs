@@ -1,6 +1,6 @@
-//! The one thing a camera writes into a picture that helps to place it: the focal length
-//! as on 35 mm film (Exif 2.3, tag 0xA405). Not a general Exif reader. Damaged metadata
-//! are the same as none: they never make a picture unreadable.
+//! The one piece of metadata in a picture that helps to place the camera: the 35 mm
+//! equivalent focal length (Exif 2.3, tag 0xA405). This is not a general Exif reader.
+//! Damaged metadata count as missing: they never make a picture unreadable.
 
 /// TIFF bytes with a byte order.
 struct Tiff<'a> {
@@ -19,7 +19,7 @@ impl Tiff<'_> {
         Some(if self.big { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) })
     }
 
-    /// The value of a one-number entry (SHORT or LONG) of the directory at `at`.
+    /// Returns the value of a one-number entry (SHORT or LONG) of the directory at `at`.
     fn entry(&self, at: usize, tag: u16) -> Option<u32> {
         let count = usize::from(self.u16(at)?);
         let found = (0..count).map(|i| at + 2 + 12 * i).find(|&e| self.u16(e) == Some(tag))?;
@@ -31,8 +31,8 @@ impl Tiff<'_> {
     }
 }
 
-/// The focal length in mm on 35 mm film of an Exif chunk (a TIFF structure), where it
-/// says one.
+/// Returns the 35 mm equivalent focal length in mm of an Exif chunk (a TIFF structure),
+/// if present.
 pub fn focal_35mm(chunk: &[u8]) -> Option<f64> {
     let chunk = chunk.strip_prefix(b"Exif\0\0").unwrap_or(chunk);
     let big = match chunk.get(..4)? {
@@ -83,8 +83,8 @@ mod tests {
     fn damaged_chunks_are_none() {
         let good = chunk(6, 35);
         for n in 0..good.len() - 4 {
-            // The last four bytes (next directory) are not needed; the value itself ends
-            // right before them.
+            // The last four bytes (next directory) are not needed; the value ends right
+            // before them.
             let cut = focal_35mm(&good[..n]);
             assert!(cut.is_none() || n >= good.len() - 6, "{n}");
         }

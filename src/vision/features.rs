@@ -1,53 +1,51 @@
-//! Features of pictures: short lists of numbers by which pictures that look alike are
-//! found.
+//! Features of pictures: short lists of numbers for finding similar pictures.
 //!
-//! Contours give pooled distances to the nearest contour, and oriented histograms of
-//! contour length in cells as HOG has them (Dalal & Triggs 2005); keypoints give their
-//! positions. The same functions serve rendered and observed pictures, in units of the
-//! longer side about the picture's middle, so that sizes need not agree. Not a
-//! comparator: nothing here is a density. Invariant: features are finite, and as many
-//! whatever the picture.
+//! Contours give pooled distances to the nearest contour, and histograms of contour
+//! length by cell and orientation, as in HOG (Dalal & Triggs 2005); keypoints give their
+//! positions. The same functions serve rendered and observed pictures. Positions are in
+//! units of the longer side relative to the picture's middle, so the sizes of pictures
+//! need not agree. This is not a comparator: features have no density. Invariant:
+//! features are finite, and their number does not depend on the picture.
 
 use super::{ContourMap, Elements, distance_transform};
 
-/// Pixels along a side of the square in which distances are taken.
+/// Side in pixels of the square in which distances are computed.
 const SIDE: usize = 64;
-/// Distances are averaged over blocks of so many pixels.
+/// Distances are averaged over blocks with sides of this many pixels.
 const POOL: usize = 4;
-/// Distances beyond this, in pixels of that square, are as far as can be: a sixth of the
-/// picture.
+/// Upper bound of distances, in pixels of that square: a sixth of the picture.
 const FAR: f32 = 10.0;
-/// Cells along a side, and orientations in a cell, of the histograms.
+/// Cells per side, and orientations per cell, of the histograms.
 const CELLS: usize = 8;
 const ORIENTATIONS: usize = 4;
 /// The number of features of contours.
 pub const CONTOUR_FEATURES: usize = (SIDE / POOL) * (SIDE / POOL) + CELLS * CELLS * ORIENTATIONS;
 
-/// How far a picture may be moved to look more like another, in units of its longer side,
-/// and the sizes it may take.
+/// Shifts by which a picture is moved for comparison, in units of its longer side, and
+/// scales by which it is resized.
 const SHIFTS: [f32; 3] = [0.0, -0.05, 0.05];
 const SCALES: [f32; 3] = [1.0, 0.9, 1.11];
 
-/// A short piece of contour, in units of the picture's longer side, from its middle; x to
-/// the right, y down.
+/// A short piece of contour, in units of the picture's longer side relative to its
+/// middle; x to the right, y down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
-    /// Its middle.
+    /// Its centre.
     pub at: [f32; 2],
-    /// Its direction; the sign means nothing.
+    /// Its direction; the sign is arbitrary.
     pub along: [f32; 2],
     /// Its length.
     pub length: f32,
 }
 
-/// A place of a picture of some size in pixels, in units of its longer side from its
+/// Converts a position in pixels of a picture to units of its longer side relative to its
 /// middle.
 fn centred(x: f32, y: f32, width: u32, height: u32) -> [f32; 2] {
     let longer = width.max(height).max(1) as f32;
     [(x - width as f32 / 2.0) / longer, (y - height as f32 / 2.0) / longer]
 }
 
-/// Rendered contours as strokes.
+/// Converts rendered contours to strokes.
 pub fn rendered(e: &Elements) -> Vec<Stroke> {
     let longer = e.width.max(e.height).max(1) as f32;
     let stroke = |p: super::elements::Element| Stroke {
@@ -58,7 +56,7 @@ pub fn rendered(e: &Elements) -> Vec<Stroke> {
     e.in_view().map(stroke).collect()
 }
 
-/// Observed contours as strokes: every point is about a pixel long.
+/// Converts observed contours to strokes: every point is about a pixel long.
 pub fn observed(m: &ContourMap) -> Vec<Stroke> {
     let longer = m.width.max(m.height).max(1) as f32;
     let lists = m.x.iter().zip(&m.y).zip(m.tx.iter().zip(&m.ty));
@@ -70,22 +68,22 @@ pub fn observed(m: &ContourMap) -> Vec<Stroke> {
     lists.map(stroke).collect()
 }
 
-/// The features of contours: [`CONTOUR_FEATURES`] numbers. Pooled distances first, from 0
-/// on a contour to 1 far from any, together weighed as one number; then the square roots
-/// of the shares of the length in each cell and orientation, whose squares sum to 1 where
-/// there are contours.
+/// Returns the features of contours: [`CONTOUR_FEATURES`] numbers. First come pooled
+/// distances, from 0 on a contour to 1 far from any, scaled so that together they weigh
+/// as much as one number. Then come the square roots of the fractions of the total length
+/// in each cell and orientation, whose squares sum to 1 if there are contours.
 pub fn contour_features(strokes: &[Stroke]) -> Vec<f32> {
     features_of(strokes, &turns(strokes))
 }
 
-/// The features, given the orientations.
+/// Returns the features, given the orientations.
 fn features_of(strokes: &[Stroke], turns: &[f32]) -> Vec<f32> {
     let mut features = pooled_distances(strokes);
     features.extend(histograms(strokes, turns));
     features
 }
 
-/// The orientation of every piece, in those of the histograms.
+/// Returns the orientation of every piece, in units of the histograms' bins.
 fn turns(strokes: &[Stroke]) -> Vec<f32> {
     let turn = |s: &Stroke| {
         let angle = libm::atan2f(s.along[1], s.along[0]) / std::f32::consts::PI;
@@ -113,8 +111,8 @@ fn pooled_distances(strokes: &[Stroke]) -> Vec<f32> {
     pooled.iter().map(|p| p * weight).collect()
 }
 
-/// Length by cell and orientation, each piece shared between the nearest cells and
-/// orientations.
+/// Returns length by cell and orientation; each piece is split linearly between the
+/// nearest cells and orientations.
 fn histograms(strokes: &[Stroke], turns: &[f32]) -> Vec<f32> {
     let mut lengths = vec![0.0f32; CELLS * CELLS * ORIENTATIONS];
     let sound = |s: &Stroke| (s.at[0] + s.at[1] + s.along[0] + s.along[1] + s.length).is_finite();
@@ -141,16 +139,16 @@ fn histograms(strokes: &[Stroke], turns: &[f32]) -> Vec<f32> {
     lengths
 }
 
-/// The whole numbers next to a number, and its share in each.
+/// Returns the integers next to a number and their linear weights.
 fn split(x: f32) -> [(i32, f32); 2] {
     let low = x.floor();
     [(low as i32, 1.0 - (x - low)), (low as i32 + 1, x - low)]
 }
 
-/// The features of keypoints, some of which may be missing: positions in pixels of a
-/// picture.
+/// Returns the features of keypoints, some of which may be missing, from their positions
+/// in pixels of a picture.
 pub fn keypoint_features(points: &[Option<[f64; 2]>], width: u32, height: u32) -> Vec<f32> {
-    // What is not there is in the middle, and what is far off is far.
+    // Missing points are placed in the middle; distant ones are clamped.
     let near = |x: f64| x.clamp(-1e9, 1e9) as f32;
     let at = |p: &Option<[f64; 2]>| {
         p.map_or([0.0; 2], |p| centred(near(p[0]), near(p[1]), width, height))
@@ -162,24 +160,24 @@ pub fn keypoint_features(points: &[Option<[f64; 2]>], width: u32, height: u32) -
         .collect()
 }
 
-/// An observed picture that others are compared with.
+/// The features of an observed picture, to which others are compared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
-    /// Its features, as it is and a little moved.
+    /// Its features, unmoved and slightly moved.
     variants: Vec<Vec<f32>>,
-    /// What each feature counts.
+    /// The weight of each feature.
     weights: Vec<f32>,
 }
 
 impl Query {
-    /// Features that are compared as they are.
+    /// Builds a query that compares features directly.
     pub fn new(features: Vec<f32>) -> Query {
         Query { weights: vec![1.0; features.len()], variants: vec![features] }
     }
 
-    /// Contours, compared also after small shifts (a twentieth of the longer side) and
-    /// changes of size (a tenth): a scene of the right shape should be found though it is
-    /// not quite in the right place.
+    /// Builds a query from contours that also compares them after small shifts (a
+    /// twentieth of the longer side) and scalings (a tenth), so that a scene of the right
+    /// shape is found even if it is slightly displaced.
     pub fn contours(strokes: &[Stroke]) -> Query {
         let turns = turns(strokes);
         let moved = |(dx, dy, scale): (f32, f32, f32)| {
@@ -189,8 +187,8 @@ impl Query {
         Query { variants: movements().map(moved).collect(), weights: vec![1.0; CONTOUR_FEATURES] }
     }
 
-    /// Keypoints with the confidence in each, compared also after the same movements.
-    /// Missing ones do not count.
+    /// Builds a query from keypoints, weighted by confidence, that also compares them
+    /// after the same movements. Missing ones are ignored.
     pub fn keypoints(
         points: &[Option<[f64; 2]>],
         confidence: &[f64],
@@ -216,24 +214,25 @@ impl Query {
         self.weights.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no features.
     pub fn is_empty(&self) -> bool {
         self.weights.is_empty()
     }
 
-    /// The squared distance to features of the same kind: of all variants the least.
+    /// Returns the squared distance to features of the same kind: the minimum over all
+    /// variants.
     pub fn distance(&self, features: &[f32]) -> f32 {
         let to = |v: &Vec<f32>| -> f32 {
             let terms =
                 v.iter().zip(features).zip(&self.weights).map(|((a, b), w)| w * (a - b) * (a - b));
-            // NaN, from a detector of the user's, is far from everything.
+            // NaN, which a user's detector may produce, is infinitely far.
             Some(terms.sum::<f32>()).filter(|d| !d.is_nan()).unwrap_or(f32::INFINITY)
         };
         self.variants.iter().map(to).fold(f32::INFINITY, f32::min)
     }
 }
 
-/// Shifts and sizes that are tried, the picture as it is first.
+/// The shifts and scales to compare with, the identity first.
 fn movements() -> impl Iterator<Item = (f32, f32, f32)> {
     SCALES.into_iter().flat_map(|s| {
         SHIFTS.into_iter().flat_map(move |x| SHIFTS.into_iter().map(move |y| (x, y, s)))
@@ -244,7 +243,7 @@ fn movements() -> impl Iterator<Item = (f32, f32, f32)> {
 mod tests {
     use super::*;
 
-    /// A circle of pieces in a picture of some size.
+    /// A circle of pieces in a picture of the given size.
     fn circle(cx: f32, cy: f32, r: f32, width: u32, height: u32) -> Vec<Stroke> {
         let n = 400;
         let at = |f: fn(f32) -> f32, c: f32| -> Vec<f32> {
@@ -276,7 +275,7 @@ mod tests {
         for s in &strokes {
             map.x.push(s.at[0] * 128.0 + 64.0);
             map.y.push(s.at[1] * 128.0 + 50.0);
-            // The sense of a tangent means nothing.
+            // The sign of a tangent is arbitrary.
             map.tx.push(-s.along[0]);
             map.ty.push(-s.along[1]);
             map.strength.push(0.7);
@@ -287,7 +286,7 @@ mod tests {
 
     #[test]
     fn strokes_are_in_units_of_the_longer_side_from_the_middle() {
-        // The second one is on the border: half of it is in view.
+        // The second one is on the border, so half of it is in view.
         let (x, y): (&[f32], &[f32]) = (&[64.0, 0.0], &[25.0, 50.0]);
         let (tx, ty): (&[f32], &[f32]) = (&[1.0, 0.0], &[0.0, 1.0]);
         let drawn =
@@ -334,7 +333,7 @@ mod tests {
         let at = |points: [[f64; 2]; 2]| points.map(Some);
         let q = Query::keypoints(&at([[20.0, 80.0], [90.0, 10.0]]), &[1.0, 1.0], 100, 100);
         let to = |points: [[f64; 2]; 2]| q.distance(&keypoint_features(&at(points), 100, 100));
-        // As they were; smaller; then also to the right and up; larger.
+        // Unmoved; smaller; smaller, to the right and up; larger.
         for points in [
             [[20.0, 80.0], [90.0, 10.0]],
             [[23.0, 77.0], [86.0, 14.0]],
@@ -343,7 +342,7 @@ mod tests {
         ] {
             assert!(to(points) < 1e-9, "{points:?}: {}", to(points));
         }
-        // Narrower and taller is something else.
+        // Anisotropic scaling is not matched.
         assert!(to([[23.0, 83.0], [86.0, 6.0]]) > 1e-3);
     }
 

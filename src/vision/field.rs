@@ -1,20 +1,20 @@
 //! Distance to the observed contours as a grid of samples, in percent of the picture's
-//! diagonal. The grid is at least [`FIELD_SIDE`] samples on its longer side whatever the
-//! frame, so that a coarse frame reads the same distances as a fine one. Not a detector,
-//! and no likelihood. Invariant: every sample is finite, within 0..=100, and reading is
-//! continuous.
+//! diagonal. The grid has at least [`FIELD_SIDE`] samples on its longer side for any
+//! frame, so that coarse and fine frames read the same distances. It is neither a
+//! detector nor a likelihood. Invariant: every sample is finite, within 0..=100, and
+//! interpolation is continuous.
 
 use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, check_size, diagonal};
 
-/// Least number of samples on the longer side of a field. At 256, reading |d| bilinearly
-/// is wrong by 0.1 % of the diagonal at most.
+/// Minimum number of samples on the longer side of a field. At 256, the error of bilinear
+/// interpolation of |d| is at most 0.1 % of the diagonal.
 pub const FIELD_SIDE: u32 = 256;
 
 /// Number of orientation channels, `PI / 8` apart.
 pub(super) const CHANNELS: usize = 8;
 
-/// Channels in a radian.
+/// Channels per radian.
 pub(super) const PER_RADIAN: f32 = CHANNELS as f32 / std::f32::consts::PI;
 
 /// An observed contour point as a short straight piece, in grid units.
@@ -40,7 +40,7 @@ impl Edge {
     pub fn distance(&self, x: f32, y: f32) -> f32 {
         let (dx, dy) = (x - self.x, y - self.y);
         let along = dx * self.tx + dy * self.ty;
-        // A clamp, written so that several are worked out at a time.
+        // A clamp, written so that it vectorises.
         let along = if along < -self.half { -self.half } else { along };
         let along = if along > self.half { self.half } else { along };
         let (ex, ey) = (dx - along * self.tx, dy - along * self.ty);
@@ -61,8 +61,8 @@ pub(super) struct Edges {
     pub sy: f32,
     /// Percent of the diagonal per grid unit.
     pub percent: f32,
-    /// The points, in the order of the map, those that are not finite or out of the
-    /// picture left out.
+    /// The points, in the order of the map, without those that are not finite or outside
+    /// the picture.
     pub edges: Vec<Edge>,
 }
 
@@ -107,13 +107,13 @@ impl Edges {
         })
     }
 
-    /// Where a point of the frame lies between the grid's samples.
+    /// Returns the grid samples around a point of the frame.
     #[inline(always)]
     pub fn corners(&self, x: f32, y: f32) -> Corners {
         let (w, h) = (self.width as usize, self.height as usize);
         let gx = (x * self.sx - 0.5).clamp(0.0, (w - 1) as f32);
         let gy = (y * self.sy - 0.5).clamp(0.0, (h - 1) as f32);
-        // Through 32 bits, which is one instruction.
+        // Via a 32-bit integer, which takes one instruction.
         let whole = |v: f32| v as i32 as usize;
         let (x0, y0) = (whole(gx).min(w.saturating_sub(2)), whole(gy).min(h.saturating_sub(2)));
         let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
@@ -125,7 +125,7 @@ impl Edges {
     }
 }
 
-/// The four samples round a point and the fractions between them.
+/// The four samples around a point and the fractions between them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corners {
     /// Indices: top left, top right, bottom left, bottom right.
@@ -144,7 +144,7 @@ impl Corners {
         [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy]
     }
 
-    /// The bilinear value, and its derivatives in grid units.
+    /// Returns the interpolated value, and its derivatives per grid unit.
     #[inline(always)]
     pub fn read(&self, field: &[f32]) -> (f32, f32, f32) {
         let [a, b, c, d] = self.at.map(|i| field[i]);
@@ -154,14 +154,15 @@ impl Corners {
     }
 }
 
-/// Orientation of a tangent in channels: the angle modulo PI, times 8 / PI, within 0..8.
+/// Returns the orientation of a tangent in channels: the angle modulo PI, times 8 / PI,
+/// within 0..8.
 pub(super) fn channel(tx: f32, ty: f32) -> f32 {
     let k = libm::atan2f(ty, tx) * PER_RADIAN;
     let k = if k < 0.0 { k + CHANNELS as f32 } else { k };
     if k >= CHANNELS as f32 { k - CHANNELS as f32 } else { k }
 }
 
-/// The smaller difference of two orientations in channels, 0..=4.
+/// Returns the smaller difference of two orientations in channels, 0..=4.
 #[inline(always)]
 pub(super) fn turn_between(a: f32, b: f32) -> f32 {
     let d = (a - b).abs();
@@ -169,7 +170,7 @@ pub(super) fn turn_between(a: f32, b: f32) -> f32 {
     if other < d { other } else { d }
 }
 
-/// The two channels next to a tangent's orientation and the weight of the second.
+/// Returns the two channels next to a tangent's orientation and the weight of the second.
 #[inline]
 pub(super) fn channels_of(tx: f32, ty: f32) -> (usize, usize, f32) {
     let k = channel(tx, ty);

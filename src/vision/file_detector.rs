@@ -1,5 +1,5 @@
-//! Contour detectors that files describe: structured forests and, with the feature
-//! `onnx`, networks.
+//! Contour detectors read from files: structured forests and, with the feature `onnx`,
+//! networks.
 
 use super::VisionError;
 use super::contour_map::ContourMap;
@@ -12,9 +12,8 @@ use super::photo::Photo;
 use super::resize::fitted;
 use super::soft_map::{Shows, SoftMap};
 
-/// A detector that was read from a file. It makes a map of a photograph, which takes
-/// time, and finds contours in the map, which does not: whoever tries several settings
-/// keeps the map.
+/// A detector that was read from a file. Computing the map of a photograph is slow, and
+/// extracting contours from the map is fast: to try several settings, keep the map.
 #[derive(Debug)]
 pub struct FileDetector(Kind);
 
@@ -26,17 +25,16 @@ enum Kind {
 }
 
 impl FileDetector {
-    /// The longer side of the picture worked on, pixels, unless something else is asked
-    /// for.
+    /// The default longer side of the picture that the detector works on, pixels.
     pub const SIZE: u32 = 512;
-    /// The longest side of the picture worked on that may be asked for.
+    /// The maximum longer side of the picture that the detector works on, pixels.
     pub const MOST: u32 = 2048;
 
-    /// Reads the file of a detector. The options are for networks.
+    /// Reads a detector from the bytes of its file. The options apply to networks.
     ///
     /// # Errors
-    /// If it is of no kind that is known, or is damaged, or needs a feature that this
-    /// build was made without; or if the options do not fit it.
+    /// If the kind of file is unknown, the file is damaged or needs a feature that this
+    /// build lacks, or the options do not fit the detector.
     pub fn read(bytes: &[u8], options: &NetworkOptions) -> Result<FileDetector, VisionError> {
         if Forest::is_forest(bytes) {
             if *options != NetworkOptions::default() {
@@ -56,12 +54,11 @@ impl FileDetector {
         }
     }
 
-    /// What it says of every pixel of a photograph. Forests work at a longer side of at
-    /// most `size` pixels, and so do networks that take any size; others work at their
-    /// own.
+    /// Computes the map of a photograph. Forests, and networks that accept any size, work
+    /// at a longer side of at most `size` pixels; other networks work at their own size.
     ///
     /// # Errors
-    /// If a network fails while it runs, or gives no map.
+    /// If a network fails while it runs, or does not return a map.
     pub fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError> {
         let size = size.clamp(1, FileDetector::MOST);
         match &self.0 {
@@ -71,16 +68,15 @@ impl FileDetector {
         }
     }
 
-    /// The contours in a map of it, after smoothing by `sigma` pixels, in a picture that
-    /// has the photograph's shape.
+    /// Returns the contours in a map of a photograph after smoothing by `sigma` pixels,
+    /// scaled to the photograph's aspect ratio.
     pub fn contours(&self, map: &SoftMap, photo: &Photo, sigma: f32) -> ContourMap {
         let found = map.contours(sigma);
         let shape = fitted(photo.width(), photo.height(), map.width.max(map.height));
         if shape == (map.width, map.height) { found } else { found.scaled_to(shape.0, shape.1) }
     }
 
-    /// How much its maps are smoothed unless something else is asked for, pixels of the
-    /// map.
+    /// The default smoothing of its maps, pixels of the map.
     pub fn sigma(&self) -> f32 {
         match self.shows() {
             Shows::Contours => 1.0,
@@ -88,14 +84,14 @@ impl FileDetector {
         }
     }
 
-    /// How strong a contour must be to count, of 1, unless something else is asked for.
+    /// The default threshold on the strength of contours, in 0..=1.
     pub fn strength(&self) -> f32 {
         match &self.0 {
-            // Edges that all trees agree on but for their place are about this strong:
-            // few pixels come near to 1.
+            // Edges whose presence all trees agree on, but not their exact position, are
+            // about this strong; few pixels come close to 1.
             Kind::Forest(_) => 0.1,
-            // HED's best threshold against human outlines is 0.65, and a few more edges
-            // help where the object is dim.
+            // HED's best threshold against human outlines is 0.65; a few more edges help
+            // where the object is dim.
             #[cfg(feature = "onnx")]
             Kind::Network(_) => 0.5,
         }
@@ -116,9 +112,9 @@ impl ContourDetector for FileDetector {
     }
 }
 
-/// ONNX files are protocol buffers without a mark of their own. All begin with a field of
-/// the model: its version (8), who wrote it (0x12), its graph (0x3a), or its sets of
-/// operators (0x42), the last two being letters, which control characters follow.
+/// ONNX files are protocol buffers without a magic number. All begin with a field of the
+/// model: its version (8), its producer (0x12), its graph (0x3a), or its operator sets
+/// (0x42). The last two are letters, so a control character must follow soon.
 fn looks_like_onnx(bytes: &[u8]) -> bool {
     match bytes {
         [0x08 | 0x12, _, ..] => true,

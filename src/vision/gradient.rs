@@ -1,35 +1,35 @@
 //! The gradient of a colour picture: smoothing and differentiation by Gaussians, and the
 //! structure tensor over the channels (Di Zenzo 1986, "A note on the gradient of a
-//! multi-image", CVGIP 33, 116-125). Beyond the border the picture is mirrored.
+//! multi-image", CVGIP 33, 116-125). The picture is mirrored at its borders.
 
 use crate::num::simd::vectorised;
 
-/// Gradient magnitude and direction of every pixel, row by row.
+/// Gradient magnitude and direction of every pixel, in row-major order.
 #[derive(Clone, Debug)]
 pub struct Gradient {
     /// Width, pixels.
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Root of the tensor's larger eigenvalue: change per pixel, at least 0.
+    /// Square root of the tensor's larger eigenvalue: change per pixel, at least 0.
     pub magnitude: Vec<f32>,
-    /// The structure tensor, `[xx, xy, yy]`: squares of change per pixel, added up over
+    /// The structure tensor, `[xx, xy, yy]`: products of changes per pixel, summed over
     /// the channels.
     pub tensor: Vec<[f32; 3]>,
 }
 
 impl Gradient {
-    /// The direction of most change as a unit vector (its sign means nothing). Worked out
-    /// when it is asked for, which is at few pixels; there is none beyond the picture,
-    /// where it is to the right.
+    /// Returns the direction of strongest change as a unit vector of arbitrary sign. It
+    /// is computed on demand, because few pixels need it. Outside the picture it points
+    /// to the right.
     pub fn normal(&self, pixel: usize) -> [f32; 2] {
         self.tensor.get(pixel).map_or([1.0, 0.0], |&[a, b, c]| principal(a, b, c).1)
     }
 }
 
-/// Samples of a Gaussian at `-r..=r`, sum 1, and of its derivative, exact on straight
-/// ramps; `r` is three standard deviations. Deviations outside 0.1..=100 pixels are taken
-/// to be its ends.
+/// Returns samples of a Gaussian at `-r..=r` with sum 1, and of its derivative, scaled to
+/// be exact on linear ramps; `r` is three standard deviations. The standard deviation is
+/// clamped to 0.1..=100 pixels.
 fn kernels(sigma: f32) -> (Vec<f64>, Vec<f64>) {
     let s = if sigma.is_nan() { 0.1 } else { f64::from(sigma).clamp(0.1, 100.0) };
     let r = (3.0 * s).ceil() as i32;
@@ -41,17 +41,18 @@ fn kernels(sigma: f32) -> (Vec<f64>, Vec<f64>) {
     (smooth, slope.iter().map(|v| v / ramp).collect())
 }
 
-/// The place `i` of a line of `n`, mirrored at its ends (the end pixels count twice).
+/// Returns position `i` of a line of `n`, mirrored at its ends (the end pixels count
+/// twice).
 pub(super) fn mirrored(i: i64, n: i64) -> usize {
     let m = i.rem_euclid(2 * n);
     (if m < n { m } else { 2 * n - 1 - m }) as usize
 }
 
-/// Values that a filter works on side by side.
+/// Number of values that a filter processes at a time.
 const LANES: usize = 16;
 
 /// Sums `line[i + k] * kernel[k]` over k into `out[i]`, in the order of k and in double
-/// precision. `line` has room for a kernel and for whole lanes beyond `out`.
+/// precision. `line` is padded for the kernel and for whole lanes beyond `out`.
 #[inline(always)]
 fn convolve(line: &[f64], kernel: &[f64], out: &mut [f32]) {
     for (n, out) in out.chunks_mut(LANES).enumerate() {
@@ -63,7 +64,7 @@ fn convolve(line: &[f64], kernel: &[f64], out: &mut [f32]) {
     }
 }
 
-/// Rows filtered by a kernel of odd length.
+/// Filters the rows by a kernel of odd length.
 fn along_rows(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
     let reach = kernel.len() / 2;
     let source: Vec<usize> =
@@ -88,7 +89,7 @@ fn along_rows(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
     out
 }
 
-/// Columns filtered by a kernel of odd length.
+/// Filters the columns by a kernel of odd length.
 fn along_columns(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
     let (height, reach) = (data.len() / width, (kernel.len() / 2) as i64);
     let mut out = vec![0.0f32; data.len()];
@@ -110,19 +111,20 @@ fn along_columns(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
     out
 }
 
-/// The picture's part of a channel; nothing of a picture without pixels.
+/// The pixels of a channel; empty for a picture without pixels.
 fn pixels(width: u32, height: u32, data: &[f32]) -> &[f32] {
     &data[..width as usize * height as usize]
 }
 
-/// A channel (at least `width * height` values) smoothed by a Gaussian of `sigma` pixels.
+/// Smooths a channel (at least `width * height` values) by a Gaussian of `sigma` pixels.
 pub fn smoothed(width: u32, height: u32, data: &[f32], sigma: f32) -> Vec<f32> {
     let (smooth, _) = kernels(sigma);
     let w = (width as usize).max(1);
     along_columns(w, &along_rows(w, pixels(width, height, data), &smooth), &smooth)
 }
 
-/// Derivatives along x and y of a channel smoothed by a Gaussian of `sigma` pixels.
+/// Returns the derivatives along x and y of a channel smoothed by a Gaussian of `sigma`
+/// pixels.
 pub fn derivatives(width: u32, height: u32, data: &[f32], sigma: f32) -> (Vec<f32>, Vec<f32>) {
     let (smooth, slope) = kernels(sigma);
     let (w, data) = ((width as usize).max(1), pixels(width, height, data));
@@ -130,7 +132,8 @@ pub fn derivatives(width: u32, height: u32, data: &[f32], sigma: f32) -> (Vec<f3
     (filter(&slope, &smooth), filter(&smooth, &slope))
 }
 
-/// Larger eigenvalue and its unit eigenvector of the symmetric matrix `[[a, b], [b, c]]`.
+/// Returns the larger eigenvalue of the symmetric matrix `[[a, b], [b, c]]` and its unit
+/// eigenvector.
 pub fn principal(a: f32, b: f32, c: f32) -> (f32, [f32; 2]) {
     let angle = 0.5 * libm::atan2(2.0 * f64::from(b), f64::from(a) - f64::from(c));
     (most(a, b, c), [libm::cos(angle) as f32, libm::sin(angle) as f32])
@@ -142,8 +145,8 @@ fn most(a: f32, b: f32, c: f32) -> f32 {
     (0.5 * (a + c + libm::hypot(a - c, 2.0 * b))) as f32
 }
 
-/// The gradient of a picture of several channels, smoothed by a Gaussian of `sigma`
-/// pixels.
+/// Returns the gradient of a picture of several channels, smoothed by a Gaussian of
+/// `sigma` pixels.
 pub fn colour_gradient<const N: usize>(
     width: u32,
     height: u32,
@@ -208,7 +211,7 @@ mod tests {
 
     #[test]
     fn opposite_channels_do_not_cancel() {
-        // A step of equal luminance: the mean of the channels is flat.
+        // A step of equal luminance: the mean of the channels is constant.
         let data: Vec<[f32; 2]> =
             (0..400).map(|i| if i % 20 < 10 { [0.0, 8.0] } else { [8.0, 0.0] }).collect();
         let g = colour_gradient(20, 20, &data, 1.0);

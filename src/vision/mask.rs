@@ -1,6 +1,6 @@
-//! Masks: which pixels show the object, and how likely an observed mask is given a
-//! rendered one. Not segmentation: masks come from files or from elsewhere in the
-//! program.
+//! Masks (which pixels show the object), and the likelihood of an observed mask given a
+//! rendered one. There is no segmentation here: masks come from files or from elsewhere
+//! in the program.
 
 use super::error::{VisionError, read_bytes};
 use super::photo::{Limits, decode_dynamic};
@@ -8,7 +8,7 @@ use super::{npy, resize};
 use crate::rng::Stream;
 use std::path::Path;
 
-/// A mask, true on the object. `data` has `width * height` entries, row by row.
+/// A mask, true on the object. `data` has `width * height` entries in row-major order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     width: u32,
@@ -17,7 +17,7 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// A mask of `width * height` pixels, row by row, true on the object.
+    /// Builds a mask from `width * height` pixels in row-major order, true on the object.
     pub fn new(width: u32, height: u32, data: Vec<bool>) -> Result<Self, VisionError> {
         if data.len() as u64 != u64::from(width) * u64::from(height) || data.is_empty() {
             return Err(VisionError::size(width, height, format!("{} pixels", data.len())));
@@ -35,13 +35,13 @@ impl Mask {
         self.height
     }
 
-    /// The pixels, row by row.
+    /// The pixels, in row-major order.
     pub fn data(&self) -> &[bool] {
         &self.data
     }
 
-    /// The mask at another size (at least 1 x 1): a pixel is on the object when at least
-    /// half of its area is.
+    /// Returns the mask at another size (at least 1 x 1): a pixel is on the object if at
+    /// least half of its area is.
     pub fn resized(&self, width: u32, height: u32) -> Mask {
         let (width, height) = (width.max(1), height.max(1));
         if (width, height) == (self.width, self.height) {
@@ -53,21 +53,21 @@ impl Mask {
                 *p = [f32::from(u8::from(m))];
             }
         });
-        // Just under a half: sums of areas are rounded.
+        // Slightly less than a half, because sums of areas are rounded.
         Mask { width, height, data: area.into_iter().map(|[a]| a >= 0.4999).collect() }
     }
 }
 
-/// Reads a mask from a PNG or JPEG (bright pixels are the object; where the picture has
-/// transparent pixels, opaque ones are) or a `.npy` array of two axes (bool: true;
-/// numbers: above half of the kind's range, 127 for uint8 and 0.5 for floats, or above 0
-/// for uint8 arrays with nothing above 1).
+/// Reads a mask from a PNG or JPEG (bright pixels are the object; if any pixels are
+/// transparent, opaque pixels are the object) or a `.npy` array of two axes (bool: true;
+/// numbers: above half of the type's range, 127 for uint8 and 0.5 for floats, or above 0
+/// for uint8 arrays without values above 1).
 pub fn load(path: &Path) -> Result<Mask, VisionError> {
     let limits = Limits::default();
     decode(&read_bytes(path, limits.max_bytes())?, &limits).map_err(|e| e.in_file(path))
 }
 
-/// As [`load`], from the bytes of a file.
+/// Like [`load`], from the bytes of a file.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Mask, VisionError> {
     if npy::is_npy(bytes) {
         let array = npy::parse(bytes)?;
@@ -96,9 +96,9 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Mask, VisionError> {
     Mask::new(width, height, grey.pixels().map(|p| p.0[0] >= 128).collect())
 }
 
-/// How likely an observed mask is given a rendered one: every pixel is observed wrongly
-/// on its own, with one probability on the rendered object and another beside it. A
-/// density over all masks of one size (their probabilities sum to 1).
+/// The likelihood of an observed mask given a rendered one: every pixel is observed
+/// wrongly and independently, with one probability on the rendered object and another
+/// outside it. It is normalised over all masks of one size.
 #[derive(Clone, Debug)]
 pub struct MaskLikelihood {
     observed: Mask,
@@ -107,9 +107,9 @@ pub struct MaskLikelihood {
 }
 
 impl MaskLikelihood {
-    /// The likelihood of `observed` at its own size. `eps_in`: probability that a pixel
-    /// of the rendered object is observed as background; `eps_out`: that a pixel beside
-    /// it is observed as object. Both strictly between 0 and 1.
+    /// Builds the likelihood of `observed` at its own size. `eps_in` is the probability
+    /// that a pixel of the rendered object is observed as background; `eps_out` that a
+    /// pixel outside it is observed as object. Both must be strictly between 0 and 1.
     pub fn new(observed: &Mask, eps_in: f64, eps_out: f64) -> Result<Self, VisionError> {
         for (name, value) in [("eps_in", eps_in), ("eps_out", eps_out)] {
             if !(value > 0.0 && value < 1.0) {
@@ -119,13 +119,13 @@ impl MaskLikelihood {
         Ok(MaskLikelihood { observed: observed.clone(), eps_in, eps_out })
     }
 
-    /// The same at the size that is rendered, once: a pixel is observed on the object
-    /// when at least half of its area is.
+    /// Returns the likelihood at the rendered size: a pixel is observed on the object if
+    /// at least half of its area is.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         MaskLikelihood { observed: self.observed.resized(width, height), ..*self }
     }
 
-    /// The observed mask at the size that is compared.
+    /// The observed mask at the size of comparison.
     pub fn observed(&self) -> &Mask {
         &self.observed
     }
@@ -142,7 +142,8 @@ impl MaskLikelihood {
         Ok(())
     }
 
-    /// Log probability of the observed mask given a rendered one of the same size.
+    /// Returns the log probability of the observed mask given a rendered one of the same
+    /// size.
     pub fn log_likelihood(
         &self,
         rendered: &[bool],
@@ -160,7 +161,8 @@ impl MaskLikelihood {
             + counts[0][0] as f64 * libm::log1p(-self.eps_out))
     }
 
-    /// For each pixel, how much the log probability grows if the object covers it.
+    /// Returns for each pixel the increase of the log probability if the object covers
+    /// it.
     pub fn gains(&self) -> Vec<f64> {
         let (seen, unseen) = (
             libm::log1p(-self.eps_in) - libm::log(self.eps_out),
@@ -169,8 +171,8 @@ impl MaskLikelihood {
         self.observed.data.iter().map(|o| if *o { seen } else { unseen }).collect()
     }
 
-    /// Log probability of the observed mask given the part of every pixel that the
-    /// rendered object covers (0..=1): a pixel half covered is a toss between the two
+    /// Returns the log probability of the observed mask given the fraction of every pixel
+    /// that the rendered object covers (0..=1); a partly covered pixel mixes the two
     /// cases. Values of 0 and 1 give [`MaskLikelihood::log_likelihood`].
     pub fn log_likelihood_coverage(
         &self,
@@ -198,7 +200,7 @@ impl MaskLikelihood {
         Ok(sum)
     }
 
-    /// A mask drawn given a rendered one of the same size.
+    /// Samples a mask given a rendered one of the same size.
     pub fn simulate(&self, rendered: &[bool], rng: &mut Stream) -> Result<Mask, VisionError> {
         self.check(rendered.len(), self.observed.width, self.observed.height)?;
         let data = rendered

@@ -1,10 +1,10 @@
-//! From pictures to evidence: reading photographs, masks and depth maps; contours; and
-//! how well what was rendered explains them. Nothing here knows of scenes or of
-//! rendering: what is compared with a picture arrives as arrays of its size.
+//! From pictures to evidence: reading photographs, masks and depth maps, detecting
+//! contours, and scoring how well rendered data explain them. This module does not depend
+//! on scenes or rendering: rendered data arrive as arrays of the picture's size.
 //!
-//! Everywhere in this module a pixel `(i, j)` (column, row; row 0 on top) covers
-//! `[i, i+1] x [j, j+1]`, so its centre is at `(i + 0.5, j + 0.5)`, and arrays run row by
-//! row.
+//! Everywhere in this module, pixel `(i, j)` (column, row; row 0 at the top) covers
+//! `[i, i+1] x [j, j+1]`, so its centre is `(i + 0.5, j + 0.5)`. Arrays are in row-major
+//! order.
 
 pub mod candidates;
 pub mod chamfer;

@@ -1,7 +1,7 @@
-//! Which observed edge is nearest to every sample of a grid, and how far it is: the
-//! distance transform's nearest edges of a sample and its eight neighbours are measured
-//! exactly, several samples at a time. Invariant: the result is that of measuring them
-//! one by one; of edges as near the first counts.
+//! The observed edge nearest to every sample of a grid, and its distance. Candidates are
+//! the distance transform's nearest edges of a sample and of its eight neighbours; their
+//! exact distances are computed several samples at a time. Invariant: the result is that
+//! of measuring them one by one; among equally near edges the first one counts.
 
 use super::distance_transform::{Columns, Envelope, FARTHEST};
 use super::field::{Edge, Edges};
@@ -12,12 +12,12 @@ use crate::num::simd::vectorised;
 pub(super) struct Nearest {
     /// Distance in percent of the diagonal, at most 100.
     pub distance: Vec<f32>,
-    /// Index into [`Edges::edges`]; `u32::MAX` where none was found within reach.
+    /// Index into [`Edges::edges`]; `u32::MAX` if no edge was found within reach.
     pub edge: Vec<u32>,
 }
 
-/// The edges that the distance transform finds along a row of samples, one list for each
-/// property, with room on both sides where there is none.
+/// The edges that the distance transform finds along a row of samples, one list per
+/// property, padded by a missing edge on both sides.
 struct Row {
     x: Vec<f32>,
     y: Vec<f32>,
@@ -28,7 +28,7 @@ struct Row {
 }
 
 impl Row {
-    /// A row of edges too far away to be any sample's.
+    /// A row of missing edges, which are too far away to be the nearest of any sample.
     fn nothing(width: usize) -> Self {
         let list = |v: f32| vec![v; width + 2];
         let (x, y, tx, ty, half) =
@@ -43,23 +43,23 @@ impl Row {
     }
 }
 
-/// No edge's place.
+/// The position of a missing edge.
 const FAR: Edge = Edge { x: f32::MAX, y: f32::MAX, tx: 0.0, ty: 0.0, half: 0.0, turn: 0.0 };
 
 impl Edges {
-    /// For each grid pixel the nearest of the chosen edges and the distance in percent of
-    /// the diagonal; `None` where there are no such edges. The candidates are the
+    /// Returns for each grid pixel the nearest of the chosen edges and its distance in
+    /// percent of the diagonal; `None` if no edges are chosen. The candidates are the
     /// transform's nearest edges of the pixel and its eight neighbours.
     pub fn nearest(&self, chosen: impl Fn(&Edge) -> bool) -> Option<Nearest> {
         self.search(None, chosen)
     }
 
-    /// As [`Edges::nearest`], but where the distance would be `percent` of the diagonal
-    /// or more, it may be any such number, and the edge none.
+    /// Like [`Edges::nearest`], but where the distance would be at least `percent` of the
+    /// diagonal, it may be any number from there on, and the edge may be missing.
     pub fn nearest_within(&self, percent: f64, chosen: impl Fn(&Edge) -> bool) -> Option<Nearest> {
-        // A sample, its neighbour, that neighbour's pixel, and a piece that lies in it
-        // with its middle: what is nearer than asked for at a sample is that much farther
-        // from the pixel that has to find it.
+        // The transform measures between pixel centres, and from a sample's neighbours
+        // too: half an edge's length and a few pixels bound the difference to the
+        // distance from the sample to the edge.
         let half = self.edges.iter().map(|e| e.half).fold(0.0, f32::max);
         let reach = (percent / f64::from(self.percent) + f64::from(half)).ceil() + 4.0;
         self.search((reach <= FARTHEST as f64).then_some(reach as usize), chosen)
@@ -114,13 +114,13 @@ impl Edges {
     }
 }
 
-/// A list from its first three places on.
+/// A list from each of its first three positions on.
 #[inline(always)]
 fn three<T>(list: &[T], length: usize) -> [&[T]; 3] {
     [&list[..length], &list[1..][..length], &list[2..][..length]]
 }
 
-/// The nearest of the edges found at the samples of a row and next to them.
+/// Finds the nearest of the edges found at the samples of a row and at their neighbours.
 #[inline(always)]
 fn closest(rows: &[Row; 3], y: f32, percent: f32, distance: &mut [f32], edge: &mut [u32]) {
     let w = distance.len();
@@ -144,7 +144,7 @@ fn closest(rows: &[Row; 3], y: f32, percent: f32, distance: &mut [f32], edge: &m
             for (ex, ey, tx, ty, half, id) in candidates {
                 let d = Edge { x: ex, y: ey, tx, ty, half, turn: 0.0 }
                     .distance(i as u32 as f32 + 0.5, y);
-                // No branches, so that several are worked out at a time.
+                // Without branches, so that it vectorises.
                 let nearer = (d < least) | ((d == least) & (id < nearest));
                 least = if nearer { d } else { least };
                 nearest = if nearer { id } else { nearest };
@@ -163,7 +163,7 @@ mod tests {
     use crate::vision::testing::clutter;
 
     /// The nearest of the nine edges that the transform finds at a sample and next to it,
-    /// one by one.
+    /// measured one by one.
     fn plain(edges: &Edges, chosen: &dyn Fn(&Edge) -> bool) -> Vec<(f32, u32)> {
         let (w, h) = (edges.width as usize, edges.height as usize);
         let mut first = vec![u32::MAX; w * h];

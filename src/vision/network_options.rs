@@ -1,35 +1,35 @@
-//! What a network has to be told besides its file: how it likes its picture, which of its
-//! outputs is the map, and what that shows.
+//! The settings of a network that its file does not contain: its input normalisation,
+//! which output is the map, and what the map shows.
 
 use super::soft_map::Shows;
 
 /// Which output of a network is the map.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Output {
-    /// The last one: networks that give several put what they fused there.
+    /// The last one, where networks with several outputs usually put the fused one.
     #[default]
     Last,
-    /// The one of a number, from 1.
+    /// The output with this number, from 1.
     Number(usize),
-    /// The one of a name.
+    /// The output with this name.
     Named(String),
 }
 
-/// How a network takes a picture and gives a map. The picture's values go from 0 to
-/// `white`; what the network gets is that less `mean`, by `spread`.
+/// Input and output conventions of a network. Its input is the picture's values, from 0
+/// to `white`, minus `mean`, divided by `spread`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetworkOptions {
-    /// Blue before green before red.
+    /// The order of channels is blue, green, red.
     pub bgr: bool,
     /// The value of white.
     pub white: f32,
-    /// What is taken from each channel, in the network's order.
+    /// The value subtracted from each channel, in the network's order.
     pub mean: [f32; 3],
-    /// By what each channel is divided then.
+    /// The value that each channel is then divided by.
     pub spread: [f32; 3],
     /// Which output is the map.
     pub output: Output,
-    /// The map is of log odds, not of probabilities.
+    /// The map holds log odds, not probabilities.
     pub logits: bool,
     /// What the map shows.
     pub shows: Shows,
@@ -50,7 +50,7 @@ impl Default for NetworkOptions {
 }
 
 impl NetworkOptions {
-    /// Why they make no sense, if they do not.
+    /// Returns why the options are invalid, if they are.
     pub(super) fn wrong(&self) -> Option<&'static str> {
         let all = || self.mean.iter().chain(&self.spread);
         let white = self.white > 0.0 && self.white <= 65535.0;

@@ -1,13 +1,13 @@
-//! Thin contours out of a gradient: suppression of what is not a maximum along the
-//! gradient's direction, with places finer than a pixel, and hysteresis (Canny 1986, "A
-//! computational approach to edge detection", PAMI 8, 679-698).
+//! Thin contours from a gradient: non-maximum suppression along the gradient's direction,
+//! sub-pixel positions, and hysteresis (Canny 1986, "A computational approach to edge
+//! detection", PAMI 8, 679-698).
 
 use super::gradient::Gradient;
 
 /// A maximum of the gradient along its direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgePoint {
-    /// The pixel it was found in (row * width + column).
+    /// Its pixel (row * width + column).
     pub pixel: usize,
     /// Column, pixels (pixel centres at +0.5).
     pub x: f32,
@@ -19,8 +19,8 @@ pub struct EdgePoint {
     pub magnitude: f32,
 }
 
-/// Bilinear value at a place counted from the first pixel's centre, clamped to the
-/// picture.
+/// Returns the bilinear interpolation at a position relative to the first pixel's centre,
+/// clamped to the picture.
 fn bilinear(width: usize, height: usize, data: &[f32], x: f32, y: f32) -> f32 {
     let (x, y) = (x.clamp(0.0, (width - 1) as f32), y.clamp(0.0, (height - 1) as f32));
     let (i, j) = (x as usize, y as usize);
@@ -31,11 +31,11 @@ fn bilinear(width: usize, height: usize, data: &[f32], x: f32, y: f32) -> f32 {
     top * (1.0 - fy) + bottom * fy
 }
 
-/// Offset of a ridge of `data` from the centre of a pixel along a unit normal, pixels,
-/// within 0.7: the peak of the quadratic through the pixel with the first and second
-/// central differences there (Steger 1998, "An unbiased detector of curvilinear
-/// structures", PAMI 20, 113-125). Beyond the border values repeat. 0 where the quadratic
-/// has no peak.
+/// Returns the offset of a ridge of `data` from the centre of a pixel along a unit
+/// normal, pixels, within 0.7: the peak of the quadratic through the pixel with the first
+/// and second central differences there (Steger 1998, "An unbiased detector of
+/// curvilinear structures", PAMI 20, 113-125). Values at the border are repeated beyond
+/// it. Returns 0 if the quadratic has no peak.
 pub fn ridge_offset(width: u32, height: u32, data: &[f32], pixel: usize, normal: [f32; 2]) -> f32 {
     let (w, h) = (width as usize, height as usize);
     let (x, y) = (pixel % w, pixel / w);
@@ -53,8 +53,8 @@ pub fn ridge_offset(width: u32, height: u32, data: &[f32], pixel: usize, normal:
     if bend < 0.0 { (-slope / bend).clamp(-0.7, 0.7) } else { 0.0 }
 }
 
-/// The direction of most change of a structure tensor but for its sign, right to a
-/// millionth and without angles.
+/// Returns the direction of strongest change of a structure tensor, up to sign, accurate
+/// to a millionth and without trigonometry.
 fn roughly([a, b, c]: [f32; 3]) -> [f32; 2] {
     let (half, b) = (0.5 * (f64::from(a) - f64::from(c)), f64::from(b));
     let root = (half * half + b * b).sqrt();
@@ -63,13 +63,13 @@ fn roughly([a, b, c]: [f32; 3]) -> [f32; 2] {
     [(x / length) as f32, (y / length) as f32]
 }
 
-/// All maxima with a magnitude above `floor`, in raster order.
+/// Returns all maxima with a magnitude above `floor`, in raster order.
 pub fn suppress(gradient: &Gradient, floor: f32) -> Vec<EdgePoint> {
     let (w, h) = (gradient.width as usize, gradient.height as usize);
     let strength = &gradient.magnitude;
-    // A pixel that is below its neighbours in about the right direction, by more than the
-    // direction and the rounding of places can be wrong, is no maximum: most need no
-    // angle.
+    // A pixel that is below a neighbour in the approximate direction, by more than errors
+    // of the direction and of positions can explain, is not a maximum. This spares most
+    // pixels the exact angle.
     let most = strength.iter().copied().fold(0.0, f32::max);
     let slack = most * (1e-5 + 5e-7 * w.max(h) as f32);
     let mut out = Vec::new();
@@ -84,7 +84,8 @@ pub fn suppress(gradient: &Gradient, floor: f32) -> Vec<EdgePoint> {
             continue;
         }
         let normal = gradient.normal(pixel);
-        // One of the two may be equal: a maximum between two pixels is found once.
+        // One of the comparisons allows equality, so that a maximum between two pixels is
+        // found once.
         if m > at(-1.0, normal) && m >= at(1.0, normal) {
             let t = ridge_offset(gradient.width, gradient.height, strength, pixel, normal);
             let (px, py) = (x + 0.5 + t * normal[0], y + 0.5 + t * normal[1]);
@@ -95,8 +96,8 @@ pub fn suppress(gradient: &Gradient, floor: f32) -> Vec<EdgePoint> {
     out
 }
 
-/// The points of at least `low` that hang together (8 neighbours) with one of at least
-/// `high`, in the given order.
+/// Returns the points of at least `low` that are 8-connected to one of at least `high`,
+/// in the given order.
 pub fn hysteresis(
     width: u32,
     height: u32,
@@ -131,8 +132,8 @@ mod tests {
     use super::*;
     use crate::vision::gradient::colour_gradient;
 
-    /// A picture bright beyond the line `x cos a + y sin a = d`, with exact areas to
-    /// 1/16.
+    /// A picture that is bright beyond the line `x cos a + y sin a = d`, with pixel
+    /// coverage computed from 16 x 16 samples.
     fn half_plane(n: usize, angle: f32, d: f32) -> Vec<[f32; 1]> {
         let (c, s) = (libm::cosf(angle), libm::sinf(angle));
         (0..n * n)
@@ -195,7 +196,7 @@ mod tests {
     fn hysteresis_follows_weak_points_from_strong_ones() {
         let point =
             |pixel, magnitude| EdgePoint { pixel, x: 0.0, y: 0.0, normal: [1.0, 0.0], magnitude };
-        // A row of ten: strong, weak, weak, none, weak, too weak, strong.
+        // A row of ten: strong, weak, weak, missing, weak, too weak, strong.
         let row = [
             point(0, 9.0),
             point(1, 3.0),

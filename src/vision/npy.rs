@@ -1,6 +1,6 @@
 //! Reading numpy's `.npy` arrays (numpy.lib.format, versions 1.0 to 3.0): little-endian
-//! float32 and float64, uint8 and bool, in C order. Not `.npz`, not other kinds of
-//! numbers, not Fortran order: those are errors that say what to do.
+//! float32 and float64, uint8 and bool, in C order. `.npz` archives, other types and
+//! Fortran order are rejected with a message that says what to do.
 
 use super::error::{VisionError, read_bytes};
 use std::path::Path;
@@ -18,7 +18,7 @@ pub enum NpyData {
     Bool(Vec<bool>),
 }
 
-/// An array in C order: the last index runs fastest. It has as many numbers as the
+/// An array in C order: the last index varies fastest. The number of elements is the
 /// product of `shape`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NpyArray {
@@ -29,7 +29,8 @@ pub struct NpyArray {
 }
 
 impl NpyArray {
-    /// The numbers as float32 (rounded to nearest from float64; false is 0, true is 1).
+    /// Converts the numbers to float32 (float64 is rounded to nearest; false is 0, true
+    /// is 1).
     pub fn into_f32(self) -> Vec<f32> {
         match self.data {
             NpyData::F32(v) => v,
@@ -39,7 +40,7 @@ impl NpyArray {
         }
     }
 
-    /// Width and height of an array of rows (also of shape height x width x 1).
+    /// Returns width and height of an array of rows (also of shape height x width x 1).
     pub fn picture_size(&self) -> Result<(u32, u32), VisionError> {
         match self.shape[..] {
             [h, w] | [h, w, 1] if h > 0 && w > 0 => u32::try_from(w)
@@ -63,7 +64,7 @@ pub fn load(path: &Path, max_bytes: u64) -> Result<NpyArray, VisionError> {
     parse(&read_bytes(path, max_bytes)?).map_err(|e| e.in_file(path))
 }
 
-/// Whether bytes begin as a `.npy` file does.
+/// Whether bytes begin with the magic number of a `.npy` file.
 pub fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x93NUMPY")
 }
@@ -128,7 +129,7 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
     Ok(NpyArray { shape, data })
 }
 
-/// What follows `'name':` in the header, without leading blanks.
+/// Returns the text after `'name':` in the header, without leading blanks.
 fn field<'a>(header: &'a str, name: &str) -> Result<&'a str, VisionError> {
     ['\'', '"']
         .iter()

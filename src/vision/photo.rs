@@ -1,7 +1,7 @@
 //! Photographs: reading PNG and JPEG files (8 or 16 bit, grey, palette, colour, alpha)
-//! and shrinking them in linear light. Not a general picture reader. A [`Photo`] stands
-//! upright (Exif orientation applied), is opaque (alpha laid over white, on the sRGB
-//! values as viewers do) and has at least one pixel.
+//! and shrinking them in linear light. This is not a general picture reader. A [`Photo`]
+//! is upright (Exif orientation applied), is opaque (alpha composited over white in sRGB
+//! values, as viewers do) and has at least one pixel.
 
 use super::color::{linear_table, linear_to_srgb};
 use super::error::{VisionError, read_bytes};
@@ -10,13 +10,13 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Rg
 use std::io::Cursor;
 use std::path::Path;
 
-/// How large a picture may be. The size in the header is checked before pixels get
-/// memory.
+/// Limits on the size of a picture. The size in the header is checked before memory is
+/// allocated for pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// The longest side, pixels.
+    /// The maximum longer side, pixels.
     pub max_side: u32,
-    /// The most pixels in all.
+    /// The maximum total number of pixels.
     pub max_pixels: u64,
 }
 
@@ -27,7 +27,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// An error for a picture that is too large, or has no pixels.
+    /// Returns an error for a picture that is too large or has no pixels.
     pub fn check(&self, width: u32, height: u32) -> Result<(), VisionError> {
         if width == 0 || height == 0 {
             return Err(VisionError::Damaged("it has no pixels".into()));
@@ -41,8 +41,8 @@ impl Limits {
         Ok(())
     }
 
-    /// The most bytes a file is read from: 16 a pixel, more than any kind that is read
-    /// here takes uncompressed.
+    /// The maximum number of bytes of a file: 16 per pixel, more than any supported
+    /// format needs uncompressed.
     pub(crate) fn max_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(16).saturating_add(1 << 20)
     }
@@ -55,19 +55,19 @@ pub struct Photo {
     focal_35mm: Option<f64>,
 }
 
-/// A picture in linear light (sRGB primaries, 0..=1), row by row.
+/// A picture in linear light (sRGB primaries, 0..=1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
     /// Width, pixels.
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Pixels, row by row.
+    /// Pixels, in row-major order.
     pub rgb: Vec<[f32; 3]>,
 }
 
 impl Photo {
-    /// A photo of sRGB pixels; an error when there are none.
+    /// Wraps sRGB pixels; an error if there are none.
     pub fn from_rgb(rgb: RgbImage) -> Result<Self, VisionError> {
         Limits { max_side: u32::MAX, max_pixels: u64::MAX }.check(rgb.width(), rgb.height())?;
         Ok(Photo { rgb, focal_35mm: None })
@@ -88,13 +88,13 @@ impl Photo {
         &self.rgb
     }
 
-    /// The focal length the camera wrote down, mm as on 35 mm film (a frame of 36 mm x 24
-    /// mm).
+    /// The 35 mm equivalent focal length recorded by the camera, mm (for a frame of 36 mm
+    /// x 24 mm).
     pub fn focal_35mm(&self) -> Option<f64> {
         self.focal_35mm
     }
 
-    /// The picture in linear light at `width` x `height` pixels, area-averaged.
+    /// Returns the picture in linear light at `width` x `height` pixels, area-averaged.
     pub fn linear(&self, width: u32, height: u32) -> LinearImage {
         let table = linear_table();
         let stride = 3 * self.rgb.width() as usize;
@@ -108,8 +108,8 @@ impl Photo {
         LinearImage { width, height, rgb }
     }
 
-    /// The sRGB values, 0..=1, at `width` x `height` pixels: area-averaged in linear
-    /// light, or in between if that is larger.
+    /// Returns the sRGB values, 0..=1, at `width` x `height` pixels: area-averaged in
+    /// linear light, or interpolated if either side is enlarged.
     pub fn srgb(&self, width: u32, height: u32) -> Vec<[f32; 3]> {
         let values =
             |rgb: &RgbImage| rgb.pixels().map(|p| p.0.map(|b| f32::from(b) / 255.0)).collect();
@@ -131,8 +131,8 @@ impl Photo {
             .collect()
     }
 
-    /// The photo shrunk, in linear light, to a longer side of at most `longer` pixels;
-    /// unchanged where it is smaller.
+    /// Returns the photo shrunk, in linear light, to a longer side of at most `longer`
+    /// pixels; unchanged if it is smaller.
     pub fn shrunk(&self, longer: u32) -> Photo {
         let (width, height) = resize::fitted(self.width(), self.height(), longer);
         if (width, height) == self.rgb.dimensions() {
@@ -158,7 +158,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Photo, VisionError> {
     Ok(Photo { rgb: over_white(picture), focal_35mm })
 }
 
-/// The decoded picture, upright, in the file's own kind of pixels, and the camera's focal
+/// Decodes a picture, upright, in the file's own pixel format, and the camera's focal
 /// length.
 pub(crate) fn decode_dynamic(
     bytes: &[u8],
@@ -168,8 +168,8 @@ pub(crate) fn decode_dynamic(
     if !cfg!(feature = "codecs") {
         return Err(VisionError::NoCodecs);
     }
-    // A PNG begins with its size; a decoder may stumble over an absurd one before it
-    // tells.
+    // A PNG begins with its size; check it first, because the decoder may fail on an
+    // absurd one before it reports the size.
     if let (ImageFormat::Png, Some(&[w0, w1, w2, w3, h0, h1, h2, h3])) = (format, bytes.get(16..24))
     {
         limits.check(u32::from_be_bytes([w0, w1, w2, w3]), u32::from_be_bytes([h0, h1, h2, h3]))?;
@@ -184,7 +184,7 @@ pub(crate) fn decode_dynamic(
     if format == ImageFormat::Jpeg && !jpeg_ends(bytes) {
         return Err(VisionError::Truncated);
     }
-    // Damaged metadata are the same as none.
+    // Damaged metadata count as missing.
     let orientation = decoder.orientation().unwrap_or(image::metadata::Orientation::NoTransforms);
     let focal = decoder.exif_metadata().ok().flatten().and_then(|chunk| exif::focal_35mm(&chunk));
     let mut picture = DynamicImage::from_decoder(decoder).map_err(cause)?;
@@ -215,9 +215,8 @@ fn format_of(bytes: &[u8]) -> Result<ImageFormat, VisionError> {
     }
 }
 
-/// Whether a JPEG file has its end marker after the start of its own first scan
-/// (thumbnails in the metadata have theirs before). The decoder fills what is missing
-/// with grey, without a word.
+/// Whether a JPEG file has an end marker after the start of its first scan (thumbnails in
+/// the metadata have theirs before). The decoder silently fills missing data with grey.
 fn jpeg_ends(bytes: &[u8]) -> bool {
     let mut at = 2;
     loop {

@@ -1,4 +1,4 @@
-//! Pictures good and bad, made in memory and in a folder for temporary files.
+//! Tests with good and bad pictures, in memory and in a temporary folder.
 
 use super::*;
 use image::{GrayAlphaImage, GrayImage, ImageBuffer, Luma, LumaA, Rgb, Rgba, RgbaImage};
@@ -52,7 +52,7 @@ fn every_kind_of_pixel() {
     let deep = ImageBuffer::<Luma<u16>, _>::from_raw(3, 1, vec![0u16, 257 * 100, 65535]).unwrap();
     let photo = read(&encoded(deep, ImageFormat::Png)).unwrap();
     assert_eq!(photo.rgb().as_raw()[..], [0, 0, 0, 100, 100, 100, 255, 255, 255]);
-    // Alpha lies over white.
+    // Alpha is composited over white.
     let alpha =
         RgbaImage::from_raw(3, 1, vec![10, 20, 30, 255, 10, 20, 30, 0, 0, 0, 0, 128]).unwrap();
     let photo = read(&encoded(alpha, ImageFormat::Png)).unwrap();
@@ -81,7 +81,7 @@ fn every_kind_of_pixel() {
 
 #[test]
 fn palettes() {
-    // Two pixels of one bit: red, then green that is half transparent.
+    // Two 1-bit pixels: red, then partly transparent green.
     let ihdr = [&2u32.to_be_bytes()[..], &1u32.to_be_bytes(), &[1, 3, 0, 0, 0]].concat();
     // zlib, one stored block: filter 0, bits 01.
     let idat = [0x78, 0x01, 0x01, 2, 0, 0xfd, 0xff, 0, 0b0100_0000, 0, 0x42, 0, 0x41];
@@ -113,7 +113,7 @@ fn orientation_and_focal_length() {
     assert!(red(&photo, 3, 8) && !red(&photo, 28, 8));
     let photo = read(&with(3)).unwrap();
     assert!(!red(&photo, 3, 8) && red(&photo, 28, 8));
-    // 6: turned clockwise by a quarter, so the left side comes on top.
+    // 6: rotated clockwise by a quarter turn, so the left side is at the top.
     let photo = read(&with(6)).unwrap();
     assert_eq!((photo.width(), photo.height()), (16, 32));
     assert!(red(&photo, 8, 3) && !red(&photo, 8, 28));
@@ -198,7 +198,7 @@ fn files() {
 
 #[test]
 fn shrinking_is_in_linear_light() {
-    // Black and white stripes of a pixel: half the light is sRGB 188, not 128.
+    // Black and white stripes one pixel wide: half the light is sRGB 188, not 128.
     let stripes =
         Photo::from_rgb(RgbImage::from_fn(64, 32, |i, _| Rgb([(i % 2 * 255) as u8; 3]))).unwrap();
     let small = stripes.shrunk(32);

@@ -1,14 +1,14 @@
 //! Area-averaged resizing: every target pixel is the mean of the source over the
-//! rectangle it covers, so the mean of the whole is kept. Not for enlarging beautifully:
+//! rectangle it covers, so the overall mean is preserved. It is not meant for enlarging:
 //! enlarged pixels become blocks.
 
-/// Pixels `first..` of the source that a target pixel covers on one axis, with weights
+/// The source pixels `first..` that each target pixel covers along one axis, with weights
 /// that sum to 1.
 fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
     let ratio = f64::from(from) / f64::from(to);
     (0..to)
         .map(|i| {
-            // Ends in exact integer arithmetic where they fall on pixel borders.
+            // Span ends are exact where they fall on pixel borders.
             let end = |k: u32| (u64::from(k) * u64::from(from)) as f64 / f64::from(to);
             let (a, b) = (end(i), end(i + 1));
             let first = a.floor() as usize;
@@ -21,7 +21,7 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
         .collect()
 }
 
-/// Area-averaged resizing of a picture whose rows are made on demand: `row(j, buffer)`
+/// Resizes a picture by area averaging, reading its rows on demand: `row(j, buffer)`
 /// fills row `j` (of `width` pixels). A side of 0 gives an empty picture.
 pub fn resize_rows<const N: usize>(
     (width, height): (u32, u32),
@@ -62,8 +62,8 @@ pub fn resize_rows<const N: usize>(
     out
 }
 
-/// The size with the longer side at most `longer` (at least 1) and the same shape; never
-/// larger than the original.
+/// Returns the size with the same aspect ratio whose longer side is at most `longer` (at
+/// least 1); never larger than the original.
 pub fn fitted(width: u32, height: u32, longer: u32) -> (u32, u32) {
     let (side, longer) = (width.max(height), longer.max(1));
     if side <= longer {

@@ -1,5 +1,6 @@
-//! Maps that detectors make of a picture, one number a pixel, and the contours in them:
-//! along ridges of a map of contours, around what stands out in a map of objects.
+//! Maps that detectors compute from a picture, one number per pixel, and the contours in
+//! them: along the ridges of a map of contours, or around the regions in a map of
+//! objects.
 
 use super::contour_map::ContourMap;
 use super::gradient::{Gradient, colour_gradient, smoothed};
@@ -8,14 +9,14 @@ use super::nms::{EdgePoint, suppress};
 /// What a map shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shows {
-    /// How likely a pixel is to be on a contour.
+    /// The probability that a pixel is on a contour.
     #[default]
     Contours,
-    /// How likely a pixel is to belong to an object.
+    /// The probability that a pixel belongs to an object.
     Objects,
 }
 
-/// A number for each pixel, row by row: about 0 to 1, finite.
+/// A number for each pixel, in row-major order: about 0 to 1, finite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SoftMap {
     /// Width, pixels.
@@ -24,24 +25,24 @@ pub struct SoftMap {
     pub height: u32,
     /// The numbers.
     pub values: Vec<f32>,
-    /// What they mean.
+    /// Their meaning.
     pub shows: Shows,
 }
 
-/// Less than this, of 1, is no contour.
+/// Values below this are not contours; the scale is 1.
 const FLOOR: f32 = 0.01;
 
 impl SoftMap {
-    /// The contours in it, after smoothing by a Gaussian of `sigma` pixels. The strength
-    /// of a point is the map's value there, or of an object's contour how high the step
-    /// is, if it is sharp.
+    /// Returns the contours of the map after smoothing by a Gaussian of `sigma` pixels.
+    /// The strength of a point is the map's value there or, for the contour of an object,
+    /// the height of the step, if it is sharp.
     pub fn contours(&self, sigma: f32) -> ContourMap {
         let (width, height) = (self.width, self.height);
         match self.shows {
             Shows::Contours => {
                 let ridges = ridges(width, height, &self.values, sigma);
-                // Beside a ridge the map bends the other way, and more; a maximum along
-                // it is none across it.
+                // Beside a ridge the map has stronger, positive curvature, and a maximum
+                // along the ridge is not one across it.
                 let bends =
                     |p: &EdgePoint| ridges.tensor[p.pixel][0] + ridges.tensor[p.pixel][2] > 0.0;
                 let points = suppress(&ridges, FLOOR).into_iter().filter(bends);
@@ -52,7 +53,7 @@ impl SoftMap {
             Shows::Objects => {
                 let pixels: Vec<[f32; 1]> =
                     self.values.iter().map(|v| [v.clamp(0.0, 1.0)]).collect();
-                // The steepest slope of a step of 1 once it is smoothed.
+                // The steepest slope of a smoothed step of height 1.
                 let step = 1.0 / (f64::from(sigma) * (2.0 * std::f64::consts::PI).sqrt()) as f32;
                 let points =
                     suppress(&colour_gradient(width, height, &pixels, sigma), FLOOR * step);
@@ -61,8 +62,8 @@ impl SoftMap {
         }
     }
 
-    /// The largest value within a pixel: smoothing moves ridges a little and flattens
-    /// them.
+    /// Returns the largest value within a pixel's distance: smoothing moves ridges a
+    /// little and flattens them.
     fn around(&self, pixel: usize) -> f32 {
         let (w, h) = (self.width as usize, self.height as usize);
         let (x, y) = (pixel % w, pixel / w);
@@ -72,12 +73,13 @@ impl SoftMap {
     }
 }
 
-/// The smoothed map as if it were a gradient: its values for magnitudes, and for a tensor
-/// how it bends, so that the direction of most change is the one across a ridge.
+/// Presents the smoothed map as a gradient: its values are the magnitudes, and the
+/// negative second derivatives are the tensor, so that the direction of strongest change
+/// is the one across a ridge.
 fn ridges(width: u32, height: u32, values: &[f32], sigma: f32) -> Gradient {
     let (w, h) = (width as usize, height as usize);
     let magnitude = smoothed(width, height, values, sigma);
-    // Directions from further around: they turn slowly, noise does not.
+    // Directions come from a larger neighbourhood: they vary slowly, unlike noise.
     let soft = smoothed(width, height, &magnitude, sigma);
     let mut tensor = Vec::with_capacity(w * h);
     for j in 0..h {

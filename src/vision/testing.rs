@@ -1,6 +1,6 @@
 //! Scenes for the comparators' tests: circles and random strokes, as rendered pieces and
-//! as observed maps. Positions are given as fractions of the frame, so the same scene
-//! exists at every resolution.
+//! as observed maps. Positions are fractions of the frame, so that the same scene exists
+//! at every resolution.
 
 use super::contour_map::ContourMap;
 use super::elements::Elements;
@@ -30,7 +30,7 @@ impl Pieces {
         self.length.push(length);
     }
 
-    /// A circle of pieces about a pixel long; the middle and radius as fractions of the
+    /// A circle of pieces about a pixel long; the centre and radius are fractions of the
     /// width.
     pub fn circle(mut self, cx: f32, cy: f32, r: f32) -> Self {
         let w = self.width as f32;
@@ -56,7 +56,7 @@ impl Pieces {
         }
     }
 
-    /// As an observed map of the same size.
+    /// Returns an observed map of the same size.
     pub fn map(&self) -> ContourMap {
         ContourMap {
             width: self.width,
@@ -69,7 +69,7 @@ impl Pieces {
         }
     }
 
-    /// In the opposite order.
+    /// Returns the pieces in the opposite order.
     pub fn reversed(&self) -> Self {
         let mut r = self.clone();
         for list in [&mut r.x, &mut r.y, &mut r.tx, &mut r.ty, &mut r.length] {
@@ -78,7 +78,8 @@ impl Pieces {
         r
     }
 
-    /// With the x, y, length or angle (0 to 3) of one piece changed by so much.
+    /// Returns a copy with the x, y, length or angle (`k` = 0 to 3) of piece `i` changed
+    /// by `by`.
     pub fn nudged(&self, i: usize, k: usize, by: f32) -> Self {
         let mut r = self.clone();
         match k {
@@ -94,8 +95,9 @@ impl Pieces {
         r
     }
 
-    /// Counts the derivatives by x, y, length and angle that differ from central
-    /// differences of a score, which may do so where a difference straddles a bend.
+    /// Counts the derivatives with respect to x, y, length and angle that differ from
+    /// central differences of a score. Some may differ where a difference straddles a
+    /// kink.
     pub fn differing(&self, found: &[[f64; 4]], score: impl Fn(&Elements<'_>) -> f64) -> usize {
         let h = 1.0f32 / 128.0;
         let differs = |i: usize, k: usize| {
@@ -109,7 +111,7 @@ impl Pieces {
             .count()
     }
 
-    /// Moved by some pixels.
+    /// Returns a copy moved by some pixels.
     pub fn moved(&self, dx: f32, dy: f32) -> Self {
         let mut r = self.clone();
         r.x.iter_mut().for_each(|x| *x += dx);
@@ -118,7 +120,7 @@ impl Pieces {
     }
 }
 
-/// Numbers in 0..1 from a seed.
+/// Returns a generator of numbers in 0..1.
 pub(super) fn numbers(mut seed: u64) -> impl FnMut() -> f32 {
     move || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -144,8 +146,8 @@ pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
     pieces
 }
 
-/// Pieces that come and go, some of each step, each time with all that are there; the
-/// steps are told by what they were and are.
+/// Calls `each` with steps in which some of the pieces appear, disappear or move, and
+/// with all pieces that are there after the step.
 pub(super) fn comings_and_goings(
     all: &Pieces,
     mut each: impl FnMut(&super::elements::ContourDelta<'_>, &Pieces),
@@ -157,7 +159,7 @@ pub(super) fn comings_and_goings(
         }
         some
     };
-    // Now a few, now most of them.
+    // A few of them or most of them, in turn.
     let there = |step: usize, i: usize| {
         (i * 7919 + step * [1, 31, 977][step % 3]) % 100 > [20, 25, 90][step % 3]
     };

@@ -1,18 +1,18 @@
-//! Thinning a map of strengths to lines one pixel wide without tearing them: pixels are
-//! removed from the weakest to the strongest, and from the rim inwards among equals, as
-//! long as the lines around stay connected (ordered homotopic thinning, Pudney 1998,
+//! Thins a map of strengths to connected lines one pixel wide. Pixels are removed from
+//! the weakest to the strongest, and among equals from the rim inwards, as long as the
+//! lines around them stay connected (ordered homotopic thinning, Pudney 1998,
 //! "Distance-ordered homotopic thinning", CVIU 72, 404-413).
 
 use super::distance_transform::distance_transform;
 
-/// The eight neighbours in circular order, from the north.
+/// The eight neighbours in circular order, starting in the north.
 const RING: [(i64, i64); 8] =
     [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
 
-/// Which pixels of a map (0: nothing) are left; `width * height` values.
+/// Returns which pixels of a map of `width * height` strengths (0: empty) are kept.
 pub(super) fn thinned(width: u32, height: u32, map: &[u8]) -> Vec<bool> {
     let (w, h) = (width as usize, height as usize);
-    // With an empty pixel on every side, so that all pixels of the map have eight
+    // Padded by an empty pixel on every side, so that all pixels of the map have eight
     // neighbours.
     let across = w + 2;
     let mut strength = vec![0u8; across * (h + 2)];
@@ -26,12 +26,13 @@ pub(super) fn thinned(width: u32, height: u32, map: &[u8]) -> Vec<bool> {
     let ring = RING.map(|(dx, dy)| dy * across as i64 + dx);
     let around = |k: usize| ring.map(|o| (k as i64 + o) as usize);
 
-    // Bits of numbers that are not negative have their order.
+    // The bit patterns of non-negative floats are ordered like the floats.
     let key = |k: usize| (u64::from(strength[k]) << 32 | u64::from(depth[k].to_bits()), k);
     let mut order: Vec<(u64, usize)> = (0..set.len()).filter(|&k| set[k]).map(key).collect();
     order.sort_unstable();
     let simple = SIMPLE;
-    // Removing a pixel may free an earlier one, so until nothing changes.
+    // Removing a pixel may make an earlier one removable, so repeat until nothing
+    // changes.
     loop {
         let before = order.len();
         order.retain(|&(_, k)| {
@@ -53,10 +54,9 @@ pub(super) fn thinned(width: u32, height: u32, map: &[u8]) -> Vec<bool> {
     }
 }
 
-/// For every set of neighbours (bit i: the i-th of [`RING`]) whether those that are set
-/// stay in one piece, and the empty ones too, without the pixel: the 8-connectivity
-/// number is 1 (Yokoi, Toriwaki & Fukumura 1975), which is false inside areas and for
-/// lone pixels.
+/// For every set of neighbours (bit i: the i-th of [`RING`]) whether the set ones stay
+/// connected, and the empty ones too, without the pixel: the 8-connectivity number is 1
+/// (Yokoi, Toriwaki & Fukumura 1975). False inside areas and for isolated pixels.
 const SIMPLE: [bool; 256] = {
     let mut table = [false; 256];
     let mut ring = 0;
@@ -76,8 +76,8 @@ const SIMPLE: [bool; 256] = {
     table
 };
 
-/// Whether a pixel is the end of a line, rather than of a spur: one neighbour, or two
-/// side by side, that are neither much stronger nor deeper inside.
+/// Whether a pixel is the end of a line rather than of a spur: it has one neighbour, or
+/// two adjacent ones, which are neither much stronger nor farther inside.
 fn is_end(k: usize, ring: u8, around: &[usize; 8], strength: &[u8], depth: &[f32]) -> bool {
     let close = ring & ring.rotate_left(1) != 0;
     let few = ring.count_ones() == 1 || ring.count_ones() == 2 && close;
@@ -95,7 +95,7 @@ mod tests {
         set.iter().filter(|&&s| s).count()
     }
 
-    /// Number of 8-connected pieces.
+    /// Number of 8-connected components.
     fn pieces(w: usize, set: &[bool]) -> usize {
         let mut left: Vec<bool> = set.to_vec();
         let mut n = 0;
@@ -127,7 +127,7 @@ mod tests {
         map[19 * 20] = 9;
         let set = thinned(20, 20, &map);
         let gone = (0..400).filter(|&k| (map[k] > 0) != set[k]).count();
-        // Where they cross they are thicker than a pixel.
+        // Crossings are thicker than a pixel.
         assert!(gone <= 2, "{gone}");
         assert!(set[19 * 20] && set[5 * 20 + 2] && set[17 * 20 + 17]);
     }

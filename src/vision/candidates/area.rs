@@ -1,22 +1,22 @@
 //! Sets of pixels: components, holes, outlines, dilation and overlap.
 
-/// A set of pixels, not empty.
+/// A non-empty set of pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Area {
     pub width: usize,
     pub height: usize,
-    /// Row by row.
+    /// In row-major order.
     pub on: Vec<bool>,
-    /// How many are on.
+    /// The number of pixels that are on.
     pub count: usize,
-    /// First column and row, and those beyond the last.
+    /// First column and row, and one past the last column and row.
     pub bounds: [usize; 4],
-    /// The same as `on`, 64 to a word.
+    /// The same as `on`, 64 pixels per word.
     words: Vec<u64>,
 }
 
 impl Area {
-    /// Of pixels row by row; none if all are off.
+    /// Builds a set from pixels in row-major order; `None` if all are off.
     pub fn new(width: usize, height: usize, on: Vec<bool>) -> Option<Area> {
         let word =
             |bits: &[bool]| bits.iter().rev().fold(0u64, |word, on| word << 1 | u64::from(*on));
@@ -31,10 +31,10 @@ impl Area {
         (count > 0).then_some(Area { width, height, on, count, bounds, words })
     }
 
-    /// Whether intersection over union with another set of the same picture is above a
-    /// threshold.
+    /// Whether the intersection over union with another set of the same picture is above
+    /// a threshold.
     pub fn overlaps(&self, other: &Area, threshold: f64) -> bool {
-        // It cannot be above the ratio of the sizes.
+        // The ratio of the sizes is an upper bound.
         let (less, more) = (self.count.min(other.count), self.count.max(other.count));
         less as f64 > threshold * more as f64 && self.iou(other) > threshold
     }
@@ -45,12 +45,12 @@ impl Area {
         both as f64 / (self.count + other.count - both) as f64
     }
 
-    /// How many pixels are in both.
+    /// Returns the number of pixels in both sets.
     pub fn shared(&self, other: &Area) -> usize {
         self.words.iter().zip(&other.words).map(|(a, b)| (a & b).count_ones() as usize).sum()
     }
 
-    /// The pixels of both together.
+    /// Returns the union of both sets.
     pub fn union(&self, other: &Area) -> Option<Area> {
         Area::new(
             self.width,
@@ -66,14 +66,14 @@ impl Area {
         all.filter(|&(i, j)| self.on[j * self.width + i])
     }
 
-    /// Whether the pixel at a place is on; none is beyond the picture.
+    /// Whether the pixel at a position is on; false outside the picture.
     pub fn at(&self, x: f64, y: f64) -> bool {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
         inside && self.on[y as usize * self.width + x as usize]
     }
 
-    /// The pixels with one of the four neighbours off or beyond the picture, and how many
-    /// are at the picture's frame.
+    /// Returns the pixels of which one of the four neighbours is off or outside the
+    /// picture, and the number of pixels at the picture's frame.
     pub fn outline(&self) -> (Vec<usize>, usize) {
         let (w, h) = (self.width, self.height);
         let (mut outline, mut framed) = (Vec::new(), 0);
@@ -89,8 +89,7 @@ impl Area {
         (outline, framed)
     }
 
-    /// With holes filled: what is off and does not hang together (4 neighbours) with the
-    /// outside.
+    /// Fills holes: pixels that are off and not 4-connected to the outside.
     pub fn filled(self) -> Area {
         let [x0, y0, x1, y1] = self.bounds;
         let (w, h) = (x1 - x0, y1 - y0);
@@ -119,7 +118,7 @@ impl Area {
         Area::new(self.width, self.height, on).unwrap_or(self)
     }
 
-    /// The pixels at most `by` columns and rows away from one that is on.
+    /// Returns the pixels at most `by` columns and rows away from one that is on.
     pub fn dilated(&self, by: usize) -> Vec<bool> {
         let [x0, y0, x1, y1] = self.bounds;
         let (left, right) = (x0.saturating_sub(by), (x1 + by).min(self.width));
@@ -137,7 +136,8 @@ impl Area {
     }
 }
 
-/// Calls `mark` with all places of a line that are at most `by` away from one that is on.
+/// Calls `mark` with all positions of a line that are at most `by` away from one that is
+/// on.
 fn spread(line: impl ExactSizeIterator<Item = bool>, by: usize, mut mark: impl FnMut(usize)) {
     let n = line.len();
     let mut done = 0;
@@ -148,7 +148,7 @@ fn spread(line: impl ExactSizeIterator<Item = bool>, by: usize, mut mark: impl F
     }
 }
 
-/// The four neighbours of a pixel of a picture of some width and height.
+/// Returns the four neighbours of a pixel of a picture of the given width and height.
 pub fn neighbours(w: usize, h: usize, p: usize) -> [Option<usize>; 4] {
     let (i, j) = (p % w, p / w);
     [
@@ -159,8 +159,8 @@ pub fn neighbours(w: usize, h: usize, p: usize) -> [Option<usize>; 4] {
     ]
 }
 
-/// The number of its component for every pixel, and the components' sizes: pixels of the
-/// same label that hang together.
+/// Returns the component number of every pixel, and the sizes of the components:
+/// 4-connected pixels of the same label.
 pub fn components(w: usize, h: usize, label: impl Fn(usize) -> u32) -> (Vec<u32>, Vec<usize>) {
     let mut of = vec![u32::MAX; w * h];
     let mut sizes = Vec::new();
@@ -186,7 +186,8 @@ pub fn components(w: usize, h: usize, label: impl Fn(usize) -> u32) -> (Vec<u32>
     (of, sizes)
 }
 
-/// The largest component of some pixels, the first among equals; none if all are off.
+/// Returns the largest component of some pixels, the first one among equals; `None` if
+/// all are off.
 pub fn largest(w: usize, h: usize, on: &[bool]) -> Option<Area> {
     let (of, sizes) = components(w, h, |p| u32::from(on[p]));
     let mut best: Option<(usize, u32)> = None;

@@ -1,29 +1,30 @@
-//! Clusters of pixels by k-means, from a deterministic start: the clusters' components
-//! are regions, and a codebook gives every pixel a letter for histograms.
+//! Clusters of pixels by k-means from a deterministic start. The clusters' components are
+//! regions, and a codebook assigns every pixel a letter for histograms.
 
 use super::area::{Area, components};
 use super::picture::Picture;
 use crate::num::simd::vectorised;
 
-/// Coordinates of a pixel: L*, a*, b*, the local deviation of L*, and its place.
+/// Number of coordinates of a pixel: L*, a*, b*, the local deviation of L*, and its
+/// position.
 const COORDINATES: usize = 6;
 type Point = [f32; COORDINATES];
 
-/// The most clusters that regions are made from.
+/// The maximum number of clusters that regions are made from.
 const MOST: usize = 12;
 /// Weights of position (along the longer side of the picture, in units of L*) and of the
 /// local deviation.
 const WEIGHTS: [[f32; 2]; 4] = [[0.0, 0.0], [0.0, 1.0], [40.0, 0.5], [80.0, 1.0]];
-/// How many letters a codebook has at most.
+/// The maximum number of letters of a codebook.
 pub const LETTERS: usize = 48;
-/// Clusters are found on at most about this many pixels.
+/// Approximate maximum number of pixels that clusters are fitted to.
 const FITTED: usize = 1 << 12;
 /// Rounds of k-means after each new centre.
 const ROUNDS: usize = 4;
-/// Points that are compared with a centre side by side.
+/// Number of points that are compared with a centre at a time.
 const BLOCK: usize = 32;
 
-/// Points, a list for each coordinate, with zeros to the end of a block.
+/// Points as a list per coordinate, padded with zeros to whole blocks.
 struct Points {
     count: usize,
     lists: [Vec<f32>; COORDINATES],
@@ -43,7 +44,7 @@ impl Points {
         std::array::from_fn(|c| self.lists[c][i])
     }
 
-    /// The nearest centre of every point, the first among equals.
+    /// Returns the nearest centre of every point, the first one among equals.
     fn nearest(&self, centres: &[Point]) -> Vec<u32> {
         let mut labels = vec![0u32; self.lists[0].len()];
         vectorised(
@@ -71,8 +72,8 @@ impl Points {
     }
 }
 
-/// The pixels' coordinates with some weights: all, and some on a grid that clusters are
-/// found on.
+/// Returns the coordinates, scaled by weights, of all pixels and of the pixels on a grid
+/// that clusters are fitted to.
 fn points(picture: &Picture, [place, texture]: [f32; 2]) -> (Points, Points) {
     let (w, h) = (picture.width, picture.height);
     let unit = place / w.max(h) as f32;
@@ -99,14 +100,14 @@ impl Moments {
         self.sums.map(|s| (s / self.count) as f32)
     }
 
-    /// Sum of squares about the mean.
+    /// Returns the sum of squares about the mean.
     fn spread(&self, c: usize) -> f64 {
         self.squares[c] - self.sums[c] * self.sums[c] / self.count.max(1.0)
     }
 }
 
-/// Clusters that grow in number: the one with the greatest spread is cut in two along its
-/// widest coordinate.
+/// A growing set of clusters: the cluster with the largest sum of squares is split along
+/// its widest coordinate.
 struct Means {
     points: Points,
     labels: Vec<u32>,
@@ -134,8 +135,8 @@ impl Means {
         all
     }
 
-    /// Moves centres to the means of their points, and points to their nearest centres. A
-    /// centre without points stays.
+    /// Moves centres to the means of their points, and assigns points to their nearest
+    /// centres. A centre without points stays.
     fn round(&mut self) {
         let all = self.moments();
         let pairs = self.centres.iter_mut().zip(&all).filter(|(_, m)| m.count > 0.0);
@@ -143,7 +144,7 @@ impl Means {
         self.labels = self.points.nearest(&self.centres);
     }
 
-    /// One cluster more; whether there was anything left to tell apart.
+    /// Adds a cluster by splitting one; returns false if all points in it are equal.
     fn split(&mut self) -> bool {
         let all = self.moments();
         let spread = |k: usize| (0..COORDINATES).map(|c| all[k].spread(c)).sum::<f64>();
@@ -152,7 +153,7 @@ impl Means {
         let cluster = all[widest];
         let wider = |best, c| if cluster.spread(c) > cluster.spread(best) { c } else { best };
         let axis = (0..COORDINATES).fold(0, wider);
-        // Less is rounding.
+        // Less is rounding error.
         if cluster.spread(axis) < 1e-3 * cluster.count {
             return false;
         }
@@ -176,7 +177,7 @@ impl Means {
     }
 }
 
-/// Components of clusters of at least `least` pixels.
+/// Returns the components of clusters that have at least `least` pixels.
 pub fn regions(picture: &Picture, least: usize) -> Vec<Area> {
     let (w, h) = (picture.width, picture.height);
     let mut out = Vec::new();
@@ -195,7 +196,7 @@ pub fn regions(picture: &Picture, least: usize) -> Vec<Area> {
     out
 }
 
-/// A letter below [`LETTERS`] for every pixel, by colour and texture.
+/// Assigns every pixel a letter below [`LETTERS`] by colour and texture.
 pub fn codebook(picture: &Picture) -> Vec<u8> {
     let (all, some) = points(picture, [0.0, 1.0]);
     let mut means = Means::new(some);

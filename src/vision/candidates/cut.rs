@@ -1,37 +1,37 @@
-//! Cutting an object out around a seed, as GrabCut does (Rother et al. 2004, ACM Trans.
-//! Graphics 23, 309-314): colours of the object and of what is around it are learned from
-//! the last mask, and a field of pixels, alike where their colours are, decides the next
-//! one. The field is not cut exactly but by mean field (Kraehenbuehl & Koltun 2011,
-//! NIPS), here with four neighbours: a fifth of the time.
+//! Cuts an object out around a seed, as in GrabCut (Rother et al. 2004, ACM Trans.
+//! Graphics 23, 309-314): colours of the object and its surroundings are learned from the
+//! last mask, and a Markov random field with stronger coupling between similar colours
+//! gives the next one. Instead of a graph cut it uses mean-field inference (Kraehenbuehl
+//! & Koltun 2011, NIPS), here with four neighbours, which takes a fifth of the time.
 
 use super::area::{Area, largest};
 use super::clusters::LETTERS;
 use super::picture::Picture;
 
-/// How often colours are learned anew, and the sweeps of mean field after each time.
+/// Number of times colours are learned, and sweeps of mean field after each time.
 const ESTIMATES: usize = 3;
 const SWEEPS: usize = 10;
-/// Beliefs that change by less have settled.
+/// Beliefs have converged if they change by less than this.
 const SETTLED: f32 = 0.02;
 /// The weight of neighbours.
 const LAMBDA: f32 = 0.8;
-/// The most that a pixel's colour may say either way, in logarithms.
+/// Bound on the log-likelihood ratio of a pixel's colour.
 const CLIP: f32 = 3.0;
 
-/// What the cuts of a picture share: the letters of its pixels, and how alike neighbours
-/// are.
+/// Data shared by all cuts of a picture: the letters (codebook entries) of its pixels,
+/// and the similarity of neighbours.
 pub struct Field {
     width: usize,
     height: usize,
     pub letters: Vec<u8>,
-    /// How alike a pixel is to the one on its left, and one entry more.
+    /// Similarity of each pixel to the one on its left, with one extra entry.
     left: Vec<f32>,
-    /// To the one above, and a row more.
+    /// Similarity to the one above, with an extra row.
     above: Vec<f32>,
 }
 
 impl Field {
-    /// Of a picture and its letters.
+    /// Builds the field of a picture with these letters.
     pub fn new(picture: &Picture, letters: Vec<u8>) -> Field {
         let (w, h) = (picture.width, picture.height);
         let squared = |p: usize, q: usize| {
@@ -40,7 +40,7 @@ impl Field {
                 + (a[1] - b[1]) * (a[1] - b[1])
                 + (a[2] - b[2]) * (a[2] - b[2])
         };
-        // A pixel is unlike anything beyond the frame.
+        // The similarity to anything beyond the frame is 0.
         let n = w * h;
         let side = |p: usize| {
             if !p.is_multiple_of(w) && p < n { squared(p, p - 1) } else { f32::INFINITY }
@@ -55,7 +55,7 @@ impl Field {
         Field { width: w, height: h, letters, left, above }
     }
 
-    /// The object at a seed; none where nothing stands out.
+    /// Cuts out the object at a seed; `None` if nothing stands out.
     pub fn cut(&self, seed: &Area) -> Option<Area> {
         let by = (0.22 * (seed.count as f64).sqrt()).max(4.0) as usize;
         let window = seed.dilated(by);
@@ -69,8 +69,8 @@ impl Field {
         Some(largest(self.width, self.height, &mask)?.filled())
     }
 
-    /// How much more often a letter is on the object than beside it, in logarithms; none
-    /// if one of the two is empty.
+    /// Returns for each letter the log ratio of its frequency on the object and beside
+    /// it; `None` if either is empty.
     fn gains(&self, window: &[bool], mask: &[bool]) -> Option<[f32; LETTERS]> {
         let mut counts = [[0u32; LETTERS]; 2];
         for (p, _) in window.iter().enumerate().filter(|(_, inside)| **inside) {
@@ -80,7 +80,8 @@ impl Field {
         if totals.contains(&0) {
             return None;
         }
-        // Half a pixel more of each, so that unseen letters say something finite.
+        // Half a pixel more per letter, so that the log ratio of unseen letters is
+        // finite.
         let part = |side: usize, l: usize| {
             let all = totals[side] as f32 + 0.5 * LETTERS as f32;
             (counts[side][l] as f32 + 0.5) / all
@@ -88,9 +89,9 @@ impl Field {
         Some(std::array::from_fn(|l| libm::logf(part(1, l) / part(0, l)).clamp(-CLIP, CLIP)))
     }
 
-    /// How much each pixel of the window is believed to be the object, from the last
-    /// mask. Pixels with an even and with an odd sum of column and row take turns: no two
-    /// neighbours change at once, so it settles.
+    /// Updates the belief of each pixel of the window to be on the object, starting from
+    /// the last mask. Pixels with even and with odd sum of column and row alternate: no
+    /// two neighbours change at once, so the iteration converges.
     fn mean_field(
         &self,
         window: &[bool],
@@ -108,7 +109,8 @@ impl Field {
         for _ in 0..SWEEPS {
             let mut most = 0.0f32;
             for &p in sides.iter().flatten() {
-                // Without a neighbour the weight is 0, whichever pixel is taken for it.
+                // Without a neighbour the weight is 0, whichever pixel is used in its
+                // place.
                 let towards = |q: usize| 2.0 * belief[q.min(w * h - 1)] - 1.0;
                 let pull = self.left[p] * towards(p.saturating_sub(1))
                     + self.left[p + 1] * towards(p + 1)

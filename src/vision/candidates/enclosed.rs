@@ -1,4 +1,4 @@
-//! What clean contours enclose: regions where there is no photograph to find them in.
+//! Regions enclosed by clean contours, for use without a photograph.
 
 use super::area::{Area, components};
 use super::mirror::symmetry;
@@ -8,23 +8,24 @@ use super::{Candidate, CandidateOptions, LEAST, OVERLAP};
 use crate::vision::ContourMap;
 use crate::vision::gradient::Gradient;
 
-/// How far points reach along their contour, so that gaps between them close, pixels.
+/// How far points are extended along their contour, to close the gaps between them,
+/// pixels.
 const REACH: f32 = 0.75;
-/// Gaps of up to twice so many pixels are closed: where a contour is hidden by a hair,
-/// some of it is missing.
+/// Gaps of up to twice this many pixels are closed, since parts of a contour may be
+/// missing where it is narrowly hidden.
 const GAPS: [usize; 5] = [0, 1, 3, 6, 12];
-/// What is mostly lines encloses nothing.
+/// Regions with at least this fraction of line pixels are not enclosed areas.
 const LINES: f64 = 0.8;
 
-/// The regions that contours enclose, the largest and most symmetric first. Contours that
-/// do not close, such as those of an object that is cut off by the frame, enclose
-/// nothing.
+/// Returns the regions that contours enclose, the largest and most symmetric first. Open
+/// contours, such as those of an object that is cut off by the frame, do not enclose
+/// anything.
 pub fn enclosed(map: &ContourMap, options: &CandidateOptions) -> Vec<Candidate> {
     let longer = map.width.max(map.height);
     if map.is_empty() || longer == 0 {
         return Vec::new();
     }
-    // No finer than the map is: its points would lie apart.
+    // At most the map's resolution, beyond which its points would be disconnected.
     let size = f64::from(options.size.clamp(16, 1024).min(longer));
     let side = |n: u32| (f64::from(n) * size / f64::from(longer)).round().max(1.0) as u32;
     let small = map.scaled_to(side(map.width), side(map.height));
@@ -41,8 +42,8 @@ pub fn enclosed(map: &ContourMap, options: &CandidateOptions) -> Vec<Candidate> 
     suppressed(regions, OVERLAP, options.most).into_iter().filter_map(candidate).collect()
 }
 
-/// What lines enclose that are made wider by some pixels, less what they were made wider
-/// by: regions of at least so many pixels.
+/// Returns the regions of at least `least` pixels that lines enclose after dilation by
+/// `by` pixels, with the dilation undone.
 fn closed(w: usize, h: usize, lines: &[bool], by: usize, least: usize) -> Vec<Area> {
     let Some(wide) = Area::new(w, h, lines.to_vec()) else { return Vec::new() };
     let Some(wide) = Area::new(w, h, wide.dilated(by)).map(Area::filled) else { return Vec::new() };
@@ -61,13 +62,13 @@ fn closed(w: usize, h: usize, lines: &[bool], by: usize, least: usize) -> Vec<Ar
     sizes.iter().enumerate().filter_map(region).collect()
 }
 
-/// The pixel at a place, if it is in the picture.
+/// Returns the pixel at a position, if it is in the picture.
 fn pixel(map: &ContourMap, x: f32, y: f32) -> Option<usize> {
     let inside = x >= 0.0 && y >= 0.0 && x < map.width as f32 && y < map.height as f32;
     inside.then(|| y as usize * map.width as usize + x as usize)
 }
 
-/// The pixels that contours run through.
+/// Marks the pixels that contours run through.
 fn drawn(map: &ContourMap) -> Vec<bool> {
     let mut on = vec![false; map.width as usize * map.height as usize];
     for (((x, y), tx), ty) in map.x.iter().zip(&map.y).zip(&map.tx).zip(&map.ty) {
@@ -80,7 +81,7 @@ fn drawn(map: &ContourMap) -> Vec<bool> {
     on
 }
 
-/// Edges of strength 1 along contours, which fade within a pixel or two.
+/// Returns edges of strength 1 along contours that fade within a pixel or two.
 fn across(map: &ContourMap) -> Gradient {
     let pixels = map.width as usize * map.height as usize;
     let (mut magnitude, mut tensor) = (vec![0.0f32; pixels], vec![[0.0f32; 3]; pixels]);

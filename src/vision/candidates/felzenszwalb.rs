@@ -3,15 +3,14 @@
 
 use super::picture::Picture;
 
-/// Pairs of neighbouring pixels (8 neighbours) and how far apart their colours are,
-/// nearest first.
+/// Pairs of 8-connected pixels with the distance of their colours, nearest first.
 pub struct Edges {
     pixels: usize,
     edges: Vec<(f32, u32, u32)>,
 }
 
 impl Edges {
-    /// Those of a picture, between smoothed colours.
+    /// Returns the pairs of a picture, with smoothed colours.
     pub fn of(picture: &Picture) -> Edges {
         let (w, h) = (picture.width, picture.height);
         let mut edges = Vec::with_capacity(4 * w * h);
@@ -25,19 +24,19 @@ impl Edges {
                 edges.push((distance(picture.smooth[p], picture.smooth[q]), p as u32, q as u32));
             }
         }
-        // Stable: equals stay in raster order.
+        // A stable sort: equal distances stay in raster order.
         edges.sort_by(|a, b| a.0.total_cmp(&b.0));
         Edges { pixels: w * h, edges }
     }
 }
 
-/// How far apart two colours are.
+/// Returns the distance of two colours.
 pub fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
 }
 
-/// Trees of pixels: the root stands for its segment.
+/// Trees of pixels: the root represents its segment.
 struct Forest {
     parent: Vec<u32>,
     size: Vec<u32>,
@@ -63,9 +62,10 @@ impl Forest {
     }
 }
 
-/// The number of its segment for every pixel, and how many there are. `k`: how much
-/// longer than within a segment an edge to the next one has to be, for a segment of one
-/// pixel; segments of fewer than `least` pixels are joined to their nearest neighbour.
+/// Returns the segment number of every pixel, and the number of segments. `k` is by how
+/// much an edge to another segment must exceed the longest edge within, for a segment of
+/// one pixel; it decreases with size. Segments of fewer than `least` pixels are joined to
+/// their nearest neighbour.
 pub fn felzenszwalb(edges: &Edges, k: f32, least: u32) -> (Vec<u32>, usize) {
     let n = edges.pixels;
     let mut forest =

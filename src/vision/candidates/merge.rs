@@ -1,40 +1,41 @@
-//! Hierarchies of regions: the two most alike neighbours are joined until one is left,
-//! and every region on the way is a proposal (Uijlings et al. 2013, "Selective search for
-//! object recognition", IJCV 104, 154-171, section 3).
+//! Hierarchies of regions: the two most similar neighbours are merged until one region is
+//! left, and every region on the way is a proposal (Uijlings et al. 2013, "Selective
+//! search for object recognition", IJCV 104, 154-171, section 3).
 
 use super::area::Area;
 use super::picture::Picture;
 
-/// Bins of each of L*, a* and b*.
+/// Number of bins of each of L*, a* and b*.
 const BINS: usize = 20;
-/// Directions of the gradient of L*, and steps of its strength.
+/// Number of directions and of strengths of the gradient of L*.
 const DIRECTIONS: usize = 8;
 const STRENGTHS: usize = 4;
 
-/// What makes neighbours alike.
+/// The similarity measure of neighbours.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Rule {
-    /// Colour, texture, that both are small, and that they fill their common bounds.
+    /// Colour, texture, small size of both, and how well they fill their common bounding
+    /// box.
     Likeness,
-    /// Colour, and that there is no edge between them.
+    /// Colour, and the absence of an edge between them.
     Edges,
 }
 
-/// A region in the making.
+/// A region of the hierarchy.
 #[derive(Clone)]
 struct Region {
     size: f32,
     bounds: [usize; 4],
-    /// Parts of the pixels by colour, a third of each coordinate.
+    /// Fractions of the pixels by colour; each coordinate sums to a third.
     colour: [f32; 3 * BINS],
-    /// Parts of the pixels by gradient.
+    /// Fractions of the pixels by gradient.
     texture: [f32; DIRECTIONS * STRENGTHS],
-    /// Which segments it is made of.
+    /// The segments that it consists of.
     segments: Vec<usize>,
 }
 
-/// Two neighbours, with the sum of the gradient along their border, its length, and how
-/// alike they are.
+/// Two neighbours, with the sum of the gradient along their border, its length, and their
+/// similarity.
 #[derive(Clone, Copy)]
 struct Pair {
     a: usize,
@@ -44,12 +45,12 @@ struct Pair {
     alike: f32,
 }
 
-/// The part that two normalised histograms have in common.
+/// Returns the intersection of two normalised histograms.
 fn common(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).map(|(a, b)| a.min(*b)).sum()
 }
 
-/// The mean of two histograms with some weights.
+/// Returns the weighted mean of two histograms.
 fn mixed<const N: usize>(a: &[f32; N], b: &[f32; N], (wa, wb): (f32, f32)) -> [f32; N] {
     std::array::from_fn(|i| (wa * a[i] + wb * b[i]) / (wa + wb))
 }
@@ -67,7 +68,7 @@ impl Region {
     }
 }
 
-/// The segments of a picture as regions.
+/// Returns the segments of a picture as regions.
 fn regions(picture: &Picture, labels: &[u32], count: usize) -> Vec<Region> {
     let empty = Region {
         size: 0.0,
@@ -96,7 +97,7 @@ fn regions(picture: &Picture, labels: &[u32], count: usize) -> Vec<Region> {
     all
 }
 
-/// The bin of a gradient.
+/// Returns the bin of a gradient.
 fn texture(x: f32, y: f32) -> usize {
     let turn = libm::atan2f(y, x) / std::f32::consts::TAU + 0.5;
     let direction = ((turn * DIRECTIONS as f32) as usize).min(DIRECTIONS - 1);
@@ -104,7 +105,7 @@ fn texture(x: f32, y: f32) -> usize {
     direction * STRENGTHS + strength
 }
 
-/// Neighbouring segments, in the order of their numbers.
+/// Returns neighbouring segments, in the order of their numbers.
 fn pairs(picture: &Picture, labels: &[u32]) -> Vec<Pair> {
     let (w, h) = (picture.width, picture.height);
     let mut borders = Vec::new();
@@ -128,14 +129,15 @@ fn pairs(picture: &Picture, labels: &[u32]) -> Vec<Pair> {
     same.map(pair).collect()
 }
 
-/// How alike two neighbours are.
+/// Returns the similarity of two neighbours.
 fn alike(picture: &Picture, rule: Rule, all: &[Region], pair: &Pair) -> f32 {
     let (a, b) = (&all[pair.a], &all[pair.b]);
     let colour = common(&a.colour, &b.colour);
     let pixels = picture.pixels() as f32;
     match rule {
         Rule::Edges => {
-            // Small regions go first here too, or specks are left to the end.
+            // Small regions are preferred here too; otherwise specks would be left to the
+            // end.
             let edge = (pair.edge / pair.length / picture.strong).min(1.0);
             colour - 2.0 * edge - (a.size.min(b.size) / pixels).sqrt()
         }
@@ -153,7 +155,8 @@ fn alike(picture: &Picture, rule: Rule, all: &[Region], pair: &Pair) -> f32 {
     }
 }
 
-/// Every region of the hierarchy over some segments that has `least` to `most` pixels.
+/// Returns every region of the hierarchy over some segments that has `least` to `most`
+/// pixels.
 pub fn merge(
     picture: &Picture,
     (labels, count): &(Vec<u32>, usize),
@@ -188,8 +191,8 @@ pub fn merge(
     all.iter().filter(fits).filter_map(area).collect()
 }
 
-/// The pairs after `joined` has become region `new`, which has each of its neighbours
-/// once.
+/// Updates the pairs after `joined` has become region `new`, so that each of its
+/// neighbours occurs once.
 fn renamed(pairs: &[Pair], joined: Pair, new: usize) -> Vec<Pair> {
     let gone = |r: usize| r == joined.a || r == joined.b;
     let (touched, mut out): (Vec<Pair>, Vec<Pair>) =

@@ -1,32 +1,31 @@
-//! Mirror symmetry of a region: the axes in which it is most its own mirror image, and
-//! its widths along them. The silhouette of a lathe is symmetric in the projection of its
-//! axis, seen from anywhere far enough away.
+//! Mirror symmetry of a region: the axes in which it is most similar to its own mirror
+//! image, and its widths along them. The silhouette of an object of revolution is
+//! symmetric about the projection of its axis if the camera is far enough away.
 
 use super::area::Area;
 use std::f64::consts::PI;
 
-/// The angles that are tried first, over half a turn.
+/// Number of angles in the initial scan, over half a turn.
 const ANGLES: usize = 60;
-/// About how many pixels they are tried on.
+/// Approximate number of pixels used in the scan.
 const SAMPLE: usize = 200;
-/// Second axes are at least this far from the first, radians.
+/// Minimum angle between the first and the second axis, radians.
 const APART: f64 = PI / 6.0;
 
-/// A line to mirror in: the points whose product with the unit `normal` is `offset`,
-/// pixels.
+/// A mirror line: the points whose product with the unit `normal` is `offset`, pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Mirror {
     /// Intersection over union of the region with its mirror image.
     pub symmetry: f64,
-    /// Of the normal, radians.
+    /// Angle of the normal, radians.
     pub angle: f64,
-    /// From the region's centroid along the normal.
+    /// Distance from the region's centroid along the normal.
     pub offset: f64,
     /// The centroid.
     pub centre: [f64; 2],
 }
 
-/// A region's points about its centroid.
+/// A region's points relative to its centroid.
 struct Shape<'a> {
     area: &'a Area,
     centre: [f64; 2],
@@ -47,7 +46,7 @@ impl Shape<'_> {
         Shape { area, centre, points: area.points().step_by(step).map(about).collect() }
     }
 
-    /// The mirror at an angle and offset, with its symmetry.
+    /// Returns the mirror at an angle and offset, with its symmetry.
     fn mirror(&self, angle: f64, offset: f64) -> Mirror {
         let (nx, ny) = (libm::cos(angle), libm::sin(angle));
         let hits = self.points.iter().filter(|[x, y]| {
@@ -59,13 +58,13 @@ impl Shape<'_> {
         Mirror { symmetry, angle, offset, centre: self.centre }
     }
 
-    /// The best mirror near another: steps of the given size in angle and offset, halved
-    /// `halvings` times.
+    /// Returns the best mirror near another: steps of the given size in angle and offset,
+    /// halved `halvings` times.
     fn refined(&self, from: Mirror, angle: f64, offset: f64, halvings: i32) -> Mirror {
         let mut best = self.mirror(from.angle, from.offset);
         for h in 0..=halvings {
             let (a, o) = (angle / f64::from(1 << h), offset / f64::from(1 << h));
-            // A few steps at each size: the scan was near already.
+            // A few steps at each size suffice, since the scan is already close.
             for _ in 0..3 {
                 let tries = [(-a, 0.0), (a, 0.0), (0.0, -o), (0.0, o)];
                 let last = best;
@@ -88,8 +87,8 @@ fn between(a: f64, b: f64) -> f64 {
     d.min(PI - d)
 }
 
-/// The symmetry of a region in its best mirror, roughly: what many regions are compared
-/// by.
+/// Returns the approximate symmetry of a region in its best mirror, for comparing many
+/// regions.
 pub fn symmetry(area: &Area) -> f64 {
     let shape = Shape::of(area, SAMPLE);
     let scan = (0..ANGLES / 2).map(|i| shape.mirror(PI * i as f64 / (ANGLES / 2) as f64, 0.0));
@@ -97,14 +96,15 @@ pub fn symmetry(area: &Area) -> f64 {
     best.map_or(0.0, |b| shape.refined(b, PI / 60.0, 1.0, 1).symmetry)
 }
 
-/// The best mirror, and the best of those in a direction of its own.
+/// Returns the best mirror, and the best one in a different direction.
 pub fn mirrors(area: &Area) -> Vec<Mirror> {
     let (rough, all) = (Shape::of(area, SAMPLE), Shape::of(area, usize::MAX));
     let angle = |i: usize| PI * i as f64 / ANGLES as f64;
     let mut scan: Vec<Mirror> = (0..ANGLES).map(|i| rough.mirror(angle(i), 0.0)).collect();
     scan.sort_by(|a, b| b.symmetry.total_cmp(&a.symmetry));
     let refined = |m: &Mirror| all.refined(*m, PI / 120.0, 1.0, 4);
-    // Neighbouring angles are much the same on few points: the best three are refined.
+    // On few points, neighbouring angles are hardly distinguishable, so the best three
+    // are refined.
     let better = |a: Mirror, b: Mirror| if b.symmetry > a.symmetry { b } else { a };
     let Some(first) = scan.iter().take(3).map(refined).reduce(better) else { return Vec::new() };
     let second = scan.iter().find(|m| between(m.angle, first.angle) > APART + 0.05).map(refined);

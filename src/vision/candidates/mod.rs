@@ -1,13 +1,13 @@
-//! Regions of a photograph that may be an object of revolution (vases, bottles, cups,
+//! Regions of a photograph that may be objects of revolution (vases, bottles, cups,
 //! lamps), without learned weights.
 //!
-//! Of clean contours without a photograph they are what the contours enclose. Of a
-//! photograph:
+//! For clean contours without a photograph, the candidates are the regions that the
+//! contours enclose. For a photograph, segments and clusters of colour are merged into
+//! regions, and the most promising ones are cut out along edges. Regions are ranked by
+//! symmetry, contrast with their surroundings, and distance from the picture's border.
 //!
-//! Segments and clusters of colour are joined into regions, the most promising are cut
-//! out along edges, and what is symmetric, stands out from what is around it and lies
-//! within the picture comes first. A function of the picture alone, with the same bits on
-//! any machine. Not here: what is made of the candidates, and three dimensions.
+//! The result is a function of the picture alone, with the same bits on any machine. The
+//! use of the candidates, and anything in three dimensions, is elsewhere.
 
 mod area;
 mod clusters;
@@ -33,25 +33,25 @@ use picture::Picture;
 pub use rim::tilts;
 use score::{Judge, suppressed};
 
-/// Regions are at least and at most this part of the picture.
+/// Minimum and maximum size of regions, as a fraction of the picture.
 const LEAST: f64 = 0.004;
 const MOST: f64 = 0.65;
-/// Of two regions that overlap more than this (intersection over union) the better one is
+/// Of two regions with a larger intersection over union than this, only the better one is
 /// kept.
 const OVERLAP: f64 = 0.85;
-/// How many of the regions are cut out.
+/// Number of regions that are cut out.
 const SEEDS: usize = 30;
-/// How many of the best are put together with their neighbours.
+/// Number of best regions that are joined with their neighbours.
 const PARTS: usize = 30;
-/// Neighbours touch in at least this many pixels.
+/// Minimum number of pixels in which neighbours touch.
 const TOUCHING: usize = 4;
 
-/// How candidates are looked for.
+/// Options of the search for candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CandidateOptions {
-    /// The longer side, in pixels, that the picture is made smaller to; 16 to 1024.
+    /// The longer side, in pixels, that the picture is shrunk to; 16 to 1024.
     pub size: u32,
-    /// How many candidates there are at most.
+    /// The maximum number of candidates.
     pub most: usize,
 }
 
@@ -61,21 +61,21 @@ impl Default for CandidateOptions {
     }
 }
 
-/// An axis in which a mask is nearly its own mirror image.
+/// An axis about which a mask is nearly mirror-symmetric.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// How nearly: intersection over union of the mask and its mirror image, 0 to 1.
+    /// Intersection over union of the mask and its mirror image, 0 to 1.
     pub symmetry: f64,
-    /// Where the mask ends along the axis, in pixels of the photograph: the lower end in
-    /// the picture.
+    /// The end of the mask along the axis that is lower in the picture, in pixels of the
+    /// photograph.
     pub foot: [f64; 2],
     /// The other end.
     pub top: [f64; 2],
-    /// Half-widths across the axis in the middles of 24 equal parts from foot to top, in
-    /// pixels of the photograph; smoothed lightly, above 0.
+    /// Half-widths across the axis at the centres of 24 equal parts from foot to top, in
+    /// pixels of the photograph; lightly smoothed, above 0.
     pub widths: Vec<f64>,
-    /// How much speaks for each of the [`tilts`], 0 to 1: whether a flat end, a rim or a
-    /// foot, is seen as an ellipse so high.
+    /// The evidence for each of the [`tilts`], 0 to 1: whether a flat end, a rim or a
+    /// foot, is visible as an ellipse of the corresponding height.
     pub rims: Vec<f64>,
 }
 
@@ -90,7 +90,7 @@ pub struct Candidate {
     pub axes: Vec<Axis>,
 }
 
-/// The candidates of a photograph, the best first.
+/// Returns the candidates of a photograph, the best first.
 pub fn candidates(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
     let picture = Picture::of(photo, options.size.clamp(16, 1024));
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
@@ -101,8 +101,8 @@ pub fn candidates(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
 }
 
 impl Candidate {
-    /// Of a region of a picture with these edges, where a pixel is `scale` pixels of the
-    /// photograph.
+    /// Builds a candidate from a region of a picture with these edges, where a pixel is
+    /// `scale` pixels of the photograph.
     fn new(score: f64, area: Area, edges: &rim::Edges, scale: [f64; 2]) -> Option<Candidate> {
         let axes =
             mirror::mirrors(&area).iter().map(|m| profile::axis(edges, &area, m, scale)).collect();
@@ -111,7 +111,7 @@ impl Candidate {
     }
 }
 
-/// The best regions with their scores.
+/// Returns the best regions with their scores.
 fn found(picture: &Picture, most: usize) -> Vec<(f64, Area)> {
     let field = Field::new(picture, clusters::codebook(picture));
     let judge = Judge::new(picture, &field.letters);
@@ -125,8 +125,8 @@ fn found(picture: &Picture, most: usize) -> Vec<(f64, Area)> {
     suppressed(wholes.into_iter().chain(parts).collect(), OVERLAP, most)
 }
 
-/// Neighbours among the best regions put together: objects of two colours, such as a
-/// lamp's foot and its shade.
+/// Joins neighbours among the best regions, for objects of two colours, such as a lamp's
+/// foot and shade.
 fn wholes(parts: &[(f64, Area)]) -> Vec<Area> {
     let parts: Vec<&Area> = parts.iter().take(PARTS).map(|(_, area)| area).collect();
     let near: Vec<Area> =
@@ -134,7 +134,7 @@ fn wholes(parts: &[(f64, Area)]) -> Vec<Area> {
     let mut out = Vec::new();
     for (i, a) in parts.iter().enumerate() {
         for (b, near) in parts.iter().zip(&near).take(i) {
-            // Side by side: they have little in common, and touch.
+            // Side by side: they overlap little, and touch.
             if 20 * a.shared(b) <= a.count.min(b.count) && a.shared(near) >= TOUCHING {
                 out.extend(a.union(b).map(Area::filled));
             }
@@ -143,7 +143,7 @@ fn wholes(parts: &[(f64, Area)]) -> Vec<Area> {
     out
 }
 
-/// All regions that segments and clusters make, without holes.
+/// Returns all regions from segments and clusters, without holes.
 fn regions(picture: &Picture) -> Vec<Area> {
     let part = |p: f64| (p * picture.pixels() as f64).ceil() as usize;
     let (least, most) = (part(LEAST), part(MOST));

@@ -1,5 +1,5 @@
-//! A small picture as the search for candidates sees it: colours in CIE L*a*b*, how much
-//! lightness varies around a pixel, and gradients.
+//! A small picture for the search for candidates: colours in CIE L*a*b*, local variation
+//! of lightness, and gradients.
 
 use crate::vision::Photo;
 use crate::vision::color::linear_to_labs;
@@ -8,32 +8,31 @@ use crate::vision::gradient::{Gradient, colour_gradient, derivatives, smoothed};
 /// Standard deviation, pixels, of the smoothing before colours are compared (Felzenszwalb
 /// & Huttenlocher 2004, section 4).
 const SMOOTHING: f32 = 0.8;
-/// That of the Gaussian in which lightness varies.
+/// Standard deviation, pixels, of the Gaussian window for the variation of lightness.
 const AROUND: f32 = 2.0;
-/// Gradients as strong as this part of a picture's pixels have, and stronger, are edges
-/// beyond doubt.
+/// Quantile of a picture's gradient magnitudes above which gradients are certainly edges.
 const STRONG: f64 = 0.97;
 
-/// A picture at the working resolution; lists run row by row.
+/// A picture at the working resolution; lists are in row-major order.
 pub struct Picture {
     pub width: usize,
     pub height: usize,
     /// L*, a* and b*.
     pub lab: Vec<[f32; 3]>,
-    /// The same, smoothed a little.
+    /// The same, lightly smoothed.
     pub smooth: Vec<[f32; 3]>,
     /// Local standard deviation of L*.
     pub deviation: Vec<f32>,
-    /// Of L*, a* and b* together.
+    /// Gradient of L*, a* and b* together.
     pub gradient: Gradient,
-    /// Along x and y, of L* alone.
+    /// Derivatives of L* along x and y.
     pub slope: (Vec<f32>, Vec<f32>),
-    /// A gradient that is an edge beyond doubt, above 0.
+    /// A gradient that is certainly an edge, above 0.
     pub strong: f32,
 }
 
 impl Picture {
-    /// The photo with a longer side of at most `size` pixels.
+    /// Prepares a photo with a longer side of at most `size` pixels.
     pub fn of(photo: &Photo, size: u32) -> Picture {
         let photo = photo.shrunk(size);
         let (width, height) = (photo.width(), photo.height());
@@ -58,13 +57,13 @@ impl Picture {
         }
     }
 
-    /// How many pixels there are.
+    /// The number of pixels.
     pub fn pixels(&self) -> usize {
         self.lab.len()
     }
 }
 
-/// Local standard deviation of a channel.
+/// Returns the local standard deviation of a channel.
 fn deviation(width: u32, height: u32, channel: &[f32]) -> Vec<f32> {
     let mean = smoothed(width, height, channel, AROUND);
     let squares: Vec<f32> = channel.iter().map(|v| v * v).collect();

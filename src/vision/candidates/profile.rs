@@ -1,22 +1,22 @@
-//! Axes with widths: what a mirror of a region says in pixels of the photograph.
+//! Axes with widths, computed from a mirror of a region, in pixels of the photograph.
 
 use super::Axis;
 use super::area::Area;
 use super::mirror::Mirror;
 use super::rim::{Edges, rims};
 
-/// Places along an axis at which there are widths.
+/// Number of positions along an axis with widths.
 const PLACES: usize = 24;
-/// Lines across the axis for each of them.
+/// Number of lines across the axis per position.
 const LINES: usize = 4;
-/// Steps across, pixels.
+/// Step across the axis, pixels.
 const STEP: f64 = 0.25;
 
-/// The axis of a mirror of a region of a picture with these edges, where a pixel is
-/// `scale` pixels of the photograph wide and high.
+/// Returns the axis of a mirror of a region of a picture with these edges, where a pixel
+/// is `scale` pixels of the photograph wide and high.
 pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
     let normal = [libm::cos(mirror.angle), libm::sin(mirror.angle)];
-    // Upwards in the picture; to the right where it is level.
+    // Upwards in the picture; to the right if the axis is level.
     let up = if normal[0] > 0.0 { [normal[1], -normal[0]] } else { [-normal[1], normal[0]] };
     let on_axis = [0, 1].map(|c| mirror.centre[c] + mirror.offset * normal[c]);
     let (mut low, mut high, mut reach) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
@@ -39,7 +39,7 @@ pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axi
         lines.chunks(LINES).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
     let means = smoothed(&means);
     let length = high - low;
-    // By distance from the foot, linear between the middles of the parts.
+    // By distance from the foot, linear between the centres of the parts.
     let width = |d: f64| {
         let t = (d / length * PLACES as f64 - 0.5).clamp(0.0, (PLACES - 1) as f64);
         let i = (t as usize).min(PLACES - 2);
@@ -61,7 +61,7 @@ pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axi
     }
 }
 
-/// Means with the neighbours, which count half.
+/// Averages each value with its neighbours, which have half its weight.
 fn smoothed(values: &[f64]) -> Vec<f64> {
     let at = |i: usize| values[i.min(values.len() - 1)];
     (0..values.len())

@@ -1,42 +1,43 @@
-//! Flat ends seen as ellipses: a rim, a lid or a foot that is turned towards the camera.
-//! The outline shows only the far half; where the near half is an edge, its height tells
-//! the tilt, which an outline does not.
+//! Flat ends visible as ellipses: a rim, a lid or a foot that is tilted towards the
+//! camera. The outline shows only the far half; if the near half is an edge, its height
+//! determines the tilt, which the outline does not.
 
 use crate::vision::gradient::Gradient;
 
-/// Tilts that are tried, radians from level.
+/// Step and number of candidate tilts, radians from level.
 const STEP: f64 = 0.025;
 const TRIED: usize = 40;
-/// Places along the near half of an ellipse, without its ends, where it runs along the
-/// outline.
+/// Number of positions along the near half of an ellipse, excluding its ends, where it
+/// runs along the outline.
 const PLACES: usize = 25;
 const ENDS: f64 = 0.35;
-/// How far the near half is from the far one at least, pixels: nearer, it is the
-/// outline's own edge.
+/// Minimum distance of the near half from the far one, pixels: closer to it, the edge is
+/// the outline's own.
 const APART: f64 = 3.0;
 
-/// Where a picture has edges, and which way they run.
+/// The edges of a picture and their directions.
 pub struct Edges<'a> {
     pub gradient: &'a Gradient,
-    /// A gradient that is an edge beyond doubt, above 0.
+    /// A gradient that is certainly an edge, above 0.
     pub strong: f32,
 }
 
-/// The tilts that `rims` of an axis tell of, radians: below 0 the lower end is turned
-/// towards the camera, above 0 the upper end.
+/// Returns the tilts that the `rims` of an axis refer to, radians: below 0 the lower end
+/// is tilted towards the camera, above 0 the upper end.
 pub fn tilts() -> impl Iterator<Item = f64> {
     (0..TRIED).rev().map(|i| -tilt(i)).chain((0..TRIED).map(tilt))
 }
 
-/// One of the tilts that are tried at an end.
+/// Returns a candidate tilt of an end.
 fn tilt(i: usize) -> f64 {
     STEP * (i + 1) as f64
 }
 
-/// How much speaks for each tilt of an end, 0 to 1: how much more of an edge the near
-/// half of the ellipse is than those between it and the outline. `at` gives the place in
-/// the picture by the distance from the end inwards and that across the axis; `width` the
-/// half-width at such a distance; `length` is that of the axis. All in pixels.
+/// Returns the evidence for each tilt of an end, 0 to 1: how much more of an edge the
+/// near half of its ellipse is than those closer to the outline. `at` maps the distance
+/// inwards from the end and the distance across the axis to a position in the picture;
+/// `width` is the half-width at a distance from the end; `length` is that of the axis.
+/// All are in pixels.
 pub fn rims(
     edges: &Edges,
     length: f64,
@@ -53,9 +54,10 @@ pub fn rims(
     (0..TRIED).map(support).collect()
 }
 
-/// How much of an edge the near half of an ellipse is, 0 to 1: of one whose far half ends
-/// where the axis does, with the half-width there and `flat` times as high as wide.
-/// `None` where it is not apart from the far half, or not within the object.
+/// Returns the edge strength along the near half of an ellipse, 0 to 1. Its far half ends
+/// where the axis does, its half-width is that of the object there, and it is `flat`
+/// times as high as wide. `None` if the near half is not distinct from the far half, or
+/// not within the object.
 fn near_half(
     edges: &Edges,
     flat: f64,
@@ -63,7 +65,7 @@ fn near_half(
     width: &impl Fn(f64) -> f64,
     at: &impl Fn(f64, f64) -> [f64; 2],
 ) -> Option<f64> {
-    // Where the ellipse's middle is depends on how wide the outline is there.
+    // The position of the ellipse's centre depends on the outline's width there.
     let middle = (0..8).fold(0.0, |middle: f64, _| 0.5 * (middle + flat * width(middle)));
     let across = width(middle);
     let high = flat * across;
@@ -74,8 +76,8 @@ fn near_half(
         let angle = ENDS + (std::f64::consts::PI - 2.0 * ENDS) * i as f64 / (PLACES - 1) as f64;
         let (c, s) = (libm::cos(angle), libm::sin(angle));
         let [x, y] = at(middle + high * s, across * c);
-        // The normal of the ellipse, in the picture: its direction is that between two
-        // places.
+        // The normal of the ellipse in the picture is the direction between two
+        // positions.
         let ([x1, y1], [x2, y2]) = (at(middle, 0.0), at(middle + across * s, high * c));
         let (dx, dy) = (x2 - x1, y2 - y1);
         directed(edges.gradient, [x, y], [dx, dy]) / f64::from(edges.strong)
@@ -83,7 +85,8 @@ fn near_half(
     Some((0..PLACES).map(|i| edge(i).min(1.0)).sum::<f64>() / PLACES as f64)
 }
 
-/// The change of colour along a direction at a place, per pixel; 0 beyond the picture.
+/// Returns the change of colour along a direction at a position, per pixel; 0 beyond the
+/// picture.
 fn directed(gradient: &Gradient, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) -> f64 {
     let inside = |v: f64, most: u32| v >= 0.0 && v < f64::from(most);
     if !inside(x, gradient.width) || !inside(y, gradient.height) {

@@ -1,22 +1,22 @@
-//! How much a region looks like the silhouette of an object of revolution.
+//! Scores how much a region looks like the silhouette of an object of revolution.
 
 use super::area::Area;
 use super::clusters::LETTERS;
 use super::mirror::symmetry;
 use super::picture::Picture;
 
-/// What is less symmetric is no lathe, whatever else speaks for it.
+/// Minimum symmetry of an object of revolution, whatever its other properties.
 const SYMMETRIC: f64 = 0.5;
 
-/// What regions of a picture are judged with.
+/// Data for scoring regions of a picture.
 pub struct Judge<'a> {
     letters: &'a [u8],
-    /// How much of an edge there is at a pixel or beside it, 0 to 1.
+    /// The edge strength at a pixel or beside it, 0 to 1.
     edges: Vec<f32>,
 }
 
 impl Judge<'_> {
-    /// Of a picture and its letters.
+    /// Prepares a picture with its letters.
     pub fn new<'a>(picture: &Picture, letters: &'a [u8]) -> Judge<'a> {
         let (w, h) = (picture.width, picture.height);
         let most = |p: usize| {
@@ -29,9 +29,10 @@ impl Judge<'_> {
         Judge { letters, edges: (0..w * h).map(|p| (most(p) / picture.strong).min(1.0)).collect() }
     }
 
-    /// The score of a region, at least 0. Symmetry is what tells lathes from other
-    /// things. The rest: edges along the outline, colours unlike those around, little of
-    /// the outline at the picture's frame, and a size worth looking at.
+    /// Returns the score of a region, at least 0. Symmetry is what distinguishes objects
+    /// of revolution from others. The other factors are edges along the outline, contrast
+    /// with the surrounding colours, little outline at the picture's frame, and a
+    /// sufficient size.
     pub fn score(&self, area: &Area) -> f64 {
         let part = area.count as f64 / area.on.len() as f64;
         let fade = ((0.65 - part) / 0.15).clamp(0.0, 1.0);
@@ -53,8 +54,8 @@ impl Judge<'_> {
         symmetry * symmetry * support * chi * chi * inside * size * fade
     }
 
-    /// One less the Bhattacharyya coefficient of the letters of a region and of a ring
-    /// around it; 0 without a ring.
+    /// Returns one minus the Bhattacharyya coefficient between the letters of a region
+    /// and of a ring around it; 0 without a ring.
     fn contrast(&self, area: &Area) -> f64 {
         let ring = area.dilated((0.15 * (area.count as f64).sqrt()).max(3.0) as usize);
         let mut counts = [[0u32; LETTERS]; 2];
@@ -71,10 +72,10 @@ impl Judge<'_> {
     }
 }
 
-/// The best regions by score, at most `most`, none of which overlaps a better one by more
-/// than `overlap` (intersection over union).
+/// Returns the best regions by score, at most `most`, none of which overlaps a better one
+/// by more than `overlap` (intersection over union).
 pub fn suppressed(mut scored: Vec<(f64, Area)>, overlap: f64, most: usize) -> Vec<(f64, Area)> {
-    // Stable: equals stay in the order they were found in.
+    // A stable sort: equal scores stay in their original order.
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<(f64, Area)> = Vec::new();
     for (score, area) in scored {

@@ -1,4 +1,4 @@
-//! A drawn vase is found, and the steps do what they say.
+//! Tests of the detection of a drawn vase, and of the individual steps.
 
 use super::*;
 use crate::vision::ContourMap;
@@ -6,31 +6,31 @@ use image::{Rgb, RgbImage};
 
 const WIDTH: u32 = 240;
 const HEIGHT: u32 = 200;
-/// Where the middle of the drawn vase's axis is, and its length, pixels.
+/// The middle of the drawn vase's axis, and its length, pixels.
 const MIDDLE: [f64; 2] = [108.0, 97.0];
 const LENGTH: f64 = 120.0;
 
-/// A number in 0..1 that looks random.
+/// Returns a pseudo-random number in 0..1.
 fn noise(i: u32) -> f64 {
     let x = i.wrapping_mul(0x9e37_79b9) ^ (i >> 3);
     let x = (x ^ x >> 15).wrapping_mul(0x85eb_ca6b);
     f64::from((x ^ x >> 13) >> 8) / f64::from(1 << 24)
 }
 
-/// The half-width of the vase at a part of the way from foot to top.
+/// The half-width of the vase at a fraction of the way from foot to top.
 fn profile(t: f64) -> f64 {
     22.0 + 14.0 * libm::sin(5.0 * t)
 }
 
-/// Where a pixel is along the vase, 0 at the foot and 1 at the top, and across its axis,
-/// which leans by an angle to the right.
+/// The position of a pixel along the vase, 0 at the foot and 1 at the top, and across its
+/// axis, which leans to the right by an angle.
 fn place(i: u32, j: u32, lean: f64) -> (f64, f64) {
     let (x, y) = (f64::from(i) + 0.5 - MIDDLE[0], f64::from(j) + 0.5 - MIDDLE[1]);
     let (s, c) = (libm::sin(lean), libm::cos(lean));
     ((x * s - y * c) / LENGTH + 0.5, x * c + y * s)
 }
 
-/// A bright vase before a darker, speckled ground, and its mask.
+/// A bright vase before a darker, speckled background, and its mask.
 fn vase(lean: f64) -> (Photo, Mask) {
     let inside = |i: u32, j: u32| {
         let (t, across) = place(i, j, lean);
@@ -62,7 +62,7 @@ fn check_vase(lean: f64) {
     check_first(&found, &truth, lean);
 }
 
-/// Whether the vase comes first in a list, with its axis and its widths.
+/// Checks that the vase comes first in a list, with its axis and its widths.
 fn check_first(found: &[Candidate], truth: &Mask, lean: f64) {
     let first = found.first().expect("nothing was found");
     let overlap = iou(&first.mask, &truth.resized(first.mask.width(), first.mask.height()));
@@ -119,7 +119,7 @@ fn the_same_photo_gives_the_same_list() {
     assert!(candidates(&photo, &CandidateOptions { size: 96, most: 0 }).is_empty());
 }
 
-/// What any list has to be, whatever the picture.
+/// Checks the properties that any list has, whatever the picture.
 fn check_list(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
     let found = candidates(photo, options);
     assert!(found.len() <= options.most);
@@ -156,7 +156,7 @@ fn any_photo_gives_a_sane_list() {
     check_list(&photo(60, 40, &|i, _| if i < 30 { [0; 3] } else { [255; 3] }), &options);
 }
 
-/// Of rows of a drawing, `#` is on.
+/// An area drawn in rows, where `#` is on.
 fn area(rows: &[&str]) -> Area {
     let on = rows.iter().flat_map(|r| r.bytes()).map(|b| b == b'#').collect();
     Area::new(rows[0].len(), rows.len(), on).unwrap()
@@ -203,7 +203,7 @@ fn mirrors_of_a_leaning_ellipse() {
     }
     assert!(mirrors.iter().all(|m| m.symmetry > 0.95 && m.offset.abs() < 0.3));
     assert!(mirror::symmetry(&area) > 0.93);
-    // Half of it is one but for the long axis.
+    // A half of it, cut obliquely to its axes, is less symmetric.
     let half = |p: usize| inside(p % 80, p / 80) && p % 80 < 40;
     let half = Area::new(80, 60, (0..80 * 60).map(half).collect()).unwrap();
     assert!(mirror::symmetry(&half) < 0.9);
@@ -241,7 +241,7 @@ fn a_cut_moves_to_the_object() {
     let picture = Picture::of(&photo, 128);
     let truth = truth.resized(picture.width as u32, picture.height as u32);
     let truth = Area::new(picture.width, picture.height, truth.data().to_vec()).unwrap();
-    // Its shape, a little beside it.
+    // Its shape, shifted slightly.
     let seed = |p: usize| p % picture.width >= 2 && truth.on[p - 2];
     let seed = Area::new(picture.width, picture.height, (0..picture.pixels()).map(seed).collect())
         .unwrap();
@@ -256,8 +256,8 @@ fn a_cut_moves_to_the_object() {
     assert_eq!(suppressed(vec![(0.2, truth.clone()), (0.3, truth)], OVERLAP, 9).len(), 1);
 }
 
-/// A bright vessel before a darker ground, seen from above by a tilt: a cylinder with a
-/// dark inside.
+/// A bright vessel before a darker background, seen from above by a tilt: a cylinder with
+/// a dark inside.
 fn vessel(tilt: f64, below: bool) -> Photo {
     const RADIUS: f64 = 40.0;
     let (flat, rim, foot) = (RADIUS * libm::sin(tilt), 75.0, 75.0 + 80.0 * libm::cos(tilt));
@@ -277,7 +277,7 @@ fn vessel(tilt: f64, below: bool) -> Photo {
     Photo::from_rgb(picture).unwrap()
 }
 
-/// The near half of the rim tells the tilt, from above and from below.
+/// The near half of the rim determines the tilt, from above and from below.
 #[test]
 fn rims_tell_tilts() {
     let tilts: Vec<f64> = tilts().collect();
@@ -293,13 +293,13 @@ fn rims_tell_tilts() {
             axis.rims[best]
         );
     }
-    // Nothing speaks for a tilt of what has no flat end.
+    // Without a flat end there is little evidence for any tilt.
     let (photo, _) = vase(0.0);
     let rims = &candidates(&photo, &CandidateOptions::default())[0].axes[0].rims;
     assert!(rims.iter().all(|r| (0.0..0.35).contains(r)), "{rims:?}");
 }
 
-/// Points a pixel apart along lines between places.
+/// Adds points a pixel apart along lines between positions.
 fn lines(places: &[[f64; 2]], map: &mut ContourMap) {
     for ends in places.windows(2) {
         let d = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
@@ -316,7 +316,7 @@ fn lines(places: &[[f64; 2]], map: &mut ContourMap) {
     }
 }
 
-/// The outline of the vase from its foot up, over the top and down again, and at last
+/// The outline of the vase from its foot up, over the top and down again, and finally
 /// along the foot.
 fn outline(lean: f64) -> Vec<[f64; 2]> {
     let (s, c) = (libm::sin(lean), libm::cos(lean));
@@ -343,7 +343,7 @@ fn clean_contours_enclose_a_vase() {
             iou(&all[0].mask, &truth.resized(all[0].mask.width(), all[0].mask.height()))
         };
         assert!(found.len() == 1 && whole(&found) > 0.95, "{}", whole(&found));
-        // With gaps of six pixels, and smaller, as a program may ask.
+        // With gaps of six pixels, and at smaller sizes.
         let mut gaps = ContourMap::new(WIDTH, HEIGHT);
         outline(lean).chunks(20).for_each(|part| lines(part, &mut gaps));
         let closed = enclosed(&gaps, &options);
@@ -351,7 +351,7 @@ fn clean_contours_enclose_a_vase() {
         assert!(whole(&enclosed(&map, &CandidateOptions { size: 96, most: 5 })) > 0.88);
         assert!(enclosed(&map, &CandidateOptions { most: 0, ..options }).is_empty());
     }
-    // An outline that does not close, and no outline.
+    // An outline that does not close, and an empty one.
     let mut open = ContourMap::new(WIDTH, HEIGHT);
     lines(&[[60.0, 40.0], [60.0, 160.0], [160.0, 160.0], [160.0, 40.0]], &mut open);
     assert!(enclosed(&open, &options).is_empty());
@@ -359,7 +359,7 @@ fn clean_contours_enclose_a_vase() {
     assert!(enclosed(&ContourMap::default(), &options).is_empty());
 }
 
-/// The inner edge of a rim tells the tilt in clean contours, too.
+/// The inner edge of a rim determines the tilt in clean contours, too.
 #[test]
 fn rims_of_clean_contours_tell_tilts() {
     const RADIUS: f64 = 40.0;
@@ -380,7 +380,7 @@ fn rims_of_clean_contours_tell_tilts() {
             .chain([[120.0 - RADIUS, rim]]);
         lines(&below.collect::<Vec<_>>(), &mut map);
         let found = enclosed(&map, &CandidateOptions { size: 256, most: 20 });
-        // The axis that stands upright, which need not be the more symmetric one.
+        // The upright axis, which need not be the most symmetric one.
         let upright = |a: &&Axis| (a.top[0] - a.foot[0]).abs() < 4.0;
         let axis =
             found.first().and_then(|c| c.axes.iter().find(upright)).expect("no upright axis");

@@ -1,6 +1,6 @@
-//! The derivatives of the chamfer score by the rendered elements. The score is piecewise
-//! smooth: at the lines of the grid, and where another piece becomes the nearest, they
-//! are those of one side.
+//! The derivatives of the chamfer score with respect to the rendered elements. The score
+//! is piecewise smooth: on grid lines, and where a different piece becomes the nearest,
+//! they are one-sided.
 
 use super::super::elements::{Element, Elements};
 use super::super::field::{PER_RADIAN, channel};
@@ -8,8 +8,9 @@ use super::reverse::Piece;
 use super::{Chamfer, Mode, NOTHING, Scratch};
 
 impl Chamfer {
-    /// The derivatives of [`Chamfer::log_likelihood`] by each element's x, y, length
-    /// (pixels) and angle (radians, from right to down) into `out`, and the one by sigma.
+    /// Computes the derivatives of [`Chamfer::log_likelihood`] with respect to each
+    /// element's x, y, length (pixels) and angle (radians, from right to down) into
+    /// `out`, and returns the derivative with respect to sigma.
     pub fn gradient(
         &self,
         elements: &Elements<'_>,
@@ -25,7 +26,7 @@ impl Chamfer {
         let rho = share * (forth.mean() + back.map_or(0.0, |b| b.mean()));
         let outer = -share * rho / square;
         let mean = forth.mean();
-        // By a length and by its distance, of a unit length.
+        // Derivatives with respect to a length and, per unit length, its distance.
         let slopes = |length: f64, mean: f64, d: f64| match self.options.mode {
             Mode::Mean => (outer * (d - mean) / length, outer / length),
             Mode::Sum => (self.log_normal(d), -d / square),
@@ -95,7 +96,7 @@ fn by_index(elements: &Elements<'_>) -> Vec<Option<Element>> {
 }
 
 /// The derivatives of the distance from an observed point to a rendered piece, in pixels,
-/// by the piece's x, y, length and angle.
+/// with respect to the piece's x, y, length and angle.
 fn distance_slope(point: &Piece, piece: &Piece, turn: f32) -> [f64; 4] {
     let (p, e) = (&point.edge, &piece.edge);
     let (dx, dy) = (p.x - e.x, p.y - e.y);
@@ -103,13 +104,13 @@ fn distance_slope(point: &Piece, piece: &Piece, turn: f32) -> [f64; 4] {
     let held = along.clamp(-e.half, e.half);
     let (ux, uy) = (dx - held * e.tx, dy - held * e.ty);
     let distance = (ux * ux + uy * uy).sqrt();
-    // On the piece itself the distance has no slope.
+    // On the piece itself the distance has a kink; 0 is used as its derivative.
     let (ux, uy) = if distance > 0.0 { (ux / distance, uy / distance) } else { (0.0, 0.0) };
     let by_length =
         if along.abs() > e.half { -0.5 * along.signum() * (ux * e.tx + uy * e.ty) } else { 0.0 };
     let mut by_angle = -held * (uy * e.tx - ux * e.ty);
     if turn > 0.0 {
-        // Shorter one way round or the other.
+        // The shorter way around.
         let d = channel(e.tx, e.ty) - p.turn;
         let half = 0.5 * super::CHANNELS as f32;
         let sign = if d.abs() > half { -d.signum() } else { d.signum() };

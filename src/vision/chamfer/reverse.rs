@@ -1,45 +1,45 @@
-//! Distances from the observed contours to the rendered ones, exact and continuous, by
-//! buckets of elements. Per evaluation it fills a scratch and walks the observed points;
-//! it renders nothing. Invariant: the result does not depend on the order of the
-//! elements, and every candidate that could be nearest is looked at.
+//! Exact and continuous distances from the observed contours to the rendered ones, by
+//! means of buckets of elements. An evaluation fills a scratch and visits the observed
+//! points; it does not render. Invariant: the result does not depend on the order of the
+//! elements, and every candidate that could be the nearest is examined.
 
 use super::super::elements::Elements;
 use super::super::field::{Edge, Edges, channel, turn_between};
 
-/// Buckets along the longer side.
+/// Number of buckets along the longer side.
 const BUCKETS: f32 = 12.0;
 
-/// Observed points that are measured; of more, every so many-th in the order of the
-/// buckets stands for its neighbours.
+/// Maximum number of observed points that are measured. Of more points, every n-th in the
+/// order of the buckets stands for its neighbours.
 pub const MOST_OBSERVED: usize = 512;
 
-/// Memory that evaluations reuse.
+/// Memory reused between evaluations.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
     pieces: Vec<Piece>,
     sorted: Vec<Piece>,
-    /// Where each bucket starts in `sorted`, and at the end its length.
+    /// The start of each bucket in `sorted`, and finally the length of `sorted`.
     start: Vec<u32>,
     filled: Vec<Filled>,
     near: Vec<(f32, u32)>,
 }
 
-/// A bucket that is not empty.
+/// A non-empty bucket.
 #[derive(Debug, Clone, Copy)]
 struct Filled {
     bucket: u32,
     across: u16,
     down: u16,
-    /// The least cost of a piece in it.
+    /// The lowest cost of a piece in it.
     cost: f32,
 }
 
-/// A piece of contour and what it costs, in pixels, besides the distance.
+/// A piece of contour and its cost, in pixels, besides the distance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
     pub edge: Edge,
     cost: f32,
-    /// The element, of rendered pieces.
+    /// The index of the element, for rendered pieces.
     pub index: u32,
 }
 
@@ -47,20 +47,20 @@ pub(super) struct Piece {
 #[derive(Debug, Clone)]
 pub(super) struct Reverse {
     points: Vec<Piece>,
-    /// Observed points that each one stands for.
+    /// Number of observed points that each point stands for.
     stands_for: f32,
     start: Vec<u32>,
     across: usize,
     down: usize,
     /// Side of a bucket in pixels.
     side: f32,
-    /// Least and greatest distance in pixels between points of two buckets, by how many
-    /// lie between them down and across.
+    /// Minimum and maximum distance in pixels between points of two buckets, by the
+    /// number of rows and columns that separate the buckets.
     gaps: Vec<(f32, f32)>,
 }
 
 impl Reverse {
-    /// Keeps the observed points in the frame's pixels.
+    /// Converts the observed points to pixels of the frame and sorts them.
     pub fn new(grid: &Edges, width: u32, height: u32) -> Self {
         let side = (width.max(height) as f32 / BUCKETS).max(1.0);
         let across = ((width as f32 / side).ceil() as usize).max(1);
@@ -131,10 +131,11 @@ impl Reverse {
         v * self.across + u
     }
 
-    /// Calls `f(length, distance, pair)` for every observed point, in a fixed order, both
-    /// in pixels, with the point and the piece it is measured to. `turn` is the cost in
-    /// pixels of one channel's turn. An element partly in view costs up to a diagonal
-    /// more, so that none appears suddenly. With nothing in view distances are infinite.
+    /// Calls `f(length, distance, pair)` for every observed point in a fixed order, where
+    /// length and distance are in pixels and the pair is the point and the piece nearest
+    /// to it. `turn` is the cost in pixels of a difference of one orientation channel. An
+    /// element partly in view costs up to a diagonal more, so that elements do not appear
+    /// suddenly. With nothing in view, distances are infinite.
     pub fn each(
         &self,
         elements: &Elements<'_>,
@@ -150,8 +151,8 @@ impl Reverse {
             let edge = Edge { x: e.x, y: e.y, tx: e.tx, ty: e.ty, half: 0.5 * e.length, turn };
             Piece { edge, cost: (1.0 - e.weight) * diagonal, index: e.index as u32 }
         }));
-        // Pieces reach out of their bucket by half their length, and half a pixel at the
-        // border.
+        // Pieces extend beyond their bucket by half their length, and by half a pixel at
+        // the border.
         let slack = pieces.iter().map(|p| p.edge.half).fold(0.0, f32::max) + 1.0;
         self.sort(pieces, start, sorted);
         filled.clear();

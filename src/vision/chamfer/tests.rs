@@ -1,4 +1,4 @@
-//! Tests of the chamfer comparator against plainly written distances.
+//! Tests of the chamfer comparator against a brute-force reference.
 
 use super::super::testing::{Pieces, clutter, comings_and_goings, numbers};
 use super::*;
@@ -47,7 +47,7 @@ fn slow(a: &Pieces, b: &Pieces, half: impl Fn(usize) -> f32, per_radian: f64) ->
     sum / length
 }
 
-/// Half lengths of the observed pieces: a pixel's chord.
+/// Half lengths of the observed pieces: half the chord of a pixel.
 fn chord(p: &Pieces) -> impl Fn(usize) -> f32 {
     |j| 0.5 / p.tx[j].abs().max(p.ty[j].abs())
 }
@@ -73,7 +73,7 @@ fn orientation_costs_as_the_plain_one() {
     let fast =
         Chamfer::prepare(&seen.map(), 128, 128, &turned).unwrap().distance(&drawn.elements());
     let plain = slow(&drawn, &seen, chord(&seen), 3.0);
-    // Orientations are held in eight channels.
+    // Orientations are quantised to eight channels.
     assert!((fast - plain).abs() < 0.12 * plain, "{fast} {plain}");
 }
 
@@ -127,9 +127,9 @@ fn log_normal_of_the_distance() {
     let rho = c.distance(&drawn.elements());
     let exact = -0.5 * (rho / 0.7).powi(2) - 0.7f64.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln();
     assert!((c.log_likelihood(&drawn.elements()) - exact).abs() < 1e-12);
-    // Radius off by 0.02 of the width: 2 / sqrt 2 percent of the diagonal.
+    // The radius is off by 0.02 of the width: 2 / sqrt 2 percent of the diagonal.
     assert!((rho - std::f64::consts::SQRT_2).abs() < 0.05, "{rho}");
-    // A sum over pieces that are all equally far is the length in percent times one
+    // With all pieces equally far, the sum is the length in percent times one log
     // density.
     let sum = ChamferOptions { sigma: 0.7, mode: Mode::Sum, ..options() };
     let sum =
@@ -218,8 +218,8 @@ fn gradient_is_that_of_differences() {
         let numeric = (scored(5.001) - scored(4.999)) / 0.002;
         assert!((numeric - by_sigma).abs() < 1e-5 * numeric.abs(), "{o:?}: {numeric} {by_sigma}");
         let bad = drawn.differing(&out, |e| c.log_likelihood(e));
-        // A difference that straddles a line of the grid, or two nearest pieces, need not
-        // agree.
+        // A finite difference across a grid line, or between two nearest pieces, may
+        // differ.
         assert!(bad <= 16, "{o:?}: {bad} of 248 differ");
     }
 }

@@ -1,39 +1,38 @@
-//! The log ratio at every place of the grid: how the distance to the nearest edge is
-//! distributed round that place, and how much likelier an edge of one's own makes the
-//! distance found. For one orientation channel at a time. Invariant: every density is
-//! positive and integrates to 1 with the mass at the truncation, so every score is
-//! finite.
+//! The log ratio at every sample of the grid, for one orientation channel at a time: how
+//! the distance to the nearest edge is distributed around that sample, and how much
+//! likelier its own distance is if the piece has a matching edge. Invariant: every
+//! density is positive and integrates to 1 together with the mass beyond the truncation,
+//! so every score is finite.
 //!
-//! Counts are taken over tiles, tiles are added up to windows centred on tiles, and
-//! densities between window centres and between bin centres are interpolated linearly.
+//! Distances are counted per tile, tiles are summed to windows centred on tiles, and
+//! densities are interpolated linearly between window centres and between bin centres.
 
 use super::super::field::Edges;
 use super::ContourRatioOptions;
 use super::ratio::Ratio;
 use crate::num::simd::vectorised;
 
-/// Bins of the distance, up to the truncation.
+/// Number of bins of the distance, up to the truncation.
 const BINS: usize = 24;
 
-/// Tiles along the longer side of the picture.
+/// Number of tiles along the longer side of the picture.
 const TILES: usize = 32;
 
-/// What the whole picture's distribution counts for in a window's, as a share of the
-/// window.
+/// Weight of the whole picture's distribution in the distribution of a window.
 const PRIOR: f64 = 0.05;
 
-/// A distribution of distances: the bins' masses. What is missing to 1 lies beyond the
-/// truncation.
+/// A distribution of distances: the masses of the bins. The remainder to 1 lies beyond
+/// the truncation.
 type Masses = [f32; BINS];
 
-/// The score at every place, from the distances in percent of the diagonal.
+/// Returns the score at every sample, given the distances in percent of the diagonal.
 pub(super) fn scores(grid: &Edges, distance: &[f32], options: &ContourRatioOptions) -> Vec<f32> {
     let w = grid.width as usize;
     let mut windows = Windows::new(w, grid.height as usize, distance, options);
     let bin = options.truncate / BINS as f64;
     let ratio = Ratio::new(options);
     let mut out = vec![libm::log(1.0 - options.foreground) as f32; distance.len()];
-    // The places of a row that are near an edge, side by side.
+    // The samples of a row that are near an edge, packed.
     let (mut places, mut near, mut density) =
         (Vec::with_capacity(w), Vec::with_capacity(w), Vec::with_capacity(w));
     let mut scores = Vec::with_capacity(w);
@@ -58,21 +57,21 @@ pub(super) fn scores(grid: &Edges, distance: &[f32], options: &ContourRatioOptio
     out
 }
 
-/// A bin's mass in the windows about a place, and how much more there is in the next bin:
-/// up left, up right, down left, down right.
+/// A bin's mass in the four windows around a sample (top left, top right, bottom left,
+/// bottom right), and the differences to the next bin.
 type Quad = [[f32; 4]; 2];
 
-/// The windows' distributions.
+/// The distributions of the windows.
 struct Windows {
     down: usize,
     /// Side of a tile in grid units.
     side: f32,
     masses: Vec<Masses>,
-    /// For every column the window on its left, and how far it is to the next one.
+    /// For every column the window to its left, and the fraction of the way to the next.
     columns: Vec<(u32, f32)>,
-    /// How far the row that was entered is from the windows above it.
+    /// The current row's fraction of the way from the window row above to the one below.
     below: f32,
-    /// The window row above it, and the quads between that and the next.
+    /// The window row above the current row, and the quads between it and the next.
     above: usize,
     quads: Vec<[Quad; BINS]>,
 }
@@ -94,7 +93,7 @@ impl Windows {
         for tile in &counts {
             all.iter_mut().zip(tile).for_each(|(a, &n)| *a += u64::from(n));
         }
-        // A little of everything, so that no density is 0.
+        // One extra count per bin, so that no density is 0.
         let total = all.iter().sum::<u64>() as f64 + (BINS + 1) as f64;
         let reach_x = (0.5 * options.window * w as f64 / side as f64).max(0.5);
         let reach_y = (0.5 * options.window * h as f64 / side as f64).max(0.5);
@@ -141,7 +140,7 @@ impl Windows {
         }
     }
 
-    /// Turns to a row of the grid.
+    /// Moves to a row of the grid.
     fn enter(&mut self, y: f32) {
         let (v0, v1, below) = between((y + 0.5) / self.side - 0.5, self.down);
         self.below = below;
@@ -161,7 +160,7 @@ impl Windows {
         }
     }
 
-    /// The mass per bin at a place of that row and a distance in bins.
+    /// Returns the mass per bin at a column of the current row and a distance in bins.
     #[inline]
     fn mass(&self, x: usize, bins: f32) -> f32 {
         let (left, fu) = self.columns[x];
@@ -173,8 +172,8 @@ impl Windows {
     }
 }
 
-/// The tiles within `reach` tiles of the middle of tile `at`, each with the part of it
-/// that is covered.
+/// The tiles within `reach` tiles of the centre of tile `at`, each with its covered
+/// fraction.
 fn overlap(at: usize, reach: f64, n: usize) -> impl Iterator<Item = (usize, f64)> {
     let (low, high) = (at as f64 + 0.5 - reach, at as f64 + 0.5 + reach);
     let first = low.max(0.0) as usize;
@@ -182,7 +181,8 @@ fn overlap(at: usize, reach: f64, n: usize) -> impl Iterator<Item = (usize, f64)
     (first..last).map(move |t| (t, (high.min(t as f64 + 1.0) - low.max(t as f64)).max(0.0)))
 }
 
-/// The two of `n` samples next to a position, clamped, and the fraction between them.
+/// The two of `n` samples next to a position, clamped to the ends, and the fraction
+/// between them.
 #[inline]
 fn between(position: f32, n: usize) -> (usize, usize, f32) {
     let p = position.clamp(0.0, (n - 1) as f32);

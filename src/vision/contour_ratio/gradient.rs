@@ -1,6 +1,6 @@
-//! The derivatives of the contour ratio by the rendered elements: those of the table,
-//! read between its places, and of what groups of edges pay. At the lines of the grid
-//! they are those of one side.
+//! The derivatives of the contour ratio with respect to the rendered elements: those of
+//! the interpolated table and of the groups' matched scores. On grid lines, where the
+//! score has a kink, they are one-sided.
 
 use super::super::elements::Elements;
 use super::super::field::{PER_RADIAN, channels_of};
@@ -8,8 +8,9 @@ use super::match_capacity::NO_GROUP;
 use super::{ContourRatio, Scratch};
 
 impl ContourRatio {
-    /// The derivatives of [`ContourRatio::log_likelihood`] by each element's x, y, length
-    /// (pixels) and angle (radians, from right to down) into `out`.
+    /// Computes the derivatives of [`ContourRatio::log_likelihood`] with respect to each
+    /// element's x, y, length (pixels) and angle (radians, from right to down) into
+    /// `out`.
     pub fn gradient(
         &self,
         elements: &Elements<'_>,
@@ -18,7 +19,7 @@ impl ContourRatio {
     ) {
         out.clear();
         out.resize(elements.len(), [0.0; 4]);
-        // Fills in what every group is asked for.
+        // Fills in every group's assignments.
         self.log_likelihood_with(elements, scratch);
         let samples = self.grid.width as usize * self.grid.height as usize;
         let factor = self.options.weight / self.options.unit;
@@ -26,7 +27,7 @@ impl ContourRatio {
             .in_view()
             .map(|e| (f64::from(e.length * e.weight) * self.percent).min(1e4))
             .sum();
-        // With too little in view, each unit of length takes away some of the penalty.
+        // With too little contour in view, each unit of length reduces the penalty.
         let missing = if length < self.options.least {
             -self.options.nothing * libm::log(1.0 - self.options.foreground) / self.options.least
         } else {
@@ -36,7 +37,7 @@ impl ContourRatio {
             let Some(place) = out.get_mut(e.index) else { continue };
             let (low, high, f) = channels_of(e.tx, e.ty);
             let corners = self.grid.corners(e.x, e.y);
-            // What a unit of length brings in each channel, with its slopes over the
+            // The score per unit length in each channel, and its derivatives over the
             // grid.
             let read = |k: usize| {
                 let [a, b, c, d] = corners.at.map(|at| match self.cells.get(k * samples + at) {

@@ -1,23 +1,24 @@
-//! How often observed edges pay: edges in one small cell of the picture and of like
-//! orientation form a group, whose positive scores are scaled down once the contour that
-//! claims them is longer than `match_capacity` times the edges themselves. It scores nothing.
-//! Invariant: exact integer sums per group, so the order of the claims has no influence,
-//! and every share is a continuous function of the claims.
+//! How much rendered contour observed edges can match. Edges in one small cell of the
+//! picture and of similar orientation form a group; the positive scores matched to a
+//! group are scaled down once the contour assigned to it is longer than `match_capacity`
+//! times the group's edges. The log ratios themselves are computed elsewhere. Invariant:
+//! sums per group are exact integers, so the order of assignments does not matter, and
+//! every matched score is a continuous function of the assigned lengths and scores.
 //!
-//! Groups, and not single edge pixels, because a piece of contour at a coarse resolution
-//! is longer than an edge pixel.
+//! Edges are grouped, and not limited one by one, because a piece of contour at a coarse
+//! resolution is longer than an edge pixel.
 
 use super::super::field::{CHANNELS, Edges};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// Where nothing pays.
+/// Marks a cell that is not matched to any group.
 pub(super) const NO_GROUP: u32 = u32::MAX;
 
 /// Cells along the picture's longer side.
 const CELLS: f32 = 64.0;
 
-/// Steps per percent of contour and per unit of score.
+/// Fixed-point steps per percent of contour and per unit of score.
 const FIXED: f64 = (1u64 << 32) as f64;
 
 /// The groups of observed edges.
@@ -25,18 +26,19 @@ const FIXED: f64 = (1u64 << 32) as f64;
 pub(super) struct MatchCapacity {
     /// Group of every edge.
     group: Vec<u32>,
-    /// The length each group pays for, in percent of the diagonal.
+    /// The length of contour each group can match at full score, in percent of the
+    /// diagonal.
     limit: Vec<f64>,
 }
 
 impl MatchCapacity {
-    /// Groups edges; a cell is no smaller than a pixel of the frame (`pixel`, in grid
+    /// Groups edges into cells of at least one pixel of the frame (`pixel`, in grid
     /// units).
     pub fn new(grid: &Edges, pixel: f32, match_capacity: f64) -> Self {
         let side = (grid.width.max(grid.height) as f32 / CELLS).max(pixel);
         let mut numbers: FxHashMap<(u32, u32, u32), u32> = FxHashMap::default();
         let mut limit: Vec<f64> = Vec::new();
-        // Numbers are given in the order of the edges; the map is only looked up.
+        // Groups are numbered in the order of the edges; the map is never iterated over.
         let group = grid
             .edges
             .iter()
@@ -54,29 +56,30 @@ impl MatchCapacity {
         MatchCapacity { group, limit }
     }
 
-    /// The group of an edge.
+    /// Returns the group of an edge.
     pub fn group(&self, edge: u32) -> u32 {
         self.group.get(edge as usize).copied().unwrap_or(NO_GROUP)
     }
 
-    /// The number of groups.
+    /// Returns the number of groups.
     pub fn groups(&self) -> usize {
         self.limit.len()
     }
 }
 
-/// What a group was asked for, and what it paid when that was settled last.
+/// The contour assigned to a group, and its matched score when last updated.
 #[derive(Debug, Clone, Copy, Default)]
 struct Assignment {
     length: i64,
     score: i64,
     matched: i64,
-    /// Whether it was ever asked, and whether so since it was settled.
+    /// Whether anything was ever assigned, and whether anything was since the last update
+    /// of `matched`.
     known: bool,
     open: bool,
 }
 
-/// A state to come back to.
+/// A state to return to.
 pub(super) struct Savepoint {
     known: usize,
     matched: i64,
@@ -84,28 +87,28 @@ pub(super) struct Savepoint {
     length: i64,
 }
 
-/// The claims of some contour, of which pieces may come and go. Reused from evaluation to
-/// evaluation.
+/// The assignments of some contours, to which pieces can be added and from which they can
+/// be removed. Reused between evaluations.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
     assignments: Vec<Assignment>,
-    /// Groups that were ever asked.
+    /// Groups that were ever assigned to.
     known: Vec<u32>,
-    /// Groups asked since the last settlement.
+    /// Groups assigned to since the last update of `matched`.
     open: Vec<u32>,
     matched: i64,
-    /// Length times score of what no group pays for, and length.
+    /// Sum of length times score of unmatched contour, and total length of contour.
     pub(super) total: i64,
     pub(super) length: i64,
-    /// Claims as they were at the mark, and whether there is one.
+    /// Assignments as they were at the savepoint, and whether there is a savepoint.
     log: Vec<(u32, Assignment)>,
     marked: bool,
-    /// The contours whose claims these are, if they have a name.
+    /// Identifies the assigned contours, if known.
     pub(super) of: Option<Arc<()>>,
 }
 
 impl Scratch {
-    /// Makes room for `groups`, all unclaimed.
+    /// Makes room for `groups`, all without assignments.
     pub(super) fn begin(&mut self, groups: usize) {
         for id in self.known.drain(..) {
             if let Some(assign) = self.assignments.get_mut(id as usize) {
@@ -119,8 +122,8 @@ impl Scratch {
         (self.matched, self.total, self.length, self.of) = (0, 0, 0, None);
     }
 
-    /// Adds a claim (`sign` 1) or takes it back (-1): a length of contour in percent and
-    /// the score (length times log ratio) it would bring.
+    /// Adds (`sign` 1) or removes (-1) an assignment: a length of contour in percent and
+    /// its unscaled score (length times log ratio).
     #[inline]
     pub(super) fn assign(&mut self, group: u32, length: f64, score: f64, sign: i64) {
         if let Some(assign) = self.assignments.get_mut(group as usize) {
@@ -140,7 +143,7 @@ impl Scratch {
         }
     }
 
-    /// Marks a settled state to come back to.
+    /// Records the state to return to. All matches must have been scored before.
     pub(super) fn savepoint(&mut self) -> Savepoint {
         self.marked = true;
         Savepoint {
@@ -151,7 +154,7 @@ impl Scratch {
         }
     }
 
-    /// Goes back to a mark, once all is settled.
+    /// Returns to a savepoint. All matches must have been scored before.
     pub(super) fn restore(&mut self, savepoint: Savepoint) {
         for (group, before) in self.log.drain(..) {
             if let Some(assign) = self.assignments.get_mut(group as usize) {
@@ -164,7 +167,8 @@ impl Scratch {
             (savepoint.matched, savepoint.total, savepoint.length);
     }
 
-    /// What a group pays for one more unit of length that would bring `score` for each.
+    /// Returns the derivative of a group's matched score with respect to the length of a
+    /// piece with the given score per unit length.
     pub(super) fn slope(&self, capacity: &MatchCapacity, group: u32, score: f64) -> f64 {
         let (Some(assign), Some(&limit)) =
             (self.assignments.get(group as usize), capacity.limit.get(group as usize))
@@ -179,7 +183,8 @@ impl Scratch {
         }
     }
 
-    /// The scores paid. Each group's is rounded to the fixed point before they are added.
+    /// Returns the total matched score. Each group's score is rounded to fixed point
+    /// before they are added.
     pub(super) fn score_matches(&mut self, capacity: &MatchCapacity) -> f64 {
         for id in self.open.drain(..) {
             let (Some(assign), Some(&limit)) =

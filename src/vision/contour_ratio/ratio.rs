@@ -1,25 +1,25 @@
-//! The log ratio of a piece at a distance from the nearest edge,
+//! The log ratio of a piece as a function of the distance to the nearest edge,
 //! `ln(foreground f(d) / b + 1 - foreground)`, for many distances `d` and densities `b`,
-//! several at a time. Invariant: every score is the one that [`Ratio::plain`] gives one
-//! by one, to the last bit.
+//! several at a time. Invariant: every score equals that of [`Ratio::plain`] to the last
+//! bit.
 //!
-//! Exponentials and logarithms are worked out to 13 digits; where that leaves open which
-//! of two single precision numbers is the nearest, which is once in many thousand times,
-//! the plain way decides.
+//! Exponentials and logarithms are computed to 13 digits. Where this does not determine
+//! the nearest single precision number, about once in many thousand scores, the plain
+//! formula decides.
 
 use super::ContourRatioOptions;
 use crate::num::simd::vectorised;
 use std::f64::consts::{LN_2, LOG2_E, PI};
 
-/// What the quick way may be wrong by, as a share of one more than the score's magnitude;
-/// many times what it is wrong by.
+/// Error bound of the fast path relative to one plus the score's magnitude; many times
+/// the actual error.
 const DOUBT: f64 = 1e-12;
 
-/// Adding and taking this away rounds to a whole number, which is in the lowest bits
-/// meanwhile.
+/// Adding and subtracting this number rounds to an integer, which the lowest bits of the
+/// sum hold.
 const ROUND: f64 = 6755399441055744.0;
 
-/// What the score depends on besides distance and density.
+/// The parameters of the score other than distance and density.
 pub(super) struct Ratio {
     foreground: f64,
     sd: f64,
@@ -33,14 +33,14 @@ impl Ratio {
         Ratio { foreground: options.foreground, sd: options.sd, norm }
     }
 
-    /// The score at a distance, where the background's density is as given.
+    /// Returns the score at a distance for a given background density.
     fn plain(&self, distance: f64, density: f64) -> f32 {
         let z = distance / self.sd;
         let own = self.norm * libm::exp(-0.5 * z * z);
         libm::log(self.foreground * own / density + 1.0 - self.foreground) as f32
     }
 
-    /// The scores of as many distances as densities into `out`.
+    /// Computes the scores of pairs of distance and density into `out`.
     pub fn scores(&self, distance: &[f64], density: &[f64], out: &mut Vec<f32>) {
         out.clear();
         out.resize(distance.len().min(density.len()), f32::NAN);
@@ -63,14 +63,14 @@ impl Ratio {
     }
 }
 
-/// The exponential of a number that is not above 0, as a multiple of 1 + 1e-14 at most;
-/// below e^-700 as there.
+/// Returns the exponential of a number of at most 0 with a relative error of at most
+/// 1e-14. Numbers below -700 are treated as -700.
 #[inline(always)]
 fn quick_exp(x: f64) -> f64 {
     let x = if x < -700.0 { -700.0 } else { x };
     let shifted = x * LOG2_E + ROUND;
     let r = x - (shifted - ROUND) * LN_2;
-    // Taylor's series for at most half of ln 2, from its end.
+    // Taylor series for magnitudes of at most half of ln 2, from the last term.
     let mut sum = 1.0 / 6227020800.0;
     for factorial in [
         479001600.0,
@@ -92,13 +92,13 @@ fn quick_exp(x: f64) -> f64 {
     (sum * r + 1.0) * power
 }
 
-/// The natural logarithm of a number above 1e-300, to 1e-14 of one more than its
-/// magnitude.
+/// Returns the natural logarithm of a number above 1e-300, with an error of at most 1e-14
+/// relative to one plus its magnitude.
 #[inline(always)]
 fn quick_ln(x: f64) -> f64 {
     const HALF: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
     const MANTISSA: u64 = (1 << 52) - 1;
-    // x = m 2^e with m from the root of 1/2 to that of 2.
+    // x = m 2^e with m between sqrt(1/2) and sqrt(2).
     let above = x.to_bits().wrapping_sub(HALF).wrapping_add(1023 << 52);
     let m = f64::from_bits((above & MANTISSA).wrapping_add(HALF));
     let e = f64::from_bits((above >> 52) | 0x4330_0000_0000_0000) - (4503599627370496.0 + 1023.0);

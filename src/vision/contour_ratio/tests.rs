@@ -1,4 +1,4 @@
-//! Tests of the contour ratio: a plain reference for one element, and properties.
+//! Tests of the contour ratio: a closed-form reference for one element, and properties.
 
 use super::super::testing::{Pieces, clutter, comings_and_goings};
 use super::*;
@@ -11,8 +11,8 @@ fn prepare(seen: &Pieces, size: u32) -> ContourRatio {
     ContourRatio::prepare(&seen.map(), size, size, &options()).unwrap()
 }
 
-/// A single vertical edge line: the scores are known in closed form but for the window's
-/// counts, which are plain sums.
+/// With a single vertical line of edges the scores have a closed form, given the counts
+/// in the window, which are simple sums.
 #[test]
 fn scores_follow_the_formula() {
     let mut seen = Pieces::new(256, 256);
@@ -26,8 +26,8 @@ fn scores_follow_the_formula() {
         let mut one = Pieces::new(256, 256);
         one.push(128.0 + offset, 128.0, std::f32::consts::FRAC_PI_2, 1.0);
         let got = c.log_likelihood(&one.elements()) / (o.weight / o.unit) / percent;
-        // Window of 64 pixels in the middle, of which distances cover 2 pixels per pixel;
-        // 5 % comes from the whole picture.
+        // A window of 64 pixels in the middle, in which the distance changes by a pixel
+        // per pixel on both sides; 5 % of the density comes from the whole picture.
         let d = f64::from(offset) * percent;
         let expected = if d >= 3.3 {
             0.25f64.ln()
@@ -112,12 +112,12 @@ fn small_moves_change_little() {
             &drawn.moved(0.001 * i as f32, 0.0007 * i as f32).elements(),
             &mut scratch,
         );
-        // Some 700 pieces, each of which can change by a few hundredths per hundredth of
-        // a pixel.
+        // There are about 700 pieces, each of which can change by a few hundredths per
+        // hundredth of a pixel.
         assert!((now - last).abs() < 0.5, "step {i}: {last} {now}");
         last = now;
     }
-    // And as they turn.
+    // The same for rotations.
     let turned = |i: usize| {
         let mut p = drawn.clone();
         let a = 0.001 * i as f32;
@@ -146,7 +146,7 @@ fn nothing_in_view_is_worse_than_a_bad_match() {
     assert_eq!(nothing, c.log_likelihood(&Pieces::new(128, 128).circle(5.0, 5.0, 0.3).elements()));
     let bad = c.log_likelihood(&Pieces::new(128, 128).circle(0.5, 0.5, 0.49).elements());
     assert!(nothing < bad);
-    // Less and less in view is no way out.
+    // Shrinking the contour does not escape the penalty.
     let mut last = f64::INFINITY;
     for r in [0.02, 0.01, 0.005, 0.002] {
         let now = c.log_likelihood(&Pieces::new(128, 128).circle(0.5, 0.5, r).elements());
@@ -216,8 +216,8 @@ fn gradient_is_that_of_differences() {
     let mut drawn = Pieces::new(128, 128).circle(0.52, 0.49, 0.29);
     drawn.push(-0.2, 50.3, 1.0, 1.0);
     drawn.push(70.3, 128.3, 1.0, 1.0);
-    // Smooth scores, so that differences are about slopes; then too little contour, and
-    // edges that pay no more.
+    // Smooth scores, so that finite differences approximate derivatives; then too little
+    // contour in view, and groups beyond their match capacity.
     let smooth =
         ContourRatioOptions { sd: 3.0, truncate: 12.0, weight: 0.05, credit: 1e9, ..options() };
     for o in [
@@ -238,7 +238,7 @@ fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
     let seen = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
     let all =
         Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.5, 0.5, 0.305).circle(0.4, 0.4, 0.35);
-    // Little credit, so that groups are asked for more than they pay.
+    // A small match capacity, so that groups are assigned more than they can match.
     let ratio = ContourRatio::prepare(
         &seen.map(),
         96,
@@ -255,7 +255,7 @@ fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
         };
         let score = ratio.log_likelihood_after(step, elements, &mut scratch);
         assert_eq!(score.to_bits(), ratio.log_likelihood(&whole.elements()).to_bits());
-        // The same contours again cost nothing.
+        // Repeating the same contours does not ask for all of them.
         let again = ratio.log_likelihood_after(step, || panic!("they are known"), &mut scratch);
         assert_eq!(again.to_bits(), score.to_bits());
         asked += count;

@@ -1,11 +1,11 @@
-//! What the trees of a structured forest look at: colours, and gradients at two scales,
-//! each as strong as the gradients around are weak, by direction. All smaller than the
-//! picture, and smoothed a little or more.
+//! The features that the trees of a structured forest use: colours, and gradients at two
+//! scales, normalised by the gradients around them and split by direction. All are
+//! smaller than the picture, and smoothed lightly or strongly.
 
 use super::ForestOptions;
 use crate::vision::gradient::mirrored;
 
-/// A channel: width, height, and its values row by row.
+/// A channel: width, height, and its values in row-major order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Plane {
     pub width: usize,
@@ -13,20 +13,20 @@ pub(super) struct Plane {
     pub data: Vec<f32>,
 }
 
-/// The features of a picture with a border around it; those of one pixel lie side by
-/// side.
+/// The features of a picture with a border around it; the channels of a pixel are
+/// adjacent.
 pub(super) struct Features {
     pub width: usize,
     pub height: usize,
     pub channels: usize,
-    /// Those that trees look at one by one.
+    /// The features that trees use individually.
     pub plain: Vec<f32>,
-    /// The same, smoothed more: of these trees look at differences.
+    /// The same with more smoothing, for differences.
     pub similar: Vec<f32>,
 }
 
 impl Features {
-    /// Of a picture in sRGB values from 0 to 1.
+    /// Computes the features of a picture in sRGB values from 0 to 1.
     pub fn of(rgb: &[[f32; 3]], width: usize, height: usize, o: &ForestOptions) -> Features {
         let luv = bordered(rgb, width, height, o);
         let mut all: Vec<Plane> = luv.iter().map(|p| averaged(p, o.shrink)).collect();
@@ -58,13 +58,13 @@ impl Features {
     }
 }
 
-/// `a / b` to the nearest whole number, halves to the even one.
+/// Returns `a / b` rounded to the nearest integer, halves to even.
 pub(super) fn rounded(a: usize, b: usize) -> usize {
     (a as f64 / b as f64).round_ties_even() as usize
 }
 
-/// The colours of a picture that is mirrored beyond its border: as far as patches reach,
-/// and so that its sides can be halved and shrunk.
+/// Returns the colours of a picture that is mirrored beyond its border, as far as patches
+/// extend and so that its sides can be halved and shrunk.
 fn bordered(rgb: &[[f32; 3]], width: usize, height: usize, o: &ForestOptions) -> [Plane; 3] {
     let border = (o.patch - o.inner) / 2;
     let side = |n: usize| (n + 2 * border).next_multiple_of(2 * o.shrink);
@@ -85,10 +85,10 @@ fn bordered(rgb: &[[f32; 3]], width: usize, height: usize, o: &ForestOptions) ->
 
 /// L*, u* and v* are given in 270ths, so that they lie between 0 and 1.
 const UNIT: f32 = 1.0 / 270.0;
-/// Steps in which forests know lightness.
+/// Number of steps of luminance in the lightness table.
 const STEPS: usize = 1024;
 
-/// L* by luminance. The thresholds of forests were learnt with such a table.
+/// Returns L* by luminance. The thresholds of forests were learnt with such a table.
 fn lightness() -> Vec<f32> {
     let slope = 29.0f32 * 29.0 * 29.0 / 27.0;
     let of = |i: usize| {
@@ -98,15 +98,15 @@ fn lightness() -> Vec<f32> {
     (0..STEPS + 40).map(of).collect()
 }
 
-/// L*, u* and v* of sRGB values, which are taken for linear light: so were those that
-/// forests were trained on.
+/// Returns L*, u* and v* of sRGB values, which are treated as linear light, because they
+/// were in training too.
 fn luv([r, g, b]: [f32; 3], table: &[f32]) -> [f32; 3] {
     let x = 0.430_574 * r + 0.341_550 * g + 0.178_325 * b;
     let y = 0.222_015 * r + 0.706_655 * g + 0.071_330 * b;
     let z = 0.020_183 * r + 0.129_553 * g + 0.939_180 * b;
     let l = table[((STEPS as f32 * y) as usize).min(table.len() - 1)];
     let n = 1.0 / (x + 15.0 * y + 3.0 * z + 1e-35);
-    // The white point, and what makes the least u* and v* zero.
+    // The white point, and offsets that make the smallest u* and v* zero.
     let (white_u, white_v) = (0.197_833, 0.468_331);
     [
         l,
@@ -115,7 +115,7 @@ fn luv([r, g, b]: [f32; 3], table: &[f32]) -> [f32; 3] {
     ]
 }
 
-/// Means of squares of `by` pixels a side; sides are multiples of it.
+/// Averages squares of `by` pixels a side; sides are multiples of it.
 fn averaged(plane: &Plane, by: usize) -> Plane {
     if by == 1 {
         return plane.clone();
@@ -131,8 +131,8 @@ fn averaged(plane: &Plane, by: usize) -> Plane {
     Plane { width, height, data }
 }
 
-/// Smoothed by a triangle of a radius, along rows and columns; mirrored beyond the
-/// border, whose pixels count once.
+/// Smooths by a triangle filter along rows and columns; mirrored at the border, whose
+/// pixels count once.
 pub(super) fn smoothed(plane: &Plane, radius: usize) -> Plane {
     if radius == 0 {
         return plane.clone();
@@ -161,17 +161,18 @@ pub(super) fn smoothed(plane: &Plane, radius: usize) -> Plane {
     Plane { width: w, height: h, data }
 }
 
-/// The place `i` of a line of `n`, mirrored at its ends; the end pixels count once.
+/// Returns position `i` of a line of `n`, mirrored at its ends; the end pixels count
+/// once.
 fn once(i: i64, n: i64) -> usize {
     let m = i.rem_euclid((2 * n - 2).max(1));
     (if m < n { m } else { 2 * n - 2 - m }) as usize
 }
 
-/// Less change than this has no direction.
+/// Smaller changes have no direction.
 const FLAT: f32 = 1e-5;
 
-/// The gradient of the channel that changes most, in proportion to the gradients around,
-/// and the number of its direction.
+/// Returns the gradient of the channel that changes most, relative to the gradients
+/// around it, and the index of its direction.
 fn gradient(planes: &[Plane; 3], o: &ForestOptions) -> (Plane, Vec<usize>) {
     let (w, h) = (planes[0].width, planes[0].height);
     let directions: Vec<[f32; 2]> = (0..o.orientations)
@@ -205,7 +206,7 @@ fn gradient(planes: &[Plane; 3], o: &ForestOptions) -> (Plane, Vec<usize>) {
     (plane, bins)
 }
 
-/// The direction that is nearest to that of a change, forwards or backwards.
+/// Returns the direction nearest to that of a change, regardless of sign.
 fn nearest([x, y]: [f32; 2], directions: &[[f32; 2]]) -> usize {
     let mut best = (0, -1.0);
     for (k, [c, s]) in directions.iter().enumerate() {

@@ -1,12 +1,12 @@
 //! Structured forests (Dollár & Zitnick 2013, "Structured forests for fast edge
-//! detection", ICCV, 1841-1848): decision trees that look at patches of 32 x 32 pixels
-//! and say where edges run in their middle 16 x 16; what the trees say of overlapping
-//! patches is averaged. Read from the files of OpenCV (`model.yml.gz`); there is no
-//! training here.
+//! detection", ICCV, 1841-1848): decision trees that read patches of 32 x 32 pixels and
+//! predict the edges in their central 16 x 16; predictions of overlapping patches are
+//! averaged. Forests are read from OpenCV's files (`model.yml.gz`); there is no training
+//! here.
 //!
-//! The same numbers as from OpenCV's code for pictures whose sides are multiples of 4;
-//! others are padded to that, as the authors' own code does, where OpenCV resamples by
-//! odd factors.
+//! The result equals that of OpenCV's code for pictures whose sides are multiples of 4.
+//! Other pictures are padded to such sides, as in the authors' own code; OpenCV resamples
+//! them by non-integer factors.
 
 mod features;
 mod read;
@@ -25,18 +25,18 @@ use super::soft_map::{Shows, SoftMap};
 use features::Features;
 use std::fmt;
 
-/// What a forest says of itself: sizes in pixels, and how its features are made.
+/// The parameters of a forest: sizes in pixels, and the computation of its features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ForestOptions {
-    /// Pixels from one patch to the next.
+    /// Distance from one patch to the next in pixels.
     pub stride: usize,
-    /// By how much features are smaller than the picture.
+    /// Factor by which features are smaller than the picture.
     pub shrink: usize,
-    /// The side of what trees look at.
+    /// The side of the patches that trees read.
     pub patch: usize,
-    /// The side of what they say something of.
+    /// The side of the central part that trees predict.
     pub inner: usize,
-    /// How many directions of gradients are told apart.
+    /// Number of gradient orientations.
     pub orientations: usize,
     /// The radius of the smoothing before gradients are taken.
     pub gradient_smoothing: usize,
@@ -47,17 +47,17 @@ pub struct ForestOptions {
     pub similarity_smoothing: usize,
     /// The radius within which gradients are normalised.
     pub normalization: usize,
-    /// Places along each side of a patch whose features are compared.
+    /// Number of positions along each side of a patch whose features are compared.
     pub grid: usize,
     /// The number of trees.
     pub trees: usize,
-    /// How many of them look at a patch.
+    /// Number of trees that are evaluated per patch.
     pub evaluated: usize,
 }
 
 impl ForestOptions {
-    /// Features of a pixel: three of colour, and at two scales the gradient's magnitude
-    /// and its parts by direction.
+    /// Number of features of a pixel: three of colour, and at two scales the gradient's
+    /// magnitude and its parts by direction.
     fn channels(&self) -> usize {
         2 * (self.orientations + 1) + 3
     }
@@ -67,27 +67,27 @@ impl ForestOptions {
         self.patch / self.shrink
     }
 
-    /// Features that are looked at by themselves.
+    /// Number of features that are used individually.
     fn plain(&self) -> usize {
         self.cells() * self.cells() * self.channels()
     }
 
-    /// Differences of features at two places of the grid.
+    /// Number of differences of features between two positions of the grid.
     fn pairs(&self) -> usize {
         let places = self.grid * self.grid;
         places * places.saturating_sub(1) / 2 * self.channels()
     }
 }
 
-/// One node of a tree; the first child has a larger number than its parent, so every way
-/// down ends.
+/// A node of a tree. The first child has a larger index than its parent, so every path
+/// ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node {
-    /// The feature that is looked at.
+    /// The feature that is compared.
     feature: u32,
-    /// Below this it goes on at the left child.
+    /// Smaller values lead to the left child.
     threshold: f32,
-    /// The left child; the right one is the next. 0: a leaf.
+    /// The left child; the right one is the next node. 0: a leaf.
     left: u32,
 }
 
@@ -95,11 +95,11 @@ struct Node {
 #[derive(Clone, PartialEq)]
 pub struct Forest {
     options: ForestOptions,
-    /// The nodes of all trees, each tree as many.
+    /// The nodes of all trees; all trees have the same number of nodes.
     nodes: Vec<Node>,
-    /// Where the edge pixels of each node begin, and behind the last one where they end.
+    /// Start of the edge pixels of each node in `pixels`, and finally their end.
     begins: Vec<u32>,
-    /// Edge pixels, column by column from the upper left of a patch's middle.
+    /// Edge pixels, as column-major indices into the central part of a patch.
     pixels: Vec<u16>,
 }
 
@@ -113,28 +113,27 @@ impl fmt::Debug for Forest {
 }
 
 impl Forest {
-    /// Reads OpenCV's text (`model.yml`), or the same compressed by gzip
-    /// (`model.yml.gz`).
+    /// Reads OpenCV's YAML (`model.yml`), optionally compressed by gzip (`model.yml.gz`).
     ///
     /// # Errors
-    /// If it is no such text, or a forest that cannot be used: children before their
-    /// parents, features that there are none of.
+    /// If the text is not a forest, or the forest is invalid: children before their
+    /// parents, or unknown features.
     pub fn read(bytes: &[u8]) -> Result<Forest, VisionError> {
         read::forest(bytes).map_err(VisionError::Detector)
     }
 
-    /// Whether bytes begin as such files do.
+    /// Whether bytes begin like such a file.
     pub fn is_forest(bytes: &[u8]) -> bool {
         read::is_gzip(bytes) || bytes.starts_with(b"%YAML")
     }
 
-    /// What the forest says of itself.
+    /// The parameters of the forest.
     pub fn options(&self) -> &ForestOptions {
         &self.options
     }
 
-    /// How likely each pixel of a photograph is to be on an edge, worked out at a longer
-    /// side of at most `size` pixels.
+    /// Computes the probability of each pixel of a photograph to be on an edge, at a
+    /// longer side of at most `size` pixels.
     pub fn map(&self, photo: &Photo, size: u32) -> SoftMap {
         let (width, height) = fitted(photo.width(), photo.height(), size);
         let small = photo.srgb(width, height);

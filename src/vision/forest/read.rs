@@ -1,26 +1,27 @@
-//! From the bytes of a file to a forest. All numbers are checked here, so that whatever a
-//! file says, looking at a picture ends and stays within its arrays.
+//! Parses a forest from the bytes of a file. All numbers are checked here, so that
+//! evaluating a forest terminates and stays within its arrays, whatever the file
+//! contains.
 
 use super::yaml::{Token, Tokens};
 use super::{Forest, ForestOptions, Node};
 use flate2::bufread::MultiGzDecoder;
 use std::io::{BufRead, BufReader};
 
-/// The most bytes of text that are read: the forest of the paper has about 200 million.
+/// The maximum number of bytes of text: the forest of the paper has about 200 million.
 const TEXT: u64 = 1 << 30;
-/// The most nodes of all trees together.
+/// The maximum number of nodes of all trees together.
 const NODES: usize = 1 << 23;
-/// The most edge pixels of all leaves together.
+/// The maximum number of edge pixels of all leaves together.
 const PIXELS: usize = 1 << 27;
-/// The longest side of a patch.
+/// The maximum side of a patch.
 const PATCH: usize = 128;
 
-/// Whether bytes begin as gzip files do.
+/// Whether bytes begin like a gzip file.
 pub fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1f, 0x8b])
 }
 
-/// The forest of a file.
+/// Reads the forest of a file.
 pub fn forest(bytes: &[u8]) -> Result<Forest, String> {
     match is_gzip(bytes) {
         true => parse(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(bytes))),
@@ -28,7 +29,7 @@ pub fn forest(bytes: &[u8]) -> Result<Forest, String> {
     }
 }
 
-/// What a file has, as it was read.
+/// The contents of a file, before checks.
 #[derive(Default)]
 struct Raw {
     options: Vec<(String, usize)>,
@@ -39,7 +40,7 @@ struct Raw {
     pixels: Vec<u16>,
 }
 
-/// Where the numbers of a name go.
+/// The list that the numbers after a name belong to.
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     Options,
@@ -48,7 +49,7 @@ enum Part {
     Thresholds,
     Boundaries,
     Pixels,
-    /// A name that means nothing here.
+    /// An unknown name, which is ignored.
     Other,
 }
 
@@ -139,7 +140,7 @@ fn parse(text: impl BufRead) -> Result<Forest, String> {
     checked(raw)
 }
 
-/// The options of a forest, each in a range where its arithmetic makes sense.
+/// Returns the options of a forest after checking that each is in its range.
 fn options(given: &[(String, usize)]) -> Result<ForestOptions, String> {
     let get = |name: &str, least: usize, most: usize| {
         let mut found = given.iter().filter(|(n, _)| n == name).map(|(_, v)| *v);
@@ -190,7 +191,7 @@ fn options(given: &[(String, usize)]) -> Result<ForestOptions, String> {
     Ok(options)
 }
 
-/// The forest, if everything fits together.
+/// Builds the forest after checking that its parts are consistent.
 fn checked(raw: Raw) -> Result<Forest, String> {
     if raw.options.is_empty() {
         return Err("there are no `options`; is this the model of a structured forest?".into());
@@ -214,7 +215,7 @@ fn checked(raw: Raw) -> Result<Forest, String> {
     for (i, &child) in raw.children.iter().enumerate() {
         let (at, right) = (i % each, child as usize);
         if child != 0 {
-            // Both children come behind: every way down ends.
+            // Both children have larger indices than their parent, so every path ends.
             if right <= at + 1 || right >= each {
                 return Err(format!(
                     "node {at} of tree {} has the child {child} of {each} nodes",
@@ -254,7 +255,8 @@ fn checked(raw: Raw) -> Result<Forest, String> {
             raw.pixels.len()
         ));
     }
-    // Edges may be told by direction, one after the other; here only their places count.
+    // Edges may be listed by direction, one direction after the other; only their
+    // positions are used.
     let area = options.inner * options.inner;
     let most = area * options.channels();
     let mut pixels = raw.pixels;

@@ -1,5 +1,5 @@
-//! Features against their definition, leaves against the rules, and files that cannot be
-//! used.
+//! Tests of features against their definition, of leaves against the rules, and of
+//! invalid files.
 
 use super::features::{Features, Plane, smoothed};
 use super::writer::{Text, difference, gzip, options, small};
@@ -28,15 +28,15 @@ fn picture(width: usize, height: usize) -> Vec<[f32; 3]> {
 }
 
 /// The features by their definition, one value at a time in double precision: slow, and
-/// nothing in common with the fast way but the constants.
+/// independent of the fast code except for the constants.
 mod plainly {
     pub struct Picture {
         pub size: [i64; 2],
         pub luv: Vec<[f64; 3]>,
     }
 
-    /// The place `i`, reflected at the ends until it is within; `twice`: the end pixel
-    /// comes twice.
+    /// Position `i`, reflected at the ends until it is inside; `twice`: the end pixel is
+    /// repeated.
     fn reflected(mut i: i64, n: i64, twice: bool) -> i64 {
         let shift = i64::from(twice);
         loop {
@@ -65,8 +65,8 @@ mod plainly {
         [l / 270.0, (u + 88.0) / 270.0, (v + 134.0) / 270.0]
     }
 
-    /// With 8 pixels around it, reflected, and more on the right and below up to a
-    /// multiple of 4.
+    /// Adds 8 reflected pixels around the picture, and more on the right and below up to
+    /// a multiple of 4.
     pub fn bordered(rgb: &[[f32; 3]], w: i64, h: i64) -> Picture {
         let up = |n: i64| (n + 16 + 3) / 4 * 4;
         let (bw, bh) = (up(w), up(h));
@@ -87,7 +87,8 @@ mod plainly {
             Picture { size: [w, h], luv }
         }
 
-        /// The length of the steepest channel's change and its direction in degrees, 0 to 180.
+        /// The magnitude of the steepest channel's change and its direction in degrees, 0
+        /// to 180.
         fn change(&self, i: i64, j: i64) -> (f64, f64) {
             let [w, h] = self.size;
             let at = |i: i64, j: i64, c: usize| {
@@ -102,7 +103,8 @@ mod plainly {
             (x.hypot(y), y.atan2(x).to_degrees().rem_euclid(180.0))
         }
 
-        /// That length by those around it, in a triangle of radius 4, and a hundredth.
+        /// That magnitude divided by those around it, in a triangle of radius 4, plus
+        /// 0.01.
         pub fn magnitude(&self, i: i64, j: i64) -> f64 {
             let [w, h] = self.size;
             let mut around = 0.0;
@@ -116,7 +118,7 @@ mod plainly {
             self.change(i, j).0 / (around + 0.01)
         }
 
-        /// Which of four directions a change has.
+        /// The index of a change's direction, of four.
         pub fn bin(&self, i: i64, j: i64) -> usize {
             let (length, angle) = self.change(i, j);
             if length < 1e-5 { 2 } else { (angle / 45.0).round() as usize % 4 }
@@ -152,7 +154,7 @@ mod plainly {
         all
     }
 
-    /// Smoothed in both directions by a triangle.
+    /// A sample smoothed in both directions by a triangle.
     pub fn triangle(channel: &[f64], w: i64, h: i64, i: i64, j: i64, r: i64) -> f64 {
         let mut sum = 0.0;
         for dj in -r..=r {
@@ -178,8 +180,8 @@ fn features_are_what_the_definition_says() {
         let slow = plainly::channels(&full);
         let [fw, fh] = full.size.map(|n| n / 2);
         assert_eq!((fast.width as i64, fast.height as i64, fast.channels), (fw, fh, 13));
-        // A direction halfway between two may fall to either in single precision: such
-        // pixels are few.
+        // A direction halfway between two may fall to either in single precision; such
+        // pixels are rare.
         let (mut off, mut all) = (0, 0);
         for (c, channel) in slow.iter().enumerate() {
             for k in 0..fw * fh {
@@ -200,10 +202,10 @@ fn features_are_what_the_definition_says() {
 fn triangles() {
     let plane = Plane { width: 5, height: 1, data: vec![0.0, 0.0, 9.0, 0.0, 0.0] };
     assert_eq!(smoothed(&plane, 0), plane);
-    // Up and down there is one pixel alone, which is its own mirror image.
+    // There is only one row, which is its own mirror image.
     let close = |a: &[f32], b: [f32; 5]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
     assert!(close(&smoothed(&plane, 1).data, [0.0, 2.25, 4.5, 2.25, 0.0]));
-    // The end pixels count once: the second one is seen from the first on both sides.
+    // The end pixels count once: the first pixel has the second one on both sides.
     assert!(close(&smoothed(&plane, 2).data, [2.0, 2.0, 3.0, 2.0, 2.0]));
 }
 
@@ -238,15 +240,15 @@ fn a_small_forest_finds_the_sides_of_a_square() {
         }
     }
     assert!(sides.iter().all(|n| *n >= 40), "{sides:?}");
-    // The same file packed is the same forest.
+    // The compressed file gives the same forest.
     assert_eq!(Forest::read(&gzip(small().yaml().as_bytes())).unwrap(), forest);
 }
 
-/// What OpenCV's rules say of one patch, worked out by hand: the tree is chosen by place,
-/// its leaf by one feature.
+/// OpenCV's rules for one patch, worked out by hand: position selects the tree, and one
+/// feature the leaf.
 #[test]
 fn leaves_fall_where_the_rules_say() {
-    // One tree of one leaf that has one pixel, in row 3 and column 5 of the middle of a
+    // One tree of one leaf with one pixel, in row 3 and column 5 of the central part of a
     // patch.
     let one = Text {
         options: options(1, 1),
@@ -259,8 +261,8 @@ fn leaves_fall_where_the_rules_say() {
     let forest = forest(&one).unwrap();
     let photo = Photo::from_rgb(RgbImage::from_pixel(24, 20, Rgb([90, 90, 90]))).unwrap();
     let map = forest.map(&photo, 512);
-    // With a border of 8 there are (40 - 32) / 2 = 4 patches side by side, and 2 one
-    // below the other; each says 2 * 4 / 256.
+    // With a border of 8 there are (40 - 32) / 2 = 4 patches across and 2 down; each
+    // contributes 2 * 4 / 256.
     let mut said = vec![0.0f32; 24 * 20];
     for (i, j) in (0..2).flat_map(|i| (0..4).map(move |j| (i, j))) {
         said[(2 * i + 3) * 24 + 2 * j + 5] = 8.0 / 256.0;
@@ -271,8 +273,8 @@ fn leaves_fall_where_the_rules_say() {
 
 #[test]
 fn places_of_the_grid_and_numbers_of_features() {
-    // 16 x 16 cells of 13 channels, and differences of 25 places; the last one is of
-    // places 23 and 24.
+    // 16 x 16 cells of 13 channels, and differences of 25 positions; the last one is of
+    // positions 23 and 24.
     let o = *forest(&small()).unwrap().options();
     assert_eq!((o.plain(), o.pairs()), (3328, 3900));
     assert_eq!(
@@ -355,7 +357,7 @@ fn no_part_of_a_file_is_a_file() {
             let at = (x >> 33) as usize % text.len();
             text[at] = b"0123456789-.,[]e: \n\xff"[(x >> 20) as usize % 20];
         }
-        // What is read can be used.
+        // Every forest that can be read can be evaluated.
         if let Ok(forest) = Forest::read(&text) {
             let photo = Photo::from_rgb(RgbImage::from_fn(30, 20, |x, y| {
                 Rgb([(8 * x) as u8, 99, (9 * y) as u8])
@@ -366,7 +368,8 @@ fn no_part_of_a_file_is_a_file() {
     }
 }
 
-/// A file of a few kilobytes that unpacks to much more is refused before it takes memory.
+/// A file of a few kilobytes that decompresses to much more is rejected before it takes
+/// memory.
 #[test]
 fn bombs_do_not_go_off() {
     let mut bomb = b"childs:\n   - [".to_vec();
@@ -379,7 +382,7 @@ fn bombs_do_not_go_off() {
     );
 }
 
-/// How long a text of the length of the paper's forest takes to read:
+/// Measures the time to read a text as long as the paper's forest:
 /// `cargo test --release --lib forest_of_full_size -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]

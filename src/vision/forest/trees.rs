@@ -1,10 +1,10 @@
-//! Down the trees of a structured forest, patch by patch, and what their leaves say
-//! together.
+//! Evaluates the trees of a structured forest patch by patch, and combines the
+//! predictions of their leaves.
 
 use super::features::{Features, Plane, rounded, smoothed};
 use super::{Forest, ForestOptions, Node};
 
-/// Where the numbers that nodes ask for lie, from the first one of a patch on.
+/// Offsets of the features that nodes refer to, relative to the first feature of a patch.
 struct Places {
     plain: Vec<usize>,
     pairs: Vec<(usize, usize)>,
@@ -31,7 +31,7 @@ impl Places {
     }
 }
 
-/// Middles of a grid's cells along one side of a patch.
+/// Centres of a grid's cells along one side of a patch.
 fn grid(o: &ForestOptions) -> Vec<usize> {
     let (cells, half) = (o.cells(), rounded(o.cells(), 2 * o.grid));
     let middle = |i: usize| {
@@ -41,7 +41,7 @@ fn grid(o: &ForestOptions) -> Vec<usize> {
     (0..o.grid).map(middle).collect()
 }
 
-/// The leaf that a patch comes to.
+/// Returns the leaf that a patch reaches.
 fn leaf(tree: &[Node], places: &Places, plain: &[f32], similar: &[f32]) -> usize {
     let mut at = 0;
     while tree[at].left != 0 {
@@ -54,7 +54,8 @@ fn leaf(tree: &[Node], places: &Places, plain: &[f32], similar: &[f32]) -> usize
                 similar[a] - similar[b]
             }
         };
-        // The right child lies behind the left one; what is not smaller goes there.
+        // The right child follows the left one; values that are not smaller (and NaN) go
+        // there.
         at = node.left as usize
             + usize::from(!matches!(
                 value.partial_cmp(&node.threshold),
@@ -64,7 +65,8 @@ fn leaf(tree: &[Node], places: &Places, plain: &[f32], similar: &[f32]) -> usize
     at
 }
 
-/// How likely each pixel of a picture is to be on an edge, 0 to 1 and now and then more.
+/// Returns the probability of each pixel of a picture to be on an edge, 0 to 1 and
+/// occasionally more.
 pub(super) fn edges(forest: &Forest, f: &Features, width: usize, height: usize) -> Vec<f32> {
     let o = &forest.options;
     let places = Places::new(f, o);
@@ -76,7 +78,7 @@ pub(super) fn edges(forest: &Forest, f: &Features, width: usize, height: usize) 
             let first = (i * o.stride / o.shrink * f.width + j * o.stride / o.shrink) * f.channels;
             let (plain, similar) = (&f.plain[first..], &f.similar[first..]);
             for k in 0..o.evaluated {
-                // Neighbours are looked at by different trees.
+                // Neighbouring patches use different trees.
                 let tree = ((i + j) % (2 * o.evaluated) + k) % o.trees;
                 let leaf = tree * each
                     + leaf(&forest.nodes[tree * each..][..each], &places, plain, similar);

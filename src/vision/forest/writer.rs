@@ -1,9 +1,9 @@
-//! Small forests as OpenCV writes them, for tests.
+//! Small forests in OpenCV's format, for tests.
 
 use std::fmt::Write;
 use std::io::Write as _;
 
-/// A forest's text from its parts: options by name, and lists of numbers.
+/// The parts of a forest's text: options by name, and lists of numbers.
 pub struct Text {
     pub options: Vec<(&'static str, usize)>,
     pub children: Vec<u32>,
@@ -13,7 +13,7 @@ pub struct Text {
     pub pixels: Vec<u32>,
 }
 
-/// The options of the paper's forest, with so many trees.
+/// The options of the paper's forest, with the given numbers of trees.
 pub fn options(trees: usize, evaluated: usize) -> Vec<(&'static str, usize)> {
     vec![
         ("stride", 2),
@@ -31,18 +31,18 @@ pub fn options(trees: usize, evaluated: usize) -> Vec<(&'static str, usize)> {
     ]
 }
 
-/// The number of a difference of L* between two places of the grid, of 25.
+/// Returns the index of the feature that is the difference of L* between two of the 25
+/// positions of the grid.
 pub fn difference(a: u32, b: u32) -> u32 {
     let before: u32 = (0..a).map(|k| 24 - k).sum();
     16 * 16 * 13 + before + b - a - 1
 }
 
-/// Two trees that say where there is a gradient from left to right, and from top to
-/// bottom.
+/// Two trees that detect a gradient from left to right, and from top to bottom.
 pub fn small() -> Text {
-    // No such gradient in the middle cell: leaf 1. Else node 2, where a difference of
-    // lightness tells brighter from darker: leaves 3 and 4, which say the same of edges.
-    // Nodes 5 and 6 fill up.
+    // No such gradient in the middle cell: leaf 1. Otherwise node 2, where a difference
+    // of lightness distinguishes the sign: leaves 3 and 4, which predict the same edges.
+    // Nodes 5 and 6 are padding.
     let children = [2, 0, 4, 0, 0, 0, 0];
     let features = |bin: u32, a, b| [(4 + bin) * 256 + 7 * 16 + 7, 0, difference(a, b), 0, 0, 0, 0];
     let thresholds = [0.7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -51,7 +51,7 @@ pub fn small() -> Text {
     Text {
         options: options(2, 2),
         children: [children, children].concat(),
-        // Places of the grid are counted downwards first.
+        // Positions of the grid are counted downwards first.
         features: [features(0, 7, 17), features(2, 11, 13)].concat(),
         thresholds: [thresholds, thresholds].concat(),
         boundaries: vec![0, 0, 0, 0, 32, 64, 64, 64, 64, 64, 64, 96, 128, 128, 128],
@@ -60,7 +60,7 @@ pub fn small() -> Text {
 }
 
 impl Text {
-    /// The text.
+    /// Returns the text.
     pub fn yaml(&self) -> String {
         let mut s = "%YAML:1.0\n---\noptions:\n".to_owned();
         for (name, value) in &self.options {
@@ -88,7 +88,7 @@ impl Text {
     }
 }
 
-/// Compressed by gzip.
+/// Compresses bytes by gzip.
 pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     out.write_all(bytes).unwrap();

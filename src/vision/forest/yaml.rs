@@ -1,13 +1,13 @@
-//! The part of YAML that OpenCV writes a forest in: names with numbers, lists of numbers
-//! and lists of such lists. Read from a stream, number by number, since a forest's text
-//! is some hundred megabytes long.
+//! The subset of YAML in which OpenCV writes a forest: names with numbers, lists of
+//! numbers and lists of such lists. It is read from a stream, number by number, since a
+//! forest's text has a few hundred megabytes.
 
 use std::io::{BufRead, ErrorKind};
 
-/// The longest word.
+/// The maximum length of a word.
 const WORD: usize = 64;
 
-/// What a text consists of, once spaces, commas and line ends are left out.
+/// An element of a text, ignoring spaces, commas and line ends.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Token {
     /// A name at the beginning of a line, and whether it is indented.
@@ -23,21 +23,21 @@ pub struct Tokens<R> {
     /// Bytes read so far.
     read: u64,
     most: u64,
-    /// Whether something other than spaces has been on this line, and whether there were
+    /// Whether this line has had anything other than spaces, and whether it began with
     /// spaces.
     begun: bool,
     indented: bool,
-    /// Brackets that are open.
+    /// Number of open brackets.
     depth: u32,
 }
 
 impl<R: BufRead> Tokens<R> {
-    /// Of a text that may have so many bytes.
+    /// Reads a text of at most `most` bytes.
     pub fn new(from: R, most: u64) -> Self {
         Tokens { from, line: 1, read: 0, most, begun: false, indented: false, depth: 0 }
     }
 
-    /// An error with the line it is in.
+    /// Returns an error message that begins with the current line.
     pub fn wrong(&self, what: impl std::fmt::Display) -> String {
         format!("line {}: {what}", self.line)
     }
@@ -64,7 +64,7 @@ impl<R: BufRead> Tokens<R> {
         }
     }
 
-    /// The rest of the line is left out.
+    /// Skips the rest of the line.
     fn skip_line(&mut self) -> Result<(), String> {
         while self.peek()?.is_some_and(|b| b != b'\n') {
             self.skip()?;
@@ -72,7 +72,7 @@ impl<R: BufRead> Tokens<R> {
         Ok(())
     }
 
-    /// The next token; `None` at the end.
+    /// Returns the next token; `None` at the end.
     pub fn next(&mut self) -> Result<Option<Token>, String> {
         while let Some(byte) = self.peek()? {
             match byte {
@@ -85,8 +85,7 @@ impl<R: BufRead> Tokens<R> {
                     self.indented |= !self.begun;
                     self.skip()?;
                 }
-                // `%YAML:1.0` before the text, `---` where it begins, `...` where it
-                // ends.
+                // `%YAML:1.0` comes before the text, `---` begins it, and `...` ends it.
                 b'%' | b'#' if !self.begun && self.depth == 0 => self.skip_line()?,
                 b'[' => {
                     self.depth += 1;
@@ -115,7 +114,7 @@ impl<R: BufRead> Tokens<R> {
         }
     }
 
-    /// A name, a number, or one of the marks `-`, `---` and `...`.
+    /// Reads a name, a number, or one of the marks `-`, `---` and `...`.
     fn word(&mut self) -> Result<Option<Token>, String> {
         let mut word = [0u8; WORD];
         let mut n = 0;
@@ -158,12 +157,12 @@ impl<R: BufRead> Tokens<R> {
     }
 }
 
-/// A finite number. Most are small and whole, which is quick.
+/// Parses a finite number. Most are small integers, which have a fast path.
 fn number(word: &[u8]) -> Option<f64> {
     if word.len() < 10 && word.iter().all(u8::is_ascii_digit) {
         return Some(f64::from(word.iter().fold(0u32, |n, b| 10 * n + u32::from(b - b'0'))));
     }
-    // "inf" and "nan" would be numbers, too.
+    // "inf" and "nan" would also parse as numbers.
     let plain =
         word.iter().all(|b| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'e' | b'E'));
     let x: f64 = std::str::from_utf8(word).ok().filter(|_| plain)?.parse().ok()?;

@@ -1,6 +1,6 @@
-//! Simulation-based calibration (Talts et al. 2018): of data drawn from the model, the
-//! quantile of the truth in the posterior is uniform. The model is a figure of eight
-//! joints, moved and scaled; its posterior is summed on a grid.
+//! Simulation-based calibration (Talts et al. 2018): for data drawn from the model, the
+//! posterior quantile of the truth is uniform. The model is a figure of eight joints with
+//! a shift and a scale; its posterior is summed on a grid.
 
 use super::{Detection, KeypointLikelihood, KeypointOptions};
 use crate::rng::{Purpose, Stream, StreamKey};
@@ -21,8 +21,8 @@ const BINS: usize = 20;
 /// The 0.999 quantile of chi-square with 19 degrees of freedom.
 const CRITICAL: f64 = 43.82;
 
-/// The joints in an image of 640 x 480; both parameters have a normal prior on their
-/// grid.
+/// The position of a joint in an image of 640 x 480; both parameters have a normal prior
+/// on their grid.
 fn joint(k: usize, shift: usize, scale: usize) -> [f64; 2] {
     let t = 40.0 * 6.0 * (shift as f64 / (SHIFTS - 1) as f64 - 0.5);
     let s = libm::exp(0.2 * 6.0 * (scale as f64 / (SCALES - 1) as f64 - 0.5));
@@ -50,8 +50,8 @@ fn quantile(weights: &[f64], truth: usize, rng: &mut Stream) -> f64 {
     (below + rng.uniform() * weights[truth]) / weights.iter().sum::<f64>()
 }
 
-/// Chi-square of the quantiles of shift and scale over 400 data sets.
-/// `minds`: the weights of further places that the detector is not sure about.
+/// Chi-square of the quantiles of shift and scale over 400 data sets. `minds`: the
+/// weights of the detector's alternative positions.
 fn chi_squares(
     drawn: &KeypointOptions,
     assumed: &KeypointOptions,

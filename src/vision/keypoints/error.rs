@@ -1,13 +1,13 @@
-//! What is wrong with keypoints, and what to do about it.
+//! Errors of keypoints, with hints.
 
 use std::fmt;
 
-/// Keypoints that cannot be used.
+/// An error in keypoints.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeypointsError {
-    /// What is wrong, with the place in the file.
+    /// What is wrong, with the path in the file.
     pub message: String,
-    /// What to do about it.
+    /// How to fix it.
     pub hint: Option<String>,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for KeypointsError {
 
 impl std::error::Error for KeypointsError {}
 
-/// The first few of some names, for messages.
+/// Joins the first few of some names, for messages.
 pub(super) fn first<'a>(names: impl ExactSizeIterator<Item = &'a str>, most: usize) -> String {
     let all = names.len();
     let mut text = names.take(most).collect::<Vec<_>>().join(", ");

@@ -1,8 +1,8 @@
-//! The layouts of files of keypoints, told apart by their shape; the [parent](super) says
-//! which there are.
+//! The layouts of keypoint files, distinguished by their shape; the [parent](super) lists
+//! them.
 //!
-//! Only shapes: who is meant is chosen in `people.rs`, what the joints are in
-//! `matching.rs`.
+//! This file only parses: `people.rs` chooses the person, and `matching.rs` matches the
+//! joints.
 
 use super::names::{COCO, MEDIAPIPE, usual};
 use super::node::Node;
@@ -15,10 +15,10 @@ const LAYOUTS: &str = "one person's {\"nose\": [x, y, confidence], …}, people 
                        COCO's \"annotations\" or results, or MediaPipe's \"pose_landmarks\"";
 const POINT: &str = "[x, y] or [x, y, confidence], or null if it was not found";
 
-/// Where MediaPipe's landmarks stand.
+/// Names of the field with MediaPipe's landmarks.
 const MEDIAPIPE_KEYS: [&str; 2] = ["pose_landmarks", "landmarks"];
 
-/// Everybody in a document.
+/// Returns all people of a document.
 pub(super) fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
     match root.value {
         Value::Null => Ok(Vec::new()),
@@ -55,7 +55,7 @@ pub(super) fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
     }
 }
 
-/// `{"keypoints": …}`; null is nobody.
+/// Reads `{"keypoints": …}`; null means nobody.
 fn person(of: &Node) -> Result<Person, KeypointsError> {
     let keypoints = match (of.value, of.get("keypoints")) {
         (Value::Null, _) => Keypoints::default(),
@@ -83,7 +83,7 @@ fn sized(k: Keypoints, size: Option<(u32, u32)>) -> Keypoints {
     size.map_or(k.clone(), |(w, h)| k.in_image(w, h))
 }
 
-/// `{"nose": [x, y, confidence], …}`.
+/// Reads `{"nose": [x, y, confidence], …}`.
 fn named(all: &Node) -> Result<Keypoints, KeypointsError> {
     let mut points: Vec<Keypoint> = Vec::new();
     for (name, n) in all.fields().filter(|(_, n)| !n.value.is_null()) {
@@ -111,7 +111,7 @@ fn confidence(c: &Node) -> Result<f64, KeypointsError> {
     if (0.0..=1.0).contains(&x) { Ok(x) } else { Err(c.wrong(wanted)) }
 }
 
-/// COCO's `[x, y, v, …]`, three a joint.
+/// Reads COCO's `[x, y, v, …]`, three numbers per joint.
 fn triples(all: &Node, names: Option<&[String]>) -> Result<Keypoints, KeypointsError> {
     let count = names.map_or(COCO.len(), <[String]>::len);
     if all.len() != 3 * count || !all.value.is_array() {
@@ -138,7 +138,8 @@ fn triples(all: &Node, names: Option<&[String]>) -> Result<Keypoints, KeypointsE
     Keypoints::new(points)
 }
 
-/// COCO's annotations or results; `root` has images and categories, if there are any.
+/// Reads COCO's annotations or results; `root` has images and categories, if there are
+/// any.
 fn coco(all: &Node, root: &Node) -> Result<Vec<Person>, KeypointsError> {
     if !all.value.is_array() {
         return Err(all.wrong("a list of annotations"));
@@ -180,7 +181,8 @@ fn coco(all: &Node, root: &Node) -> Result<Vec<Person>, KeypointsError> {
     Ok(people)
 }
 
-/// Ids for those without: the image's, with `/1`, `/2`, … where it shows several people.
+/// Gives people without an id that of the image, with `/1`, `/2`, … if it shows several
+/// people.
 fn number(people: &mut [Person]) {
     let image = |p: &Person| p.image.first().cloned().unwrap_or_default();
     let images: Vec<String> = people.iter().map(image).collect();
@@ -196,9 +198,10 @@ fn number(people: &mut [Person]) {
     }
 }
 
-/// MediaPipe's landmarks: 33 of them, or a list of them a person. Ids are 1, 2, ….
+/// Reads MediaPipe's landmarks: 33 of them, or a list of them per person. Ids are 1, 2,
+/// ….
 fn mediapipe(all: &Node, size: Option<(u32, u32)>) -> Result<Vec<Person>, KeypointsError> {
-    // Its older interface has one more level.
+    // The older interface has one more level.
     let inner = all.get("landmark");
     let all = inner.as_ref().unwrap_or(all);
     let lists: Vec<Node> = match all.value {

@@ -1,4 +1,4 @@
-//! What each layout gives, and what is said of files that are wrong.
+//! Tests of the result of each layout, and of the messages for invalid files.
 
 use crate::vision::keypoints::{COCO, Keypoints, MEDIAPIPE, People, split_id};
 use serde_json::{Value, json};

@@ -1,22 +1,23 @@
-//! How likely a detection is given where the model has the joint: it is near, or it is
-//! anywhere in the picture.
+//! The likelihood of a detection given the joint's position in the model: it is near the
+//! joint, or anywhere in the picture.
 //!
-//! Pure arithmetic on positions in pixels. A detection `z` of a joint at `p` has the
-//! density `(1 - e) N(z; p, s^2 I) + e / area` with `e = 1 - c (1 - outlier)` for a
-//! detector's confidence `c`: certain detections are off with the probability `outlier`,
-//! worthless ones tell nothing. `s^2 = sd^2 + offset^2`: the model's joint may be off,
-//! too, and where the joint really is then lies between it and the detection. A detector
-//! that is of several minds gives several places `z_m` with shares `w_m`, of which one is
-//! meant and the others are anywhere:
-//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. A share of joints
-//! may be missed by the model, with 8 times the spread: so a body that is far off still
-//! feels where its joints were seen. Invariant: finite and never NaN, as `e > 0`.
+//! All positions are in pixels. A detection `z` of a joint at `p` has the density
+//! `(1 - e) N(z; p, s^2 I) + e / area` with `e = 1 - c (1 - outlier)` for a detector's
+//! confidence `c`: a detection of full confidence is an outlier with probability
+//! `outlier`, and one of confidence 0 is uninformative. `s^2 = sd^2 + offset^2`, because
+//! the model's joint may be off, too; the true joint then lies between it and the
+//! detection. A detector with several hypotheses gives positions `z_m` with probabilities
+//! `w_m`, of which one belongs to the joint and the others are uniform:
+//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. The model may miss a
+//! fraction of the joints, which have 8 times the standard deviation, so that a distant
+//! body is still pulled towards its detected joints. Invariant: the density is finite and
+//! never NaN, as `e > 0`.
 
 use crate::rng::Stream;
 use crate::vision::VisionError;
 use smallvec::{SmallVec, smallvec};
 
-/// What the spreads of an error model are given in.
+/// The unit of the standard deviations of an error model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Unit {
     /// Percent of the image's diagonal.
@@ -29,25 +30,26 @@ pub enum Unit {
 /// The error model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeypointOptions {
-    /// The standard deviation of a good detection along each axis; positive.
+    /// The standard deviation of an inlier along each axis; positive.
     pub sd: f64,
-    /// The probability that a detection of full confidence is off; strictly between 0 and 1.
+    /// The probability that a detection of full confidence is an outlier; strictly
+    /// between 0 and 1.
     pub outlier: f64,
-    /// How far the joint may be from where the model has it, as a standard deviation
-    /// along each axis; not negative.
+    /// The standard deviation along each axis of the true joint about the model's; not
+    /// negative.
     pub offset: f64,
-    /// What these are given in.
+    /// The unit of `sd`, `offset` and `systematic`.
     pub unit: Unit,
-    /// The share of joints that the model has further off; from 0 to less than 1.
+    /// The fraction of joints that are farther off in the model; from 0 to less than 1.
     pub misses: f64,
-    /// How far joints are from where detector and model alike put them, as a standard
-    /// deviation along each axis; not negative. No detection tells of it, so it is in
-    /// what is said of joints ([`KeypointLikelihood::located`]) and not in the density.
+    /// The standard deviation along each axis of an error that detector and model have in
+    /// common; not negative. Detections are uninformative about it, so it enters the
+    /// uncertainty of joints ([`KeypointLikelihood::located`]) and not the density.
     pub systematic: f64,
 }
 
-/// How much wider detections are spread about joints that the model misses: it is the
-/// model that is off.
+/// Factor on the standard deviation of detections about joints that the model misses; the
+/// model is off then.
 const MISS: f64 = 8.0;
 
 impl Default for KeypointOptions {
@@ -63,23 +65,23 @@ impl Default for KeypointOptions {
     }
 }
 
-/// Where a joint was detected, in pixels.
+/// The detected position of a joint, in pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
-    /// The places and their shares, which sum to 1: at least one.
+    /// The positions and their probabilities, which sum to 1: at least one.
     places: SmallVec<[([f64; 2], f64); 3]>,
-    /// How sure the detector is, 0 to 1; others count as the nearest of those.
+    /// The detector's confidence, clamped to 0..=1.
     pub confidence: f64,
 }
 
 impl Detection {
-    /// At one place.
+    /// Builds a detection with a single position.
     pub fn new(at: [f64; 2], confidence: f64) -> Self {
         Detection { places: smallvec![(at, 1.0)], confidence }
     }
 
-    /// At one place, or at others with positive weights in proportion to its own, which
-    /// is 1.
+    /// Adds alternative positions with positive weights relative to the first position's
+    /// weight of 1.
     #[must_use]
     pub fn or(mut self, others: impl Iterator<Item = ([f64; 2], f64)>) -> Self {
         self.places.extend(others);
@@ -89,15 +91,15 @@ impl Detection {
     }
 }
 
-/// The error model for one size of image. Positions are in its pixels. Its density
-/// integrates to 1 as far as joints lie inside the image, which is where outliers are.
+/// The error model for one image size. Positions are in pixels. Its density integrates to
+/// 1 if joints are well inside the image, where outliers are uniform.
 #[derive(Clone, Debug)]
 pub struct KeypointLikelihood {
     width: f64,
     height: f64,
-    /// Of a detection about the model's joint: both spreads together.
+    /// Of a detection about the model's joint: `sd` and `offset` combined.
     sd: f64,
-    /// Of the joint about the model's.
+    /// Of the true joint about the model's.
     offset: f64,
     outlier: f64,
     misses: f64,
@@ -106,14 +108,16 @@ pub struct KeypointLikelihood {
     log_area: f64,
 }
 
-/// By place, near and as a near miss.
+/// Per position: as a good detection, and of a missed joint.
 type Logs = SmallVec<[[f64; 2]; 3]>;
 
 impl KeypointLikelihood {
-    /// The model for an image of this size and a torso of this length, all in pixels.
+    /// Builds the model for an image of this size and a torso of this length, all in
+    /// pixels.
     ///
     /// # Errors
-    /// If a side or an option is outside its range; a torso only where it is the unit.
+    /// If a side or an option is outside its range; the torso is only checked if it is
+    /// the unit.
     pub fn new(
         width: f64,
         height: f64,
@@ -135,7 +139,7 @@ impl KeypointLikelihood {
         let systematic = not_negative("systematic", options.systematic)? * unit;
         let own = positive("sd", options.sd)? * unit;
         let sd = (own * own + offset * offset).sqrt();
-        // Whose square is still a number.
+        // So that its square does not underflow.
         let sd = sd.max(1e-100);
         let outlier = options.outlier;
         if !(outlier > 0.0 && outlier < 1.0) {
@@ -168,27 +172,27 @@ impl KeypointLikelihood {
         })
     }
 
-    /// The standard deviation of a good detection about the model's joint along each
-    /// axis, in pixels.
+    /// The standard deviation of an inlier about the model's joint along each axis, in
+    /// pixels.
     pub fn sd(&self) -> f64 {
         self.sd
     }
 
-    /// The variance along an axis of a joint about where detector and model alike put it,
-    /// in squared pixels.
+    /// The variance along an axis of the error that detector and model have in common, in
+    /// squared pixels.
     pub fn systematic_variance(&self) -> f64 {
         self.systematic * self.systematic
     }
 
-    /// The probability that a detection of this confidence is off.
+    /// Returns the probability that a detection of this confidence is an outlier.
     pub fn outlier(&self, confidence: f64) -> f64 {
-        // Written so that NaN counts as no confidence.
+        // NaN counts as no confidence.
         let confidence = if confidence > 0.0 { confidence.min(1.0) } else { 0.0 };
         1.0 - confidence * (1.0 - self.outlier)
     }
 
-    /// The logs of the parts of the density, but for the places that are not meant: of
-    /// each place, and of none.
+    /// Returns the logs of the components of the density, without the factor for the
+    /// other positions: one for each position, and one for an outlier.
     fn parts(&self, seen: &Detection, joint: Option<[f64; 2]>) -> (Logs, f64) {
         let e = self.outlier(seen.confidence);
         let off = libm::log(e) - self.log_area;
@@ -205,7 +209,8 @@ impl KeypointLikelihood {
         (seen.places.iter().map(near).collect(), off)
     }
 
-    /// How likely each place is meant, well or as a near miss, and that none is.
+    /// Returns the probability that each position belongs to the joint, well or as a
+    /// miss, and that none does.
     fn shares(&self, seen: &Detection, joint: [f64; 2]) -> (Logs, f64) {
         let (mut near, off) = self.parts(seen, Some(joint));
         let sum = log_sum(&near, off);
@@ -213,14 +218,14 @@ impl KeypointLikelihood {
         (near, libm::exp(off - sum))
     }
 
-    /// The log density of a detection. `joint` is where the model has the joint; of one
-    /// that it has nowhere (behind the camera) every detection is off.
+    /// Returns the log density of a detection. `joint` is the model's position; if it has
+    /// none (behind the camera), every detection is an outlier.
     pub fn log_density(&self, seen: &Detection, joint: Option<[f64; 2]>) -> f64 {
         let (near, off) = self.parts(seen, joint);
         log_sum(&near, off) - (near.len() - 1) as f64 * self.log_area
     }
 
-    /// The derivative of the log density by the joint's position.
+    /// Returns the derivative of the log density with respect to the joint's position.
     pub fn gradient(&self, seen: &Detection, joint: [f64; 2]) -> [f64; 2] {
         let (shares, _) = self.shares(seen, joint);
         let mut sum = [0.0; 2];
@@ -233,14 +238,14 @@ impl KeypointLikelihood {
         sum
     }
 
-    /// Where the joint is, given a detection and where the model has it: the mean, and
-    /// the variance along an axis (the mean of the two).
+    /// Returns the mean position of the true joint given a detection and the model's
+    /// position, and the variance along an axis (averaged over the two).
     pub fn located(&self, seen: &Detection, joint: [f64; 2]) -> ([f64; 2], f64) {
         let (shares, off) = self.shares(seen, joint);
         let between = self.offset * self.offset;
         let own = (self.sd * self.sd - between).max(0.0);
-        // Of the mixture of joints that the model has, those it misses and detections
-        // that are off: within each, and between them.
+        // The variance of the mixture of hits, misses and outliers: within each
+        // component, and between them.
         let (mut shift, mut square, mut within) = ([0.0; 2], 0.0, off * between);
         for ((at, _), both) in seen.places.iter().zip(shares) {
             for (share, wider) in
@@ -259,14 +264,14 @@ impl KeypointLikelihood {
         ([0, 1].map(|i| joint[i] + shift[i]), within + apart.max(0.0) + self.systematic_variance())
     }
 
-    /// The place of a detection that is the likeliest to be meant.
+    /// Returns the position of a detection that most probably belongs to the joint.
     pub fn meant(&self, seen: &Detection, joint: [f64; 2]) -> [f64; 2] {
         let (shares, _) = self.shares(seen, joint);
         let all = seen.places.iter().zip(shares).map(|((at, _), [well, miss])| (*at, well + miss));
         all.reduce(|a, b| if b.1 > a.1 { b } else { a }).map_or(joint, |(at, _)| at)
     }
 
-    /// Places drawn, as many as a detection has.
+    /// Samples as many positions as a detection has.
     pub fn sample(
         &self,
         seen: &Detection,
@@ -296,7 +301,7 @@ impl KeypointLikelihood {
     }
 }
 
-/// The log of a sum of these exponentials, of which the last is finite.
+/// Returns the log of the sum of these exponentials, of which the last is finite.
 fn log_sum(near: &[[f64; 2]], off: f64) -> f64 {
     let most = near.iter().flatten().copied().fold(off, f64::max);
     let rest: f64 = near.iter().flatten().chain([&off]).map(|x| libm::exp(x - most)).sum();
@@ -411,7 +416,7 @@ mod tests {
         let m = KeypointLikelihood::new(400.0, 300.0, 0.0, &options).unwrap();
         assert!((m.sd() - 5.0).abs() < 1e-12, "both spreads: 3 and 4 pixels");
         let (seen, joint) = ([103.0, 96.0], [100.0, 100.0]);
-        // By quadrature over where the joint is: N(q; joint, 4) times the density of the
+        // By quadrature over the true joint: N(q; joint, 4) times the density of the
         // detection about q.
         let own = KeypointLikelihood::new(
             400.0,
@@ -472,8 +477,8 @@ mod tests {
                 square += r2;
             }
         }
-        // Beyond 4 standard deviations lies exp(-8) of the normal part; within it a
-        // hundredth of the uniform one.
+        // The normal part has exp(-8) beyond 4 standard deviations, and the uniform part
+        // a hundredth within them.
         let expected =
             0.4 * (1.0 - libm::exp(-8.0)) + 0.6 * std::f64::consts::PI * 400.0 / 120_000.0;
         assert!((near / f64::from(n) - expected).abs() < 0.01, "{}", near / f64::from(n));

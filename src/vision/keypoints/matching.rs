@@ -1,21 +1,21 @@
-//! Which landmark of a scene a detected joint is.
+//! Matches detected joints to the landmarks of a scene.
 
 use super::error::first;
 use super::names::may_lack;
 use super::{Keypoints, KeypointsError};
 
-/// At most this many landmarks are listed in a message.
+/// Maximum number of landmarks listed in a message.
 const LISTED: usize = 24;
 
-/// For each detected joint the index of the landmark of its name. Well-known joints that
-/// a rig may lack (eyes, ears, fingers, heels, …) have none where the scene has no such
-/// landmark.
+/// Returns for each detected joint the index of the landmark of the same name. Well-known
+/// joints that a rig may lack (eyes, ears, fingers, heels, …) have `None` if the scene
+/// does not have such a landmark.
 ///
-/// `nearest` finds the name most like another, for the message.
+/// `nearest` returns the most similar name, for the message.
 ///
 /// # Errors
-/// If a joint that is detected is no landmark and not one of those: its name, and the
-/// landmarks there are.
+/// If a detected joint is neither a landmark nor one of those; the message has its name
+/// and the existing landmarks.
 pub fn matching(
     detected: &Keypoints,
     landmarks: &[&str],

@@ -1,13 +1,14 @@
-//! Keypoints: where a detector found the joints of a person, and how likely that is given
-//! where a model has them.
+//! Keypoints: the detected joints of a person, and their likelihood given the joints of a
+//! model.
 //!
-//! Reads what pose detectors write, picks one person, and holds the error model; not a
-//! detector, and it knows nothing of bodies: a joint is a name. Invariant of
-//! [`Keypoints`]: names are unique, numbers finite, confidences in 0..=1.
+//! This module reads the output of pose detectors, picks one person, and holds the error
+//! model. It is not a detector, and it has no knowledge of bodies: a joint is a name.
+//! Invariant of [`Keypoints`]: names are unique, numbers finite, and confidences in
+//! 0..=1.
 //!
-//! The layouts that [`People::parse`] reads, told apart by their shape; `null` for a
-//! person means that nobody was found, for a joint that it was not; the confidence is
-//! from 0 to 1 and may be left out:
+//! [`People::parse`] reads the following layouts and distinguishes them by their shape.
+//! `null` for a person means that nobody was detected, and for a joint that it was not;
+//! the confidence is from 0 to 1 and optional:
 //!
 //! * one person: `{"nose": [x, y, confidence], …}`, or the same under `"keypoints"`;
 //! * many by id: `{"ID": {"keypoints": {"nose": [x, y, confidence], …}}, …}`;
@@ -16,11 +17,11 @@
 //!   or the list of results `[{"image_id": …, "keypoints": [x, y, v, …]}]`, with v = 0
 //!   for a joint that is missing and v above 1 counting as 1;
 //! * MediaPipe: `{"pose_landmarks": [33 of {"x", "y", "visibility"}]}`, also called
-//!   `"landmarks"`, also one such list per person; x and y as shares of the image's width
-//!   and height.
+//!   `"landmarks"`, also one such list per person; x and y as fractions of the image's
+//!   width and height.
 //!
-//! Beside `"keypoints"`, and in COCO's `"images"`, `"width"` and `"height"` say which
-//! size of image the pixels are of.
+//! `"width"` and `"height"`, beside `"keypoints"` or in COCO's `"images"`, give the size
+//! of the image in whose pixels the positions are.
 
 mod error;
 mod layouts;
@@ -43,61 +44,61 @@ pub use relative_depth::RelativeDepthLikelihood;
 
 use std::sync::Arc;
 
-/// A joint that was detected.
+/// A detected joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keypoint {
-    /// Its name, as the well-known lists [`COCO`] and [`MEDIAPIPE`] write it if it is one
-    /// of theirs.
+    /// Its name, normalised to the spelling of [`COCO`] and [`MEDIAPIPE`] if it is in
+    /// those lists.
     pub name: Arc<str>,
-    /// From the left edge, in pixels; a share of the width if the set is normalised.
+    /// From the left edge, in pixels; a fraction of the width if the set is normalised.
     pub x: f64,
-    /// From the top edge, in pixels; a share of the height if the set is normalised.
+    /// From the top edge, in pixels; a fraction of the height if the set is normalised.
     pub y: f64,
-    /// The detector's confidence, 0 to 1; 1 if it gives none.
+    /// The detector's confidence, 0 to 1; 1 if the detector does not report it.
     pub confidence: f64,
-    /// Where else it may be, if the detector is of several minds.
+    /// Alternative positions, if the detector has several hypotheses.
     pub others: Vec<Elsewhere>,
 }
 
-/// Another place where a joint may be.
+/// An alternative position of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elsewhere {
     /// As [`Keypoint::x`].
     pub x: f64,
     /// As [`Keypoint::y`].
     pub y: f64,
-    /// How likely in proportion to the joint's own place: positive.
+    /// Probability relative to that of the joint's main position: positive.
     pub weight: f64,
 }
 
 impl Keypoint {
-    /// At one place.
+    /// Builds a keypoint with a single position.
     pub fn new(name: impl Into<Arc<str>>, [x, y]: [f64; 2], confidence: f64) -> Keypoint {
         Keypoint { name: name.into(), x, y, confidence, others: Vec::new() }
     }
 }
 
-/// The joints detected of one person; none if nobody was.
+/// The detected joints of one person; empty if nobody was detected.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Keypoints {
     points: Vec<Keypoint>,
     normalised: bool,
     size: Option<(u32, u32)>,
-    /// The length of the torso in pixels, if it is not to be taken from the points.
+    /// The length of the torso in pixels, overriding the one computed from the points.
     torso: Option<f64>,
 }
 
-/// The ways across a torso.
+/// Diagonals of a torso.
 const ACROSS: [[&str; 2]; 2] = [["l_shoulder", "r_hip"], ["r_shoulder", "l_hip"]];
-/// A torso is at least this share of the longer side of the box round all joints: seen
-/// from its end it is no measure.
+/// Lower bound of a torso's length, as a fraction of the longer side of the box around
+/// all joints: a strongly foreshortened torso does not measure a person's size.
 const LEAST_TORSO: f64 = 0.2;
 
 impl Keypoints {
-    /// A set in pixels.
+    /// Builds a set of keypoints in pixels.
     ///
     /// # Errors
-    /// If a name occurs twice, a position is not finite or a confidence is not from 0 to 1.
+    /// If a name occurs twice, a position is not finite, or a confidence is not in 0..=1.
     pub fn new(points: Vec<Keypoint>) -> Result<Keypoints, KeypointsError> {
         for (i, p) in points.iter().enumerate() {
             if points[..i].iter().any(|q| q.name == p.name) {
@@ -128,7 +129,7 @@ impl Keypoints {
         Ok(Keypoints { points, ..Keypoints::default() })
     }
 
-    /// The same numbers as shares of the image's width and height.
+    /// Interprets the same numbers as fractions of the image's width and height.
     fn into_normalised(self) -> Keypoints {
         Keypoints { normalised: true, ..self }
     }
@@ -138,24 +139,24 @@ impl Keypoints {
         &self.points
     }
 
-    /// Whether there are none.
+    /// Whether there are no joints.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Whether positions are shares of the image's width and height, as MediaPipe writes
-    /// them.
+    /// Whether positions are fractions of the image's width and height, as in MediaPipe's
+    /// files.
     pub fn is_normalised(&self) -> bool {
         self.normalised
     }
 
-    /// Width and height in pixels of the image they were found in, if that is known.
+    /// Width and height in pixels of the image that they were detected in, if known.
     pub fn size(&self) -> Option<(u32, u32)> {
         self.size
     }
 
-    /// The same joints at other places, in the same units: as many of `points` as there
-    /// are joints.
+    /// Returns the same joints at the positions of `points`, in the same units and with
+    /// one point per joint.
     #[must_use]
     pub fn moved(&self, points: &[Keypoint]) -> Keypoints {
         let moved = |(p, to): (&Keypoint, &Keypoint)| Keypoint {
@@ -167,23 +168,22 @@ impl Keypoints {
         Keypoints { points: self.points.iter().zip(points).map(moved).collect(), ..self.clone() }
     }
 
-    /// The same, known to be of an image of this size; what a file says of its own size
-    /// goes first.
+    /// Records the size of the image; a size given in the file takes precedence.
     #[must_use]
     pub fn in_image(self, width: u32, height: u32) -> Keypoints {
         let known = (width > 0 && height > 0).then_some((width, height));
         Keypoints { size: self.size.or(known), ..self }
     }
 
-    /// The same with a torso of this length in pixels, wherever the joints are.
+    /// Sets the length of the torso in pixels, whatever the joints are.
     #[must_use]
     pub fn with_torso(self, torso: f64) -> Keypoints {
         Keypoints { torso: Some(torso), ..self }
     }
 
-    /// The length of the torso in pixels of an image of this size: the mean of the ways
-    /// from a shoulder to the opposite hip, as far as they were detected, and at least a
-    /// fifth of the box round all joints. 0 without joints.
+    /// Returns the length of the torso in pixels of an image of this size: the mean
+    /// distance from a shoulder to the opposite hip over the detected pairs, and at least
+    /// a fifth of the box around all joints. It is 0 without joints.
     pub fn torso(&self, size: (u32, u32)) -> f64 {
         if let Some(torso) = self.torso {
             return torso;
@@ -205,7 +205,7 @@ impl Keypoints {
         long.max(LEAST_TORSO * extent(0).max(extent(1)))
     }
 
-    /// A joint as detected, in pixels of an image of this size.
+    /// Returns the detection of a joint, in pixels of an image of this size.
     pub fn detection(&self, of: &Keypoint, size: (u32, u32)) -> Detection {
         let one = Detection::new(self.position(of, size), of.confidence);
         match of.others.is_empty() {
@@ -214,8 +214,8 @@ impl Keypoints {
         }
     }
 
-    /// The position of a joint in pixels of an image of this size, where the set itself
-    /// is in pixels of it or normalised.
+    /// Returns the position of a joint in pixels of an image of this size, if the set is
+    /// in its pixels or normalised.
     pub fn position(&self, of: &Keypoint, (width, height): (u32, u32)) -> [f64; 2] {
         self.scaled([of.x, of.y], (width, height))
     }

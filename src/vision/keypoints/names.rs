@@ -62,11 +62,11 @@ pub const MEDIAPIPE: [&str; 33] = [
     "r_foot_index",
 ];
 
-/// Joints of other well-known lists that a rig may lack.
+/// Joints of other common lists that a rig may lack.
 const MORE: [&str; 2] = ["neck", "head_top"];
 
-/// The name as the lists here have it: `left_eye` and `LEFT_EYE` are `l_eye`,
-/// `mouth_left` is `l_mouth`. Other names are left as they are.
+/// Returns the name in the spelling of these lists: `left_eye` and `LEFT_EYE` become
+/// `l_eye`, `mouth_left` becomes `l_mouth`. Other names are unchanged.
 pub(super) fn usual(name: &str) -> Cow<'_, str> {
     let lower = name.to_ascii_lowercase();
     let short = match (lower.strip_prefix("left_"), lower.strip_prefix("right_"), &*lower) {

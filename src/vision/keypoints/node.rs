@@ -1,9 +1,9 @@
-//! A place in a JSON document, so that what is wrong can be said with its path.
+//! A position in a JSON document, so that errors can name its path.
 
 use super::KeypointsError;
 use serde_json::Value;
 
-/// A value and where it stands.
+/// A value and its path.
 #[derive(Clone, Debug)]
 pub(super) struct Node<'a> {
     pub value: &'a Value,
@@ -15,7 +15,7 @@ impl<'a> Node<'a> {
         Node { value, path: String::new() }
     }
 
-    /// The field of an object; absent ones and fields of other things are none.
+    /// Returns the field of an object; `None` if it is absent or this is not an object.
     pub fn get(&self, field: &str) -> Option<Node<'a>> {
         self.value.get(field).map(|value| self.field(field, value))
     }
@@ -42,7 +42,7 @@ impl<'a> Node<'a> {
         self.value.as_array().map_or(0, Vec::len)
     }
 
-    /// The error that this is not what was wanted.
+    /// Returns the error that this is not the expected value.
     pub fn wrong(&self, wanted: &str) -> KeypointsError {
         let got = match self.value {
             Value::Null => "null".to_owned(),
@@ -58,12 +58,12 @@ impl<'a> Node<'a> {
         KeypointsError::new(format!("{place} must be {wanted}, got {got}"))
     }
 
-    /// A finite number.
+    /// Returns a finite number.
     pub fn number(&self, wanted: &str) -> Result<f64, KeypointsError> {
         self.value.as_f64().filter(|x| x.is_finite()).ok_or_else(|| self.wrong(wanted))
     }
 
-    /// A string, or a number as it is written.
+    /// Returns a string, or a number as it is written.
     pub fn id(&self) -> Result<String, KeypointsError> {
         match self.value {
             Value::String(s) => Ok(s.clone()),
@@ -72,7 +72,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// `width` and `height` of an object that has both as positive whole numbers.
+    /// Returns `width` and `height` of an object if both are positive integers.
     pub fn size(&self) -> Option<(u32, u32)> {
         let side = |name: &str| {
             let x = self.value.get(name)?.as_u64()?;

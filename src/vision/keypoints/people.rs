@@ -1,26 +1,26 @@
-//! Everybody a file tells of, and the choice of one of them.
+//! The people in a file, and the choice of one of them.
 
 use super::error::first;
 use super::node::Node;
 use super::{Keypoints, KeypointsError, layouts};
 
-/// The people of a file, in its order.
+/// The people of a file, in the order of the file.
 #[derive(Clone, Debug, Default)]
 pub struct People {
     pub(super) all: Vec<Person>,
 }
 
-/// One of them.
+/// A person of a file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Person {
-    /// What tells them from the others; empty where the file has one person only.
+    /// The person's id; empty if the file has a single person.
     pub id: String,
-    /// What they may share with others: the number and the file of the image.
+    /// Ids that people in the same image share: the image's number and file name.
     pub image: Vec<String>,
     pub keypoints: Keypoints,
 }
 
-/// A path without the `#ID` that picks a person out of the file, and that id.
+/// Splits a path with `#ID`, which picks a person from the file, into path and id.
 pub fn split_id(path: &str) -> (&str, Option<&str>) {
     match path.rsplit_once('#') {
         Some((file, id)) if !file.is_empty() && !id.is_empty() && !id.contains(['/', '\\']) => {
@@ -31,38 +31,38 @@ pub fn split_id(path: &str) -> (&str, Option<&str>) {
 }
 
 impl People {
-    /// Reads a file; the layouts are those of the [module's head](super).
+    /// Reads a file in one of the layouts of the [parent module](super).
     ///
     /// # Errors
-    /// If it is not JSON or of no known layout, or has something wrong in it: a message
-    /// with the path of it.
+    /// If it is not JSON, has an unknown layout, or contains an invalid value; the
+    /// message has its path.
     pub fn parse(bytes: &[u8]) -> Result<People, KeypointsError> {
         let document = serde_json::from_slice(bytes)
             .map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
         layouts::people(&Node::root(&document)).map(|all| People { all })
     }
 
-    /// The number of people; somebody who was looked for and not found counts.
+    /// The number of people, including those that were searched for but not detected.
     pub fn len(&self) -> usize {
         self.all.len()
     }
 
-    /// Whether the file tells of nobody.
+    /// Whether the file has no people.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// What tells people apart, in the order of the file.
+    /// The ids of the people, in the order of the file.
     pub fn ids(&self) -> impl ExactSizeIterator<Item = &str> {
         self.all.iter().map(|p| p.id.as_str())
     }
 
-    /// One person: that of an id, or else that of a picture whose file is called `stem`
-    /// (without folder and ending), or else the only one there is. Of a file with nobody
-    /// in it, no keypoints.
+    /// Returns one person: the one with the given id, or else the one of a picture whose
+    /// file is called `stem` (without folder and extension), or else the only one. A file
+    /// without people gives no keypoints.
     ///
     /// # Errors
-    /// If there is nobody of that id, or nothing says which of several people is meant.
+    /// If nobody has that id, or it is ambiguous which of several people is meant.
     pub fn pick(&self, id: Option<&str>, stem: Option<&str>) -> Result<Keypoints, KeypointsError> {
         if let Some(id) = id {
             return match self.find(id)? {
@@ -88,7 +88,7 @@ impl People {
         if let Some(p) = self.all.iter().find(|p| p.id == id) {
             return Ok(Some(p));
         }
-        // Files of pictures are often called by a number with zeros before it.
+        // Files of pictures often have a number with leading zeros for a name.
         let number = id.trim_start_matches('0');
         let same = |i: &String| i == id || i == number && id.bytes().all(|b| b.is_ascii_digit());
         let found: Vec<&Person> = self.all.iter().filter(|p| p.image.iter().any(same)).collect();

@@ -1,16 +1,17 @@
-//! How likely a network's depth of a landmark is given the model's, both in metres from
-//! the middle of the hips: it is near, or it is anywhere within a body's reach.
+//! The likelihood of a network's depth of a landmark given the model's, both in metres
+//! from the middle of the hips: it is near, or anywhere within a body's reach.
 //!
-//! Pure arithmetic. A depth `z` of a landmark that the model has at `d` has the density
-//! `(1 - e) N(z; d, sd^2) + e N(z; 0, REACH^2)`: one picture says little about depth, and
-//! a network that takes a limb for one that points the other way is off by twice its
-//! depth. Invariant: finite and never NaN, as `e > 0`.
+//! A depth `z` of a landmark that the model has at `d` has the density
+//! `(1 - e) N(z; d, sd^2) + e N(z; 0, REACH^2)`: a single picture is only weakly
+//! informative about depth, and a network that mistakes a limb for one pointing the other
+//! way is off by twice its depth. Invariant: the density is finite and never NaN, as
+//! `e > 0`.
 
 use crate::rng::Stream;
 use crate::vision::VisionError;
 
-/// The spread of depths that tell nothing, in metres: half of what a body reaches about
-/// its hips.
+/// The standard deviation of uninformative depths, in metres: half of a body's reach
+/// around its hips.
 const REACH: f64 = 0.5;
 
 /// The error model of relative depths.
@@ -21,11 +22,11 @@ pub struct RelativeDepthLikelihood {
 }
 
 impl RelativeDepthLikelihood {
-    /// `sd`: the standard deviation of a good depth, in metres, positive; `outlier`: the
-    /// share of depths that are off, strictly between 0 and 1.
+    /// `sd`: the standard deviation of an inlier, in metres, positive; `outlier`: the
+    /// probability of an outlier, strictly between 0 and 1.
     ///
     /// # Errors
-    /// If one of them is outside its range.
+    /// If either is outside its range.
     pub fn new(sd: f64, outlier: f64) -> Result<Self, VisionError> {
         if !(sd > 0.0 && sd < 1e9) {
             return Err(VisionError::Range {
@@ -41,11 +42,11 @@ impl RelativeDepthLikelihood {
                 value: outlier,
             });
         }
-        // Whose square is still a number.
+        // So that its square does not underflow.
         Ok(RelativeDepthLikelihood { sd: sd.max(1e-100), outlier })
     }
 
-    /// The logs of the two parts of the density: near, and anywhere.
+    /// Returns the logs of the two components of the density: near, and anywhere.
     fn parts(&self, seen: f64, model: f64) -> [f64; 2] {
         let log_normal = |x: f64, sd: f64| {
             let z = x / sd;
@@ -58,21 +59,21 @@ impl RelativeDepthLikelihood {
         [near, libm::log(self.outlier) + log_normal(seen, REACH)]
     }
 
-    /// The log density of a finite depth given the model's.
+    /// Returns the log density of a finite depth given the model's.
     pub fn log_density(&self, seen: f64, model: f64) -> f64 {
         let [near, off] = self.parts(seen, model);
         let most = near.max(off);
         most + libm::log(libm::exp(near - most) + libm::exp(off - most))
     }
 
-    /// The derivative of the log density by the model's depth.
+    /// Returns the derivative of the log density with respect to the model's depth.
     pub fn slope(&self, seen: f64, model: f64) -> f64 {
         let [near, off] = self.parts(seen, model);
         let share = 1.0 / (1.0 + libm::exp(off - near));
         if share > 0.0 { share * ((seen - model) / self.sd) / self.sd } else { 0.0 }
     }
 
-    /// A depth drawn given the model's.
+    /// Samples a depth given the model's.
     pub fn sample(&self, model: f64, rng: &mut Stream) -> f64 {
         let off = rng.uniform() < self.outlier || !model.is_finite();
         let (middle, sd) = if off { (0.0, REACH) } else { (model, self.sd) };

@@ -1,6 +1,7 @@
-//! Networks that map a picture to a map of contours or objects, from ONNX files, run by
-//! `rten`. Any network will do that takes one picture and gives a map of one channel in
-//! the same shape. A network's last bits depend on the processor's instructions.
+//! Networks from ONNX files that map a picture to a map of contours or objects, run by
+//! `rten`. A network must take one picture and return a map of one channel with the same
+//! aspect ratio. The last bits of a network's output depend on the processor's
+//! instructions.
 
 #[cfg(test)]
 mod tests;
@@ -14,31 +15,31 @@ use rten::{DataType, Dimension, Model, NodeId, Value, ValueType};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Networks that take any size get sides that are multiples of this: most halve their
-/// picture up to five times.
+/// Networks that accept any size get sides that are multiples of this, because most halve
+/// their picture up to five times.
 const MULTIPLE: u32 = 32;
-/// The most pixels a side that a network may ask for.
+/// The maximum side of a network's fixed input or of its output, pixels.
 const SIDE: usize = 4096;
 
-/// A network that maps a picture to a map.
+/// A network that maps a picture to a soft map.
 pub struct Network {
     model: Model,
     input: NodeId,
     takes: Takes,
     output: NodeId,
-    /// What messages call the output.
+    /// The output's name in messages.
     called: String,
     options: NetworkOptions,
 }
 
-/// What a network takes for a picture.
+/// The input format of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Takes {
     /// The channels are the last dimension, not the second.
     channels_last: bool,
     /// 1: grey; 3: colours.
     channels: usize,
-    /// Its own width and height, where it has any.
+    /// Its fixed width and height, if any.
     width: Option<u32>,
     height: Option<u32>,
 }
@@ -56,7 +57,7 @@ fn wrong(message: impl fmt::Display) -> VisionError {
     VisionError::Detector(message.to_string())
 }
 
-/// Runs what may fail inside of a library on files that nobody has checked.
+/// Runs library code that may panic on unchecked files.
 fn guarded<T>(what: &str, work: impl FnOnce() -> Result<T, VisionError>) -> Result<T, VisionError> {
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|_| Err(wrong(format!("the network cannot be {what}"))))
@@ -65,9 +66,8 @@ fn guarded<T>(what: &str, work: impl FnOnce() -> Result<T, VisionError>) -> Resu
 impl Network {
     /// Reads an ONNX file.
     ///
-    /// # Errors
-    /// If it is damaged, has operators that are not known, takes something other than one
-    /// picture, or has no such output.
+    /// If the file is damaged, has unknown operators, takes anything but one picture, or
+    /// lacks the output that the options name.
     pub fn read(bytes: &[u8], options: &NetworkOptions) -> Result<Network, VisionError> {
         let model = guarded("read", || {
             Model::load(bytes.to_vec()).map_err(|e| wrong(format!("cannot read the network: {e}")))
@@ -88,7 +88,7 @@ impl Network {
                     Dimension::Symbolic(_) => None,
                 })
                 .collect();
-            // What it says of itself; what it gives is looked at again.
+            // This is the declared shape; the actual output is checked again.
             if let (Some(sizes), Some(width), Some(height)) = (sizes, takes.width, takes.height) {
                 side_lengths(&sizes, (width, height))
                     .map_err(|why| wrong(format!("the output `{called}` {why}")))?;
@@ -97,17 +97,17 @@ impl Network {
         Ok(Network { model, input, takes, output, called, options: options.clone() })
     }
 
-    /// What its map shows.
+    /// The meaning of its map.
     pub fn shows(&self) -> Shows {
         self.options.shows
     }
 
-    /// The map of a photograph, at the network's own size or else at a longer side of at
-    /// most `size` pixels, at least a multiple of 32 each side.
+    /// Computes the map of a photograph, at the network's own size or else at a longer
+    /// side of at most about `size` pixels, with sides rounded to multiples of 32.
     ///
     /// # Errors
-    /// If the network fails, or gives something other than a map of one channel in the
-    /// shape of its input.
+    /// If the network fails, or returns anything but a map of one channel in the aspect
+    /// ratio of its input.
     pub fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError> {
         let own = fitted(photo.width(), photo.height(), size);
         let round = |n: u32| ((n + MULTIPLE / 2) / MULTIPLE * MULTIPLE).max(MULTIPLE);
@@ -144,7 +144,7 @@ impl Network {
         wrong(format!("the output `{}` {why}", self.called))
     }
 
-    /// The photograph as the network likes it.
+    /// Converts the photograph to the network's input format.
     fn picture(&self, photo: &Photo, width: u32, height: u32) -> Result<Value, VisionError> {
         let NetworkOptions { bgr, white, mean, spread, .. } = self.options;
         let mut rgb = photo.srgb(width, height);
@@ -154,7 +154,7 @@ impl Network {
             }
             if self.takes.channels == 1 {
                 let [red, blue] = if bgr { [p[2], p[0]] } else { [p[0], p[2]] };
-                // Luma of Rec. 601, which is what most pictures in grey were made by.
+                // Luma of Rec. 601, which most grey pictures use.
                 *p = [0.299 * red + 0.587 * p[1] + 0.114 * blue; 3];
             }
             *p = std::array::from_fn(|c| (white * p[c] - mean[c]) / spread[c]);
@@ -172,14 +172,14 @@ impl Network {
     }
 }
 
-/// What a network takes, from what it says of its input.
+/// Determines the input format from the network's declaration.
 fn takes(model: &Model, input: NodeId) -> Result<Takes, VisionError> {
     let info = model.node_info(input).ok_or_else(|| wrong("the network has no input"))?;
     if info.dtype().is_some_and(|t| t != ValueType::Tensor(DataType::Float)) {
         return Err(wrong("the network's input is not in single precision"));
     }
     let Some(shape) = info.shape() else {
-        // Nothing is said: colours, channels first, as most are.
+        // Without a declaration: colours, channels first, as in most networks.
         return Ok(Takes { channels_last: false, channels: 3, width: None, height: None });
     };
     let shown = || {
@@ -229,7 +229,7 @@ fn takes(model: &Model, input: NodeId) -> Result<Takes, VisionError> {
     Ok(Takes { channels_last, channels, width: side(width)?, height: side(height)? })
 }
 
-/// The output that is the map, and its name.
+/// Returns the output that is the map, and its name.
 fn output(model: &Model, which: &Output) -> Result<(NodeId, String), VisionError> {
     let all: Vec<(NodeId, String)> = model
         .output_ids()
@@ -257,7 +257,7 @@ fn output(model: &Model, which: &Output) -> Result<(NodeId, String), VisionError
     })
 }
 
-/// The shape and the numbers of an output.
+/// Returns the shape and the numbers of an output.
 fn numbers(value: Value) -> Option<(Vec<usize>, Vec<f32>)> {
     fn of<const N: usize>((shape, data): ([usize; N], Vec<f32>)) -> (Vec<usize>, Vec<f32>) {
         (shape.to_vec(), data)
@@ -269,7 +269,8 @@ fn numbers(value: Value) -> Option<(Vec<usize>, Vec<f32>)> {
     four.or_else(|_| three()).or_else(|_| two()).or_else(|_| other()).ok()
 }
 
-/// Width and height of a map of one channel in the shape of a picture, or why it is none.
+/// Returns width and height of a map of one channel in the aspect ratio of a picture, or
+/// an error message.
 fn side_lengths(shape: &[usize], (width, height): (u32, u32)) -> Result<(u32, u32), String> {
     let (h, w) = match *shape {
         [h, w] | [1, h, w] | [1, 1, h, w] | [1, h, w, 1] => (h, w),
@@ -280,7 +281,7 @@ fn side_lengths(shape: &[usize], (width, height): (u32, u32)) -> Result<(u32, u3
         }
     };
     let (a, b) = (w as u64 * u64::from(height), h as u64 * u64::from(width));
-    // A pixel more or less comes from rounding.
+    // Rounding may cause a difference of a pixel.
     if w == 0 || h == 0 || w > SIDE || h > SIDE || a.abs_diff(b) > u64::from(width.max(height)) {
         return Err(format!(
             "is {w} x {h} pixels, which does not match the aspect ratio of the picture, {width} x {height}"

@@ -1,11 +1,11 @@
-//! Networks written byte by byte, and what becomes of them.
+//! Tests of networks written byte by byte.
 
 use super::*;
 use crate::vision::{ContourDetector, FileDetector};
 use image::{Rgb, RgbImage};
 use writer::{Dim, Graph, floats, node};
 
-/// ONNX files by hand: protocol buffers, field by field.
+/// A minimal writer of ONNX files: protocol buffers, field by field.
 mod writer {
     fn varint(mut n: u64) -> Vec<u8> {
         let mut out = Vec::new();
@@ -32,7 +32,7 @@ mod writer {
         Any(&'static str),
     }
 
-    /// A tensor of numbers: of an input or output, by name, its type and its shape.
+    /// The declaration of an input or output: its name, element type and shape.
     fn value(name: &str, element: u64, shape: &[Dim]) -> Vec<u8> {
         let dims = shape.iter().flat_map(|d| {
             bytes(
@@ -54,7 +54,7 @@ mod writer {
         [dims, number(2, 1), bytes(8, name.as_bytes()), bytes(9, &raw)].concat()
     }
 
-    /// A node; attributes are lists of whole numbers.
+    /// A node; attributes are lists of integers.
     pub fn node(op: &str, inputs: &[&str], output: &str, attributes: &[(&str, &[u64])]) -> Vec<u8> {
         let inputs = inputs.iter().flat_map(|i| bytes(1, i.as_bytes())).collect::<Vec<u8>>();
         let attributes = attributes.iter().flat_map(|(name, ints)| {
@@ -93,8 +93,8 @@ fn shape(channels: u64, sides: [Dim; 2]) -> Vec<Dim> {
     vec![Dim::Of(1), Dim::Of(channels), sides[0], sides[1]]
 }
 
-/// One convolution of 1 x 1, which adds up the channels with weights, and then something
-/// that is done to the sum.
+/// A 1 x 1 convolution, which is a weighted sum of the channels, followed by another
+/// operator.
 fn weighted(channels: u64, sides: [Dim; 2], weights: &[f32], then: &str) -> Graph {
     Graph {
         inputs: vec![("picture", 1, shape(channels, sides))],
@@ -111,7 +111,7 @@ fn network(graph: &Graph, options: &NetworkOptions) -> Result<Network, String> {
     Network::read(&graph.file(), options).map_err(|e| e.to_string())
 }
 
-/// A disc on a ground, of red, green and blue.
+/// A disc of one colour on black.
 fn photo(width: u32, height: u32) -> Photo {
     let middle = (width as f32 / 2.0, height as f32 / 2.0);
     Photo::from_rgb(RgbImage::from_fn(width, height, |x, y| {
@@ -133,7 +133,7 @@ fn the_picture_arrives_as_the_options_say() {
         middle(&network(graph, options).unwrap().map(&photo, 512).unwrap())
     };
     let near = |a: f32, b: f32| assert!((a - b).abs() < 1e-6, "{a} {b}");
-    // One channel at a time: red, green, blue are 1, 0.4, 0.2 in the disc.
+    // One channel at a time: red, green and blue are 1, 0.4 and 0.2 in the disc.
     let one = |c: usize| {
         weighted(3, SIDES, &std::array::from_fn::<f32, 3, _>(|k| f32::from(k == c)), "Identity")
     };
@@ -150,7 +150,7 @@ fn the_picture_arrives_as_the_options_say() {
     };
     near(get(&one(0), &normalised), 1.0);
     near(get(&one(1), &normalised), 153.0 / 510.0);
-    // Grey, by Rec. 601, whatever the order of colours.
+    // Grey, by Rec. 601, in either order of colours.
     let grey = weighted(1, SIDES, &[1.0], "Identity");
     near(get(&grey, &plain), 0.299 + 0.587 * 0.4 + 0.114 * 0.2);
     near(get(&grey, &bgr), 0.299 + 0.587 * 0.4 + 0.114 * 0.2);
@@ -204,7 +204,7 @@ fn values_beyond_1_are_log_odds_or_an_error() {
 
 #[test]
 fn objects_and_contours_become_contour_maps_in_the_shape_of_the_photograph() {
-    // The disc itself: an object. A network of fixed size, which is not that of the
+    // The disc is an object. The network has a fixed size that differs from that of the
     // photograph.
     let fixed = weighted(3, [Dim::Of(64), Dim::Of(64)], &[1.0, 0.0, 0.0], "Identity");
     let objects = NetworkOptions { shows: Shows::Objects, ..NetworkOptions::default() };
@@ -221,7 +221,7 @@ fn objects_and_contours_become_contour_maps_in_the_shape_of_the_photograph() {
         assert!((r - 64.0 / 6.0).abs() < 0.8, "{r}");
         assert!(((map.tx[k] * x + map.ty[k] * y) / r).abs() < 0.3);
     }
-    // What a map shows is for the options to say.
+    // The options decide what a map shows.
     let contours = FileDetector::read(&fixed.file(), &NetworkOptions::default())
         .unwrap()
         .detect(&photo)
@@ -243,7 +243,7 @@ fn sides_of_networks_that_take_any_size() {
         let map = any.map(&photo(w, h), size).unwrap();
         assert_eq!((map.width, map.height), expected);
     }
-    // Channels last, one of them, as some frameworks have it.
+    // A single channel, last, as in some frameworks.
     let last = Graph {
         inputs: vec![("picture", 1, vec![Dim::Of(1), SIDES[0], SIDES[1], Dim::Of(1)])],
         outputs: vec![("map", vec![Dim::Of(1), SIDES[0], SIDES[1], Dim::Of(1)])],
@@ -277,7 +277,7 @@ fn networks_that_are_of_no_use() {
         (input(&[1, 4, 64, 64]), "it must take 1 or 3 channels"),
         (input(&[1, 3, 64, 9999]), "sides may be 1 to 4096"),
         (with(&|g| g.outputs.clear()), "the network has no output"),
-        // A picture of three channels for a map.
+        // The output has three channels.
         (
             with(&|g| {
                 g.outputs = vec![("same", shape(3, SIDES))];
@@ -294,7 +294,7 @@ fn networks_that_are_of_no_use() {
     ] {
         assert!(why.contains(says), "{why:?} does not say {says:?}");
     }
-    // What a file says of its output is looked at when it is read.
+    // The declared shape of the output is checked on reading.
     let mut thin = weighted(3, [Dim::Of(64), Dim::Of(64)], &[1.0, 0.0, 0.0], "Identity");
     thin.outputs[1].1 = shape(1, [Dim::Of(64), Dim::Of(32)]);
     let why = network(&thin, &plain).unwrap_err();

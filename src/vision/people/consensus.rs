@@ -1,9 +1,9 @@
-//! One person out of several views: which views agree, what they agree on, and what the
-//! others say.
+//! Combines several views of a person: which views agree, what they agree on, and which
+//! poses the others have.
 //!
-//! Means over views are bad, since views have several modes (an arm here or there, left
-//! and right exchanged). So the view that most others agree with is looked for, and each
-//! landmark is the median over those that agree with it.
+//! Means over views are poor, since views have several modes (an arm here or there, left
+//! and right exchanged). Instead, each landmark is the median over the views that agree
+//! with the view that has most agreement.
 
 use super::landmarks::{NAMED, SeenLandmark, View};
 use super::window::Window;
@@ -11,12 +11,12 @@ use super::{Hypothesis, Landmark};
 
 /// Shoulders, elbows, wrists, hips, knees, ankles.
 const LIMBS: [usize; 12] = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28];
-/// Landmarks this far apart, in lengths of the torso, agree by exp(-1/2).
+/// Landmarks this far apart, in lengths of the torso, have an agreement of exp(-1/2).
 const NEAR: f64 = 0.3;
-/// Views that agree more than this, 0 to 1, see the same pose.
+/// Views with more agreement than this, 0 to 1, have the same pose.
 const AGREEING: f64 = 0.5;
 
-/// A view with the score and the window of the detection that it comes from.
+/// A view with the score and the window of its detection.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
     pub score: f64,
@@ -24,8 +24,8 @@ pub(super) struct Run {
     pub view: View,
 }
 
-/// Runs by person: windows about the same place and of about the same size, in the order
-/// of their first.
+/// Groups runs by person: windows at about the same position and of about the same size.
+/// People are in the order of their first run.
 pub(super) fn by_person(runs: Vec<Run>) -> Vec<Vec<Run>> {
     let mut people: Vec<Vec<Run>> = Vec::new();
     for run in runs {
@@ -44,15 +44,15 @@ pub(super) fn by_person(runs: Vec<Run>) -> Vec<Vec<Run>> {
     people
 }
 
-/// The mean centre and side of the windows of a person.
+/// Returns the mean centre and side of the windows of a person.
 fn middle(runs: &[Run]) -> ([f64; 2], f64) {
     let n = runs.len().max(1) as f64;
     let mean = |f: &dyn Fn(&Run) -> f64| runs.iter().map(f).sum::<f64>() / n;
     ([mean(&|r| r.found.centre[0]), mean(&|r| r.found.centre[1])], mean(&|r| r.found.side))
 }
 
-/// How much a picture of this size is about a person: how often and surely they are seen,
-/// how large, how near its middle.
+/// Returns the prominence of a person in a picture of this size: it increases with the
+/// number and score of detections, with the person's size, and towards the middle.
 pub(super) fn prominence(runs: &[Run], width: u32, height: u32) -> f64 {
     let (centre, side) = middle(runs);
     let off = libm::hypot(centre[0] / f64::from(width) - 0.5, centre[1] / f64::from(height) - 0.5);
@@ -64,15 +64,15 @@ pub(super) fn prominence(runs: &[Run], width: u32, height: u32) -> f64 {
 #[derive(Clone, Debug)]
 pub(super) struct Consensus {
     pub landmarks: [Landmark; NAMED],
-    /// Lengths of the torso in pixels, as views have it in the middle.
+    /// The median length of the torso over the views, in pixels.
     pub torso: f64,
-    /// Which runs agree, by their place.
+    /// Indices of the agreeing runs.
     pub agreeing: Vec<usize>,
     /// Poses that other views agree on, most views first.
     pub others: Vec<Hypothesis>,
 }
 
-/// The consensus of some runs, of which there is at least one.
+/// Returns the consensus of at least one run; `None` without runs.
 pub(super) fn consensus(runs: &[Run]) -> Option<Consensus> {
     let torso = median(runs.iter().map(|r| length(&r.view)).collect())?.max(1e-3);
     let mut left: Vec<usize> = (0..runs.len()).collect();
@@ -94,8 +94,8 @@ pub(super) fn consensus(runs: &[Run]) -> Option<Consensus> {
     Some(Consensus { landmarks, torso, agreeing, others })
 }
 
-/// The run, among some, that the others agree with most, by how sure they are; of equal
-/// ones the first.
+/// Returns the run, among some, with which the others agree most, weighted by their
+/// confidence; the first one among equals.
 fn most_agreed(runs: &[Run], among: &[usize], torso: f64) -> Option<usize> {
     let support = |i: usize| -> f64 {
         let each = |j: &usize| {
@@ -111,7 +111,7 @@ fn most_agreed(runs: &[Run], among: &[usize], torso: f64) -> Option<usize> {
     among.iter().fold(None, better).map(|(i, _)| i)
 }
 
-/// How far two views see the same pose, 0 to 1.
+/// Returns the agreement of two views on a pose, 0 to 1.
 fn agreement(a: &View, b: &View, torso: f64) -> f64 {
     let near = |i: usize| {
         let d = distance(a.landmarks[i].at, b.landmarks[i].at) / torso / NEAR;
@@ -120,7 +120,7 @@ fn agreement(a: &View, b: &View, torso: f64) -> f64 {
     LIMBS.iter().map(|i| near(*i)).sum::<f64>() / LIMBS.len() as f64
 }
 
-/// The mean of the two ways from a shoulder to the opposite hip.
+/// Returns the mean distance from a shoulder to the opposite hip.
 fn length(view: &View) -> f64 {
     let [a, b, c, d] = [11, 24, 12, 23].map(|i| view.landmarks[i].at);
     0.5 * (distance(a, b) + distance(c, d))
@@ -141,7 +141,7 @@ fn medians(runs: &[Run], among: &[usize]) -> Option<[Landmark; NAMED]> {
             let d = distance(runs[*i].view.landmarks[k].at, at);
             d * d
         });
-        // Of one coordinate.
+        // Standard deviation of one coordinate.
         let spread = libm::sqrt(squares.sum::<f64>() / (2 * among.len()) as f64);
         let metres = [each(&|s| s.metres[0])?, each(&|s| s.metres[1])?, each(&|s| s.metres[2])?];
         *landmark = Landmark { at, spread, visibility: each(&|s| s.visibility)?, metres };
@@ -149,7 +149,7 @@ fn medians(runs: &[Run], among: &[usize]) -> Option<[Landmark; NAMED]> {
     Some(out)
 }
 
-/// The middle number, the lower of two.
+/// Returns the median; of two middle numbers the lower one.
 fn median(mut xs: Vec<f64>) -> Option<f64> {
     xs.sort_by(f64::total_cmp);
     xs.get(xs.len().checked_sub(1)? / 2).copied()

@@ -1,27 +1,27 @@
-//! Where in a picture people are, roughly: an SSD network's boxes (Liu et al. 2016;
-//! MediaPipe's `pose_detection`).
+//! Approximate detection of people in a picture: the boxes of an SSD network (Liu et al.
+//! 2016; MediaPipe's `pose_detection`).
 
 use super::window::{Beyond, Window};
 use crate::nn::{Network, NetworkError, sigmoid};
 use crate::vision::Photo;
 
-/// Samples along a side of the network's input.
+/// Side of the network's input, in samples.
 const SIDE: usize = 224;
-/// Grids of anchors: cells along a side, anchors in each.
+/// Grids of anchors: cells along a side, and anchors per cell.
 const GRIDS: [(usize, usize); 3] = [(28, 2), (14, 2), (7, 6)];
-/// Numbers of an anchor: a box's centre, width and height, and four points.
+/// Number of values per anchor: a box's centre, width and height, and four points.
 const NUMBERS: usize = 12;
-/// Boxes that overlap more than this are of one person (intersection over union).
+/// Boxes with a larger intersection over union than this belong to the same person.
 const OVERLAP: f64 = 0.3;
 
-/// A person, as the network sees them.
+/// A person detected by the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Detection {
     /// 0 to 1.
     pub score: f64,
-    /// Left, top, right, bottom, in pixels. It is about the head, not the whole person.
+    /// Left, top, right, bottom, in pixels, of the head rather than the whole person.
     pub head: [f64; 4],
-    /// The window in which to look for landmarks.
+    /// The window in which to detect landmarks.
     pub window: Window,
 }
 
@@ -43,7 +43,7 @@ fn anchors() -> impl Iterator<Item = [f64; 2]> {
     })
 }
 
-/// Fails unless the network takes and gives what one that detects people does.
+/// Returns an error unless the network has the inputs and outputs of a person detector.
 pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     let count = anchors().count();
     let outputs: Vec<&[usize]> = network.output_shapes().collect();
@@ -55,7 +55,8 @@ pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     Err(NetworkError::Format("it is not a person detector (pose_detection.tflite)".into()))
 }
 
-/// The people in a view of a picture with a score of at least this, best first.
+/// Returns the people in a view of a picture with a score of at least `least`, best
+/// first.
 pub(super) fn detect(
     network: &Network,
     photo: &Photo,
@@ -91,8 +92,8 @@ fn found(c: &Candidate, view: &Window) -> Option<Detection> {
     window.is_sound().then_some(Detection { score: c.score, head, window })
 }
 
-/// One candidate for each group that overlaps the best of those left: their mean,
-/// weighted by score.
+/// Merges the candidates that overlap the best remaining one into their mean, weighted by
+/// score, until none remain.
 fn people(mut all: Vec<Candidate>) -> Vec<Candidate> {
     let mut out = Vec::new();
     while let Some(best) = all.first().copied() {

@@ -1,13 +1,14 @@
-//! People as files that other programs read, and `--keypoints` too: COCO's layout and
-//! MediaPipe's.
+//! People as JSON, for other programs and for `--keypoints`: in COCO's and in MediaPipe's
+//! layout.
 
 use super::{Landmark, Person};
 use crate::vision::keypoints::{COCO, MEDIAPIPE};
 use serde_json::{Map, Value, json};
 
-/// People in a picture of this size and name as COCO's annotations: 17 joints with the
-/// visibility as third number, box, score. Beside them, under `landmarks`, all 33 by
-/// name: x, y, visibility, spread in pixels; under `metres` their places about the hips.
+/// Returns the people in a picture of this size and name as COCO annotations: 17 joints
+/// with the visibility as third number, box and score. In addition, `landmarks` has all
+/// 33 by name (x, y, visibility, standard deviation in pixels), and `metres` their
+/// positions relative to the hips.
 pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str) -> Value {
     let annotation = |(i, p): (usize, &Person)| {
         let [left, top, right, bottom] = p.bounds;
@@ -29,8 +30,8 @@ pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str) -> Value
     })
 }
 
-/// People in a picture of this size as MediaPipe has them: 33 landmarks each, as shares
-/// of its width and height, and in metres about the hips.
+/// Returns the people in a picture of this size in MediaPipe's layout: 33 landmarks each,
+/// as fractions of its width and height, and in metres relative to the hips.
 pub fn mediapipe(people: &[Person], (width, height): (u32, u32)) -> Value {
     let each = |one: &dyn Fn(&Landmark) -> Value| -> Value {
         people.iter().map(|p| p.landmarks.iter().map(one).collect::<Value>()).collect()
@@ -57,7 +58,7 @@ fn by_name(p: &Person, one: impl Fn(&Landmark) -> Value) -> Map<String, Value> {
     MEDIAPIPE.iter().zip(&p.landmarks).map(|(name, l)| ((*name).to_owned(), one(l))).collect()
 }
 
-/// To a thousandth.
+/// Rounds to a thousandth.
 fn number(x: f64) -> Value {
     json!(libm::round(x * 1000.0) / 1000.0)
 }

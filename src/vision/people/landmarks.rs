@@ -1,4 +1,4 @@
-//! The landmarks of one person in a window: MediaPipe's `pose_landmark` networks
+//! The landmarks of one person in a window, by MediaPipe's `pose_landmark` networks
 //! (Bazarevsky et al. 2020, "BlazePose").
 
 use super::window::{Beyond, Window};
@@ -6,44 +6,45 @@ use crate::nn::{Network, NetworkError, sigmoid};
 use crate::vision::Photo;
 use crate::vision::keypoints::MEDIAPIPE;
 
-/// Samples along a side of the network's input and of its mask.
+/// Side of the network's input and of its mask, in samples.
 pub(super) const SIDE: usize = 256;
-/// Landmarks that are named, and all, of which two more give the next window.
+/// Number of named landmarks, and of all landmarks, of which two more define the next
+/// window.
 pub(super) const NAMED: usize = MEDIAPIPE.len();
 const ALL: usize = 39;
-/// Cells along a side of a heat map, and how far around a landmark it is read.
+/// Side of a heat map in cells, and the radius around a landmark in which it is read.
 const MAP: usize = 64;
 const REACH: usize = 3;
-/// A heat map that is lower than this everywhere around a landmark says nothing of it.
+/// A heat map whose maximum around a landmark is lower than this is ignored.
 const LOWEST: f32 = 0.5;
 
-/// A landmark as a network sees it in one window.
+/// A landmark that a network detects in one window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SeenLandmark {
     /// In pixels of the picture.
     pub at: [f64; 2],
     /// 0 to 1.
     pub visibility: f64,
-    /// In metres from the middle of the hips: right and down in the picture, and away
-    /// from the camera.
+    /// In metres relative to the middle of the hips: right and down in the picture, and
+    /// away from the camera.
     pub metres: [f64; 3],
 }
 
-/// What a network sees in a window.
+/// The output of a network for a window.
 #[derive(Clone, Debug)]
 pub(super) struct View {
     pub window: Window,
-    /// How sure it is that there is a person, 0 to 1.
+    /// Confidence that there is a person, 0 to 1.
     pub presence: f64,
     /// In the order of [`MEDIAPIPE`].
     pub landmarks: [SeenLandmark; NAMED],
     /// The window that these landmarks suggest.
     pub next: Window,
-    /// Logits of the person's mask, by row of the window.
+    /// Logits of the person's mask, in row-major order of the window.
     pub mask: Vec<f32>,
 }
 
-/// Fails unless the network takes and gives what one for landmarks does.
+/// Returns an error unless the network has the inputs and outputs of a landmark network.
 pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     let outputs: Vec<&[usize]> = network.output_shapes().collect();
     let wanted: [&[usize]; 5] =
@@ -54,7 +55,7 @@ pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     Err(NetworkError::Format("it is not a landmark network (pose_landmark_*.tflite)".into()))
 }
 
-/// The same landmark of the other side of the body.
+/// Returns the same landmark on the other side of the body.
 fn other_side(i: usize) -> usize {
     match i {
         1..=3 => i + 3,
@@ -65,8 +66,8 @@ fn other_side(i: usize) -> usize {
     }
 }
 
-/// What the network sees in a window of a picture; `None` if that is no window to go on
-/// from.
+/// Runs the network on a window of a picture; `None` if the output is not finite or
+/// suggests an unusable window.
 pub(super) fn look(
     network: &Network,
     photo: &Photo,
@@ -100,8 +101,8 @@ pub(super) fn look(
     }))
 }
 
-/// A position, moved to the mean of the landmark's heat map around it where that is sure
-/// of itself.
+/// Returns a position, refined to the mean of the landmark's heat map around it if that
+/// is confident.
 fn refined(maps: &[f32], landmark: usize, at: [f64; 2]) -> [f64; 2] {
     let cell = at.map(|x| x * MAP as f64);
     if !cell.iter().all(|c| (0.0..MAP as f64).contains(c)) {

@@ -1,11 +1,11 @@
-//! People in a photograph: where they are, 33 landmarks of each, and which pixels are
-//! theirs, by two small networks of MediaPipe.
+//! Detects the people in a photograph, with 33 landmarks and a mask for each, by two
+//! small networks of MediaPipe.
 //!
-//! The picture is looked at in several views, padded and mirrored; what they agree on is
-//! the person, what they do not are other hypotheses ([`Person::others`]). A function of
-//! the picture alone, with the same bits on any machine and for any number of threads.
-//! Not here: which networks there are (`pcadlang-models`), and what is made of the
-//! landmarks.
+//! The picture is examined in several views, padded and mirrored. What most of them agree
+//! on is the person; poses that only other views agree on are alternative hypotheses
+//! ([`Person::others`]). The result is a function of the picture alone, with the same
+//! bits on any machine and for any number of threads. The networks themselves
+//! (`pcadlang-models`) and the use of the landmarks are elsewhere.
 
 mod consensus;
 mod detection;
@@ -25,20 +25,20 @@ use landmarks::{NAMED, SIDE, View};
 use std::thread::available_parallelism;
 use window::Window;
 
-/// The longest side that is looked at; larger pictures are made smaller first.
+/// The maximum longer side that is processed; larger pictures are shrunk first.
 const LONGEST: u32 = 1280;
-/// Views see at most this often that there is nobody.
+/// If a run has a presence above this, runs with a lower one are ignored.
 const PRESENT: f64 = 0.5;
 
-/// How people are looked for.
+/// Options of the search for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FindOptions {
-    /// How many views there are, half of them mirrored: 2, 4 or 8, by padding the picture
-    /// by 0, 30 %, 15 % and 50 %.
+    /// The number of views, half of them mirrored: 2, 4 or 8, with paddings of 0, 30 %,
+    /// 15 % and 50 %.
     pub views: u32,
-    /// How many people a view is searched for at most.
+    /// The maximum number of people per view.
     pub most: usize,
-    /// Detections of a lower score are left out, 0 to 1.
+    /// Minimum score of detections, 0 to 1.
     pub least: f64,
 }
 
@@ -53,32 +53,32 @@ impl Default for FindOptions {
 pub struct Landmark {
     /// In pixels of the photograph.
     pub at: [f64; 2],
-    /// The standard deviation of a coordinate over the views that agree, in pixels.
+    /// The standard deviation of a coordinate over the agreeing views, in pixels.
     pub spread: f64,
-    /// How sure the network is that it can be seen, 0 to 1.
+    /// The network's confidence that it is visible, 0 to 1.
     pub visibility: f64,
-    /// In metres from the middle of the hips: right and down in the picture, and away
-    /// from the camera.
+    /// In metres relative to the middle of the hips: right and down in the picture, and
+    /// away from the camera.
     pub metres: [f64; 3],
 }
 
-/// Another pose that some views of a person agree on.
+/// An alternative pose that some views of a person agree on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hypothesis {
     /// In the order of [`MEDIAPIPE`].
     pub landmarks: [Landmark; NAMED],
-    /// How many views have it.
+    /// Number of views with this pose.
     pub views: usize,
 }
 
-/// A person that was found.
+/// A detected person.
 #[derive(Clone, Debug)]
 pub struct Person {
-    /// How much the picture is about them: how often and surely they are seen, how large,
-    /// how near the middle.
+    /// Prominence of the person in the picture: the larger, the more often and
+    /// confidently they are seen, the larger they are, and the nearer to the middle.
     pub score: f64,
-    /// How sure it is that this is a person, 0 to 1: what both networks grant, in the
-    /// view where that is most.
+    /// Confidence that this is a person, 0 to 1: the smaller of both networks'
+    /// confidences, in the view where that is largest.
     pub sure: f64,
     /// Left, top, right and bottom of all landmarks, in pixels.
     pub bounds: [f64; 4],
@@ -86,17 +86,17 @@ pub struct Person {
     pub torso: f64,
     /// In the order of [`MEDIAPIPE`].
     pub landmarks: [Landmark; NAMED],
-    /// How many views saw them, and how many of these agree.
+    /// Number of views that saw them.
     pub views: usize,
-    /// Those that agree.
+    /// Number of views that agree.
     pub agreeing: usize,
-    /// What the others say, most views first.
+    /// Poses of the other views, most views first.
     pub others: Vec<Hypothesis>,
-    /// The masks of the views that agree, with their windows in pixels of the photograph.
+    /// The masks of the agreeing views, with their windows in pixels of the photograph.
     masks: Vec<(Window, Vec<f32>)>,
 }
 
-/// The two networks that find people.
+/// The two networks that detect people.
 #[derive(Debug)]
 pub struct PeopleFinder {
     detection: Network,
@@ -104,11 +104,11 @@ pub struct PeopleFinder {
 }
 
 impl PeopleFinder {
-    /// From the files of a detection and of a landmark network (`pose_detection.tflite`,
+    /// Reads the files of a detection and of a landmark network (`pose_detection.tflite`,
     /// `pose_landmark_*.tflite`).
     ///
     /// # Errors
-    /// If a file cannot be read, or is of another network.
+    /// If a file cannot be read, or contains a different network.
     pub fn new(detection: &[u8], landmarks: &[u8]) -> Result<PeopleFinder, NetworkError> {
         let finder = PeopleFinder {
             detection: Network::read(detection)?,
@@ -119,11 +119,11 @@ impl PeopleFinder {
         Ok(finder)
     }
 
-    /// The people in a photograph, the most prominent first; `threads` views (0: as many
-    /// as there are cores) are looked at side by side.
+    /// Returns the people in a photograph, the most prominent first. `threads` views (0:
+    /// the number of cores) are processed in parallel.
     ///
     /// # Errors
-    /// Those of the networks, which sound ones do not have.
+    /// Errors of the networks, which valid ones do not have.
     pub fn find(
         &self,
         photo: &Photo,
@@ -158,7 +158,7 @@ impl PeopleFinder {
         Ok(people.into_iter().filter_map(|(score, runs)| person(score, &runs, scale)).collect())
     }
 
-    /// What is seen of each person that is detected in a view of the whole picture.
+    /// Returns a run for each person detected in a view of the whole picture.
     fn runs(
         &self,
         photo: &Photo,
@@ -169,7 +169,7 @@ impl PeopleFinder {
         let found = detection::detect(&self.detection, photo, view, options.least)?;
         for d in found.into_iter().take(options.most) {
             let Some(first) = landmarks::look(&self.landmarks, photo, &d.window)? else { continue };
-            // Once more, in the window that the first look suggests.
+            // A second time, in the window that the first view suggests.
             if let Some(view) = landmarks::look(&self.landmarks, photo, &first.next)? {
                 runs.push(Run { score: d.score, found: d.window, view });
             }
@@ -178,7 +178,7 @@ impl PeopleFinder {
     }
 }
 
-/// The person that some runs see, in pixels `scale` times smaller.
+/// Combines the runs of a person, scaling pixels by `scale`.
 fn person(score: f64, runs: &[Run], scale: f64) -> Option<Person> {
     let mut c = consensus(runs)?;
     let all = c.others.iter_mut().map(|h| &mut h.landmarks).chain([&mut c.landmarks]);
@@ -208,14 +208,14 @@ fn person(score: f64, runs: &[Run], scale: f64) -> Option<Person> {
 }
 
 impl Person {
-    /// A landmark by its name in [`MEDIAPIPE`].
+    /// Returns a landmark by its name in [`MEDIAPIPE`].
     pub fn landmark(&self, name: &str) -> Option<&Landmark> {
         MEDIAPIPE.iter().position(|n| *n == name).and_then(|i| self.landmarks.get(i))
     }
 
-    /// How likely each pixel is the person's, 0 to 1, in a picture of this size that
-    /// shows what the photograph, `photo_width` pixels wide, shows; the mean over the
-    /// views that agree.
+    /// Returns the probability of each pixel to be the person's, 0 to 1, in a picture of
+    /// this size with the same content as the photograph, which is `photo_width` pixels
+    /// wide. It is the mean over the agreeing views.
     pub fn mask(&self, width: u32, height: u32, photo_width: u32) -> Vec<f32> {
         let scale = f64::from(photo_width) / f64::from(width.max(1));
         let mut out = Vec::with_capacity(width as usize * height as usize);
@@ -231,7 +231,7 @@ impl Person {
     }
 }
 
-/// The probability at a position of a window's mask, between its samples; 0 outside.
+/// Returns the interpolated probability at a position of a window's mask; 0 outside.
 fn at(mask: &[f32], [u, v]: [f64; 2]) -> f32 {
     let (x, y) = (u * SIDE as f64, v * SIDE as f64);
     let most = SIDE as f64 - 1.0;

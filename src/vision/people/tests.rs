@@ -1,5 +1,5 @@
-//! Windows there and back, groups of detections, what views agree on; and, with the
-//! shipped networks, a photograph.
+//! Tests of windows, grouping of detections and consensus of views; and, with the
+//! included networks, of a photograph.
 
 use super::consensus::{Run, by_person, consensus};
 use super::landmarks::{NAMED, SIDE, SeenLandmark, View};
@@ -68,7 +68,7 @@ fn samples_are_interpolated_and_beyond_the_picture_black_or_as_at_its_edge() {
         assert_eq!(all.len(), 3 * 4 * 4);
         all.into_iter().step_by(3).collect()
     };
-    // Half a pixel apart.
+    // Samples are half a pixel apart.
     let edge: [[f32; 4]; 4] = [
         [10.0, 15.0, 20.0, 20.0],
         [25.0, 37.5, 50.0, 50.0],
@@ -83,7 +83,7 @@ fn samples_are_interpolated_and_beyond_the_picture_black_or_as_at_its_edge() {
     ];
     assert_eq!(sampled(0.0, Beyond::Edge), edge.as_flattened());
     assert_eq!(sampled(0.0, Beyond::Black), black.as_flattened());
-    // A pixel apart, from one beyond the picture on.
+    // Samples are a pixel apart, starting one pixel outside the picture.
     let (above, below): ([f32; 4], [f32; 4]) = ([10.0, 10.0, 20.0, 20.0], [40.0, 40.0, 80.0, 80.0]);
     assert_eq!(sampled(0.5, Beyond::Edge), [above, above, below, below].as_flattened());
     let black: [[f32; 4]; 4] = [[0.0; 4], [0.0, 10.0, 20.0, 0.0], [0.0, 40.0, 80.0, 0.0], [0.0; 4]];
@@ -107,8 +107,8 @@ fn masks_are_read_between_samples_up_to_the_last_ones() {
     }
 }
 
-/// A view of a person about these hips, with the torso's length and all landmarks moved
-/// by some pixels.
+/// A view of a person with these hips and this length of the torso, with all landmarks
+/// moved by some pixels.
 fn run(hips: [f64; 2], torso: f64, moved: f64) -> Run {
     let at = |i: usize| {
         let (dx, up) = match i {
@@ -147,7 +147,8 @@ fn the_view_that_most_agree_with_counts() {
     let runs: Vec<Run> = moved.iter().map(|m| run([100.0, 100.0], 40.0, *m)).collect();
     let c = consensus(&runs).unwrap();
     assert_eq!(c.agreeing, [0, 1, 3]);
-    // Medians, and the deviation of a coordinate from them: (1 + 0 + 1) / (2 * 3).
+    // Medians, and the standard deviation of a coordinate from them: the variance is (1 +
+    // 0 + 1) / (2 * 3).
     assert!(
         (c.landmarks[0].at[0] - 101.0).abs() < 1e-9
             && (c.landmarks[0].metres[0] - 1.0).abs() < 1e-12
@@ -218,7 +219,7 @@ mod shipped {
             assert!(super::near(at(name), place, 12.0), "{name} {:?}", at(name));
         }
         assert!((60.0..140.0).contains(&skier.torso) && skier.views == 2 && skier.agreeing == 2);
-        // One view is mirrored: the two do not see quite the same.
+        // One view is mirrored, so the two differ slightly.
         assert!(skier.landmarks.iter().any(|l| l.spread > 0.0));
         // The mask is on the person and off the snow.
         let mask = skier.mask(344, 425, 344);

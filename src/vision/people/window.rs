@@ -1,4 +1,4 @@
-//! Square windows of a picture, turned and perhaps mirrored, as networks see it.
+//! Square windows of a picture, rotated and optionally mirrored, as input of networks.
 
 use crate::vision::Photo;
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -11,13 +11,13 @@ pub struct Window {
     pub centre: [f64; 2],
     /// Its side, in pixels.
     pub side: f64,
-    /// How far it is turned clockwise, in radians.
+    /// Its clockwise rotation, in radians.
     pub turn: f64,
     /// Whether left and right are exchanged in it.
     pub mirrored: bool,
 }
 
-/// What lies beyond the picture.
+/// The value of pixels beyond the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Beyond {
     Black,
@@ -26,8 +26,8 @@ pub(super) enum Beyond {
 }
 
 impl Window {
-    /// The whole picture in its middle, with so much of its longer side added on every
-    /// side.
+    /// Returns a window with the whole picture in its middle, padded on every side by a
+    /// fraction of its longer side.
     pub fn whole(width: u32, height: u32, padding: f64) -> Window {
         let centre = [f64::from(width) / 2.0, f64::from(height) / 2.0];
         Window {
@@ -38,8 +38,8 @@ impl Window {
         }
     }
 
-    /// The window of a person: about the hips, turned so that a second point, which gives
-    /// its size, is above them; after MediaPipe.
+    /// Returns the window of a person: centred at the hips, and rotated so that a second
+    /// point, whose distance gives its size, is above them; as in MediaPipe.
     pub(super) fn around(hips: [f64; 2], above: [f64; 2]) -> Window {
         let [dx, dy] = [above[0] - hips[0], above[1] - hips[1]];
         let turn = FRAC_PI_2 - libm::atan2(-dy, dx);
@@ -47,7 +47,7 @@ impl Window {
         Window { centre: hips, side: 2.5 * libm::hypot(dx, dy), turn, mirrored: false }
     }
 
-    /// The pixel at a position.
+    /// Returns the pixel at a position.
     pub fn pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let along = if self.mirrored { -self.side } else { self.side };
         let (x, y) = ((u - 0.5) * along, (v - 0.5) * self.side);
@@ -55,7 +55,7 @@ impl Window {
         [self.centre[0] + cos * x - sin * y, self.centre[1] + sin * x + cos * y]
     }
 
-    /// The position of a pixel.
+    /// Returns the position of a pixel.
     pub fn position(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = libm::sincos(self.turn);
         let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
@@ -63,15 +63,16 @@ impl Window {
         [if self.mirrored { -u } else { u } + 0.5, v + 0.5]
     }
 
-    /// Whether a window can be looked through: its numbers are finite, and it is not all
-    /// but a point.
+    /// Whether a window can be sampled: its numbers are finite and its size is
+    /// reasonable.
     pub(super) fn is_sound(&self) -> bool {
         let all = [self.centre[0], self.centre[1], self.turn, self.side];
         all.iter().all(|x| x.is_finite()) && (1e-3..1e7).contains(&self.side)
     }
 
-    /// `n` x `n` samples of the picture, red, green and blue from `lo` (black) to `hi`;
-    /// interpolated linearly, sample (i, j) at (i / n, j / n) as MediaPipe has it.
+    /// Returns `n` x `n` samples of the picture, with red, green and blue from `lo`
+    /// (black) to `hi`. Samples are interpolated linearly; sample (i, j) is at (i / n, j
+    /// / n), as in MediaPipe.
     pub(super) fn sample(
         &self,
         photo: &Photo,

@@ -1,12 +1,12 @@
-//! Tables of ln Gamma for whole numbers added to a constant: what makes an evaluation a
-//! pass of counting and look-ups.
+//! Tables of ln Gamma at integers added to a constant, which reduce an evaluation to
+//! counting and look-ups.
 //!
 //! Invariant: a look-up equals the formula to the last bit, whether the count is in the
 //! table or beyond it.
 
 use crate::num::ln_gamma;
 
-/// The longest table; larger counts are worked out each time.
+/// Maximum length of a table; values for larger counts are computed on demand.
 const LONGEST: usize = 1 << 16;
 
 /// `ln Gamma(a + n) - ln Gamma(a)` for n = 0, 1, ...: the log of the rising factorial of
@@ -19,7 +19,7 @@ pub(super) struct LnRising {
 }
 
 impl LnRising {
-    /// For a constant above 0 and counts mostly up to `most`.
+    /// Builds a table for a constant above 0 and counts mostly up to `most`.
     pub fn new(a: f64, most: usize) -> Self {
         let mut this = LnRising { a, ln_gamma_a: ln_gamma(a), table: Vec::new() };
         this.table =
@@ -27,7 +27,7 @@ impl LnRising {
         this
     }
 
-    /// The value for a count.
+    /// Returns the value for a count.
     pub fn at(&self, n: u32) -> f64 {
         self.table.get(n as usize).copied().unwrap_or_else(|| self.formula(n))
     }
@@ -37,10 +37,10 @@ impl LnRising {
     }
 }
 
-/// Counts of colours scored as one exchangeable sequence whose probabilities have a
+/// Scores counts of colours as one exchangeable sequence whose probabilities have a
 /// symmetric Dirichlet prior:
 /// `ln Gamma(A) - ln Gamma(A + N) + sum over k of (ln Gamma(a + n_k) - ln Gamma(a))`, A =
-/// K a (the Dirichlet-multinomial without its number of orders).
+/// K a (the Dirichlet-multinomial without its multinomial coefficient).
 #[derive(Debug, Clone)]
 pub(super) struct Urn {
     each: LnRising,
@@ -48,13 +48,14 @@ pub(super) struct Urn {
 }
 
 impl Urn {
-    /// For `colours` colours with `a` prior counts each, and up to about `most` pixels.
+    /// Builds the tables for `colours` colours with `a` prior counts each, and up to
+    /// about `most` pixels.
     pub fn new(colours: usize, a: f64, most: usize) -> Self {
         Urn { each: LnRising::new(a, most), all: LnRising::new(a * colours as f64, most) }
     }
 
-    /// How much the log-probability grows by one more pixel of a colour, for counts of
-    /// that colour and of all: the mean of the last one's and the next one's.
+    /// Returns the increase of the log-probability per pixel of a colour, given the
+    /// counts of that colour and of all: the mean of removing one and adding one.
     pub fn slope(&self, n: u32, all: u32) -> f64 {
         let mean = |table: &LnRising, n: u32| match n {
             0 => table.at(1),
@@ -63,7 +64,7 @@ impl Urn {
         mean(&self.each, n) - mean(&self.all, all)
     }
 
-    /// The log-probability of a sequence with these counts; 0 for an empty one.
+    /// Returns the log-probability of a sequence with these counts; 0 for an empty one.
     pub fn score(&self, counts: impl Iterator<Item = u32>) -> f64 {
         let (mut n, mut sum) = (0, 0.0);
         for c in counts.filter(|c| *c > 0) {

@@ -1,15 +1,16 @@
-//! Regions: are the photograph's colours told apart by the silhouette? Pixels become
-//! numbers of few colours; those of each group (background, object, or parts of it) are
-//! an exchangeable sequence whose colour probabilities are integrated out under a
-//! Dirichlet prior, over the whole picture and again within each of a grid of tiles. A
-//! shading term can be added.
+//! Regions: whether the silhouette separates the photograph's colours. The photograph is
+//! reduced to few colours; the colour indices of each group of pixels (background,
+//! object, or parts of it) are an exchangeable sequence whose colour probabilities are
+//! integrated out under a Dirichlet prior, over the whole picture and again within each
+//! of a grid of tiles. A shading term is optional.
 //!
-//! Not a segmentation, and nothing is learnt but from the picture itself. Colours, tiles
-//! and scored pixels (all of them) are fixed before inference. With a power of 1 for one
-//! of the two grids and 0 for all else it is a probability of quantised pictures that sum
-//! to 1, and [`Region::simulate`] draws from it; pixels are correlated, so powers are
-//! well below 1 by default and the result is a pseudo-likelihood. Invariant: scores are
-//! finite, and a silhouette without pixels scores 0.
+//! This is not a segmentation, and everything is learnt from the picture itself. Colours,
+//! tiles and scored pixels (all of them) are fixed before inference. With a power of 1
+//! for one of the two grids and 0 for everything else, the score is a normalised
+//! distribution over quantised pictures, and [`Region::simulate`] samples from it. Pixels
+//! are correlated, so the default powers are well below 1 and the result is a
+//! pseudo-likelihood. Invariant: scores are finite, and a silhouette without pixels
+//! scores 0.
 
 mod counts;
 mod palette;
@@ -22,20 +23,20 @@ use super::elements::{ComparatorError, check, check_size};
 use super::photo::Photo;
 use crate::rng::Stream;
 
-/// What [`Region`] can be told.
+/// Options of [`Region`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegionOptions {
-    /// Power of the whole picture's term, at least 0. Default 0.05.
+    /// Power of the term of the whole picture, at least 0. Default 0.05.
     pub power: f64,
-    /// Tiles along each side, at most 64; 0 for none. Default 8.
+    /// Number of tiles along each side, at most 64; 0 for none. Default 8.
     pub tiles: u32,
-    /// Power of the tiles' term, at least 0. Default 0.1.
+    /// Power of the term of the tiles, at least 0. Default 0.1.
     pub tile_power: f64,
-    /// Colours, 2 to 256; fewer if the picture has fewer. Default 32.
+    /// Number of colours, 2 to 256; fewer if the picture has fewer. Default 32.
     pub colours: usize,
     /// Prior counts of each colour in each group, 1e-6 to 1e6. Default 0.5.
     pub prior: f64,
-    /// Power of the shading term, at least 0. Default 0: none.
+    /// Power of the shading term, at least 0. Default 0: no shading.
     pub shading: f64,
 }
 
@@ -53,7 +54,7 @@ impl Default for RegionOptions {
 }
 
 impl RegionOptions {
-    /// An error that names an option out of its range.
+    /// Returns an error that names an option out of its range.
     pub fn check(&self) -> Result<(), ComparatorError> {
         check("power", "at least 0", self.power, self.power >= 0.0)?;
         check("tiles", "0 to 64", f64::from(self.tiles), self.tiles <= 64)?;
@@ -63,47 +64,47 @@ impl RegionOptions {
         check("shading", "at least 0", self.shading, self.shading >= 0.0)
     }
 
-    /// Whether it is a probability of quantised pictures: one of the two terms with power
-    /// 1 and nothing else.
+    /// Whether the score is a normalised distribution over quantised pictures: one of the
+    /// two terms has power 1, and nothing else counts.
     pub fn is_proper(&self) -> bool {
         let tiles = if self.tiles == 0 { 0.0 } else { self.tile_power };
         self.shading == 0.0 && matches!((self.power, tiles), (1.0, 0.0) | (0.0, 1.0))
     }
 
-    /// Tiles along a side that pixels are counted by.
+    /// Number of tiles along a side for counting pixels.
     fn grid(&self) -> u32 {
         if self.tile_power > 0.0 { self.tiles.max(1) } else { 1 }
     }
 
-    /// The power of each of those.
+    /// The power of the tiles' term, 0 without tiles.
     fn by_tile(&self) -> f64 {
         if self.tiles == 0 { 0.0 } else { self.tile_power }
     }
 }
 
-/// A photograph's colours, ready to score many silhouettes.
+/// A photograph's colours, prepared for scoring many silhouettes.
 #[derive(Debug, Clone)]
 pub struct Region {
     options: RegionOptions,
     colours: usize,
     /// For each pixel: its tile times the number of colours, plus its colour.
     cells: Vec<u32>,
-    /// Pixels of each such cell.
+    /// Number of pixels of each cell.
     totals: Vec<u32>,
     urn: Urn,
     /// The score of each tile, and of the picture, if all of it is background.
     empty_tiles: Vec<f64>,
     empty: f64,
-    /// Log brightness, if shading is asked for.
+    /// Log brightness, if shading is scored.
     brightness: Vec<f32>,
 }
 
-/// Memory that evaluations share.
+/// Memory reused between evaluations.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
-    /// Pixels of each cell, group after group from group 1 on.
+    /// Number of pixels of each cell, group after group, starting with group 1.
     counts: Vec<u32>,
-    /// Pixels of each colour, group after group from group 0 on.
+    /// Number of pixels of each colour, group after group, starting with group 0.
     colours: Vec<u32>,
 }
 
@@ -128,8 +129,7 @@ impl Region {
         Ok(region)
     }
 
-    /// Prepares a picture whose pixels are numbers of colours already; it has no shading
-    /// term.
+    /// Prepares a picture whose colours are already reduced; it has no shading term.
     ///
     /// # Errors
     /// An option out of its range.
@@ -173,7 +173,7 @@ impl Region {
         self.colours
     }
 
-    /// The weighted log-probability of the colours if everything is background: a
+    /// Returns the weighted log-probability of the colours if everything is background, a
     /// constant of the picture. Added to [`Region::log_likelihood`] it gives the
     /// log-probability itself (without shading).
     pub fn log_background(&self) -> f64 {
@@ -181,11 +181,12 @@ impl Region {
             + self.options.by_tile() * self.empty_tiles.iter().sum::<f64>()
     }
 
-    /// The weighted log ratio of the picture's colours, and of its shading where asked
-    /// for, against all of it being background. `groups`: a number for each pixel, row by
-    /// row; 0 is background, others have colours of their own. `normals`: unit normals in
-    /// the camera's frame, read where the group is not 0 and only for shading. What is
-    /// missing at the slices' ends counts as background.
+    /// Returns the weighted log ratio of the picture's colours, and of its shading if
+    /// scored, relative to a picture that is all background. `groups` has a number for
+    /// each pixel in row-major order: 0 is background, and each other group has its own
+    /// colour distribution. `normals` are unit normals in the camera's frame, used only
+    /// for shading and where the group is not 0. Elements missing at the slices' ends
+    /// count as background.
     pub fn log_likelihood(&self, groups: &[u8], normals: &[[f32; 3]]) -> f64 {
         self.log_likelihood_with(groups, normals, &mut Scratch::default())
     }
@@ -243,15 +244,15 @@ impl Region {
         sum
     }
 
-    /// For each pixel, how much the score without shading grows if it goes over from the
-    /// background to the object (every group but 0 counts as one).
+    /// Returns for each pixel the increase of the score without shading if the pixel
+    /// moves from the background to the object (all groups except 0 count as one).
     pub fn gains(&self, groups: &[u8]) -> Vec<f64> {
         let k = self.colours;
         let mut own = vec![0; self.totals.len()];
         for (_, cell) in groups.iter().zip(&self.cells).filter(|(g, _)| **g > 0) {
             own[*cell as usize] += 1;
         }
-        // By cell: the gain within its tile and in the whole picture.
+        // Per cell: the gain within its tile and in the whole picture.
         let gain = |own: &[u32], total: &[u32], power: f64| -> Vec<f64> {
             let (inside, all) = (own.iter().sum::<u32>(), total.iter().sum::<u32>());
             let one = |(n, t): (&u32, &u32)| {
@@ -272,7 +273,7 @@ impl Region {
         self.cells.iter().map(|c| tiles[*c as usize] + whole[*c as usize % k]).collect()
     }
 
-    /// The whole picture's score, from the counts of the groups' colours.
+    /// Returns the whole picture's score from the counts of the groups' colours.
     fn whole(&self, ground: &mut [u32], own: &[u32]) -> f64 {
         ground.fill(0);
         self.totals.chunks_exact(self.colours).for_each(|t| add(ground, t));
@@ -284,11 +285,11 @@ impl Region {
         score + self.urn.score(ground.iter().copied())
     }
 
-    /// Labels drawn given groups (row by row, as many as pixels; missing ones are
+    /// Samples labels given groups (row-major, one per pixel; missing ones are
     /// background), each group by Polya's urn: within tiles if the tiles' term is the
-    /// only one, over the whole picture otherwise. Where the options are
-    /// [proper](RegionOptions::is_proper), these are draws from the probability that is
-    /// scored.
+    /// only one, over the whole picture otherwise. If the options are
+    /// [proper](RegionOptions::is_proper), these are samples from the distribution that
+    /// is scored.
     pub fn simulate(&self, groups: &[u8], rng: &mut Stream) -> Vec<u8> {
         let k = self.colours;
         let within = self.options.power == 0.0 && self.options.by_tile() > 0.0;

@@ -1,22 +1,22 @@
-//! Pictures in few colours: k-means in CIE L*a*b* from a deterministic start, and a label
-//! for every pixel.
+//! Reduces pictures to few colours: k-means in CIE L*a*b* from a deterministic start, and
+//! a label for every pixel.
 //!
-//! Not a general clustering: three coordinates, at most 256 clusters. Invariant: every
-//! label is below the number of colours, and the same picture gives the same labels on
-//! every machine.
+//! This is not general clustering: there are three coordinates and at most 256 clusters.
+//! Invariant: every label is below the number of colours, and the same picture gives the
+//! same labels on every machine.
 
 use crate::num::simd::vectorised;
 use crate::vision::color::linear_to_labs;
 use crate::vision::elements::{ComparatorError, check_size};
 use crate::vision::photo::LinearImage;
 
-/// Clusters are found on at most about this many pixels, evenly spread; all pixels are
-/// then labelled.
+/// Approximate maximum number of pixels, evenly spaced, that clusters are fitted to; all
+/// pixels are then labelled.
 const FITTED: usize = 1 << 16;
-/// The most rounds of k-means; they end earlier when no centre moves.
+/// Maximum number of rounds of k-means; they end earlier if no centre moves.
 const ROUNDS: usize = 30;
 
-/// A picture whose pixels are numbers of colours, row by row.
+/// A picture whose pixels are indices of colours, in row-major order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quantised {
     width: u32,
@@ -26,11 +26,12 @@ pub struct Quantised {
 }
 
 impl Quantised {
-    /// A picture from its labels, row by row.
+    /// Builds a picture from its labels in row-major order.
     ///
     /// # Errors
-    /// A side outside 1 to 16384 pixels, a number of colours outside 1 to 256, or labels
-    /// that are not one a pixel below that number.
+    /// A side outside 1 to 16384 pixels, a number of colours outside 1 to 256, a number
+    /// of labels other than that of pixels, or a label that is not below the number of
+    /// colours.
     pub fn new(
         width: u32,
         height: u32,
@@ -48,8 +49,8 @@ impl Quantised {
         }
     }
 
-    /// The picture in at most `colours` colours (1 to 256; fewer where it has no more):
-    /// clusters of L*a*b* values, least squares.
+    /// Reduces a picture to at most `colours` colours (1 to 256; fewer if it has fewer)
+    /// by least-squares clustering of L*a*b* values.
     ///
     /// # Errors
     /// As [`Quantised::new`].
@@ -86,13 +87,13 @@ impl Quantised {
         self.colours
     }
 
-    /// The colour's number of every pixel, row by row.
+    /// The index of every pixel's colour, in row-major order.
     pub fn labels(&self) -> &[u8] {
         &self.labels
     }
 }
 
-/// Mean of some points, and the sums of squares about it by coordinate.
+/// Returns the mean of some points, and the sums of squares about it by coordinate.
 fn moments(points: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
     let n = points.len().max(1) as f64;
     let mut mean = [0.0; 3];
@@ -109,8 +110,8 @@ fn moments(points: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
     (mean, squares)
 }
 
-/// First centres: the box with the greatest spread is cut at its mean along its widest
-/// coordinate until there are enough.
+/// Returns the initial centres: the box with the largest sum of squares is split at its
+/// mean along its widest coordinate until there are enough boxes.
 fn start(points: &[[f32; 3]], colours: usize) -> Vec<[f32; 3]> {
     type Cut = (Vec<[f32; 3]>, [f64; 3], [f64; 3]);
     let of = |points: Vec<[f32; 3]>| -> Cut {
@@ -130,7 +131,7 @@ fn start(points: &[[f32; 3]], colours: usize) -> Vec<[f32; 3]> {
         let axis = (0..3).fold(0, |best, c| if squares[c] > squares[best] { c } else { best });
         let (low, high): (Vec<_>, Vec<_>) =
             points.into_iter().partition(|p| f64::from(p[axis]) < mean[axis]);
-        // Nothing is left to tell apart, but for rounding.
+        // The remaining points are equal, except for rounding.
         if squares[axis] < 1e-6 || low.is_empty() || high.is_empty() {
             break;
         }
@@ -140,10 +141,10 @@ fn start(points: &[[f32; 3]], colours: usize) -> Vec<[f32; 3]> {
     boxes.iter().map(|(_, mean, _)| mean.map(|m| m as f32)).collect()
 }
 
-/// Points that are compared with a centre side by side.
+/// Number of points that are compared with a centre at a time.
 const BLOCK: usize = 32;
 
-/// The coordinates of points in lists of their own, with zeros to the end of a block.
+/// Returns the points' coordinates as separate lists, padded with zeros to whole blocks.
 fn planes(points: &[[f32; 3]]) -> [Vec<f32>; 3] {
     let list = |c: usize| {
         let mut list: Vec<f32> = points.iter().map(|p| p[c]).collect();
@@ -153,7 +154,7 @@ fn planes(points: &[[f32; 3]]) -> [Vec<f32>; 3] {
     [list(0), list(1), list(2)]
 }
 
-/// The nearest centre of every point, the first among equals.
+/// Assigns every point to its nearest centre, the first one among equals.
 fn label([l, a, b]: &[Vec<f32>; 3], centres: &[[f32; 3]], labels: &mut [u8]) {
     let blocks = l.as_chunks().0.iter().zip(a.as_chunks().0).zip(b.as_chunks().0);
     for (((l, a), b), labels) in blocks.zip(labels.chunks_mut(BLOCK)) {
@@ -177,8 +178,8 @@ fn label([l, a, b]: &[Vec<f32>; 3], centres: &[[f32; 3]], labels: &mut [u8]) {
     }
 }
 
-/// Moves every centre to the mean of its points; whether any has moved. A centre without
-/// points stays.
+/// Moves every centre to the mean of its points, and returns whether any has moved. A
+/// centre without points stays.
 fn recentre(points: &[[f32; 3]], labels: &[u8], centres: &mut [[f32; 3]]) -> bool {
     let mut sums = vec![([0.0f64; 3], 0u32); centres.len()];
     for (p, l) in points.iter().zip(labels) {
@@ -207,7 +208,7 @@ mod tests {
     #[test]
     fn distinct_colours_get_labels_of_their_own() {
         let palette = [[0.0; 3], [0.9, 0.1, 0.1], [0.1, 0.7, 0.1], [0.1, 0.1, 0.8], [1.0; 3]];
-        // A little noise that must not matter.
+        // Noise that is too small to matter.
         let pixels: Vec<usize> = (0..400).map(|i| (i * i / 7) % 5).collect();
         let rgb = pixels
             .iter()

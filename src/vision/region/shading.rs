@@ -1,30 +1,31 @@
-//! Shading: does the brightness inside the silhouette follow the normals? A Bayesian
+//! Shading: whether the brightness inside the silhouette follows the normals. A Bayesian
 //! linear regression of log brightness on seven functions of the normal, with
-//! coefficients and noise variance integrated out, as a log ratio against a constant
-//! brightness.
+//! coefficients and noise variance integrated out, is compared with a constant brightness
+//! by a log ratio.
 //!
-//! Not a reflectance model and without shadows or light sources: the seven functions span
-//! what distant light does to a matt surface (Ramamoorthi & Hanrahan 2001, "An efficient
-//! representation for irradiance environment maps": harmonics of first and second order),
-//! but for the one of `3 z^2 - 1`, which on the visible half is close to `z`. Invariant:
-//! the result is finite.
+//! This is not a reflectance model, and it has no shadows or light sources: the seven
+//! functions span what distant light does to a matt surface (Ramamoorthi & Hanrahan 2001,
+//! "An efficient representation for irradiance environment maps": harmonics of first and
+//! second order), except for `3 z^2 - 1`, which is close to `z` on the visible half.
+//! Invariant: the result is finite.
 
 use crate::num::simd::vectorised;
 use crate::vision::photo::LinearImage;
 
-/// Functions of the normal.
+/// Number of functions of the normal.
 const TERMS: usize = 7;
-/// Constant, terms, brightness.
+/// Number of variables: constant, terms, brightness.
 const ALL: usize = TERMS + 2;
-/// Prior precision of a coefficient, in units of one over the noise variance.
+/// Prior precision of a coefficient, relative to the inverse noise variance.
 const RIDGE: f64 = 1.0;
-/// The noise variance's inverse-gamma prior: shape, and scale in squared log brightness.
+/// The inverse-gamma prior of the noise variance: shape, and scale in squared log
+/// brightness.
 const SHAPE: f64 = 1.0;
 const SCALE: f64 = 0.05;
 /// Added to linear brightness (0 to 1) before the logarithm, so that black is finite.
 const DARK: f32 = 1.0 / 128.0;
 
-/// The log brightness of every pixel (ITU-R BT.709 luminance, natural logarithm).
+/// Returns the log brightness of every pixel (ITU-R BT.709 luminance, natural logarithm).
 pub(super) fn log_brightness(picture: &LinearImage) -> Vec<f32> {
     let log =
         |[r, g, b]: &[f32; 3]| libm::logf((0.2126 * r + 0.7152 * g + 0.0722 * b).max(0.0) + DARK);
@@ -36,9 +37,9 @@ fn terms([x, y, z]: [f32; 3]) -> [f64; TERMS] {
     [x, y, z, x * y, x * z, y * z, x * x - y * y]
 }
 
-/// The log ratio of the marginal likelihoods of the brightness of the pixels whose group
-/// is not 0: linear in functions of the normal against constant. 0 with fewer than two
-/// pixels. Pixels whose normal is not finite are left out.
+/// Returns the log ratio of the marginal likelihoods of the brightness of the pixels
+/// whose group is not 0: linear in functions of the normal versus constant. It is 0 with
+/// fewer than two pixels. Pixels whose normal or brightness is not finite are ignored.
 pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
     let mut sums =
         Moments { some: [[0.0; SOME]; ALL], count: 0, products: [[[0.0; LANES]; ALL]; ALL] };
@@ -58,14 +59,14 @@ pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32])
     from_products(&sums.products.map(|row| row.map(|lanes| lanes.iter().sum())))
 }
 
-/// Pixels whose products are summed at a time.
+/// Number of pixels whose products are summed at a time.
 const SOME: usize = 64;
-/// Sums that are kept apart, so that they need not wait for each other: always as many,
-/// so that the result is always the same.
+/// Number of independent partial sums. It is fixed, so that the result does not depend on
+/// the machine.
 const LANES: usize = 8;
 
-/// Sums of the products of (1, terms, brightness), of which those above the diagonal are
-/// kept.
+/// Sums of the products of (1, terms, brightness); only those on and above the diagonal
+/// are kept.
 struct Moments {
     some: [[f64; SOME]; ALL],
     count: usize,
@@ -87,7 +88,7 @@ impl Moments {
         }
     }
 
-    /// Adds the products of the pixels that wait; places without one count 0.
+    /// Adds the products of the buffered pixels; unused positions count as 0.
     #[inline(always)]
     fn add(&mut self) {
         let Moments { some, count, products } = self;
@@ -107,8 +108,9 @@ impl Moments {
     }
 }
 
-/// From sums of products of (1, terms, brightness), of which those above the diagonal
-/// count. The constant has a flat prior, so one degree of freedom goes to it.
+/// Computes the log ratio from sums of products of (1, terms, brightness), of which those
+/// on and above the diagonal are used. The constant has a flat prior, so it takes one
+/// degree of freedom.
 fn from_products(products: &[[f64; ALL]; ALL]) -> f64 {
     let n = products[0][0];
     if n < 2.0 {
@@ -117,7 +119,7 @@ fn from_products(products: &[[f64; ALL]; ALL]) -> f64 {
     let centred =
         |i: usize, j: usize| products[i.min(j)][i.max(j)] - products[0][i] * products[0][j] / n;
     let total = centred(ALL - 1, ALL - 1).max(0.0);
-    // Cholesky factor of X'X + ridge, and the forward solution of X'y, in one go.
+    // Cholesky factor of X'X + ridge, and the forward solution of X'y, in one pass.
     let mut factor = [[0.0f64; TERMS]; TERMS];
     let mut solved = [0.0f64; TERMS];
     let (mut log_det, mut explained) = (0.0, 0.0);
@@ -127,8 +129,7 @@ fn from_products(products: &[[f64; ALL]; ALL]) -> f64 {
             for k in 0..j {
                 sum -= factor[i][k] * factor[j][k];
             }
-            // Pivots of a matrix above the ridge are at least the ridge, but for
-            // rounding.
+            // Pivots are at least the ridge, except for rounding.
             factor[i][j] = if i == j { sum.max(RIDGE).sqrt() } else { sum / factor[j][j] };
         }
         let done: f64 = (0..i).map(|k| factor[i][k] * solved[k]).sum();
@@ -146,8 +147,8 @@ mod tests {
     use super::*;
     use crate::rng::{Purpose, StreamKey};
 
-    /// Normals of a sphere's visible half on a grid of `side` pixels, row by row; groups
-    /// 1 on it.
+    /// Normals of a sphere's visible half on a grid of `side` pixels, in row-major order;
+    /// the group is 1 on it.
     fn sphere(side: usize) -> (Vec<u8>, Vec<[f32; 3]>) {
         let at = |i: usize| (2.0 * i as f32 + 1.0) / side as f32 - 1.0;
         let pixels = (0..side * side).map(|i| (at(i % side), -at(i / side)));
@@ -167,9 +168,9 @@ mod tests {
             .collect()
     }
 
-    /// The log ratio from the definition: contrasts free of the constant, their
-    /// covariance under either model, and the noise variance integrated out: a
-    /// multivariate t density each.
+    /// The log ratio from its definition: contrasts that do not depend on the constant,
+    /// their covariance under either model, and the noise variance integrated out, which
+    /// gives a multivariate t density each.
     fn reference(normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
         let n = normals.len();
         // Helmert's contrasts.

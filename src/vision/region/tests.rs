@@ -1,5 +1,5 @@
-//! Against the urn written out, all pictures of a few pixels, and calibration on
-//! simulated pictures.
+//! Comparisons with a brute-force urn, enumeration of all pictures of a few pixels, and
+//! calibration on simulated pictures.
 
 use super::*;
 use crate::rng::{Purpose, StreamKey};
@@ -16,7 +16,7 @@ fn random(n: usize, below: usize, step: u64) -> Vec<u8> {
     (0..n).map(|_| rng.index(below) as u8).collect()
 }
 
-/// The log-probability of labels, one pixel after another.
+/// The log-probability of labels, pixel by pixel.
 fn reference(
     labels: &[u8],
     groups: &[u8],
@@ -62,7 +62,8 @@ fn agrees_with_one_pixel_after_another() {
             assert!((background - nothing).abs() < 1e-9 * nothing.abs().max(1.0));
             assert_eq!(region.log_likelihood(&vec![0; n], &[]), 0.0);
             assert_eq!(region.log_likelihood(&[], &[]), 0.0);
-            // All of it the object, in one colour group: another name for the background.
+            // If all of it is the object, in one group, only the name of the group
+            // changes.
             assert!(region.log_likelihood(&vec![1; n], &[]).abs() < 1e-9 * expected.abs().max(1.0));
         }
     }
@@ -109,7 +110,7 @@ fn draws_have_the_probabilities_that_are_scored() {
                 * libm::exp(region.log_likelihood(&groups, &[]) + region.log_background());
             chi2 += (seen - expected) * (seen - expected) / expected;
         }
-        // 15 degrees of freedom: above with probability 0.001.
+        // 15 degrees of freedom: exceeded with probability 0.001.
         assert!(chi2 < 37.7, "{chi2}");
     }
 }
@@ -128,9 +129,9 @@ fn draws_are_within_tiles_only_where_nothing_else_counts() {
     assert_ne!(draws(0.0, 4, 1.0), whole);
 }
 
-/// Discs of unknown place and radius on 24 x 24 pixels: where the truth lies in exact
-/// posteriors of pictures simulated from it. Chi-square of 10 bins (9 degrees of freedom)
-/// for the horizontal place and for the radius.
+/// Discs of unknown position and radius on 24 x 24 pixels: ranks of the truth in exact
+/// posteriors of pictures simulated from it. Returns the chi-square of 10 bins (9 degrees
+/// of freedom) for the horizontal position and for the radius.
 fn calibration(simulated: &RegionOptions, scored: &RegionOptions) -> [f64; 2] {
     const SIDE: usize = 24;
     let mut states = Vec::new();
@@ -170,7 +171,7 @@ fn calibration(simulated: &RegionOptions, scored: &RegionOptions) -> [f64; 2] {
         let of = |s: &(f64, f64, f64)| [s.0, s.2];
         for (d, bins) in bins.iter_mut().enumerate() {
             let x = of(&states[truth])[d];
-            // A place at random among equals, so that the rank of a discrete quantity is
+            // Ties are broken at random, so that the rank of a discrete quantity is
             // uniform too.
             let (mut below, mut equal) = (0.0, 0.0);
             for (s, w) in states.iter().zip(&weights) {
@@ -187,16 +188,15 @@ fn calibration(simulated: &RegionOptions, scored: &RegionOptions) -> [f64; 2] {
 
 #[test]
 fn posteriors_of_simulated_pictures_are_calibrated() {
-    // Many prior counts: the two groups look much alike, so that posteriors are wide.
+    // With many prior counts the two groups look much alike, so that posteriors are wide.
     let global = RegionOptions { prior: 12.0, ..GLOBAL };
     let tiled = RegionOptions { power: 0.0, tiles: 3, tile_power: 1.0, ..global.clone() };
     for o in [&global, &tiled] {
         let chi2 = calibration(o, o);
-        // Above with probability 0.001.
+        // Exceeded with probability 0.001.
         assert!(chi2.iter().all(|c| *c < 27.9), "{chi2:?}");
     }
-    // A planted error shows: the picture counted three times over; another prior; tiles
-    // scored as one.
+    // Deliberate errors are detected: a power of 3, and a wrong prior.
     let thrice = RegionOptions { power: 3.0, ..global.clone() };
     let other = RegionOptions { prior: 0.05, ..global.clone() };
     for wrong in [thrice, other] {
