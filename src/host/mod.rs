@@ -1,14 +1,13 @@
-//! What a host program brings to the language: functions, distributions, likelihoods and
-//! kernels under names of their own.
+//! Functions, distributions, likelihoods and kernels that a host program adds to the
+//! language.
 //!
-//! A [`Host`] is a list of [`Entry`]s. They go into the one table of built-ins, so static
-//! checks, error messages, completion and `doc` know them as they know the language's
-//! own.
+//! A [`Host`] is a list of [`Entry`]s. They join the table of built-ins, so that static
+//! checks, error messages, completion and `doc` treat them like those of the language.
 //!
 //! ```
 //! use pcadlang::host::{Adjoint, Entry, Host, Type};
 //! use pcadlang::{Program, Value};
-//! // The host's own drag, with what it has captured and its derivative.
+//! // A drag function with a captured constant and its derivative.
 //! let density = 1.2;
 //! let drag = Entry::function("drag", move |a| Ok(Value::Num(0.5 * density * a.num(0)? * a.num(0)?)))
 //!     .argument("speed", Type::Num, "How fast it moves.").unit("m/s")
@@ -57,36 +56,37 @@ use crate::lang::builtins::{Builtin, Table, doc};
 use crate::syntax::{is_keyword, is_name};
 use std::sync::Arc;
 
-/// What a host brings along; see the [module](self).
+/// The items that a host registers; see the [module](self).
 #[derive(Clone, Default)]
 pub struct Host {
     entries: Vec<Entry>,
 }
 
 impl Host {
-    /// Nothing yet.
+    /// Creates an empty host.
     pub fn new() -> Host {
         Host::default()
     }
 
-    /// The same with one more.
+    /// Adds an entry.
     #[must_use]
     pub fn with(mut self, entry: Entry) -> Host {
         self.entries.push(entry);
         self
     }
 
-    /// What `pcadlang doc` says of a name: the host's own, or the language's. `None` also
-    /// where an entry is not valid.
+    /// Returns the documentation of a name, as `pcadlang doc` shows it, of the host or of
+    /// the language. `None` if the name is unknown or an entry is invalid.
     pub fn doc(&self, name: &str) -> Option<String> {
         doc::doc(&*self.table().ok()?, name)
     }
 
-    /// The built-ins of the language and the host's.
+    /// Returns the built-ins of the language and of the host.
     ///
     /// # Errors
-    /// A name that is none or taken, arguments that cannot be told apart, a gradient of
-    /// what is no function: all of them.
+    /// Reports all mistakes in the entries: a name that is invalid, taken or registered
+    /// twice, invalid or ambiguous arguments, and a setting that does not apply, such as
+    /// a gradient for something that is not a function.
     pub(crate) fn table(&self) -> Result<Arc<Table>, Error> {
         let own = Table::default();
         let mut diagnostics = Vec::new();
