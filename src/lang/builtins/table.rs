@@ -1,6 +1,6 @@
-//! The built-ins a program sees, by index and by name, and the named constants.
+//! The built-ins available to a program, by index and by name, and the named constants.
 //!
-//! Not a scope: shadowing by a program's own names is the business of lowering.
+//! This is not a scope: lowering handles names in the program that shadow them.
 
 use super::{
     Builtin, Row, Text, covariance, data, definite, distributions, forms, inference, interp, list,
@@ -33,7 +33,7 @@ const CONSTANTS: &[Constant] = &[
     },
 ];
 
-/// Those of the language, in the order of the reference.
+/// The language's own built-ins, in the order of the reference.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
     let own: [&[Row]; 13] = [
         operators::TABLE,
@@ -57,7 +57,7 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 struct FullName(Text, Text);
 
-/// The same, borrowed, to look one up.
+/// A borrowed [`FullName`], for look-ups.
 #[derive(Hash)]
 struct Sought<'a>(&'a str, &'a str);
 
@@ -67,7 +67,7 @@ impl Equivalent<FullName> for Sought<'_> {
     }
 }
 
-/// The built-ins a program sees, by index and by name.
+/// The built-ins available to a program, by index and by name.
 #[derive(Clone, Debug)]
 pub struct Table {
     entries: IndexMap<FullName, Builtin, FxBuildHasher>,
@@ -80,35 +80,35 @@ impl Default for Table {
 }
 
 impl Table {
-    /// The built-ins of the language and these; one of the same module and name replaces
-    /// the language's own.
+    /// Creates the table of the language's built-ins and `more`, which replace entries
+    /// with the same module and name.
     pub fn new(more: impl IntoIterator<Item = Builtin>) -> Self {
         let all = all().chain(more);
         Table { entries: all.map(|b| (FullName(b.module.clone(), b.name.clone()), b)).collect() }
     }
 
-    /// The built-in at an index that [`find`](Table::find) gave.
+    /// Returns the built-in at an index from [`find`](Table::find).
     pub fn get(&self, i: u32) -> &Builtin {
         &self.entries[i as usize]
     }
 
-    /// The index of a built-in; operators are named as they are written, with `neg` and
-    /// `not` for the prefix ones.
+    /// Returns the index of a built-in; operators are named as they are written, the
+    /// prefix ones `neg` and `not`.
     pub fn find(&self, module: &str, name: &str) -> Option<u32> {
         self.entries.get_index_of(&Sought(module, name)).map(|i| i as u32)
     }
 
-    /// All of them, in the order of the reference.
+    /// Returns all built-ins, in the order of the reference.
     pub fn iter(&self) -> impl Iterator<Item = &Builtin> {
         self.entries.values()
     }
 
-    /// The named constants: `pi`, `inf`.
+    /// Returns the named constants: `pi`, `inf`.
     pub fn constants(&self) -> &'static [Constant] {
         CONSTANTS
     }
 
-    /// The value of a named constant.
+    /// Returns the value of a named constant.
     pub fn constant(&self, name: &str) -> Option<f64> {
         CONSTANTS.iter().find(|c| c.name == name).map(|c| c.value)
     }

@@ -1,9 +1,9 @@
-//! Data: what a `data` item can hold, and the loaders that read it from a file's bytes.
+//! Data: the types of a `data` item, and the loaders that read them from a file's bytes.
 //!
 //! The names are built-ins so that they are documented and checked like any other; a
-//! program cannot call them on values it computes, because what a run reads must be known
-//! before it starts. Which files may be read, and where they lie, is the host's business:
-//! this module gets bytes.
+//! program cannot call them on computed values, because the files of a run must be known
+//! before it starts. The host decides which files may be read and where they are: this
+//! module only receives bytes.
 
 mod armature;
 mod csv;
@@ -22,7 +22,8 @@ use crate::vision::{ContourMap, FileDetector, Limits, VisionError, depth, mask, 
 
 const SECTION: &str = "Data files";
 
-/// Reads a file by its path relative to that of another, or says why not.
+/// Reads a file by its path relative to that of another file, or returns an error
+/// message.
 pub type Beside<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program's folder.")];
@@ -144,14 +145,14 @@ fn not_an_expression(a: &Args) -> Result<Value, Fault> {
         .with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
 }
 
-/// The kinds of data that [`load`] reads: what may stand after the colon of
+/// Returns the kinds of data that [`load`] reads: the names allowed after the colon of
 /// `data d: kind;`.
 pub fn kinds() -> impl Iterator<Item = &'static str> + Clone {
     TABLE.iter().map(|b| b.name)
 }
 
-/// The value of a data item of a kind that is given no file, for those that can do
-/// without: no keypoints, the detector that is built in.
+/// Returns the value of a data item without a file, for the kinds that allow it: empty
+/// keypoints, the built-in detector.
 pub fn without_file(kind: &str) -> Option<Value> {
     match kind {
         "keypoints" => Some(Value::object(KeypointsValue(Keypoints::default()))),
@@ -160,17 +161,18 @@ pub fn without_file(kind: &str) -> Option<Value> {
     }
 }
 
-/// The file to read for data of a kind: what is given, but for keypoints without the
-/// `#ID` that chooses a person.
+/// Returns the path of the file to read: for keypoints, without the `#ID` that selects a
+/// person.
 pub fn path_of<'a>(kind: &str, file: &'a str) -> &'a str {
     if kind == "keypoints" { keypoints::split_id(file).0 } else { file }
 }
 
-/// Keypoints from the bytes of a file: of the person whom `#ID` at the end of `file`
-/// names, or else the one whom the picture is called by, or else the only one.
+/// Reads keypoints from the bytes of a file: of the person selected by `#ID` at the end
+/// of `file`, or else by `picture`, the name of the picture's file, or else of the only
+/// person.
 ///
 /// # Errors
-/// As [`People::parse`] and [`People::pick`], with the file's name.
+/// Those of [`People::parse`] and [`People::pick`], with the file's name.
 pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result<Value, Fault> {
     let (path, id) = keypoints::split_id(file);
     let found = People::parse(bytes).and_then(|people| people.pick(id, picture));
@@ -180,13 +182,13 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
     })
 }
 
-/// Reads data of a kind from the bytes of a file; `file` is what messages call it, and
-/// `beside` reads files by paths relative to it. Options are those of the item's default
-/// call.
+/// Reads data of a kind from the bytes of a file. `file` is its name in messages,
+/// `beside` reads files by paths relative to it, and `options` come from the item's
+/// default call.
 ///
 /// # Errors
-/// An unknown kind, or bytes that are not of that kind: a message with the line where
-/// there are lines.
+/// An unknown kind, or bytes that are not of that kind: a message with the line number if
+/// the format has lines.
 pub fn load(
     kind: &str,
     file: &str,
@@ -210,7 +212,8 @@ pub fn load(
             mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text)
         }
         "depth" => {
-            // An array holds depths; a picture's whole numbers are thousandths.
+            // A NumPy array holds depths; the integers of a picture are thousandths of a
+            // scene unit.
             let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
             depth::decode(bytes, scale, &limits)
                 .map(|d| Value::object(DepthValue::new(d)))

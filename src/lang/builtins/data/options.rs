@@ -1,7 +1,6 @@
-//! What a `data` item says of its file beside the path:
-//! `mesh("x.glb", up = "z", unit = 0.01)`.
+//! Options of a `data` item besides the path: `mesh("x.glb", up = "z", unit = 0.01)`.
 //!
-//! Written as constants, since what a run reads must be known before it starts.
+//! They must be literals, because the inputs of a run must be known before it starts.
 
 use crate::geom::{FileFrame, UpAxis};
 use crate::lang::error::Fault;
@@ -10,7 +9,7 @@ use crate::vision::NetworkOptions;
 use crate::vision::file_detector::Output;
 use crate::vision::soft_map::Shows;
 
-/// How a file is to be read.
+/// Options for reading a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     frame: FileFrame,
@@ -18,22 +17,22 @@ pub struct Options {
 }
 
 impl Options {
-    /// A mesh file's axes and unit.
+    /// The axes and unit of a mesh file.
     pub fn frame(&self) -> FileFrame {
         self.frame
     }
 
-    /// How a network takes its picture and gives its map.
+    /// The input and output format of a network.
     pub fn network(&self) -> &NetworkOptions {
         &self.network
     }
 
-    /// From the arguments of a call after the path; for [kinds](super::kinds) of data
+    /// Parses the arguments of a call after the path, for [kinds](super::kinds) of data
     /// that have options.
     ///
     /// # Errors
-    /// An argument of another name or type, or given twice, or outside its domain: with
-    /// its place among the arguments.
+    /// An argument with an unknown name, a wrong type or a value outside its domain, or
+    /// given twice: with its index among the arguments.
     pub fn parse(kind: &str, args: &[Arg]) -> Result<Options, (usize, Fault)> {
         let mut seen: Vec<&str> = Vec::new();
         let mut frame = (UpAxis::default(), 1.0);
@@ -60,7 +59,7 @@ impl Options {
             }
             seen.push(name);
         }
-        // Only the unit can be refused.
+        // Only the unit can be invalid here.
         let at = args
             .iter()
             .position(|a| a.name.as_ref().is_some_and(|n| &*n.node == "unit"))
@@ -72,7 +71,7 @@ impl Options {
     }
 }
 
-/// Sets an option of a mesh; false if there is none of that name.
+/// Sets an option of a mesh; returns false if there is no such option.
 fn set_frame(frame: &mut (UpAxis, f64), name: &str, value: &Expr) -> Result<bool, String> {
     match (name, &value.kind) {
         ("up", ExprKind::Str(axis)) => {
@@ -93,7 +92,7 @@ fn set_frame(frame: &mut (UpAxis, f64), name: &str, value: &Expr) -> Result<bool
     Ok(true)
 }
 
-/// Sets an option of a network; false if there is none of that name.
+/// Sets an option of a network; returns false if there is no such option.
 fn set_network(network: &mut NetworkOptions, name: &str, value: &Expr) -> Result<bool, String> {
     let word = |ways: [&str; 2]| match &value.kind {
         ExprKind::Str(s) if **s == *ways[0] => Ok(false),
@@ -134,7 +133,7 @@ fn set_network(network: &mut NetworkOptions, name: &str, value: &Expr) -> Result
     Ok(true)
 }
 
-/// A number that is written out.
+/// A literal number, possibly negated.
 fn number(e: &Expr) -> Option<f32> {
     match &e.kind {
         ExprKind::Num(x) => Some(*x as f32),
@@ -143,7 +142,7 @@ fn number(e: &Expr) -> Option<f32> {
     }
 }
 
-/// Whether data of a kind have options.
+/// Whether this kind of data has options.
 pub fn has_options(kind: &str) -> bool {
     matches!(kind, "mesh" | "armature" | "detector")
 }
