@@ -1,8 +1,8 @@
 //! The module `scene`: shapes, placements, cameras, and the likelihoods that compare a
-//! view with what was observed.
+//! view with an observation.
 //!
-//! A thin layer: geometry, rendering and comparison are the business of [`crate::geom`],
-//! [`crate::render`] and [`crate::vision`]; here their values become values of the
+//! A thin layer over [`crate::geom`], [`crate::render`] and [`crate::vision`], which
+//! implement geometry, rendering and comparison; here their values become values of the
 //! language.
 
 mod adjoints;
@@ -38,7 +38,7 @@ const VIEW: Type = Type::Object("a view");
 const IMAGE: Type = Type::Object("an image");
 const DETECTOR: Type = Type::Object("a detector");
 
-/// A pure function of the module.
+/// A pure function of this module.
 const fn native(
     name: &'static str,
     section: &'static str,
@@ -50,7 +50,7 @@ const fn native(
     Row { module: "scene", ..function(name, section, args, returns, doc, f) }
 }
 
-/// All of them.
+/// All built-ins of the module.
 pub(super) fn all() -> impl Iterator<Item = &'static Row> {
     let keypoints =
         [people::TABLE, candidates::TABLE, compare_keypoints::TABLE, compare_depths::TABLE];
@@ -59,8 +59,8 @@ pub(super) fn all() -> impl Iterator<Item = &'static Row> {
     tables.flatten()
 }
 
-/// A shape that cannot be made: numbers outside their domain reject a proposal, anything
-/// else ends the run.
+/// Converts the error of a shape that cannot be made: numbers outside their domain reject
+/// a proposal, anything else ends the run.
 fn fault(e: GeomError) -> Fault {
     match e {
         GeomError::Domain(m) => Fault::domain(m),
