@@ -1,7 +1,7 @@
-//! An example for every built-in. Each one runs: `tests/examples.rs` sees to that.
+//! An example for every built-in. `tests/examples.rs` runs them all.
 //!
-//! An example is an expression with its value behind `//`, or a program. What uses
-//! `scene` is to be read with the line [`INCLUDE`] before it.
+//! An example is an expression followed by `//` and its value, or a program. Programs
+//! that use `scene` omit the line [`INCLUDE`], which precedes them.
 
 mod distributions;
 mod inference;
@@ -10,14 +10,14 @@ mod values;
 
 use super::Builtin;
 
-/// The line that programs with `scene` begin with.
+/// The first line of programs that use `scene`.
 pub const INCLUDE: &str = "include \"std/scene.pcad\" as scene;";
 
-/// By full name.
+/// Examples by full name.
 type Examples = &'static [(&'static str, &'static str)];
 
 impl Builtin {
-    /// An example of its use, if it is the language's own.
+    /// Returns an example of its use; `None` for a host's built-in.
     pub fn example(&self) -> Option<&'static str> {
         if self.host.is_some() {
             return None;
