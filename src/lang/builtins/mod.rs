@@ -286,8 +286,8 @@ impl Builtin {
     }
 
     /// Returns, for each parameter, the index of the written argument that supplies it;
-    /// `None` for a default. With a variadic last parameter, the result has one entry per
-    /// written argument. `args` has the keyword of each argument, if any.
+    /// `None` for a default. Further arguments of a variadic last parameter are appended.
+    /// `args` has the keyword of each argument, if any.
     ///
     /// # Errors
     /// Too many or too few arguments, a duplicate, or an unknown keyword: a message for
