@@ -1,14 +1,14 @@
 //! `pcadlang`: a probabilistic CAD language. A program draws a scene from a prior; the
 //! engine samples the scenes that explain a photograph.
 //!
-//! [`Program`] and [`Model`] are the way in; [`trace::Trace`] is the engine's one data
-//! structure; [`host`] is how a program that embeds the language brings functions,
-//! distributions, likelihoods and kernels of its own. What is shown here follows semantic
-//! versioning, is used by the doc-tests, and is listed in `docs/embedding.md`; modules
-//! that are public for tests and tools only are hidden.
+//! [`Program`] and [`Model`] are the entry points; [`trace::Trace`] is the engine's
+//! central data structure; [`host`] lets a program that embeds the language register its
+//! own functions, distributions, likelihoods and kernels. The documented interface
+//! follows semantic versioning, is exercised by the doc-tests, and is listed in
+//! `docs/embedding.md`; modules that are public only for tests and tools are hidden.
 //!
-//! Modules depend one way: `syntax`, `dist`, `geom`, `render` and `vision` know nothing
-//! of traces, `infer` knows nothing of pictures.
+//! Dependencies between modules are one-way: `syntax`, `dist`, `geom`, `render` and
+//! `vision` do not depend on traces, and `infer` does not depend on pictures.
 #![doc = include_str!("guide.md")]
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]

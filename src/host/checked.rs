@@ -1,10 +1,10 @@
-//! A host's distribution, held to what the engine relies on.
+//! A wrapper that makes a host's distribution meet the engine's assumptions.
 
 use crate::dist::{Datum, Distribution, Gradient, Support};
 use crate::rng::Stream;
 
-/// A distribution whose log density is never NaN: where it would be, the value is
-/// impossible.
+/// A distribution whose log density is never NaN: a NaN is replaced by -inf, so that the
+/// value counts as impossible.
 #[derive(Debug)]
 pub(super) struct Checked<D>(pub D);
 
@@ -12,7 +12,7 @@ fn number(log_density: f64) -> f64 {
     if log_density.is_nan() { f64::NEG_INFINITY } else { log_density }
 }
 
-/// Methods that are the distribution's own.
+/// Methods that call the wrapped distribution unchanged.
 macro_rules! forward {
     ($($name:ident($($arg:ident: $ty:ty),*) -> $out:ty;)*) => {
         $(fn $name(&self, $($arg: $ty),*) -> $out { self.0.$name($($arg),*) })*

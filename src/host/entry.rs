@@ -1,29 +1,27 @@
-//! One thing that a host brings.
+//! One item that a host registers.
 
 use super::Previous;
 use super::checked::Checked;
 use crate::dist::{Dist, Distribution};
 use crate::infer::{Kernel, KernelCall, KernelMaker};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{
-    Args, Argument, Before, Builtin, Derivative, HostItem, Row, State, Type,
-};
+use crate::lang::builtins::{Args, Argument, Before, Builtin, Derivative, HostItem,  Row , State, Type , };
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Likelihood, Value};
 use crate::syntax::{is_keyword, is_name};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// One thing that a host brings: a function, a family of distributions or likelihoods, a
-/// kernel. Arguments are told in their order.
+/// One item that a host registers: a function, a family of distributions or likelihoods,
+/// or a kernel. Arguments are declared in order.
 ///
-/// Closures are called from several threads at once, and must give the same for the same
-/// arguments, to the last bit.
+/// Closures are called from several threads at once, and must return bit-identical
+/// results for the same arguments.
 #[derive(Clone)]
 pub struct Entry {
     pub(super) builtin: Builtin,
     pub(super) replaces: bool,
-    /// What was said of it that does not fit.
+    /// A mistake in its declaration, reported by `Host::table`.
     pub(super) wrong: Option<String>,
 }
 
@@ -46,14 +44,12 @@ impl Entry {
             kind,
             scalar: None,
             derivative,
-            host: Some(host),
-            format: None,
-            example: None,
+            host: Some(host) , format : None , example : None ,
         };
         Entry { builtin, replaces: false, wrong: None }
     }
 
-    /// A function.
+    /// Creates a function.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Fault, Host, Type};
@@ -78,14 +74,14 @@ impl Entry {
         Entry::new(name, HOST, Type::Any, HostItem::Function { call: Arc::new(call), vjp: None })
     }
 
-    /// A function that can go on from an earlier evaluation, and what it then keeps for
-    /// the next one.
+    /// Creates a function that can resume from an earlier evaluation, and that returns
+    /// the state to resume from next time.
     ///
-    /// It must give what it gives from scratch (`None`), bit for bit: an earlier
-    /// evaluation saves work and nothing else. What it keeps belongs to the place in the
-    /// program where it is called and to the state of the trace: a rejected proposal goes
-    /// back to what was kept before it, forks of a trace share it, and it is never
-    /// changed, so a large one had better share what stays the same.
+    /// The result must equal that from scratch (`None`), bit for bit: an earlier
+    /// evaluation only saves work. The state belongs to a call site in the program and to
+    /// a state of the trace: a rejected proposal restores the previous one, and forks of
+    /// a trace share it. It is never modified in place, so a large state should share its
+    /// unchanged parts.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Fault, Host, Previous, Type};
@@ -134,12 +130,12 @@ impl Entry {
         Entry::new(name, HOST, Type::Any, HostItem::Incremental { call: Arc::new(call), vjp: None })
     }
 
-    /// A family of distributions: from its parameters to one of them. A parameter outside
-    /// its domain is a [`Fault::domain`].
+    /// Creates a family of distributions; `make` maps the parameters to a distribution. A
+    /// parameter outside its domain is a [`Fault::domain`].
     ///
     /// A value whose log density is NaN counts as impossible.
-    /// [`Gradient::params`](crate::host::Gradient) are by the numbers in the arguments,
-    /// one after the other.
+    /// [`Gradient::params`](crate::host::Gradient) has one derivative for each number in
+    /// the arguments, in order.
     pub fn distribution<D: Distribution + 'static>(
         name: impl Into<Cow<'static, str>>,
         make: impl Fn(&Args) -> Result<D, Fault> + Send + Sync + 'static,
@@ -148,9 +144,9 @@ impl Entry {
         Entry::new(name, "Distributions", Type::Dist, HostItem::Family(Arc::new(make)))
     }
 
-    /// A family of likelihoods: from its arguments to one of them, which scores what is
-    /// observed. A comparator is one whose argument is a view (see
-    /// [`SceneView`](crate::host::SceneView)).
+    /// Creates a family of likelihoods; `make` maps the arguments to a likelihood, which
+    /// scores the observed value. A comparator is a likelihood with a view as an argument
+    /// (see [`SceneView`](crate::host::SceneView)).
     ///
     /// [`Likelihood::gradient`] is a list: the adjoint of each argument in turn.
     pub fn likelihood<L: Likelihood + 'static>(
@@ -161,7 +157,7 @@ impl Entry {
         Entry::new(name, "Comparing", Type::Likelihood, HostItem::Likelihood(Arc::new(make)))
     }
 
-    /// A kernel for `infer` blocks: from the call as written to what moves the trace.
+    /// Creates a kernel for `infer` blocks; `make` maps the call as written to a kernel.
     /// Each chain makes its own.
     pub fn kernel<K: Kernel + 'static>(
         name: impl Into<Cow<'static, str>>,
@@ -171,7 +167,7 @@ impl Entry {
         Entry::new(name, "Kernels", Type::Kernel, HostItem::Kernel(Arc::new(maker)))
     }
 
-    /// One more argument, which must be given.
+    /// Appends a required argument.
     #[must_use]
     pub fn argument(
         self,
@@ -183,7 +179,7 @@ impl Entry {
         self.push(Argument { name, ty, unit: "".into(), default: None, value: Value::Unit, doc })
     }
 
-    /// One more argument, with the value it has where it is left out.
+    /// Appends an optional argument with its default.
     #[must_use]
     pub fn optional(
         self,
@@ -203,7 +199,7 @@ impl Entry {
         })
     }
 
-    /// The unit of the argument told last.
+    /// Sets the unit of the argument declared last.
     #[must_use]
     pub fn unit(mut self, unit: impl Into<Cow<'static, str>>) -> Entry {
         let mut args = self.builtin.args.to_vec();
@@ -215,30 +211,30 @@ impl Entry {
         self
     }
 
-    /// What it gives, as far as static checks and `doc` are concerned.
+    /// Sets the type of the result, for static checks and `doc`.
     #[must_use]
     pub fn returns(mut self, ty: Type) -> Entry {
         self.builtin.returns = ty;
         self
     }
 
-    /// A line about it.
+    /// Sets the one-line description.
     #[must_use]
     pub fn about(mut self, line: impl Into<Cow<'static, str>>) -> Entry {
         self.builtin.doc = line.into();
         self
     }
 
-    /// The heading it stands under in the reference.
+    /// Sets the heading of its section in the reference.
     #[must_use]
     pub fn section(mut self, heading: impl Into<Cow<'static, str>>) -> Entry {
         self.builtin.section = heading.into();
         self
     }
 
-    /// The vector-Jacobian product of a function: from its arguments, its result and the
-    /// result's adjoint to the adjoints of the arguments in order; `None` where it is not
-    /// known. Those left out at the end are zero.
+    /// Sets the vector-Jacobian product of a function: it maps the arguments, the result
+    /// and the adjoint of the result to the adjoints of the arguments, in order; `None`
+    /// where they are unknown. Omitted trailing adjoints are zero.
     #[must_use]
     pub fn gradient(
         mut self,
@@ -259,7 +255,8 @@ impl Entry {
         self
     }
 
-    /// Its derivative is zero wherever there is one: what counts, compares or rounds.
+    /// Declares that the derivative is zero wherever it exists, as for counting,
+    /// comparing and rounding.
     #[must_use]
     pub fn flat(mut self) -> Entry {
         match &self.builtin.host {
@@ -271,15 +268,7 @@ impl Entry {
         self
     }
 
-    /// An example of its use, for `doc`: an expression with its value behind `//`, or a
-    /// program.
-    #[must_use]
-    pub fn example(mut self, text: impl Into<Cow<'static, str>>) -> Entry {
-        self.builtin.example = Some(text.into());
-        self
-    }
-
-    /// It takes the place of the language's own of that name.
+    /// Makes it replace the language's built-in of the same name.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Host, Type};
@@ -292,7 +281,7 @@ impl Entry {
     /// # Ok::<(), pcadlang::Error>(())
     /// ```
     #[must_use]
-    pub fn replacing(mut self) -> Entry {
+    pub fn  example ( mut self , text : impl Into < Cow < 'static , str > > ) - > Entry { self . builtin . example = Some ( text . into ( ) ) ; self } # [ must_use ] pub fn replacing(mut self) -> Entry {
         self.replaces = true;
         self
     }
@@ -302,7 +291,7 @@ impl Entry {
         self
     }
 
-    /// What is wrong with the arguments.
+    /// Returns the mistakes in the declaration of the arguments.
     pub(super) fn check_arguments(&self) -> Vec<String> {
         let (name, args) = (&self.builtin.name, &self.builtin.args);
         let mut wrong = Vec::new();
@@ -324,16 +313,9 @@ impl Entry {
     }
 }
 
-/// A built-in of plain functions, which capture nothing.
-impl From<&Row> for Entry {
-    fn from(row: &Row) -> Entry {
-        Entry { builtin: row.into(), replaces: false, wrong: None }
-    }
-}
+ impl From < & Row > for Entry { fn from ( row : & Row ) - > Entry { Entry { builtin : row . into ( ) , replaces : false , wrong : None } } } const HOST: &str = "Of the host";
 
-const HOST: &str = "Of the host";
-
-/// Parameters that are none: a proposal that leads there is rejected.
+/// Invalid parameters are a domain fault: a proposal that leads to them is rejected.
 impl From<crate::dist::ParamError> for Fault {
     fn from(e: crate::dist::ParamError) -> Fault {
         Fault::new(FaultKind::Domain, e.to_string())

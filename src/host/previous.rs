@@ -3,8 +3,8 @@
 use crate::lang::builtins::{Args, Before};
 use crate::lang::value::Value;
 
-/// An earlier evaluation of a function of the host: its arguments, its result, what it
-/// kept ([`Entry::incremental`](super::Entry::incremental)).
+/// An earlier evaluation of a host function: its arguments, its result, and the state
+/// that it kept ([`Entry::incremental`](super::Entry::incremental)).
 #[derive(Clone, Copy, Debug)]
 pub struct Previous<'a, S> {
     before: &'a Before,
@@ -12,36 +12,37 @@ pub struct Previous<'a, S> {
 }
 
 impl<'a, S: 'static> Previous<'a, S> {
-    /// None if another kind of state was kept.
+    /// Returns `None` if the state has a different type.
     pub(super) fn new(before: &'a Before) -> Option<Self> {
         before.state.downcast_ref().map(|state| Previous { before, state })
     }
 }
 
 impl<'a, S> Previous<'a, S> {
-    /// Argument `i` as it was.
+    /// Returns the earlier value of argument `i`.
     pub fn argument(&self, i: usize) -> &'a Value {
         self.before.args.get(i).unwrap_or(&Value::Unit)
     }
 
-    /// The result.
+    /// Returns the earlier result.
     pub fn value(&self) -> &'a Value {
         &self.before.value
     }
 
-    /// What was kept.
+    /// Returns the state that the function kept.
     pub fn state(&self) -> &'a S {
         self.state
     }
 
-    /// Whether argument `i` is another than it was. What is shared by pointer is told at
-    /// once, numbers by their bits.
+    /// Returns whether argument `i` differs from its earlier value. Numbers are compared
+    /// by their bits; distributions, likelihoods and objects only by pointer. Values that
+    /// share a pointer are equal without a comparison of their contents.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Host, Previous, Type};
     /// use pcadlang::trace::Draws;
     /// use pcadlang::{Program, Value};
-    /// // `slow(mesh, x)` prepares `mesh`, which seldom changes; how often it did is what it gives.
+    /// // `slow(mesh, x)` prepares `mesh`, and does so again only when `mesh` changes.
     /// let slow = Entry::incremental("slow", |a, previous: Option<Previous<f64>>| {
     ///     let prepared = match previous {
     ///         Some(p) if !p.changed(a, 0) => {
@@ -63,8 +64,8 @@ impl<'a, S> Previous<'a, S> {
         !self.argument(i).same(a.get(i))
     }
 
-    /// The elements of argument `i` that are others than they were; `None` if it is no
-    /// array, or of another length than it was.
+    /// Returns the indices of the elements of argument `i` that have changed; `None` if
+    /// it is not an array or its length has changed.
     pub fn changed_elements(&self, a: &Args, i: usize) -> Option<Vec<usize>> {
         let (old, new) = (self.argument(i), a.get(i));
         match (old, new) {

@@ -1,8 +1,8 @@
-//! The adjoints of scene objects: derivatives by named points and by the vertices of
-//! surfaces, as points.
+//! The adjoints of scene objects: derivatives with respect to landmarks and vertices, as
+//! points.
 //!
-//! They travel as lists of arrays of numbers; what nothing depends on is zero, whatever
-//! its length, and costs nothing.
+//! They are passed as lists of arrays of numbers. A part on which nothing depends is
+//! zero, whatever its length, and costs nothing.
 
 use crate::geom::Solid;
 use crate::geom::armature::{Armature, RestGradient};
@@ -10,20 +10,20 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
 use glam::DVec3;
 
-/// By a solid: what [`super::SolidValue`] says its adjoint is. An empty list stands for
-/// zeros.
+/// The adjoint of a solid, in the layout of [`super::SolidValue`]. An empty list stands
+/// for zeros.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BySolid {
-    /// By each landmark.
+    /// With respect to each landmark.
     pub landmarks: Vec<DVec3>,
-    /// By each vertex.
+    /// With respect to each vertex.
     pub vertices: Vec<DVec3>,
 }
 
 impl BySolid {
     pub fn read(by: &Adjoint, solid: &Solid) -> BySolid {
         let vertices = match part(by, 1) {
-            // Counting them makes the meshes.
+            // Counting the vertices would build the meshes.
             Adjoint::Zero => Vec::new(),
             by => points(by, solid.vertex_count()),
         };
@@ -35,7 +35,7 @@ impl BySolid {
     }
 }
 
-/// By an armature: what [`super::ArmatureValue`] says its adjoint is.
+/// The adjoint of an armature, in the layout of [`super::ArmatureValue`].
 pub(super) fn by_armature(by: &Adjoint, body: &Armature) -> RestGradient {
     let rig = body.rig();
     RestGradient {
@@ -49,7 +49,7 @@ pub(super) fn by_armature(by: &Adjoint, body: &Armature) -> RestGradient {
     }
 }
 
-/// The other way round.
+/// The inverse of [`by_armature`].
 pub(super) fn armature_adjoint(by: &RestGradient) -> Adjoint {
     Adjoint::List(
         [&by.heads, &by.tails, &by.keypoints, &by.vertices].map(|p| from_points(p)).to_vec(),
@@ -63,7 +63,7 @@ fn part(by: &Adjoint, i: usize) -> &Adjoint {
     }
 }
 
-/// Numbers as points, so many of them.
+/// Converts an adjoint of `3 n` numbers to points.
 pub(super) fn points(by: &Adjoint, n: usize) -> Vec<DVec3> {
     match by {
         Adjoint::Array(gs) if gs.len() == 3 * n => {
@@ -73,7 +73,7 @@ pub(super) fn points(by: &Adjoint, n: usize) -> Vec<DVec3> {
     }
 }
 
-/// Points as numbers; none are zero.
+/// Converts points to an adjoint; zero if all of them are.
 pub(super) fn from_points(points: &[DVec3]) -> Adjoint {
     if points.iter().all(|p| *p == DVec3::ZERO) {
         return Adjoint::Zero;
@@ -81,8 +81,8 @@ pub(super) fn from_points(points: &[DVec3]) -> Adjoint {
     Adjoint::Array(points.iter().flat_map(DVec3::to_array).collect())
 }
 
-/// In the shape of a value that stands for three numbers: themselves, one for all, a
-/// record of x, y and z.
+/// Converts to the shape of a value that stands for a vector: three numbers, one number
+/// for all three, or a record of x, y and z.
 pub(super) fn shaped(v: &Value, g: DVec3) -> Adjoint {
     match v {
         Value::Unit => Adjoint::Zero,

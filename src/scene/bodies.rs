@@ -1,4 +1,4 @@
-//! Bodies: armatures in a shape and a pose, and those made from a mesh.
+//! Bodies: shaping and posing armatures, and rigging meshes.
 
 use super::shapes::vector_of;
 use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, body_vjps, fault, native};
@@ -135,7 +135,7 @@ pub(super) fn armature<'a>(a: &Args<'a>) -> Result<&'a Arc<Armature>, Fault> {
     a.object::<ArmatureValue>(0, BODY).map(|v| &v.0)
 }
 
-/// The index of a joint of the argument's rig.
+/// Returns the index of a joint in the armature's rig.
 pub(super) fn joint(a: &Args, body: &Armature, name: &str) -> Result<usize, Fault> {
     body.rig().find(name).ok_or_else(|| {
         let f =
@@ -159,7 +159,7 @@ pub(super) fn stops(a: &Args, body: &Armature) -> Result<Vec<bool>, Fault> {
     Ok(stops)
 }
 
-/// How joints are stretched, in the order given.
+/// Reads the stretch of each joint, in the order given.
 pub(super) fn stretches(a: &Args, body: &Armature) -> Result<Vec<(usize, Stretch)>, Fault> {
     let Value::Record(factors) = a.get(1) else { return Err(a.wrong(1, FACTORS)) };
     let mut list = Vec::with_capacity(factors.len());
@@ -207,7 +207,7 @@ pub(super) fn pose(a: &Args, body: &Armature) -> Result<Vec<JointPose>, Fault> {
 const WANTED: &str =
     "a placement, a rotation vector, or a record with `rotvec`, `rotate`, `location`, `scale`";
 
-/// What one joint does.
+/// Reads the pose of one joint.
 fn one(a: &Args, v: &Value) -> Result<JointPose, Fault> {
     if let Some(placement) = v.downcast::<AffineValue>() {
         return affine(a, placement);
@@ -222,7 +222,8 @@ fn one(a: &Args, v: &Value) -> Result<JointPose, Fault> {
     }
 }
 
-/// The parts of a placement without shear: its scale acts first.
+/// Decomposes a placement without shear into location, rotation and scale; the scale acts
+/// first.
 fn affine(a: &Args, placement: &AffineValue) -> Result<JointPose, Fault> {
     let m = placement.0.0.matrix3;
     let scale = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
@@ -231,7 +232,7 @@ fn affine(a: &Args, placement: &AffineValue) -> Result<JointPose, Fault> {
         .to_cols_array()
         .iter()
         .fold(0.0, |m: f64, x| m.max(x.abs()));
-    // Also where a scale is 0 and `off` no number.
+    // Also rejects a scale of 0, for which `off` is NaN.
     if !(off < 1e-9 && turn.determinant() > 0.0) {
         let name = a.builtin.full_name();
         return Err(Fault::domain(format!(

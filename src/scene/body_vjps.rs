@@ -1,4 +1,4 @@
-//! How derivatives pass through bodies: from surfaces and keypoints to poses, shapes and
+//! Vector-Jacobian products of bodies: from surfaces and keypoints to poses, shapes and
 //! proportions.
 
 use super::adjoints::{BySolid, armature_adjoint, by_armature, from_points, shaped as like};
@@ -13,7 +13,8 @@ use glam::{DMat3, DVec3};
 use smallvec::smallvec;
 use std::sync::Arc;
 
-/// Of `scene.skin`. By the armature for poses of rotation vectors only.
+/// For `scene.skin`. The adjoint of the armature is known only for poses that consist of
+/// rotation vectors.
 pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let body = armature(a).ok()?;
     let by = BySolid::read(by, &posed.downcast::<SolidValue>()?.0);
@@ -30,7 +31,7 @@ pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<ArgAdjoints>
     Some(smallvec![Adjoint::Unknown, by_pose(a, body, &g)?])
 }
 
-/// In the shape that the pose was given in.
+/// Converts to the shape in which the pose was given.
 fn by_pose(a: &Args, body: &Armature, by: &[JointGradient]) -> Option<Adjoint> {
     Some(match a.get(1) {
         Value::Array(xs) if xs.is_empty() => Adjoint::Zero,
@@ -50,8 +51,8 @@ fn by_pose(a: &Args, body: &Armature, by: &[JointGradient]) -> Option<Adjoint> {
 
 fn by_joint(v: &Value, by: &JointGradient) -> Adjoint {
     if let Some(placement) = v.downcast::<AffineValue>() {
-        // Columns s_k R_k: they grow with the scale, and turn with a small rotation
-        // vector w by w x s_k R_k.
+        // The columns are s_k R_k: they are proportional to s_k, and a small rotation
+        // vector w changes them by w x s_k R_k.
         let m = placement.0.0.matrix3;
         let column = |c: DVec3, by_scale: f64| {
             let scale = c.length();
@@ -78,7 +79,8 @@ fn by_joint(v: &Value, by: &JointGradient) -> Adjoint {
     }
 }
 
-/// Of `scene.shaped`: offsets add up, so what was there moves as before.
+/// For `scene.shaped`: offsets are added, so the adjoint of the original armature is that
+/// of the result.
 pub(super) fn shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let body = armature(a).ok()?;
     let Value::Record(amounts) = a.get(1) else { return None };
@@ -88,7 +90,7 @@ pub(super) fn shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     Some(smallvec![by.clone(), by_amounts, Adjoint::Num(body.vjp_cloth(&rest))])
 }
 
-/// Of `scene.stretched`.
+/// For `scene.stretched`.
 pub(super) fn stretched(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let body = armature(a).ok()?;
     let Value::Record(factors) = a.get(1) else { return None };

@@ -1,4 +1,4 @@
-//! What may be an object of revolution in a photograph, as values: a thin layer over
+//! Candidate objects of revolution in a photograph, as values: a thin layer over
 //! [`crate::vision::candidates`].
 
 use super::observed::MaskValue;
@@ -72,7 +72,8 @@ pub(super) const TABLE: &[Row] = &[native(
     },
 )];
 
-/// A candidate as a record; `scale` is what a pixel of the photograph is in the camera's.
+/// Converts a candidate to a record; `scale` is the size of a photograph's pixel in
+/// pixels of the camera.
 fn value(c: &Candidate, camera: &Camera, scale: [f64; 2]) -> Value {
     let axes = c.axes.iter().map(|a| axis(a, camera, scale)).collect();
     Value::record([
@@ -83,8 +84,8 @@ fn value(c: &Candidate, camera: &Camera, scale: [f64; 2]) -> Value {
 }
 
 fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
-    // Where the middle is seen at the depth of the origin, and the plane through it that
-    // faces the eye.
+    // The midpoint of the axis is placed at the depth of the origin; the axis lies in the
+    // plane through it that faces the camera.
     let depth = (-camera.eye).dot(camera.forward).max(Camera::NEAR);
     let at = |[x, y]: [f64; 2], depth| camera.unproject(x * scale[0], y * scale[1], depth);
     let middle = at([0.5 * (a.foot[0] + a.top[0]), 0.5 * (a.foot[1] + a.top[1])], depth);
@@ -129,8 +130,8 @@ fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
 mod tests {
     use super::*;
 
-    /// A disc that faces the eye, far from the middle of the picture, is as long as it is
-    /// wide in every direction.
+    /// A disc that faces the camera, far from the centre of the picture, is as long as it
+    /// is wide in every direction.
     #[test]
     fn lengths_are_those_of_a_plane_that_faces_the_eye() {
         let camera = Camera::default_for(256, 256);

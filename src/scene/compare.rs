@@ -1,4 +1,4 @@
-//! Likelihoods of what is observed given a view.
+//! Likelihoods of observed pictures given a view.
 
 use super::adjoints::BySolid;
 use super::observed::{DepthValue, ImageValue, MaskValue};
@@ -116,7 +116,7 @@ pub(super) const TABLE: &[Row] = &[
     .vjp(|_, _, by| Some(by_view(by.clone(), 5))),
 ];
 
-/// How a picture is drawn, as far as it is not exact.
+/// Describes the approximations in rendering.
 pub(super) fn drawn(view: &View, size: u32) -> String {
     let coarse = match view.detail() {
         0.0 => String::new(),
@@ -169,18 +169,18 @@ fn chamfer(a: &Args) -> Result<Value, Fault> {
     likelihood(ChamferOf { view: view(a)?, size: size(a, 6)?, options })
 }
 
-/// The adjoints of a likelihood's arguments: by the view as given, by so many others
-/// unknown.
+/// The adjoints of a likelihood's arguments: `by` for the view, unknown for `others`
+/// more.
 pub(super) fn by_view(by: Adjoint, others: usize) -> ArgAdjoints {
     std::iter::once(by).chain((0..others).map(|_| Adjoint::Unknown)).collect()
 }
 
-/// By the view, from derivatives by the pieces of its contours.
+/// The adjoint of the view, given derivatives with respect to the pieces of its contours.
 pub(crate) fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.vjp_contours(size, by_piece) }.into_adjoint()
 }
 
-/// By the view, from what each pixel brings that the object covers.
+/// The adjoint of the view, given derivatives with respect to the coverage of each pixel.
 pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.vjp_mask(size, gains) }.into_adjoint()
 }
@@ -197,7 +197,7 @@ fn elements(c: &Contours) -> Elements<'_> {
     }
 }
 
-/// The observed image, if its shape is that of the view's picture.
+/// Returns the observed image, if its aspect ratio matches that of the view's picture.
 pub(super) fn image<'a>(
     observed: &'a Value,
     view: &View,
@@ -232,10 +232,11 @@ thread_local! {
     static CHAMFERS: RefCell<Followed<Chamfer, chamfer::Tally>> = RefCell::default();
 }
 
-/// What a thread knows of the contours that comparators saw last.
+/// A thread's records of the contours that recent comparators scored last, most recent
+/// first.
 struct Followed<C, T>(Vec<(Weak<C>, T)>);
 
-/// The most comparators of a kind that a thread knows something of.
+/// The maximum number of comparators of a kind that a thread remembers.
 const FOLLOWED: usize = 8;
 
 impl<C, T> Default for Followed<C, T> {
@@ -245,7 +246,7 @@ impl<C, T> Default for Followed<C, T> {
 }
 
 impl<C, T: Default> Followed<C, T> {
-    /// That of one comparator, which comes to the front.
+    /// Returns the record of a comparator, which moves to the front.
     fn of(&mut self, comparator: &Arc<C>) -> &mut T {
         match self.0.iter().position(|(c, _)| std::ptr::eq(c.as_ptr(), Arc::as_ptr(comparator))) {
             Some(at) => self.0[..=at].rotate_right(1),
@@ -278,7 +279,7 @@ struct ContourOf {
 }
 
 impl ContourOf {
-    /// The comparator for what was observed.
+    /// Returns the comparator for the observed image at the rendered size.
     fn prepared(&self, observed: &Value) -> Result<Arc<ContourRatio>, String> {
         let image = image(observed, &self.view, self.name())?;
         let camera = self.view.camera().scaled_to(self.size);
@@ -308,7 +309,7 @@ impl Likelihood for ContourOf {
             .with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
     }
 
-    /// By the view.
+    /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (ratio, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
@@ -337,7 +338,7 @@ struct ChamferOf {
 }
 
 impl ChamferOf {
-    /// The comparator for what was observed.
+    /// Returns the comparator for the observed image at the rendered size.
     fn prepared(&self, observed: &Value) -> Result<Arc<Chamfer>, String> {
         let image = image(observed, &self.view, self.name())?;
         let camera = self.view.camera().scaled_to(self.size);
@@ -370,7 +371,7 @@ impl Likelihood for ChamferOf {
         })
     }
 
-    /// By the view and by sigma.
+    /// With respect to the view and sigma.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (chamfer, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
@@ -411,7 +412,7 @@ struct MaskOf {
 }
 
 impl MaskOf {
-    /// What is observed, ready at the size that is drawn, and what is drawn.
+    /// Returns the observed mask, prepared at the rendered size, and the rendered frame.
     fn prepared(&self, observed: &Value) -> Result<(Arc<MaskLikelihood>, Arc<Frame>), String> {
         let Some(mask) = observed.downcast::<MaskValue>() else {
             return Err(format!(
@@ -448,7 +449,7 @@ impl Likelihood for MaskOf {
             .map_err(|e| format!("scene.mask: {e}"))
     }
 
-    /// A mask of the size that is drawn.
+    /// Draws a mask of the rendered size.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let draw = |(prepared, frame): (Arc<MaskLikelihood>, Arc<Frame>)| {
             let rendered: Vec<bool> = frame.mask().collect();
@@ -459,7 +460,7 @@ impl Likelihood for MaskOf {
         Some(self.prepared(observed).and_then(draw))
     }
 
-    /// By the view.
+    /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (prepared, _) = self.prepared(observed).ok()?;
         Some(by_silhouette(&self.view, self.size, &prepared.gains()))
@@ -474,7 +475,8 @@ struct DepthOf {
 }
 
 impl DepthOf {
-    /// What is observed, ready at the size that is drawn, and what is drawn.
+    /// Returns the observed depths, prepared at the rendered size, and the rendered
+    /// frame.
     fn prepared(&self, observed: &Value) -> Result<(Arc<DepthLikelihood>, Arc<Frame>), String> {
         let Some(depth) = observed.downcast::<DepthValue>() else {
             return Err(format!(
@@ -511,7 +513,8 @@ impl Likelihood for DepthOf {
             .map_err(|e| format!("scene.depth: {e}"))
     }
 
-    /// A map of the size that is drawn, missing where the observed one is.
+    /// Draws a depth map of the rendered size; pixels missing in the observed one stay
+    /// missing.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let wrong = |e: VisionError| format!("scene.depth: {e}");
         let draw = |(prepared, frame): (Arc<DepthLikelihood>, Arc<Frame>)| {
@@ -524,7 +527,7 @@ impl Likelihood for DepthOf {
         Some(self.prepared(observed).and_then(draw))
     }
 
-    /// By the view.
+    /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (prepared, frame) = self.prepared(observed).ok()?;
         let mut vertices = self.view.vjp_depth(self.size, &prepared.slopes(&frame.depth));

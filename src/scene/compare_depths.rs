@@ -1,5 +1,5 @@
-//! The likelihood of relative depths: how far in front of or behind the hips a network
-//! has the landmarks of a person.
+//! The likelihood of relative depths: the depths of a person's landmarks relative to the
+//! hips, as estimated by a network.
 
 use super::adjoints::BySolid;
 use super::compare::{SECTION, SEEN, by_view, likelihood, view};
@@ -54,25 +54,25 @@ pub(super) const TABLE: &[Row] = &[native(
 #[derive(Debug)]
 struct RelativeDepthOf {
     view: Arc<View>,
-    /// Scene units in a metre.
+    /// Scene units per metre.
     scale: f64,
-    /// The share of a depth that is told.
+    /// The fraction of the true depth that the network reports.
     share: f64,
     model: RelativeDepthLikelihood,
 }
 
-/// One depth and the landmark it is of.
+/// One observed depth and its landmark.
 struct Term<'a> {
     name: &'a Arc<str>,
     point: &'a [f64],
-    /// The landmark, by its place among the solid's, and as much of its depth in metres
-    /// from the hips' as is told.
+    /// The landmark's index in the solid, and the depth that the network is expected to
+    /// report for it: relative to the mid-hip, in metres, times `share`.
     landmark: usize,
     depth: f64,
 }
 
 impl RelativeDepthOf {
-    /// The two hips among the landmarks.
+    /// Returns the indices of the two hip landmarks.
     fn hips(&self, landmarks: &[Landmark]) -> Result<[usize; 2], String> {
         let find = |name: &str| landmarks.iter().position(|l| &*l.name == name);
         find("l_hip").zip(find("r_hip")).map(|(l, r)| [l, r]).ok_or_else(|| {
@@ -124,8 +124,8 @@ impl Likelihood for RelativeDepthOf {
         Ok(sum)
     }
 
-    /// Depths of the landmarks that the scene has; the others, and what is beside and
-    /// above, stay.
+    /// Draws depths of the landmarks in the scene; the other landmarks, and the numbers
+    /// to the right and down, stay as observed.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let Value::Record(points) = observed else { return None };
         let mut drawn = (**points).clone();
@@ -136,7 +136,7 @@ impl Likelihood for RelativeDepthOf {
         Some(each.map(|()| Value::Record(Arc::new(drawn))))
     }
 
-    /// By the view and by the scale.
+    /// With respect to the view and the scale.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let landmarks = self.view.solid().landmarks();
         let hips = self.hips(landmarks).ok()?;

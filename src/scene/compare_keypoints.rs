@@ -1,8 +1,8 @@
-//! The likelihood of detected joints given a view: its landmarks projected, compared with
-//! where a detector found them.
+//! The likelihood of detected joints given a view: its projected landmarks are compared
+//! with the detections.
 //!
 //! A thin layer over [`crate::vision::keypoints`]: here landmarks become positions in
-//! pixels of the picture that the detections belong to.
+//! pixels of the picture in which the joints were detected.
 
 use super::adjoints::BySolid;
 use super::compare::{SECTION, SEEN, by_view, likelihood, same_shape, view};
@@ -115,14 +115,14 @@ struct KeypointsOf {
     view: Arc<View>,
     options: KeypointOptions,
     by_joint: ByJoint,
-    /// Whether confidences count.
+    /// Whether the confidence of detections is used.
     confident: bool,
 }
 
-/// Joints with a spread of their own.
+/// Joints with individual standard deviations.
 type ByJoint = Vec<(Arc<str>, f64)>;
 
-/// The spread of joints, and those with one of their own.
+/// Reads the default standard deviation, and those of individual joints.
 fn spreads(a: &Args) -> Result<(f64, ByJoint), Fault> {
     let Value::Record(record) = a.get(1) else { return Ok((a.positive_or(1, 1.5)?, Vec::new())) };
     let positive = |v: &Value| match v {
@@ -141,7 +141,7 @@ fn spreads(a: &Args) -> Result<(f64, ByJoint), Fault> {
     Ok((positive(other)?, named))
 }
 
-/// Where a landmark is in a picture of some size; none behind the camera.
+/// Projects a landmark into a picture of this size; `None` if it is behind the camera.
 fn project(l: &Landmark, camera: &Camera, (width, height): (u32, u32)) -> Option<[f64; 2]> {
     let (x, y, depth) = camera.project(l.position);
     let (sx, sy) =
@@ -150,8 +150,8 @@ fn project(l: &Landmark, camera: &Camera, (width, height): (u32, u32)) -> Option
 }
 
 impl ViewValue {
-    /// The landmarks of its solid, each with its place in a picture of this size
-    /// (pixels): none of those behind the camera.
+    /// Returns the landmarks of its solid, each with its position in a picture of this
+    /// size (pixels); `None` for those behind the camera.
     pub fn landmarks(
         &self,
         width: u32,
@@ -177,8 +177,8 @@ impl Likelihood for KeypointsOf {
         Ok(sum)
     }
 
-    /// Detections of the joints that were detected, with the same confidence. One that is
-    /// of no landmark stays.
+    /// Draws positions for the detected joints, with the same confidence. A detection
+    /// without a landmark in the scene stays as observed.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let KeypointsValue(seen) = observed.downcast::<KeypointsValue>()?;
         let mut points = seen.points().to_vec();
@@ -195,7 +195,7 @@ impl Likelihood for KeypointsOf {
                     .for_each(|(o, at)| (o.x, o.y) = (at[0] / w, at[1] / h));
             }
         });
-        // In the same unit, wherever the shoulders and hips were drawn.
+        // The unit of length stays the same, wherever the shoulders and hips were drawn.
         let moved = || seen.moved(&points);
         Some(drawn.map(|()| {
             Value::object(KeypointsValue(if torso > 0.0 {
@@ -206,8 +206,8 @@ impl Likelihood for KeypointsOf {
         }))
     }
 
-    /// The landmarks that were detected, between where the scene has them and where they
-    /// were seen.
+    /// The detected landmarks, at positions that combine those of the scene and of the
+    /// detector.
     fn located(&self, observed: &Value) -> Vec<Located> {
         let mut all = Vec::new();
         let landmarks = self.view.solid().landmarks();
@@ -225,12 +225,12 @@ impl Likelihood for KeypointsOf {
                 own_variance: term.model.systematic_variance() / (width * width + height * height),
             });
         };
-        // What cannot be compared has failed before.
+        // A value that cannot be compared has already failed in `log_density`.
         let _ = self.each(observed, add);
         all
     }
 
-    /// By the view.
+    /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
         let mut all = vec![DVec3::ZERO; landmarks.len()];
@@ -245,20 +245,20 @@ impl Likelihood for KeypointsOf {
     }
 }
 
-/// One detection and the landmark it is of.
+/// One detection and its landmark.
 struct Term<'a> {
     model: &'a KeypointLikelihood,
     seen: Detection,
     landmark: usize,
-    /// Which of the detections it is.
+    /// The index of the detection.
     point: usize,
-    /// Where the landmark is, in pixels of the picture.
+    /// The projected landmark, in pixels of the picture.
     joint: Option<[f64; 2]>,
-    /// Pixels of the picture in one of the camera's.
+    /// Pixels of the picture per pixel of the camera.
     scale: [f64; 2],
     /// The width and height of the picture.
     size: (f64, f64),
-    /// The length of the torso in its pixels.
+    /// The length of the detected torso, in pixels of the picture.
     torso: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The contours of a photograph, found otherwise than by default.
+//! The contours of a photograph, detected with other settings than the default.
 
 use super::observed::{Detecting, DetectorValue};
 use super::{DETECTOR, IMAGE, ImageValue, native};
@@ -47,7 +47,7 @@ pub(super) const TABLE: &[Row] = &[native(
     "The photograph with contours detected by these settings, for comparators. They are detected \
      once for each photograph and setting; a detector from a file runs once for each size.",
     |a| {
-        // A photograph that is not given, where a program is looked at without one.
+        // The photograph is missing when a program is examined without its data.
         if matches!(a.values.first(), Some(Value::Unit)) {
             return Ok(Value::Unit);
         }

@@ -2,7 +2,7 @@
 
 use crate::lang::builtins::Row;
 
-/// A ball, a picture of something, and this observation.
+/// A program with a ball, after `$data` and before an observation.
 macro_rules! seen {
     ($data:literal, $observe:literal) => {
         concat!(
@@ -13,7 +13,7 @@ macro_rules! seen {
     };
 }
 
-/// The shipped body, and this.
+/// A program with the shipped body.
 macro_rules! body {
     ($rest:literal) => {
         concat!("data body = armature(\"std/human/human.lod2.rig.json\");\n", $rest)

@@ -1,6 +1,6 @@
-//! Every function of the table says what its derivative is: a vector-Jacobian product,
-//! zero, or one of a few that have none. Every product is compared with differences,
-//! alone or composed with others, for random derivatives of what comes out.
+//! Every function in the table declares its derivative: a vector-Jacobian product, zero,
+//! or, for a few, unknown. Every product is compared with finite differences, alone or
+//! composed with others, for random adjoints of the result.
 
 use crate::geom::Affine;
 use crate::lang::adjoint::Adjoint;
@@ -11,7 +11,7 @@ use crate::scene::{AffineValue, ArmatureValue, SolidValue};
 use glam::DVec3;
 use std::collections::HashSet;
 
-/// Functions without a derivative, and why.
+/// Functions without a derivative, and the reason.
 const NONE: &[(&str, &str)] = &[
     ("scene.autorig", "joints are found by search"),
     ("scene.bounds", "they jump from vertex to vertex"),
@@ -21,8 +21,8 @@ const NONE: &[(&str, &str)] = &[
     ("scene.people", "people are found in a photograph, which nothing moves"),
 ];
 
-/// Functions compared with differences elsewhere: in `tests/gradient.rs`, and beside the
-/// comparators and renderers.
+/// Functions that are compared with finite differences elsewhere: in `tests/gradient.rs`,
+/// and next to the comparators and renderers.
 const ELSEWHERE: &[&str] = &[
     "sq_exp",
     "matern32",
@@ -45,14 +45,14 @@ const ELSEWHERE: &[&str] = &[
 
 /// An expression.
 enum E {
-    /// What derivatives are by.
+    /// A value with respect to which derivatives are taken.
     By(Value),
     Fixed(Value),
     Call(&'static str, Vec<E>),
 }
 use E::{By, Call, Fixed};
 
-/// The same value with each number replaced, in order.
+/// Maps each number of a value, in order.
 fn mapped(v: &Value, f: &mut dyn FnMut(f64) -> f64) -> Value {
     match v {
         Value::Num(x) => num(f(*x)),
@@ -65,7 +65,7 @@ fn mapped(v: &Value, f: &mut dyn FnMut(f64) -> f64) -> Value {
     }
 }
 
-/// An adjoint's numbers in the order of [`mapped`].
+/// Appends the numbers of an adjoint in the order of [`mapped`].
 fn flat(v: &Value, by: &Adjoint, out: &mut Vec<f64>) {
     match v {
         Value::Num(_) => out.push(by.number()),
@@ -114,7 +114,7 @@ impl E {
     }
 }
 
-/// What comes out, as lists of numbers, and whether in single precision.
+/// Returns a result as lists of numbers, and whether it has single precision.
 fn numbers(v: &Value) -> (Vec<Vec<f64>>, bool) {
     let points =
         |ps: &mut dyn Iterator<Item = DVec3>| ps.flat_map(|p| p.to_array()).collect::<Vec<f64>>();
@@ -145,7 +145,7 @@ fn numbers(v: &Value) -> (Vec<Vec<f64>>, bool) {
     (vec![all], false)
 }
 
-/// Random derivatives by what comes out, in its shape.
+/// A random adjoint of a result, in its shape.
 fn shaped(v: &Value, next: &mut dyn FnMut() -> f64) -> Adjoint {
     match v {
         Value::Num(_) => Adjoint::Num(next()),
@@ -206,7 +206,7 @@ fn check(what: &str, e: &E) {
     let scale = weights.iter().map(|w| w * w).sum::<f64>().sqrt().max(1.0);
     assert!(!found.is_empty(), "{what}");
     for (k, found) in found.iter().enumerate() {
-        // Of the fourth order: wide enough for single precision.
+        // A fourth-order difference: its step can be wide enough for single precision.
         let slope =
             (8.0 * (at(k, h) - at(k, -h)) - (at(k, 2.0 * h) - at(k, -2.0 * h))) / (12.0 * h);
         assert!(
@@ -238,7 +238,7 @@ fn body() -> Value {
         .unwrap()
 }
 
-/// At least one expression with each function.
+/// Expressions that contain each function at least once.
 fn cases() -> Vec<E> {
     let mut all = Vec::new();
     for name in [
@@ -343,7 +343,7 @@ fn cases() -> Vec<E> {
         ],
     );
     all.push(Call("scene.group", vec![pair]));
-    // Bodies: every way of posing, and shapes and proportions through poses.
+    // Bodies: all ways of posing, and shapes and proportions together with poses.
     let rig = || Fixed(body());
     let turns: Vec<f64> = (0..66).map(|i| 0.5 * libm::sin(f64::from(i) * 1.3)).collect();
     let morphs = || By(record(&[("heavy", num(0.4)), ("thin", num(0.2))]));
@@ -410,7 +410,7 @@ fn a_placed_joint_passes_its_derivative_to_its_placement() {
 fn every_function_has_a_derivative_is_flat_or_is_listed() {
     let mut without: Vec<String> = Vec::new();
     for b in TABLE.iter().filter(|b| matches!(b.kind, Kind::Function(_))) {
-        // What stands for files is no expression.
+        // Loaders of files are not used in expressions.
         if matches!(b.derivative, Derivative::Unknown) && b.section != "Data files" {
             without.push(b.full_name());
         }

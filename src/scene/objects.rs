@@ -11,8 +11,9 @@ use glam::{DMat3, DVec3};
 use std::any::Any;
 use std::sync::Arc;
 
-/// A solid. Its adjoint: a list of two arrays, by each landmark's x, y and z in turn, and
-/// by those of each vertex of its meshes in turn, in world coordinates.
+/// A solid. Its adjoint is a list of two arrays: the derivatives with respect to each
+/// landmark's x, y and z in turn, and to those of each vertex of its meshes, in world
+/// coordinates.
 #[derive(Clone, Debug)]
 pub struct SolidValue(pub Solid);
 
@@ -46,8 +47,8 @@ impl Object for SolidValue {
     }
 }
 
-/// A placement. Its adjoint: by the columns of its linear part and by its shift, twelve
-/// numbers.
+/// A placement. Its adjoint has twelve numbers: the derivatives with respect to the
+/// columns of the linear part and to the translation.
 #[derive(Clone, Debug)]
 pub struct AffineValue(pub Affine);
 
@@ -60,8 +61,8 @@ impl Object for AffineValue {
         self
     }
 
-    /// A placement of a solid is a solid, of a placement a placement: first the right
-    /// one, then the left one.
+    /// Applies the placement to a solid, or composes it with a placement, of which the
+    /// right one acts first.
     fn multiply(&self, other: &Value) -> Option<Result<Value, String>> {
         if let Some(s) = other.downcast::<SolidValue>() {
             return Some(Ok(Value::object(SolidValue(s.0.placed(self.0)))));
@@ -89,7 +90,7 @@ impl Object for AffineValue {
     fn field(&self, name: &str) -> Option<Value> {
         match name {
             "translate" => Some(xyz(self.0.0.translation.to_array())),
-            // Where the object's own y axis points.
+            // The direction of the object's own y axis.
             "axis" => Some(xyz(self.0.0.matrix3.y_axis.normalize_or_zero().to_array())),
             _ => None,
         }
@@ -100,8 +101,9 @@ pub(super) fn affine_adjoint(linear: DMat3, shift: DVec3) -> Adjoint {
     Adjoint::Array(linear.to_cols_array().into_iter().chain(shift.to_array()).collect())
 }
 
-/// An armature: a rig with its mesh. Its adjoint: a list of four arrays, by the places at
-/// rest of the joints' heads, of their tails, of the keypoints and of the vertices.
+/// An armature: a rig with its mesh. Its adjoint is a list of four arrays: the
+/// derivatives with respect to the rest positions of the joints' heads, their tails, the
+/// keypoints and the vertices.
 #[derive(Clone, Debug)]
 pub struct ArmatureValue(pub Arc<Armature>);
 
@@ -150,7 +152,7 @@ impl Object for CameraValue {
     }
 }
 
-/// A solid before a camera. Its adjoint is that of the solid.
+/// A solid in front of a camera. Its adjoint is that of the solid.
 #[derive(Clone, Debug)]
 pub struct ViewValue(pub Arc<View>);
 

@@ -1,6 +1,6 @@
-//! What is observed: photographs and ready contour maps, masks, depth maps, keypoints.
-//! What comparators prepare from them alone is made once, on first use, and kept beside
-//! them.
+//! Observations: photographs and ready-made contour maps, masks, depth maps, keypoints.
+//! Data that comparators derive from an observation alone are computed on first use and
+//! cached with it.
 
 use crate::lang::value::{Object, Value};
 use crate::vision::candidates::{Candidate, CandidateOptions};
@@ -13,11 +13,11 @@ use crate::vision::{
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// The most prepared things of a kind that are kept: options may be choices, such as the
-/// `sigma` of a chamfer distance.
+/// The maximum number of cached items of a kind: options can be choices of the program,
+/// such as the `sigma` of a chamfer distance.
 const MOST: usize = 32;
 
-/// Prepared things by what they were prepared for.
+/// A cache of prepared data, by their options.
 #[derive(Debug)]
 pub(super) struct Prepared<K, T>(Mutex<Vec<(K, Arc<T>)>>);
 
@@ -28,7 +28,7 @@ impl<K, T> Default for Prepared<K, T> {
 }
 
 impl<K: PartialEq, T> Prepared<K, T> {
-    /// The one for a key, made if it is new.
+    /// Returns the item for a key; makes it if it is new.
     pub fn get(
         &self,
         key: K,
@@ -40,79 +40,79 @@ impl<K: PartialEq, T> Prepared<K, T> {
         }
         let made = Arc::new(make(&key)?);
         if all.len() == MOST {
-            // The first one may not be as it would be made again: what a likelihood draws
-            // is put there.
+            // Keeps the first item, which may be a simulated observation that cannot be
+            // remade.
             all.remove(1);
         }
         all.push((key, Arc::clone(&made)));
         Ok(made)
     }
 
-    /// The first that was made.
+    /// Returns the item that was made first.
     pub fn any(&self) -> Option<Arc<T>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).first().map(|(_, t)| Arc::clone(t))
     }
 }
 
-/// Options and the size of the frame.
+/// Options, and the width and height of the frame.
 type Key<O> = (O, u32, u32);
 
-/// A photograph, a ready contour map, or both.
+/// A photograph, a ready-made contour map, or both.
 #[derive(Debug, Default)]
 pub struct ImageValue {
     photo: Option<Photo>,
-    /// Its contours, once they were asked for, or given.
+    /// Its contours, given or detected on first use.
     map: OnceLock<Result<ContourMap, String>>,
     /// Whether the contours were given.
     ready: bool,
-    /// What finds its contours where a program says nothing of it.
+    /// The detector to use where the program does not choose one.
     by: OnceLock<DetectorValue>,
     pub(super) ratios: Prepared<Key<ContourRatioOptions>, ContourRatio>,
     pub(super) chamfers: Prepared<Key<ChamferOptions>, Chamfer>,
     pub(super) regions: Prepared<Key<RegionOptions>, Region>,
-    /// The same photograph with contours found otherwise: by what, and how strong they
-    /// must be.
+    /// The same photograph with contours detected by other settings: the detector and the
+    /// minimum strength.
     detected: Prepared<(Detecting, f32), Value>,
-    /// What detectors from files say of its pixels, at a size.
+    /// Maps from detectors that were read from files, by detector and size.
     soft: Prepared<(DetectorValue, u32), SoftMap>,
-    /// What may be objects in it, by how they were looked for.
+    /// Candidate objects, by the options of the search.
     pub(super) candidates: Prepared<CandidateOptions, Vec<Candidate>>,
-    /// The people in the photograph, by how they were looked for: views, and how many at
-    /// most.
+    /// The people in the photograph, by the options of the search: the number of views,
+    /// and the maximum number of people.
     pub(super) people: Prepared<(u32, u32), Vec<(Person, Value)>>,
 }
 
 impl ImageValue {
-    /// Points weaker than this are more often texture than outline: the detector's own
-    /// best threshold against human outlines is 0.47, and a few more edges help where the
-    /// object is dim (docs/objects.md).
+    /// The minimum strength of a contour point: weaker ones are more often texture than
+    /// outline. The detector's own best threshold against human outlines is 0.47, and a
+    /// few more edges help where the object is dim (docs/objects.md).
     pub(super) const STRONG: f32 = 0.4;
 
-    /// A photograph; its contours are found when they are needed.
+    /// Creates an image of a photograph; its contours are detected when they are needed.
     pub fn photo(photo: Photo) -> Self {
         ImageValue { photo: Some(photo), ..ImageValue::default() }
     }
 
-    /// A ready contour map, with the photograph if there is one.
+    /// Creates an image of a ready-made contour map, and its photograph if available.
     pub fn contours(map: ContourMap, photo: Option<Photo>) -> Self {
         ImageValue { photo, map: OnceLock::from(Ok(map)), ready: true, ..ImageValue::default() }
     }
 
-    /// The photograph.
+    /// Returns the photograph.
     pub fn as_photo(&self) -> Option<&Photo> {
         self.photo.as_ref()
     }
 
-    /// The people that programs found in it, most prominent first; none if no program has
-    /// asked.
+    /// Returns the people that programs detected in it, most prominent first; `None` if
+    /// no program did.
     pub fn people(&self) -> Option<Vec<Person>> {
         self.people.any().map(|all| all.iter().map(|(p, _)| p.clone()).collect())
     }
 
-    /// Its contours.
+    /// Returns its contours, detecting them if necessary.
     ///
     /// # Errors
-    /// If a detector was chosen for it that fails on it.
+    /// If the detector chosen for it fails.
     pub fn map(&self) -> Result<&ContourMap, String> {
         let found = self.map.get_or_init(|| match &self.photo {
             Some(photo) => {
@@ -124,19 +124,19 @@ impl ImageValue {
         found.as_ref().map_err(String::clone)
     }
 
-    /// The contours that programs looked at; none if none has asked.
+    /// Returns the contours that programs have used; `None` if they have used none.
     pub fn seen(&self) -> Option<ContourMap> {
         let otherwise = self.detected.any();
         let image = otherwise.as_ref().and_then(|v| v.downcast::<ImageValue>()).unwrap_or(self);
         image.map.get()?.as_ref().ok().cloned()
     }
 
-    /// The photograph with its contours found by a detector wherever a program says
-    /// nothing of it; contours that were given stay.
+    /// Returns the image with `by` as the detector where the program does not choose one;
+    /// given contours stay.
     pub fn detecting(image: &Value, by: &DetectorValue) -> Value {
         match image.downcast::<ImageValue>() {
             Some(ImageValue { photo: Some(photo), ready: false, map, by: known, .. }) => {
-                // Contours that were looked at before were found by what was chosen then.
+                // Contours already detected belong to the detector chosen at that time.
                 if map.get().is_none() {
                     let _ = known.set(by.clone());
                 }
@@ -152,8 +152,8 @@ impl ImageValue {
         }
     }
 
-    /// The same photograph with contours found in a way of its own, those at least so
-    /// strong; `None` if there is no photograph.
+    /// Returns the same photograph with the contours of a given detector that have at
+    /// least strength `least`; `None` if there is no photograph.
     pub(super) fn detected_by(&self, by: Detecting, least: f32) -> Result<Option<Value>, String> {
         let Some(photo) = &self.photo else { return Ok(None) };
         let found = self.detected.get((by, least), |(by, least)| {
@@ -176,7 +176,7 @@ impl ImageValue {
         }
     }
 
-    /// Width and height in pixels.
+    /// Returns the width and height in pixels.
     pub fn size(&self) -> (u32, u32) {
         match &self.photo {
             Some(p) => (p.width(), p.height()),
@@ -185,13 +185,14 @@ impl ImageValue {
     }
 }
 
-/// What finds contours, from a file; without one the detector that is built in. Clones
-/// share it.
+/// A contour detector from a file, or the built-in one if there is no file. Clones share
+/// it.
 #[derive(Clone, Debug, Default)]
 pub struct DetectorValue(pub Option<Arc<FileDetector>>);
 
 impl PartialEq for DetectorValue {
-    /// Whether they were read at once: a detector that is read again may be another.
+    /// Whether both come from the same reading of a file, which may have changed in
+    /// between.
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
@@ -213,21 +214,22 @@ impl Object for DetectorValue {
 /// A detector with its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Detecting {
-    /// The one that is built in.
+    /// The built-in detector.
     Gradients(GradientDetector),
-    /// One that was read from a file.
+    /// A detector from a file.
     File {
-        /// Which one.
+        /// The detector.
         detector: DetectorValue,
-        /// The longer side of the picture worked on.
+        /// The longer side of the picture that is analysed, in pixels.
         size: u32,
-        /// The spread of the smoothing.
+        /// The standard deviation of the smoothing, in pixels.
         sigma: f32,
     },
 }
 
 impl Detecting {
-    /// A detector with the settings that suit it, and how strong its contours must be.
+    /// Returns a detector with its default settings, and the minimum strength of its
+    /// contours.
     pub fn usual(detector: Option<&DetectorValue>) -> (Detecting, f32) {
         match detector.and_then(|d| d.0.as_ref().map(|file| (d, file))) {
             Some((d, file)) => {
@@ -239,7 +241,7 @@ impl Detecting {
     }
 }
 
-/// The points that count as edges.
+/// Returns the points of at least a given strength, which count as edges.
 fn strong(map: ContourMap, least: f32) -> ContourMap {
     let mut kept = ContourMap::new(map.width, map.height);
     for i in (0..map.len()).filter(|i| map.strength[*i] >= least) {
@@ -284,7 +286,7 @@ pub struct MaskValue {
 }
 
 impl MaskValue {
-    /// A mask.
+    /// Creates an observed mask.
     pub fn new(mask: Mask) -> Self {
         MaskValue { mask, prepared: Prepared::default() }
     }
@@ -313,7 +315,7 @@ pub struct DepthValue {
 }
 
 impl DepthValue {
-    /// A depth map.
+    /// Creates an observed depth map.
     pub fn new(depth: DepthMap) -> Self {
         DepthValue { depth, prepared: Prepared::default() }
     }
@@ -334,7 +336,7 @@ impl Object for DepthValue {
     }
 }
 
-/// The joints of a person that a detector found; none where there is no detection.
+/// The joints of a person from a pose detector; empty without a detection.
 #[derive(Clone, Debug, Default)]
 pub struct KeypointsValue(pub Keypoints);
 

@@ -1,4 +1,4 @@
-//! People in a photograph as values: a thin layer over [`crate::vision::people`].
+//! The people in a photograph, as values: a thin layer over [`crate::vision::people`].
 
 use super::observed::{KeypointsValue, MaskValue};
 use super::{IMAGE, ImageValue, native};
@@ -10,10 +10,10 @@ use crate::vision::people::{FindOptions, Person, networks};
 use crate::vision::{Mask, Photo};
 use std::sync::Arc;
 
-/// The longer side of the masks of people, in pixels.
+/// The maximum length of the longer side of a person's mask, in pixels.
 const MASK: u32 = 256;
-/// How likely a pose is that some views have in proportion to the one that most agree on,
-/// for each view.
+/// The weight of an alternative pose relative to that on which most views agree, if
+/// equally many views support both; proportional to the number of its views.
 const ELSEWHERE: f64 = 0.05;
 
 pub(super) const TABLE: &[Row] = &[native(
@@ -71,7 +71,7 @@ pub(super) const TABLE: &[Row] = &[native(
     },
 )];
 
-/// The intersection of two boxes as a share of their union.
+/// The intersection of two boxes as a fraction of their union.
 fn shared(a: [f64; 4], b: [f64; 4]) -> f64 {
     let area = |[l, t, r, b]: [f64; 4]| (r - l).max(0.0) * (b - t).max(0.0);
     let both = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
@@ -82,7 +82,7 @@ fn number(x: f64) -> Value {
     Value::Num(x)
 }
 
-/// A person as a record.
+/// Converts a person to a record.
 fn value(p: &Person, photo: &Photo) -> Result<Value, String> {
     let point = |(i, (name, l)): (usize, (&&'static str, &crate::vision::people::Landmark))| {
         let elsewhere = p.others.iter().map(|h| {

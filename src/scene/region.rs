@@ -1,5 +1,6 @@
 //! The likelihood of a photograph's colours given a view: `scene.region`. The arithmetic
-//! is in [`crate::vision::region`]; here the drawn frame becomes a group for each pixel.
+//! is in [`crate::vision::region`]; here the rendered frame is converted to one group per
+//! pixel.
 
 use super::compare::{
     SECTION, SEEN, SIZE, by_silhouette, by_view, drawn, image, likelihood, size, view,
@@ -17,7 +18,7 @@ use crate::vision::{Region, RegionOptions};
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// The most groups beside the background; parts from here on share the last one.
+/// The maximum number of groups besides the background; further parts share the last one.
 const MOST_GROUPS: u16 = 15;
 
 pub(super) const TABLE: &[Row] = &[native(
@@ -97,12 +98,13 @@ thread_local! {
 }
 
 impl RegionOf {
-    /// Whether only the silhouette counts.
+    /// Whether the likelihood depends on the silhouette only.
     fn outline(&self) -> bool {
         self.groups == Groups::Silhouette && self.options.shading == 0.0
     }
 
-    /// The observed colours, ready at the size that is drawn, and what is drawn.
+    /// Returns the observed colours, prepared at the rendered size, and the rendered
+    /// frame.
     fn prepared(&self, observed: &Value) -> Result<(Arc<Region>, Arc<Frame>), String> {
         let image = image(observed, &self.view, self.name())?;
         let Some(photo) = image.as_photo() else {
@@ -120,7 +122,7 @@ impl RegionOf {
         Ok((region, frame))
     }
 
-    /// The group of each pixel.
+    /// Computes the group of each pixel.
     fn fill(&self, frame: &Frame, groups: &mut Vec<u8>) {
         groups.clear();
         match self.groups {
@@ -147,8 +149,9 @@ impl Likelihood for RegionOf {
         }))
     }
 
-    /// Where the options make it a probability of quantised pictures: the observed
-    /// photograph with other numbers of colours in its pixels, at the size that is drawn.
+    /// Only if the options make it a probability of colour-reduced pictures. The result
+    /// is the observed photograph with simulated colours prepared for these options and
+    /// the rendered size.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         if !self.is_proper() {
             return None;
@@ -169,7 +172,7 @@ impl Likelihood for RegionOf {
         Some(self.prepared(observed).and_then(draw))
     }
 
-    /// By the view, where only the silhouette counts.
+    /// With respect to the view, if the likelihood depends on the silhouette only.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (region, frame) = self.prepared(observed).ok().filter(|_| self.outline())?;
         let groups: Vec<u8> = frame.mask().map(u8::from).collect();
@@ -181,7 +184,8 @@ impl Likelihood for RegionOf {
     }
 }
 
-/// The group of a part: one each in their order, as far as there are groups.
+/// The group of a part: one for each part in order, then the last one for the rest; 0 for
+/// the background.
 fn group(part: u16) -> u8 {
     if part == u16::MAX { 0 } else { part.min(MOST_GROUPS - 1) as u8 + 1 }
 }
@@ -207,7 +211,8 @@ mod tests {
         Arc::new(View::new(Solid::new(Arc::new(mesh)).placed(by), Camera::default_for(64, 64)))
     }
 
-    /// A photograph of the vase, its parts in colours of their own and lit from above.
+    /// A photograph of the vase, with a different colour for each part and lit from
+    /// above.
     fn photograph() -> Value {
         let frame = vase(0.0).frame(64);
         let rgb = image::RgbImage::from_fn(64, 64, |x, y| {

@@ -1,4 +1,4 @@
-//! What a host's comparator sees of a scene.
+//! A host comparator's access to a rendered scene.
 
 use super::ViewValue;
 use super::compare::{by_contours, by_silhouette};
@@ -9,8 +9,8 @@ use crate::render::View;
 use std::fmt;
 use std::sync::Arc;
 
-/// A solid before a camera (what `scene.render` gives), drawn when asked and once a size.
-/// `longer` is the longer side of the picture in pixels.
+/// A solid in front of a camera (the result of `scene.render`), rendered on first use and
+/// once per size. `longer` is the longer side of the picture in pixels.
 ///
 /// ```
 /// use pcadlang::host::{Adjoint, Entry, Host, Likelihood, SceneView, Type};
@@ -67,33 +67,33 @@ impl fmt::Debug for SceneView {
 }
 
 impl SceneView {
-    /// The view that argument `i` is.
+    /// Returns argument `i` as a view.
     ///
     /// # Errors
-    /// If it is none.
+    /// If it is not a view.
     pub fn of(a: &Args, i: usize) -> Result<SceneView, Fault> {
         a.object::<ViewValue>(i, "a view").map(|v| SceneView(Arc::clone(&v.0)))
     }
 
-    /// Width and height of its picture.
+    /// Returns the width and height of the picture.
     pub fn size(&self, longer: u32) -> (u32, u32) {
         let camera = self.0.camera().scaled_to(longer);
         (camera.width, camera.height)
     }
 
-    /// Whether each pixel shows the solid, row by row.
+    /// Returns whether each pixel shows the solid, row by row.
     pub fn mask(&self, longer: u32) -> Vec<bool> {
         self.0.frame(longer).mask().collect()
     }
 
-    /// How far away what each pixel shows is, row by row, in scene units; infinite where
-    /// it shows nothing.
+    /// Returns the depth of each pixel, row by row, in scene units; infinite where the
+    /// pixel does not show the solid.
     pub fn depth(&self, longer: u32) -> Vec<f32> {
         self.0.depth(longer).depth.clone()
     }
 
-    /// The pieces of the contours: x, y and length in pixels, and angle in radians, from
-    /// right to down.
+    /// Returns the pieces of the contours: x, y and length in pixels, and the angle in
+    /// radians, measured from right towards down.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Host, SceneView, Type};
@@ -103,7 +103,7 @@ impl SceneView {
     ///     let nearest = scene_view.depth(64).into_iter().fold(f32::INFINITY, f32::min);
     ///     assert!((6.9..7.1).contains(&nearest));
     ///     let pieces = scene_view.contours(64);
-    ///     // The sum of the lengths has derivative 1 by each.
+    ///     // The derivative of the sum of the lengths with respect to each is 1.
     ///     let by_view = scene_view.by_contours(64, &vec![[0.0, 0.0, 1.0, 0.0]; pieces.len()]);
     ///     assert!(!by_view.is_zero());
     ///     Ok(Value::Num(pieces.iter().map(|p| p[2]).sum()))
@@ -124,13 +124,14 @@ impl SceneView {
         (0..c.x.len()).map(piece).collect()
     }
 
-    /// The adjoint of the view, from the derivatives by the pieces of its contours.
+    /// Returns the adjoint of the view, given the derivatives with respect to the pieces
+    /// of its contours.
     pub fn by_contours(&self, longer: u32, by_piece: &[[f64; 4]]) -> Adjoint {
         by_contours(&self.0, longer, by_piece)
     }
 
-    /// The adjoint of the view, from what each pixel brings that the solid covers: the
-    /// outline moves, and takes pixels in.
+    /// Returns the adjoint of the view, given the derivative with respect to the coverage
+    /// of each pixel: the outline moves and covers or uncovers pixels.
     pub fn by_mask(&self, longer: u32, gains: &[f64]) -> Adjoint {
         by_silhouette(&self.0, longer, gains)
     }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 const SECTION: &str = "Seeing";
 
-/// The most that contours may be off, in pixels.
+/// The maximum tolerated error of contours, in pixels.
 const MOST_DETAIL: f64 = 16.0;
 
 pub(super) const TABLE: &[Row] = &[

@@ -1,5 +1,5 @@
-//! How derivatives pass through shapes and placements: from the vertices of surfaces and
-//! named points to sizes and profiles.
+//! Vector-Jacobian products of shapes and placements: from the vertices of surfaces and
+//! landmarks to sizes and profiles.
 
 use super::SolidValue;
 use super::adjoints::{BySolid, shaped};
@@ -12,15 +12,15 @@ use glam::{DMat3, DVec3};
 use smallvec::smallvec;
 use std::sync::Arc;
 
-/// A shape's mesh and the derivatives by its vertices; `None` where nothing depends on
-/// them.
+/// Returns a shape's mesh and the derivatives with respect to its vertices; `None` if
+/// nothing depends on them.
 fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> {
     let solid = &made.downcast::<SolidValue>()?.0;
     let vertices = BySolid::read(by, solid).vertices;
     (!vertices.is_empty()).then_some((&solid.instances().first()?.mesh, vertices))
 }
 
-/// Of `scene.lathe`.
+/// For `scene.lathe`.
 pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let Some((_, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
     let Turned { profiles, sides, wall, caps } = turned(a).ok()?;
@@ -35,7 +35,7 @@ pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints>
     Some(smallvec![parts, Adjoint::Zero, thickness, Adjoint::Zero, floor])
 }
 
-/// In the shape of a profile's record.
+/// Converts to the shape of a profile's record.
 fn profile(v: &Value, by: &Profile) -> Adjoint {
     let Value::Record(fields) = v else { return Adjoint::Zero };
     let one = |(name, v): (&Arc<str>, &Value)| {
@@ -53,20 +53,21 @@ fn profile(v: &Value, by: &Profile) -> Adjoint {
     )
 }
 
-/// Of `scene.sphere`.
+/// For `scene.sphere`.
 pub(super) fn sphere(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let Some((mesh, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
     Some(smallvec![Adjoint::Num(vjp_sphere(a.num(0).ok()?, mesh, &by_vertex))])
 }
 
-/// Of `scene.box`.
+/// For `scene.box`.
 pub(super) fn cuboid(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let Some((mesh, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
     let by_size = vjp_cuboid(vector(a, 0, DVec3::ONE).ok()?, mesh, &by_vertex);
     Some(smallvec![shaped(a.get(0), by_size)])
 }
 
-/// Of `scene.group`: what is one after the other goes to its members.
+/// For `scene.group`: landmarks and vertices are concatenated in the order of the
+/// members.
 pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let (mut landmarks, mut vertices) = (&landmarks[..], &vertices[..]);
@@ -91,7 +92,7 @@ pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints>
     Some(smallvec![Adjoint::List((0..a.get(0).len()?).map(one).collect::<Option<_>>()?)])
 }
 
-/// Of `scene.centred`: the box goes with the vertices at its sides.
+/// For `scene.centred`: the bounding box moves with the vertices on its sides.
 pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let by = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let solid: &Solid = &a.object::<SolidValue>(0, "a solid").ok()?.0;
@@ -100,7 +101,7 @@ pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoint
     Some(smallvec![BySolid { landmarks, vertices }.into_adjoint()])
 }
 
-/// Of `scene.landmarks`.
+/// For `scene.landmarks`.
 pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let own = a.record(1).ok()?.keys().zip(landmarks);
@@ -112,7 +113,7 @@ pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoi
     ])
 }
 
-/// Of `scene.affine`, T Rz Ry Rx S.
+/// For `scene.affine`, T Rz Ry Rx S.
 pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
     let by = by.numbers(12);
@@ -124,7 +125,7 @@ pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     ];
     let rotation = turns[2] * turns[1] * turns[0];
     let by_scale: [f64; 3] = std::array::from_fn(|i| rotation.col(i).dot(linear.col(i)));
-    // By R: the columns of the linear part are those of R times the scale.
+    // With respect to R: the columns of the linear part are those of R times the scale.
     let by_rotation =
         DMat3::from_cols(linear.x_axis * scale.x, linear.y_axis * scale.y, linear.z_axis * scale.z);
     let by_turn: [f64; 3] = std::array::from_fn(|i| {

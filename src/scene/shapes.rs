@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
 
-/// The most meshes of a group.
+/// The maximum number of meshes in a group.
 const MOST_MESHES: usize = 100_000;
 
 pub(super) const TABLE: &[Row] = &[
@@ -163,7 +163,7 @@ fn solid(solid: Solid) -> Value {
     Value::object(SolidValue(solid))
 }
 
-/// Three numbers, or one for all; a default where left out.
+/// Reads three numbers, or one for all three, or returns a default.
 pub(super) fn vector(a: &Args, i: usize, default: DVec3) -> Result<DVec3, Fault> {
     match a.get(i) {
         Value::Unit => Ok(default),
@@ -175,7 +175,7 @@ pub(super) fn vector(a: &Args, i: usize, default: DVec3) -> Result<DVec3, Fault>
     }
 }
 
-/// Three numbers, one for all three, or a record of x, y and z.
+/// Reads three numbers, one for all three, or a record of x, y and z.
 pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
     match v {
         Value::Num(x) => Some(DVec3::splat(*x)),
@@ -191,7 +191,7 @@ pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
     }
 }
 
-/// What `lathe` is asked for.
+/// The arguments of `lathe`.
 pub(super) struct Turned {
     pub profiles: Vec<Profile>,
     pub sides: u32,
@@ -212,7 +212,7 @@ pub(super) fn turned(a: &Args) -> Result<Turned, Fault> {
     Ok(Turned { profiles, sides, wall, caps })
 }
 
-/// One profile or an array of them.
+/// Reads one profile or an array of them.
 fn profiles(a: &Args) -> Result<Vec<Profile>, Fault> {
     let wanted = "profiles such as { y: [0, 1], r: [0.5, 0.4] }";
     let one = |v: &Value| {

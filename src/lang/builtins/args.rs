@@ -1,4 +1,4 @@
-//! Reading the arguments of a built-in, with errors that name the argument.
+//! Access to the arguments of a built-in, with errors that name the argument.
 
 use super::Builtin;
 use super::elementwise::truth;
@@ -7,19 +7,19 @@ use crate::lang::value::{MOST_ELEMENTS, Object, Record, Value};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// The arguments of one call, in the table's order; `nothing` stands for those left out.
+/// The arguments of one call, in the table's order; omitted ones are `nothing`.
 pub struct Args<'a> {
-    /// The built-in called.
+    /// The called built-in.
     pub builtin: &'a Builtin,
     /// The values.
     pub values: &'a [&'a Value],
 }
 
-/// Numbers, borrowed where they can be.
+/// Numbers, borrowed if the value is already an array of numbers.
 type Numbers<'a> = Cow<'a, [f64]>;
 
 impl<'a> Args<'a> {
-    /// Argument `i`.
+    /// Returns argument `i`, or the table's default if it is omitted.
     pub fn get(&self, i: usize) -> &'a Value {
         match self.values.get(i) {
             Some(v) if !matches!(v, Value::Unit) => v,
@@ -27,7 +27,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// Whether argument `i` was given.
+    /// Whether argument `i` has a value, from the call or from the table's default.
     pub fn given(&self, i: usize) -> bool {
         !matches!(self.get(i), Value::Unit)
     }
@@ -36,7 +36,7 @@ impl<'a> Args<'a> {
         self.builtin.args.get(i).or(self.builtin.args.last()).map_or("argument", |a| &a.name)
     }
 
-    /// The error that argument `i` is not what was wanted.
+    /// The error that argument `i` does not have the required type.
     pub fn wrong(&self, i: usize, wanted: &str) -> Fault {
         let got = described(self.get(i));
         Fault::type_error(format!(
@@ -46,8 +46,7 @@ impl<'a> Args<'a> {
         ))
     }
 
-    /// The error that argument `i` is an array with something in it that does not belong
-    /// there.
+    /// The error that argument `i` is an array with an unsuitable element.
     pub fn element_wrong(&self, i: usize, wanted: &str, found: &Value) -> Fault {
         let (name, got) = (self.builtin.full_name(), described(found));
         Fault::type_error(format!(
@@ -68,7 +67,7 @@ impl<'a> Args<'a> {
         Fault::domain(format!("{name}: `{}` must be {rule}, got {got}", self.name(i)))
     }
 
-    /// A number.
+    /// Reads a number.
     pub fn num(&self, i: usize) -> Result<f64, Fault> {
         match self.get(i) {
             Value::Num(x) => Ok(*x),
@@ -76,18 +75,18 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// A number, or a default.
+    /// Reads a number, or returns a default.
     pub fn num_or(&self, i: usize, default: f64) -> Result<f64, Fault> {
         if self.given(i) { self.num(i) } else { Ok(default) }
     }
 
-    /// A positive, finite number, or a default.
+    /// Reads a positive, finite number, or returns a default.
     pub fn positive_or(&self, i: usize, default: f64) -> Result<f64, Fault> {
         let x = self.num_or(i, default)?;
         if x > 0.0 && x.is_finite() { Ok(x) } else { Err(self.outside(i, "positive and finite")) }
     }
 
-    /// A whole number within bounds.
+    /// Reads a whole number within bounds.
     pub fn int_in(&self, i: usize, lo: i64, hi: i64) -> Result<i64, Fault> {
         let x = self.num(i)?;
         if x == libm::trunc(x) && x >= lo as f64 && x <= hi as f64 {
@@ -99,7 +98,7 @@ impl<'a> Args<'a> {
         })
     }
 
-    /// A truth value, or a default.
+    /// Reads a truth value, or returns a default.
     pub fn bool_or(&self, i: usize, default: bool) -> Result<bool, Fault> {
         match self.get(i) {
             Value::Unit => Ok(default),
@@ -108,7 +107,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// A string.
+    /// Reads a string.
     pub fn str(&self, i: usize) -> Result<&'a str, Fault> {
         match self.get(i) {
             Value::Str(s) => Ok(s),
@@ -116,7 +115,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// A string among some, or the first of them.
+    /// Reads a string that must be one of `options`; the first of them if it is omitted.
     pub fn choice<'b>(&self, i: usize, options: &'b [&'b str]) -> Result<&'b str, Fault> {
         if !self.given(i) {
             return Ok(options.first().copied().unwrap_or_default());
@@ -131,7 +130,7 @@ impl<'a> Args<'a> {
         })
     }
 
-    /// An array of numbers.
+    /// Reads an array of numbers.
     pub fn array(&self, i: usize) -> Result<Arc<[f64]>, Fault> {
         match self.get(i) {
             Value::Array(xs) => Ok(Arc::clone(xs)),
@@ -140,7 +139,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// An array of numbers or bools, which count 0 and 1.
+    /// Reads an array of numbers or bools, which count as 0 and 1.
     pub fn numbers(&self, i: usize) -> Result<Cow<'a, [f64]>, Fault> {
         match self.get(i) {
             Value::Array(xs) => Ok(Cow::Borrowed(xs)),
@@ -154,7 +153,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// An array of at least so many numbers.
+    /// Reads an array of at least `least` numbers.
     pub fn numbers_from(&self, i: usize, least: usize) -> Result<Cow<'a, [f64]>, Fault> {
         let xs = self.numbers(i)?;
         if xs.len() >= least {
@@ -164,7 +163,7 @@ impl<'a> Args<'a> {
         Err(self.wrong_length(i, &format!("at least {least} element{plural}")))
     }
 
-    /// Two arrays of numbers of equal length.
+    /// Reads two arrays of numbers of equal length.
     pub fn number_pair(&self, i: usize, j: usize) -> Result<(Numbers<'a>, Numbers<'a>), Fault> {
         let (x, y) = (self.numbers(i)?, self.numbers(j)?);
         if x.len() == y.len() {
@@ -173,18 +172,18 @@ impl<'a> Args<'a> {
         Err(self.wrong_length(j, &format!("as many elements as `{}`, {}", self.name(i), x.len())))
     }
 
-    /// The number of elements of an array to be made.
+    /// Reads the number of elements of an array to create.
     pub fn count(&self, i: usize) -> Result<usize, Fault> {
         let n = self.int_in(i, 0, i64::MAX)? as usize;
         if n <= MOST_ELEMENTS { Ok(n) } else { Err(self.too_many(n as f64)) }
     }
 
-    /// Checks the number of elements of what is to be made.
+    /// Checks the number of elements of a result.
     pub fn fits(&self, n: usize) -> Result<(), Fault> {
         if n <= MOST_ELEMENTS { Ok(()) } else { Err(self.too_many(n as f64)) }
     }
 
-    /// The error that a distribution has too much in it.
+    /// The error that a distribution has too many parts or is nested too deeply.
     #[doc(hidden)]
     pub fn too_large(&self, what: &str, most: usize) -> Fault {
         Fault::new(
@@ -201,7 +200,8 @@ impl<'a> Args<'a> {
             .with_hint(format!("at most {MOST_ELEMENTS} can be made in one call"))
     }
 
-    /// A vector of exactly three numbers, or one number for all three, or a default.
+    /// Reads a vector of three numbers, or one number for all three, or returns a
+    /// default.
     pub fn vec3_or(&self, i: usize, default: [f64; 3]) -> Result<[f64; 3], Fault> {
         match self.get(i) {
             Value::Unit => Ok(default),
@@ -211,7 +211,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// The elements of any array.
+    /// Reads the elements of an array of any type.
     pub fn elements(&self, i: usize) -> Result<Cow<'a, [Value]>, Fault> {
         match self.get(i) {
             Value::List(xs) => Ok(Cow::Borrowed(xs)),
@@ -220,7 +220,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// A record.
+    /// Reads a record.
     pub fn record(&self, i: usize) -> Result<&'a Record, Fault> {
         match self.get(i) {
             Value::Record(r) => Ok(r),
@@ -228,13 +228,13 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// An object of type `T`; `wanted` says what in words.
+    /// Reads an object of type `T`; `wanted` describes it in messages.
     pub fn object<T: Object>(&self, i: usize, wanted: &str) -> Result<&'a T, Fault> {
         self.get(i).downcast::<T>().ok_or_else(|| self.wrong(i, wanted))
     }
 }
 
-/// What a value is, with the value itself where it is short.
+/// Describes a value by its type, and by the value itself if it is short.
 fn described(v: &Value) -> String {
     match v {
         Value::Num(_) | Value::Bool(_) => format!("{} ({v})", v.type_name()),

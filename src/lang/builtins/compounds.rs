@@ -1,4 +1,4 @@
-//! Distributions made of others, read from values.
+//! Distributions composed of other distributions.
 
 use super::Args;
 use super::distributions::{UNBOUNDED, fault};
@@ -8,7 +8,7 @@ use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::sync::Arc;
 
-/// An array of distributions.
+/// Reads an array of distributions.
 fn distributions(a: &Args, i: usize) -> Result<Vec<Dist>, Fault> {
     let component = |v: &Value| match v {
         Value::Dist(d) => Ok(Dist::clone(d)),
@@ -17,7 +17,7 @@ fn distributions(a: &Args, i: usize) -> Result<Vec<Dist>, Fault> {
     a.elements(i)?.iter().map(component).collect()
 }
 
-/// So many numbers of one distribution, or one of each, in order.
+/// `n` numbers of a single distribution, or one of each in an array, in ascending order.
 pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
     let made = match a.get(0) {
         Value::Dist(d) if a.given(1) => dist::Ordered::new(Dist::clone(d), a.count(1)?),
@@ -36,7 +36,7 @@ pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
     made.map(|d| Dist::Ordered(Arc::new(d))).map_err(fault)
 }
 
-/// A distribution between bounds, element by element where a bound is an array.
+/// A distribution truncated to an interval, element by element if a bound is an array.
 pub(super) fn truncated(a: &Args) -> Result<Dist, Fault> {
     let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
     let mut columns: [Option<Arc<[f64]>>; 2] = [None, None];
@@ -66,7 +66,7 @@ pub(super) fn truncated(a: &Args) -> Result<Dist, Fault> {
     dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
 }
 
-/// One of several, by weights.
+/// A weighted mixture of distributions.
 pub(super) fn mixture(a: &Args) -> Result<Dist, Fault> {
     let components = distributions(a, 1)?;
     dist::Mixture::new(&a.array(0)?, components).map(|d| Dist::Mixture(Arc::new(d))).map_err(fault)

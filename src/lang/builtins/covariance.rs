@@ -1,4 +1,4 @@
-//! Covariance functions of Gaussian processes, as values: `sq_exp(0.5) + white(0.01)`.
+//! Covariance functions of Gaussian processes as values: `sq_exp(0.5) + white(0.01)`.
 
 use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, opt};
 use crate::dist::{Covariance, ParamError};
@@ -9,7 +9,7 @@ use std::any::Any;
 
 const SECTION: &str = "Covariances";
 
-/// The most parameters of a covariance function.
+/// The maximum number of parameters of a covariance function.
 const MOST_PARAMS: usize = 200;
 
 /// A covariance function.
@@ -36,7 +36,7 @@ impl Object for CovarianceValue {
 }
 
 impl CovarianceValue {
-    /// The adjoints of both sides of a sum or product.
+    /// Splits the adjoint of a sum or product between its two sides.
     pub(super) fn vjp_both(x: &Value, y: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
         let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
         let (left, right) = (x.0.param_count(), y.0.param_count());
@@ -44,7 +44,7 @@ impl CovarianceValue {
         Some([Adjoint::Array(all[..left].to_vec()), Adjoint::Array(all[left..].to_vec())])
     }
 
-    /// The sum of two covariance functions, if `x` and `y` are such.
+    /// Returns the sum of two covariance functions; `None` if `x` or `y` is not one.
     pub(super) fn sum(x: &Value, y: &Value) -> Option<Result<Value, String>> {
         let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
         Some(Self::joined(&x.0, &y.0, |x, y| x + y))
@@ -111,7 +111,7 @@ pub(super) const TABLE: &[Row] = &[
     ),
 ];
 
-/// The adjoint of a covariance has a number for each parameter, in the order of the
+/// The adjoint of a covariance has one number per parameter, in the order of the
 /// arguments.
 fn vjp_params(a: &Args, y: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let n = y.downcast::<CovarianceValue>()?.0.param_count();

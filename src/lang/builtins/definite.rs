@@ -1,8 +1,8 @@
 //! Symmetric positive definite matrices: Cholesky factors, linear systems, determinants,
 //! and their derivatives.
 //!
-//! Only the lower triangle is computed with. Derivatives by a matrix are symmetric: an
-//! entry off the diagonal shares them with its mirror image.
+//! Values are computed from the lower triangle only. The adjoint of a matrix is
+//! symmetric: an off-diagonal entry shares its derivative equally with its mirror image.
 
 use super::elementwise::array;
 use super::matrix::Matrix;
@@ -15,7 +15,8 @@ use smallvec::smallvec;
 
 const SECTION: &str = "Matrices";
 
-/// How much an entry and its mirror image may differ, as a share of the largest entry.
+/// The maximum difference between an entry and its mirror image, as a fraction of the
+/// largest entry.
 const ASYMMETRY: f64 = 1e-8;
 
 const M: Arg = arg("m", Type::Array, "A symmetric positive definite matrix, such as a covariance.");
@@ -38,7 +39,7 @@ pub(super) const TABLE: &[Row] = &[
         let n = l.size();
         let by: Vec<f64> = (0..n).flat_map(|i| by.element(i).numbers(n).into_iter().take(i + 1)).collect();
         let by = l.vjp_cholesky(&by);
-        // What lies off the diagonal stands for both of its places.
+        // A packed off-diagonal entry stands for both of its positions in the matrix.
         let entry = |i: usize, j: usize| if i == j { by[packed(i, i)] } else { 0.5 * by[packed(i.max(j), i.min(j))] };
         Some(smallvec![symmetric(n, entry)])
     }),
@@ -70,7 +71,8 @@ pub(super) const TABLE: &[Row] = &[
                 v => (0..n).filter_map(|i| numbers(&v.element(i)?).get(j).copied()).collect(),
             }
         };
-        // By b it is m^-1 by, by m the negative of that times x'.
+        // The adjoint of b is m^-1 times that of x; the adjoint of m is minus that times
+        // x'.
         let by_b: Vec<Vec<f64>> = (0..width)
             .map(|j| match vector {
                 true => l.solve(&by.numbers(n)),
@@ -106,12 +108,12 @@ pub(super) const TABLE: &[Row] = &[
     }),
 ];
 
-/// Where an entry of the lower triangle is among those packed by rows.
+/// The index of an entry of the lower triangle, packed by rows.
 fn packed(i: usize, j: usize) -> usize {
     i * (i + 1) / 2 + j
 }
 
-/// The Cholesky factor of the first argument.
+/// Computes the Cholesky factor of the first argument, after checking it.
 fn read(a: &Args) -> Result<Factor, Fault> {
     let m = Matrix::read(a, 0)?;
     let (name, n) = (a.builtin.full_name(), m.rows.len());
@@ -150,14 +152,14 @@ fn read(a: &Args) -> Result<Factor, Fault> {
     })
 }
 
-/// The mean of a matrix and its mirror image, as an adjoint.
+/// The mean of a matrix and its transpose, as an adjoint.
 fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> Adjoint {
     let row =
         |i: usize| Adjoint::Array((0..n).map(|j| 0.5 * (entry(i, j) + entry(j, i))).collect());
     Adjoint::List((0..n).map(row).collect())
 }
 
-/// The columns of the second argument, each with so many numbers.
+/// Returns the columns of the second argument, each of length `n`.
 fn right_side(a: &Args, n: usize) -> Result<Vec<Vec<f64>>, Fault> {
     let wrong = |rows: usize| {
         Fault::type_error(format!("solve: `b` must have as many rows as `m`, {n}, got {rows}"))

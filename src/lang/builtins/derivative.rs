@@ -1,5 +1,5 @@
-//! How built-ins pass derivatives back: vector-Jacobian products of functions of numbers,
-//! element by element and otherwise.
+//! Reverse-mode derivatives of built-ins: vector-Jacobian products of functions of
+//! numbers, element by element or not.
 
 use super::Args;
 use super::elementwise::{array_len, part};
@@ -8,57 +8,58 @@ use crate::lang::value::Value;
 use crate::num::Column;
 use smallvec::{SmallVec, smallvec};
 
-/// The adjoints of a call's arguments, in order; those left out at the end are zero.
+/// The adjoints of a call's arguments, in order; omitted trailing ones are zero.
 pub type ArgAdjoints = SmallVec<[Adjoint; 4]>;
 
-/// From the arguments, the result and its adjoint to the adjoints of the arguments;
-/// `None` where nobody knows them.
+/// Maps the arguments, the result and its adjoint to the adjoints of the arguments;
+/// `None` where they are unknown.
 pub type Vjp = fn(&Args, &Value, &Adjoint) -> Option<ArgAdjoints>;
 
 /// The derivative of a function.
 #[derive(Clone, Copy, Debug)]
 pub enum Derivative {
-    /// Not known.
+    /// Unknown.
     Unknown,
-    /// Zero wherever there is one: comparing, counting, rounding, and what has no numbers
-    /// in it.
+    /// Zero wherever it exists: comparing, counting, rounding, and results without
+    /// numbers.
     Zero,
     /// Its vector-Jacobian product.
     Product(Vjp),
-    /// dy/dx of a function of one number, element by element: of x and y.
+    /// dy/dx, as a function of x and y, of a function of one number applied element by
+    /// element.
     Unary(fn(f64, f64) -> f64),
-    /// That of a function of two numbers, element by element.
+    /// The partial derivatives of a function of two numbers, applied element by element.
     Binary(&'static Binary),
-    /// That of a function of an array that gives one number.
+    /// The derivatives of a function of an array with a single number as its result.
     Reduction(&'static Reduction),
 }
 
-/// A function of two numbers, also in loops over numbers in a buffer (see `of_pairs`).
+/// A function of two numbers, with loops over numbers in a buffer (see `of_pairs`).
 #[derive(Debug)]
 pub struct Binary {
-    /// dz/dx and dz/dy, of x, y and z.
+    /// dz/dx and dz/dy, as functions of x, y and z.
     pub slopes: fn(f64, f64, f64) -> [f64; 2],
-    /// Of a buffer, both arguments, where the results begin and how many there are: fills
-    /// in the results.
+    /// Computes results in a buffer: the arguments are the buffer, the columns of x and
+    /// y, and the index and number of the results.
     pub forward: fn(&mut [f64], Column, Column, usize, usize),
-    /// Of a buffer, adjoints in the same places, and the rest as above: adds to the
-    /// adjoints of the arguments.
+    /// Adds to the adjoints of the arguments: takes the buffer, the adjoints at the same
+    /// indices, and the rest as for `forward`.
     pub reverse: fn(&[f64], &mut [f64], Column, Column, usize, usize),
-    /// The product where the result is an object.
+    /// The vector-Jacobian product for results that are objects.
     pub objects: Option<Vjp>,
 }
 
-/// A function of an array that gives one number.
+/// A function of an array with a single number as its result.
 #[derive(Debug)]
 pub struct Reduction {
     /// The function.
     pub value: fn(&[f64]) -> f64,
-    /// Its partial derivatives, of the array and the result: one for each element.
+    /// Writes its partial derivatives, one per element, given the array and the result.
     pub slopes: fn(&[f64], f64, &mut [f64]),
 }
 
 impl Derivative {
-    /// The adjoints of the arguments of a call with this result.
+    /// Returns the adjoints of the arguments of a call, given its result and its adjoint.
     pub fn vjp(&self, a: &Args, value: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
         match (self, value) {
             (Derivative::Unknown, _) => None,
@@ -74,8 +75,9 @@ impl Derivative {
     }
 }
 
-/// A row of a function of two numbers with its slopes, of x, y and z: loops made for
-/// them, so that arithmetic runs over buffers without calls.
+/// The row of a function of two numbers, given its slopes as a function of x, y and z.
+/// Its loops are monomorphised, so that arithmetic runs over buffers without indirect
+/// calls.
 macro_rules! of_pairs {
     ($row:expr, $f:expr, $slopes:expr) => {
         of_pairs!($row, $f, $slopes, None)
@@ -95,7 +97,7 @@ macro_rules! of_pairs {
 }
 pub(super) use of_pairs;
 
-/// Fills in the results of a function of two columns that lie before them in a buffer.
+/// Computes a function of two columns. The results start at `out`, behind both columns.
 #[inline(always)]
 pub(super) fn each_pair(
     v: &mut [f64],
@@ -124,7 +126,7 @@ pub(super) fn each_pair(
     }
 }
 
-/// Adds to the adjoints of both columns.
+/// Adds to the adjoints of both columns, if they are live.
 #[inline(always)]
 pub(super) fn vjp_pairs(
     v: &[f64],
@@ -147,13 +149,13 @@ pub(super) fn vjp_pairs(
     }
 }
 
-/// A product in which nothing stays nothing: an infinite slope of something that does not
-/// matter is 0.
+/// The product, but 0 if `by` is 0: an infinite slope does not matter where the adjoint
+/// is zero.
 pub(crate) fn times(by: f64, slope: f64) -> f64 {
     if by == 0.0 { 0.0 } else { by * slope }
 }
 
-/// Element `i` of an array of numbers; a number stands for every element.
+/// Returns element `i` of an array of numbers; a number is broadcast.
 fn number(v: &Value, i: usize) -> Option<f64> {
     match v {
         Value::Num(x) => Some(*x),
@@ -162,7 +164,8 @@ fn number(v: &Value, i: usize) -> Option<f64> {
     }
 }
 
-/// A function of one number, element by element: `slope(x, y)` is dy/dx.
+/// The vector-Jacobian product of a function of one number, element by element:
+/// `slope(x, y)` is dy/dx.
 fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<ArgAdjoints> {
     fn go(x: &Value, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Adjoint> {
         Some(match (x, y, by) {
@@ -183,8 +186,8 @@ fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Optio
     Some(smallvec![go(a.get(0), y, by, slope)?])
 }
 
-/// A function of two numbers, element by element as [`super::elementwise::broadcast`]
-/// pairs them: `slopes(x, y, z)` are dz/dx and dz/dy.
+/// The vector-Jacobian product of a function of two numbers, paired as by
+/// [`super::elementwise::broadcast`]: `slopes(x, y, z)` are dz/dx and dz/dy.
 pub(super) fn binary(
     x: &Value,
     y: &Value,
@@ -233,7 +236,7 @@ pub(super) fn binary(
     }
 }
 
-/// The same for a call with two arguments.
+/// [`binary`] for a call with two arguments.
 fn of_two(
     a: &Args,
     z: &Value,
@@ -243,7 +246,8 @@ fn of_two(
     binary(a.get(0), a.get(1), z, by, slopes).map(|both| both.into_iter().collect())
 }
 
-/// A function of an array that gives one number.
+/// The vector-Jacobian product of a function of an array with a single number as its
+/// result.
 fn reduction(
     a: &Args,
     y: &Value,
@@ -259,9 +263,9 @@ fn reduction(
     Some(smallvec![Adjoint::Array(all)])
 }
 
-/// A function of several numbers that gives one of them, element by element (`min`,
-/// `max`, `clamp`, `select`): the derivative goes to the first of `order` that is equal
-/// to it.
+/// The vector-Jacobian product of a function whose result is one of its arguments,
+/// element by element (`min`, `max`, `clamp`): the adjoint goes to the first argument in
+/// `order` that is equal to the result.
 pub(super) fn one_of(
     values: &[&Value],
     order: &[usize],

@@ -1,9 +1,9 @@
-//! The distributions: one built-in per family of [`crate::dist`], which computes and
-//! documents them.
+//! The distributions: one built-in per family of [`crate::dist`], which implements and
+//! documents it.
 //!
-//! Here parameters are read from values. A parameter that is an array makes a product of
-//! independent elements, with an address each. A parameter outside its domain is a
-//! recoverable fault: a proposal that leads there is rejected.
+//! This module reads the parameters from values. An array as a parameter makes a product
+//! of independent elements, each with its own address. A parameter outside its domain is
+//! a recoverable fault: a proposal that leads to it is rejected.
 
 use super::compounds::{mixture, ordered, truncated};
 use super::covariance::CovarianceValue;
@@ -19,7 +19,8 @@ use std::sync::Arc;
 
 const SECTION: &str = "Distributions";
 
-/// The row of a family whose parameters are all numbers, documented by `dist`.
+/// The row of a family whose parameters are all numbers, with the documentation in
+/// `dist`.
 macro_rules! scalar {
     ($name:literal, [$($p:ident),+], $made:expr) => {
         other(
@@ -252,10 +253,10 @@ pub(super) const TABLE: &[Row] = &[
     ),
 ];
 
-/// The bounds of all numbers.
+/// The bounds of the whole real line.
 pub(super) const UNBOUNDED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// What the reference says of a family besides its arguments.
+/// The support and density of a family, for the reference.
 pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
     let found = FAMILIES.iter().find(|f| f.name == name);
     found.map_or(Vec::new(), |f| {
@@ -263,7 +264,7 @@ pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
     })
 }
 
-/// A parameter outside its domain, with a hint where there is one.
+/// The fault of a parameter outside its domain, with a hint if there is one.
 pub(super) fn fault(e: ParamError) -> Fault {
     let fault = Fault::domain(e.to_string());
     match e.rule {
@@ -275,8 +276,8 @@ pub(super) fn fault(e: ParamError) -> Fault {
     }
 }
 
-/// A distribution of a number, or a product of such when a parameter is an array.
-/// Parameters left out have the defaults.
+/// A distribution of a number, or a product of them if a parameter is an array. Omitted
+/// parameters take their defaults.
 fn elementwise<const N: usize>(
     a: &Args,
     defaults: &[f64],
@@ -300,7 +301,7 @@ fn product<const N: usize>(
 ) -> Result<Dist, Fault> {
     let mut parameters = [0.0; N];
     let mut columns: [Option<Arc<[f64]>>; N] = [const { None }; N];
-    // The first array, and its length.
+    // The argument index of the first array, and its length.
     let mut first: Option<(usize, usize)> = None;
     for i in 0..N {
         match a.get(i) {
@@ -329,7 +330,8 @@ fn product<const N: usize>(
             }
         }
         let made = match (elements.last(), &parameters[..]) {
-            // All are of one family; a deviation that stays needs no other logarithm.
+            // All elements are of one family; an equal standard deviation reuses the
+            // logarithm.
             (Some(Dist::Normal(d)), [mean, sd]) => d.near(*mean, *sd).map(Dist::Normal),
             _ => make(parameters),
         };
@@ -338,16 +340,16 @@ fn product<const N: usize>(
     dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
 }
 
-/// The most multivariate normals that a thread remembers.
+/// The maximum number of multivariate normals cached per thread.
 const REMEMBERED: usize = 64;
 
 thread_local! {
-    /// By mean and matrix, the very same arrays: factors take long, and a trace asks for
-    /// the same ones again and again.
+    /// Recent multivariate normals, by the identity of the arrays for mean and matrix: a
+    /// factorisation is expensive, and a trace requests the same ones repeatedly.
     static NORMALS: RefCell<VecDeque<([Value; 3], bool, Dist)>> = const { RefCell::new(VecDeque::new()) };
 }
 
-/// Whether two values are the same array, not only equal ones.
+/// Whether two values are the same array in memory, not merely equal.
 fn is_same_array(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Array(a), Value::Array(b)) => Arc::ptr_eq(a, b),
@@ -393,7 +395,7 @@ fn wishart(a: &Args) -> Result<Dist, Fault> {
     dist::Wishart::new(a.num(0)?, &scale).map(|d| Dist::Wishart(Arc::new(d))).map_err(fault)
 }
 
-/// A square matrix as large as the mean.
+/// Reads a square matrix of size `n`, the length of the mean.
 fn square(a: &Args, i: usize, n: usize) -> Result<nalgebra::DMatrix<f64>, Fault> {
     let m = Matrix::read(a, i)?;
     if m.rows.len() != n || m.width != n {
@@ -424,7 +426,7 @@ fn gp(a: &Args) -> Result<Dist, Fault> {
         .map_err(fault)
 }
 
-/// The family of a name, found while compiling.
+/// Finds a family by name at compile time.
 const fn family(name: &str) -> &'static Family {
     let mut i = 0;
     while i < FAMILIES.len() {

@@ -1,13 +1,13 @@
-//! The language reference, made from the table of built-ins: one entry for
-//! `pcadlang doc`, and the whole as Markdown.
+//! The language reference, generated from the table of built-ins: single entries for
+//! `pcadlang doc`, and all of it as Markdown.
 
 use super::examples::INCLUDE;
 use super::{Argument, Builtin, Kind, Table, Type};
 use crate::syntax::{Place, STATEMENTS, Statement};
 use std::fmt::Write;
 
-/// The entry of a built-in, constant or statement as plain text: `normal`, `scene.lathe`,
-/// or `lathe` where that is clear, `observe`.
+/// Returns the plain-text entry of a built-in, constant or statement: `normal`,
+/// `scene.lathe`, `observe`, or `lathe` without its module.
 pub fn doc(table: &Table, name: &str) -> Option<String> {
     if let Some(c) = table.constants().iter().find(|c| c.name == name) {
         return Some(format!("{} = {}\n\n{}\n", c.name, c.value, c.doc));
@@ -22,7 +22,7 @@ pub fn doc(table: &Table, name: &str) -> Option<String> {
     (!texts.is_empty()).then(|| texts.join("\n"))
 }
 
-/// What `doc` says of a statement.
+/// The entry of a statement.
 fn statement(s: &Statement) -> String {
     let forms: Vec<&str> = s.forms().collect();
     let place = match s.place {
@@ -33,7 +33,7 @@ fn statement(s: &Statement) -> String {
     format!("{}\n\n{}\n\n{place}Example:\n\n  {}\n", forms.join("\n"), s.doc, s.example)
 }
 
-/// What `doc` says of one built-in.
+/// The entry of a built-in.
 fn entry(b: &Builtin) -> String {
     let mut s = b.signature();
     if let Some(what) = gives(b) {
@@ -50,8 +50,8 @@ fn entry(b: &Builtin) -> String {
     for (what, text) in notes(b) {
         let _ = write!(s, "\n{what}: {text}\n");
     }
-    if let Some(example) = b.example.as_deref() {
-        // An expression is no program yet.
+    if let Some(example) = b.example . as_deref () {
+        // Only programs, which contain `;`, need the include line; expressions do not.
         let include = if example.contains("scene.") && example.contains(';') {
             format!("  {INCLUDE}\n")
         } else {
@@ -62,12 +62,12 @@ fn entry(b: &Builtin) -> String {
     s
 }
 
-/// The lines of a text, further in.
+/// Indents the lines of a text.
 fn indented(text: &str, by: &str) -> String {
     text.lines().map(|line| format!("{by}{line}\n")).collect()
 }
 
-/// The reference of every built-in, by section, as Markdown.
+/// Returns the reference of all built-ins by section, as Markdown.
 pub fn reference(table: &Table) -> String {
     let mut s = String::new();
     let _ = write!(s, "## Statements\n\n");
@@ -99,7 +99,7 @@ pub fn reference(table: &Table) -> String {
             for (what, text) in notes(b) {
                 let _ = writeln!(s, "  - *{what}*: {text}");
             }
-            if let Some(example) = b.example.as_deref() {
+            if let Some(example) = b.example . as_deref () {
                 let _ = writeln!(s, "  ```pcad\n{}  ```", indented(example, "  "));
             }
         }
@@ -107,7 +107,7 @@ pub fn reference(table: &Table) -> String {
     s
 }
 
-/// What a call is worth saying to give.
+/// The type of the result, unless it is `any`.
 fn gives(b: &Builtin) -> Option<String> {
     match b.returns {
         Type::Any => None,
@@ -115,7 +115,7 @@ fn gives(b: &Builtin) -> Option<String> {
     }
 }
 
-/// Type, unit and default of an argument, as "number, radians, default 0."
+/// The type, unit and default of an argument, such as "number, radians, default 0."
 fn traits(a: &Argument) -> String {
     let mut s = a.ty.to_string();
     if !a.unit.is_empty() {
@@ -128,7 +128,7 @@ fn traits(a: &Argument) -> String {
     s
 }
 
-/// What else there is to say.
+/// Further notes: availability, support and density.
 fn notes(b: &Builtin) -> Vec<(&'static str, String)> {
     let mut notes = Vec::new();
     if b.is_planned() {

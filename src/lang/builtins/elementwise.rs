@@ -1,15 +1,14 @@
-//! Functions of single numbers applied to arrays element by element, and arrays of arrays
-//! through and through.
+//! Functions of scalars, applied element by element to arrays and nested arrays.
 //!
-//! The rule: two arrays need equal lengths; anything else is paired with every element.
-//! Plain numbers come first because nearly every call in a model has them.
+//! Two arrays must have equal lengths; any other value is paired with every element.
+//! Plain numbers are handled first because nearly every call in a model has them.
 
 use super::{Args, Scalar};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::sync::Arc;
 
-/// The function that the table has for single numbers, on numbers and arrays of them.
+/// Applies the table's scalar function to numbers and arrays of numbers.
 pub(super) fn mapped(a: &Args) -> Result<Value, Fault> {
     match a.builtin.scalar {
         Some(Scalar::Unary(f)) => unary(a, f),
@@ -17,7 +16,7 @@ pub(super) fn mapped(a: &Args) -> Result<Value, Fault> {
     }
 }
 
-/// The function of two numbers that the table has.
+/// Returns the table's function of two numbers.
 pub(super) fn of_two(a: &Args) -> fn(f64, f64) -> f64 {
     match a.builtin.scalar {
         Some(Scalar::Binary(f)) => f,
@@ -25,7 +24,7 @@ pub(super) fn of_two(a: &Args) -> fn(f64, f64) -> f64 {
     }
 }
 
-/// A function of one number.
+/// Applies a function of one number.
 pub(super) fn unary(a: &Args, f: fn(f64) -> f64) -> Result<Value, Fault> {
     fn go(a: &Args, v: &Value, f: fn(f64) -> f64) -> Result<Value, Fault> {
         match v {
@@ -42,7 +41,7 @@ pub(super) fn unary(a: &Args, f: fn(f64) -> f64) -> Result<Value, Fault> {
     go(a, a.get(0), f)
 }
 
-/// A function of two numbers.
+/// Applies a function of two numbers.
 pub(super) fn binary(a: &Args, f: fn(f64, f64) -> f64) -> Result<Value, Fault> {
     numeric(a, a.get(0), a.get(1), f, &|x, y| match x {
         Value::Num(_) => Err(not_a_number(a, 1, y)),
@@ -50,8 +49,8 @@ pub(super) fn binary(a: &Args, f: fn(f64, f64) -> f64) -> Result<Value, Fault> {
     })
 }
 
-/// A function of two numbers or arrays of them; `other` takes pairs of which one is
-/// neither.
+/// Applies a function of two numbers to numbers or arrays; `other` handles pairs in which
+/// one value is neither.
 pub(super) fn numeric(
     a: &Args,
     x: &Value,
@@ -77,10 +76,10 @@ pub(super) fn numeric(
     }
 }
 
-/// What [`broadcast`] does with two values of which neither is an array.
+/// The operation of [`broadcast`] on two values that are not arrays.
 pub(super) type Pairing<'a> = &'a dyn Fn(&Value, &Value) -> Result<Value, Fault>;
 
-/// Pairs the elements of two values, down to those that are no arrays.
+/// Pairs the elements of two values recursively, down to values that are not arrays.
 pub(super) fn broadcast(a: &Args, x: &Value, y: &Value, f: Pairing<'_>) -> Result<Value, Fault> {
     match common_len(a, x, y)? {
         None => f(x, y),
@@ -91,7 +90,7 @@ pub(super) fn broadcast(a: &Args, x: &Value, y: &Value, f: Pairing<'_>) -> Resul
     }
 }
 
-/// The length two values have together; `None` when neither is an array.
+/// Returns the common length of two values; `None` if neither is an array.
 pub(super) fn common_len(a: &Args, x: &Value, y: &Value) -> Result<Option<usize>, Fault> {
     match (array_len(x), array_len(y)) {
         (Some(m), Some(n)) if m != n => {
@@ -102,12 +101,12 @@ pub(super) fn common_len(a: &Args, x: &Value, y: &Value) -> Result<Option<usize>
     }
 }
 
-/// Element `i` of an array; anything else stands for every element.
+/// Returns element `i` of an array; any other value is broadcast.
 pub(super) fn part(v: &Value, i: usize) -> Value {
     v.element(i).unwrap_or_else(|| v.clone())
 }
 
-/// The length, of arrays only.
+/// Returns the length of an array; `None` for other values.
 pub(super) fn array_len(v: &Value) -> Option<usize> {
     match v {
         Value::Array(xs) => Some(xs.len()),
@@ -116,7 +115,7 @@ pub(super) fn array_len(v: &Value) -> Option<usize> {
     }
 }
 
-/// A number or bool among the elements of an array.
+/// Returns a number, or a bool as 0 or 1.
 pub(super) fn truth(v: &Value) -> Option<f64> {
     match v {
         Value::Num(x) => Some(*x),
@@ -125,7 +124,7 @@ pub(super) fn truth(v: &Value) -> Option<f64> {
     }
 }
 
-/// The error that an argument, or something in it, is no number.
+/// The error that an argument, or an element of it, is not a number.
 pub(super) fn not_a_number(a: &Args, i: usize, found: &Value) -> Fault {
     match array_len(a.get(i)) {
         Some(_) => a.element_wrong(i, "a number or an array of numbers", found),
@@ -133,7 +132,7 @@ pub(super) fn not_a_number(a: &Args, i: usize, found: &Value) -> Fault {
     }
 }
 
-/// An array of numbers made element by element.
+/// Creates an array of numbers from a function of the index.
 pub(super) fn array(n: usize, f: impl FnMut(usize) -> f64) -> Value {
     let xs: Arc<[f64]> = (0..n).map(f).collect();
     Value::Array(xs)

@@ -1,5 +1,5 @@
-//! Forms: built-ins that are lowered to operations of their own, because they call
-//! functions or look at the whole trace.
+//! Forms: built-ins that are lowered to dedicated operations, because they call functions
+//! or depend on the whole trace.
 
 use super::{Arg, Form, Kind, Row, Type, arg};
 

@@ -1,8 +1,8 @@
-//! What a host stands behind a built-in: closures, with what they have captured.
+//! The host's part of a built-in: closures with their captured state.
 //!
-//! The entry of the table has plain functions as any other ([`HostItem::entry`]); they
-//! find the closures at the built-in that their arguments name. So nothing that calls
-//! built-ins needs to know of hosts.
+//! The table has plain functions for them, as for other built-ins ([`HostItem::entry`]);
+//! these find the closure through the built-in in their [`Args`]. Callers of built-ins
+//! therefore need not know about hosts.
 
 use super::{ArgAdjoints, Args, Builtin, Derivative, Kind};
 use crate::dist::Dist;
@@ -13,7 +13,7 @@ use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 
-/// What a function keeps between evaluations.
+/// The state that a function keeps between evaluations.
 pub type State = Arc<dyn Any + Send + Sync>;
 
 type Function = dyn Fn(&Args) -> Result<Value, Fault> + Send + Sync;
@@ -21,15 +21,15 @@ type Incremental = dyn Fn(&Args, Option<&Before>) -> Result<(Value, State), Faul
 type Make = dyn Fn(&Args) -> Result<Dist, Fault> + Send + Sync;
 type Product = dyn Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync;
 
-/// An evaluation that a later one may start from. It is kept with what it is the value of
-/// (a node of a trace, an operation of a tape) and never changed: whatever goes back to
-/// an earlier state has that state's.
+/// An evaluation from which a later one may resume. It is stored with its result (in a
+/// node of a trace or an operation of a tape) and immutable, so that restoring an earlier
+/// state of the trace restores it as well.
 pub struct Before {
     /// The arguments.
     pub args: Vec<Value>,
     /// The result.
     pub value: Value,
-    /// What the function kept.
+    /// The state that the function kept.
     pub state: State,
 }
 
@@ -52,7 +52,7 @@ pub enum HostItem {
         /// Its vector-Jacobian product.
         vjp: Option<Arc<Product>>,
     },
-    /// One that may start from an earlier evaluation.
+    /// A function that may resume from an earlier evaluation.
     Incremental {
         /// The function.
         call: Arc<Incremental>,
@@ -63,12 +63,12 @@ pub enum HostItem {
     Family(Arc<Make>),
     /// A family of likelihoods.
     Likelihood(Arc<Function>),
-    /// What makes a kernel; inference knows its type.
+    /// A maker of kernels; only `infer` knows its type.
     Kernel(State),
 }
 
 impl HostItem {
-    /// What the entry of the table is.
+    /// Returns the kind and derivative for the table.
     pub fn entry(&self) -> (Kind, Derivative) {
         let product = |vjp: &Option<_>| match vjp {
             Some(_) => Derivative::Product(vjp_host),
@@ -85,8 +85,8 @@ impl HostItem {
 }
 
 impl Builtin {
-    /// Calls an incremental function of a host, from an earlier evaluation if there is
-    /// one; `None` for any other built-in.
+    /// Calls an incremental host function, from an earlier evaluation if given; returns
+    /// `None` for any other built-in.
     #[inline]
     pub(crate) fn resume(
         &self,
@@ -145,7 +145,8 @@ fn vjp_host(a: &Args, value: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
         Some(HostItem::Function { vjp, .. } | HostItem::Incremental { vjp, .. }) => {
             vjp.as_ref()?(a, value, by).map(ArgAdjoints::from_vec)
         }
-        // Its gradient is by its arguments already.
+        // The gradient of a likelihood is already a list of the adjoints of its
+        // arguments.
         Some(HostItem::Likelihood(_)) => Some((0..a.values.len()).map(|i| by.element(i)).collect()),
         _ => None,
     }

@@ -1,8 +1,8 @@
-//! Names known to inference blocks, user kernels and reports only: kernels, starts,
+//! Names that exist only in inference blocks, user kernels and reports: kernels, starts,
 //! monitors.
 //!
-//! This is their documentation and their arguments; what they do is the business of the
-//! engine. They are not values of the model.
+//! This module declares and documents them; the engine implements them. They are not
+//! values of the model.
 
 use super::{Arg, Kind, Row, Type, arg, opt};
 
@@ -10,7 +10,7 @@ const KERNELS: &str = "Kernels";
 const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
-/// What this version checks and documents but cannot run.
+/// Names that this version checks and documents but cannot run.
 pub(super) const PLANNED: &[&str] = &["acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(

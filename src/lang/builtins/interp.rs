@@ -26,7 +26,7 @@ fn interp(a: &Args) -> Result<Value, Fault> {
     if ys.len() != xs.len() {
         return Err(a.wrong_length(2, &format!("{} numbers, as many as `xs`", xs.len())));
     }
-    // Also false of NaN.
+    // Also rejects NaN.
     if !xs.is_sorted_by(|a, b| a <= b) {
         return Err(Fault::domain("interp: `xs` must be ascending"));
     }
@@ -48,8 +48,8 @@ fn interp(a: &Args) -> Result<Value, Fault> {
     }
 }
 
-/// By the places read, and by the values of the table; by its places where lines are
-/// straight between them.
+/// The adjoints of the points of evaluation, the abscissae and the values of the table.
+/// At an abscissa, where the derivative jumps, the segment to its right counts.
 fn vjp(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let (xs, ys) = (a.numbers(1).ok()?, a.numbers(2).ok()?);
     let (mut by_xs, mut by_ys) = (vec![0.0; xs.len()], vec![0.0; ys.len()]);

@@ -1,8 +1,7 @@
-//! What built-ins are called elsewhere: words that the search of the reference knows,
-//! from Stan, PyMC, BUGS and numpy.
+//! Names of built-ins in other systems (Stan, PyMC, BUGS, numpy), for the search of the
+//! reference.
 
-/// Names, and other words for them. Underscores and dots divide words, as in what is
-/// searched for.
+/// Built-ins with their other names. Underscores and dots separate words, as in queries.
 pub(super) const KNOWN_AS: &[(&str, &str)] = &[
     (
         "log_density",

@@ -1,4 +1,4 @@
-//! Making, joining and searching arrays and records; truth tests over arrays; strings.
+//! Creating, joining and searching arrays and records; truth tests over arrays; strings.
 
 use super::elementwise::{array, array_len, common_len, part};
 use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, opt};
@@ -251,7 +251,7 @@ fn len(a: &Args) -> Result<Value, Fault> {
 fn linspace(a: &Args) -> Result<Value, Fault> {
     let (lo, hi, n) = (a.num(0)?, a.num(1)?, a.count(2)?);
     let last = n.saturating_sub(1);
-    // The ends are exact, and neighbours never swap by rounding.
+    // The end points are exact, and rounding cannot swap neighbours.
     let at = |i| {
         if i == 0 {
             lo
@@ -285,7 +285,7 @@ fn concat(a: &Args) -> Result<Value, Fault> {
         return Ok(Value::Str(parts.concat().into()));
     }
     a.fits(a.values.iter().filter_map(|v| v.len()).sum())?;
-    // As below, without a value for each number.
+    // Same as below, without a `Value` for each number.
     if a.values.iter().all(|v| matches!(v, Value::Array(_))) {
         let mut all = Vec::new();
         for v in a.values {
@@ -341,7 +341,7 @@ fn vjp_select(cond: &Value, x: &Value, y: &Value, z: &Value, by: &Adjoint) -> Op
     Some(both)
 }
 
-/// The positions in ascending order, equals in the order they had.
+/// Returns the positions of the elements in ascending order; the sort is stable.
 fn sorted(a: &Args, xs: &[Value]) -> Result<Vec<usize>, Fault> {
     let mut order: Vec<usize> = (0..xs.len()).collect();
     if xs.iter().all(|x| matches!(x, Value::Num(_)))
@@ -355,7 +355,7 @@ fn sorted(a: &Args, xs: &[Value]) -> Result<Vec<usize>, Fault> {
 
 fn ascending(x: &Value, y: &Value) -> Ordering {
     match (x, y) {
-        // Total, so that NaN of either sign comes last; -0 and 0 are equal.
+        // A total order: NaN of either sign comes last; -0 and 0 are equal.
         (Value::Num(x), Value::Num(y)) => {
             x.is_nan().cmp(&y.is_nan()).then_with(|| (x + 0.0).total_cmp(&(y + 0.0)))
         }
@@ -364,7 +364,7 @@ fn ascending(x: &Value, y: &Value) -> Ordering {
     }
 }
 
-/// The position of the best number; NaN never is.
+/// Returns the position of the best number, ignoring NaN.
 fn best(a: &Args, better: fn(f64, f64) -> bool) -> Result<Value, Fault> {
     let xs = a.numbers_from(0, 1)?;
     let mut found: Option<(usize, f64)> = None;

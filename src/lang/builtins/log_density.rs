@@ -1,5 +1,5 @@
-//! The log density of a value under a distribution, as a number: for mixtures written
-//! out, pointwise scores, factors.
+//! The log density of a value under a distribution, as a number: for marginalised
+//! mixtures, pointwise scores and factors.
 
 use super::{ArgAdjoints, Args, Row, Type, arg, function};
 use crate::dist::Dist;
@@ -47,7 +47,7 @@ fn dist<'a>(a: &Args<'a>) -> Result<&'a Dist, Fault> {
     }
 }
 
-/// Whether a value is of the kind that a distribution draws, or an array of such.
+/// Whether a value is in the space of a distribution, or an array of such values.
 fn fits(d: &Dist, x: &Value) -> bool {
     let one = |d: &Dist, x: &Value| x.to_datum().is_some_and(|x| d.support().fits(&x));
     match (d.elements(), x) {
@@ -61,7 +61,7 @@ fn fits(d: &Dist, x: &Value) -> bool {
     }
 }
 
-/// What a distribution draws, in words.
+/// Describes the values of a distribution, as a hint.
 fn drawn(d: &Dist) -> String {
     let name = d.name();
     match d.elements() {
@@ -76,15 +76,16 @@ fn drawn(d: &Dist) -> String {
     }
 }
 
-/// By the distribution: by its parameters, and behind them by the factor of its
-/// covariance. Where the density is 0 it stays so.
+/// The adjoint of the distribution has its parameters, then the entries of the factor of
+/// its covariance if it has one. Adjoints are zero where the log density is not finite.
 fn vjp(a: &Args, value: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let (Value::Dist(d), Value::Num(score)) = (a.get(0), value) else { return None };
     let weight = by.number();
     if weight == 0.0 || !score.is_finite() {
         return Some(ArgAdjoints::new());
     }
-    // What is scored is the value, however a choice would be stored.
+    // The value itself is scored, even if choices of this distribution are stored as
+    // noise.
     let d = Dist::clone(d).centred();
     let (mut by_x, mut params) = density::gradient(&d, a.get(1))?;
     if density::matrix(&d, &[]).is_some() {

@@ -1,5 +1,5 @@
-//! Functions of numbers, element by element on arrays, through libm so that they are the
-//! same on every platform.
+//! Functions of numbers, element by element on arrays. They use libm, so that results are
+//! the same on every platform.
 
 use super::derivative::{of_pairs, one_of};
 use super::elementwise::{mapped, numeric};
@@ -14,10 +14,10 @@ const SECTION: &str = "Math";
 const X: &[Arg] = &[arg("x", Type::Nums, "The argument.")];
 const ANGLE: &[Arg] = &[arg("x", Type::Nums, "An angle.").unit("radians")];
 const DEGREES: &[Arg] = &[arg("x", Type::Nums, "An angle.").unit("degrees")];
-/// A degree in radians.
+/// One degree in radians.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// The row of a function of one number with its slope, of x and y.
+/// The row of a function of one number, given its slope as a function of x and y.
 macro_rules! smooth {
     ($name:literal, $args:ident, $doc:literal, $f:expr, $slope:expr) => {
         function($name, SECTION, $args, Type::Nums, $doc, mapped)
@@ -26,7 +26,7 @@ macro_rules! smooth {
     };
 }
 
-/// Constant between jumps.
+/// The row of a piecewise constant function.
 const fn steps(name: &'static str, doc: &'static str, f: fn(f64) -> f64) -> Row {
     function(name, SECTION, X, Type::Nums, doc, mapped).scalar(Scalar::Unary(f)).flat()
 }
@@ -87,8 +87,8 @@ pub(super) const TABLE: &[Row] = &[
         "`x` moved into the interval from `lo` to `hi`.",
         clamp,
     )
-    // The bounds first, of which the upper one wins: at a bound the argument moves
-    // nothing.
+    // The bounds come first, the upper before the lower one: at a bound, the derivative
+    // with respect to `x` is 0.
     .vjp(|a, z, by| one_of(a.values, &[2, 1, 0], z, by)),
     smooth!("sin", ANGLE, "The sine.", libm::sin, |x, _| libm::cos(x)),
     smooth!("cos", ANGLE, "The cosine.", libm::cos, |x, _| -libm::sin(x)),
@@ -123,9 +123,9 @@ pub(super) const TABLE: &[Row] = &[
     }),
 ];
 
-/// The derivatives of x^y.
+/// The partial derivatives of z = x^y.
 pub(super) fn pow_slopes(x: f64, y: f64, z: f64) -> [f64; 2] {
-    // A base of 0 has no logarithm, and x^y does not move with y there.
+    // At a base of 0, which has no logarithm, x^y does not vary with y.
     [
         if y == 0.0 { 0.0 } else { y * libm::pow(x, y - 1.0) },
         if z == 0.0 { 0.0 } else { z * libm::log(x) },
@@ -159,12 +159,13 @@ fn step(x: f64) -> f64 {
     if x.is_nan() { x } else { f64::from(u8::from(x >= 0.0)) }
 }
 
-/// The smaller of two, NaN if one is (std's ignores NaN, which would hide a mistake).
+/// The smaller of two numbers, NaN if either is (std's `min` ignores NaN, which would
+/// hide a mistake).
 pub(super) fn smaller(x: f64, y: f64) -> f64 {
     if x < y || x.is_nan() { x } else { y }
 }
 
-/// The larger of two, NaN if one is.
+/// The larger of two numbers, NaN if either is.
 pub(super) fn larger(x: f64, y: f64) -> f64 {
     if x > y || x.is_nan() { x } else { y }
 }
@@ -195,13 +196,13 @@ fn clamp(a: &Args) -> Result<Value, Fault> {
     numeric(a, &raised, a.get(2), smaller, &wrong(2))
 }
 
-/// `ln p - ln(1 - p)`, the second by log1p, so that small `p` lose nothing.
+/// `log p - log(1 - p)`, the second term with `log1p`, which is accurate for small `p`.
 fn logit(p: f64) -> f64 {
     libm::log(p) - libm::log1p(-p)
 }
 
 fn expit(x: f64) -> f64 {
-    // The exponential never overflows this way.
+    // In this form the exponential never overflows.
     if x >= 0.0 {
         1.0 / (1.0 + libm::exp(-x))
     } else {

@@ -1,7 +1,7 @@
-//! Matrices: arrays of rows, every row an array of as many numbers.
+//! Matrices: arrays of rows, which are arrays of numbers of equal length.
 //!
 //! Plain triple loops in a fixed order: the matrices of a model are small, and results
-//! must not depend on a machine.
+//! must not depend on the machine.
 
 use super::elementwise::array;
 use super::reduce::dot;
@@ -109,12 +109,12 @@ pub(super) const TABLE: &[Row] = &[
 pub(super) struct Matrix<'a> {
     /// The rows.
     pub rows: Vec<Cow<'a, [f64]>>,
-    /// The length of each.
+    /// The length of each row.
     pub width: usize,
 }
 
 impl<'a> Matrix<'a> {
-    /// Argument `i` as a matrix.
+    /// Reads argument `i` as a matrix.
     pub fn read(a: &Args<'a>, i: usize) -> Result<Self, Fault> {
         let wrong = || a.wrong(i, "a matrix, an array of rows of numbers");
         let Value::List(list) = a.get(i) else { return Err(wrong()) };
@@ -146,7 +146,7 @@ impl<'a> Matrix<'a> {
         Matrix { rows: (0..rows).map(row).collect(), width }
     }
 
-    /// The derivatives by a matrix of this size.
+    /// Converts the adjoint of a matrix of this size.
     fn of(by: &Adjoint, rows: usize, width: usize) -> Matrix<'static> {
         Matrix {
             rows: (0..rows).map(|i| Cow::Owned(by.element(i).numbers(width))).collect(),
@@ -185,11 +185,11 @@ fn matmul(a: &Args) -> Result<Value, Fault> {
     })
 }
 
-/// With C = A B: by A it is G B', by B it is A' G.
+/// For C = A B with adjoint G, the adjoint of A is G B' and that of B is A' G.
 fn vjp_matmul(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let is_vector = |i: usize| matches!(a.get(i), Value::Array(_));
     let left = if is_vector(0) { single_row(a, 0).ok()? } else { Matrix::read(a, 0).ok()? };
-    // Its columns.
+    // Stored by columns.
     let right =
         if is_vector(1) { single_row(a, 1).ok()? } else { Matrix::read(a, 1).ok()?.transposed() };
     let (n, m, inner) = (left.rows.len(), right.rows.len(), left.width);
@@ -204,7 +204,7 @@ fn vjp_matmul(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     };
     let by_left =
         Matrix::from_fn(n, inner, |i, k| (0..m).map(|j| g.rows[i][j] * right.rows[j][k]).sum());
-    // As columns, too.
+    // Stored by columns, too.
     let by_right =
         Matrix::from_fn(m, inner, |j, k| (0..n).map(|i| g.rows[i][j] * left.rows[i][k]).sum());
     let row = |m: Matrix| {

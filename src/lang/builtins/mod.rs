@@ -1,9 +1,9 @@
 //! The table of built-ins: every function, distribution, form and kernel with its
 //! arguments, units and doc line.
 //!
-//! Evaluation, static checks, `pcadlang doc` and the language reference all read this one
-//! table. Functions here are pure: the same arguments give the same value to the last
-//! bit, on every platform.
+//! Evaluation, static checks, `pcadlang doc` and the language reference all read this
+//! table. The functions are pure: equal arguments give bit-identical results on every
+//! platform.
 
 mod args;
 mod compounds;
@@ -47,10 +47,10 @@ use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
-/// A name or text: the language's own, or one that a host made.
+/// A name or text, of the language or of a host.
 pub type Text = Cow<'static, str>;
 
-/// The type of an argument or result, as far as it can be told before a run.
+/// The type of an argument or result, as far as it is known statically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
     /// Anything.
@@ -63,7 +63,7 @@ pub enum Type {
     Bool,
     /// A string.
     Str,
-    /// A number, or an array of them taken element by element.
+    /// A number, or an array of numbers to process element by element.
     Nums,
     /// An array.
     Array,
@@ -81,7 +81,7 @@ pub enum Type {
     Object(&'static str),
     /// A selection of addresses.
     Selection,
-    /// A step of inference.
+    /// A kernel, a start, or another part of an inference plan.
     Kernel,
 }
 
@@ -114,17 +114,17 @@ pub struct Argument {
     pub name: Text,
     /// Its type.
     pub ty: Type,
-    /// Its unit, or nothing.
+    /// Its unit, or empty.
     pub unit: Text,
-    /// How its default is written; `None` if it must be given.
+    /// The default as shown in the reference; `None` for a required argument.
     pub default: Option<Text>,
-    /// What a call that leaves it out gets; nothing where the function itself knows.
+    /// The default that a call receives; `nothing` if the function supplies it.
     pub value: Value,
-    /// One line about it.
+    /// A one-line description.
     pub doc: Text,
 }
 
-/// Forms: built-ins that are lowered to operations of their own.
+/// Built-ins that are lowered to dedicated operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Form {
@@ -136,7 +136,7 @@ pub enum Form {
     LogLikelihood,
 }
 
-/// What a built-in is.
+/// The kind of a built-in.
 #[derive(Clone, Copy)]
 pub enum Kind {
     /// A pure function of its arguments.
@@ -145,34 +145,34 @@ pub enum Kind {
     Distribution(fn(&Args) -> Result<Dist, Fault>),
     /// A form.
     Form(Form),
-    /// Known to inference blocks only: kernels, starts, monitors.
+    /// Known only to inference plans: kernels, starts, monitors.
     Inference,
 }
 
-/// What a built-in is on single numbers, where that is all there is to it: what formulas
-/// of scores run, and what functions of arrays do with each element.
+/// The action of a built-in on single numbers, if that determines it completely. Compiled
+/// score formulas run it, and functions of arrays apply it to each element.
 #[derive(Clone, Copy)]
 pub enum Scalar {
-    /// A number of a number.
+    /// A function of one number.
     Unary(fn(f64) -> f64),
-    /// A number of two.
+    /// A function of two numbers.
     Binary(fn(f64, f64) -> f64),
-    /// A truth value of two numbers.
+    /// A predicate on two numbers.
     Test(fn(f64, f64) -> bool),
-    /// A truth value of a truth value.
+    /// A function of a truth value.
     Logic(fn(bool) -> bool),
-    /// A distribution by its parameters.
+    /// A family of distributions with numbers as parameters.
     Family {
-        /// The distribution, if there is one.
+        /// Makes the distribution; `None` if a parameter is invalid.
         make: fn(&[f64]) -> Option<Dist>,
-        /// The log density of a number, without keeping it.
+        /// The log density of a number, without keeping the distribution.
         log_density: fn(&[f64], f64) -> Option<f64>,
     },
-    /// A distribution over 0, 1, … by an array of weights.
+    /// A distribution over 0, 1, … with an array of weights.
     Weights {
-        /// The distribution, if there is one.
+        /// Makes the distribution; `None` if the weights are invalid.
         make: fn(&Arc<[f64]>) -> Option<Dist>,
-        /// The log probability of a number, without making it.
+        /// The log probability of a number, without constructing the distribution.
         log_probability: fn(&[f64], f64) -> Option<f64>,
     },
 }
@@ -182,26 +182,25 @@ pub enum Scalar {
 pub struct Builtin {
     /// Its name.
     pub name: Text,
-    /// The namespace it belongs to: nothing for the language itself, `scene` for
-    /// `std/scene.pcad`.
+    /// Its namespace: empty for the language itself, `scene` for `std/scene.pcad`.
     pub module: Text,
-    /// The heading it stands under in the reference.
+    /// The heading of its section in the reference.
     pub section: Text,
     /// Its arguments in order.
     pub args: Arc<[Argument]>,
-    /// Whether the last argument may be given any number of times.
+    /// Whether the last argument may be repeated.
     pub variadic: bool,
-    /// What it gives.
+    /// The type of the result.
     pub returns: Type,
-    /// One line about it.
+    /// A one-line description.
     pub doc: Text,
-    /// What it is.
+    /// Its kind and implementation.
     pub kind: Kind,
-    /// What it is on single numbers.
+    /// Its action on single numbers.
     pub scalar: Option<Scalar>,
     /// Its derivative.
     pub derivative: Derivative,
-    /// What stands behind it, where that is a host's and not the language's own.
+    /// The host's implementation; `None` for the language's own built-ins.
     pub host: Option<HostItem>,
     /// How files are read, for a kind of data.
     pub format: Option<Arc<dyn data::DataFormat>>,
@@ -216,10 +215,10 @@ impl fmt::Debug for Builtin {
 }
 
 impl Builtin {
-    /// Calls it with values, one for each argument.
+    /// Calls it with one value per argument.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// If the arguments are invalid, or it is a form or a name for inference.
     pub(crate) fn apply(&self, values: &[&Value]) -> Result<Value, Fault> {
         let args = Args { builtin: self, values };
         match self.kind {
@@ -234,10 +233,11 @@ impl Builtin {
         }
     }
 
-    /// The distribution it makes of values.
+    /// Makes a distribution of this family from values.
     ///
     /// # Errors
-    /// What is wrong with them, and if there is too much in it to be handled.
+    /// If the arguments are invalid, or the distribution has too many parts or is nested
+    /// too deeply.
     pub(crate) fn distribution(&self, values: &[&Value]) -> Result<Dist, Fault> {
         let args = Args { builtin: self, values };
         let Kind::Distribution(make) = self.kind else {
@@ -251,14 +251,14 @@ impl Builtin {
         }
     }
 
-    /// Whether this version only checks and documents it, and cannot run it yet.
+    /// Whether this version only checks and documents it but cannot run it.
     pub fn is_planned(&self) -> bool {
         matches!(self.kind, Kind::Inference)
             && self.host.is_none()
             && inference::PLANNED.contains(&&*self.name)
     }
 
-    /// Its name as a program writes it: `normal`, `scene.lathe`.
+    /// Returns its name as in a program: `normal`, `scene.lathe`.
     pub fn full_name(&self) -> String {
         if self.module.is_empty() {
             self.name.clone().into_owned()
@@ -267,7 +267,7 @@ impl Builtin {
         }
     }
 
-    /// `name(a, b = default)`, as the reference shows it.
+    /// Returns `name(a, b = default)`, as in the reference.
     pub fn signature(&self) -> String {
         let mut s = self.full_name();
         s.push('(');
@@ -288,12 +288,12 @@ impl Builtin {
         s
     }
 
-    /// For each parameter, the index of the written argument that feeds it; `None` for a
-    /// default. With a variadic last parameter the result is as long as what was written.
-    /// `args` tells the keyword of each argument, if it has one.
+    /// Returns, for each parameter, the index of the written argument that supplies it;
+    /// `None` for a default. Further arguments of a variadic last parameter are appended.
+    /// `args` has the keyword of each argument, if any.
     ///
     /// # Errors
-    /// Too many arguments, too few, one given twice, an unknown keyword: a message for
+    /// Too many or too few arguments, a duplicate, or an unknown keyword: a message for
     /// the user.
     pub fn match_names<'a>(
         &self,
@@ -315,7 +315,8 @@ impl Builtin {
                     .position(|a| a.name == k)
                     .ok_or_else(|| self.no_such_argument(k))?,
             };
-            // Too many are counted first, so that the message can say how many.
+            // Excess arguments are only counted here, so that the message below can give
+            // their number.
             if p < order.len() && order[p].replace(i).is_some() {
                 return Err(format!(
                     "`{}` got its argument `{}` twice",

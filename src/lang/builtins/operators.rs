@@ -1,8 +1,7 @@
-//! The operators, under the names they are written with; `neg` and `not` are the prefix
-//! ones.
+//! The operators, named as they are written; `neg` and `not` are the prefix operators.
 //!
-//! Numbers follow IEEE 754: division by zero gives an infinity or NaN, which is caught
-//! where it is scored.
+//! Arithmetic follows IEEE 754: division by zero gives an infinity or NaN, which is
+//! detected when it is scored.
 
 use super::covariance::CovarianceValue;
 use super::derivative::of_pairs;
@@ -27,7 +26,7 @@ const fn infix(
     function(name, SECTION, SIDES, returns, doc, f)
 }
 
-/// The row of an operator on numbers with its slopes, of x, y and z.
+/// The row of an operator on numbers, given its slopes as a function of x, y and z.
 macro_rules! arithmetic {
     ($name:literal, $doc:literal, $f:expr, $slopes:expr) => {
         of_pairs!(infix($name, Type::Nums, $doc, arithmetic), $f, $slopes)
@@ -147,7 +146,7 @@ fn arithmetic(a: &Args) -> Result<Value, Fault> {
     })
 }
 
-/// `x - y floor(x / y)`, exact where IEEE's remainder is.
+/// `x - y floor(x / y)`, computed from the exact IEEE remainder.
 fn remainder(x: f64, y: f64) -> f64 {
     let r = x % y;
     if r != 0.0 && (r < 0.0) != (y < 0.0) { r + y } else { r }
@@ -174,8 +173,7 @@ fn equality(a: &Args, wanted: bool) -> Result<Value, Fault> {
     }
 }
 
-/// Equality of whole values: numbers as IEEE compares them, functions and objects by
-/// identity.
+/// Equality of whole values: numbers by IEEE 754, functions and objects by identity.
 pub(super) fn equal(x: &Value, y: &Value) -> bool {
     match (x, y) {
         (Value::Num(x), Value::Num(y)) => x == y,
@@ -194,7 +192,7 @@ fn at(v: &Value, i: usize) -> Value {
 }
 
 fn compare(a: &Args, holds: fn(Ordering) -> bool) -> Result<Value, Fault> {
-    // An ordering that does not exist (NaN) satisfies nothing.
+    // Comparisons with NaN are false.
     let test = |o: Option<Ordering>| Value::Bool(o.is_some_and(holds));
     match (a.get(0), a.get(1)) {
         (Value::Num(x), Value::Num(y)) => Ok(test(x.partial_cmp(y))),
@@ -220,10 +218,10 @@ fn range(a: &Args) -> Result<Value, Fault> {
     Ok(array(n as usize, |i| lo + i as f64))
 }
 
-/// The largest number up to which every whole number is an f64.
+/// The largest number up to which every whole number is exact in an f64.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// The error that an operator is not defined for what stands at its sides.
+/// The error that an operator is not defined for its operands.
 fn unsuited(a: &Args, wanted: &str, x: &Value, y: &Value) -> Fault {
     let name = &a.builtin.name;
     let fault = Fault::type_error(format!(

@@ -1,5 +1,5 @@
-//! Functions that make one number, or one running array, of an array of numbers. Sums run
-//! from left to right.
+//! Reductions of an array of numbers to one number, and cumulative sums. Sums run from
+//! left to right.
 
 use super::derivative::{Reduction, times};
 use super::math::{larger, smaller};
@@ -14,7 +14,7 @@ const XS: &[Arg] = &[arg("xs", Type::Array, "Numbers; bools count 0 and 1.")];
 const PAIR: &[Arg] =
     &[arg("xs", Type::Array, "Numbers."), arg("ys", Type::Array, "The same number of numbers.")];
 
-/// The row of a function of at least so many numbers.
+/// The row of a function of at least `$least` numbers.
 macro_rules! of_all {
     ($name:literal, $least:literal, $doc:literal, $f:expr, $slopes:expr) => {
         function($name, SECTION, XS, Type::Num, $doc, |a| {
@@ -88,14 +88,14 @@ pub(super) const TABLE: &[Row] = &[
     }),
 ];
 
-/// `factor (x - mean) / (n - 1)`: the derivatives of the variance for a factor of 2.
+/// `factor (x - mean) / (n - 1)`: the derivatives of the variance if the factor is 2.
 fn spread_slopes(xs: &[f64], factor: f64, by: &mut [f64]) {
     let m = mean(xs);
     by.iter_mut().zip(xs).for_each(|(by, x)| *by = factor * (x - m) / (xs.len() as f64 - 1.0));
 }
 
 fn sum(xs: &[f64]) -> f64 {
-    // std's sum starts from -0, which shows for an empty array.
+    // std's sum starts from -0, which would be the result for an empty array.
     xs.iter().fold(0.0, |s, x| s + x)
 }
 
@@ -103,7 +103,7 @@ fn mean(xs: &[f64]) -> f64 {
     sum(xs) / xs.len() as f64
 }
 
-/// Two passes, so that a large mean does not swallow the spread.
+/// Two passes, so that a large mean does not cancel the variation.
 fn variance(xs: &[f64]) -> f64 {
     let m = mean(xs);
     xs.iter().fold(0.0, |s, x| s + (x - m) * (x - m)) / (xs.len() as f64 - 1.0)
@@ -113,7 +113,7 @@ pub(crate) fn dot(xs: &[f64], ys: &[f64]) -> f64 {
     xs.iter().zip(ys).fold(0.0, |s, (x, y)| s + x * y)
 }
 
-/// Scaled by the largest, so that squares neither overflow nor vanish.
+/// Scaled by the largest element, so that squares neither overflow nor underflow.
 fn norm(xs: &[f64]) -> f64 {
     let scale = xs.iter().fold(0.0, |m, x| larger(m, x.abs()));
     if scale == 0.0 || !scale.is_finite() {
@@ -130,12 +130,12 @@ fn log_sum_exp(xs: &[f64]) -> f64 {
     top + libm::log(xs.iter().fold(0.0, |s, x| s + libm::exp(x - top)))
 }
 
-/// The largest; -inf of nothing.
+/// The largest element; -inf if empty.
 pub(super) fn largest(xs: &[f64]) -> f64 {
     xs.iter().copied().fold(f64::NEG_INFINITY, larger)
 }
 
-/// The smallest; inf of nothing.
+/// The smallest element; inf if empty.
 pub(super) fn smallest(xs: &[f64]) -> f64 {
     xs.iter().copied().fold(f64::INFINITY, smaller)
 }

@@ -1,5 +1,5 @@
-//! The rows that the language's own built-ins are written in: constants, from which the
-//! table's entries are made.
+//! The rows in which the language's own built-ins are declared: constants that are
+//! converted to entries of the table.
 
 use super::data::DataFormat;
 use super::{Args, Argument, Builtin, Derivative, Kind, Scalar, Type, Vjp};
@@ -7,7 +7,7 @@ use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::sync::Arc;
 
-/// One argument.
+/// One argument; see [`Argument`].
 #[derive(Clone, Copy, Debug)]
 pub struct Arg {
     pub name: &'static str,
@@ -17,24 +17,24 @@ pub struct Arg {
     pub doc: &'static str,
 }
 
-/// An argument that must be given.
+/// A required argument.
 pub const fn arg(name: &'static str, ty: Type, doc: &'static str) -> Arg {
     Arg { name, ty, unit: "", default: None, doc }
 }
 
-/// An argument with a default.
+/// An optional argument with its default.
 pub const fn opt(name: &'static str, ty: Type, default: &'static str, doc: &'static str) -> Arg {
     Arg { name, ty, unit: "", default: Some(default), doc }
 }
 
 impl Arg {
-    /// The same with a unit.
+    /// Adds a unit.
     pub const fn unit(self, unit: &'static str) -> Arg {
         Arg { unit, ..self }
     }
 }
 
-/// One built-in: see [`Builtin`].
+/// One built-in; see [`Builtin`].
 #[derive(Clone, Copy)]
 pub struct Row {
     pub name: &'static str,
@@ -51,7 +51,7 @@ pub struct Row {
     pub format: Option<fn() -> Arc<dyn DataFormat>>,
 }
 
-/// A pure function of the language's own namespace.
+/// A pure function in the language's own namespace.
 pub const fn function(
     name: &'static str,
     section: &'static str,
@@ -64,7 +64,7 @@ pub const fn function(
 }
 
 impl Row {
-    /// One of the language's own namespace, of which no derivative is known.
+    /// A row in the language's own namespace, without a known derivative.
     pub const fn new(
         kind: Kind,
         name: &'static str,
@@ -89,27 +89,27 @@ impl Row {
         }
     }
 
-    /// The same, known to be this on single numbers.
+    /// Adds its action on single numbers.
     pub const fn scalar(self, f: Scalar) -> Row {
         Row { scalar: Some(f), ..self }
     }
 
-    /// The same with a last argument that may be given any number of times.
+    /// Allows the last argument to be repeated.
     pub const fn variadic(self) -> Row {
         Row { variadic: true, ..self }
     }
 
-    /// The same with its vector-Jacobian product.
+    /// Adds its vector-Jacobian product.
     pub const fn vjp(self, f: Vjp) -> Row {
         Row { derivative: Derivative::Product(f), ..self }
     }
 
-    /// The same with a derivative.
+    /// Adds its derivative.
     pub const fn derivative(self, derivative: Derivative) -> Row {
         Row { derivative, ..self }
     }
 
-    /// The same, with a derivative of zero wherever there is one.
+    /// Declares that its derivative is zero wherever it exists.
     pub const fn flat(self) -> Row {
         Row { derivative: Derivative::Zero, ..self }
     }

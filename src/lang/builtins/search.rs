@@ -1,23 +1,23 @@
-//! Finding built-ins by what is said of them.
+//! Full-text search for built-ins.
 
 use super::known_as::KNOWN_AS;
 use super::{Builtin, Table};
 use crate::diag::nearest;
 
-/// What a search found.
+/// The result of a search.
 #[derive(Debug)]
 pub struct Found<'t> {
-    /// The best first.
+    /// The matches, best first.
     pub entries: Vec<&'t Builtin>,
-    /// Words that nothing has, and the nearest ones, which were looked for in their
-    /// place.
+    /// Words without a match, each with the nearest known word, which was searched for
+    /// instead.
     pub instead: Vec<(String, String)>,
-    /// Words that nothing has and nothing is near to; they were left out.
+    /// Words without a match or a near word; they are ignored.
     pub unknown: Vec<String>,
 }
 
-/// The built-ins that have all the words, those that have them in their names first, then
-/// by section, arguments, text.
+/// Returns the built-ins that match all words, ranked by where the words occur: in the
+/// name, in a name from another system, in the section, the description or the arguments.
 pub fn search<'t>(table: &'t Table, words: &str) -> Found<'t> {
     let texts: Vec<Text<'t>> = table.iter().map(Text::new).collect();
     let mut found = Found { entries: Vec::new(), instead: Vec::new(), unknown: Vec::new() };
@@ -50,7 +50,7 @@ pub fn search<'t>(table: &'t Table, words: &str) -> Found<'t> {
     found
 }
 
-/// What is said of a built-in, in lower-case words.
+/// The searchable text of a built-in, as lower-case words.
 struct Text<'t> {
     of: &'t Builtin,
     name: String,
@@ -58,7 +58,7 @@ struct Text<'t> {
     section: Vec<String>,
     doc: Vec<String>,
     args: Vec<String>,
-    /// Words that other languages have for it.
+    /// Its names in other systems.
     elsewhere: Vec<String>,
 }
 
@@ -87,7 +87,7 @@ impl<'t> Text<'t> {
         all.map(String::as_str).chain(std::iter::once(self.name.as_str()))
     }
 
-    /// What it is worth for a word: nothing if it is nowhere.
+    /// The score of a word: 0 if it does not occur.
     fn worth(&self, word: &str) -> u32 {
         let begins = |words: &[String]| words.iter().any(|known| known.starts_with(word));
         let is = |words: &[String]| words.iter().any(|known| known == word);
@@ -106,7 +106,8 @@ impl<'t> Text<'t> {
     }
 }
 
-/// The words of a text: what is no letter or digit divides them. Operators are words too.
+/// Splits a text into lower-case words at white space and punctuation. Texts of one or
+/// two characters are kept whole, so that operators are words too.
 fn words_of(text: &str) -> impl Iterator<Item = String> + '_ {
     text.split(|c: char| c.is_whitespace() || "_.,;:()[]{}`'\"/".contains(c) && text.len() > 2)
         .map(|word| word.trim_matches(|c: char| c == '?').to_lowercase())

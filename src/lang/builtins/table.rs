@@ -1,16 +1,13 @@
-//! The built-ins a program sees, by index and by name, and the named constants.
+//! The built-ins available to a program, by index and by name, and the named constants.
 //!
-//! Not a scope: shadowing by a program's own names is the business of lowering.
+//! This is not a scope: lowering handles names in the program that shadow them.
 
 use super::{
-    Builtin, Row, Text, covariance, data, definite, distributions, examples, forms, inference,
-    interp, list, log_density, math, matrix, operators, reduce,
-};
-use crate::lang::value::Value;
+    Builtin, Row, Text, covariance, data, definite, distributions,  examples , forms, inference, interp, list,
+    log_density, math, matrix, operators, reduce, 
+} ; use crate : : lang : : value : : Value ;
 use indexmap::{Equivalent, IndexMap};
-use rustc_hash::{FxBuildHasher, FxHashMap};
-use std::fmt;
-use std::sync::Arc;
+use rustc_hash:: { FxBuildHasher , FxHashMap } ; use std : : fmt ; use std : : sync : : Arc ;
 
 /// A name with a fixed value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +33,7 @@ const CONSTANTS: &[Constant] = &[
     },
 ];
 
-/// Those of the language, in the order of the reference.
+/// The language's own built-ins, in the order of the reference.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
     let own: [&[Row]; 13] = [
         operators::TABLE,
@@ -53,17 +50,14 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
         data::TABLE,
         inference::TABLE,
     ];
-    own.into_iter().flatten().map(|row| {
-        let builtin = Builtin::from(row);
-        Builtin { example: examples::of(row.name), ..builtin }
-    })
+    own.into_iter().flatten().map( | row | { let builtin = Builtin::from ( row ) ; Builtin { example : examples : : of ( row . name ) , . . builtin } } )
 }
 
 /// The module and name of a built-in.
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 struct FullName(Text, Text);
 
-/// The same, borrowed, to look one up.
+/// A borrowed [`FullName`], for look-ups.
 #[derive(Hash)]
 struct Sought<'a>(&'a str, &'a str);
 
@@ -73,67 +67,48 @@ impl Equivalent<FullName> for Sought<'_> {
     }
 }
 
-/// Values of arguments wherever a program leaves them out: of a built-in by full name, an
-/// argument by name.
-pub type Defaults = FxHashMap<(String, String), Value>;
-
-/// What a host does with a program's inputs before the program is compiled.
-pub trait InputHook: fmt::Debug + Send + Sync {
-    /// Completes the `data` items that were given and the defaults of arguments.
-    fn prepare(&self, data: &mut IndexMap<String, Value>, defaults: &mut Defaults);
-
-    /// Adapts a value that a `data` item reads from a file.
-    fn adapt(&self, value: Value, defaults: &Defaults) -> Value;
-}
-
-/// The built-ins a program sees, by index and by name.
-#[derive(Clone, Debug)]
+/// The built-ins available to a program, by index and by name.
+ pub type Defaults = FxHashMap < ( String , String ) , Value > ; pub trait InputHook : fmt : : Debug + Send + Sync { fn prepare ( & self , data : & mut IndexMap < String , Value > , defaults : & mut Defaults ) ; fn adapt ( & self , value : Value , defaults : & Defaults ) - > Value ; } #[derive(Clone, Debug)]
 pub struct Table {
     entries: IndexMap<FullName, Builtin, FxBuildHasher>,
-    /// What prepares the inputs of programs.
-    pub hooks: Vec<Arc<dyn InputHook>>,
-}
+ pub hooks : Vec < Arc < dyn InputHook > > , }
 
 impl Default for Table {
-    /// The built-ins of the language alone.
     fn default() -> Self {
-        let table = Table { entries: IndexMap::default(), hooks: Vec::new() };
-        table.with(all())
+         let table = Table { entries : IndexMap : : default ( ) , hooks : Vec ::new() } ; table . with ( all ( ))
     }
 }
 
 impl Table {
-    /// The table with more built-ins; one of the same module and name replaces an earlier
-    /// one.
-    #[must_use]
-    pub fn with(mut self, more: impl IntoIterator<Item = Builtin>) -> Self {
-        let more = more.into_iter();
-        self.entries.extend(more.map(|b| (FullName(b.module.clone(), b.name.clone()), b)));
-        self
+    /// Creates the table of the language's built-ins and `more`, which replace entries
+    /// with the same module and name.
+     # [ must_use ] pub fn with( mut self , more: impl IntoIterator<Item = Builtin>) -> Self {
+        let more = more . into_iter() ; self .entries . extend(more
+           .map(|b| (FullName(b.module.clone(), b.name.clone()), b))) ; self
     }
 
-    /// The built-in at an index that [`find`](Table::find) gave.
+    /// Returns the built-in at an index from [`find`](Table::find).
     pub fn get(&self, i: u32) -> &Builtin {
         &self.entries[i as usize]
     }
 
-    /// The index of a built-in; operators are named as they are written, with `neg` and
-    /// `not` for the prefix ones.
+    /// Returns the index of a built-in; operators are named as they are written, the
+    /// prefix ones `neg` and `not`.
     pub fn find(&self, module: &str, name: &str) -> Option<u32> {
         self.entries.get_index_of(&Sought(module, name)).map(|i| i as u32)
     }
 
-    /// All of them, in the order of the reference.
-    pub fn iter(&self) -> impl Iterator<Item = &Builtin> + Clone {
+    /// Returns all built-ins, in the order of the reference.
+    pub fn iter(&self) -> impl Iterator<Item = &Builtin>  + Clone {
         self.entries.values()
     }
 
-    /// The named constants: `pi`, `inf`.
+    /// Returns the named constants: `pi`, `inf`.
     pub fn constants(&self) -> &'static [Constant] {
         CONSTANTS
     }
 
-    /// The value of a named constant.
+    /// Returns the value of a named constant.
     pub fn constant(&self, name: &str) -> Option<f64> {
         CONSTANTS.iter().find(|c| c.name == name).map(|c| c.value)
     }

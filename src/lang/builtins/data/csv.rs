@@ -1,18 +1,18 @@
-//! Tables as text (RFC 4180): a header line, then one row a line; quoted fields may hold
-//! separators and line ends.
+//! Tables as text (RFC 4180): a header line, then one row per line; quoted fields may
+//! contain separators and line breaks.
 //!
-//! The separator is the one of comma, semicolon and tab that splits the header into most
-//! fields. A column is of numbers if all its fields are, else of bools if all are `true`
-//! or `false`, else of strings. There are no missing values: an empty field in a column
-//! of numbers is an error, not a NaN that shows up later.
+//! The separator is the one of comma, semicolon and tab that is most frequent in the
+//! header. A column holds numbers if all its fields are numbers, otherwise bools if all
+//! are `true` or `false`, otherwise strings. There are no missing values: an empty field
+//! in a column of numbers is an error rather than a NaN that surfaces later.
 
 use crate::lang::value::{MOST_ELEMENTS, Record, Value};
 use std::sync::Arc;
 
-/// A row and the line it starts in, from 1.
+/// A row and its first line, counted from 1.
 type Row = (usize, Vec<String>);
 
-/// The columns of a table as a record of arrays.
+/// Parses a table into a record of arrays, one per column.
 pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     let text = std::str::from_utf8(bytes)
         .map_err(|e| format!("not UTF-8 text (byte {})", e.valid_up_to()))?;
@@ -45,7 +45,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     Ok(Value::Record(Arc::new(table)))
 }
 
-/// The values of a column.
+/// Converts a column to an array.
 fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
     let fields = || rows.iter().map(|(line, row)| (*line, row.get(i).map_or("", |f| f.trim())));
     let numbers: Vec<f64> = fields().filter_map(|(_, f)| f.parse().ok()).collect();
@@ -70,14 +70,14 @@ fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
     ))
 }
 
-/// The separator that splits the header most often; a comma when none does.
+/// The most frequent separator in the header; a comma if there is none.
 fn separator(text: &str) -> char {
     let header = text.lines().next().unwrap_or_default();
     let count = |c: char| header.matches(c).count();
     [';', '\t'].into_iter().fold(',', |best, c| if count(c) > count(best) { c } else { best })
 }
 
-/// The rows that are not blank.
+/// Splits the text into rows, without blank ones.
 fn rows(text: &str, separator: char) -> Result<Vec<Row>, String> {
     let mut rows: Vec<Row> = Vec::new();
     let (mut row, mut field) = (Vec::new(), String::new());

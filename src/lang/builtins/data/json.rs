@@ -1,14 +1,13 @@
-//! JSON (RFC 8259) as values: objects are records in their order, arrays of numbers pack,
-//! null is nothing.
+//! JSON (RFC 8259) as values: objects become records in their order, arrays of numbers
+//! are packed, null becomes `nothing`.
 
 use crate::lang::value::{Extent, MOST_ELEMENTS, Value};
 use std::sync::Arc;
 
-/// The most bytes of a JSON text that is read as a value: its elements take many times as
-/// much.
+/// The maximum size of a JSON text in bytes: the value needs many times as much memory.
 const MOST_BYTES: usize = 1 << 26;
 
-/// The value of a JSON text. Nesting is limited by the reader, to 128.
+/// Parses a JSON text. serde_json limits nesting to 128 levels.
 pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     if bytes.len() > MOST_BYTES {
         return Err(format!("{} bytes of JSON; at most {MOST_BYTES}", bytes.len()));

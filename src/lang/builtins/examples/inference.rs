@@ -2,14 +2,14 @@
 
 use super::Examples;
 
-/// A number with one observation, and this plan.
+/// A program with one number and one observation, followed by a plan.
 macro_rules! number {
     ($plan:literal) => {
         concat!("assume x ~ normal(0, 1);\nobserve normal(x, 1) = 2 as y;\n", $plan)
     };
 }
 
-/// Switches with an observation each, and this plan.
+/// A program with switches and an observation of each, followed by a plan.
 macro_rules! switches {
     ($plan:literal) => {
         concat!(
@@ -19,7 +19,7 @@ macro_rules! switches {
     };
 }
 
-/// A ball in a photograph, and this plan.
+/// A program with a ball and a photograph of it, followed by a plan.
 macro_rules! ball {
     ($plan:literal) => {
         concat!(

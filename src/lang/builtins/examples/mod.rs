@@ -1,25 +1,32 @@
-//! An example for every built-in. Each one runs: `tests/examples.rs` sees to that.
+//! An example for every built-in. `tests/examples.rs` runs them all.
 //!
-//! An example is an expression with its value behind `//`, or a program. What uses
-//! `scene` is to be read with the line [`INCLUDE`] before it.
+//! An example is an expression followed by `//` and its value, or a program. Programs
+//! that use `scene` omit the line [`INCLUDE`], which precedes them.
 
 mod distributions;
-mod inference;
+mod inference
+ ;
 mod values;
 
 use super::Text;
 
-/// The line that programs with `scene` begin with.
+/// The first line of programs that use `scene`.
 pub const INCLUDE: &str = "include \"std/scene.pcad\" as scene;";
 
-/// By full name.
-pub(crate) type Examples = &'static [(&'static str, &'static str)];
+/// Examples by full name.
+ pub ( crate ) type Examples = &'static [(&'static str, &'static str)];
 
-/// The example of one of the language's built-ins.
-pub(super) fn of(name: &str) -> Option<Text> {
-    [values::EXAMPLES, distributions::EXAMPLES, inference::EXAMPLES]
-        .into_iter()
-        .flatten()
-        .find(|(of, _)| *of == name)
-        .map(|(_, text)| (*text).into())
-}
+  
+    /// Returns an example of its use; `None` for a host's built-in.
+    pub  ( super ) fn of( name : &str) -> Option<Text > {
+          
+             
+        
+           
+        [values::EXAMPLES, distributions::EXAMPLES, inference ::EXAMPLES]
+            .into_iter()
+            .flatten()
+            .find(|(of, _)| *of == name)
+            .map(|(_, text)|  ( *text)
+     . into ( ) ) }
+

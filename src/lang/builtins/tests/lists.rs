@@ -1,4 +1,4 @@
-//! Arrays and records: making, joining, searching.
+//! Arrays and records: creating, joining, searching.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Math, sums and matrices: values against exact ones, edges, error texts.
+//! Math, sums and matrices: exact values, edge cases, error messages.
 
 use super::*;
 use std::f64::consts::{LN_2, PI};

@@ -1,18 +1,19 @@
-//! Tests of the built-ins through the table, as a program calls them.
+//! Tests of the built-ins through the table, as programs call them.
 
+ 
 mod lists;
 mod maths;
 mod operators;
 mod table;
 
-pub(crate) use super::{Args, Builtin, Kind, Table};
+ pub ( crate ) use super::{Args, Builtin, Kind, Table};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
-use std::sync::{Arc, LazyLock};
+use std::sync:: { Arc , LazyLock } ;
 
-pub(crate) static TABLE: LazyLock<Arc<Table>> = LazyLock::new(crate::standard::table);
+ pub ( crate ) static TABLE: LazyLock< Arc < Table > > = LazyLock::new(crate::standard : : table);
 
-/// A built-in by `module.name` or `name`.
+/// Finds a built-in by `module.name` or `name`.
 pub(crate) fn find(name: &str) -> &'static Builtin {
     let (module, short) = match name.split_once('.') {
         Some((m, n)) if !m.is_empty() && !n.is_empty() => (m, n),
@@ -35,12 +36,12 @@ pub(crate) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
     }
 }
 
-/// The same, of a call that must succeed.
+/// Calls a function, and requires success.
 pub(crate) fn call(name: &str, values: &[Value]) -> Value {
     try_call(name, values).unwrap_or_else(|f| panic!("{name}: {}", f.message))
 }
 
-/// The message, and hint if any, of a call that must fail.
+/// Calls a function, requires an error, and returns its message with its hint, if any.
 pub(crate) fn fails(name: &str, values: &[Value]) -> String {
     match try_call(name, values) {
         Ok(v) => panic!("{name} gave {v}"),
@@ -65,13 +66,13 @@ pub(crate) fn bools(xs: &[bool]) -> Value {
     Value::List(xs.iter().map(|b| Value::Bool(*b)).collect())
 }
 
-/// Asserts that two values are the same to the last bit.
+/// Asserts that two values are bit-identical.
 #[track_caller]
 pub(crate) fn same(got: Value, wanted: Value) {
     assert!(got.same(&wanted), "got {got}, wanted {wanted}");
 }
 
-/// Asserts that a number is near another.
+/// Asserts that a number is within a relative error of 1e-15 (absolute below 1).
 #[track_caller]
 pub(crate) fn near(got: Value, wanted: f64) {
     let Value::Num(x) = got else { panic!("got {got}") };

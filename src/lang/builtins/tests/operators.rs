@@ -1,4 +1,4 @@
-//! Operators: values, broadcasting, edge cases, error texts.
+//! Operators: values, broadcasting, edge cases, error messages.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! The table itself: look-up, matching of arguments, and what every entry must satisfy.
+//! The table: look-up, matching of arguments, and invariants of every entry.
 
 use super::*;
 use crate::dist::Dist;
@@ -51,7 +51,7 @@ fn names_are_found_by_module() {
     }
 }
 
-/// The words that the grammar keeps for itself: none of them can be written as a name.
+/// The reserved words of the grammar, which cannot be used as names.
 const KEYWORDS: &[&str] = &[
     "include", "param", "data", "fn", "kernel", "infer", "report", "export", "as", "to", "assume",
     "let", "observe", "with", "coarse", "predict", "factor", "force", "freeze", "forget", "sample",
