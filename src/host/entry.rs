@@ -5,7 +5,9 @@ use super::checked::Checked;
 use crate::dist::{Dist, Distribution};
 use crate::infer::{Kernel, KernelCall, KernelMaker};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Argument, Before, Builtin, Derivative, HostItem,  Row , State, Type , };
+use crate::lang::builtins::{
+    Args, Argument, Before, Builtin, Derivative, HostItem, Row, State, Type,
+};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Likelihood, Value};
 use crate::syntax::{is_keyword, is_name};
@@ -44,7 +46,9 @@ impl Entry {
             kind,
             scalar: None,
             derivative,
-            host: Some(host) , format : None , example : None ,
+            host: Some(host),
+            format: None,
+            example: None,
         };
         Entry { builtin, replaces: false, wrong: None }
     }
@@ -268,7 +272,15 @@ impl Entry {
         self
     }
 
-    /// Makes it replace the language's built-in of the same name.
+    /// An example of its use, for `doc`: an expression with its value behind `//`, or a
+    /// program.
+    #[must_use]
+    pub fn example(mut self, text: impl Into<Cow<'static, str>>) -> Entry {
+        self.builtin.example = Some(text.into());
+        self
+    }
+
+    /// It takes the place of the language's own of that name.
     ///
     /// ```
     /// use pcadlang::host::{Entry, Host, Type};
@@ -281,7 +293,7 @@ impl Entry {
     /// # Ok::<(), pcadlang::Error>(())
     /// ```
     #[must_use]
-    pub fn  example ( mut self , text : impl Into < Cow < 'static , str > > ) - > Entry { self . builtin . example = Some ( text . into ( ) ) ; self } # [ must_use ] pub fn replacing(mut self) -> Entry {
+    pub fn replacing(mut self) -> Entry {
         self.replaces = true;
         self
     }
@@ -313,7 +325,14 @@ impl Entry {
     }
 }
 
- impl From < & Row > for Entry { fn from ( row : & Row ) - > Entry { Entry { builtin : row . into ( ) , replaces : false , wrong : None } } } const HOST: &str = "Of the host";
+/// A built-in of plain functions, which capture nothing.
+impl From<&Row> for Entry {
+    fn from(row: &Row) -> Entry {
+        Entry { builtin: row.into(), replaces: false, wrong: None }
+    }
+}
+
+const HOST: &str = "Of the host";
 
 /// Invalid parameters are a domain fault: a proposal that leads to them is rejected.
 impl From<crate::dist::ParamError> for Fault {

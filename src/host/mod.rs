@@ -31,8 +31,7 @@
 
 mod checked;
 mod entry;
-mod previous
- ;
+mod previous;
 
 #[doc(inline)]
 pub use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
@@ -48,18 +47,17 @@ pub use crate::lang::error::{Fault, FaultKind};
 pub use crate::lang::value::{Likelihood, Located, Object};
 pub use entry::Entry;
 pub use previous::Previous;
-  
 
- 
-use crate::diag::{Diagnostic , Error , Severity, SourceMap};
-use crate::lang::builtins::{Builtin,  InputHook , Table };
+use crate::diag::{Diagnostic, Error, Severity, SourceMap};
+use crate::lang::builtins::{Builtin, InputHook, Table};
 use crate::syntax::{is_keyword, is_name};
 use std::sync::Arc;
 
 /// The items that a host registers; see the [module](self).
 #[derive(Clone, Default)]
 pub struct Host {
-    entries: Vec<Entry > , hooks : Vec < Arc < dyn InputHook > >,
+    entries: Vec<Entry>,
+    hooks: Vec<Arc<dyn InputHook>>,
 }
 
 impl Host {
@@ -75,20 +73,18 @@ impl Host {
         self
     }
 
-    /// Returns the documentation of a name, as `pcadlang doc` shows it, of the host or of
-    /// the language. `None` if the name is unknown or an entry is invalid.
-    pub  ( crate ) fn hook(mutself, hook: Arc < dyn InputHook >) -> Host {
-        self.hooks . push( hook ); self 
+    /// The same with what prepares the inputs of programs.
+    pub(crate) fn hook(mut self, hook: Arc<dyn InputHook>) -> Host {
+        self.hooks.push(hook);
+        self
     }
 
-    /// Returns the built-ins of the language and of the host.
+    /// These built-ins and the host's.
     ///
     /// # Errors
-    /// Reports all mistakes in the entries: a name that is invalid, taken or registered
-    /// twice, invalid or ambiguous arguments, and a setting that does not apply, such as
-    /// a gradient for something that is not a function.
-    pub(crate) fn table(&self , own : & Table ) -> Result<Arc<Table>, Error> {
-           
+    /// A name that is none or taken, arguments that cannot be told apart, a gradient of
+    /// what is no function: all of them.
+    pub(crate) fn table(&self, own: &Table) -> Result<Arc<Table>, Error> {
         let mut diagnostics = Vec::new();
         let mut wrong = |message: String, hint: &str| {
             let d = Diagnostic::new(Severity::Error, message);
@@ -96,7 +92,7 @@ impl Host {
         };
         for (i, e) in self.entries.iter().enumerate() {
             let (b, name) = (&e.builtin, &*e.builtin.name);
-            let taken = own.find(& b . module, name).is_some() || own.constant(name).is_some();
+            let taken = own.find(&b.module, name).is_some() || own.constant(name).is_some();
             if !is_name(name) || is_keyword(name) {
                 wrong(
                     format!("`{name}` is not a valid name for a host function"),
@@ -107,7 +103,10 @@ impl Host {
                     format!("`{name}` is a built-in of the language"),
                     "choose another name; functions can be `replacing()`",
                 );
-            } else if self.entries[..i].iter().any(|o| o.builtin.name == b.name & & o . builtin . module = = b . module ) {
+            } else if self.entries[..i]
+                .iter()
+                .any(|o| o.builtin.name == b.name && o.builtin.module == b.module)
+            {
                 wrong(format!("the host registers `{name}` twice"), "");
             }
             if let Some(what) = &e.wrong {
@@ -117,7 +116,10 @@ impl Host {
         }
         match diagnostics.is_empty() {
             true => {
-                let entries =self.entries.iter().map(|e| Builtin::clone(&e.builtin)) ; let mut table = own . clone ( ) . with ( entries ) ; table . hooks . extend ( self . hooks . iter ( ) . cloned ( ) ) ; Ok ( Arc : : new ( table ))
+                let entries = self.entries.iter().map(|e| Builtin::clone(&e.builtin));
+                let mut table = own.clone().with(entries);
+                table.hooks.extend(self.hooks.iter().cloned());
+                Ok(Arc::new(table))
             }
             false => Err(Error { diagnostics, sources: SourceMap::new() }),
         }

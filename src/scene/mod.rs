@@ -1,9 +1,9 @@
 //! The module `scene`: shapes, placements, cameras, and the likelihoods that compare a
 //! view with an observation.
 //!
-//! A thin layer over [`crate::geom`], [`crate::render`] and [`crate::vision`], which
-//! implement geometry, rendering and comparison; here their values become values of the
-//! language.
+//! The scene is a guest of the engine: it registers everything through [`crate::host`], as
+//! any embedding program does. It is a thin layer: [`crate::geom`], [`crate::render`] and
+//! [`crate::vision`] do the work; here their values become values of the language.
 
 mod adjoints;
 mod bodies;
@@ -12,23 +12,32 @@ mod candidates;
 mod compare;
 mod compare_depths;
 mod compare_keypoints;
- pub mod data ; mod edges ; mod examples ; # [ cfg ( test ) ] mod gradient_tests ; mod inputs ;
+pub mod data;
+mod edges;
+mod examples;
+#[cfg(test)]
+mod gradient_tests;
+mod inputs;
 mod objects;
 mod observed;
 mod people;
 mod region;
-mod  scene_view ; mod seeing;
+mod scene_view;
+mod seeing;
 mod shape_vjps;
 mod shapes;
 
 pub use inputs::{CAMERAS, DETECTOR_DEFAULT};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
+pub use scene_view::SceneView;
 
- pub use scene_view : : SceneView ; use crate : : geom : : GeomError ; use crate : : host : : { Entry , Host } ; use crate : : lang : : builtins::{Arg, Args, Row, Type, function}
- ;
+use crate::geom::GeomError;
+use crate::host::{Entry, Host};
+use crate::lang::builtins::{Arg, Args, Row, Type, function};
 use crate::lang::error::{Fault, FaultKind};
-use crate::lang::value::Value ; use std : : sync : : Arc ;
+use crate::lang::value::Value;
+use std::sync::Arc;
 
 const SOLID: Type = Type::Object("a solid");
 const ARMATURE: Type = Type::Object("an armature");
@@ -50,13 +59,29 @@ const fn native(
     Row { module: "scene", ..function(name, section, args, returns, doc, f) }
 }
 
-/// All built-ins of the module.
-pub fn host() -> Host     {
-    let tables =
-        [ data : : TABLE , shapes : : TABLE , bodies : : TABLE , seeing : : TABLE , compare : : TABLE , region : : TABLE , edges : : TABLE , people::TABLE, candidates::TABLE, compare_keypoints::TABLE, compare_depths::TABLE , ];
-    let host = Host::new ( ) . hook ( Arc ::new( inputs::Inputs ) ) ; tables.into_iter().flatten
-         ().fold(host , | host , row | { let entry = Entry : : from ( row);
-    host.with( match examples : : of ( row ) { Some ( text ) = > entry . example ( text ) , None = > entry , } ) } )
+/// The scene as a host: its functions, its kinds of data, and how it prepares inputs.
+pub fn host() -> Host {
+    let tables = [
+        data::TABLE,
+        shapes::TABLE,
+        bodies::TABLE,
+        seeing::TABLE,
+        compare::TABLE,
+        region::TABLE,
+        edges::TABLE,
+        people::TABLE,
+        candidates::TABLE,
+        compare_keypoints::TABLE,
+        compare_depths::TABLE,
+    ];
+    let host = Host::new().hook(Arc::new(inputs::Inputs));
+    tables.into_iter().flatten().fold(host, |host, row| {
+        let entry = Entry::from(row);
+        host.with(match examples::of(row) {
+            Some(text) => entry.example(text),
+            None => entry,
+        })
+    })
 }
 
 /// Converts the error of a shape that cannot be made: numbers outside their domain reject

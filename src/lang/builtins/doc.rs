@@ -50,7 +50,7 @@ fn entry(b: &Builtin) -> String {
     for (what, text) in notes(b) {
         let _ = write!(s, "\n{what}: {text}\n");
     }
-    if let Some(example) = b.example . as_deref () {
+    if let Some(example) = b.example.as_deref() {
         // Only programs, which contain `;`, need the include line; expressions do not.
         let include = if example.contains("scene.") && example.contains(';') {
             format!("  {INCLUDE}\n")
@@ -99,7 +99,7 @@ pub fn reference(table: &Table) -> String {
             for (what, text) in notes(b) {
                 let _ = writeln!(s, "  - *{what}*: {text}");
             }
-            if let Some(example) = b.example . as_deref () {
+            if let Some(example) = b.example.as_deref() {
                 let _ = writeln!(s, "  ```pcad\n{}  ```", indented(example, "  "));
             }
         }

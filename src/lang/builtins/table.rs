@@ -3,11 +3,14 @@
 //! This is not a scope: lowering handles names in the program that shadow them.
 
 use super::{
-    Builtin, Row, Text, covariance, data, definite, distributions,  examples , forms, inference, interp, list,
-    log_density, math, matrix, operators, reduce, 
-} ; use crate : : lang : : value : : Value ;
+    Builtin, Row, Text, covariance, data, definite, distributions, examples, forms, inference,
+    interp, list, log_density, math, matrix, operators, reduce,
+};
+use crate::lang::value::Value;
 use indexmap::{Equivalent, IndexMap};
-use rustc_hash:: { FxBuildHasher , FxHashMap } ; use std : : fmt ; use std : : sync : : Arc ;
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use std::fmt;
+use std::sync::Arc;
 
 /// A name with a fixed value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +53,10 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
         data::TABLE,
         inference::TABLE,
     ];
-    own.into_iter().flatten().map( | row | { let builtin = Builtin::from ( row ) ; Builtin { example : examples : : of ( row . name ) , . . builtin } } )
+    own.into_iter().flatten().map(|row| {
+        let builtin = Builtin::from(row);
+        Builtin { example: examples::of(row.name), ..builtin }
+    })
 }
 
 /// The module and name of a built-in.
@@ -67,24 +73,43 @@ impl Equivalent<FullName> for Sought<'_> {
     }
 }
 
-/// The built-ins available to a program, by index and by name.
- pub type Defaults = FxHashMap < ( String , String ) , Value > ; pub trait InputHook : fmt : : Debug + Send + Sync { fn prepare ( & self , data : & mut IndexMap < String , Value > , defaults : & mut Defaults ) ; fn adapt ( & self , value : Value , defaults : & Defaults ) - > Value ; } #[derive(Clone, Debug)]
+/// Values of arguments wherever a program leaves them out: of a built-in by full name, an
+/// argument by name.
+pub type Defaults = FxHashMap<(String, String), Value>;
+
+/// What a host does with a program's inputs before the program is compiled.
+pub trait InputHook: fmt::Debug + Send + Sync {
+    /// Completes the `data` items that were given and the defaults of arguments.
+    fn prepare(&self, data: &mut IndexMap<String, Value>, defaults: &mut Defaults);
+
+    /// Adapts a value that a `data` item reads from a file.
+    fn adapt(&self, value: Value, defaults: &Defaults) -> Value;
+}
+
+/// The built-ins a program sees, by index and by name.
+#[derive(Clone, Debug)]
 pub struct Table {
     entries: IndexMap<FullName, Builtin, FxBuildHasher>,
- pub hooks : Vec < Arc < dyn InputHook > > , }
+    /// What prepares the inputs of programs.
+    pub hooks: Vec<Arc<dyn InputHook>>,
+}
 
 impl Default for Table {
+    /// The built-ins of the language alone.
     fn default() -> Self {
-         let table = Table { entries : IndexMap : : default ( ) , hooks : Vec ::new() } ; table . with ( all ( ))
+        let table = Table { entries: IndexMap::default(), hooks: Vec::new() };
+        table.with(all())
     }
 }
 
 impl Table {
-    /// Creates the table of the language's built-ins and `more`, which replace entries
-    /// with the same module and name.
-     # [ must_use ] pub fn with( mut self , more: impl IntoIterator<Item = Builtin>) -> Self {
-        let more = more . into_iter() ; self .entries . extend(more
-           .map(|b| (FullName(b.module.clone(), b.name.clone()), b))) ; self
+    /// The table with more built-ins; one of the same module and name replaces an earlier
+    /// one.
+    #[must_use]
+    pub fn with(mut self, more: impl IntoIterator<Item = Builtin>) -> Self {
+        let more = more.into_iter();
+        self.entries.extend(more.map(|b| (FullName(b.module.clone(), b.name.clone()), b)));
+        self
     }
 
     /// Returns the built-in at an index from [`find`](Table::find).
@@ -98,8 +123,8 @@ impl Table {
         self.entries.get_index_of(&Sought(module, name)).map(|i| i as u32)
     }
 
-    /// Returns all built-ins, in the order of the reference.
-    pub fn iter(&self) -> impl Iterator<Item = &Builtin>  + Clone {
+    /// All of them, in the order of the reference.
+    pub fn iter(&self) -> impl Iterator<Item = &Builtin> + Clone {
         self.entries.values()
     }
 

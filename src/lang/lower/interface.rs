@@ -1,6 +1,7 @@
 //! The interface of a program: its parameters and data, found without lowering it.
 
- use crate : : lang : : builtins : : Table ; use crate::lang::builtins::data::Options;
+use crate::lang::builtins::Table;
+use crate::lang::builtins::data::Options;
 use crate::lang::load::Loaded;
 use crate::syntax::ast::{ExprKind, ItemKind};
 use crate::syntax::print_expr;
@@ -43,16 +44,16 @@ pub struct Interface {
     pub data: Vec<DataItem>,
 }
 
-/// Returns a program's interface, from its text.
-pub fn inspect(loaded: &Loaded , builtins : & Table ) -> Interface {
+/// Reads a program's interface off its text.
+pub fn inspect(loaded: &Loaded, builtins: &Table) -> Interface {
     let mut found = Interface::default();
     if !loaded.units.is_empty() {
-        unit(loaded,  builtins , 0, "", &mut found);
+        unit(loaded, builtins, 0, "", &mut found);
     }
     found
 }
 
-fn unit(loaded: &Loaded , builtins : & Table , index: usize, prefix: &str, found: &mut Interface) {
+fn unit(loaded: &Loaded, builtins: &Table, index: usize, prefix: &str, found: &mut Interface) {
     let unit_ = &loaded.units[index];
     for (i, item) in unit_.program.items.iter().enumerate() {
         match &item.kind {
@@ -74,7 +75,7 @@ fn unit(loaded: &Loaded , builtins : & Table , index: usize, prefix: &str, found
                 });
                 // Errors in options are reported when the program is lowered.
                 let options =
-                    read.as_ref().and_then(|(kind, args)| builtins . options(kind, args).ok());
+                    read.as_ref().and_then(|(kind, args)| builtins.options(kind, args).ok());
                 found.data.push(DataItem {
                     name: format!("{prefix}{}", d.name.node),
                     ty: d.ty.as_ref().map(|t| t.node.to_string()).or(read.map(|(kind, _)| kind)),
@@ -86,8 +87,8 @@ fn unit(loaded: &Loaded , builtins : & Table , index: usize, prefix: &str, found
             ItemKind::Include { alias, .. } => {
                 if let Some(inner) = unit_.includes.get(i).copied().flatten() {
                     match alias {
-                        Some(a) => unit(loaded,  builtins , inner, &format!("{}/", a.node), found),
-                        None => unit(loaded,  builtins , inner, prefix, found),
+                        Some(a) => unit(loaded, builtins, inner, &format!("{}/", a.node), found),
+                        None => unit(loaded, builtins, inner, prefix, found),
                     }
                 }
             }

@@ -4,7 +4,8 @@ use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
 use super::types::{accepts, declared, shown};
 use super::{AddHint, Export, Lowerer, Pending, Plan, Report, Typed};
 use crate::diag::{IntoDiagnostic, nearest};
-use crate::lang::builtins::Type; use crate : : lang : : builtins : : data: : Options;
+use crate::lang::builtins::Type;
+use crate::lang::builtins::data::Options;
 use crate::lang::code::{BlockKind, Op};
 use crate::lang::value::{Closure, Value};
 use crate::syntax::ast::{
@@ -314,9 +315,10 @@ impl Lowerer<'_> {
     fn data(&mut self, d: &Declaration, folder: &str) {
         let name = self.global_name(&d.name);
         if let Some(t) = &d.ty
-            && self . code . builtins . kind(   &t.node)
-         . is_none ( ) {
-             let builtins = Arc : : clone ( & self . code . builtins ) ; let near = nearest(&t.node, builtins .kinds()).map(str::to_owned);
+            && self.code.builtins.kind(&t.node).is_none()
+        {
+            let builtins = Arc::clone(&self.code.builtins);
+            let near = nearest(&t.node, builtins.kinds()).map(str::to_owned);
             let e = self.error(
                 format!("there is no data of type `{}`", t.node),
                 t.span,
@@ -326,7 +328,7 @@ impl Lowerer<'_> {
                 Some(n) => e.hint_also(format!("did you mean `{n}`?")),
                 None => e.hint_also(format!(
                     "types are {}",
-                    builtins .kinds().collect::<Vec<_>>().join(", ")
+                    builtins.kinds().collect::<Vec<_>>().join(", ")
                 )),
             }
         }
@@ -335,7 +337,7 @@ impl Lowerer<'_> {
                 // The file was read with the options of the default.
                 if let Some(ExprKind::Call { callee, args }) = default.as_ref().map(|e| &e.kind)
                     && let ExprKind::Var(kind) = &callee.kind
-                    && self . code . builtins . kind( kind ).is_some(   )
+                    && self.code.builtins.kind(kind).is_some()
                 {
                     self.options(kind, args.get(1..).unwrap_or_default());
                 }
@@ -359,9 +361,9 @@ impl Lowerer<'_> {
     fn data_default(&mut self, e: &Expr, folder: &str) -> Typed {
         if let ExprKind::Call { callee, args } = &e.kind
             && let ExprKind::Var(kind) = &callee.kind
-            && self . code . builtins . kind( kind ).is_some(   )
+            && self.code.builtins.kind(kind).is_some()
         {
-            if let (true, Some(v)) = (args.is_empty(), self .without_file(kind)) {
+            if let (true, Some(v)) = (args.is_empty(), self.without_file(kind)) {
                 return self.constant(v);
             }
             let Some((arg, rest)) = args.split_first() else {
@@ -390,18 +392,23 @@ impl Lowerer<'_> {
         self.expr(e)
     }
 
-    /// Parses the reading options of a data item's file from the arguments that follow
-    /// its path.
-    fn  without_file ( & self , kind : & str ) - > Option < Value > { self . code . builtins . kind ( kind ) ? . format . as_ref ( ) ? . without_file ( ) } fn options(&mut self, kind: &str, args: &[crate::syntax::ast::Arg]) -> Option<Options> {
+    /// The value of a data item of a kind that is given no file.
+    fn without_file(&self, kind: &str) -> Option<Value> {
+        self.code.builtins.kind(kind)?.format.as_ref()?.without_file()
+    }
+
+    /// How a data item's file is to be read, from the arguments after its path.
+    fn options(&mut self, kind: &str, args: &[crate::syntax::ast::Arg]) -> Option<Options> {
         let (i, fault) = match self.code.builtins.options(kind, args) {
             Ok(options) => return Some(options),
             Err(e) => e,
         };
         let span = args.get(i)?.value.span;
-         let builtins = Arc : : clone ( & self . code . builtins ) ; self.error(
+        let builtins = Arc::clone(&self.code.builtins);
+        self.error(
             fault.message,
             span,
-            if builtins .has_options(kind) { "not an option" } else { "not expected" },
+            if builtins.has_options(kind) { "not an option" } else { "not expected" },
         )
         .hints
         .extend(fault.hint);
@@ -410,7 +417,7 @@ impl Lowerer<'_> {
 
     /// Reports `--set` and `--observe` names that no file declares.
     pub fn unused_inputs(&mut self) {
-        let interface = super::inspect(self.loaded , & self . code . builtins );
+        let interface = super::inspect(self.loaded, &self.code.builtins);
         let params: Vec<&str> = interface.params.iter().map(|p| p.name.as_str()).collect();
         let items: Vec<&str> = interface.data.iter().map(|d| d.name.as_str()).collect();
         let mut unknown = Vec::new();

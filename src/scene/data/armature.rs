@@ -1,4 +1,4 @@
-//! Armatures: a rig file with its mesh and morphs, or a glTF file with a skin.
+//! Armatures: a rig file and what it names, or a glTF file with a skin.
 
 use super::Beside;
 use crate::geom::armature::{Armature, morphs_from_json, rig_from_json};
@@ -8,7 +8,7 @@ use crate::lang::value::Value;
 use crate::scene::ArmatureValue;
 use std::sync::Arc;
 
-/// Reads a glTF file, or a rig with its mesh and its morphs, if any.
+/// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
 pub(super) fn load(
     file: &str,
     bytes: &[u8],

@@ -4,8 +4,7 @@
 //! that use `scene` omit the line [`INCLUDE`], which precedes them.
 
 mod distributions;
-mod inference
- ;
+mod inference;
 mod values;
 
 use super::Text;
@@ -13,20 +12,14 @@ use super::Text;
 /// The first line of programs that use `scene`.
 pub const INCLUDE: &str = "include \"std/scene.pcad\" as scene;";
 
-/// Examples by full name.
- pub ( crate ) type Examples = &'static [(&'static str, &'static str)];
+/// By full name.
+pub(crate) type Examples = &'static [(&'static str, &'static str)];
 
-  
-    /// Returns an example of its use; `None` for a host's built-in.
-    pub  ( super ) fn of( name : &str) -> Option<Text > {
-          
-             
-        
-           
-        [values::EXAMPLES, distributions::EXAMPLES, inference ::EXAMPLES]
-            .into_iter()
-            .flatten()
-            .find(|(of, _)| *of == name)
-            .map(|(_, text)|  ( *text)
-     . into ( ) ) }
-
+/// The example of one of the language's built-ins.
+pub(super) fn of(name: &str) -> Option<Text> {
+    [values::EXAMPLES, distributions::EXAMPLES, inference::EXAMPLES]
+        .into_iter()
+        .flatten()
+        .find(|(of, _)| *of == name)
+        .map(|(_, text)| (*text).into())
+}

@@ -1,19 +1,18 @@
 //! Tests of the built-ins through the table, as programs call them.
 
- 
 mod lists;
 mod maths;
 mod operators;
 mod table;
 
- pub ( crate ) use super::{Args, Builtin, Kind, Table};
+pub(crate) use super::{Args, Builtin, Kind, Table};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
-use std::sync:: { Arc , LazyLock } ;
+use std::sync::{Arc, LazyLock};
 
- pub ( crate ) static TABLE: LazyLock< Arc < Table > > = LazyLock::new(crate::standard : : table);
+pub(crate) static TABLE: LazyLock<Arc<Table>> = LazyLock::new(crate::standard::table);
 
-/// Finds a built-in by `module.name` or `name`.
+/// A built-in by `module.name` or `name`.
 pub(crate) fn find(name: &str) -> &'static Builtin {
     let (module, short) = match name.split_once('.') {
         Some((m, n)) if !m.is_empty() && !n.is_empty() => (m, n),
@@ -36,12 +35,12 @@ pub(crate) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
     }
 }
 
-/// Calls a function, and requires success.
+/// The same, of a call that must succeed.
 pub(crate) fn call(name: &str, values: &[Value]) -> Value {
     try_call(name, values).unwrap_or_else(|f| panic!("{name}: {}", f.message))
 }
 
-/// Calls a function, requires an error, and returns its message with its hint, if any.
+/// The message, and hint if any, of a call that must fail.
 pub(crate) fn fails(name: &str, values: &[Value]) -> String {
     match try_call(name, values) {
         Ok(v) => panic!("{name} gave {v}"),
