@@ -13,32 +13,22 @@
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "scene")]
 #[doc(hidden)]
 pub mod bank;
 pub mod diag;
-#[doc(hidden)]
-pub mod dist;
-#[doc(hidden)]
-pub mod geom;
 pub mod host;
 pub mod infer;
 #[doc(hidden)]
 pub mod lang;
 mod model;
-#[doc(hidden)]
-pub mod nn;
-#[doc(hidden)]
-pub mod num;
-mod platform;
-#[doc(hidden)]
-pub mod render;
 pub mod report;
-pub mod rng;
 #[cfg(feature = "scene")]
 #[doc(hidden)]
 pub mod scene;
 #[doc(hidden)]
 pub mod score;
+#[cfg(feature = "scene")]
 #[doc(hidden)]
 pub mod session;
 #[doc(hidden)]
@@ -48,12 +38,20 @@ pub mod syntax;
 pub mod trace;
 #[doc(hidden)]
 pub mod tradeoff;
-#[doc(hidden)]
-pub mod vision;
+
+#[doc(no_inline)]
+#[cfg(feature = "scene")]
+pub use pcadlang_detectors::{nn, people};
+use pcadlang_numerics::platform;
+pub use pcadlang_numerics::{dist, num, rng};
+#[doc(no_inline)]
+#[cfg(feature = "scene")]
+pub use pcadlang_scene::{geom, render, vision};
 
 pub use infer::RunOptions;
 #[doc(inline)]
 pub use lang::value::Value;
 pub use model::{Error, Model, Posterior, Program};
+#[cfg(feature = "scene")]
 #[doc(inline)]
 pub use render::Camera;

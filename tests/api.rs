@@ -20,9 +20,9 @@ const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/lang/adjoint.rs", &["Adjoint"], &["src/host"]),
     ("src/lang/error.rs", &["Fault", "FaultKind", "RunError"], &["src/host", "src/trace"]),
     ("src/lang/value.rs", &["Value", "Object", "Likelihood", "Located"], &["src/host"]),
-    ("src/dist/distribution.rs", &["Distribution", "Gradient"], &["src/host"]),
-    ("src/dist/datum.rs", &["Datum"], &["src/host"]),
-    ("src/dist/support.rs", &["Support"], &["src/host"]),
+    ("crates/numerics/src/dist/distribution.rs", &["Distribution", "Gradient"], &["src/host"]),
+    ("crates/numerics/src/dist/datum.rs", &["Datum"], &["src/host"]),
+    ("crates/numerics/src/dist/support.rs", &["Support"], &["src/host"]),
     ("src/trace/mod.rs", &["Trace", "TraceResult"], &["src/trace"]),
     ("src/trace/operations.rs", &[], &["src/trace"]),
     ("src/trace/observed.rs", &[], &["src/trace"]),
@@ -65,7 +65,7 @@ const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/diag/diagnostic.rs", &["Diagnostic", "Label", "Severity"], &["src/diag"]),
     ("src/diag/source.rs", &["SourceMap", "SourceFile"], &["src/diag"]),
     ("src/diag/render.rs", &["render"], &["src/diag"]),
-    ("src/rng.rs", &["Stream", "StreamKey", "Purpose"], &[]),
+    ("crates/numerics/src/rng.rs", &["Stream", "StreamKey", "Purpose"], &[]),
 ];
 
 fn root() -> &'static Path {

@@ -3,7 +3,7 @@
 #[path = "common/folder.rs"]
 mod folder;
 #[allow(dead_code)]
-#[path = "../src/vision/forest/writer.rs"]
+#[path = "../crates/scene/src/vision/forest/writer.rs"]
 mod forests;
 
 use folder::{Folder, disc, png};

@@ -4,7 +4,7 @@
 #[path = "common/folder.rs"]
 mod folder;
 #[allow(dead_code)]
-#[path = "../src/vision/forest/writer.rs"]
+#[path = "../crates/scene/src/vision/forest/writer.rs"]
 mod forests;
 
 use folder::{Folder, disc, png};
@@ -22,7 +22,7 @@ fn files() -> Folder {
     let f = Folder::new("examples");
     let ball = png(disc(64, 64, 32.0, 32.0, 15.0));
     f.write("ball.png", &ball).write("mask.png", &ball);
-    f.write("depth.npy", pcadlang::report::npy::f32_array(&[32, 32], [7.0; 32 * 32]));
+    f.write("depth.npy", pcadlang::vision::npy::f32_array(&[32, 32], [7.0; 32 * 32]));
     f.write("model.yml.gz", forests::gzip(forests::small().yaml().as_bytes()));
     f.write("person.json", include_str!("../examples/images/skier.keypoints.json"));
     f.succeeds(&["contours", "ball.png", "-o", "contours.png"]);

@@ -4,13 +4,13 @@
 #[path = "common/folder.rs"]
 mod folder;
 #[allow(dead_code)]
-#[path = "../src/vision/forest/writer.rs"]
+#[path = "../crates/scene/src/vision/forest/writer.rs"]
 mod forests;
 #[path = "common/gltf.rs"]
 #[allow(dead_code)]
 mod gltf;
 #[allow(dead_code)]
-#[path = "../src/nn/tests/writer.rs"]
+#[path = "../crates/detectors/src/nn/tests/writer.rs"]
 mod networks;
 #[path = "../fuzz/src/lib.rs"]
 mod targets;
@@ -18,7 +18,7 @@ mod targets;
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage, RgbaImage};
 use pcadlang::Program;
 use pcadlang::bank::{Features, Learn, learn};
-use pcadlang::report::npy;
+use pcadlang::vision::npy;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;

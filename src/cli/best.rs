@@ -13,12 +13,12 @@ use pcadlang::geom::{Mesh, Solid, glb, obj};
 use pcadlang::infer::{BestSoFar, BestState, ChainResult};
 use pcadlang::lang::value::Located;
 use pcadlang::render::{Camera, View};
+use pcadlang::report::RunDir;
 use pcadlang::report::pictures::{self, png};
-use pcadlang::report::{RunDir, npy};
 use pcadlang::scene::{ImageValue, ViewValue};
 use pcadlang::session::{detected, exported, exported_operand, over, strokes};
 use pcadlang::trace::Trace;
-use pcadlang::vision::Photo;
+use pcadlang::vision::{Photo, npy};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

@@ -3,9 +3,9 @@
 use super::{Failure, files, plain};
 use clap::Args;
 use image::RgbImage;
+use pcadlang::people::{FindOptions, PeopleFinder, Person, json, networks};
 use pcadlang::report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang::vision::Photo;
-use pcadlang::vision::people::{FindOptions, PeopleFinder, Person, json, networks};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 

@@ -2,8 +2,8 @@
 
 use clap::Args;
 use pcadlang::lang::value::Value;
+use pcadlang::people::Person;
 use pcadlang::scene::ImageValue;
-use pcadlang::vision::people::Person;
 use std::path::PathBuf;
 
 /// Which person of a photograph is meant, and what finds people.

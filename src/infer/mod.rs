@@ -37,6 +37,7 @@ mod state;
 mod structure;
 
 use crate::platform::threads as parallel;
+#[cfg(feature = "scene")]
 pub(crate) use crate::platform::threads::in_parallel;
 pub use best::{BestSoFar, BestState};
 pub use callback::{Callback, Callbacks};

@@ -21,9 +21,8 @@ mod hash;
 pub mod html;
 mod modes;
 mod moments;
-#[doc(hidden)]
-pub mod npy;
 mod number;
+#[cfg(feature = "scene")]
 #[doc(hidden)]
 pub mod pictures;
 mod reread;

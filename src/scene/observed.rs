@@ -3,8 +3,8 @@
 //! cached with it.
 
 use crate::lang::value::{Object, Value};
+use crate::people::Person;
 use crate::vision::candidates::{Candidate, CandidateOptions};
-use crate::vision::people::Person;
 use crate::vision::{
     Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
     DepthMap, FileDetector, GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region,

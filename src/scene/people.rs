@@ -1,12 +1,12 @@
-//! The people in a photograph, as values: a thin layer over [`crate::vision::people`].
+//! The people in a photograph, as values: a thin layer over [`crate::people`].
 
 use super::observed::{KeypointsValue, MaskValue};
 use super::{IMAGE, ImageValue, native};
 use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
+use crate::people::{FindOptions, Person, networks};
 use crate::vision::keypoints::{Elsewhere, Keypoint, Keypoints, MEDIAPIPE};
-use crate::vision::people::{FindOptions, Person, networks};
 use crate::vision::{Mask, Photo};
 use std::sync::Arc;
 
@@ -84,7 +84,7 @@ fn number(x: f64) -> Value {
 
 /// Converts a person to a record.
 fn value(p: &Person, photo: &Photo) -> Result<Value, String> {
-    let point = |(i, (name, l)): (usize, (&&'static str, &crate::vision::people::Landmark))| {
+    let point = |(i, (name, l)): (usize, (&&'static str, &crate::people::Landmark))| {
         let elsewhere = p.others.iter().map(|h| {
             let [x, y] = h.landmarks[i].at;
             Elsewhere { x, y, weight: ELSEWHERE * h.views as f64 / p.agreeing.max(1) as f64 }

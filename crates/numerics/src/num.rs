@@ -1,0 +1,32 @@
+//! Numerics for densities: exact sums, functions that are stable in log space, a hash.
+//! All through `libm`, so results are the same on every platform.
+
+mod column;
+mod exact;
+mod hash;
+mod incomplete;
+mod log_tails;
+mod saddle;
+pub mod simd;
+mod special;
+mod tails;
+
+pub use column::Column;
+pub use exact::ExactSum;
+pub use hash::fnv1a;
+pub use incomplete::{chi_square_tail, upper_gamma};
+pub use log_tails::{beta_tails, gamma_tails};
+pub use saddle::{deviance, stirling_error};
+pub use special::{
+    LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma,
+    log_diff_exp, log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
+};
+pub use tails::{bessel_deficit, log_scaled_i0, mills_ratio};
+
+/// Adds `more` to `all` element by element, extending `all` with zeros if it is shorter.
+pub fn accumulate(all: &mut Vec<f64>, more: &[f64]) {
+    if all.len() < more.len() {
+        all.resize(more.len(), 0.0);
+    }
+    all.iter_mut().zip(more).for_each(|(a, b)| *a += b);
+}

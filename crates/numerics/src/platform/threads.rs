@@ -1,0 +1,87 @@
+//! Parallel maps, which run sequentially if there are no threads. Invariant: results do
+//! not depend on the number of threads.
+
+/// A pool of threads. It has none in a build without the feature `threads`, or if they
+/// cannot be created.
+pub struct Pool {
+    #[cfg(feature = "threads")]
+    pool: Option<rayon::ThreadPool>,
+}
+
+#[cfg(feature = "threads")]
+impl Pool {
+    /// Starts this many threads (0: one per core), which live until the pool is dropped.
+    pub fn new(threads: usize) -> Pool {
+        Pool { pool: rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok() }
+    }
+
+    /// Applies `one` to each item; results are in order.
+    pub fn map<I: Send, T: Send>(
+        &self,
+        items: Vec<I>,
+        one: impl Fn(I) -> T + Sync + Send,
+    ) -> Vec<T> {
+        use rayon::prelude::*;
+        match &self.pool {
+            Some(pool) => pool.install(|| items.into_par_iter().with_max_len(1).map(one).collect()),
+            None => items.into_iter().map(one).collect(),
+        }
+    }
+}
+
+#[cfg(not(feature = "threads"))]
+impl Pool {
+    /// Makes a pool without threads.
+    pub fn new(_threads: usize) -> Pool {
+        Pool {}
+    }
+
+    /// Applies `one` to each item in turn.
+    pub fn map<I: Send, T: Send>(
+        &self,
+        items: Vec<I>,
+        one: impl Fn(I) -> T + Sync + Send,
+    ) -> Vec<T> {
+        items.into_iter().map(one).collect()
+    }
+}
+
+/// Applies `one` to each item on this many threads (0: one per core); results are in
+/// order.
+pub fn in_parallel<I: Send, T: Send>(
+    threads: usize,
+    items: Vec<I>,
+    one: impl Fn(I) -> T + Sync + Send,
+) -> Vec<T> {
+    Pool::new(threads).map(items, one)
+}
+
+/// Runs `work` for every part, each on its own thread, and waits for all. It does not use
+/// a [`Pool`]: a pool's waiting thread takes up other tasks, which could need a lock that
+/// the caller holds.
+pub fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(usize, T) + Sync) {
+    #[cfg(all(feature = "threads", not(target_family = "wasm")))]
+    {
+        let work = &work;
+        std::thread::scope(|scope| {
+            for (i, part) in parts.into_iter().enumerate() {
+                scope.spawn(move || work(i, part));
+            }
+        });
+    }
+    #[cfg(not(all(feature = "threads", not(target_family = "wasm"))))]
+    parts.into_iter().enumerate().for_each(|(i, part)| work(i, part));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_parallel;
+
+    #[test]
+    fn results_are_in_order_on_any_number_of_threads() {
+        let expected: Vec<u64> = (0..1000).map(|i| i * i).collect();
+        for threads in [0, 1, 2, 7] {
+            assert_eq!(in_parallel(threads, (0..1000u64).collect(), |i| i * i), expected);
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Shapes: triangle meshes made in code or read from files, placed in the world.
+//!
+//! World frame: right-handed, y up; lengths in scene units, angles in radians.
+//! Independent of cameras and programs.
+
+mod affine;
+pub mod armature;
+mod bounds;
+mod cuboid;
+mod detail;
+mod edges;
+mod error;
+mod frame;
+pub mod glb;
+pub mod gltf;
+mod landmark;
+mod lathe;
+mod mesh;
+pub mod obj;
+mod patches;
+mod profile_path;
+mod real;
+mod revolve;
+mod solid;
+mod sphere;
+
+pub use affine::Affine;
+pub use bounds::Bounds;
+pub use cuboid::{cuboid, vjp_cuboid};
+pub use detail::{Coarse, Detail};
+pub use error::GeomError;
+pub use frame::{FileFrame, UpAxis};
+pub use landmark::Landmark;
+pub use lathe::{Caps, LatheGradient, Profile, Wall, lathe, vjp_lathe};
+pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
+pub use patches::Patches;
+pub(crate) use patches::Run;
+pub(crate) use solid::MeshesMark;
+pub use solid::{Instance, PlacedGradient, Solid};
+pub use sphere::{sphere, vjp_sphere};
+
+/// Returns the matrix a b'.
+pub fn outer(a: glam::DVec3, b: glam::DVec3) -> glam::DMat3 {
+    glam::DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}

@@ -1,0 +1,8 @@
+//! The scene of `pcadlang`: geometry, drawing on the CPU, and the evidence of images. It
+//! knows nothing of programs and traces, and can be used without them.
+#![warn(missing_docs)]
+#![forbid(unsafe_code)]
+
+pub mod geom;
+pub mod render;
+pub mod vision;

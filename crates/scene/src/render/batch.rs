@@ -1,0 +1,179 @@
+//! Drawing many scenes at once, for banks of proposals and populations, whose members do
+//! not wait for one another.
+//!
+//! [`BatchRenderer`] is the interface for other devices: its input is shared meshes with
+//! flat lists of vertices, its output is one set of flat lists for all scenes. Invariant:
+//! a scene's contours do not depend on the other scenes, on their order, or on the number
+//! of threads: they are those of [`Contours::of`].
+
+use super::{Camera, Contours};
+use crate::geom::Solid;
+use pcadlang_numerics::platform::threads::Pool;
+
+/// A scene to be drawn.
+///
+/// Its meshes ([`Solid::instances`]) are triangle lists: `positions` and `normals` are
+/// three `f32` per vertex without gaps, in scene units, y up; `triangles` are three `u32`
+/// indices each, counter-clockwise as seen from outside; placements are `f64`, column by
+/// column, from the mesh's coordinates to the world's. Scenes share meshes: the same
+/// `Arc` is the same data, so a device may cache meshes by address as long as it holds
+/// the `Arc`.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The solid to be drawn.
+    pub solid: Solid,
+    /// The camera, at the size of the picture.
+    pub camera: Camera,
+}
+
+/// The contours of many scenes. Those of scene `i` are the entries `ends[i - 1]..ends[i]`
+/// of each list (from 0 for the first). All are `f32`, in pixels of the scene's picture,
+/// x to the right and y down, as in [`Contours`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContourBatch {
+    /// Middle of each piece, from the left edge.
+    pub x: Vec<f32>,
+    /// Middle of each piece, from the top edge.
+    pub y: Vec<f32>,
+    /// Unit tangent, component to the right.
+    pub tx: Vec<f32>,
+    /// Unit tangent, downward component.
+    pub ty: Vec<f32>,
+    /// Length of each piece.
+    pub length: Vec<f32>,
+    /// Where the pieces of each scene end.
+    pub ends: Vec<usize>,
+    /// Width and height of each scene's picture.
+    pub sizes: Vec<[u32; 2]>,
+}
+
+/// Borrowed lists of pieces of contour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContourSlice<'a> {
+    /// As in [`Contours`]; all lists have the same length.
+    pub x: &'a [f32],
+    /// As in [`Contours`].
+    pub y: &'a [f32],
+    /// As in [`Contours`].
+    pub tx: &'a [f32],
+    /// As in [`Contours`].
+    pub ty: &'a [f32],
+    /// As in [`Contours`].
+    pub length: &'a [f32],
+    /// Width of the picture.
+    pub width: u32,
+    /// Height of the picture.
+    pub height: u32,
+}
+
+impl ContourBatch {
+    /// The number of scenes.
+    pub fn len(&self) -> usize {
+        self.ends.len().min(self.sizes.len())
+    }
+
+    /// Whether there are no scenes.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The contours of a scene; empty if there is no such scene.
+    pub fn scene(&self, i: usize) -> ContourSlice<'_> {
+        let past = self.ends.get(i).copied().unwrap_or_default();
+        let first = i.checked_sub(1).and_then(|i| self.ends.get(i)).copied().unwrap_or_default();
+        let part = |list: &'_ Vec<f32>| -> std::ops::Range<usize> {
+            first.min(list.len())..past.clamp(first, list.len())
+        };
+        let [width, height] = self.sizes.get(i).copied().unwrap_or_default();
+        ContourSlice {
+            x: &self.x[part(&self.x)],
+            y: &self.y[part(&self.y)],
+            tx: &self.tx[part(&self.tx)],
+            ty: &self.ty[part(&self.ty)],
+            length: &self.length[part(&self.length)],
+            width,
+            height,
+        }
+    }
+
+    /// Adds a scene's contours after the others.
+    pub fn push(&mut self, contours: &Contours) {
+        self.x.extend_from_slice(&contours.x);
+        self.y.extend_from_slice(&contours.y);
+        self.tx.extend_from_slice(&contours.tx);
+        self.ty.extend_from_slice(&contours.ty);
+        self.length.extend_from_slice(&contours.length);
+        self.ends.push(self.x.len());
+        self.sizes.push([contours.width, contours.height]);
+    }
+}
+
+/// Draws the contours of many scenes.
+pub trait BatchRenderer: Sync {
+    /// The contours of each scene, in the order given: on the CPU, those of
+    /// [`Contours::of`] bit for bit; another device may differ by rounding, and must
+    /// document by how much.
+    fn contours(&self, scenes: &[Scene]) -> ContourBatch;
+}
+
+/// Draws on several cores of the CPU.
+pub struct Cores {
+    pool: Pool,
+}
+
+impl Cores {
+    /// Starts a number of threads (0: one for each core). They live until this is
+    /// dropped, and so do their drawing caches.
+    pub fn new(threads: usize) -> Cores {
+        Cores { pool: Pool::new(threads) }
+    }
+}
+
+impl BatchRenderer for Cores {
+    fn contours(&self, scenes: &[Scene]) -> ContourBatch {
+        let draw = |scene: &Scene| Contours::of(&scene.solid, &scene.camera);
+        let drawn = self.pool.map(scenes.iter().collect(), draw);
+        let mut batch = ContourBatch::default();
+        drawn.iter().for_each(|contours| batch.push(contours));
+        batch
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Affine;
+    use crate::render::testing::{Uniform, lathe, sphere};
+    use glam::DVec3;
+
+    #[test]
+    fn scenes_are_drawn_as_one_by_one_on_any_number_of_threads() {
+        let mut random = Uniform(41);
+        let shapes = [sphere(24, 16), lathe(&[(0.3, -0.8), (0.7, -0.2), (0.4, 0.5)], 24, true)];
+        let mut one = |i: usize| {
+            let turn = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
+            // Some are out of view.
+            let at = DVec3::new(
+                if i.is_multiple_of(7) { 50.0 } else { random.between(-0.5, 0.5) },
+                0.0,
+                0.0,
+            );
+            let solid = shapes[i % 2].placed(Affine::new(at, turn, DVec3::ONE));
+            Scene { solid, camera: Camera::default_for(40 + (i as u32 % 3) * 20, 50) }
+        };
+        let scenes: Vec<Scene> = (0..40).map(&mut one).collect();
+        let batch = Cores::new(1).contours(&scenes);
+        for threads in [0, 2, 5] {
+            assert_eq!(Cores::new(threads).contours(&scenes), batch);
+        }
+        assert_eq!((batch.len(), batch.is_empty()), (40, false));
+        for (i, scene) in scenes.iter().enumerate() {
+            let (own, wanted) = (batch.scene(i), Contours::of(&scene.solid, &scene.camera));
+            assert_eq!((own.x, own.y, own.tx), (&wanted.x[..], &wanted.y[..], &wanted.tx[..]));
+            assert_eq!((own.ty, own.length), (&wanted.ty[..], &wanted.length[..]));
+            assert_eq!((own.width, own.height), (scene.camera.width, scene.camera.height));
+            assert_eq!(own.x.is_empty(), i % 7 == 0);
+        }
+        assert!(batch.scene(40).x.is_empty() && Cores::new(2).contours(&[]).is_empty());
+    }
+}

@@ -1,0 +1,252 @@
+//! Contours as a log-likelihood ratio: how much better each rendered piece explains the
+//! observed edges near it than the background density of edges around it does. This is
+//! the default contour score for photographs. It is a pseudo-likelihood, because
+//! neighbouring pieces are not independent (hence the weight), and it has no sampler.
+//! Everything except the match capacity is tabulated when the comparator is prepared, so
+//! an evaluation only reads a table. Invariant: scores are finite, continuous in
+//! positions and orientations, and exactly independent of the order of the elements.
+//!
+//! For a piece at distance d (percent of the diagonal) from the nearest observed edge of
+//! similar orientation, `s = ln((0.75 f(d) + 0.25 b(d)) / b(d))`, where f is a
+//! half-normal density and b the density of that distance over the points of a window
+//! around the piece. A piece far from every edge scores ln 0.25; one in dense texture
+//! about 0.
+
+mod background;
+mod gradient;
+mod match_capacity;
+mod ratio;
+
+use self::background::scores;
+use self::match_capacity::{MatchCapacity, NO_GROUP};
+use super::contour_map::ContourMap;
+use super::elements::{ComparatorError, ContourDelta, Elements, check};
+use super::field::{CHANNELS, Edge, Edges, channels_of, turn_between};
+use pcadlang_numerics::platform::threads::side_by_side;
+
+pub use self::match_capacity::Scratch;
+
+/// Options of [`ContourRatio`]. Lengths are percent of the image diagonal. The defaults
+/// were chosen on ten pictures of 256 x 256 pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContourRatioOptions {
+    /// Fraction of pieces that have a matching observed edge, above 0 and below 1.
+    /// Default 0.75.
+    pub foreground: f64,
+    /// Standard deviation of the half-normal distance of those pieces, above 0. Default
+    /// 0.4.
+    pub sd: f64,
+    /// Distances from this value on count as "no edge nearby", above 0. Default 3.3.
+    pub truncate: f64,
+    /// Side of the window around a piece from which the background density is estimated,
+    /// as a fraction of the picture's sides, above 0 and at most 2. Default 0.25.
+    pub window: f64,
+    /// Length of rendered contour that observed edges match at full score, as a multiple
+    /// of their own length, above 0. Default 2.
+    pub credit: f64,
+    /// Power to which the likelihood ratio of a `unit` of contour is raised, at least 0.
+    /// Default 0.5.
+    pub weight: f64,
+    /// Length of contour that counts as one observation, above 0. Default 0.5524: two
+    /// pixels of a 256 x 256 picture.
+    pub unit: f64,
+    /// Length of contour in view (percent of the diagonal, above 0) below which a penalty
+    /// applies, linear in the missing length. Default 10.
+    pub least: f64,
+    /// The penalty with nothing in view, as the length of contour far from every edge
+    /// that has the same score; at least 0. Default 1000: ten diagonals.
+    pub nothing: f64,
+}
+
+impl Default for ContourRatioOptions {
+    fn default() -> Self {
+        ContourRatioOptions {
+            foreground: 0.75,
+            sd: 0.4,
+            truncate: 3.3,
+            window: 0.25,
+            credit: 2.0,
+            weight: 0.5,
+            unit: 200.0 / (256.0 * std::f64::consts::SQRT_2),
+            least: 10.0,
+            nothing: 1000.0,
+        }
+    }
+}
+
+impl ContourRatioOptions {
+    fn check(&self) -> Result<(), ComparatorError> {
+        check(
+            "foreground",
+            "above 0 and below 1",
+            self.foreground,
+            self.foreground > 0.0 && self.foreground < 1.0,
+        )?;
+        check("sd", "above 0", self.sd, self.sd > 0.0)?;
+        check("truncate", "above 0", self.truncate, self.truncate > 0.0)?;
+        check(
+            "window",
+            "above 0 and at most 2",
+            self.window,
+            self.window > 0.0 && self.window <= 2.0,
+        )?;
+        check("credit", "above 0", self.credit, self.credit > 0.0)?;
+        check("weight", "at least 0", self.weight, self.weight >= 0.0)?;
+        check("unit", "above 0", self.unit, self.unit > 0.0)?;
+        check("least", "above 0", self.least, self.least > 0.0)?;
+        check("nothing", "at least 0", self.nothing, self.nothing >= 0.0)
+    }
+}
+
+/// A sample of the grid, for one orientation channel.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// Log ratio of a piece here.
+    score: f32,
+    /// The group of observed edges that it is matched to, if the score is above 0.
+    group: u32,
+}
+
+/// Observed contours, prepared for scoring many rendered ones.
+#[derive(Debug, Clone)]
+pub struct ContourRatio {
+    options: ContourRatioOptions,
+    grid: Edges,
+    /// The cells of one orientation channel after another, each laid out like the grid.
+    cells: Vec<Cell>,
+    capacity: MatchCapacity,
+    /// Percent of the diagonal per pixel of the frame.
+    percent: f64,
+}
+
+/// Fixed-point steps per unit, for exact sums.
+const FIXED: f64 = (1u64 << 32) as f64;
+
+impl ContourRatio {
+    /// Prepares the observed contours for frames of `width` x `height` pixels. With no
+    /// observed contours every piece scores ln(1 - foreground).
+    ///
+    /// # Errors
+    /// A side outside 1 to 16384 pixels, an option out of its range, or a map whose lists
+    /// differ in length.
+    pub fn prepare(
+        map: &ContourMap,
+        width: u32,
+        height: u32,
+        options: &ContourRatioOptions,
+    ) -> Result<Self, ComparatorError> {
+        options.check()?;
+        let grid = Edges::new(map, width, height)?;
+        let samples = grid.width as usize * grid.height as usize;
+        let frame_pixel = grid.sx.max(grid.sy);
+        let capacity = MatchCapacity::new(&grid, frame_pixel, options.credit);
+        let none = Cell { score: libm::log(1.0 - options.foreground) as f32, group: NO_GROUP };
+        let mut cells = vec![none; samples * CHANNELS];
+        side_by_side(cells.chunks_exact_mut(samples), |k, out| {
+            // A channel holds the edges within one channel's width, so both channels next
+            // to an element's orientation contain an edge of that orientation.
+            let near = |e: &Edge| turn_between(e.turn, k as f32) <= 1.0;
+            let Some(nearest) = grid.nearest_within(options.truncate, near) else { return };
+            let scores = scores(&grid, &nearest.distance, options);
+            for ((cell, score), &edge) in out.iter_mut().zip(scores).zip(&nearest.edge) {
+                *cell = Cell {
+                    score,
+                    group: if score > 0.0 { capacity.group(edge) } else { NO_GROUP },
+                };
+            }
+        });
+        let percent = 100.0 / super::elements::diagonal(width, height);
+        Ok(ContourRatio { options: options.clone(), grid, cells, capacity, percent })
+    }
+
+    /// The options it was prepared with.
+    pub fn options(&self) -> &ContourRatioOptions {
+        &self.options
+    }
+
+    /// Returns the weighted log-likelihood ratio: above 0 if the rendered contours
+    /// explain the observed ones better than chance. With nothing in view it is that of
+    /// `nothing` percent of contour without a nearby edge (-1254.9 with the defaults),
+    /// which is below any ordinary contour; with at least `least` percent of contour in
+    /// view there is no penalty.
+    pub fn log_likelihood(&self, elements: &Elements<'_>) -> f64 {
+        self.log_likelihood_with(elements, &mut Scratch::default())
+    }
+
+    /// [`ContourRatio::log_likelihood`] without allocation once the scratch has grown.
+    pub fn log_likelihood_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
+        scratch.begin(self.capacity.groups());
+        self.count(elements, 1, scratch);
+        self.score(scratch)
+    }
+
+    /// Returns the [`ContourRatio::log_likelihood`] after a change of the contours, bit
+    /// for bit. If the scratch holds the state before the change, only the changes are
+    /// counted; otherwise `whole` must give all contours. A scratch belongs to one
+    /// comparator.
+    pub fn log_likelihood_after<'a>(
+        &self,
+        step: &ContourDelta<'_>,
+        whole: impl FnOnce() -> Elements<'a>,
+        scratch: &mut Scratch,
+    ) -> f64 {
+        if !step.leads_to(scratch.of.as_ref()) {
+            if step.follows(scratch.of.as_ref()) {
+                self.count(&step.gone, -1, scratch);
+                self.count(&step.come, 1, scratch);
+            } else {
+                scratch.begin(self.capacity.groups());
+                self.count(&whole(), 1, scratch);
+                self.count(&step.moving, -1, scratch);
+            }
+            scratch.of = Some(step.to.clone());
+        }
+        scratch.score_matches(&self.capacity);
+        let before = scratch.savepoint();
+        self.count(&step.moving, 1, scratch);
+        let score = self.score(scratch);
+        scratch.restore(before);
+        score
+    }
+
+    /// Adds (`sign` 1) or subtracts (-1) the contributions of elements.
+    fn count(&self, elements: &Elements<'_>, sign: i64, scratch: &mut Scratch) {
+        let samples = self.grid.width as usize * self.grid.height as usize;
+        // Integer sums are exact: a sum of individually rounded terms does not depend on
+        // their order.
+        let (mut total, mut length) = (scratch.total, scratch.length);
+        for e in elements.in_view() {
+            let weight = (f64::from(e.length * e.weight) * self.percent).min(1e4);
+            length = length.saturating_add(sign * (weight * FIXED) as i64);
+            let (low, high, f) = channels_of(e.tx, e.ty);
+            let corners = self.grid.corners(e.x, e.y);
+            let shares = corners.weights();
+            for (k, part) in [(low, 1.0 - f), (high, f)] {
+                for (&at, share) in corners.at.iter().zip(shares) {
+                    let Some(cell) = self.cells.get(k * samples + at) else { continue };
+                    let length = weight * f64::from(part * share);
+                    if cell.group == NO_GROUP {
+                        total = total
+                            .saturating_add(sign * (length * f64::from(cell.score) * FIXED) as i64);
+                    } else {
+                        scratch.assign(cell.group, length, length * f64::from(cell.score), sign);
+                    }
+                }
+            }
+        }
+        (scratch.total, scratch.length) = (total, length);
+    }
+
+    /// Returns the score of the elements counted so far.
+    fn score(&self, scratch: &mut Scratch) -> f64 {
+        let evidence = scratch.total as f64 / FIXED + scratch.score_matches(&self.capacity);
+        let length = scratch.length as f64 / FIXED;
+        let missing = (1.0 - length / self.options.least).max(0.0);
+        let penalty = missing * self.options.nothing * libm::log(1.0 - self.options.foreground);
+        let score = (evidence + penalty) * self.options.weight / self.options.unit;
+        score.clamp(f64::MIN, f64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests;

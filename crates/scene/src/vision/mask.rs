@@ -1,0 +1,300 @@
+//! Masks (which pixels show the object), and the likelihood of an observed mask given a
+//! rendered one. There is no segmentation here: masks come from files or from elsewhere
+//! in the program.
+
+use super::error::{VisionError, read_bytes};
+use super::photo::{Limits, decode_dynamic};
+use super::{npy, resize};
+use pcadlang_numerics::rng::Stream;
+use std::path::Path;
+
+/// A mask, true on the object. `data` has `width * height` entries in row-major order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mask {
+    width: u32,
+    height: u32,
+    data: Vec<bool>,
+}
+
+impl Mask {
+    /// Builds a mask from `width * height` pixels in row-major order, true on the object.
+    pub fn new(width: u32, height: u32, data: Vec<bool>) -> Result<Self, VisionError> {
+        if data.len() as u64 != u64::from(width) * u64::from(height) || data.is_empty() {
+            return Err(VisionError::size(width, height, format!("{} pixels", data.len())));
+        }
+        Ok(Mask { width, height, data })
+    }
+
+    /// Width, pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height, pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The pixels, in row-major order.
+    pub fn data(&self) -> &[bool] {
+        &self.data
+    }
+
+    /// Returns the mask at another size (at least 1 x 1): a pixel is on the object if at
+    /// least half of its area is.
+    pub fn resized(&self, width: u32, height: u32) -> Mask {
+        let (width, height) = (width.max(1), height.max(1));
+        if (width, height) == (self.width, self.height) {
+            return self.clone();
+        }
+        let w = self.width as usize;
+        let area = resize::resize_rows((self.width, self.height), (width, height), |j, row| {
+            for (p, &m) in row.iter_mut().zip(self.data.iter().skip(j as usize * w)) {
+                *p = [f32::from(u8::from(m))];
+            }
+        });
+        // Slightly less than a half, because sums of areas are rounded.
+        Mask { width, height, data: area.into_iter().map(|[a]| a >= 0.4999).collect() }
+    }
+}
+
+/// Reads a mask from a PNG or JPEG (bright pixels are the object; if any pixels are
+/// transparent, opaque pixels are the object) or a `.npy` array of two axes (bool: true;
+/// numbers: above half of the type's range, 127 for uint8 and 0.5 for floats, or above 0
+/// for uint8 arrays without values above 1).
+pub fn load(path: &Path) -> Result<Mask, VisionError> {
+    let limits = Limits::default();
+    decode(&read_bytes(path, limits.max_bytes())?, &limits).map_err(|e| e.in_file(path))
+}
+
+/// Like [`load`], from the bytes of a file.
+pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Mask, VisionError> {
+    if npy::is_npy(bytes) {
+        let array = npy::parse(bytes)?;
+        let (width, height) = array.picture_size()?;
+        limits.check(width, height)?;
+        let data = match array.data {
+            npy::NpyData::Bool(v) => v,
+            npy::NpyData::U8(v) => {
+                let above = if v.iter().all(|&x| x <= 1) { 0 } else { 127 };
+                v.into_iter().map(|x| x > above).collect()
+            }
+            npy::NpyData::F32(v) => v.into_iter().map(|x| x > 0.5).collect(),
+            npy::NpyData::F64(v) => v.into_iter().map(|x| x > 0.5).collect(),
+        };
+        return Mask::new(width, height, data);
+    }
+    let (picture, _) = decode_dynamic(bytes, limits)?;
+    let (width, height) = (picture.width(), picture.height());
+    if picture.color().has_alpha() {
+        let rgba = picture.to_rgba8();
+        if rgba.pixels().any(|p| p.0[3] < 255) {
+            return Mask::new(width, height, rgba.pixels().map(|p| p.0[3] >= 128).collect());
+        }
+    }
+    let grey = picture.into_luma8();
+    Mask::new(width, height, grey.pixels().map(|p| p.0[0] >= 128).collect())
+}
+
+/// The likelihood of an observed mask given a rendered one: every pixel is observed
+/// wrongly and independently, with one probability on the rendered object and another
+/// outside it. It is normalised over all masks of one size.
+#[derive(Clone, Debug)]
+pub struct MaskLikelihood {
+    observed: Mask,
+    eps_in: f64,
+    eps_out: f64,
+}
+
+impl MaskLikelihood {
+    /// Builds the likelihood of `observed` at its own size. `eps_in` is the probability
+    /// that a pixel of the rendered object is observed as background; `eps_out` that a
+    /// pixel outside it is observed as object. Both must be strictly between 0 and 1.
+    pub fn new(observed: &Mask, eps_in: f64, eps_out: f64) -> Result<Self, VisionError> {
+        for (name, value) in [("eps_in", eps_in), ("eps_out", eps_out)] {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(VisionError::Range { name, rule: "strictly between 0 and 1", value });
+            }
+        }
+        Ok(MaskLikelihood { observed: observed.clone(), eps_in, eps_out })
+    }
+
+    /// Returns the likelihood at the rendered size: a pixel is observed on the object if
+    /// at least half of its area is.
+    pub fn resized(&self, width: u32, height: u32) -> Self {
+        MaskLikelihood { observed: self.observed.resized(width, height), ..*self }
+    }
+
+    /// The observed mask at the size of comparison.
+    pub fn observed(&self) -> &Mask {
+        &self.observed
+    }
+
+    fn check(&self, pixels: usize, width: u32, height: u32) -> Result<(), VisionError> {
+        let own = &self.observed;
+        if (own.width, own.height) != (width, height) || pixels != own.data.len() {
+            return Err(VisionError::size(
+                own.width,
+                own.height,
+                format!("{width} x {height} ({pixels} pixels)"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Returns the log probability of the observed mask given a rendered one of the same
+    /// size.
+    pub fn log_likelihood(
+        &self,
+        rendered: &[bool],
+        width: u32,
+        height: u32,
+    ) -> Result<f64, VisionError> {
+        self.check(rendered.len(), width, height)?;
+        let mut counts = [[0u64; 2]; 2];
+        for (&r, &o) in rendered.iter().zip(&self.observed.data) {
+            counts[usize::from(r)][usize::from(o)] += 1;
+        }
+        Ok(counts[1][1] as f64 * libm::log1p(-self.eps_in)
+            + counts[1][0] as f64 * libm::log(self.eps_in)
+            + counts[0][1] as f64 * libm::log(self.eps_out)
+            + counts[0][0] as f64 * libm::log1p(-self.eps_out))
+    }
+
+    /// Returns for each pixel the increase of the log probability if the object covers
+    /// it.
+    pub fn gains(&self) -> Vec<f64> {
+        let (seen, unseen) = (
+            libm::log1p(-self.eps_in) - libm::log(self.eps_out),
+            libm::log(self.eps_in) - libm::log1p(-self.eps_out),
+        );
+        self.observed.data.iter().map(|o| if *o { seen } else { unseen }).collect()
+    }
+
+    /// Returns the log probability of the observed mask given the fraction of every pixel
+    /// that the rendered object covers (0..=1); a partly covered pixel mixes the two
+    /// cases. Values of 0 and 1 give [`MaskLikelihood::log_likelihood`].
+    pub fn log_likelihood_coverage(
+        &self,
+        coverage: &[f32],
+        width: u32,
+        height: u32,
+    ) -> Result<f64, VisionError> {
+        self.check(coverage.len(), width, height)?;
+        let mut sum = 0.0;
+        for (&c, &o) in coverage.iter().zip(&self.observed.data) {
+            let c = f64::from(c);
+            if !(0.0..=1.0).contains(&c) {
+                return Err(VisionError::Range {
+                    name: "coverage",
+                    rule: "between 0 and 1",
+                    value: c,
+                });
+            }
+            let (hit, miss) = match o {
+                true => (1.0 - self.eps_in, self.eps_out),
+                false => (self.eps_in, 1.0 - self.eps_out),
+            };
+            sum += libm::log(c * hit + (1.0 - c) * miss);
+        }
+        Ok(sum)
+    }
+
+    /// Samples a mask given a rendered one of the same size.
+    pub fn simulate(&self, rendered: &[bool], rng: &mut Stream) -> Result<Mask, VisionError> {
+        self.check(rendered.len(), self.observed.width, self.observed.height)?;
+        let data = rendered
+            .iter()
+            .map(|&r| (rng.uniform() < if r { self.eps_in } else { self.eps_out }) != r)
+            .collect();
+        Ok(Mask { data, ..self.observed })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pcadlang_numerics::rng::{Purpose, StreamKey};
+
+    #[test]
+    fn probabilities_of_all_masks_sum_to_one() {
+        let soft = [0.0, 1.0, 0.3, 0.5, 0.9, 1.0];
+        let hard = [false, true, true, false, true, false];
+        let (mut a, mut b) = (0.0, 0.0);
+        for bits in 0..64u32 {
+            let mask = Mask::new(3, 2, (0..6).map(|i| bits >> i & 1 == 1).collect()).unwrap();
+            let l = MaskLikelihood::new(&mask, 0.07, 0.2).unwrap();
+            a += libm::exp(l.log_likelihood(&hard, 3, 2).unwrap());
+            b += libm::exp(l.log_likelihood_coverage(&soft, 3, 2).unwrap());
+            let same =
+                l.log_likelihood_coverage(&hard.map(|h| f32::from(u8::from(h))), 3, 2).unwrap();
+            assert!((same - l.log_likelihood(&hard, 3, 2).unwrap()).abs() < 1e-12);
+        }
+        assert!((a - 1.0).abs() < 1e-12 && (b - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn draws_have_the_stated_rates() {
+        let rendered: Vec<bool> = (0..200 * 200).map(|i| i % 200 < 100).collect();
+        let l = MaskLikelihood::new(&Mask::new(200, 200, rendered.clone()).unwrap(), 0.1, 0.03)
+            .unwrap();
+        let mut rng = StreamKey::new(1, 0, Purpose::PREDICT).stream(0, 0, 0);
+        let drawn = l.simulate(&rendered, &mut rng).unwrap();
+        let wrong = |on: bool| {
+            (0..40000).filter(|&i| rendered[i] == on && drawn.data[i] != on).count() as f64
+                / 20000.0
+        };
+        // Standard errors are 0.0021 and 0.0012.
+        assert!((wrong(true) - 0.1).abs() < 0.01 && (wrong(false) - 0.03).abs() < 0.006);
+    }
+
+    #[test]
+    fn sizes_and_parameters_are_checked() {
+        let mask = Mask::new(2, 1, vec![true, false]).unwrap();
+        assert!(Mask::new(2, 2, vec![true]).is_err() && Mask::new(0, 0, vec![]).is_err());
+        for eps in [0.0, 1.0, -0.1, f64::NAN] {
+            assert!(MaskLikelihood::new(&mask, eps, 0.1).is_err());
+            assert!(MaskLikelihood::new(&mask, 0.1, eps).is_err());
+        }
+        let l = MaskLikelihood::new(&mask, 0.1, 0.1).unwrap();
+        assert!(l.log_likelihood(&[true, false], 1, 2).is_err());
+        assert!(l.log_likelihood(&[true], 2, 1).is_err());
+        assert!(l.log_likelihood_coverage(&[f32::NAN, 0.0], 2, 1).is_err());
+        assert!(l.resized(1, 1).observed().data()[0]);
+        assert!(
+            l.resized(4, 2)
+                .log_likelihood(&[true, true, false, false, true, true, false, false], 4, 2)
+                .is_ok()
+        );
+    }
+
+    #[test]
+    fn masks_from_arrays_and_pictures() {
+        let u8s = npy::bytes_of(1, "|u1", "False", "(1, 2)", &[0, 1]);
+        assert_eq!(decode(&u8s, &Limits::default()).unwrap().data(), [false, true]);
+        let u8s = npy::bytes_of(1, "|u1", "False", "(2, 1)", &[200, 1]);
+        assert_eq!(decode(&u8s, &Limits::default()).unwrap().data(), [true, false]);
+        let f32s: Vec<u8> = [0.0f32, 0.5, 0.51, 1.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+        let f32s = npy::bytes_of(1, "<f4", "False", "(1, 4)", &f32s);
+        assert_eq!(decode(&f32s, &Limits::default()).unwrap().data(), [false, false, true, true]);
+        let f64s: Vec<u8> = [0.5f64, 0.75].iter().flat_map(|x| x.to_le_bytes()).collect();
+        let f64s = npy::bytes_of(1, "<f8", "False", "(1, 2)", &f64s);
+        assert_eq!(decode(&f64s, &Limits::default()).unwrap().data(), [false, true]);
+        let png = |picture: image::DynamicImage| {
+            let mut out = std::io::Cursor::new(Vec::new());
+            picture.write_to(&mut out, image::ImageFormat::Png).unwrap();
+            out.into_inner()
+        };
+        let grey = image::GrayImage::from_raw(3, 1, vec![0, 255, 100]).unwrap();
+        assert_eq!(
+            decode(&png(grey.into()), &Limits::default()).unwrap().data(),
+            [false, true, false]
+        );
+        let cut = image::RgbaImage::from_raw(2, 1, vec![255, 255, 255, 0, 0, 0, 0, 255]).unwrap();
+        assert_eq!(decode(&png(cut.into()), &Limits::default()).unwrap().data(), [false, true]);
+        assert!(matches!(
+            load(Path::new("no/such.png")).unwrap_err().cause(),
+            VisionError::Missing
+        ));
+    }
+}
