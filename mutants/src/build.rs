@@ -1,6 +1,6 @@
 //! Builds the copy with all mutants in it; those that do not compile are left out.
 
-use crate::Failure;
+use crate::{CRATES, Failure};
 use crate::find::Mutant;
 use crate::rewrite::rewritten;
 use serde_json::Value;
@@ -64,9 +64,12 @@ fn write(root: &Path, copy: &Path, mutants: &[Mutant]) -> Result<Places, Failure
         put(&copy.join(relative), text.as_bytes())?;
         places.insert(relative.to_path_buf(), at);
     }
-    let lib = std::fs::read_to_string(root.join("src/lib.rs"))?;
-    put(&copy.join("src/lib.rs"), format!("{lib}\nmod mutation;\n").as_bytes())?;
-    put(&copy.join("src/mutation.rs"), include_str!("mutation.rs.txt").as_bytes())?;
+    for of in CRATES {
+        let lib = std::fs::read_to_string(root.join(of).join("lib.rs"))?;
+        let with = format!("{lib}\nmod mutation;\n");
+        put(&copy.join(of).join("lib.rs"), with.as_bytes())?;
+        put(&copy.join(of).join("mutation.rs"), include_str!("mutation.rs.txt").as_bytes())?;
+    }
     Ok(places)
 }
 

@@ -24,8 +24,17 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// The mutated folders.
-const FOLDERS: [&str; 6] =
-    ["src/infer", "src/trace", "src/dist", "src/rng", "src/render", "src/vision"];
+const FOLDERS: [&str; 6] = [
+    "src/infer",
+    "src/trace",
+    "crates/numerics/src/dist",
+    "crates/numerics/src/rng",
+    "crates/scene/src/render",
+    "crates/scene/src/vision",
+];
+
+/// The sources of the crates that are mutated.
+const CRATES: [&str; 3] = ["src", "crates/numerics/src", "crates/scene/src"];
 
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -75,8 +84,9 @@ fn main() -> Result<(), Failure> {
     let copy = if o.work.is_absolute() { o.work.clone() } else { root.join(&o.work) };
     let mut mutants = find::select(&root, &FOLDERS, o.mutants)?;
     println!("{} mutants chosen", mutants.len());
+    let libraries = CRATES.map(|of| root.join(of).join("lib.rs"));
     let rewritten: Vec<PathBuf> =
-        mutants.iter().map(|m| m.file.clone()).chain([root.join("src/lib.rs")]).collect();
+        mutants.iter().map(|m| m.file.clone()).chain(libraries).collect();
     build::copy(&root, &copy, &rewritten)?;
     let tests = build::build(&root, &copy, &mut mutants)?;
     println!("{} of them compile; {} test programs", mutants.len(), tests.len());

@@ -274,6 +274,15 @@ impl Entry {
 
     /// An example of its use, for `doc`: an expression with its value behind `//`, or a
     /// program.
+    ///
+    /// ```
+    /// use pcadlang::Value;
+    /// use pcadlang::host::{Entry, Host, Type};
+    /// let half = Entry::function("half", |a| Ok(Value::Num(0.5 * a.num(0)?)))
+    ///     .argument("x", Type::Num, "A number.")
+    ///     .example("half(3) // 1.5");
+    /// assert!(Host::new().with(half).doc("half").unwrap().contains("half(3) // 1.5"));
+    /// ```
     #[must_use]
     pub fn example(mut self, text: impl Into<Cow<'static, str>>) -> Entry {
         self.builtin.example = Some(text.into());
