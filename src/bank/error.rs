@@ -11,7 +11,7 @@ pub enum BankError {
     Io(#[from] io::Error),
     /// The file is not a bank.
     #[error("it is not a bank; `pcadlang learn` makes one")]
-    NoBank,
+    NotABank,
     /// The file has another format version.
     #[error(
         "it has format version {found}, but this program reads version {expected}; rebuild it \

@@ -78,7 +78,7 @@ impl Preamble {
             b.get(i..i + 8).and_then(|w| w.try_into().ok()).map_or(0, u64::from_le_bytes)
         };
         if b.get(..8) != Some(MAGIC) {
-            return Err(BankError::NoBank);
+            return Err(BankError::NotABank);
         }
         if b.len() < START as usize {
             return Err(BankError::Damaged("it is truncated".into()));
@@ -130,7 +130,7 @@ mod tests {
             "no room for a header"
         );
         assert!(matches!(Preamble::decode(&p.encode()[..40], 40), Err(BankError::Damaged(_))));
-        assert!(matches!(Preamble::decode(b"PNG", 3), Err(BankError::NoBank)));
+        assert!(matches!(Preamble::decode(b"PNG", 3), Err(BankError::NotABank)));
         let huge = Preamble { count: u64::MAX, width: u64::MAX, ..p };
         assert!(matches!(Preamble::decode(&huge.encode(), 1000), Err(BankError::Damaged(_))));
         let mut other = p.encode();

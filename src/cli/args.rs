@@ -6,7 +6,7 @@ use super::compare::Compare;
 use super::detect::Detect;
 use super::files::program_name;
 use super::manual::{Completions, Man};
-use super::people::Who;
+use super::people::PersonArgs;
 use super::report::Report;
 use super::show::Show;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -85,7 +85,7 @@ pub struct Inputs {
     pub edges: Option<String>,
     /// Whom it is about
     #[command(flatten)]
-    pub who: Who,
+    pub who: PersonArgs,
     /// What it may read and build
     #[command(flatten)]
     pub allowed: Allowed,

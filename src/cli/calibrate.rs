@@ -4,7 +4,7 @@
 
 use super::args::{Check, Inputs, Job, Sampling};
 use super::job::{Interrupt, machine_threads};
-use super::people::Who;
+use super::people::PersonArgs;
 use super::progress::{self, Ending};
 use super::{Failure, inputs, plain};
 use pcadlang::infer::calibration::{
@@ -60,7 +60,7 @@ fn job(a: &Check, path: &str) -> Job {
             sets: a.sets.clone(),
             camera: None,
             edges: None,
-            who: Who::default(),
+            who: PersonArgs::default(),
             allowed: a.allowed.clone(),
         },
         observe: a.observe.clone(),

@@ -30,17 +30,20 @@ const LISTED: usize = 40;
 const SIDE: u32 = 512;
 
 /// A run as recorded in its folder.
-struct Told {
+struct RunSummary {
     run: Value,
     summary: Value,
 }
 
-impl Told {
-    fn of(folder: &Path) -> Result<Told, Failure> {
+impl RunSummary {
+    fn of(folder: &Path) -> Result<RunSummary, Failure> {
         let run = resume::run(folder)?;
         let path = folder.join("summary.json");
         let summary = serde_json::from_slice(&files::read(&path)?);
-        Ok(Told { run, summary: summary.map_err(|e| plain(format!("{}: {e}", path.display())))? })
+        Ok(RunSummary {
+            run,
+            summary: summary.map_err(|e| plain(format!("{}: {e}", path.display())))?,
+        })
     }
 
     /// Returns the arguments of its command.
@@ -69,7 +72,7 @@ impl Told {
 
 /// Compares two runs.
 pub fn compare(a: &Compare) -> Result<(), Failure> {
-    let (one, two) = (Told::of(&a.a)?, Told::of(&a.b)?);
+    let (one, two) = (RunSummary::of(&a.a)?, RunSummary::of(&a.b)?);
     for (name, told) in [("A", &one), ("B", &two)] {
         print_line!("{name}: pcadlang run {}", quoted(&told.arguments()));
     }
@@ -102,7 +105,7 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
 
 /// Formats a table of the quantities of both runs, in decreasing order of the difference
 /// of means in units of their standard deviation.
-fn quantities(one: &Told, two: &Told) -> String {
+fn quantities(one: &RunSummary, two: &RunSummary) -> String {
     let names = one.summary["quantities"].as_object();
     let both = names.into_iter().flatten().map(|(name, _)| name);
     let apart = |name: &str| {
@@ -119,7 +122,7 @@ fn quantities(one: &Told, two: &Told) -> String {
         ["quantity", "mean A", "sd A", "mean B", "sd B", "difference/sd", "r_hat A", "r_hat B"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (name, apart) in both.iter().take(LISTED) {
-        let of = |t: &Told, what: &str| number(t.number(name, what));
+        let of = |t: &RunSummary, what: &str| number(t.number(name, what));
         let mut row = vec![
             (*name).to_owned(),
             of(one, "mean"),

@@ -99,7 +99,7 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
         .undrawn()
         .into_iter()
         .map(written)
-        .filter(|[place, _]| place.starts_with(own))
+        .filter(|[place, _]| place.strip_prefix(own).is_some_and(|rest| rest.starts_with(':')))
         .collect();
     let mut observed: Vec<String> =
         trace.observations().iter().map(|(a, _)| without_keys(&a.to_string())).collect();

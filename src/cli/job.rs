@@ -286,7 +286,7 @@ pub const CHECKPOINT: Duration = Duration::from_secs(10);
 
 /// How a run is carried out; its draws do not depend on this.
 #[derive(Clone, Copy, Debug)]
-pub struct Manner {
+pub struct RunMode {
     /// Whether progress is shown.
     pub live: bool,
     /// The time between checkpoints.
@@ -304,7 +304,7 @@ pub fn perform(
     dir: &RunDir,
     record: &Map<String, Value>,
     interrupt: &Interrupt,
-    manner: Manner,
+    manner: RunMode,
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
     write(dir, PROGRAM, ready.model.text().as_bytes())?;
@@ -342,7 +342,7 @@ fn fill(
     dir: &RunDir,
     record: &Map<String, Value>,
     interrupt: &Interrupt,
-    manner: Manner,
+    manner: RunMode,
 ) -> Result<Outcome, Failure> {
     let Ready { model, image, begun, chooses } = ready;
     let s = &job.sampling;

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 /// Which person of a photograph is meant, and what finds people.
 #[derive(Args, Clone, Debug, Default)]
-pub struct Who {
+pub struct PersonArgs {
     /// Which person in the photograph, 1 being the most prominent: sets the program's
     /// `person`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]

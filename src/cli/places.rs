@@ -21,7 +21,7 @@ const COLUMNS: u32 = 3;
 const SIDE: u32 = 384;
 
 /// The best state of a mode.
-pub struct Place {
+pub struct ModeBest {
     /// The number of the mode, from 1.
     number: usize,
     /// The caption of its picture.
@@ -35,7 +35,7 @@ pub fn name(mode: usize) -> String {
 }
 
 /// Returns the best state of each mode.
-pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<Place> {
+pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<ModeBest> {
     let chains: usize = modes.iter().map(|m| m.chains.len()).sum();
     let state = |m: &Mode| {
         let all = m.chains.iter().filter_map(|c| best.of_chain(c.checked_sub(1)?));
@@ -50,7 +50,7 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<Place> {
             m.chains.len(),
             best.log_joint
         );
-        Some(Place { number: i + 1, said, best })
+        Some(ModeBest { number: i + 1, said, best })
     };
     modes.iter().take(SHOWN).enumerate().filter_map(place).collect()
 }
@@ -69,7 +69,7 @@ pub fn show_places(
     dir: &RunDir,
     seed: u64,
     model: &Model,
-    places: &[Place],
+    places: &[ModeBest],
     photo: Option<&Photo>,
 ) -> Result<(), Failure> {
     for old in (1..=SHOWN).map(name).chain(["modes.png".to_owned()]).map(|name| dir.file(&name)) {

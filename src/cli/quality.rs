@@ -40,7 +40,7 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
             return Ok(None);
         };
         let seconds = job.sampling.time.map_or(0.0, |t| t.as_secs_f64());
-        return Ok(presets.of_time(seconds).map(|choice| fill(job, &choice, &name)));
+        return Ok(presets.of_time(seconds).map(|choice| apply_preset(job, &choice, &name)));
     };
     let Some((name, presets)) = known else {
         let hint = "`pcadlang tradeoff` measures settings on cases with ground truth; its option --presets writes the file";
@@ -56,7 +56,7 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
         )));
     }
     match presets.of_quality(quality) {
-        Some(choice) => Ok(Some(fill(job, &choice, &name))),
+        Some(choice) => Ok(Some(apply_preset(job, &choice, &name))),
         None => Err(plain(format!("{name} contains no presets"))),
     }
 }
@@ -66,7 +66,7 @@ fn fits(presets: &Presets, keypoints: bool) -> bool {
     presets.needs.iter().all(|kind| kind == "keypoints" && keypoints)
 }
 
-fn fill(job: &mut Job, choice: &Choice, name: &str) -> String {
+fn apply_preset(job: &mut Job, choice: &Choice, name: &str) -> String {
     let setting = &choice.preset.setting;
     let mut said = Vec::new();
     for (param, value) in &setting.set {
@@ -157,7 +157,8 @@ mod tests {
             {"chains": 2, "time": 1, "set": {"size": "96", "keep": "4"}, "seconds": 1.1, "error": 0.3, "interval": [0.2, 0.4], "cases": 3}]}"#;
         let presets: Presets = serde_json::from_str(text).unwrap();
         let mut open = job(None, None);
-        let said = fill(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
+        let said =
+            apply_preset(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
         assert_eq!(open.inputs.sets, [("size".into(), "64".into()), ("keep".into(), "4".into())]);
         assert_eq!((open.sampling.chains(), open.sampling.time), (2, Some(Duration::from_secs(1))));
         assert!(said.starts_with(
@@ -165,7 +166,7 @@ mod tests {
         ));
         let mut told = job(None, Some(5.0));
         told.sampling.chains = Some(3);
-        fill(&mut told, &presets.of_time(5.0).unwrap(), "x.quality.json");
+        apply_preset(&mut told, &presets.of_time(5.0).unwrap(), "x.quality.json");
         assert_eq!((told.sampling.chains(), told.sampling.time), (3, Some(Duration::from_secs(5))));
     }
 
@@ -175,14 +176,14 @@ mod tests {
             {"steps": 200, "warmup": 50, "seconds": 1.1, "error": 0.3, "interval": [0.2, 0.4], "cases": 3}]}"#;
         let presets: Presets = serde_json::from_str(text).unwrap();
         let mut open = job(None, None);
-        fill(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
+        apply_preset(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
         assert_eq!(
             (open.sampling.steps, open.sampling.warmup, open.sampling.time),
             (Some(200), Some(50), None)
         );
         let mut told = job(None, Some(2.0));
         told.sampling.warmup = Some(7);
-        fill(&mut told, &presets.of_time(2.0).unwrap(), "x.quality.json");
+        apply_preset(&mut told, &presets.of_time(2.0).unwrap(), "x.quality.json");
         assert_eq!((told.sampling.steps, told.sampling.warmup), (None, Some(7)));
     }
 

@@ -2,7 +2,7 @@
 
 use super::args::{Job, Run};
 use super::explain::{Explanation, explain};
-use super::job::{self, Interrupt, Manner, Outcome};
+use super::job::{self, Interrupt, Outcome, RunMode};
 use super::print::paragraph;
 use super::{Failure, plain, quality, resume};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
@@ -33,7 +33,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         Some(path) => RunDir::create(path).map_err(|e| plain(e.to_string()))?,
         None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
     };
-    let manner = Manner {
+    let manner = RunMode {
         live: !(a.quiet || a.json),
         checkpoint: a.checkpoint,
         resume: a.resume,

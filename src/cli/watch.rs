@@ -65,7 +65,7 @@ impl FileStamps {
             let own = Reach::default().of(program);
             let reach =
                 folders.iter().fold(own, |reach, f| reach.clone().allow(f).unwrap_or(reach));
-            let asked = Asked { reach, stamps: Mutex::new(stamps) };
+            let asked = RecordingLoader { reach, stamps: Mutex::new(stamps) };
             let _ = load(program, &asked, &mut SourceMap::new());
             stamps = asked.stamps.into_inner().unwrap_or_else(PoisonError::into_inner);
         }
@@ -83,12 +83,12 @@ impl FileStamps {
 }
 
 /// Reads what a program may read, and records the requested files.
-struct Asked {
+struct RecordingLoader {
     reach: Reach,
     stamps: Mutex<BTreeMap<String, Stamp>>,
 }
 
-impl Loader for Asked {
+impl Loader for RecordingLoader {
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
         let mut stamps = self.stamps.lock().unwrap_or_else(PoisonError::into_inner);
         stamps.entry(path.to_owned()).or_insert_with(|| stamp(path));

@@ -6,7 +6,7 @@ use crate::dist::{Dist, Distribution};
 use crate::infer::{Kernel, KernelCall, KernelMaker};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{
-    Args, Argument, Before, Builtin, Derivative, HostItem, Row, State, Type,
+    Args, Argument, Builtin, Derivative, HostItem, PreviousEvaluation, Row, State, Type,
 };
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Likelihood, Value};
@@ -127,7 +127,7 @@ impl Entry {
         + Sync
         + 'static,
     ) -> Entry {
-        let call = move |a: &Args, before: Option<&Before>| {
+        let call = move |a: &Args, before: Option<&PreviousEvaluation>| {
             let previous = before.and_then(Previous::new);
             call(a, previous).map(|(value, state)| (value, Arc::new(state) as State))
         };

@@ -1,19 +1,19 @@
 //! An earlier evaluation of an incremental function.
 
-use crate::lang::builtins::{Args, Before};
+use crate::lang::builtins::{Args, PreviousEvaluation};
 use crate::lang::value::Value;
 
 /// An earlier evaluation of a host function: its arguments, its result, and the state
 /// that it kept ([`Entry::incremental`](super::Entry::incremental)).
 #[derive(Clone, Copy, Debug)]
 pub struct Previous<'a, S> {
-    before: &'a Before,
+    before: &'a PreviousEvaluation,
     state: &'a S,
 }
 
 impl<'a, S: 'static> Previous<'a, S> {
     /// Returns `None` if the state has a different type.
-    pub(super) fn new(before: &'a Before) -> Option<Self> {
+    pub(super) fn new(before: &'a PreviousEvaluation) -> Option<Self> {
         before.state.downcast_ref().map(|state| Previous { before, state })
     }
 }

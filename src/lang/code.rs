@@ -9,7 +9,6 @@
 pub use super::slots::{SlotFacts, StaticScaffold};
 
 use super::builtins::Table;
-use super::key::Key;
 use super::value::Value;
 use crate::syntax::span::Span;
 use std::sync::Arc;
@@ -514,14 +513,5 @@ impl Code {
     /// Returns the value of a constant.
     pub fn const_value(&self, i: u32) -> &Value {
         &self.consts[i as usize]
-    }
-
-    /// Returns the key that a constant operand stands for; computed keys are checked at
-    /// run time.
-    pub fn key_of(&self, o: Operand) -> Option<Key> {
-        match o {
-            Operand::Const(i) => Key::from_value(self.const_value(i)),
-            _ => None,
-        }
     }
 }

@@ -34,7 +34,7 @@ pub enum Source {
 #[allow(missing_docs)]
 pub enum Instruction {
     /// Jumps to `to` if the slot is not evaluated, because nothing needs it.
-    SkipUnasked { slot: Slot, to: u16 },
+    SkipUnevaluated { slot: Slot, to: u16 },
     /// If the slot is evaluated, takes its value and jumps to `to`.
     Recall { slot: Slot, into: u8, to: u16 },
     /// A function of single numbers.
@@ -157,7 +157,7 @@ impl Compiler<'_> {
     /// Emits the instructions that score a slot.
     fn score(&mut self, slot: Slot) -> Option<()> {
         let known = self.known.clone();
-        let skip = self.push(Instruction::SkipUnasked { slot, to: 0 })?;
+        let skip = self.push(Instruction::SkipUnevaluated { slot, to: 0 })?;
         let instruction = match &self.ops[slot as usize] {
             Op::Draw { dist: DistSpec::Family { builtin, args }, keys, .. } => {
                 if keys.iter().any(|k| self.depends(*k)) {
@@ -331,7 +331,7 @@ impl Compiler<'_> {
     /// Makes the jump at an instruction lead to the next one.
     fn land(&mut self, jump: usize) {
         let here = self.instructions.len() as u16;
-        if let Instruction::SkipUnasked { to, .. }
+        if let Instruction::SkipUnevaluated { to, .. }
         | Instruction::Recall { to, .. }
         | Instruction::Go { to }
         | Instruction::Branch { otherwise: to, .. } = &mut self.instructions[jump]

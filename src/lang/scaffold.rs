@@ -29,9 +29,9 @@ pub(super) fn scaffold(
     let bits = order.iter().enumerate().filter(|(_, s)| !asked[**s as usize]);
     let conditional = bits.fold(0, |all, (i, _)| all | 1 << i);
     let decides = |o: &Operand| matches!(o, Operand::Local(s) if *s == from || order.contains(s));
-    let turns =
+    let switches =
         order.iter().any(|s| matches!(&ops[*s as usize], Op::Select { cond, .. } if decides(cond)));
-    Some(StaticScaffold { slots: order.into(), is_closed, conditional, turns })
+    Some(StaticScaffold { slots: order.into(), is_closed, conditional, switches })
 }
 
 /// Returns which slots the effects of their block need whatever the values of conditions.

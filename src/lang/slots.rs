@@ -43,7 +43,7 @@ pub struct StaticScaffold {
     /// changed, so they must not run before the conditions.
     pub conditional: u64,
     /// Whether the condition of a selection depends on the choice.
-    pub turns: bool,
+    pub switches: bool,
 }
 
 impl Code {

@@ -40,7 +40,7 @@ impl Program {
     ///
     /// # Errors
     /// If the text is not an expression.
-    pub fn asking(&self, name: &str, text: &str) -> Result<Program, Error> {
+    pub fn with_query(&self, name: &str, text: &str) -> Result<Program, Error> {
         self.with_items(name, text, |text, file| {
             let expr = parse_expr(text, file)?;
             let span = expr.span;

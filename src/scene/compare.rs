@@ -228,24 +228,24 @@ pub(super) fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<
 thread_local! {
     static RATIO: RefCell<contour_ratio::Scratch> = RefCell::default();
     static CHAMFER: RefCell<chamfer::Scratch> = RefCell::default();
-    static RATIOS: RefCell<Followed<ContourRatio, contour_ratio::Scratch>> = RefCell::default();
-    static CHAMFERS: RefCell<Followed<Chamfer, chamfer::Tally>> = RefCell::default();
+    static RATIOS: RefCell<RecentScores<ContourRatio, contour_ratio::Scratch>> = RefCell::default();
+    static CHAMFERS: RefCell<RecentScores<Chamfer, chamfer::Tally>> = RefCell::default();
 }
 
 /// A thread's records of the contours that recent comparators scored last, most recent
 /// first.
-struct Followed<C, T>(Vec<(Weak<C>, T)>);
+struct RecentScores<C, T>(Vec<(Weak<C>, T)>);
 
 /// The maximum number of comparators of a kind that a thread remembers.
 const FOLLOWED: usize = 8;
 
-impl<C, T> Default for Followed<C, T> {
+impl<C, T> Default for RecentScores<C, T> {
     fn default() -> Self {
-        Followed(Vec::new())
+        RecentScores(Vec::new())
     }
 }
 
-impl<C, T: Default> Followed<C, T> {
+impl<C, T: Default> RecentScores<C, T> {
     /// Returns the record of a comparator, which moves to the front.
     fn of(&mut self, comparator: &Arc<C>) -> &mut T {
         match self.0.iter().position(|(c, _)| std::ptr::eq(c.as_ptr(), Arc::as_ptr(comparator))) {
@@ -260,12 +260,12 @@ impl<C, T: Default> Followed<C, T> {
 }
 
 fn step(change: &Change) -> ContourDelta<'_> {
-    let Change { from, to, gone, come, moving, count } = change;
+    let Change { from, to, removed, added, moving, count } = change;
     ContourDelta {
         from,
         to,
-        gone: elements(gone),
-        come: elements(come),
+        removed: elements(removed),
+        added: elements(added),
         moving: elements(moving),
         count: *count,
     }

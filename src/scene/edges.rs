@@ -1,6 +1,6 @@
 //! The contours of a photograph, detected with other settings than the default.
 
-use super::observed::{Detecting, DetectorValue};
+use super::observed::{DetectorSettings, DetectorValue};
 use super::{DETECTOR, IMAGE, ImageValue, native};
 use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
@@ -54,10 +54,10 @@ pub(super) const TABLE: &[Row] = &[native(
         let image = a.object::<ImageValue>(0, "an image")?;
         let detector =
             if a.given(4) { Some(a.object::<DetectorValue>(4, "a detector")?) } else { None };
-        let (mut by, usual) = Detecting::usual(detector);
+        let (mut by, usual) = DetectorSettings::usual(detector);
         let (most, old_size, old_sigma) = match &by {
-            Detecting::Gradients(g) => (8192, g.size, g.sigma),
-            Detecting::File { size, sigma, .. } => (FileDetector::MOST, *size, *sigma),
+            DetectorSettings::Gradients(g) => (8192, g.size, g.sigma),
+            DetectorSettings::File { size, sigma, .. } => (FileDetector::MOST, *size, *sigma),
         };
         let asked = if a.given(1) { a.int_in(1, 8, i64::from(most))? as u32 } else { old_size };
         let smooth = a.num_or(2, f64::from(old_sigma))?;
@@ -69,8 +69,8 @@ pub(super) const TABLE: &[Row] = &[native(
             return Err(a.outside(3, "from 0 to 1"));
         }
         match &mut by {
-            Detecting::Gradients(g) => (g.size, g.sigma) = (asked, smooth as f32),
-            Detecting::File { size, sigma, .. } => (*size, *sigma) = (asked, smooth as f32),
+            DetectorSettings::Gradients(g) => (g.size, g.sigma) = (asked, smooth as f32),
+            DetectorSettings::File { size, sigma, .. } => (*size, *sigma) = (asked, smooth as f32),
         }
         let found = image.detected_by(by, strength as f32);
         let found = found.map_err(|e| Fault::new(FaultKind::Other, format!("scene.edges: {e}")))?;

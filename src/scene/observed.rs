@@ -19,15 +19,15 @@ const MOST: usize = 32;
 
 /// A cache of prepared data, by their options.
 #[derive(Debug)]
-pub(super) struct Prepared<K, T>(Mutex<Vec<(K, Arc<T>)>>);
+pub(super) struct Cache<K, T>(Mutex<Vec<(K, Arc<T>)>>);
 
-impl<K, T> Default for Prepared<K, T> {
+impl<K, T> Default for Cache<K, T> {
     fn default() -> Self {
-        Prepared(Mutex::default())
+        Cache(Mutex::default())
     }
 }
 
-impl<K: PartialEq, T> Prepared<K, T> {
+impl<K: PartialEq, T> Cache<K, T> {
     /// Returns the item for a key; makes it if it is new.
     pub fn get(
         &self,
@@ -67,19 +67,19 @@ pub struct ImageValue {
     ready: bool,
     /// The detector to use where the program does not choose one.
     by: OnceLock<DetectorValue>,
-    pub(super) ratios: Prepared<Key<ContourRatioOptions>, ContourRatio>,
-    pub(super) chamfers: Prepared<Key<ChamferOptions>, Chamfer>,
-    pub(super) regions: Prepared<Key<RegionOptions>, Region>,
+    pub(super) ratios: Cache<Key<ContourRatioOptions>, ContourRatio>,
+    pub(super) chamfers: Cache<Key<ChamferOptions>, Chamfer>,
+    pub(super) regions: Cache<Key<RegionOptions>, Region>,
     /// The same photograph with contours detected by other settings: the detector and the
     /// minimum strength.
-    detected: Prepared<(Detecting, f32), Value>,
+    detected: Cache<(DetectorSettings, f32), Value>,
     /// Maps from detectors that were read from files, by detector and size.
-    soft: Prepared<(DetectorValue, u32), SoftMap>,
+    soft: Cache<(DetectorValue, u32), SoftMap>,
     /// Candidate objects, by the options of the search.
-    pub(super) candidates: Prepared<CandidateOptions, Vec<Candidate>>,
+    pub(super) candidates: Cache<CandidateOptions, Vec<Candidate>>,
     /// The people in the photograph, by the options of the search: the number of views,
     /// and the maximum number of people.
-    pub(super) people: Prepared<(u32, u32), Vec<(Person, Value)>>,
+    pub(super) people: Cache<(u32, u32), Vec<(Person, Value)>>,
 }
 
 impl ImageValue {
@@ -116,7 +116,7 @@ impl ImageValue {
     pub fn map(&self) -> Result<&ContourMap, String> {
         let found = self.map.get_or_init(|| match &self.photo {
             Some(photo) => {
-                let (by, least) = Detecting::usual(self.by.get());
+                let (by, least) = DetectorSettings::usual(self.by.get());
                 self.found(photo, &by).map(|map| strong(map, least))
             }
             None => Ok(ContourMap::default()),
@@ -154,7 +154,11 @@ impl ImageValue {
 
     /// Returns the same photograph with the contours of a given detector that have at
     /// least strength `least`; `None` if there is no photograph.
-    pub(super) fn detected_by(&self, by: Detecting, least: f32) -> Result<Option<Value>, String> {
+    pub(super) fn detected_by(
+        &self,
+        by: DetectorSettings,
+        least: f32,
+    ) -> Result<Option<Value>, String> {
         let Some(photo) = &self.photo else { return Ok(None) };
         let found = self.detected.get((by, least), |(by, least)| {
             let map = strong(self.found(photo, by)?, *least);
@@ -163,10 +167,10 @@ impl ImageValue {
         Ok(Some(Value::clone(&found)))
     }
 
-    fn found(&self, photo: &Photo, by: &Detecting) -> Result<ContourMap, String> {
+    fn found(&self, photo: &Photo, by: &DetectorSettings) -> Result<ContourMap, String> {
         match by {
-            Detecting::Gradients(detector) => Ok(detector.contours(photo)),
-            Detecting::File { detector, size, sigma } => {
+            DetectorSettings::Gradients(detector) => Ok(detector.contours(photo)),
+            DetectorSettings::File { detector, size, sigma } => {
                 let Some(file) = &detector.0 else { return Err("the detector has no file".into()) };
                 let soft = self.soft.get((detector.clone(), *size), |_| {
                     file.map(photo, *size).map_err(|e| e.to_string())
@@ -213,7 +217,7 @@ impl Object for DetectorValue {
 
 /// A detector with its settings.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Detecting {
+pub(super) enum DetectorSettings {
     /// The built-in detector.
     Gradients(GradientDetector),
     /// A detector from a file.
@@ -227,16 +231,16 @@ pub(super) enum Detecting {
     },
 }
 
-impl Detecting {
+impl DetectorSettings {
     /// Returns a detector with its default settings, and the minimum strength of its
     /// contours.
-    pub fn usual(detector: Option<&DetectorValue>) -> (Detecting, f32) {
+    pub fn usual(detector: Option<&DetectorValue>) -> (DetectorSettings, f32) {
         match detector.and_then(|d| d.0.as_ref().map(|file| (d, file))) {
             Some((d, file)) => {
                 let (detector, size, sigma) = (d.clone(), FileDetector::SIZE, file.sigma());
-                (Detecting::File { detector, size, sigma }, file.strength())
+                (DetectorSettings::File { detector, size, sigma }, file.strength())
             }
-            None => (Detecting::Gradients(GradientDetector::default()), ImageValue::STRONG),
+            None => (DetectorSettings::Gradients(GradientDetector::default()), ImageValue::STRONG),
         }
     }
 }
@@ -282,13 +286,13 @@ impl Object for ImageValue {
 pub struct MaskValue {
     /// The mask.
     pub mask: Mask,
-    pub(super) prepared: Prepared<Key<[f64; 2]>, MaskLikelihood>,
+    pub(super) prepared: Cache<Key<[f64; 2]>, MaskLikelihood>,
 }
 
 impl MaskValue {
     /// Creates an observed mask.
     pub fn new(mask: Mask) -> Self {
-        MaskValue { mask, prepared: Prepared::default() }
+        MaskValue { mask, prepared: Cache::default() }
     }
 }
 
@@ -311,13 +315,13 @@ impl Object for MaskValue {
 pub struct DepthValue {
     /// The depth map.
     pub depth: DepthMap,
-    pub(super) prepared: Prepared<Key<[f64; 4]>, DepthLikelihood>,
+    pub(super) prepared: Cache<Key<[f64; 4]>, DepthLikelihood>,
 }
 
 impl DepthValue {
     /// Creates an observed depth map.
     pub fn new(depth: DepthMap) -> Self {
-        DepthValue { depth, prepared: Prepared::default() }
+        DepthValue { depth, prepared: Cache::default() }
     }
 }
 
@@ -369,7 +373,7 @@ mod tests {
 
     #[test]
     fn options_that_move_do_not_fill_the_memory() {
-        let prepared: Prepared<u32, u32> = Prepared::default();
+        let prepared: Cache<u32, u32> = Cache::default();
         prepared.get(0, |_| Ok(7)).unwrap();
         let first = Arc::downgrade(&prepared.get(1, |_| Ok(2)).unwrap());
         for key in 0..1000 {

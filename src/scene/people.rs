@@ -6,7 +6,7 @@ use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::people::{FindOptions, Person, networks};
-use crate::vision::keypoints::{Elsewhere, Keypoint, Keypoints, MEDIAPIPE};
+use crate::vision::keypoints::{Alternative, Keypoint, Keypoints, MEDIAPIPE};
 use crate::vision::{Mask, Photo};
 use std::sync::Arc;
 
@@ -87,7 +87,7 @@ fn value(p: &Person, photo: &Photo) -> Result<Value, String> {
     let point = |(i, (name, l)): (usize, (&&'static str, &crate::people::Landmark))| {
         let elsewhere = p.others.iter().map(|h| {
             let [x, y] = h.landmarks[i].at;
-            Elsewhere { x, y, weight: ELSEWHERE * h.views as f64 / p.agreeing.max(1) as f64 }
+            Alternative { x, y, weight: ELSEWHERE * h.views as f64 / p.agreeing.max(1) as f64 }
         });
         let one = Keypoint::new(*name, l.at, l.visibility.clamp(0.0, 1.0));
         Keypoint { others: elsewhere.collect(), ..one }

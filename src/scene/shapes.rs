@@ -41,7 +41,7 @@ pub(super) const TABLE: &[Row] = &[
         "A surface of revolution: profiles stacked and swept around the y axis; a step from one \
          profile to the next is closed by a ring.",
         |a| {
-            let Turned { profiles, sides, wall, caps } = turned(a)?;
+            let LatheArgs { profiles, sides, wall, caps } = lathe_args(a)?;
             Solid::lathe(&profiles, sides, wall, caps).map(solid).map_err(fault)
         },
     )
@@ -192,14 +192,14 @@ pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
 }
 
 /// The arguments of `lathe`.
-pub(super) struct Turned {
+pub(super) struct LatheArgs {
     pub profiles: Vec<Profile>,
     pub sides: u32,
     pub wall: Wall,
     pub caps: Caps,
 }
 
-pub(super) fn turned(a: &Args) -> Result<Turned, Fault> {
+pub(super) fn lathe_args(a: &Args) -> Result<LatheArgs, Fault> {
     let profiles = profiles(a)?;
     let sides = if a.given(1) { a.int_in(1, 3, 1024)? as u32 } else { 48 };
     let caps = match a.choice(3, &["both", "bottom", "top", "none"])? {
@@ -209,7 +209,7 @@ pub(super) fn turned(a: &Args) -> Result<Turned, Fault> {
         _ => Caps::Both,
     };
     let wall = Wall { thickness: a.num_or(2, 0.0)?, floor: a.num_or(4, 0.0)? };
-    Ok(Turned { profiles, sides, wall, caps })
+    Ok(LatheArgs { profiles, sides, wall, caps })
 }
 
 /// Reads one profile or an array of them.

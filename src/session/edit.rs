@@ -243,7 +243,7 @@ impl Session {
 
     /// Returns the value of an expression in the current state.
     pub(super) fn value_of(&mut self, text: &str) -> Result<Value, Trouble> {
-        let model = self.program.asking(INPUT, text)?.compile()?;
+        let model = self.program.with_query(INPUT, text)?.compile()?;
         let mut trace = self.moved_to(&model, &self.trace)?;
         let Some(operand) = model.code().samples.last().copied() else {
             return Err(Trouble::plain("this is not an expression"));

@@ -62,9 +62,9 @@ pub struct Session {
     program: Arc<Program>,
     model: Arc<Model>,
     trace: Trace,
-    past: VecDeque<Past>,
+    past: VecDeque<UndoState>,
     /// States that `:redo` can restore, the most recently undone one at the end.
-    undone: Vec<Past>,
+    undone: Vec<UndoState>,
     /// Files that this session wrote or loaded, which it may overwrite without a
     /// question.
     own_files: BTreeSet<String>,
@@ -78,7 +78,7 @@ pub struct Session {
 }
 
 /// A state for `:undo`. Its choices are enough to rebuild the trace, to the last bit.
-struct Past {
+struct UndoState {
     program: Arc<Program>,
     model: Arc<Model>,
     choices: Vec<(u64, Constraint)>,
@@ -261,8 +261,8 @@ impl Session {
     }
 
     /// Records the present state for `:undo`; `what` describes the change that follows.
-    fn remember(&self, what: &str) -> Past {
-        Past {
+    fn remember(&self, what: &str) -> UndoState {
+        UndoState {
             program: Arc::clone(&self.program),
             model: Arc::clone(&self.model),
             choices: self.trace.constraints(),
@@ -272,15 +272,15 @@ impl Session {
     }
 
     /// Adds a state for `:undo`; undone changes can no longer be redone.
-    fn keep(&mut self, past: Past) {
+    fn keep(&mut self, past: UndoState) {
         self.undone.clear();
         self.push(past);
     }
 
     /// Adds a state for `:undo`, and drops the oldest ones beyond the limit.
-    fn push(&mut self, past: Past) {
+    fn push(&mut self, past: UndoState) {
         self.past.push_back(past);
-        let size = |p: &Past| p.choices.len() + 100;
+        let size = |p: &UndoState| p.choices.len() + 100;
         let mut all: usize = self.past.iter().map(size).sum();
         while all > REMEMBERED && self.past.len() > 1 {
             all -= self.past.pop_front().as_ref().map_or(0, size);
@@ -288,7 +288,7 @@ impl Session {
     }
 
     /// Restores a recorded state.
-    fn go_back(&mut self, past: &Past) -> Result<(), Trouble> {
+    fn go_back(&mut self, past: &UndoState) -> Result<(), Trouble> {
         let (trace, _) = self.restart(&past.model, &past.choices, &past.observed)?;
         (self.program, self.model) = (Arc::clone(&past.program), Arc::clone(&past.model));
         self.trace = trace;
@@ -326,7 +326,7 @@ impl Session {
     }
 
     /// Switches to a recorded state, and returns the present one for the opposite step.
-    fn exchange(&mut self, other: &Past) -> Result<Past, Trouble> {
+    fn exchange(&mut self, other: &UndoState) -> Result<UndoState, Trouble> {
         let now = self.remember(&other.what);
         self.go_back(other)?;
         Ok(now)

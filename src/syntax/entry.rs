@@ -63,7 +63,7 @@ fn comments(text: &str, gap: Range<usize>, out: &mut Vec<(Range<usize>, Class)>)
 
 /// Returns whether a text is incomplete: it ends inside brackets or a comment, or after a
 /// token that needs a right-hand side.
-pub fn goes_on(text: &str) -> bool {
+pub fn is_incomplete(text: &str) -> bool {
     let (lexemes, errors) = lex(text, 0..text.len(), FileId(0), 0);
     if errors.iter().any(|e| e.kind == super::SyntaxErrorKind::UnterminatedComment) {
         return true;
@@ -152,7 +152,7 @@ mod tests {
             for (r, _) in classes(text) {
                 assert!(text.get(r.clone()).is_some_and(|t| !t.is_empty()), "{text:?} {r:?}");
             }
-            goes_on(text);
+            is_incomplete(text);
             is_directive(text);
         }
     }
@@ -161,10 +161,10 @@ mod tests {
     fn what_goes_on_and_what_does_not() {
         for text in ["fn f(x) {", "let a = [1,", "assume x ~", "1 +", "/* so", "if a { 1 } else {"]
         {
-            assert!(goes_on(text), "{text}");
+            assert!(is_incomplete(text), "{text}");
         }
         for text in ["let a = 1", "f(x)", "}", ") + (", "\"open", "x // {", ""] {
-            assert!(!goes_on(text), "{text}");
+            assert!(!is_incomplete(text), "{text}");
         }
     }
 

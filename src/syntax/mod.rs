@@ -27,7 +27,7 @@ mod token;
 
 pub use deep::MAX_DEPTH;
 pub use delimiters::MAX_NESTING;
-pub use entry::{Class, classes, goes_on, is_directive};
+pub use entry::{Class, classes, is_directive, is_incomplete};
 pub use error::{AddressError, MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 pub use format::{WIDTH, format, print, print_expr};
 pub use lexer::MAX_TOKENS;

@@ -139,7 +139,7 @@ impl<'s> Tokens<'s> {
             let next = self.live(self.mates[i].max(i) + 1).min(block.end);
             let ended = match self.lexemes[i].token {
                 Token::Semi | Token::Bad => true,
-                Token::LBrace => self.is_block(i) && !self.goes_on(next),
+                Token::LBrace => self.is_block(i) && !self.continues_statement(next),
                 _ => false,
             };
             let begins = starts_statement(&self.lexemes, next)
@@ -186,7 +186,7 @@ impl<'s> Tokens<'s> {
     }
 
     /// Returns whether token `i` continues a statement after a block.
-    fn goes_on(&self, i: usize) -> bool {
+    fn continues_statement(&self, i: usize) -> bool {
         use Token::*;
         self.token(i).is_some_and(|t| {
             t.is_infix()

@@ -189,7 +189,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         while let Some(instruction) = local_density.instructions.get(next) {
             next += 1;
             match *instruction {
-                Instruction::SkipUnasked { slot, to } => {
+                Instruction::SkipUnevaluated { slot, to } => {
                     if self.node(slot).state != State::Clean {
                         next = to as usize;
                     }

@@ -173,7 +173,7 @@ impl Trace {
             }
             _ => None,
         };
-        let settled = match scaffold {
+        let propagated = match scaffold {
             Some((target, change, scaffold)) => {
                 self.graph.update_along_scaffold(&self.code, target, change, scaffold)
             }
@@ -183,12 +183,12 @@ impl Trace {
             }
         };
         self.graph.constraints.clear();
-        self.pend(before, settled)
+        self.pend(before, propagated)
     }
 
     /// Leaves a successful update pending, and undoes one that failed.
-    fn pend(&mut self, before: Before, settled: TraceResult<()>) -> TraceResult<Weight> {
-        match settled {
+    fn pend(&mut self, before: Before, propagated: TraceResult<()>) -> TraceResult<Weight> {
+        match propagated {
             Ok(()) => {
                 let weight = self.graph.weight(&before.prior, &before.likelihood);
                 self.update = Some(before);

@@ -5,7 +5,7 @@
 //! evaluated nodes and effects hold it. Data that only structural nodes need is boxed.
 
 use crate::dist::Datum;
-use crate::lang::builtins::Before;
+use crate::lang::builtins::PreviousEvaluation;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
 use crate::num::ExactSum;
@@ -111,7 +111,7 @@ pub(crate) struct Kept {
     /// Nodes held besides the operands.
     pub deps: Deps,
     /// The evaluation.
-    pub before: Arc<Before>,
+    pub before: Arc<PreviousEvaluation>,
 }
 
 /// A call that went through `mem`.

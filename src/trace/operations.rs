@@ -196,7 +196,7 @@ impl Trace {
     fn importance(&self) -> f64 {
         let (g, none) = (&self.graph, ExactSum::default());
         let Some(before) = &self.update else { return 0.0 };
-        ExactSum::balance(
+        ExactSum::difference_of_sums(
             [&g.prior, &g.likelihood, &g.drawn],
             [&before.prior, &before.likelihood, &none],
         )

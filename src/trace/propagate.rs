@@ -8,7 +8,7 @@
 use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
-use crate::lang::builtins::Before;
+use crate::lang::builtins::PreviousEvaluation;
 use crate::lang::code::{Code, Op};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
@@ -262,7 +262,7 @@ impl Graph {
 
     /// Stores the evaluation of an incremental function, and the nodes held besides the
     /// operands.
-    pub fn keep(&mut self, n: NodeId, deps: Deps, before: Before) {
+    pub fn keep(&mut self, n: NodeId, deps: Deps, before: PreviousEvaluation) {
         let old = match self.nodes[n as usize].side.as_deref() {
             Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
             _ => Deps::new(),
@@ -275,7 +275,7 @@ impl Graph {
     }
 
     /// Returns the previous evaluation that an incremental function may start from.
-    pub fn kept(&self, n: NodeId) -> Option<&Arc<Before>> {
+    pub fn kept(&self, n: NodeId) -> Option<&Arc<PreviousEvaluation>> {
         match self.nodes[n as usize].side.as_deref() {
             Some(Side::Kept(k)) if self.incremental => Some(&k.before),
             _ => None,

@@ -100,7 +100,11 @@ impl Weight {
     pub(crate) fn beside(prior: &ExactSum, likelihood: &ExactSum, power: f64) -> f64 {
         let log_weight = ExactSum::of_both(prior, likelihood);
         let flat = power == 1.0 || log_weight.is_infinite();
-        if flat { log_weight } else { log_weight - (1.0 - power) * likelihood.above_nothing() }
+        if flat {
+            log_weight
+        } else {
+            log_weight - (1.0 - power) * likelihood.difference_from_zero()
+        }
     }
 }
 
@@ -158,9 +162,11 @@ impl Graph {
     /// Returns the effect of the current update on the score.
     pub fn weight(&self, prior: &ExactSum, likelihood: &ExactSum) -> Weight {
         let none = ExactSum::default();
-        let log_joint =
-            ExactSum::balance([&self.prior, &self.likelihood, &none], [prior, likelihood, &none]);
-        let log_weight = ExactSum::balance(
+        let log_joint = ExactSum::difference_of_sums(
+            [&self.prior, &self.likelihood, &none],
+            [prior, likelihood, &none],
+        );
+        let log_weight = ExactSum::difference_of_sums(
             [&self.prior, &self.likelihood, &self.drawn],
             [prior, likelihood, &self.undrawn()],
         );

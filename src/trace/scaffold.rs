@@ -42,7 +42,7 @@ impl Graph {
         }
         // A change that leaves the frame may come back to an entry through other frames;
         // only the general way has the right order then.
-        let conditional = if leaves || scaffold.turns { scaffold.conditional } else { 0 };
+        let conditional = if leaves || scaffold.switches { scaffold.conditional } else { 0 };
         (scaffold.is_closed || !leaves).then_some((scaffold, conditional))
     }
 

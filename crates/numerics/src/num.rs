@@ -21,7 +21,7 @@ pub use special::{
     LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma,
     log_diff_exp, log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
 };
-pub use tails::{bessel_deficit, log_scaled_i0, mills_ratio};
+pub use tails::{log_scaled_i0, mills_ratio, one_minus_i1_over_i0};
 
 /// Adds `more` to `all` element by element, extending `all` with zeros if it is shorter.
 pub fn accumulate(all: &mut Vec<f64>, more: &[f64]) {

@@ -8,7 +8,7 @@ mod dataset;
 mod observed;
 
 use super::args::{Evaluate, Inputs, Job};
-use super::job::{CHECKPOINT, Interrupt, Manner};
+use super::job::{CHECKPOINT, Interrupt, RunMode};
 use super::{Failure, inputs, job, plain, quality, term};
 use super::{edges, resume};
 use dataset::Case;
@@ -228,7 +228,7 @@ impl<'a> Evaluation<'a> {
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
-        let manner = Manner { live, checkpoint: CHECKPOINT, resume: false, keep: 0 };
+        let manner = RunMode { live, checkpoint: CHECKPOINT, resume: false, keep: 0 };
         job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, manner).map(|_| ())
     }
 

@@ -1,7 +1,7 @@
 //! The line editor: colours, completion, continuation lines, history.
 
 use pcadlang::session::Session;
-use pcadlang::syntax::{Class, classes, goes_on};
+use pcadlang::syntax::{Class, classes, is_incomplete};
 use rustyline::completion::{Completer, Pair};
 use rustyline::config::{BellStyle, CompletionType, Config};
 use rustyline::error::ReadlineError;
@@ -169,7 +169,7 @@ fn colored(line: &str) -> String {
 
 /// Returns whether an entry is complete; a `:` command always is.
 pub fn is_whole(text: &str) -> bool {
-    text.trim_start().starts_with(':') || !goes_on(text)
+    text.trim_start().starts_with(':') || !is_incomplete(text)
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub fn repl(a: &Repl) -> Result<(), Failure> {
         // A single operation, such as making an array of a billion numbers, cannot be
         // interrupted, so the third Ctrl-C exits.
         if heard.pressed.fetch_add(1, Ordering::SeqCst) >= 2 {
-            std::process::exit(3);
+            std::process::exit(130);
         }
     });
     let shown = Rc::new(Cell::new(false));
@@ -96,7 +96,8 @@ fn job(a: &Repl, path: &str) -> Job {
 
 fn graphics(a: &Repl) -> Graphics {
     let variable = |name: &str| std::env::var(name).ok();
-    a.graphics.unwrap_or_else(|| pictures::told_by(variable, std::io::stdout().is_terminal()))
+    a.graphics
+        .unwrap_or_else(|| pictures::graphics_from_env(variable, std::io::stdout().is_terminal()))
 }
 
 impl From<Trouble> for Failure {

@@ -15,7 +15,7 @@ const LONGER_SIDE: u32 = 640;
 const COLUMNS: u32 = 72;
 
 /// Chooses how to show pictures by the environment; the terminal itself is not queried.
-pub fn told_by(variable: impl Fn(&str) -> Option<String>, is_terminal: bool) -> Graphics {
+pub fn graphics_from_env(variable: impl Fn(&str) -> Option<String>, is_terminal: bool) -> Graphics {
     let get = |name| variable(name).unwrap_or_default();
     let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
     let is =
@@ -90,7 +90,7 @@ mod tests {
         let told = |vars: &[(&str, &str)]| {
             let get =
                 |name: &str| vars.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_owned());
-            told_by(get, true)
+            graphics_from_env(get, true)
         };
         assert_eq!(told(&[("TERM", "xterm-kitty")]), Graphics::Kitty);
         assert_eq!(told(&[("TERM", "xterm-256color"), ("KITTY_WINDOW_ID", "1")]), Graphics::Kitty);
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(told(&[("TERM", "dumb")]), Graphics::File);
         assert_eq!(told(&[]), Graphics::File);
         assert_eq!(
-            told_by(|n| (n == "TERM").then(|| "xterm-kitty".to_owned()), false),
+            graphics_from_env(|n| (n == "TERM").then(|| "xterm-kitty".to_owned()), false),
             Graphics::File
         );
     }

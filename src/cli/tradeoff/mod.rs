@@ -38,7 +38,7 @@ const THREADS: usize = 2;
 const OVERHEAD: f64 = 1.1;
 
 /// What is to be measured, and the results so far.
-struct Sitting<'a> {
+struct Measurement<'a> {
     a: &'a Tradeoff,
     settings: Vec<Setting>,
     /// The settings that may become presets.
@@ -55,7 +55,7 @@ struct Sitting<'a> {
 /// Measures all settings within the budget.
 pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
-    let mut s = Sitting::prepare(a)?;
+    let mut s = Measurement::prepare(a)?;
     let each = s.settings.iter().map(|x| x.time.unwrap_or(10.0)).sum::<f64>()
         / s.settings.len().max(1) as f64;
     let each = OVERHEAD * each * f64::from(a.seeds) / s.jobs as f64;
@@ -97,9 +97,9 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     }
 }
 
-impl<'a> Sitting<'a> {
+impl<'a> Measurement<'a> {
     /// Prepares a measurement, and reports all errors in its input before the first run.
-    fn prepare(a: &'a Tradeoff) -> Result<Sitting<'a>, Failure> {
+    fn prepare(a: &'a Tradeoff) -> Result<Measurement<'a>, Failure> {
         let program = inputs::program(&a.inputs, a.quiet)?;
         let Settings { all: settings, candidates } = settings::read(a)?;
         let hashes = settings::programs(a, &settings)?;
@@ -136,7 +136,7 @@ impl<'a> Sitting<'a> {
             folder.before.iter().filter_map(|r| r.marks.last()).map(|m| m.seconds).sum::<f64>();
         folder.spent = folder.spent.max(ran / jobs as f64);
         let runs = Mutex::new(folder.before.clone());
-        let s = Sitting {
+        let s = Measurement {
             a,
             settings,
             candidates,

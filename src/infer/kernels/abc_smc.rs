@@ -11,7 +11,7 @@
 //! then on.
 
 use super::abc::{simulate, step_within};
-use super::particles::{Independent, Prior, Way};
+use super::particles::{Independent, ParticlePath, Prior};
 use crate::infer::kernel::{Kernel, StepContext};
 use crate::infer::resampling::systematic;
 use crate::infer::state::{StateError, holds, pack, unpack};
@@ -22,10 +22,10 @@ use crate::trace::{Selector, Trace, TraceResult};
 const MOST: usize = 1000;
 
 /// Particle independent Metropolis-Hastings without likelihoods.
-pub type AbcSmc = Independent<Closer>;
+pub type AbcSmc = Independent<Tolerances>;
 
 /// Lowers the largest distance of simulated data to `eps`.
-pub struct Closer {
+pub struct Tolerances {
     kernel: Box<dyn Kernel>,
     eps: f64,
     particles: usize,
@@ -47,12 +47,12 @@ impl AbcSmc {
         frozen: Selector,
         span: Span,
     ) -> Self {
-        let way = Closer { kernel, eps, particles, moves, span, tolerances: Vec::new() };
+        let way = Tolerances { kernel, eps, particles, moves, span, tolerances: Vec::new() };
         Independent::by(way, frozen, span)
     }
 }
 
-impl Way for Closer {
+impl ParticlePath for Tolerances {
     fn name(&self) -> &'static str {
         "abc"
     }

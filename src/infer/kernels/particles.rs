@@ -14,7 +14,7 @@ use crate::trace::{Constraint, Selector, Trace, TraceResult};
 use std::sync::Arc;
 
 /// How particles move from the prior to their target.
-pub(super) trait Way {
+pub(super) trait ParticlePath {
     fn name(&self) -> &'static str;
 
     /// Forgets what was adapted to other data.
@@ -86,7 +86,7 @@ impl Prior {
 }
 
 #[allow(private_bounds)]
-impl<W: Way> Independent<W> {
+impl<W: ParticlePath> Independent<W> {
     /// For particles that move in this way; frozen choices are not redrawn. `span` is the
     /// position that errors refer to.
     pub(super) fn by(way: W, frozen: Selector, span: Span) -> Self {
@@ -154,7 +154,7 @@ impl<W: Way> Independent<W> {
     }
 }
 
-impl<W: Way + Send> Kernel for Independent<W> {
+impl<W: ParticlePath + Send> Kernel for Independent<W> {
     fn name(&self) -> String {
         self.way.name().into()
     }

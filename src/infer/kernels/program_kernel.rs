@@ -111,7 +111,7 @@ impl ProgramKernel {
 
     /// Executes the body in the pending state, if it depends on no part of that state but
     /// the proposed choices: the state then need not be committed and reverted.
-    fn way_back(
+    fn reverse(
         &self,
         trace: &mut Trace,
         at: &StepContext,
@@ -441,7 +441,7 @@ impl Kernel for ProgramKernel {
             at.tempered(&w) + log_back - log_forth + volume - log_volume(trace, &forth.all)
         };
         if w.appeared + w.vanished == 0
-            && let Some(back) = self.way_back(trace, at, &forth.all, &new, &auxiliaries)
+            && let Some(back) = self.reverse(trace, at, &forth.all, &new, &auxiliaries)
         {
             return Ok(accept_or_reject(trace, ratio(trace, Some(back)), &mut rng));
         }

@@ -10,7 +10,7 @@
 //! first run, such that the effective sample size is half the number of particles at
 //! each, and are fixed from then on.
 
-use super::particles::{Independent, Prior, Way};
+use super::particles::{Independent, ParticlePath, Prior};
 use crate::infer::kernel::{Kernel, StepContext, inner_step};
 use crate::infer::resampling::systematic;
 use crate::infer::state::{StateError, holds, pack, unpack};
@@ -45,7 +45,7 @@ impl Smc {
     }
 }
 
-impl Way for Annealed {
+impl ParticlePath for Annealed {
     fn name(&self) -> &'static str {
         "smc"
     }

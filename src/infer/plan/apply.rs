@@ -116,7 +116,7 @@ impl Runner<'_> {
             return Err(fail(e.span, message).into());
         }
         self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });
-        if self.way.is_empty() {
+        if self.resume_path.is_empty() {
             let given = arguments(k, args, e.span, &mut self.env())?;
             self.variables.extend(given);
         }

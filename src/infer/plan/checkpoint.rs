@@ -5,7 +5,7 @@
 //! its choices, with bit-for-bit equal scores and lists of choices in the same order;
 //! random streams are determined by step and address; caches are rebuilt.
 
-use super::place::{Doing, Place};
+use super::place::{Doing, PlanPosition};
 use super::runner::{Instance, Runner};
 use super::{ChainError, Progress, RunOptions};
 use crate::infer::draws::{Column, KernelStats, Sink, SiteStats};
@@ -45,7 +45,7 @@ pub struct Checkpoint {
     best: Option<(f64, State)>,
     population: Population,
     variables: Vec<(Arc<str>, Plain)>,
-    path: Vec<Place>,
+    path: Vec<PlanPosition>,
     kernels: Vec<SavedKernel>,
     sites: Vec<(u64, SiteStats)>,
     columns: Vec<Column>,
@@ -121,7 +121,7 @@ impl Checkpoint {
         let c: Checkpoint = unpack(bytes)?;
         let sizes =
             c.columns.iter().try_fold(0usize, |sum, column| sum.checked_add(column.shape.len()));
-        let counts = [c.step, c.draws].into_iter().chain(c.path.iter().map(Place::most));
+        let counts = [c.step, c.draws].into_iter().chain(c.path.iter().map(PlanPosition::most));
         let fits = c.warmup_steps <= c.step
             && c.population.fits()
             && sizes.is_some_and(|n| n <= MOST_NUMBERS);
@@ -202,7 +202,7 @@ impl<'a> Runner<'a> {
             (trace, c.population),
         );
         runner.variables = c.variables.into_iter().map(|(name, v)| (name, v.value())).collect();
-        runner.way = c.path.into();
+        runner.resume_path = c.path.into();
         let saved = |k: SavedKernel| Instance {
             signature: k.signature,
             kernel: None,

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// A statement of a body that is being run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Place {
+pub(super) struct PlanPosition {
     /// Its index in the body.
     pub statement: usize,
     /// The number of variables when it began.
@@ -17,7 +17,7 @@ pub(super) struct Place {
     pub doing: Doing,
 }
 
-impl Place {
+impl PlanPosition {
     /// The largest of its counts.
     pub fn most(&self) -> u64 {
         match &self.doing {

@@ -1,7 +1,7 @@
 //! Runs a plan on a chain, statement by statement.
 
 use super::checkpoint::Checkpoint;
-use super::place::{Doing, Place};
+use super::place::{Doing, PlanPosition};
 use super::{ChainError, ChainResult, Progress, RunOptions};
 use crate::infer::draws::{DrawRow, KernelStats, Sink};
 use crate::infer::expr::{PlanEnv, evaluate};
@@ -84,10 +84,10 @@ pub(super) struct Runner<'a> {
     /// Proposals, accepted proposals and divergences up to the last draw.
     pub counted: [u64; 3],
     /// The statements being run, the outermost first.
-    pub path: Vec<Place>,
+    pub path: Vec<PlanPosition>,
     /// Where a checkpoint resumes, the outermost statement first; empty once the chain
     /// has got there.
-    pub way: VecDeque<Place>,
+    pub resume_path: VecDeque<PlanPosition>,
     /// Whether the plan is finished.
     pub finished: bool,
     /// The number of checkpoints requested so far.
@@ -130,7 +130,7 @@ impl<'a> Runner<'a> {
             draws: 0,
             counted: [0; 3],
             path: Vec::new(),
-            way: VecDeque::new(),
+            resume_path: VecDeque::new(),
             finished: false,
             asked: 0,
         }
@@ -146,12 +146,12 @@ impl<'a> Runner<'a> {
                 // A step that was stopped in the middle is abandoned: the draws and
                 // checkpoints before it remain.
                 Err(ChainError::Run(e)) if e.kind == FaultKind::Stopped && self.draws > 0 => {
-                    self.way.clear();
+                    self.resume_path.clear();
                     Flow::End
                 }
                 flow => flow?,
             };
-            if !self.way.is_empty() {
+            if !self.resume_path.is_empty() {
                 return Err(StateError::new("the checkpoint belongs to another plan").into());
             }
             self.finished = flow != Flow::End;
@@ -236,10 +236,10 @@ impl<'a> Runner<'a> {
     /// Runs statements in order, starting where a checkpoint resumes.
     pub fn body(&mut self, stmts: &[KStmt]) -> Result<Flow, ChainError> {
         let level = self.path.len();
-        let mut back = self.way.pop_front();
+        let mut back = self.resume_path.pop_front();
         let first = back.as_ref().map_or(0, |p| p.statement);
         for (statement, s) in stmts.iter().enumerate().skip(first) {
-            let place = back.take().unwrap_or(Place {
+            let place = back.take().unwrap_or(PlanPosition {
                 statement,
                 depth: self.variables.len(),
                 doing: Doing::Begins,
@@ -278,7 +278,7 @@ impl<'a> Runner<'a> {
             KStmtKind::Repeat { count, body } => self.repeat(count, body, doing),
             KStmtKind::Every { count, body } => {
                 // When resuming within the body, it is known to be due.
-                if !self.way.is_empty() {
+                if !self.resume_path.is_empty() {
                     return self.body(body);
                 }
                 let n = self.count(count)?.max(1);
@@ -302,7 +302,7 @@ impl<'a> Runner<'a> {
                 let all: Option<Arc<[Plain]>> = all.map(Arc::from);
                 for (item, value) in items.into_iter().enumerate().skip(begin) {
                     self.note(Doing::Items { item, all: all.clone() });
-                    if self.way.is_empty() {
+                    if self.resume_path.is_empty() {
                         self.variables.push((Arc::clone(&var.node), value));
                     }
                     let flow = self.body(body)?;
@@ -380,7 +380,7 @@ impl<'a> Runner<'a> {
             self.progress.pass.store(i, Ordering::Relaxed);
             self.progress.passes.store(of, Ordering::Relaxed);
         }
-        if self.way.is_empty() {
+        if self.resume_path.is_empty() {
             if self.is_over() {
                 self.keep(None)?;
                 return Ok(Flow::End);

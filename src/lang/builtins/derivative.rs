@@ -296,8 +296,8 @@ pub(super) fn one_of(
             for i in 0..n {
                 let parts: SmallVec<[Value; 4]> = values.iter().map(|v| part(v, i)).collect();
                 let parts: SmallVec<[&Value; 4]> = parts.iter().collect();
-                let pulled = one_of(&parts, order, &z.element(i)?, &by.element(i))?;
-                for ((sum, v), one) in all.iter_mut().zip(values).zip(pulled) {
+                let argument_adjoints = one_of(&parts, order, &z.element(i)?, &by.element(i))?;
+                for ((sum, v), one) in all.iter_mut().zip(values).zip(argument_adjoints) {
                     if array_len(v).is_some() { sum.add_element(n, i, one) } else { sum.add(one) }
                 }
             }

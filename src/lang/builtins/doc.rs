@@ -36,7 +36,7 @@ fn statement(s: &Statement) -> String {
 /// The entry of a built-in.
 fn entry(b: &Builtin) -> String {
     let mut s = b.signature();
-    if let Some(what) = gives(b) {
+    if let Some(what) = result_type(b) {
         let _ = write!(s, " -> {what}");
     }
     let _ = write!(s, "\n\n{}\n", b.doc);
@@ -89,7 +89,7 @@ pub fn reference(table: &Table) -> String {
         let _ = write!(s, "\n## {section}\n\n");
         for b in table.iter().filter(|b| b.section == section) {
             let _ = write!(s, "- **`{}`**", b.signature());
-            if let Some(what) = gives(b) {
+            if let Some(what) = result_type(b) {
                 let _ = write!(s, " → {what}");
             }
             let _ = writeln!(s, ". {}", b.doc);
@@ -108,7 +108,7 @@ pub fn reference(table: &Table) -> String {
 }
 
 /// The type of the result, unless it is `any`.
-fn gives(b: &Builtin) -> Option<String> {
+fn result_type(b: &Builtin) -> Option<String> {
     match b.returns {
         Type::Any => None,
         _ => Some(b.returns.to_string()),

@@ -17,14 +17,15 @@ use std::sync::Arc;
 pub type State = Arc<dyn Any + Send + Sync>;
 
 type Function = dyn Fn(&Args) -> Result<Value, Fault> + Send + Sync;
-type Incremental = dyn Fn(&Args, Option<&Before>) -> Result<(Value, State), Fault> + Send + Sync;
+type Incremental =
+    dyn Fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> + Send + Sync;
 type Make = dyn Fn(&Args) -> Result<Dist, Fault> + Send + Sync;
 type Product = dyn Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync;
 
 /// An evaluation from which a later one may resume. It is stored with its result (in a
 /// node of a trace or an operation of a tape) and immutable, so that restoring an earlier
 /// state of the trace restores it as well.
-pub struct Before {
+pub struct PreviousEvaluation {
     /// The arguments.
     pub args: Vec<Value>,
     /// The result.
@@ -33,7 +34,7 @@ pub struct Before {
     pub state: State,
 }
 
-impl fmt::Debug for Before {
+impl fmt::Debug for PreviousEvaluation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Before")
             .field("args", &self.args)
@@ -91,8 +92,8 @@ impl Builtin {
     pub(crate) fn resume(
         &self,
         values: &[&Value],
-        before: Option<&Before>,
-    ) -> Option<Result<Before, Fault>> {
+        before: Option<&PreviousEvaluation>,
+    ) -> Option<Result<PreviousEvaluation, Fault>> {
         match &self.host {
             Some(HostItem::Incremental { call, .. }) => {
                 Some(self.resume_with(&**call, values, before))
@@ -105,8 +106,8 @@ impl Builtin {
         &self,
         call: &Incremental,
         values: &[&Value],
-        before: Option<&Before>,
-    ) -> Result<Before, Fault> {
+        before: Option<&PreviousEvaluation>,
+    ) -> Result<PreviousEvaluation, Fault> {
         let a = Args { builtin: self, values };
         let args: Vec<Value> = (0..values.len()).map(|i| a.get(i).clone()).collect();
         match before {
@@ -114,9 +115,9 @@ impl Builtin {
                 if b.args.len() == args.len()
                     && b.args.iter().zip(&args).all(|(x, y)| x.same(y)) =>
             {
-                Ok(Before { args, value: b.value.clone(), state: Arc::clone(&b.state) })
+                Ok(PreviousEvaluation { args, value: b.value.clone(), state: Arc::clone(&b.state) })
             }
-            _ => call(&a, before).map(|(value, state)| Before { args, value, state }),
+            _ => call(&a, before).map(|(value, state)| PreviousEvaluation { args, value, state }),
         }
     }
 }

@@ -5,6 +5,7 @@
 //! table. The functions are pure: equal arguments give bit-identical results on every
 //! platform.
 
+mod aliases;
 mod args;
 mod compounds;
 mod covariance;
@@ -19,7 +20,6 @@ mod forms;
 mod host;
 mod inference;
 mod interp;
-mod known_as;
 mod list;
 mod log_density;
 mod math;
@@ -34,7 +34,7 @@ pub use args::Args;
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
 pub use derivative::{ArgAdjoints, Binary, Derivative, Reduction, Vjp};
-pub use host::{Before, HostItem, State};
+pub use host::{HostItem, PreviousEvaluation, State};
 pub(crate) use reduce::dot;
 pub(crate) use row::{Arg, Row, arg, function, opt};
 pub use table::{Constant, Defaults, InputHook, Table};

@@ -39,14 +39,14 @@ pub(super) const TABLE: &[Row] = &[
         2,
         "The sample variance (divisor n - 1) of at least two numbers.",
         variance,
-        |xs, _, by| { spread_slopes(xs, 2.0, by) }
+        |xs, _, by| { variance_slopes(xs, 2.0, by) }
     ),
     of_all!(
         "sd",
         2,
         "The sample standard deviation (divisor n - 1) of at least two numbers.",
         |xs| variance(xs).sqrt(),
-        |xs, y, by| spread_slopes(xs, 1.0 / y, by)
+        |xs, y, by| variance_slopes(xs, 1.0 / y, by)
     ),
     of_all!("norm", 0, "The Euclidean norm.", norm, |xs, y, by| {
         by.iter_mut().zip(xs).for_each(|(by, x)| *by = x / y)
@@ -89,7 +89,7 @@ pub(super) const TABLE: &[Row] = &[
 ];
 
 /// `factor (x - mean) / (n - 1)`: the derivatives of the variance if the factor is 2.
-fn spread_slopes(xs: &[f64], factor: f64, by: &mut [f64]) {
+fn variance_slopes(xs: &[f64], factor: f64, by: &mut [f64]) {
     let m = mean(xs);
     by.iter_mut().zip(xs).for_each(|(by, x)| *by = factor * (x - m) / (xs.len() as f64 - 1.0));
 }

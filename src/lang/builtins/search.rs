@@ -1,6 +1,6 @@
 //! Full-text search for built-ins.
 
-use super::known_as::KNOWN_AS;
+use super::aliases::ALIASES;
 use super::{Builtin, Table};
 use crate::diag::nearest;
 
@@ -59,14 +59,14 @@ struct Text<'t> {
     doc: Vec<String>,
     args: Vec<String>,
     /// Its names in other systems.
-    elsewhere: Vec<String>,
+    aliases: Vec<String>,
 }
 
 impl<'t> Text<'t> {
     fn new(of: &'t Builtin) -> Self {
         let args = of.args.iter().flat_map(|arg| words_of(&arg.name).chain(words_of(&arg.doc)));
-        let known = KNOWN_AS.iter().find(|(name, _)| of.module.is_empty() && *name == of.name);
-        let elsewhere = known
+        let known = ALIASES.iter().find(|(name, _)| of.module.is_empty() && *name == of.name);
+        let aliases = known
             .into_iter()
             .flat_map(|(_, words)| words_of(words).chain(words.split(' ').map(str::to_owned)));
         Text {
@@ -76,12 +76,12 @@ impl<'t> Text<'t> {
             section: words_of(&of.section).collect(),
             doc: words_of(&of.doc).collect(),
             args: args.collect(),
-            elsewhere: elsewhere.collect(),
+            aliases: aliases.collect(),
         }
     }
 
     fn words(&self) -> impl Iterator<Item = &str> {
-        let all = [&self.parts, &self.section, &self.doc, &self.args, &self.elsewhere]
+        let all = [&self.parts, &self.section, &self.doc, &self.args, &self.aliases]
             .into_iter()
             .flatten();
         all.map(String::as_str).chain(std::iter::once(self.name.as_str()))
@@ -95,7 +95,7 @@ impl<'t> Text<'t> {
             () if self.name == word || self.of.full_name().to_lowercase() == word => 64,
             () if is(&self.parts) => 32,
             () if begins(&self.parts) || self.name.starts_with(word) => 16,
-            () if is(&self.elsewhere) => 12,
+            () if is(&self.aliases) => 12,
             () if begins(&self.section) => 8,
             () if is(&self.doc) => 6,
             () if begins(&self.doc) => 4,

@@ -20,19 +20,13 @@ enum Target {
 }
 
 impl Lowerer<'_> {
-    pub fn call(
-        &mut self,
-        e: &Expr,
-        callee: &Expr,
-        args: &[Arg],
-        name: Option<&Arc<str>>,
-    ) -> Typed {
+    pub fn call(&mut self, e: &Expr, callee: &Expr, args: &[Arg]) -> Typed {
         match self.target(callee) {
             Target::Builtin(i) => {
                 let table = Arc::clone(&self.code.builtins);
                 let b = table.get(i);
                 match b.kind {
-                    Kind::Form(form) => self.form(form, i, args, e.span, name),
+                    Kind::Form(form) => self.form(form, i, args, e.span),
                     Kind::Function(_) | Kind::Distribution(_) => {
                         match self.builtin_args(i, args, e.span) {
                             Some(operands) => {
@@ -227,14 +221,7 @@ impl Lowerer<'_> {
         }
     }
 
-    fn form(
-        &mut self,
-        form: Form,
-        i: u32,
-        args: &[Arg],
-        span: Span,
-        name: Option<&Arc<str>>,
-    ) -> Typed {
+    fn form(&mut self, form: Form, i: u32, args: &[Arg], span: Span) -> Typed {
         let table = Arc::clone(&self.code.builtins);
         let b = table.get(i);
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
@@ -284,7 +271,6 @@ impl Lowerer<'_> {
             }
             Form::Mem => {
                 let (f, label) = function(self, arg(0));
-                let _ = name;
                 let site = self.site(&label, Vec::new(), 0);
                 self.op(Op::Mem { f: f.at, site }, Type::Function, span)
             }

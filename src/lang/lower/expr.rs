@@ -37,7 +37,7 @@ impl Lowerer<'_> {
                 self.op(Op::Array(items), Type::Array, e.span)
             }
             ExprKind::Record(fields) => self.record(fields, e.span),
-            ExprKind::Call { callee, args } => self.call(e, callee, args, None),
+            ExprKind::Call { callee, args } => self.call(e, callee, args),
             ExprKind::Index { .. } => self.index(e),
             ExprKind::Field { base, field } => self.field(e, base, field),
             ExprKind::Unary { op, expr } => {
@@ -66,7 +66,7 @@ impl Lowerer<'_> {
     pub fn expr_named(&mut self, e: &Expr, name: &Arc<str>) -> Typed {
         match &e.kind {
             ExprKind::Lambda(l) => self.lambda(l, name, e.span),
-            ExprKind::Call { callee, args } => self.call(e, callee, args, Some(name)),
+            ExprKind::Call { callee, args } => self.call(e, callee, args),
             _ => self.expr(e),
         }
     }

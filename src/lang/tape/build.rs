@@ -9,7 +9,7 @@ use super::op::Op;
 use super::{Input, ScoreSums, Tape};
 use crate::dist::{Dist, Support, batch, batch_of_mixture};
 use crate::lang::builtins::{
-    Before, Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Scalar,
+    Binary, Builtin, CovarianceValue, Derivative, Kind, PreviousEvaluation, Reduction, Scalar,
 };
 use crate::lang::value::Value;
 use crate::num::Column;
@@ -142,7 +142,7 @@ impl Builder {
     }
 
     /// The last recorded call may start from this evaluation.
-    pub fn start_from(&mut self, evaluation: &Arc<Before>) {
+    pub fn start_from(&mut self, evaluation: &Arc<PreviousEvaluation>) {
         if let Some(Op::Call { before, .. }) = self.ops.last_mut() {
             *before = Some(Arc::clone(evaluation));
         }

@@ -2,7 +2,7 @@
 
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Before, Builtin, Kind};
+use crate::lang::builtins::{Args, Builtin, Kind, PreviousEvaluation};
 use crate::lang::density;
 use crate::lang::value::Value;
 use smallvec::SmallVec;
@@ -238,7 +238,7 @@ pub(super) fn call_from(
     builtin: &Builtin,
     args: &[Form],
     buffer: &[f64],
-    before: &mut Option<Arc<Before>>,
+    before: &mut Option<Arc<PreviousEvaluation>>,
     keeps: bool,
 ) -> Option<Value> {
     let values: SmallVec<[Value; 4]> =

@@ -63,7 +63,11 @@ impl Tape {
 
     /// Runs it with these values of its inputs, given by their number, and returns the
     /// coordinates in `y`. False if it cannot evaluate the program there.
-    pub fn stand(&mut self, mut value: impl FnMut(usize) -> Value, y: &mut Vec<f64>) -> bool {
+    pub fn run_at_values(
+        &mut self,
+        mut value: impl FnMut(usize) -> Value,
+        y: &mut Vec<f64>,
+    ) -> bool {
         self.sums = ScoreSums::default();
         y.clear();
         for (i, input) in self.inputs.iter().enumerate() {

@@ -3,7 +3,7 @@
 use super::ScoreSums;
 use super::form::{Form, call_from, vjp_call};
 use crate::dist::{Batch, Dist};
-use crate::lang::builtins::{Before, Binary, Builtin, Reduction, times};
+use crate::lang::builtins::{Binary, Builtin, PreviousEvaluation, Reduction, times};
 use crate::lang::density;
 use crate::lang::value::Value;
 use crate::num::{Column, ExactSum};
@@ -29,7 +29,7 @@ pub(super) enum Op {
         builtin: Builtin,
         args: Box<[Form]>,
         out: Form,
-        before: Option<Arc<Before>>,
+        before: Option<Arc<PreviousEvaluation>>,
         keeps: bool,
     },
     /// A value that must be the same as when the tape was recorded.

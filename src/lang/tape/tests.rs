@@ -15,7 +15,7 @@ fn normal(mean: f64, sd: f64) -> Dist {
 
 /// `s ~ gamma-like positive number; observe normal([1, 2] * s, s) = [0.5, 0.7]`, recorded
 /// with the values for s = 2.
-fn told(guarded: bool) -> Tape {
+fn recorded(guarded: bool) -> Tape {
     let (table, mut b) = (Table::default(), Builder::default());
     let s = b.place(&Value::Num(2.0)).unwrap();
     b.input(Support::Positive, s.clone());
@@ -48,7 +48,7 @@ fn density(y: f64) -> f64 {
 
 #[test]
 fn densities_and_gradients_are_those_of_the_formula() {
-    let mut tape = told(false);
+    let mut tape = recorded(false);
     let mut g = Vec::new();
     for y in [-1.0, 0.2, 1.3] {
         assert!(tape.run(&[y]));
@@ -61,13 +61,13 @@ fn densities_and_gradients_are_those_of_the_formula() {
     }
     // The coordinates of a given value are returned.
     let mut y = Vec::new();
-    assert!(tape.stand(|_| Value::Num(1.5), &mut y));
+    assert!(tape.run_at_values(|_| Value::Num(1.5), &mut y));
     assert_eq!(y, [libm::log(1.5)]);
 }
 
 #[test]
 fn a_guard_says_where_the_tape_ends() {
-    let mut tape = told(true);
+    let mut tape = recorded(true);
     assert!(tape.run(&[0.4]) && !tape.run(&[-0.4]) && tape.run(&[0.1]));
     assert!(!tape.run(&[]), "too few coordinates");
 }

@@ -13,7 +13,7 @@ pub fn column_names(columns: &[Column]) -> Vec<String> {
     let mut taken = HashSet::new();
     let mut names = Vec::new();
     for column in columns {
-        let wanted = bearable(&column.name);
+        let wanted = csv_safe(&column.name);
         let mut name = wanted.clone();
         let mut copies = 1;
         while !taken.insert(name.clone()) {
@@ -28,7 +28,7 @@ pub fn column_names(columns: &[Column]) -> Vec<String> {
     names
 }
 
-fn bearable(name: &str) -> String {
+fn csv_safe(name: &str) -> String {
     let mut out: String = name
         .chars()
         .map(|c| match c {

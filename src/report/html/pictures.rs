@@ -29,7 +29,7 @@ pub(super) fn pictures(p: &Page) -> String {
         }
     }
     if let Some(mesh) = &p.mesh {
-        turning(&mut s, mesh);
+        mesh_viewer(&mut s, mesh);
     }
     s.push_str("</div>\n");
     s
@@ -44,7 +44,7 @@ fn figure(s: &mut String, picture: &Picture) {
     );
 }
 
-fn turning(s: &mut String, m: &MeshData) {
+fn mesh_viewer(s: &mut String, m: &MeshData) {
     let known = |t: &&[u32; 3]| t.iter().all(|i| (*i as usize) < m.positions.len());
     let triangles: Vec<String> =
         m.triangles.iter().filter(known).flatten().map(u32::to_string).collect();

@@ -127,7 +127,7 @@ pub(super) fn marginal(q: &Quantity) -> String {
 /// Returns the number of each chain's draws with ranks in each bin, relative to a uniform
 /// distribution; `[chain][bin]`. Equal draws share their ranks, so that chains that agree
 /// look alike for discrete quantities too.
-fn rank_shares(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
+fn rank_densities(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
     let mut order: Vec<(f64, usize)> = chains
         .iter()
         .enumerate()
@@ -165,7 +165,7 @@ pub(super) fn ranks(q: &Quantity) -> String {
     let _ =
         write!(s, "<path d=\"M0,{level:.1}H{WIDTH}\" class=\"level\" stroke-dasharray=\"3 3\"/>");
     for (c, shares) in
-        rank_shares(&q.chains).iter().enumerate().filter(|(c, _)| !q.chains[*c].is_empty())
+        rank_densities(&q.chains).iter().enumerate().filter(|(c, _)| !q.chains[*c].is_empty())
     {
         let (path, color) = (steps(&shares.map(height)), color(c));
         let _ = write!(
@@ -230,14 +230,14 @@ mod tests {
         let level =
             |shares: &[[f64; RANK_BINS]]| shares.iter().flatten().all(|s| (s - 1.0).abs() < 1e-9);
         let half = |odd: usize| (0..200).map(|i| (2 * i + odd) as f64).collect::<Vec<_>>();
-        assert!(level(&rank_shares(&[half(0), half(1)])));
+        assert!(level(&rank_densities(&[half(0), half(1)])));
         let coins = |n: usize| (0..n).map(|i| f64::from(i as u32 % 2)).collect::<Vec<_>>();
         assert!(
-            level(&rank_shares(&[coins(50), coins(50), coins(90)])),
+            level(&rank_densities(&[coins(50), coins(50), coins(90)])),
             "equal draws share their ranks"
         );
-        assert!(level(&rank_shares(&[vec![0.0, -0.0, 0.0], vec![-0.0; 3]])), "zeros are equal");
-        let apart = rank_shares(&[vec![1.0; 30], vec![2.0; 30]]);
+        assert!(level(&rank_densities(&[vec![0.0, -0.0, 0.0], vec![-0.0; 3]])), "zeros are equal");
+        let apart = rank_densities(&[vec![1.0; 30], vec![2.0; 30]]);
         assert_eq!((apart[0][0], apart[0][19], apart[1][0]), (2.0, 0.0, 0.0));
         for chain in &apart {
             assert!((chain.iter().sum::<f64>() - RANK_BINS as f64).abs() < 1e-9);

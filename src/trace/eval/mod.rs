@@ -11,7 +11,7 @@ pub(crate) use observe::Score;
 use super::graph::Graph;
 use super::node::*;
 use super::propagate::{Failure, Poll};
-use crate::lang::builtins::{Before, Builtin};
+use crate::lang::builtins::{Builtin, PreviousEvaluation};
 use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Closure, Value};
@@ -233,7 +233,7 @@ impl Graph {
 pub(super) enum Made {
     Value(Value),
     /// With the data from which the next evaluation starts.
-    Kept(Before),
+    Kept(PreviousEvaluation),
 }
 
 impl Made {

@@ -22,8 +22,9 @@ impl Reverse<'_> {
         let values = self.values(self.graph.nodes[n as usize].frame, args);
         let a = Args { builtin, values: &values };
         let operand = |i: usize| args.get(i).copied();
-        let pulled = self.by_call(n, &a, &self.graph.nodes[n as usize].value, by, operand)?;
-        self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)
+        let argument_adjoints =
+            self.by_call(n, &a, &self.graph.nodes[n as usize].value, by, operand)?;
+        self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), argument_adjoints)
     }
 
     /// Propagates an adjoint through a call of a built-in function value; false if the
@@ -48,14 +49,14 @@ impl Reverse<'_> {
         };
         let values: SmallVec<[&Value; 8]> = operands.iter().map(value).collect();
         let operand = |i: usize| operands.get(i).copied().flatten();
-        let pulled = self.by_call(
+        let argument_adjoints = self.by_call(
             n,
             &Args { builtin, values: &values },
             &g.nodes[n as usize].value,
             by,
             operand,
         )?;
-        self.give_arguments(n, builtin, operands, pulled)?;
+        self.give_arguments(n, builtin, operands, argument_adjoints)?;
         Ok(true)
     }
 
@@ -86,8 +87,9 @@ impl Reverse<'_> {
             if by.is_zero() {
                 continue;
             }
-            let pulled = self.by_call(n, &Args { builtin, values: &[&x] }, &y, &by, |_| None)?;
-            whole.add_position(xs, i, pulled.into_iter().next().unwrap_or_default());
+            let argument_adjoints =
+                self.by_call(n, &Args { builtin, values: &[&x] }, &y, &by, |_| None)?;
+            whole.add_position(xs, i, argument_adjoints.into_iter().next().unwrap_or_default());
         }
         self.give(frame, *over, whole);
         Ok(())
@@ -119,10 +121,10 @@ impl Reverse<'_> {
         n: NodeId,
         builtin: &Builtin,
         args: impl IntoIterator<Item = Option<Operand>>,
-        pulled: impl IntoIterator<Item = Adjoint>,
+        argument_adjoints: impl IntoIterator<Item = Adjoint>,
     ) -> Result<(), Failure> {
         let frame = self.graph.nodes[n as usize].frame;
-        for (i, (o, part)) in args.into_iter().zip(pulled).enumerate() {
+        for (i, (o, part)) in args.into_iter().zip(argument_adjoints).enumerate() {
             let Some(source) = o.and_then(|o| self.source(frame, o)) else { continue };
             if !self.is_active(source) {
                 continue;

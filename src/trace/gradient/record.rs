@@ -122,7 +122,7 @@ impl Recorder<'_> {
             stack.pop();
             let form = match fixed {
                 true => Form::Fixed(self.value(n).clone()),
-                false => self.tell(n)?,
+                false => self.record_op(n)?,
             };
             self.forms.insert(n, form);
         }
@@ -165,7 +165,7 @@ impl Recorder<'_> {
     }
 
     /// Records the operation of a node; `None` if that is not possible.
-    fn tell(&mut self, n: NodeId) -> Option<Form> {
+    fn record_op(&mut self, n: NodeId) -> Option<Form> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
         let side = graph.nodes[n as usize].side.as_deref();
@@ -213,13 +213,13 @@ impl Recorder<'_> {
                 self.form(source).position(i?)
             }
             Op::Accumulator => self.handed_on(n),
-            Op::Gather => self.tell_gather(n, &now),
+            Op::Gather => self.record_gather(n, &now),
             Op::Call { callee: Callee::Value(f), args, .. } => {
                 if !self.operand(frame, *f).is_fixed() {
                     return None;
                 }
                 let Value::Builtin(i) = graph.value(code, frame, *f) else {
-                    return self.tell_call(n);
+                    return self.record_call(n);
                 };
                 let builtin = code.builtins.get(*i);
                 let order = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())).ok()?;
@@ -230,7 +230,7 @@ impl Recorder<'_> {
                 let args = order.iter().map(argument).collect();
                 self.tape.call(builtin, args, &now)
             }
-            Op::Call { .. } => self.tell_call(n),
+            Op::Call { .. } => self.record_call(n),
             Op::If { cond, .. } => {
                 self.guard(frame, *cond)?;
                 self.handed_on(n)
@@ -269,13 +269,13 @@ impl Recorder<'_> {
                     }
                 }
             }
-            Op::Draw { dist, keys, .. } => self.tell_draw(n, dist, keys),
+            Op::Draw { dist, keys, .. } => self.record_draw(n, dist, keys),
             Op::Observe { dist, value, .. } => {
                 let x = match graph.replaced(code, n) {
                     Some(v) => Form::Fixed(v.clone()),
                     None => self.operand(frame, *value),
                 };
-                self.tell_score(n, dist, &x, true)?;
+                self.record_score(n, dist, &x, true)?;
                 Some(Form::Fixed(now))
             }
             Op::Factor { weight, .. } => {
@@ -295,14 +295,14 @@ impl Recorder<'_> {
     }
 
     /// A call of a function of the program, whose frame is fixed.
-    fn tell_call(&mut self, n: NodeId) -> Option<Form> {
+    fn record_call(&mut self, n: NodeId) -> Option<Form> {
         match self.view.graph.nodes[n as usize].side.as_deref() {
             Some(Side::MemoCall(c)) if c.deps.iter().any(|d| !self.form(*d).is_fixed()) => None,
             _ => self.handed_on(n),
         }
     }
 
-    fn tell_gather(&mut self, n: NodeId, now: &Value) -> Option<Form> {
+    fn record_gather(&mut self, n: NodeId, now: &Value) -> Option<Form> {
         let all: Vec<Form> = self.view.gathered(n)?.iter().map(|d| self.form(*d)).collect();
         match now {
             Value::Record(r) => Some(Form::Record(r.keys().cloned().zip(all).collect())),
@@ -310,7 +310,7 @@ impl Recorder<'_> {
         }
     }
 
-    fn tell_draw(&mut self, n: NodeId, spec: &DistSpec, keys: &[Operand]) -> Option<Form> {
+    fn record_draw(&mut self, n: NodeId, spec: &DistSpec, keys: &[Operand]) -> Option<Form> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
         let dist = graph.dist_of(code, n)?;
@@ -328,11 +328,11 @@ impl Recorder<'_> {
             Some(form) => form.clone(),
             None => Form::Fixed(graph.nodes[n as usize].value.clone()),
         };
-        self.tell_score(n, spec, &x, false)?;
+        self.record_score(n, spec, &x, false)?;
         Some(x)
     }
 
-    fn tell_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
+    fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
         match spec {

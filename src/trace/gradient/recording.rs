@@ -65,9 +65,9 @@ impl Recording {
                 (v, i) => v.element(i as usize).unwrap_or_default(),
             }
         };
-        let told = self.tape.stand(now, y);
+        let recorded = self.tape.run_at_values(now, y);
         self.start.clone_from(self.tape.sums());
-        told
+        recorded
     }
 
     /// Returns the weight of a proposal of these coordinates; `None` if only an actual
@@ -77,7 +77,7 @@ impl Recording {
             return None;
         }
         let (new, old, none) = (self.tape.sums(), &self.start, &ExactSum::default());
-        let log_weight = ExactSum::balance(
+        let log_weight = ExactSum::difference_of_sums(
             [&new.prior, &new.likelihood, none],
             [&old.prior, &old.likelihood, none],
         );

@@ -112,12 +112,14 @@ impl Reverse<'_> {
             DistSpec::Family { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
                 let values = self.values(frame, args);
-                let mut pulled =
+                let mut argument_adjoints =
                     density::by_arguments(&Args { builtin, values: &values }, dist, &params);
-                if let Some(p) = density::matrix(dist, &values).and_then(|i| pulled.get_mut(i)) {
+                if let Some(p) =
+                    density::matrix(dist, &values).and_then(|i| argument_adjoints.get_mut(i))
+                {
                     *p = Adjoint::Zero;
                 }
-                self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)?;
+                self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), argument_adjoints)?;
             }
         }
         Ok(())
@@ -181,8 +183,8 @@ impl Reverse<'_> {
             return Ok(density::by_arguments(a, dist, &all));
         };
         let (params, factor) = all.split_at(dist.param_count().min(all.len()));
-        let mut pulled = density::by_arguments(a, dist, params);
-        if let Some(p) = pulled.get_mut(i) {
+        let mut argument_adjoints = density::by_arguments(a, dist, params);
+        if let Some(p) = argument_adjoints.get_mut(i) {
             *p = match factor {
                 _ if !wanted(i) => Adjoint::Zero,
                 // It is part of a distribution of several, such as `iid`, which
@@ -191,7 +193,7 @@ impl Reverse<'_> {
                 _ => density::by_matrix(a, dist, factor).ok_or_else(|| self.no_matrix(n, dist))?,
             };
         }
-        Ok(pulled)
+        Ok(argument_adjoints)
     }
 
     fn no_matrix(&self, n: NodeId, dist: &Dist) -> Failure {

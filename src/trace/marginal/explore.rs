@@ -28,18 +28,18 @@ pub(crate) enum Explored {
     Structure(Vec<(Target, Change)>),
     /// The program fails here whatever the values of the choices, some choices are never
     /// needed, or the supports are different.
-    Nowhere,
+    Impossible,
 }
 
 /// The choices that are needed under some assignment.
 #[derive(Default)]
-struct Asked {
+struct Requested {
     by_scores: FxHashSet<NodeId>,
     /// By choice: the choices that its distribution depends on.
     by_choice: FxHashMap<NodeId, FxHashSet<NodeId>>,
 }
 
-impl Asked {
+impl Requested {
     fn enter(&mut self, reader: &Reader, choices: &[Target]) {
         self.by_scores.extend(&reader.found.asked);
         for t in choices {
@@ -69,13 +69,18 @@ struct Table {
     /// fail.
     next: Vec<usize>,
     fine: Vec<Option<usize>>,
-    looks: Vec<Vec<usize>>,
+    assignments: Vec<Vec<usize>>,
 }
 
 impl Table {
     fn new(m: &Marginal, partition: &Partition) -> Result<Table, usize> {
-        let mut t =
-            Table { groups: vec![], group_of: vec![], next: vec![], fine: vec![], looks: vec![] };
+        let mut t = Table {
+            groups: vec![],
+            group_of: vec![],
+            next: vec![],
+            fine: vec![],
+            assignments: vec![],
+        };
         let mut places = FxHashMap::default();
         for (i, values) in m.values.iter().enumerate() {
             let place = *places.entry(partition.root(i as u32)).or_insert_with(|| {
@@ -101,19 +106,19 @@ impl Table {
         let open = |i: &usize| self.next[*i] < self.groups[*i].values;
         let value = |i: usize| if open(&i) { self.next[i] } else { self.fine[i].unwrap_or(0) };
         let any = (0..self.groups.len()).any(|i| open(&i));
-        (any || self.looks.is_empty()).then(|| (0..self.groups.len()).map(value).collect())
+        (any || self.assignments.is_empty()).then(|| (0..self.groups.len()).map(value).collect())
     }
 
     /// Records an assignment at which the program does not fail.
     fn enter(&mut self, look: Vec<usize>) {
         for (i, v) in look.iter().enumerate() {
             if self.next[i] == *v {
-                self.groups[i].seen[*v] = Some(self.looks.len());
+                self.groups[i].seen[*v] = Some(self.assignments.len());
                 self.next[i] += 1;
                 self.fine[i] = Some(*v);
             }
         }
-        self.looks.push(look);
+        self.assignments.push(look);
     }
 
     /// Records that a group cannot have its value in an assignment; false if no possible
@@ -159,19 +164,19 @@ impl Trace {
                 );
                 self.cannot_sum(m.sites[i], &what)
             })?;
-            let (mut found, mut asked) = (Found::default(), Asked::default());
+            let (mut found, mut asked) = (Found::default(), Requested::default());
             while let Some(look) = table.next() {
                 let mut changes = at.to_vec();
                 m.put(&table.groups, &look, &mut changes);
                 let weight = match self.attempt(&changes, &own, m, draws)? {
                     Ok(weight) => weight,
-                    Err(label) if label.site == NONE => return Ok(Explored::Nowhere),
+                    Err(label) if label.site == NONE => return Ok(Explored::Impossible),
                     Err(label) => {
                         found.structure_moves = true;
                         if m.partition.joins() == joins
                             && !table.leave_out(table.group_of[label.site as usize], &look)
                         {
-                            return Ok(Explored::Nowhere);
+                            return Ok(Explored::Impossible);
                         }
                         if m.partition.joins() == joins { continue } else { break }
                     }
@@ -181,7 +186,7 @@ impl Trace {
                     return Ok(Explored::Structure(changes));
                 }
                 match self.moved_support(m) {
-                    Some(_) if !at.is_empty() => return Ok(Explored::Nowhere),
+                    Some(_) if !at.is_empty() => return Ok(Explored::Impossible),
                     Some(t) => {
                         return Err(
                             self.cannot_sum(t, "its possible values depend on other choices")
@@ -213,7 +218,7 @@ impl Trace {
                 return Ok(if all {
                     Explored::Elimination(table.into_elimination(found))
                 } else {
-                    Explored::Nowhere
+                    Explored::Impossible
                 });
             }
         }
@@ -254,7 +259,7 @@ impl Trace {
                 self.graph.rollback(&self.code, before);
                 Err(refused.unwrap_or(e))
             }
-            settled => self.pend(before, settled).map(Ok),
+            propagated => self.pend(before, propagated).map(Ok),
         }
     }
 
@@ -284,7 +289,7 @@ impl Table {
         let Found { structure_moves, values_move, .. } = found;
         let mut elimination = Elimination {
             groups: self.groups,
-            looks: self.looks,
+            assignments: self.assignments,
             structure_moves,
             values_move,
             ..Elimination::default()

@@ -14,7 +14,7 @@ use rustc_hash::FxHashSet;
 /// Why a step is impossible: choices drawn for it change which choices it needs.
 const BY_CHANCE: &str = "which choices it needs depends on choices drawn during the step";
 
-/// Everything kept until [`Trace::let_go`].
+/// Everything kept until [`Trace::release_held`].
 #[derive(Debug, Default)]
 pub(crate) struct Held {
     nodes: Vec<NodeId>,
@@ -29,7 +29,7 @@ impl Trace {
     /// Finds everything that the choices of `sites` reach, for a kernel that moves those
     /// of `moving`. Choices that only other values of the former depend on are drawn from
     /// their prior given the rest. They and the existing choices are kept until
-    /// [`Trace::let_go`], and may be members of the selections too.
+    /// [`Trace::release_held`], and may be members of the selections too.
     ///
     /// # Errors
     /// If a choice of `sites` does not have finitely many values, and as
@@ -47,7 +47,7 @@ impl Trace {
             Ok(marginal) => Ok((marginal, held)),
             Err(e) => {
                 self.rollback();
-                self.let_go(held)?;
+                self.release_held(held)?;
                 self.restore(&before, draws)?;
                 Err(e)
             }
@@ -96,7 +96,7 @@ impl Trace {
                     self.commit();
                     self.hold_all(held)?;
                 }
-                Explored::Nowhere => return Err(self.cannot_sum(m.sites[0], BY_CHANCE)),
+                Explored::Impossible => return Err(self.cannot_sum(m.sites[0], BY_CHANCE)),
             }
         }
         Ok(m)
@@ -211,7 +211,7 @@ impl Trace {
     ///
     /// # Errors
     /// If the program fails.
-    pub(crate) fn let_go(&mut self, held: Held) -> TraceResult<()> {
+    pub(crate) fn release_held(&mut self, held: Held) -> TraceResult<()> {
         self.rollback();
         if held.nodes.is_empty() {
             return Ok(());
@@ -219,8 +219,8 @@ impl Trace {
         let before = self.graph.begin();
         held.nodes.iter().chain(&held.loops).for_each(|n| self.graph.release(*n, false));
         held.entries.iter().for_each(|(memo, key)| self.graph.leave_memo(*memo, key));
-        let settled = self.graph.propagate(&self.code);
-        self.pend(before, settled)?;
+        let propagated = self.graph.propagate(&self.code);
+        self.pend(before, propagated)?;
         self.commit();
         Ok(())
     }

@@ -45,7 +45,7 @@ pub(crate) struct Marginal {
 pub(crate) struct Elimination {
     groups: Vec<Group>,
     /// By assignment: the joint value of each group, by its number.
-    pub looks: Vec<Vec<usize>>,
+    pub assignments: Vec<Vec<usize>>,
     /// The group of each score, and of each node that has observations and factors below
     /// it.
     reached: FxHashMap<NodeId, usize>,

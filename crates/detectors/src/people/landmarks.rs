@@ -68,7 +68,7 @@ fn other_side(i: usize) -> usize {
 
 /// Runs the network on a window of a picture; `None` if the output is not finite or
 /// suggests an unusable window.
-pub(super) fn look(
+pub(super) fn run_landmarks(
     network: &Network,
     photo: &Photo,
     window: &Window,

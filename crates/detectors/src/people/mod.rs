@@ -168,9 +168,11 @@ impl PeopleFinder {
         let mut runs = Vec::new();
         let found = detection::detect(&self.detection, photo, view, options.least)?;
         for d in found.into_iter().take(options.most) {
-            let Some(first) = landmarks::look(&self.landmarks, photo, &d.window)? else { continue };
+            let Some(first) = landmarks::run_landmarks(&self.landmarks, photo, &d.window)? else {
+                continue;
+            };
             // A second time, in the window that the first view suggests.
-            if let Some(view) = landmarks::look(&self.landmarks, photo, &first.next)? {
+            if let Some(view) = landmarks::run_landmarks(&self.landmarks, photo, &first.next)? {
                 runs.push(Run { score: d.score, found: d.window, view });
             }
         }

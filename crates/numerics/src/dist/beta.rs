@@ -2,7 +2,7 @@
 
 use super::draw::{ln_gamma_draw, x_log_y, x_log1p_y};
 use super::param::positive;
-use super::tails::{Speeds, Tails, speed_by_differences};
+use super::tails::{CdfSlopes, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, expit, ln_beta, stirling_error};
 use crate::rng::Stream;
@@ -81,7 +81,7 @@ impl Scalar for Beta {
         beta_tails(self.a, self.b, x, 1.0 - x).map(|(below, above)| Tails { below, above })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
         let tails =
             |a, b| beta_tails(a, b, x, 1.0 - x).map(|(below, above)| Tails { below, above });

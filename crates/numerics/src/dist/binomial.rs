@@ -3,7 +3,7 @@
 //! "The generation of binomial random variates", BTRS).
 
 use super::param::{integer, probability};
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, beta_tails, deviance, stirling_error};
 use crate::rng::Stream;
@@ -129,7 +129,7 @@ impl Scalar for Binomial {
             .map(|(below, above)| Tails { below, above })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![0.0, -(self.n - x) / (1.0 - self.p)])
     }
 

@@ -1,6 +1,6 @@
 //! The categorical distribution: an index drawn in proportion to weights.
 
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use std::sync::Arc;
@@ -105,7 +105,7 @@ impl Scalar for Categorical {
         Some(Tails { below: part(below), above: part(above) })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let split = (libm::floor(x).max(-1.0) + 1.0) as usize;
         let own = libm::exp(self.log_density_num(x));
         let below = libm::exp(self.tails(x)?.below);

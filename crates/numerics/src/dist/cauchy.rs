@@ -2,7 +2,7 @@
 
 use super::draw::{log1p_square, standard};
 use super::param::{finite, positive};
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
@@ -77,7 +77,7 @@ impl Scalar for Cauchy {
         Some(Tails { below: part(-z), above: part(z) })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![-1.0, -standard(x, self.location, self.scale)])
     }
 

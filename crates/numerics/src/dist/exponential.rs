@@ -1,7 +1,7 @@
 //! The exponential distribution.
 
 use super::param::positive;
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
@@ -46,7 +46,7 @@ impl Scalar for Exponential {
         Some(Tails::from_above(-self.rate * x.max(0.0)))
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![x / self.rate])
     }
 

@@ -2,7 +2,7 @@
 
 use super::draw::{gamma_draw, ln_gamma_draw, representable, x_log_y};
 use super::param::positive;
-use super::tails::{Speeds, Tails, speed_by_differences};
+use super::tails::{CdfSlopes, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling_error};
 use crate::rng::Stream;
@@ -80,7 +80,7 @@ impl Scalar for Gamma {
         gamma_tails(self.shape, self.rate * x).map(|(below, above)| Tails { below, above })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
         let tails = |a| gamma_tails(a, self.rate * x).map(|(below, above)| Tails { below, above });
         Some(smallvec![speed_by_differences(self.shape, own, tails)?, x / self.rate])

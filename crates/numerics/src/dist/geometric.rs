@@ -1,7 +1,7 @@
 //! The geometric distribution: failures before the first success.
 
 use super::neg_binomial::success;
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
@@ -57,7 +57,7 @@ impl Scalar for Geometric {
         Some(Tails::from_above((k + 1.0) * libm::log1p(-self.p)))
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![(x + 1.0) / self.p])
     }
 

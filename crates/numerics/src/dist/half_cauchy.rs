@@ -3,7 +3,7 @@
 use super::cauchy::cauchy_slope;
 use super::draw::log1p_square;
 use super::param::{finite, positive};
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
@@ -63,7 +63,7 @@ impl Scalar for HalfCauchy {
         Some(Tails { below: part(z, 1.0), above: part(1.0, z) })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![-1.0, -(x - self.location) / self.scale])
     }
 

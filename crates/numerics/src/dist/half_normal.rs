@@ -1,7 +1,7 @@
 //! The half-normal distribution: the absolute value of a normal number with mean 0.
 
 use super::param::positive;
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, log_normal_cdf};
 use crate::rng::Stream;
@@ -61,7 +61,7 @@ impl Scalar for HalfNormal {
         })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![-x / self.sd])
     }
 

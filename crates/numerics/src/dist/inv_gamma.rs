@@ -2,7 +2,7 @@
 
 use super::draw::{ln_gamma_draw, representable};
 use super::param::positive;
-use super::tails::{Speeds, Tails, speed_by_differences};
+use super::tails::{CdfSlopes, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling_error};
 use crate::rng::Stream;
@@ -82,7 +82,7 @@ impl Scalar for InvGamma {
         gamma_tails(self.shape, self.scale / x).map(|(above, below)| Tails { below, above })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
         let tails = |a| gamma_tails(a, self.scale / x).map(|(above, below)| Tails { below, above });
         Some(smallvec![speed_by_differences(self.shape, own, tails)?, -x / self.scale])

@@ -2,7 +2,7 @@
 
 use super::draw::standard;
 use super::param::{finite, positive};
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
@@ -61,7 +61,7 @@ impl Scalar for Laplace {
         Some(if z < 0.0 { tails } else { tails.swapped() })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![-1.0, -standard(x, self.location, self.scale)])
     }
 

@@ -97,7 +97,7 @@ pub use product::Product;
 pub use scalar::{Scalar, Slope};
 pub use student_t::StudentT;
 pub use support::{MAX_ENUMERATED, Support};
-pub use tails::{Speeds, Tails};
+pub use tails::{CdfSlopes, Tails};
 pub use truncated::{Truncated, truncated};
 pub use truncated_normal::TruncatedNormal;
 pub use uniform::Uniform;

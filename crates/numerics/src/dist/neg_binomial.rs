@@ -3,7 +3,7 @@
 
 use super::draw::ln_gamma_draw;
 use super::param::{MAX_INTEGER, positive};
-use super::tails::{Speeds, Tails, speed_by_differences};
+use super::tails::{CdfSlopes, Tails, speed_by_differences};
 use super::{ParamError, Poisson, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, ln_gamma, stirling_error};
 use crate::rng::Stream;
@@ -89,7 +89,7 @@ impl Scalar for NegBinomial {
             .map(|(below, above)| Tails { below, above })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let tails = |r| {
             beta_tails(r, x + 1.0, self.p, 1.0 - self.p)
                 .map(|(below, above)| Tails { below, above })

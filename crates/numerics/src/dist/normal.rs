@@ -2,7 +2,7 @@
 
 use super::draw::standard;
 use super::param::{finite, positive};
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, log_normal_cdf};
 use crate::rng::Stream;
@@ -62,7 +62,7 @@ impl Scalar for Normal {
         Some(Tails { below: log_normal_cdf(z), above: log_normal_cdf(-z) })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![-1.0, -standard(x, self.mean, self.sd)])
     }
 

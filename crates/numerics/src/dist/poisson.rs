@@ -3,7 +3,7 @@
 //! transformed rejection method for generating Poisson random variables", PTRS).
 
 use super::param::MAX_INTEGER;
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{LN_SQRT_2PI, deviance, gamma_tails, stirling_error};
 use crate::rng::Stream;
@@ -93,7 +93,7 @@ impl Scalar for Poisson {
         gamma_tails(k + 1.0, self.rate).map(|(above, below)| Tails { below, above })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let _ = x;
         Some(smallvec![-1.0])
     }

@@ -1,7 +1,7 @@
 //! Distributions of one number: a smaller interface that does not allocate, and an
 //! implementation of [`Distribution`] on top of it.
 
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{Datum, Distribution, Gradient, Support};
 use crate::rng::Stream;
 use smallvec::SmallVec;
@@ -57,7 +57,7 @@ pub trait Scalar: fmt::Debug + Send + Sync {
 
     /// Returns dP(X <= x)/da divided by the density at x, for each parameter a, where the
     /// density is positive and finite; 0 for an integer parameter.
-    fn speeds(&self, _x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, _x: f64) -> Option<CdfSlopes> {
         None
     }
 

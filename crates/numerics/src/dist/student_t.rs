@@ -2,7 +2,7 @@
 
 use super::draw::{far_square, ln_gamma_draw, standard};
 use super::param::{finite, positive};
-use super::tails::{Speeds, Tails, speed_by_differences};
+use super::tails::{CdfSlopes, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{beta_tails, digamma, ln_beta};
 use crate::rng::Stream;
@@ -85,7 +85,7 @@ impl Scalar for StudentT {
         student_tails(self.df, standard(x, self.location, self.scale))
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let z = standard(x, self.location, self.scale);
         let by_df =
             speed_by_differences(self.df, self.log_density_num(x), |df| student_tails(df, z))?;

@@ -15,7 +15,7 @@ pub struct Tails {
 }
 
 /// One derivative per parameter.
-pub type Speeds = SmallVec<[f64; 3]>;
+pub type CdfSlopes = SmallVec<[f64; 3]>;
 
 impl Tails {
     /// All of the probability lies below.
@@ -113,40 +113,40 @@ impl Dist {
 
     /// Returns dP(X <= x)/da divided by the density at x, for each parameter a, where the
     /// density is positive and finite.
-    pub(super) fn speeds(&self, x: f64) -> Option<Speeds> {
+    pub(super) fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         use super::Scalar;
         match self {
-            Dist::LogNormal(d) => d.speeds(x),
-            Dist::Normal(d) => d.speeds(x),
-            Dist::Uniform(d) => d.speeds(x),
-            Dist::Beta(d) => d.speeds(x),
-            Dist::Gamma(d) => d.speeds(x),
-            Dist::Exponential(d) => d.speeds(x),
-            Dist::HalfNormal(d) => d.speeds(x),
-            Dist::HalfCauchy(d) => d.speeds(x),
-            Dist::StudentT(d) => d.speeds(x),
-            Dist::InvGamma(d) => d.speeds(x),
-            Dist::Cauchy(d) => d.speeds(x),
-            Dist::Laplace(d) => d.speeds(x),
-            Dist::Weibull(d) => d.speeds(x),
-            Dist::NegBinomial(d) => d.speeds(x),
-            Dist::Geometric(d) => d.speeds(x),
-            Dist::UniformDiscrete(d) => d.speeds(x),
-            Dist::Binomial(d) => d.speeds(x),
-            Dist::Poisson(d) => d.speeds(x),
-            Dist::Categorical(d) => d.speeds(x),
+            Dist::LogNormal(d) => d.cdf_slopes(x),
+            Dist::Normal(d) => d.cdf_slopes(x),
+            Dist::Uniform(d) => d.cdf_slopes(x),
+            Dist::Beta(d) => d.cdf_slopes(x),
+            Dist::Gamma(d) => d.cdf_slopes(x),
+            Dist::Exponential(d) => d.cdf_slopes(x),
+            Dist::HalfNormal(d) => d.cdf_slopes(x),
+            Dist::HalfCauchy(d) => d.cdf_slopes(x),
+            Dist::StudentT(d) => d.cdf_slopes(x),
+            Dist::InvGamma(d) => d.cdf_slopes(x),
+            Dist::Cauchy(d) => d.cdf_slopes(x),
+            Dist::Laplace(d) => d.cdf_slopes(x),
+            Dist::Weibull(d) => d.cdf_slopes(x),
+            Dist::NegBinomial(d) => d.cdf_slopes(x),
+            Dist::Geometric(d) => d.cdf_slopes(x),
+            Dist::UniformDiscrete(d) => d.cdf_slopes(x),
+            Dist::Binomial(d) => d.cdf_slopes(x),
+            Dist::Poisson(d) => d.cdf_slopes(x),
+            Dist::Categorical(d) => d.cdf_slopes(x),
             Dist::Mixture(d) => {
                 let (_, shares, total) = d.shares();
                 let all = self.log_density_num(x);
                 let below = libm::exp(self.tails(x)?.below);
-                let mut by_weight = Speeds::new();
-                let mut rest = Speeds::new();
+                let mut by_weight = CdfSlopes::new();
+                let mut rest = CdfSlopes::new();
                 for (share, c) in shares.iter().zip(d.components()) {
                     by_weight
                         .push((libm::exp(c.tails(x)?.below) - below) / total * libm::exp(-all));
                     let own = libm::exp(share + c.log_density_num(x) - all);
-                    match c.speeds(x).filter(|_| own > 0.0) {
-                        Some(speeds) => rest.extend(speeds.iter().map(|s| own * s)),
+                    match c.cdf_slopes(x).filter(|_| own > 0.0) {
+                        Some(cdf_slopes) => rest.extend(cdf_slopes.iter().map(|s| own * s)),
                         None if own > 0.0 => return None,
                         None => rest.extend(std::iter::repeat_n(0.0, c.param_count())),
                     }

@@ -147,7 +147,7 @@ impl Truncated {
     /// Returns the logarithm of the probability of the values up to `x` under `d`.
     fn log_mass_to(&self, x: f64) -> Option<f64> {
         let (a, b) = self.ends_to(x);
-        match self.bend(a, b) {
+        match self.kink(a, b) {
             Some(at) => {
                 Some(log_sum_exp(&[self.log_between(a, at)?, self.log_between(at, b)?]).min(0.0))
             }
@@ -156,7 +156,7 @@ impl Truncated {
     }
 
     /// Returns the kink of the density between two numbers: the centre of `laplace`.
-    fn bend(&self, a: f64, b: f64) -> Option<f64> {
+    fn kink(&self, a: f64, b: f64) -> Option<f64> {
         let Dist::Laplace(d) = &self.base else { return None };
         d.number_mean().filter(|centre| a < *centre && *centre < b)
     }
@@ -223,7 +223,7 @@ impl Truncated {
             }
             return Some(sum);
         }
-        if self.bend(a, b).is_none()
+        if self.kink(a, b).is_none()
             && !self.is_end_of_base(a)
             && !self.is_end_of_base(b)
             && self.narrow(a, b).is_some()
@@ -237,8 +237,8 @@ impl Truncated {
             let density = self.base.log_density_num(x);
             if density.is_finite() && !self.is_end_of_base(x) {
                 let weight = sign * libm::exp(density - self.log_mass);
-                let speeds = self.base.speeds(x)?;
-                sum.iter_mut().zip(&speeds).for_each(|(s, v)| *s += weight * v);
+                let cdf_slopes = self.base.cdf_slopes(x)?;
+                sum.iter_mut().zip(&cdf_slopes).for_each(|(s, v)| *s += weight * v);
             }
         }
         Some(sum)

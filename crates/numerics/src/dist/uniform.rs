@@ -1,7 +1,7 @@
 //! The uniform distribution on an interval.
 
 use super::param::finite;
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
@@ -59,7 +59,7 @@ impl Scalar for Uniform {
         Some(Tails { below: part(self.lo, x), above: part(x, self.hi) })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let width = self.hi - self.lo;
         Some(smallvec![-(self.hi - x) / width, -(x - self.lo) / width])
     }

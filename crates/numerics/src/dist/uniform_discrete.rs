@@ -1,7 +1,7 @@
 //! The uniform distribution on a range of integers.
 
 use super::param::integer;
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use smallvec::smallvec;
@@ -63,7 +63,7 @@ impl Scalar for UniformDiscrete {
         Some(Tails { below: part(k - self.lo + 1.0), above: part(self.hi - k) })
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let _ = x;
         Some(smallvec![0.0, 0.0])
     }

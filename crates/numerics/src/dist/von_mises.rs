@@ -3,7 +3,7 @@
 use super::param::finite;
 use super::support::wrap_angle;
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::{bessel_deficit, log_scaled_i0};
+use crate::num::{log_scaled_i0, one_minus_i1_over_i0};
 use crate::rng::Stream;
 use core::f64::consts::{PI, TAU};
 
@@ -85,7 +85,7 @@ impl Scalar for VonMises {
 
     fn slope(&self, x: f64) -> Slope {
         let pull = self.concentration * libm::sin(x - self.mean);
-        Slope::new(-pull, [pull, bessel_deficit(self.concentration) - self.fall(x)])
+        Slope::new(-pull, [pull, one_minus_i1_over_i0(self.concentration) - self.fall(x)])
     }
 
     fn number_mean(&self) -> Option<f64> {

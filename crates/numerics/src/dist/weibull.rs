@@ -2,7 +2,7 @@
 
 use super::draw::representable;
 use super::param::positive;
-use super::tails::{Speeds, Tails};
+use super::tails::{CdfSlopes, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::ln_gamma;
 use crate::rng::Stream;
@@ -86,7 +86,7 @@ impl Scalar for Weibull {
         Some(Tails::from_above(-libm::exp(self.shape * libm::log(x / self.scale))))
     }
 
-    fn speeds(&self, x: f64) -> Option<Speeds> {
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![x / self.shape * libm::log(x / self.scale), -x / self.scale])
     }
 

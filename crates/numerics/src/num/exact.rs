@@ -61,7 +61,7 @@ impl ExactSum {
 
     /// Returns the [`ExactSum::difference`] of `new[0] + new[1] - new[2]` and
     /// `old[0] + old[1] - old[2]`.
-    pub fn balance(new: [&ExactSum; 3], old: [&ExactSum; 3]) -> f64 {
+    pub fn difference_of_sums(new: [&ExactSum; 3], old: [&ExactSum; 3]) -> f64 {
         if new.iter().chain(&old).all(|s| s.is_fine()) {
             let fine = (new[0].fine + new[1].fine - new[2].fine)
                 - (old[0].fine + old[1].fine - old[2].fine);
@@ -77,7 +77,7 @@ impl ExactSum {
     }
 
     /// Returns the [`ExactSum::difference`] to an empty sum.
-    pub fn above_nothing(&self) -> f64 {
+    pub fn difference_from_zero(&self) -> f64 {
         if self.is_fine() {
             self.fine as f64 / SCALE
         } else {
@@ -85,14 +85,14 @@ impl ExactSum {
         }
     }
 
-    /// Returns [`ExactSum::above_nothing`] of the sum of two sums.
+    /// Returns [`ExactSum::difference_from_zero`] of the sum of two sums.
     pub fn of_both(a: &ExactSum, b: &ExactSum) -> f64 {
         if a.is_fine() && b.is_fine() {
             return (a.fine + b.fine) as f64 / SCALE;
         }
         let mut sum = a.clone();
         sum.merge(b);
-        sum.above_nothing()
+        sum.difference_from_zero()
     }
 
     fn put(&mut self, x: f64, sign: i64) {

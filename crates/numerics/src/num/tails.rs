@@ -25,7 +25,7 @@ pub fn log_scaled_i0(x: f64) -> f64 {
 }
 
 /// 1 - I1(x) / I0(x) for x >= 0, which falls from 1 at 0 towards 1 / (2 x).
-pub fn bessel_deficit(x: f64) -> f64 {
+pub fn one_minus_i1_over_i0(x: f64) -> f64 {
     if x < LARGE {
         let (i0, i1) = power_series(x);
         return 1.0 - i1 / i0;

@@ -53,7 +53,7 @@ pub struct Solid {
     group: Option<Arc<Group>>,
     landmarks: Arc<Lazy<Landmark>>,
     /// The depth of nested lists that have not been computed yet.
-    waiting: u32,
+    lazy_depth: u32,
 }
 
 /// The members of a group.
@@ -164,7 +164,7 @@ impl Solid {
             instances: Meshes(ready(instances)),
             group: None,
             landmarks: ready(Arc::default()),
-            waiting: 0,
+            lazy_depth: 0,
         }
     }
 
@@ -196,7 +196,7 @@ impl Solid {
         M: IntoIterator<Item = Instance>,
     {
         let instances = Meshes(later(move || make().into_iter().collect()));
-        Solid { instances, group: None, landmarks: ready(Arc::default()), waiting: 1 }
+        Solid { instances, group: None, landmarks: ready(Arc::default()), lazy_depth: 1 }
     }
 
     /// The placed meshes.
@@ -214,15 +214,16 @@ impl Solid {
             of.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() }).collect()
         };
         let (instances, landmarks) = (Meshes(later(placed)), later(moved));
-        Solid { instances, group: None, landmarks, waiting: self.waiting + 1 }.looked_at_in_time()
+        Solid { instances, group: None, landmarks, lazy_depth: self.lazy_depth + 1 }
+            .forced_if_deep()
     }
 
     /// Computes the lists now if they are nested too deeply.
-    fn looked_at_in_time(mut self) -> Solid {
-        if self.waiting >= MOST_WAITING {
+    fn forced_if_deep(mut self) -> Solid {
+        if self.lazy_depth >= MOST_WAITING {
             LazyLock::force(&self.instances.0);
             LazyLock::force(&self.landmarks);
-            self.waiting = 0;
+            self.lazy_depth = 0;
         }
         self
     }
@@ -230,7 +231,7 @@ impl Solid {
     /// Estimates the count of numbers in meshes that no other solid shares; 0 if they are
     /// not computed yet.
     pub fn own_numbers(&self) -> usize {
-        if self.waiting > 0 {
+        if self.lazy_depth > 0 {
             return 0;
         }
         let own = self.instances.iter().filter(|i| Arc::strong_count(&i.mesh) == 1);
@@ -258,8 +259,8 @@ impl Solid {
         let of: Vec<_> = solids.iter().map(|s| Arc::clone(&s.landmarks)).collect();
         let landmarks =
             later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
-        let waiting = solids.iter().map(|s| s.waiting).max().unwrap_or(0) + 1;
-        Solid { instances, group: Some(group), landmarks, waiting }.looked_at_in_time()
+        let lazy_depth = solids.iter().map(|s| s.lazy_depth).max().unwrap_or(0) + 1;
+        Solid { instances, group: Some(group), landmarks, lazy_depth }.forced_if_deep()
     }
 
     /// The number of meshes.

@@ -40,14 +40,14 @@ const PATIENCE: u32 = 1024;
 #[derive(Debug)]
 pub struct Change {
     /// Identifies the previous contours. If the drawing started over, a new identity that
-    /// nobody holds; `gone` and `come` are then empty.
+    /// nobody holds; `removed` and `added` are then empty.
     pub from: Arc<()>,
     /// Identifies the current contours.
     pub to: Arc<()>,
     /// Pieces of stationary meshes that are no longer visible.
-    pub gone: Contours,
+    pub removed: Contours,
     /// Pieces of stationary meshes that have become visible.
-    pub come: Contours,
+    pub added: Contours,
     /// All visible pieces of the moving meshes.
     pub moving: Contours,
     /// Number of visible pieces now, of all meshes.
@@ -358,7 +358,7 @@ impl Backdrop {
             .iter()
             .for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
-        self.shown = static_layer.look_at_all(&depths);
+        self.shown = static_layer.test_all(&depths);
         dynamic.iter_mut().for_each(|dynamic_mesh| dynamic_mesh.look(&depths));
         self.at = Arc::default();
         let none = || Contours::with_room(camera, 0);
@@ -366,12 +366,17 @@ impl Backdrop {
     }
 
     /// The change to the current state, from the one that `from` identifies.
-    fn change(&mut self, camera: &Camera, from: Arc<()>, [gone, come]: [Contours; 2]) -> Change {
+    fn change(
+        &mut self,
+        camera: &Camera,
+        from: Arc<()>,
+        [removed, added]: [Contours; 2],
+    ) -> Change {
         let mut moving =
             Contours::with_room(camera, self.dynamic.iter().map(|m| m.seen.len()).sum());
         self.dynamic.iter().for_each(|dynamic_mesh| moving.append(&dynamic_mesh.seen));
         self.count = self.shown + moving.len();
-        Change { from, to: self.at.clone(), gone, come, moving, count: self.count }
+        Change { from, to: self.at.clone(), removed, added, moving, count: self.count }
     }
 
     /// Recomposes the picture where meshes have moved, and repeats the depth tests where
@@ -467,9 +472,9 @@ impl Backdrop {
             }
         }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
-        let [mut gone, mut come] = [0; 2].map(|_| Contours::with_room(camera, 256));
-        static_layer.look_again(&depths, pixels, extents, |piece, shown| {
-            if shown { &mut come } else { &mut gone }.push(piece);
+        let [mut removed, mut added] = [0; 2].map(|_| Contours::with_room(camera, 256));
+        static_layer.retest(&depths, pixels, extents, |piece, shown| {
+            if shown { &mut added } else { &mut removed }.push(piece);
         });
         for dynamic_mesh in dynamic {
             let (area, moved) = (dynamic_mesh.now.layer.looks, moved(dynamic_mesh));
@@ -477,12 +482,12 @@ impl Backdrop {
                 dynamic_mesh.look(&depths);
             }
         }
-        self.shown = self.shown + come.len() - gone.len();
+        self.shown = self.shown + added.len() - removed.len();
         let from = self.at.clone();
         if anything {
             self.at = Arc::default();
         }
-        Some(self.change(camera, from, [gone, come]))
+        Some(self.change(camera, from, [removed, added]))
     }
 }
 

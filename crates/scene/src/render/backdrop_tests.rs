@@ -59,11 +59,12 @@ impl Followed {
         assert_eq!(change.count, wanted.len());
         let follows = Arc::ptr_eq(&self.at, &change.from);
         if follows {
-            for gone in bits(&change.gone) {
-                let at = self.pieces.iter().position(|p| *p == gone).expect("what goes was there");
+            for removed in bits(&change.removed) {
+                let at =
+                    self.pieces.iter().position(|p| *p == removed).expect("what goes was there");
                 self.pieces.swap_remove(at);
             }
-            self.pieces.extend(bits(&change.come));
+            self.pieces.extend(bits(&change.added));
         } else {
             let moving = bits(&change.moving);
             self.pieces = bits(&got);

@@ -50,7 +50,7 @@ impl Candidates {
             topology.patches.of(triangles).zip(triangles.chunks(Patches::FACES)).enumerate()
         {
             let extent = Extent::between(vertices.least(patch), size);
-            if !extent.is_empty() && bitmap.hold(extent.ends()) {
+            if !extent.is_empty() && bitmap.intersects(extent.ends()) {
                 self.add(i * Patches::FACES, triangles, vertices, size, back, |ends| {
                     bitmap.may_hold(ends)
                 });
@@ -61,7 +61,7 @@ impl Candidates {
             let (Some(&face), Some(&extent)) = (self.faces.get(i), self.extents.get(i)) else {
                 continue;
             };
-            self.put(face, extent, bitmap.hold(extent.ends()));
+            self.put(face, extent, bitmap.intersects(extent.ends()));
         }
     }
 

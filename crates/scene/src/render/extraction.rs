@@ -9,7 +9,7 @@ use super::Camera;
 use super::project::{Fronts, Lens, Placement, Point, Vertices, beyond_near};
 use super::silhouette::{self, Crossed};
 use super::simd::vectorised;
-use super::visibility::{Image, Look, Piece};
+use super::visibility::{Image, Piece, TestSides};
 use crate::geom::{Edge, Mesh};
 
 /// Whether a point is usable and beyond the near plane.
@@ -110,8 +110,8 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
                 .map(|pair| [pair[0][i], pair[1][i]]);
             let slack = batch.slack[i];
             let look = match self.open {
-                false => Look::Outward { direction, slack },
-                true => Look::BothSides { direction, slack: [slack; 2] },
+                false => TestSides::Outward { direction, slack },
+                true => TestSides::BothSides { direction, slack: [slack; 2] },
             };
             if length < LONGEST && self.inside(&a) && self.inside(&b) && batch.depth[i].is_finite()
             {
@@ -194,7 +194,7 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
             }
         }
         if any_front || open {
-            let look = Look::BothSides { direction, slack };
+            let look = TestSides::BothSides { direction, slack };
             let corners = [vertices[0], vertices[1], vertices[1]];
             let ends = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
             self.cut(
@@ -230,7 +230,7 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         b: &Point,
         length: f64,
         tangent: [f64; 2],
-        look: &Look,
+        look: &TestSides,
         edge: bool,
         from: Segment,
     ) {

@@ -128,14 +128,14 @@ impl PixelBitmap {
 
     /// Whether a rectangle that is not empty contains a set pixel.
     #[inline(always)]
-    pub fn hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
+    pub fn intersects(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
         let (columns, rows) = (right - left, bottom - top);
         // Three squares in a line, at both ends and in the middle, cover a rectangle that
         // is at most three times as long as wide.
         let side = columns.min(rows);
         let (across, down) = (columns - side, rows - side);
         if side > SIDE || across + down > 2 * side {
-            return self.hold_long([left, right], [top, bottom], side.min(SIDE));
+            return self.intersects_long([left, right], [top, bottom], side.min(SIDE));
         }
         let at = top * self.stride + left;
         let near = |at: usize| self.reach.get(at).is_some_and(|reach| usize::from(*reach) <= side);
@@ -144,9 +144,14 @@ impl PixelBitmap {
             | near(at + across + down * self.stride)
     }
 
-    /// As [`PixelBitmap::hold`], for any rectangle, covered by squares of a given side.
+    /// As [`PixelBitmap::intersects`], for any rectangle, covered by squares of a given side.
     #[inline(never)]
-    fn hold_long(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2], side: usize) -> bool {
+    fn intersects_long(
+        &self,
+        [left, right]: [usize; 2],
+        [top, bottom]: [usize; 2],
+        side: usize,
+    ) -> bool {
         (top..bottom).step_by(side).any(|y| {
             let row = y.min(bottom - side) * self.stride;
             (left..right).step_by(side).any(|x| {
@@ -200,7 +205,11 @@ mod tests {
                     };
                     let wanted = set.iter().any(inside);
                     let extent = [[x, right], [y, bottom]].map(|ends| ends.map(|v| v as usize));
-                    assert_eq!(bitmap.hold(extent), wanted, "{extent:?} in {width} x {height}");
+                    assert_eq!(
+                        bitmap.intersects(extent),
+                        wanted,
+                        "{extent:?} in {width} x {height}"
+                    );
                     assert!(!wanted || bitmap.may_hold(extent), "{extent:?} in {width} x {height}");
                     held += usize::from(wanted);
                 }

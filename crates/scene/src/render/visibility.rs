@@ -24,7 +24,7 @@ const SILHOUETTE_SLACK: f64 = 0.15;
 
 /// On which sides a piece is tested.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Look {
+pub(super) enum TestSides {
     /// On the outward side only; `slack` is how much nearer (scene units) the piece's own
     /// face reaches.
     Outward {
@@ -76,7 +76,7 @@ pub(super) struct Piece {
 /// A depth test without its pixel: everything that decides its result, except the depth
 /// there and the depth range.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Glance {
+pub(super) struct DepthTest {
     depth: f64,
     slack: f64,
     /// The piece tested, as numbered by the caller.
@@ -97,11 +97,11 @@ impl Piece {
     /// The test on the first or the second side, and the pixel tested; `number` is the
     /// caller's number of the piece.
     #[inline]
-    pub fn glance(&self, side: u8, number: u32) -> Option<(u32, Glance)> {
+    pub fn depth_test(&self, side: u8, number: u32) -> Option<(u32, DepthTest)> {
         let Side { pixel, inside, slack } = *self.sides.get(usize::from(side))?;
-        let glance =
-            Glance { depth: self.depth, slack, piece: number, side, inside, edge: self.edge };
-        (pixel != NOWHERE).then_some((pixel, glance))
+        let depth_test =
+            DepthTest { depth: self.depth, slack, piece: number, side, inside, edge: self.edge };
+        (pixel != NOWHERE).then_some((pixel, depth_test))
     }
 }
 
@@ -141,15 +141,15 @@ impl Image {
         depth: f64,
         [tx, ty]: [f64; 2],
         length: f64,
-        look: &Look,
+        look: &TestSides,
         edge: bool,
     ) -> Piece {
         let sides = match *look {
-            Look::Outward { direction: [dx, dy], slack } => {
+            TestSides::Outward { direction: [dx, dy], slack } => {
                 let none = Side { pixel: NOWHERE, inside: true, slack: 0.0 };
                 [self.side(x + BESIDE * dx, y + BESIDE * dy, slack), none]
             }
-            Look::BothSides { direction: [dx, dy], slack: [first, second] } => [
+            TestSides::BothSides { direction: [dx, dy], slack: [first, second] } => [
                 self.side(x + BESIDE * dx, y + BESIDE * dy, first),
                 self.side(x - BESIDE * dx, y - BESIDE * dy, second),
             ],
@@ -206,17 +206,17 @@ impl<'a> Depths<'a> {
     /// The least depth at its pixel for which a test passes; it falls as the depth range
     /// grows.
     #[inline]
-    pub fn least(&self, glance: &Glance) -> f64 {
+    pub fn least(&self, depth_test: &DepthTest) -> f64 {
         self.threshold(
-            [glance.depth, glance.slack, self.most[usize::from(glance.edge)]],
-            glance.inside,
+            [depth_test.depth, depth_test.slack, self.most[usize::from(depth_test.edge)]],
+            depth_test.inside,
         )
     }
 
     /// Whether a test passes with a given depth at its pixel.
     #[inline]
-    pub fn frees(&self, glance: &Glance, seen: f32) -> bool {
-        f64::from(seen) >= self.least(glance)
+    pub fn passes(&self, depth_test: &DepthTest, seen: f32) -> bool {
+        f64::from(seen) >= self.least(depth_test)
     }
 
     /// A depth below every depth at which a test of a mesh with this depth range passes.
@@ -249,7 +249,7 @@ mod tests {
         (0..64).map(|i| if i % 8 < 4 { 1.0 } else { f32::INFINITY }).collect()
     }
 
-    fn seen(extent: f64, at: [f64; 2], depth: f64, look: &Look, edge: bool) -> bool {
+    fn seen(extent: f64, at: [f64; 2], depth: f64, look: &TestSides, edge: bool) -> bool {
         let image = half();
         let piece = Image::new(8, 8).unwrap().piece(at, depth, [0.0, 1.0], 1.0, look, edge);
         Depths::new(&image, 8, 8, extent).unwrap().visible(&piece)
@@ -257,8 +257,8 @@ mod tests {
 
     #[test]
     fn looks_outward_past_its_own_object() {
-        let out = Look::Outward { direction: [1.0, 0.0], slack: 0.0 };
-        let back = Look::Outward { direction: [-1.0, 0.0], slack: 0.0 };
+        let out = TestSides::Outward { direction: [1.0, 0.0], slack: 0.0 };
+        let back = TestSides::Outward { direction: [-1.0, 0.0], slack: 0.0 };
         assert!(seen(1.0, [4.0, 4.0], 2.0, &out, false));
         assert!(!seen(1.0, [4.0, 4.0], 2.0, &back, false));
         assert!(!seen(1.0, [2.0, 4.0], 2.0, &out, false));
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn slack_is_given_up_to_a_share_of_the_depth_range() {
-        let slack = Look::Outward { direction: [1.0, 0.0], slack: 1.0 };
+        let slack = TestSides::Outward { direction: [1.0, 0.0], slack: 1.0 };
         assert!(seen(10.0, [2.0, 4.0], 2.0, &slack, false));
         assert!(!seen(1.0, [2.0, 4.0], 2.0, &slack, false));
         // 0.15 and 0.06 of the depth range, and the tolerance of 0.006.
@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn one_free_side_is_enough_and_the_border_does_not_panic() {
-        let both = Look::BothSides { direction: [1.0, 0.0], slack: [0.0; 2] };
+        let both = TestSides::BothSides { direction: [1.0, 0.0], slack: [0.0; 2] };
         assert!(seen(1.0, [4.0, 4.0], 2.0, &both, true));
         assert!(!seen(1.0, [2.0, 4.0], 2.0, &both, true));
         assert!(seen(1.0, [8.0, 8.0], 2.0, &both, true));

@@ -179,7 +179,7 @@ impl Chamfer {
 
     /// [`Chamfer::distance`] without allocation once the scratch has grown.
     pub fn distance_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
-        self.mean(self.forth(elements), self.back(elements, scratch))
+        self.mean(self.forward(elements), self.back(elements, scratch))
     }
 
     /// Returns the log-likelihood. `Mean`: log normal(distance; 0, sigma). `Sum`: the sum
@@ -191,7 +191,7 @@ impl Chamfer {
 
     /// [`Chamfer::log_likelihood`] without allocation once the scratch has grown.
     pub fn log_likelihood_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
-        self.score(self.forth(elements), self.back(elements, scratch))
+        self.score(self.forward(elements), self.back(elements, scratch))
     }
 
     /// Returns the [`Chamfer::log_likelihood`] after a change of the contours, bit for
@@ -206,8 +206,8 @@ impl Chamfer {
     ) -> f64 {
         if !step.leads_to(tally.of.as_ref()) {
             if step.follows(tally.of.as_ref()) {
-                self.count(&step.gone, -1, &mut tally.steps);
-                self.count(&step.come, 1, &mut tally.steps);
+                self.count(&step.removed, -1, &mut tally.steps);
+                self.count(&step.added, 1, &mut tally.steps);
             } else {
                 tally.steps = Steps::default();
                 self.count(&whole(), 1, &mut tally.steps);
@@ -221,14 +221,14 @@ impl Chamfer {
         self.score(steps.sums(), back)
     }
 
-    fn mean(&self, forth: ChamferSums, back: Option<ChamferSums>) -> f64 {
+    fn mean(&self, forward: ChamferSums, back: Option<ChamferSums>) -> f64 {
         match back {
-            None => forth.mean(),
-            Some(back) => 0.5 * (forth.mean() + back.mean()),
+            None => forward.mean(),
+            Some(back) => 0.5 * (forward.mean() + back.mean()),
         }
     }
 
-    fn score(&self, forth: ChamferSums, back: Option<ChamferSums>) -> f64 {
+    fn score(&self, forward: ChamferSums, back: Option<ChamferSums>) -> f64 {
         let sum = |s: ChamferSums| {
             let s = if s.length > 0.0 {
                 s
@@ -239,8 +239,8 @@ impl Chamfer {
                 - 0.5 * s.second / (self.options.sigma * self.options.sigma)
         };
         let score = match self.options.mode {
-            Mode::Mean => self.log_normal(self.mean(forth, back)),
-            Mode::Sum => sum(forth) + back.map_or(0.0, sum),
+            Mode::Mean => self.log_normal(self.mean(forward, back)),
+            Mode::Sum => sum(forward) + back.map_or(0.0, sum),
         };
         score.max(f64::MIN)
     }
@@ -278,7 +278,7 @@ impl Chamfer {
         (d, [dx * self.grid.sx, dy * self.grid.sy, turn])
     }
 
-    fn forth(&self, elements: &Elements<'_>) -> ChamferSums {
+    fn forward(&self, elements: &Elements<'_>) -> ChamferSums {
         let mut steps = Steps::default();
         self.count(elements, 1, &mut steps);
         steps.sums()

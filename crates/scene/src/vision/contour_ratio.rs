@@ -192,8 +192,8 @@ impl ContourRatio {
     ) -> f64 {
         if !step.leads_to(scratch.of.as_ref()) {
             if step.follows(scratch.of.as_ref()) {
-                self.count(&step.gone, -1, scratch);
-                self.count(&step.come, 1, scratch);
+                self.count(&step.removed, -1, scratch);
+                self.count(&step.added, 1, scratch);
             } else {
                 scratch.begin(self.capacity.groups());
                 self.count(&whole(), 1, scratch);

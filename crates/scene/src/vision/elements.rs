@@ -103,9 +103,9 @@ pub struct ContourDelta<'a> {
     /// Identifies the contours now.
     pub to: &'a Arc<()>,
     /// Contours that disappeared, excluding moving ones.
-    pub gone: Elements<'a>,
+    pub removed: Elements<'a>,
     /// Contours that appeared, excluding moving ones.
-    pub come: Elements<'a>,
+    pub added: Elements<'a>,
     /// All moving contours; given in full at every step.
     pub moving: Elements<'a>,
     /// Number of elements now.
@@ -116,7 +116,7 @@ impl ContourDelta<'_> {
     /// Whether the step starts from the known contours and is shorter than starting from
     /// scratch.
     pub(super) fn follows(&self, known: Option<&Arc<()>>) -> bool {
-        self.gone.len() + self.come.len() < self.count
+        self.removed.len() + self.added.len() < self.count
             && known.is_some_and(|known| Arc::ptr_eq(known, self.from))
     }
 

@@ -55,7 +55,7 @@ pub fn ridge_offset(width: u32, height: u32, data: &[f32], pixel: usize, normal:
 
 /// Returns the direction of strongest change of a structure tensor, up to sign, accurate
 /// to a millionth and without trigonometry.
-fn roughly([a, b, c]: [f32; 3]) -> [f32; 2] {
+fn approximate_principal([a, b, c]: [f32; 3]) -> [f32; 2] {
     let (half, b) = (0.5 * (f64::from(a) - f64::from(c)), f64::from(b));
     let root = (half * half + b * b).sqrt();
     let (x, y) = if half >= 0.0 { (root + half, b) } else { (b, root - half) };
@@ -79,7 +79,7 @@ pub fn suppress(gradient: &Gradient, floor: f32) -> Vec<EdgePoint> {
         }
         let (x, y) = ((pixel % w) as f32, (pixel / w) as f32);
         let at = |t: f32, n: [f32; 2]| bilinear(w, h, strength, x + t * n[0], y + t * n[1]);
-        let rough = roughly(tensor);
+        let rough = approximate_principal(tensor);
         if at(-1.0, rough) > m + slack || at(1.0, rough) > m + slack {
             continue;
         }

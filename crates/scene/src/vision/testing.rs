@@ -166,14 +166,14 @@ pub(super) fn comings_and_goings(
     let mut from = std::sync::Arc::new(());
     for step in 1..40 {
         let (whole, moves) = (only(&|i| there(step, i)), |i: usize| i % 5 == 2);
-        let gone = only(&|i| !moves(i) && there(step - 1, i) && !there(step, i));
-        let come = only(&|i| !moves(i) && !there(step - 1, i) && there(step, i));
+        let removed = only(&|i| !moves(i) && there(step - 1, i) && !there(step, i));
+        let added = only(&|i| !moves(i) && !there(step - 1, i) && there(step, i));
         let moving = only(&|i| moves(i) && there(step, i));
         let to = std::sync::Arc::new(());
-        let ([gone, come, moving], count) =
-            ([&gone, &come, &moving].map(Pieces::elements), whole.x.len());
+        let ([removed, added, moving], count) =
+            ([&removed, &added, &moving].map(Pieces::elements), whole.x.len());
         each(
-            &super::elements::ContourDelta { from: &from, to: &to, gone, come, moving, count },
+            &super::elements::ContourDelta { from: &from, to: &to, removed, added, moving, count },
             &whole,
         );
         from = to;

@@ -1,7 +1,7 @@
 //! Densities and gradients with finite choices summed out, and their draw from the
 //! conditional afterwards.
 //!
-//! A point is evaluated several times ([`Elimination::looks`]), each time with every
+//! A point is evaluated several times ([`Elimination::assignments`]), each time with every
 //! group of choices at one of its joint values, until each group has been at all of its
 //! joint values. The force is the mean of the log joint density's gradient over the
 //! conditional of the choices. Drawing the choices from that conditional at the end
@@ -55,7 +55,7 @@ pub(super) fn with_alternatives(
     }
     let (marginal, held) = trace.marginalise(sites, moving, at.within(1).draws(0))?;
     let outcome = step(trace, Some(marginal));
-    trace.let_go(held)?;
+    trace.release_held(held)?;
     outcome
 }
 
@@ -105,7 +105,7 @@ impl System<'_> {
         let Some(summed) = &mut self.summed else { return Ok(None) };
         match self.trace.explore(at, true, &mut summed.marginal, self.at.draws(0))? {
             Explored::Elimination(elimination) => self.look(elimination.into(), at),
-            Explored::Structure(_) | Explored::Nowhere => Ok(None),
+            Explored::Structure(_) | Explored::Impossible => Ok(None),
         }
     }
 
@@ -119,7 +119,7 @@ impl System<'_> {
         let mut conditional: Vec<Vec<f64>> =
             elimination.seen().map(|s| vec![f64::NEG_INFINITY; s.len()]).collect();
         let (mut base, mut jacobian, mut terms) = (0.0, 0.0, Vec::new());
-        for (k, values) in elimination.looks.iter().enumerate() {
+        for (k, values) in elimination.assignments.iter().enumerate() {
             let Some(w) = self.put(&elimination, at, values)? else { return Ok(None) };
             if self.summed.as_ref().is_some_and(|s| !self.trace.has_same_values(&s.marginal)) {
                 return Ok(None);
@@ -163,9 +163,11 @@ impl System<'_> {
         point.gradient.resize(point.y.len(), 0.0);
         let (elimination, layout) = (Arc::clone(&view.elimination), Arc::clone(&self.layout));
         let mut part = Vec::with_capacity(point.y.len());
-        for (k, values) in elimination.looks.iter().enumerate().rev() {
+        for (k, values) in elimination.assignments.iter().enumerate().rev() {
             // The last evaluation is still pending.
-            if k + 1 < elimination.looks.len() && self.put(&elimination, &at, values)?.is_none() {
+            if k + 1 < elimination.assignments.len()
+                && self.put(&elimination, &at, values)?.is_none()
+            {
                 return Ok(None);
             }
             let first = elimination.seen().zip(values).map(|(seen, v)| seen[*v] == Some(k));
@@ -181,7 +183,7 @@ impl System<'_> {
         // Each evaluation includes the Jacobians, which count only once.
         part.clear();
         self.trace.weighted_gradient(&layout.targets, self.at.power, &|_| 0.0, &mut part)?;
-        let more = elimination.looks.len() as f64 - 1.0;
+        let more = elimination.assignments.len() as f64 - 1.0;
         point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g -= more * p);
         Ok(point.gradient.iter().all(|g| g.is_finite()).then_some(view))
     }

@@ -80,7 +80,7 @@ impl Level {
 
     /// Whether an omitted vertex may be farther than `most` from this level of a mesh
     /// with other positions. Positions that are NaN count as farther.
-    pub fn strays(&self, positions: &[Vec3], most: f64) -> bool {
+    pub fn exceeds(&self, positions: &[Vec3], most: f64) -> bool {
         let most = (most * most) as f32;
         let at = |v: u32| positions.get(v as usize).copied().unwrap_or(Vec3::NAN);
         self.bounds.iter().any(|Bound { vertex, corners: [a, b, c], shares }| {

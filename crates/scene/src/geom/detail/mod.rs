@@ -102,7 +102,7 @@ impl Detail {
                 last(rigid_levels(levels, mesh), &|level| level.deviation <= error)
             }
             Source::Posed(levels, part) => {
-                last(levels.levels(*part), &|level| !level.strays(&mesh.positions, error))
+                last(levels.levels(*part), &|level| !level.exceeds(&mesh.positions, error))
             }
             Source::Turned(turned) => turned.steps(error).map(|s| (s.sides, s.rings)),
         }?;

@@ -156,15 +156,15 @@ fn no_vertex_is_farther_than_the_deviation() {
             let far = farthest(&mesh.positions, &level.of(&mesh).mesh);
             assert!(far <= level.deviation + 1e-6, "{far} {}", level.deviation);
             assert!(far > 0.3 * level.deviation, "a loose bound: {far} {}", level.deviation);
-            assert!(!level.strays(&mesh.positions, level.deviation + 1e-6));
-            assert!(level.strays(&mesh.positions, 0.9 * level.deviation));
+            assert!(!level.exceeds(&mesh.positions, level.deviation + 1e-6));
+            assert!(level.exceeds(&mesh.positions, 0.9 * level.deviation));
             // The same vertices in another shape, for which the level was not made.
             let other = Mesh { positions: bent.clone(), ..mesh.clone() };
             let far = farthest(&bent, &level.of(&other).mesh);
             for most in [0.5, 0.8, 1.0, 1.2, 2.0, 4.0].map(|share| share * level.deviation) {
-                assert!(level.strays(&bent, most) || far <= most + 1e-6);
+                assert!(level.exceeds(&bent, most) || far <= most + 1e-6);
             }
-            assert!(!level.strays(&bent, 1.0));
+            assert!(!level.exceeds(&bent, 1.0));
         }
     }
 }

@@ -23,7 +23,7 @@ pub(in crate::geom) struct Turned {
     pub part_count: u16,
     /// For each step between rings (1, 2, 4, …), the largest distance of the path's
     /// omitted points to the coarser path; computed on first use.
-    strays: OnceLock<Vec<f64>>,
+    exceeds: OnceLock<Vec<f64>>,
 }
 
 /// The steps: every `sides`-th meridian and every `rings`-th ring are kept.
@@ -35,7 +35,7 @@ pub(super) struct Steps {
 
 impl Turned {
     pub fn new(strips: Vec<Strip>, sides: u32, closed: bool, part_count: u16) -> Turned {
-        Turned { strips, sides, closed, part_count, strays: OnceLock::new() }
+        Turned { strips, sides, closed, part_count, exceeds: OnceLock::new() }
     }
 
     /// Returns the steps with the fewest triangles whose surface is within `most` of
@@ -62,13 +62,13 @@ impl Turned {
             Some(Steps { sides, rings })
         };
         let segments = |rings| self.strips.iter().map(|s| kept(s, rings).len() - 1).sum::<usize>();
-        let all = self.strays().iter().enumerate().filter_map(fits);
+        let all = self.exceeds().iter().enumerate().filter_map(fits);
         let best = all.min_by_key(|s| segments(s.rings) * (self.sides / s.sides) as usize)?;
         (best != Steps { sides: 1, rings: 1 }).then_some(best)
     }
 
-    fn strays(&self) -> &[f64] {
-        self.strays.get_or_init(|| {
+    fn exceeds(&self) -> &[f64] {
+        self.exceeds.get_or_init(|| {
             let longest = self.strips.iter().map(|s| s.points.len()).max().unwrap_or(0);
             let stray =
                 |rings| self.strips.iter().map(|s| stray(s, &kept(s, rings))).fold(0.0, f64::max);

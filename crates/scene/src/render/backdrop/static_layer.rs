@@ -4,7 +4,7 @@
 use crate::render::Camera;
 use crate::render::project::DepthRange;
 use crate::render::raster::Area;
-use crate::render::visibility::{Depths, Glance, Piece};
+use crate::render::visibility::{DepthTest, Depths, Piece};
 use std::sync::Arc;
 
 /// Relative half width of the first interval of depth ranges that a static layer is
@@ -45,7 +45,7 @@ pub struct StaticLayer {
     pub nearest: Vec<f32>,
     /// Where the tests at each pixel begin in `looks`.
     start: Vec<u32>,
-    looks: Vec<Glance>,
+    looks: Vec<DepthTest>,
     /// Pieces with a test whose result has changed.
     touched: Vec<u32>,
 }
@@ -98,11 +98,11 @@ impl StaticLayer {
         // A counting sort by pixel.
         self.start.clear();
         self.start.resize(self.depth.len() + 2, 0);
-        let glances = |i: usize, piece: &Piece| {
-            [0, 1].map(|side| piece.glance(side, i as u32)).into_iter().flatten()
+        let depth_tests = |i: usize, piece: &Piece| {
+            [0, 1].map(|side| piece.depth_test(side, i as u32)).into_iter().flatten()
         };
         for (i, (piece, _)) in self.live.iter().enumerate() {
-            glances(i, piece).for_each(|(pixel, _)| self.start[pixel as usize + 2] += 1);
+            depth_tests(i, piece).for_each(|(pixel, _)| self.start[pixel as usize + 2] += 1);
         }
         let mut sum = 0;
         for start in &mut self.start {
@@ -110,11 +110,11 @@ impl StaticLayer {
             *start = sum;
         }
         self.looks.clear();
-        self.looks.resize(sum as usize, Glance::default());
+        self.looks.resize(sum as usize, DepthTest::default());
         for (i, (piece, _)) in self.live.iter().enumerate() {
-            for (pixel, glance) in glances(i, piece) {
+            for (pixel, depth_test) in depth_tests(i, piece) {
                 let place = &mut self.start[pixel as usize + 1];
-                self.looks[*place as usize] = glance;
+                self.looks[*place as usize] = depth_test;
                 *place += 1;
             }
         }
@@ -123,11 +123,11 @@ impl StaticLayer {
         for (pixel, depth) in self.depth.iter().enumerate() {
             let mut nearest = f32::INFINITY;
             for at in self.start[pixel]..self.start[pixel + 1] {
-                let glance = &self.looks[at as usize];
-                nearest = nearest.min(rounded_up(most.least(glance)));
-                if most.frees(glance, *depth) && !least.frees(glance, *depth) {
+                let depth_test = &self.looks[at as usize];
+                nearest = nearest.min(rounded_up(most.least(depth_test)));
+                if most.passes(depth_test, *depth) && !least.passes(depth_test, *depth) {
                     let free =
-                        |extent: f64| depths(extent).is_some_and(|d| d.frees(glance, *depth));
+                        |extent: f64| depths(extent).is_some_and(|d| d.passes(depth_test, *depth));
                     self.unsure.push((first_true(self.extents, free), at, pixel as u32));
                 }
             }
@@ -138,7 +138,7 @@ impl StaticLayer {
     }
 
     /// Tests all pieces and returns the number of those shown.
-    pub fn look_at_all(&mut self, depths: &Depths<'_>) -> usize {
+    pub fn test_all(&mut self, depths: &Depths<'_>) -> usize {
         let mut shown = 0;
         for ((piece, _), state) in self.live.iter().zip(&mut self.state) {
             let [first, second] =
@@ -153,7 +153,7 @@ impl StaticLayer {
     /// Repeats the depth tests at some pixels, and those whose result depends on which of
     /// two depth ranges (before and now) applies. Calls `changed` once for each piece
     /// that is no longer shown (`false`) or newly shown (`true`).
-    pub fn look_again(
+    pub fn retest(
         &mut self,
         depths: &Depths<'_>,
         pixels: &[u32],
@@ -162,13 +162,13 @@ impl StaticLayer {
     ) {
         let StaticLayer { looks, start, state, touched, live, unsure, .. } = self;
         touched.clear();
-        let mut look = |glance: &Glance, pixel: usize| {
-            let Some(state) = state.get_mut(glance.piece as usize) else { return };
-            let free = u8::from(depths.frees(glance, depths.at(pixel))) << glance.side;
-            let now = (*state & !(1 << glance.side)) | free;
+        let mut look = |depth_test: &DepthTest, pixel: usize| {
+            let Some(state) = state.get_mut(depth_test.piece as usize) else { return };
+            let free = u8::from(depths.passes(depth_test, depths.at(pixel))) << depth_test.side;
+            let now = (*state & !(1 << depth_test.side)) | free;
             if now != *state {
                 *state = now;
-                touched.push(glance.piece);
+                touched.push(depth_test.piece);
             }
         };
         for pixel in pixels.iter().map(|p| *p as usize) {
@@ -177,13 +177,16 @@ impl StaticLayer {
                 .get(ends[0]..ends[1])
                 .unwrap_or_default()
                 .iter()
-                .for_each(|glance| look(glance, pixel));
+                .for_each(|depth_test| look(depth_test, pixel));
         }
         let [low, high] = [extents[0].min(extents[1]), extents[0].max(extents[1])];
         let between =
             [low, high].map(|extent| unsure.partition_point(|(flip, ..)| *flip <= extent));
         for (_, at, pixel) in unsure.get(between[0]..between[1]).unwrap_or_default() {
-            looks.get(*at as usize).into_iter().for_each(|glance| look(glance, *pixel as usize));
+            looks
+                .get(*at as usize)
+                .into_iter()
+                .for_each(|depth_test| look(depth_test, *pixel as usize));
         }
         for piece in &*touched {
             let (Some(state), Some((piece, _))) =

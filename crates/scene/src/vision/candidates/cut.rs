@@ -23,7 +23,7 @@ const CLIP: f32 = 3.0;
 pub struct Field {
     width: usize,
     height: usize,
-    pub letters: Vec<u8>,
+    pub codewords: Vec<u8>,
     /// Similarity of each pixel to the one on its left, with one extra entry.
     left: Vec<f32>,
     /// Similarity to the one above, with an extra row.
@@ -32,7 +32,7 @@ pub struct Field {
 
 impl Field {
     /// Builds the field of a picture with these letters.
-    pub fn new(picture: &Picture, letters: Vec<u8>) -> Field {
+    pub fn new(picture: &Picture, codewords: Vec<u8>) -> Field {
         let (w, h) = (picture.width, picture.height);
         let squared = |p: usize, q: usize| {
             let (a, b) = (picture.lab[p], picture.lab[q]);
@@ -52,7 +52,7 @@ impl Field {
         let mean = all.map(|d| f64::from(*d)).sum::<f64>() / (2 * w * h) as f64;
         let beta = 0.5 / mean.max(1e-3) as f32;
         left.iter_mut().chain(&mut above).for_each(|d| *d = libm::expf(-beta * *d));
-        Field { width: w, height: h, letters, left, above }
+        Field { width: w, height: h, codewords, left, above }
     }
 
     /// Cuts out the object at a seed; `None` if nothing stands out.
@@ -74,7 +74,7 @@ impl Field {
     fn gains(&self, window: &[bool], mask: &[bool]) -> Option<[f32; LETTERS]> {
         let mut counts = [[0u32; LETTERS]; 2];
         for (p, _) in window.iter().enumerate().filter(|(_, inside)| **inside) {
-            counts[usize::from(mask[p])][usize::from(self.letters[p])] += 1;
+            counts[usize::from(mask[p])][usize::from(self.codewords[p])] += 1;
         }
         let totals = counts.map(|c| c.iter().sum::<u32>());
         if totals.contains(&0) {
@@ -116,7 +116,7 @@ impl Field {
                     + self.left[p + 1] * towards(p + 1)
                     + self.above[p] * towards(p.saturating_sub(w))
                     + self.above[p + w] * towards(p + w);
-                let log_odds = gain[usize::from(self.letters[p])] + 2.0 * LAMBDA * pull;
+                let log_odds = gain[usize::from(self.codewords[p])] + 2.0 * LAMBDA * pull;
                 let new = 1.0 / (1.0 + libm::expf(-log_odds));
                 most = most.max((new - belief[p]).abs());
                 belief[p] = new;

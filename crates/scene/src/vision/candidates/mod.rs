@@ -114,7 +114,7 @@ impl Candidate {
 /// Returns the best regions with their scores.
 fn found(picture: &Picture, most: usize) -> Vec<(f64, Area)> {
     let field = Field::new(picture, clusters::codebook(picture));
-    let judge = Judge::new(picture, &field.letters);
+    let judge = Judge::new(picture, &field.codewords);
     let scored = |area: Area| (judge.score(&area), area);
     let regions =
         suppressed(regions(picture).into_iter().map(scored).collect(), OVERLAP, SEEDS.max(most));

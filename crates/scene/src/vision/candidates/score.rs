@@ -10,14 +10,14 @@ const SYMMETRIC: f64 = 0.5;
 
 /// Data for scoring regions of a picture.
 pub struct Judge<'a> {
-    letters: &'a [u8],
+    codewords: &'a [u8],
     /// The edge strength at a pixel or beside it, 0 to 1.
     edges: Vec<f32>,
 }
 
 impl Judge<'_> {
     /// Prepares a picture with its letters.
-    pub fn new<'a>(picture: &Picture, letters: &'a [u8]) -> Judge<'a> {
+    pub fn new<'a>(picture: &Picture, codewords: &'a [u8]) -> Judge<'a> {
         let (w, h) = (picture.width, picture.height);
         let most = |p: usize| {
             let (i, j) = (p % w, p / w);
@@ -26,7 +26,10 @@ impl Judge<'_> {
                 rows.flat_map(|j| (i.saturating_sub(1)..(i + 2).min(w)).map(move |i| j * w + i));
             near.map(|q| picture.gradient.magnitude[q]).fold(0.0, f32::max)
         };
-        Judge { letters, edges: (0..w * h).map(|p| (most(p) / picture.strong).min(1.0)).collect() }
+        Judge {
+            codewords,
+            edges: (0..w * h).map(|p| (most(p) / picture.strong).min(1.0)).collect(),
+        }
     }
 
     /// Returns the score of a region, at least 0. Symmetry is what distinguishes objects
@@ -60,7 +63,7 @@ impl Judge<'_> {
         let ring = area.dilated((0.15 * (area.count as f64).sqrt()).max(3.0) as usize);
         let mut counts = [[0u32; LETTERS]; 2];
         for (p, _) in ring.iter().enumerate().filter(|(_, inside)| **inside) {
-            counts[usize::from(area.on[p])][usize::from(self.letters[p])] += 1;
+            counts[usize::from(area.on[p])][usize::from(self.codewords[p])] += 1;
         }
         let totals = counts.map(|c| f64::from(c.iter().sum::<u32>()));
         if totals[0] == 0.0 {

@@ -249,7 +249,7 @@ fn a_cut_moves_to_the_object() {
     let cut = field.cut(&seed).unwrap();
     let (before, after) = (seed.iou(&truth), cut.iou(&truth));
     assert!(after > 0.94 && before < 0.88, "{after} from {before}");
-    let judge = Judge::new(&picture, &field.letters);
+    let judge = Judge::new(&picture, &field.codewords);
     assert!(judge.score(&truth) > judge.score(&seed));
     let twice = suppressed(vec![(0.2, cut.clone()), (0.3, truth.clone()), (0.0, seed)], 0.99, 9);
     assert_eq!(twice.iter().map(|(s, _)| *s).collect::<Vec<_>>(), [0.3, 0.2]);

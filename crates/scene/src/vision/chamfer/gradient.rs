@@ -21,21 +21,21 @@ impl Chamfer {
         out.resize(elements.len(), [0.0; 4]);
         let sigma = self.options.sigma;
         let square = sigma * sigma;
-        let (forth, back) = (self.forth(elements), self.back(elements, scratch));
+        let (forward, back) = (self.forward(elements), self.back(elements, scratch));
         let share = if back.is_some() { 0.5 } else { 1.0 };
-        let rho = share * (forth.mean() + back.map_or(0.0, |b| b.mean()));
+        let rho = share * (forward.mean() + back.map_or(0.0, |b| b.mean()));
         let outer = -share * rho / square;
-        let mean = forth.mean();
+        let mean = forward.mean();
         // Derivatives with respect to a length and, per unit length, its distance.
         let slopes = |length: f64, mean: f64, d: f64| match self.options.mode {
             Mode::Mean => (outer * (d - mean) / length, outer / length),
             Mode::Sum => (self.log_normal(d), -d / square),
         };
-        if forth.length > 0.0 {
+        if forward.length > 0.0 {
             for e in elements.in_view() {
                 let (read, slope) = self.read(&e);
                 let d = self.cut(read);
-                let (by_length, by_distance) = slopes(forth.length, mean, d);
+                let (by_length, by_distance) = slopes(forward.length, mean, d);
                 let Some(place) = out.get_mut(e.index) else { continue };
                 let (length, weight) = (f64::from(e.length) * self.percent, f64::from(e.weight));
                 if !self.is_cut(f64::from(read)) {
@@ -78,7 +78,7 @@ impl Chamfer {
             Mode::Mean => rho * rho / (square * sigma) - 1.0 / sigma,
             Mode::Sum => {
                 let one = |s: &super::ChamferSums| s.second / (square * sigma) - s.length / sigma;
-                one(&forth) + back.as_ref().map_or(0.0, one)
+                one(&forward) + back.as_ref().map_or(0.0, one)
             }
         };
         if by_sigma.is_finite() { by_sigma } else { 0.0 }

@@ -57,12 +57,12 @@ pub struct Keypoint {
     /// The detector's confidence, 0 to 1; 1 if the detector does not report it.
     pub confidence: f64,
     /// Alternative positions, if the detector has several hypotheses.
-    pub others: Vec<Elsewhere>,
+    pub others: Vec<Alternative>,
 }
 
 /// An alternative position of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Elsewhere {
+pub struct Alternative {
     /// As [`Keypoint::x`].
     pub x: f64,
     /// As [`Keypoint::y`].
@@ -110,7 +110,7 @@ impl Keypoints {
                     p.name
                 )));
             }
-            let sound = |o: &Elsewhere| {
+            let sound = |o: &Alternative| {
                 o.x.is_finite() && o.y.is_finite() && o.weight > 0.0 && o.weight.is_finite()
             };
             if !p.others.iter().all(sound) {

@@ -42,16 +42,19 @@ impl LnRising {
 /// `ln Gamma(A) - ln Gamma(A + N) + sum over k of (ln Gamma(a + n_k) - ln Gamma(a))`, A =
 /// K a (the Dirichlet-multinomial without its multinomial coefficient).
 #[derive(Debug, Clone)]
-pub(super) struct Urn {
+pub(super) struct DirichletMultinomial {
     each: LnRising,
     all: LnRising,
 }
 
-impl Urn {
+impl DirichletMultinomial {
     /// Builds the tables for `colours` colours with `a` prior counts each, and up to
     /// about `most` pixels.
     pub fn new(colours: usize, a: f64, most: usize) -> Self {
-        Urn { each: LnRising::new(a, most), all: LnRising::new(a * colours as f64, most) }
+        DirichletMultinomial {
+            each: LnRising::new(a, most),
+            all: LnRising::new(a * colours as f64, most),
+        }
     }
 
     /// Returns the increase of the log-probability per pixel of a colour, given the
@@ -95,7 +98,7 @@ mod tests {
 
     #[test]
     fn an_urn_is_its_draws_one_after_another() {
-        let urn = Urn::new(3, 0.7, 10);
+        let urn = DirichletMultinomial::new(3, 0.7, 10);
         let sequence = [0usize, 2, 2, 0, 2, 1, 2];
         let (mut counts, mut sum) = ([0u32; 3], 0.0);
         for (n, k) in sequence.iter().enumerate() {

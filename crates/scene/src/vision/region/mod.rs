@@ -18,7 +18,7 @@ mod shading;
 
 pub use palette::Quantised;
 
-use self::counts::Urn;
+use self::counts::DirichletMultinomial;
 use super::elements::{ComparatorError, check, check_size};
 use super::photo::Photo;
 use pcadlang_numerics::rng::Stream;
@@ -91,7 +91,7 @@ pub struct Region {
     cells: Vec<u32>,
     /// Number of pixels of each cell.
     totals: Vec<u32>,
-    urn: Urn,
+    urn: DirichletMultinomial,
     /// The score of each tile, and of the picture, if all of it is background.
     empty_tiles: Vec<f64>,
     empty: f64,
@@ -145,7 +145,7 @@ impl Region {
         let cells: Vec<u32> = pixels.map(cell).collect();
         let mut totals = vec![0; (tiles * tiles) as usize * colours];
         count(&mut totals, &cells);
-        let urn = Urn::new(colours, options.prior, cells.len());
+        let urn = DirichletMultinomial::new(colours, options.prior, cells.len());
         let empty_tiles =
             totals.chunks_exact(colours).map(|t| urn.score(t.iter().copied())).collect();
         let mut whole = vec![0; colours];

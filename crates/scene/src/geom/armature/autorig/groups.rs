@@ -68,7 +68,7 @@ pub(super) fn rig(
     let off = |g: &Group| (g.centre - middle).length();
     let root =
         (0..n).fold(0, |best, i| if off(&groups[i]) < off(&groups[best]) { i } else { best });
-    let (order, parents) = hang(&groups, &contacts, root, near);
+    let (order, parents) = spanning_tree(&groups, &contacts, root, near);
     let mut number = vec![0; n];
     for (k, g) in order.iter().enumerate() {
         number[*g] = k;
@@ -186,7 +186,7 @@ fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
 /// Returns the groups, parents before children, and their parents. Parents follow the
 /// shortest paths from the root over contacts; groups that no contact reaches attach
 /// across the smallest gap.
-fn hang(
+fn spanning_tree(
     groups: &[Group],
     contacts: &[Vec<Option<Contact>>],
     root: usize,

@@ -30,8 +30,8 @@ pub(super) struct Node {
 /// Returns the tree of curves, the longest first.
 pub(super) fn curves(grid: &Grid) -> Vec<Node> {
     let root = centre(grid);
-    let (far, _) = grid.ways(root, |_| 1.0);
-    let (_, before) = grid.ways(root, |i| 1.0 / (grid.clearance(i) * grid.clearance(i)));
+    let (far, _) = grid.shortest_paths(root, |_| 1.0);
+    let (_, before) = grid.shortest_paths(root, |i| 1.0 / (grid.clearance(i) * grid.clearance(i)));
     let mut number: Vec<Option<usize>> = vec![None; grid.len()];
     let mut covered = vec![false; grid.len()];
     let node = |i: usize, parent| Node {

@@ -124,7 +124,11 @@ impl Grid {
     /// Returns the cheapest paths from a cell to all other inside cells: the cost to
     /// each, and the previous cell. A step costs its length in cells times the mean of
     /// `cost` at its ends.
-    pub fn ways(&self, from: usize, cost: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<usize>) {
+    pub fn shortest_paths(
+        &self,
+        from: usize,
+        cost: impl Fn(usize) -> f64,
+    ) -> (Vec<f64>, Vec<usize>) {
         let (mut far, mut before) = (vec![f64::INFINITY; self.len()], vec![from; self.len()]);
         // Costs are non-negative, so their bits sort in the same order.
         let mut heap = BinaryHeap::from([Reverse((0u64, from))]);
@@ -296,7 +300,7 @@ mod tests {
             assert!((near.fold(f64::INFINITY, f64::min) / g.cell() - g.clearance(i)).abs() < 1e-9);
         }
         let from = g.cells().next().unwrap();
-        let (far, before) = g.ways(from, |_| 1.0);
+        let (far, before) = g.shortest_paths(from, |_| 1.0);
         for i in g.cells() {
             assert!(far[i] * g.cell() >= (g.middle(i) - g.middle(from)).length() - 1e-9);
             assert!(i == from || far[before[i]] < far[i]);

@@ -2,7 +2,7 @@
 //! reference.
 
 /// Built-ins with their other names. Underscores and dots separate words, as in queries.
-pub(super) const KNOWN_AS: &[(&str, &str)] = &[
+pub(super) const ALIASES: &[(&str, &str)] = &[
     (
         "log_density",
         "normal_lpdf poisson_lpmf bernoulli_logit_lpmf lpdf lpmf logp logpdf logpmf log_prob target score pointwise likelihood",
