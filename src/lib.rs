@@ -5,7 +5,7 @@
 //! central data structure; [`host`] lets a program that embeds the language register its
 //! own functions, distributions, likelihoods and kernels. The documented interface
 //! follows semantic versioning, is exercised by the doc-tests, and is listed in
-//! `docs/embedding.md`; modules that are public only for tests and tools are hidden.
+//! `docs/reference/api.md`; modules that are public only for tests and tools are hidden.
 //!
 //! Dependencies between modules are one-way: `syntax`, `dist`, `geom`, `render` and
 //! `vision` do not depend on traces, and `infer` does not depend on pictures.
