@@ -3,40 +3,34 @@
 //!
 //! [`Program`] and [`Model`] are the entry points; [`trace::Trace`] is the engine's
 //! central data structure; [`host`] lets a program that embeds the language register its
-//! own functions, distributions, likelihoods and kernels. The documented interface
-//! follows semantic versioning, is exercised by the doc-tests, and is listed in
-//! `docs/reference/api.md`; modules that are public only for tests and tools are hidden.
+//! own functions, distributions, likelihoods and kernels. What `docs/reference/api.md`
+//! lists follows semantic versioning and is exercised by the doc-tests; the rest is public
+//! for tests and tools, and may change at any time.
 //!
-//! Dependencies between modules are one-way: `syntax`, `dist`, `geom`, `render` and
-//! `vision` do not depend on traces, and `infer` does not depend on pictures.
+//! The engine ([`lang`], [`trace`], [`infer`]) knows nothing of pictures. The scene is its
+//! guest: [`scene`] registers the crates `pcadlang-scene` and `pcadlang-detectors` through
+//! [`host`], as any embedding program would. Without the feature `scene` the engine is
+//! built alone.
 #![doc = include_str!("guide.md")]
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "scene")]
-#[doc(hidden)]
 pub mod bank;
 pub mod diag;
 pub mod host;
 pub mod infer;
-#[doc(hidden)]
 pub mod lang;
 mod model;
 pub mod report;
 #[cfg(feature = "scene")]
-#[doc(hidden)]
 pub mod scene;
-#[doc(hidden)]
 pub mod score;
 #[cfg(feature = "scene")]
-#[doc(hidden)]
 pub mod session;
-#[doc(hidden)]
 pub mod standard;
-#[doc(hidden)]
 pub mod syntax;
 pub mod trace;
-#[doc(hidden)]
 pub mod tradeoff;
 
 #[doc(no_inline)]

@@ -5,13 +5,11 @@
 
 mod best;
 mod build;
-#[doc(hidden)]
 pub mod calibration;
 mod callback;
 mod chains;
 mod columns;
 mod default_plan;
-#[doc(hidden)]
 pub mod diagnostics;
 pub mod draws;
 mod evidence;
@@ -27,7 +25,6 @@ mod neighbours;
 mod plain;
 mod plan;
 mod population;
-#[doc(hidden)]
 pub mod predictive;
 mod record;
 mod resampling;

@@ -10,28 +10,22 @@
 mod aligned;
 mod atomic_write;
 mod chain_file;
-#[doc(hidden)]
 pub mod checkpoint;
 pub mod csv;
 mod draws;
-#[doc(hidden)]
 pub mod evaluation;
 mod hash;
-#[doc(hidden)]
 pub mod html;
 mod modes;
 mod moments;
 mod number;
 #[cfg(feature = "scene")]
-#[doc(hidden)]
 pub mod pictures;
 mod reread;
 mod rundir;
 mod sinks;
-#[doc(hidden)]
 pub mod table;
 mod warnings;
-#[doc(hidden)]
 pub mod zarr;
 
 pub use crate::infer::diagnostics::Summary;
