@@ -3,9 +3,9 @@
 //!
 //! [`Program`] and [`Model`] are the entry points; [`trace::Trace`] is the engine's
 //! central data structure; [`host`] lets a program that embeds the language register its
-//! own functions, distributions, likelihoods and kernels. What `docs/embedding.md` lists
-//! follows semantic versioning and is exercised by the doc-tests; the rest is public for
-//! tests and tools, and may change at any time.
+//! own functions, distributions, likelihoods and kernels. What `docs/reference/api.md`
+//! lists follows semantic versioning and is exercised by the doc-tests; the rest is public
+//! for tests and tools, and may change at any time.
 //!
 //! The engine ([`lang`], [`trace`], [`infer`]) knows nothing of pictures. The scene is its
 //! guest: [`scene`] registers the crates `pcadlang-scene` and `pcadlang-detectors` through

@@ -1,4 +1,4 @@
-//! The API that `docs/embedding.md` promises to hosts: every public item is used by a
+//! The API that `docs/reference/api.md` promises to hosts: every public item is used by a
 //! doc-test of its module, and is in that page's table.
 
 use std::collections::BTreeSet;
@@ -199,12 +199,12 @@ fn every_promised_item_is_used_by_a_doc_test_of_its_module() {
 
 #[test]
 fn the_page_for_hosts_lists_what_is_promised() {
-    let page = read(&root().join("docs/embedding.md"));
+    let page = read(&root().join("docs/reference/api.md"));
     let types: BTreeSet<String> = PROMISED
         .iter()
         .flat_map(|(file, only, _)| items(&read(&root().join(file)), only))
         .filter(|item| !item.contains("::"))
         .collect();
     let missing: Vec<&String> = types.iter().filter(|t| !uses(&page, t)).collect();
-    assert!(missing.is_empty(), "docs/embedding.md does not name {missing:?}");
+    assert!(missing.is_empty(), "docs/reference/api.md does not name {missing:?}");
 }

@@ -1,5 +1,5 @@
-//! The layers of `docs/architecture.md` (those between crates are kept by the compiler): dependencies between modules go one way, and
-//! only the command prints.
+//! The layers of `docs/explanation/architecture.md` (those between crates are kept by the
+//! compiler): dependencies between modules go one way, and only the command prints.
 
 use std::path::{Path, PathBuf};
 

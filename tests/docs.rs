@@ -1,7 +1,7 @@
-//! The reference in `docs/language.md` is generated from the table of built-ins, and the
+//! `docs/reference/builtins.md` is generated from the table of built-ins, and the
 //! README's program runs.
 //!
-//! `REGENERATE=1 cargo test --test docs` rewrites the reference.
+//! `REGENERATE=1 cargo test --test docs` rewrites the page.
 
 use pcadlang::{Model, RunOptions};
 use pcadlang::{lang::builtins::doc, standard};
@@ -10,18 +10,17 @@ const START: &str = "<!-- reference: generated from the table of built-ins -->\n
 
 #[test]
 fn the_reference_is_up_to_date() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/language.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/reference/builtins.md");
     let text = std::fs::read_to_string(path).unwrap();
-    let guide = text.split(START).next().unwrap().trim_end();
-    let expected =
-        format!("{guide}\n\n{START}\n# Reference\n\n{}", doc::reference(&standard::table()));
+    let head = text.split(START).next().unwrap().trim_end();
+    let expected = format!("{head}\n\n{START}\n{}", doc::reference(&standard::table()));
     if std::env::var_os("REGENERATE").is_some() {
         std::fs::write(path, &expected).unwrap();
         return;
     }
     assert!(
         text == expected,
-        "docs/language.md is out of date: REGENERATE=1 cargo test --test docs"
+        "docs/reference/builtins.md is out of date: REGENERATE=1 cargo test --test docs"
     );
 }
 

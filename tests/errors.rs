@@ -134,7 +134,7 @@ fn the_catalogue_is_up_to_date() {
             );
         }
     }
-    let path = root.join("docs/mistakes.md");
+    let path = root.join("docs/reference/mistakes.md");
     if std::env::var_os("REGENERATE").is_some() {
         std::fs::write(path, &text).unwrap();
         return;
@@ -142,6 +142,6 @@ fn the_catalogue_is_up_to_date() {
     let there = std::fs::read_to_string(path).unwrap();
     assert!(
         there == text,
-        "docs/mistakes.md is out of date: REGENERATE=1 cargo test --test errors"
+        "docs/reference/mistakes.md is out of date: REGENERATE=1 cargo test --test errors"
     );
 }

@@ -1,5 +1,6 @@
-//! `docs/kernels.json` and `docs/kernels.md` list which tests run which kernels; they are
-//! generated from the lists that the tests read (`tests/common/kernels.rs`).
+//! `docs/reference/kernels.json` and `kernels.md` beside it list which tests run which
+//! kernels; they are generated from the lists that the tests read
+//! (`tests/common/kernels.rs`).
 //!
 //! `REGENERATE=1 cargo test --test kernels` rewrites both.
 
@@ -34,7 +35,7 @@ fn machine_readable() -> String {
 fn readable() -> String {
     let mut s = "# Which tests run which kernels\n\n\
         Made from the lists that the tests read, by `REGENERATE=1 cargo test --test kernels`; the same as data is in\n\
-        [kernels.json](kernels.json). How a program of your own is checked: [proof.md](proof.md).\n\n"
+        [kernels.json](kernels.json). How to check a program of your own: [validation](../howto/validation.md).\n\n"
         .to_owned();
     let names: Vec<&str> = PROOFS.iter().map(|p| p.name).collect();
     let _ = writeln!(s, "| kernel | {} |", names.join(" | "));
@@ -57,13 +58,16 @@ fn readable() -> String {
 }
 
 fn up_to_date(name: &str, expected: &str) {
-    let path = format!("{}/docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/docs/reference/{name}", env!("CARGO_MANIFEST_DIR"));
     if std::env::var_os("REGENERATE").is_some() {
         std::fs::write(&path, expected).unwrap();
         return;
     }
     let text = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(text == expected, "docs/{name} is out of date: REGENERATE=1 cargo test --test kernels");
+    assert!(
+        text == expected,
+        "docs/reference/{name} is out of date: REGENERATE=1 cargo test --test kernels"
+    );
 }
 
 #[test]

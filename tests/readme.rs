@@ -2,8 +2,8 @@
 //! the pictures that they name, writes and runs its program, and tries the listed
 //! commands on the resulting runs.
 //!
-//! The guide's chapters and the recorded session of docs/repl.md are replayed by `guide`
-//! and `repl`.
+//! The guide's chapters and the recorded session of docs/reference/prompt.md are replayed
+//! by `guide` and `repl`.
 
 #[path = "common/folder.rs"]
 mod folder;
@@ -78,7 +78,7 @@ fn the_first_program_does_what_is_shown() {
     let numbers = |l: &str| l.split_whitespace().take(4).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(numbers(shown), numbers(said));
     assert!(done.err.contains("infer {"), "the plan that is used is shown: {}", done.err);
-    // The prompt resumes the run; docs/repl.md has commands to type there.
+    // The prompt resumes the run; docs/reference/prompt.md has commands to type there.
     let prompt = f.succeeds(&["repl", "runs/line"]);
     assert!(prompt.out.contains("log joint"), "{}", prompt.out);
     for command in [

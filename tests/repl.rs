@@ -1,5 +1,5 @@
-//! The prompt: the recording in docs/repl.md word for word, piped scripts, and a
-//! pseudo-terminal.
+//! The prompt: the recording in docs/reference/prompt.md word for word, piped scripts,
+//! and a pseudo-terminal.
 //!
 //! `REGENERATE=1 cargo test --test repl` writes the present output of the recorded
 //! session to the page: read it first.
@@ -51,7 +51,7 @@ fn parts(page: &str) -> Vec<(bool, String)> {
 
 #[test]
 fn the_recorded_session_replays() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/repl.md");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/prompt.md");
     let text = std::fs::read_to_string(&page).unwrap();
     let parts = parts(&text);
     let recorded: Vec<&str> =

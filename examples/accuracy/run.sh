@@ -1,11 +1,11 @@
 #!/bin/sh
-# Measures the fronts of speed and accuracy of docs/accuracy.md, and writes the presets of lathe.pcad anew: under two hours
+# Measures the fronts of speed and accuracy of docs/measurements/accuracy.md, and writes the presets of lathe.pcad anew: under two hours
 # on two cores that do nothing else. Taken up where it was interrupted when it is told the same OUT.
 #
 #     examples/accuracy/run.sh OBJECTS PEOPLE OUT
 #
-# OBJECTS, PEOPLE: folders of cases (docs/tradeoff.md). PCADLANG: the program (built if not given).
-# The presets of human.pcad are not written: its settings differ in the body, which is not among the errors (docs/accuracy.md).
+# OBJECTS, PEOPLE: folders of cases (docs/howto/presets.md). PCADLANG: the program (built if not given).
+# The presets of human.pcad are not written: its settings differ in the body, which is not among the errors (docs/measurements/accuracy.md).
 set -eu
 [ $# -eq 3 ] || { sed -n '5,7s/^# *//p' "$0" >&2; exit 2; }
 here=$(cd "$(dirname "$0")" && pwd)
@@ -41,6 +41,6 @@ done
 "$PCADLANG" tradeoff human.pcad --cases "$people" --budget 45m --out people \
   --settings "$root/programs/human.settings.json" --settings "$here/people.settings.json"
 
-mkdir -p "$root/docs/accuracy"
-cp objects/table.csv "$root/docs/accuracy/objects.csv"
-cp objects/plot.svg "$root/docs/accuracy/objects.svg"
+mkdir -p "$root/docs/measurements/accuracy"
+cp objects/table.csv "$root/docs/measurements/accuracy/objects.csv"
+cp objects/plot.svg "$root/docs/measurements/accuracy/objects.svg"

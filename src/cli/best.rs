@@ -178,7 +178,8 @@ fn frequency(chains: &[ChainResult], seed: u64, size: u32) -> (GrayImage, Option
 
 /// Chains that agree on less than this fraction of pixels may not all have found the
 /// object: in 102 runs of `lathe.pcad` on pictures of known shape it was found in 95 % of
-/// the runs above the threshold, and in 45 % of those below (docs/objects.md).
+/// the runs above the threshold, and in 45 % of those below
+/// (docs/measurements/objects.md).
 const AGREE: f64 = 0.9;
 
 /// Warns of chains that disagree on which pixels are covered.

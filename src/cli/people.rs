@@ -54,7 +54,7 @@ const BODY: [&str; 12] = [
 ];
 
 /// The networks' confidence is below this for most false detections, and for few people
-/// (docs/detector.md).
+/// (docs/measurements/detectors.md).
 const DOUBTFUL: f64 = 0.5;
 
 /// Warns if no person was found, if another person may be meant, or if little of the body

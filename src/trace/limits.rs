@@ -1,6 +1,6 @@
 //! Limits on what a program may build and how long one evaluation may take. Exceeding one
 //! is an error with a location in the program, instead of exhausted memory or an endless
-//! run. The numbers are in `docs/reliability.md`.
+//! run. The numbers are in `docs/reference/limits.md`.
 
 use super::graph::Graph;
 use super::node::NodeId;

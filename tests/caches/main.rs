@@ -1,7 +1,7 @@
 //! Every cached value depends on all of its inputs: each input is changed alone, and the
 //! result with all caches warm from the old input equals, to the last bit, the result on
-//! a fresh thread and with fresh data. docs/reliability.md lists the caches, their keys,
-//! and the test here that changes each key.
+//! a fresh thread and with fresh data. docs/explanation/caches.md lists the caches, their
+//! keys, and the test here that changes each key.
 
 mod pictures;
 mod scores;

@@ -1,6 +1,6 @@
 //! The kernels that the tests of kernels run. Both the tests and the table of
-//! `docs/kernels.md` (`tests/kernels.rs`) read these lists: to add a kernel to a proof,
-//! add a line here; the row of the table follows automatically.
+//! `docs/reference/kernels.md` (`tests/kernels.rs`) read these lists: to add a kernel to
+//! a proof, add a line here; the row of the table follows automatically.
 #![allow(dead_code)]
 
 /// A mixture of a kernel with one that reaches every state.

@@ -1,7 +1,7 @@
 //! Counts the checked points, collects failures, and compares the counts with the table
-//! of `docs/extremes.md`.
+//! of `docs/reference/numerics.md`.
 
-const DOCUMENT: &str = include_str!("../../docs/extremes.md");
+const DOCUMENT: &str = include_str!("../../docs/reference/numerics.md");
 
 /// The points of one subject.
 pub struct Points {
@@ -36,7 +36,7 @@ impl Points {
         assert_eq!(
             documented,
             Some(checked),
-            "docs/extremes.md should say {checked} points for \"{subject}\""
+            "docs/reference/numerics.md should say {checked} points for \"{subject}\""
         );
     }
 }
@@ -56,5 +56,5 @@ fn there_are_at_least_2000_points() {
     assert!(total >= 2000, "{total}");
     let said =
         DOCUMENT.lines().find_map(|l| l.strip_prefix("Together ")?.split(' ').next()?.parse().ok());
-    assert_eq!(said, Some(total), "docs/extremes.md should say: Together {total} points");
+    assert_eq!(said, Some(total), "docs/reference/numerics.md should say: Together {total} points");
 }

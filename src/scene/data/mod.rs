@@ -88,7 +88,7 @@ pub(super) const TABLE: &[Row] = &[
         Type::Object("a detector"),
         "A contour detector for photographs, for `scene.edges`: an OpenCV structured forest \
          (`model.yml.gz`), or a network (`.onnx`; only in builds with the feature `onnx`), to \
-         which the options apply; without a file, the built-in detector. See `docs/detectors.md`.",
+         which the options apply; without a file, the built-in detector. See `docs/howto/detectors.md`.",
         || Arc::new(DetectorFile),
     ),
     kind(
@@ -96,7 +96,7 @@ pub(super) const TABLE: &[Row] = &[
         SHAPE,
         Type::Object("an armature"),
         "A body: a glTF file (`.glb`, `.gltf`) with a skin, or a JSON rig file, with its mesh and \
-         morphs in the same folder: see `docs/bodies.md`. `up` and `unit` apply to glTF.",
+         morphs in the same folder: see `docs/howto/bodies.md`. `up` and `unit` apply to glTF.",
         || {
             Arc::new(Shape {
                 load: armature::load,
