@@ -3,6 +3,7 @@
 
 #![allow(dead_code)]
 
+use crate::common::folder::Folder;
 use pcadlang::host::{Entry, Host, Previous, Type};
 use pcadlang::infer::{
     Callbacks, Drift, Kernel, Mh, Pick, Progress, SiteSelection, Slice, StepContext,
