@@ -4,8 +4,9 @@
 //! One watt flows through a rod of many cells; a program infers the conductivities of the
 //! cells from temperatures. When some cells change, the sweep along the rod resumes at
 //! the first of them, from the state kept by the previous evaluation. That is always the
-//! state of the current trace, also after a rejected proposal. `tests/embedding.rs`
-//! checks that incremental and full evaluation are equal, bit for bit.
+//! state of the current trace, also after a rejected proposal.
+//! `tests/library/embedding.rs` checks that incremental and full evaluation are equal,
+//! bit for bit.
 
 use pcadlang::host::{Adjoint, Args, Entry, Fault, Host, Previous, Type};
 use pcadlang::{Error, Model, Program, RunOptions, Value};

@@ -1,7 +1,8 @@
 //! A transition of fixed structure does not allocate once the trace has warmed up.
 //!
 //! Allocations are counted by a global allocator, whose trait is unsafe; it only counts,
-//! and forwards to the system allocator.
+//! and forwards to the system allocator. It would do so for every test of its program, so
+//! this file is a program of its own.
 
 use pcadlang::Model;
 use pcadlang::infer::{Gibbs, Hmc, Kernel, Mh, Nuts, Pick, SiteSelection, StepContext};

@@ -1,7 +1,7 @@
 //! Shapes in many random poses: shared with the test of the bound on the score.
 
 #[path = "../shipped/mod.rs"]
-mod shipped;
+pub mod shipped;
 
 use glam::{DVec3, Vec3};
 use pcadlang::geom::armature::{Armature, JointPose, Rules};

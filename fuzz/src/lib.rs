@@ -1,8 +1,8 @@
 //! The fuzz targets, one function each: any bytes give a result or an error without a
 //! panic, and a result can be used.
 //!
-//! `tests/fuzz.rs` also compiles these functions, and runs them on seeds and on every
-//! input that failed before.
+//! `tests/fuzz/main.rs` also compiles these functions, and runs them on seeds and on
+//! every input that failed before.
 
 use pcadlang::bank::Bank;
 use pcadlang::diag::{IntoDiagnostic, SourceMap, render};

@@ -21,8 +21,8 @@ const NONE: &[(&str, &str)] = &[
     ("scene.people", "people are found in a photograph, which nothing moves"),
 ];
 
-/// Functions that are compared with finite differences elsewhere: in `tests/gradient.rs`,
-/// and next to the comparators and renderers.
+/// Functions that are compared with finite differences elsewhere: in
+/// `tests/trace/gradient`, and next to the comparators and renderers.
 const ELSEWHERE: &[&str] = &[
     "sq_exp",
     "matern32",

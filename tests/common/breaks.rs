@@ -1,6 +1,5 @@
 //! Chains that are interrupted and resumed from a checkpoint, compared with the same
 //! chains without interruption.
-#![allow(dead_code)]
 
 use pcadlang::Model;
 use pcadlang::infer::draws::{Column, DrawRow, Sink};

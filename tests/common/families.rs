@@ -1,5 +1,4 @@
 //! Distributions by name and parameters, for tables of reference values (`tests/data`).
-#![allow(dead_code)]
 
 use pcadlang::dist::*;
 use std::sync::Arc;

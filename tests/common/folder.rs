@@ -1,10 +1,10 @@
 //! A temporary folder for each test, and the command run in it.
-#![allow(dead_code)]
 
 use assert_cmd::Command;
 use image::{DynamicImage, GrayImage, ImageFormat};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 /// A folder that is empty at first and is removed at the end, unless the test fails.
@@ -18,9 +18,12 @@ pub struct Done {
 }
 
 impl Folder {
+    /// Makes a folder with this name and a number, so that no two tests share one.
     pub fn new(name: &str) -> Folder {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let (process, number) = (std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
         let path =
-            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{process}-{number}"));
         let _ = std::fs::remove_dir_all(&path);
         std::fs::create_dir_all(&path).unwrap();
         Folder(path)
@@ -78,6 +81,19 @@ impl Folder {
             o.status.code().unwrap_or_else(|| panic!("{args:?} was killed: {:?}\n{err}", o.status));
         assert!(!err.contains("panicked") && !out.contains("panicked"), "{args:?} panics:\n{err}");
         Done { code, out, err }
+    }
+
+    /// Returns everything that a command shows: its exit code, output and messages.
+    pub fn session(&self, args: &[&str]) -> String {
+        let d = self.run(args);
+        let mut s = format!("$ pcadlang {}\nexit {}\n", args.join(" "), d.code);
+        for (name, text) in [("stdout", d.out), ("stderr", d.err)] {
+            if !text.is_empty() {
+                s.push_str(&format!("--- {name}\n{}", text.trim_end()));
+                s.push('\n');
+            }
+        }
+        s
     }
 
     /// Runs a command that must fail with a program or data error: exit code 1, a first

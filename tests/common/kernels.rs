@@ -1,7 +1,6 @@
 //! The kernels that the tests of kernels run. Both the tests and the table of
-//! `docs/reference/kernels.md` (`tests/kernels.rs`) read these lists: to add a kernel to
+//! `docs/reference/kernels.md` (`tests/inference/kernels.rs`) read these lists: to add a kernel to
 //! a proof, add a line here; the row of the table follows automatically.
-#![allow(dead_code)]
 
 /// A mixture of a kernel with one that reaches every state.
 macro_rules! with_mh {
@@ -10,11 +9,10 @@ macro_rules! with_mh {
     };
 }
 
-#[path = "../enumeration/kernels.rs"]
 pub mod random;
 
-/// Kernels compared with exact answers (`tests/exact.rs`): one or several statements
-/// each.
+/// Kernels compared with exact answers (`tests/inference/exact.rs`): one or several
+/// statements each.
 pub mod exact {
     pub const CONJUGATE: &[&str] = &[
         "mh(one(@**))",
@@ -110,7 +108,7 @@ pub mod exact {
     ];
 }
 
-/// Reversible, with the right marginal (`tests/balance.rs`).
+/// Reversible, with the right marginal (`tests/inference/balance.rs`).
 pub mod balance {
     pub const DISCRETE: &[&str] = &[
         "mh(one(@**))",
@@ -263,11 +261,11 @@ pub mod balance {
     ];
 }
 
-/// Parameters and data moved alternately, with the data as choices (`tests/balance.rs`);
-/// `%` is the selection.
+/// Parameters and data moved alternately, with the data as choices
+/// (`tests/inference/balance.rs`); `%` is the selection.
 pub const BY_TURNS: &[&str] = &["mh(one(%))", "block(%)", "drift(%, 0.7)", "drift(one(%), 1)"];
 
-/// Simulation-based calibration and Geweke's test (`tests/calibration.rs`).
+/// Simulation-based calibration and Geweke's test (`tests/inference/calibration.rs`).
 pub const CALIBRATED: &[&str] = &[
     "mh(one(@**))",
     "block(@**)",
@@ -294,7 +292,7 @@ pub const RANKED_ON_COUNTS: &[&str] =
     &["abc(mh(one(@**)), eps = 0.5)", "abc(block(@**), eps = 0.5)"];
 
 /// Chains that are bit-identical with and without incremental updates, on any number of
-/// threads (`tests/trace.rs`).
+/// threads (`tests/trace/updates.rs`).
 pub const INCREMENTAL: &str = "mix { 0.3 => mh(one(@**)); 0.2 => gibbs(one($finite)); 0.2 => drift(one(@**)); 0.2 => elliptical(one($gaussian)); 0.1 => block(@**); 0.1 => slice(one($continuous)); }";
 
 /// A column of the table: its name, what the test shows, its file, and the statements
@@ -311,55 +309,55 @@ pub const PROOFS: &[Proof] = &[
     Proof {
         name: "exact answers",
         shows: "posterior means against conjugate, enumerated or integrated ones, within five standard errors",
-        file: "tests/exact.rs",
+        file: "tests/inference/exact.rs",
         statements: exact::ALL,
     },
     Proof {
         name: "balance",
         shows: "counts of moves there and back are symmetric, and the marginal is the posterior",
-        file: "tests/balance.rs",
+        file: "tests/inference/balance.rs",
         statements: balance::FIXED,
     },
     Proof {
         name: "changing structure",
         shows: "the same where choices appear, vanish, change form or are shared",
-        file: "tests/balance.rs",
+        file: "tests/inference/balance.rs",
         statements: balance::CHANGING,
     },
     Proof {
         name: "random programs",
         shows: "exact draws remain exact draws, in random programs with enumerated posteriors",
-        file: "tests/enumeration.rs",
+        file: "tests/inference/enumeration",
         statements: random::ALL,
     },
     Proof {
         name: "by turns",
         shows: "parameters and data, sampled alternately as choices, keep the moments of their joint prior",
-        file: "tests/balance.rs",
+        file: "tests/inference/balance.rs",
         statements: &[BY_TURNS],
     },
     Proof {
         name: "SBC",
         shows: "true values have uniform ranks among draws given data simulated from them",
-        file: "tests/calibration.rs",
+        file: "tests/inference/calibration.rs",
         statements: &[CALIBRATED, RANKED, RANKED_ON_COUNTS],
     },
     Proof {
         name: "Geweke",
         shows: "alternating the kernel with simulating data leaves the joint distribution invariant",
-        file: "tests/calibration.rs",
+        file: "tests/inference/calibration.rs",
         statements: &[CALIBRATED],
     },
     Proof {
         name: "posteriordb",
         shows: "with the default plan, means and mean squares of six reference posteriors: |z| < 4 at more than 400 effective draws",
-        file: "tests/posteriordb.rs",
+        file: "tests/inference/posteriordb.rs",
         statements: &[&["nuts($continuous)"]],
     },
     Proof {
         name: "incremental = full",
         shows: "the same chain, bit for bit, whether updates are incremental or re-run the whole program",
-        file: "tests/trace.rs",
+        file: "tests/trace/updates.rs",
         statements: &[&[INCREMENTAL]],
     },
 ];

@@ -1,8 +1,26 @@
-//! Runs programs given as text, and checks their draws.
+//! Helpers of the integration tests, included once by each test program; here are those
+//! that run programs given as text and check their draws.
+//!
+//! Where a test goes. What users rely on is tested here, through public items, in the
+//! program of its subject: `tests/SUBJECT/main.rs` with a module for each topic. What
+//! only private items show is tested beside the code: in `mod tests` at the end of the
+//! file, or in a file `x_tests.rs` or `x/tests.rs` of its own when that is over about 100
+//! lines.
+//!
+//! The tests of a program share one process: none sets environment variables or the
+//! current folder, and each writes to a [`folder::Folder`] of its own. A test that cannot
+//! share its process is a program of its own, which says why (`tests/allocation.rs`).
+//! `cargo test --release --test SUBJECT -- TOPIC::` runs one topic.
 #![allow(dead_code)]
 
+pub mod breaks;
 pub mod families;
+pub mod folder;
+pub mod gltf;
 pub mod kernels;
+pub mod programs;
+pub mod snapshots;
+pub mod tape;
 
 use pcadlang::Model;
 use pcadlang::infer::{Latent, Neighbours, RunOptions};

@@ -197,7 +197,8 @@ mod tests {
 
     #[test]
     fn quantiles_invert_the_distribution_function() {
-        // mpmath, 40 digits; the other functions are compared in tests/dist_reference.rs.
+        // mpmath, 40 digits; the other functions are compared in
+        // tests/numbers/dist_reference.rs.
         close(inv_normal_cdf(1e-10), -6.361340902404056, 1e-14);
         close(inv_normal_cdf(0.3), -0.524400512708041, 1e-14);
         close(inv_normal_cdf(0.975), 1.959963984540054, 1e-14);

@@ -1,4 +1,4 @@
-//! An example for every built-in. `tests/examples.rs` runs them all.
+//! An example for every built-in. `tests/language/examples.rs` runs them all.
 //!
 //! An example is an expression followed by `//` and its value, or a program. Programs
 //! that use `scene` omit the line [`INCLUDE`], which precedes them.

@@ -1,5 +1,5 @@
 //! Tests across families: samplers, gradients, transforms, normalisation, edges. Values
-//! of log densities are checked in `tests/dist_reference.rs`.
+//! of log densities are checked in `tests/numbers/dist_reference.rs`.
 
 mod edges;
 mod gaussian;

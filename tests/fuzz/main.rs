@@ -1,0 +1,338 @@
+//! Runs the targets of `fuzz/` on seeds, on every input that once failed, and on seeds
+//! with some bytes changed; and writes the seeds for longer fuzzing.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[allow(dead_code)]
+#[path = "../../crates/scene/src/vision/forest/writer.rs"]
+mod forests;
+#[allow(dead_code)]
+#[path = "../../crates/detectors/src/nn/tests/writer.rs"]
+mod networks;
+#[path = "../../fuzz/src/lib.rs"]
+mod targets;
+
+use common::{folder, gltf};
+use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage, RgbaImage};
+use pcadlang::Program;
+use pcadlang::bank::{Features, Learn, learn};
+use pcadlang::vision::npy;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::sync::atomic::AtomicU64;
+
+use serde_json::json;
+
+type Target = fn(&[u8]);
+
+const TARGETS: [(&str, Target); 15] = [
+    ("program_text", targets::program_text),
+    ("program", targets::program),
+    ("obj", targets::obj),
+    ("gltf", targets::gltf),
+    ("rig", targets::rig),
+    ("image", targets::image),
+    ("array", targets::array),
+    ("camera", targets::camera),
+    ("trace", targets::trace),
+    ("bank", targets::bank),
+    ("checkpoint", targets::checkpoint),
+    ("keypoints", targets::keypoints),
+    ("table", targets::table),
+    ("network", targets::network),
+    ("forest", targets::forest),
+];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Returns every file below a folder whose name has this ending, sorted.
+fn files(dir: &Path, ending: &str) -> Vec<PathBuf> {
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            all.extend(files(&path, ending));
+        } else if path.to_string_lossy().ends_with(ending) {
+            all.push(path);
+        }
+    }
+    all.sort();
+    all
+}
+
+fn read(path: impl AsRef<Path>) -> Vec<u8> {
+    std::fs::read(root().join(path.as_ref()))
+        .unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
+}
+
+fn encoded(picture: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    picture.into().write_to(&mut Cursor::new(&mut bytes), format).unwrap();
+    bytes
+}
+
+fn pictures() -> Vec<Vec<u8>> {
+    let rgb = RgbImage::from_fn(9, 7, |x, y| image::Rgb([x as u8 * 20, y as u8 * 30, 128]));
+    let deep = image::ImageBuffer::from_fn(9, 7, |x, y| Luma([(x * 4000 + y * 100) as u16]));
+    vec![
+        encoded(rgb.clone(), ImageFormat::Png),
+        encoded(rgb, ImageFormat::Jpeg),
+        encoded(GrayImage::from_fn(9, 7, |x, y| Luma([(x * y) as u8])), ImageFormat::Png),
+        encoded(GrayImage::from_fn(9, 7, |x, y| Luma([(x * y) as u8])), ImageFormat::Jpeg),
+        encoded(
+            RgbaImage::from_fn(5, 3, |x, y| image::Rgba([9, 200, x as u8, y as u8 * 99])),
+            ImageFormat::Png,
+        ),
+        encoded(DynamicImage::ImageLuma16(deep), ImageFormat::Png),
+    ]
+}
+
+/// Made once, since its folder is shared by all tests.
+static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let text = "include \"std/scene.pcad\" as scene; assume r ~ uniform(0.3, 1); assume w ~ iid(flip(0.5), 2);
+        assume view = scene.render(scene.sphere(r, sides = 8));";
+    let model = Program::parse(text).and_then(Program::compile).unwrap();
+    let f = folder::Folder::new("fuzz_bank");
+    let path = f.path().join("x.bank");
+    let how = Learn {
+        name: "x",
+        count: 3,
+        seed: 1,
+        threads: 1,
+        features: Features::Contours { size: 16 },
+    };
+    learn(&model, &how, &path, &AtomicU64::new(0)).unwrap();
+    std::fs::read(path).unwrap()
+});
+
+/// Returns a triangle on a joint, as `.glb`, and as `.gltf` with an embedded and an
+/// external buffer.
+fn bodies() -> Vec<Vec<u8>> {
+    let document = || {
+        let mut w = gltf::Writer::default();
+        let positions = w.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        let indices = w.shorts("SCALAR", &[0, 1, 2]);
+        let joints = w.bytes("VEC4", &[0; 12]);
+        let weights = w.floats("VEC4", &[1.0, 0.0, 0.0, 0.0].repeat(3));
+        let binds = w.floats("MAT4", &[1.0, 0.0, 0.0, 0.0, 0.0].repeat(4)[..16]);
+        let attributes = json!({ "POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights });
+        let mut document = json!({
+            "scene": 0, "scenes": [{ "nodes": [0, 1] }],
+            "nodes": [{ "mesh": 0, "skin": 0, "name": "n" }, { "name": "j", "translation": [0, 1, 0], "scale": [1, 2, 1] }],
+            "meshes": [{ "primitives": [{ "attributes": attributes, "indices": indices, "mode": 4 }] }],
+            "skins": [{ "joints": [1], "inverseBindMatrices": binds }],
+        });
+        let buffer = w.document(&mut document);
+        (document, buffer)
+    };
+    let (mut within, buffer) = document();
+    within["buffers"][0]["uri"] =
+        format!("data:application/octet-stream;base64,{}", gltf::base64(&buffer)).into();
+    let (mut beside, _) = document();
+    beside["buffers"][0]["uri"] = "x.bin".into();
+    let (inside, buffer) = document();
+    vec![gltf::packed(&inside, &buffer), within.to_string().into(), beside.to_string().into()]
+}
+
+const CAMERAS: [&str; 2] = [
+    r#"{"model": "pinhole", "looks_along": [0, 0, -1], "up": [0, 1, 0], "position": [0, 0, 8], "image": [256, 256],
+        "focal_px": 465.4, "principal_point": [128, 128]}"#,
+    r#"{"model": "orthographic", "looks_along": [0, 1, -1], "up": [0, 0, 1], "image": [64, 48],
+        "units_per_pixel": 0.02}"#,
+];
+
+const OBJ: &str = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0 1\nv 1 1 0\nf 1 2 3\ng b c\nf 1/1/1 2/2/2 3 4\nf -1 -2 -3\nvt 0 0\nvn 0 0 1\n\
+    usemtl x\nmtllib x.mtl\ns off\nl 1 2\np 1\n";
+
+const RIG: &str = r#"{"mesh": "a.obj", "joints": [{"name": "a", "head": [0, 0, 0], "tail": [0, 1, 0]},
+    {"name": "b", "parent": "a", "head": [0, 1, 0]}], "weights": [[[0, 1.0]], [[0, 0.5], [1, 0.5]], [[1, 1.0]]],
+    "keypoints": {"k": {"joint": "b", "rest": [0, 1, 0]}}}"#;
+
+const MORPHS: &str = r#"{"morphs": {"m": {"vertices": [[0,0,0],[0,0,1],[0,0,0]], "heads": [[0,0,0],[0,0,0]], "tails": [[0,0,0],[0,0,0]]}}}"#;
+
+const PEOPLE: [&str; 3] = [
+    r#"{"keypoints": {"nose": [1, 2, 0.5], "hand": [3, 4]}, "width": 64, "height": 48}"#,
+    r#"{"seven": {"keypoints": {"nose": [10, 20, 0.9], "left_wrist": null}}, "eight": {"keypoints": {"nose": [1, 2]}}}"#,
+    "{\"nose\": [1, 2, 0.5], \"hand\": null}",
+];
+
+/// Returns people in every file layout.
+fn people() -> Vec<Vec<u8>> {
+    let landmarks = [r#"{"x": 0.1, "y": 0.2, "z": 0, "visibility": 0.9}"#; 33].join(", ");
+    let coco = ["10, 20, 0.9"; 17].join(", ");
+    let one = format!(
+        "{{\"image_id\": 1, \"category_id\": 1, \"id\": 7, \"keypoints\": [{coco}], \"score\": 0.5}}"
+    );
+    let images = r#"[{"id": 1, "file_name": "000001.jpg", "width": 64, "height": 48}]"#;
+    let made = [
+        format!("[{one}]"),
+        format!("{{\"images\": {images}, \"annotations\": [{one}, {one}]}}"),
+        format!("{{\"pose_landmarks\": [{landmarks}]}}"),
+    ];
+    PEOPLE.iter().map(|t| t.as_bytes().to_vec()).chain(made.map(String::into_bytes)).collect()
+}
+
+/// Returns the seeds of a target.
+fn seeds_of(target: &str) -> Vec<Vec<u8>> {
+    let texts = |all: &[&str]| all.iter().map(|t| t.as_bytes().to_vec()).collect::<Vec<_>>();
+    match target {
+        "program_text" | "program" => {
+            let folders = ["programs", "tests/syntax", "tests/posteriordb"];
+            folders.iter().flat_map(|d| files(&root().join(d), ".pcad")).map(read).collect()
+        }
+        "obj" => texts(&[OBJ, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"]),
+        "gltf" => bodies(),
+        "rig" => vec![
+            RIG.into(),
+            [
+                RIG.replace("\"joints\"", "\"morphs\": \"m\", \"joints\"").as_bytes(),
+                b"\0",
+                MORPHS.as_bytes(),
+            ]
+            .concat(),
+        ],
+        "image" => pictures(),
+        "array" => {
+            let npy = |descr: &str, shape: &str, body: &[u8]| {
+                let header =
+                    format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+                let length = (header.len() as u16).to_le_bytes();
+                [b"\x93NUMPY\x01\0", &length[..], header.as_bytes(), body].concat()
+            };
+            vec![
+                npy::f32_array(&[2, 3], [1.0, 0.0, f32::NAN, f32::INFINITY, -1.0, 2.0]),
+                npy("|u1", "(2, 3)", &[0, 1, 2, 3, 128, 255]),
+                npy("|b1", "(2, 3, 1)", &[0, 1, 1, 0, 0, 1]),
+                npy("<f8", "(1, 2)", &[0; 16]),
+            ]
+        }
+        "camera" => texts(&CAMERAS),
+        "trace" => {
+            let model = targets::traced();
+            (0..5)
+                .map(|i| {
+                    serde_json::to_vec(&model.simulate(i, 0).unwrap().save(model.hash())).unwrap()
+                })
+                .collect()
+        }
+        "bank" => vec![A_BANK.clone()],
+        "checkpoint" => targets::checkpoints(None).into_iter().step_by(9).collect(),
+        "keypoints" => people(),
+        "table" => texts(&[
+            "\0{\"a\": [1, 2, {\"b\": null}], \"c\": \"x\"}",
+            "\u{1}x,y\n1,2.5\n-3e2, \"4\"\"\"\n",
+            "\u{1}x;ok\n1;true\n",
+        ]),
+        "network" => vec![networks::file(b"TFL3", &networks::small())],
+        "forest" => {
+            let text = forests::small().yaml();
+            vec![forests::gzip(text.as_bytes()), text.into_bytes()]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Returns the next number of a stream (xorshift).
+fn next(x: &mut u64) -> usize {
+    *x ^= *x << 13;
+    *x ^= *x >> 7;
+    *x ^= *x << 17;
+    *x as usize
+}
+
+/// Applies one to four mutations: bytes are changed, removed or duplicated.
+fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
+    let mut bytes = seed.to_vec();
+    for _ in 0..next(x) % 4 + 1 {
+        let at = next(x) % bytes.len().max(1);
+        match next(x) % 5 {
+            _ if bytes.is_empty() => {}
+            0 => bytes.truncate(at),
+            1 => drop(bytes.remove(at)),
+            2 => bytes[at] = next(x) as u8,
+            3 => bytes[at] ^= 1 << (next(x) % 8),
+            _ => {
+                let piece = bytes[at..(at + next(x) % 12).min(seed.len().max(at)).min(bytes.len())]
+                    .to_vec();
+                let to = next(x) % bytes.len();
+                bytes.splice(to..to, piece);
+            }
+        }
+    }
+    bytes
+}
+
+/// Each target accepts its seeds, and each seed is valid, so that its mutations get
+/// beyond the first check.
+#[test]
+fn seeds() {
+    use pcadlang::geom::{FileFrame, gltf::load, obj};
+    use pcadlang::render::Camera;
+    use pcadlang::vision::{Limits, depth, keypoints::People, photo};
+    for (name, target) in TARGETS {
+        let all = seeds_of(name);
+        assert!(!all.is_empty(), "{name}");
+        for seed in &all {
+            target(seed);
+            let text = || std::str::from_utf8(seed).unwrap();
+            let good = match name {
+                "obj" => obj::load(seed).is_ok(),
+                // One of them has an external buffer.
+                "gltf" => load(seed, &FileFrame::default(), &|_| Err("beside".into())).map_or_else(
+                    |e| e.to_string().contains("beside"),
+                    |loaded| loaded.mesh().is_ok(),
+                ),
+                "image" => photo::decode(seed, &Limits::default()).is_ok(),
+                "array" => depth::decode(seed, 1.0, &Limits::default()).is_ok(),
+                "camera" => Camera::from_json(text()).is_ok(),
+                "keypoints" => People::parse(seed).is_ok(),
+                "network" => pcadlang::nn::Network::read(seed).is_ok(),
+                "forest" => pcadlang::vision::Forest::read(seed).is_ok(),
+                "checkpoint" => pcadlang::infer::Checkpoint::from_bytes(seed).is_ok(),
+                _ => true,
+            };
+            assert!(good, "a seed of {name} is refused: {}", String::from_utf8_lossy(seed));
+        }
+    }
+}
+
+#[test]
+fn seeds_with_bytes_changed() {
+    for (name, target) in TARGETS.into_iter().filter(|(name, _)| *name != "program") {
+        let mut x = 0x9e37_79b9_7f4a_7c15;
+        for seed in seeds_of(name) {
+            // A chain is run from each checkpoint, which takes longer.
+            for _ in 0..if name == "checkpoint" { 10 } else { 30 } {
+                target(&changed(&seed, &mut x));
+            }
+        }
+    }
+}
+
+/// Inputs that fuzzing found, by target.
+#[test]
+fn findings() {
+    for (name, target) in TARGETS {
+        for path in files(&root().join("tests/data/fuzz").join(name), "") {
+            eprintln!("{}", path.display());
+            target(&read(path));
+        }
+    }
+}
+
+/// Writes the seeds to the folder that `fuzz/seeds.sh` sets.
+#[test]
+#[ignore = "writes files: see fuzz/seeds.sh"]
+fn write_seeds() {
+    let Some(to) = std::env::var_os("SEEDS").map(PathBuf::from) else { return };
+    for (name, _) in TARGETS {
+        let folder = to.join(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        for (i, seed) in seeds_of(name).iter().enumerate() {
+            std::fs::write(folder.join(format!("seed-{i}")), seed).unwrap();
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! Kernels and plans: the posterior is the right one, by every kind of proof there is, and
+//! chains can be interrupted.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod adaptation;
+mod appearing;
+mod balance;
+mod calibration;
+mod circle;
+mod enumeration;
+mod exact;
+mod kept_state;
+mod kernels;
+mod lathe_parts;
+mod own_kernels;
+mod planted_errors;
+mod posteriordb;
+mod published;
+mod resume;
+mod summing_out;
+mod transitions;

@@ -1,0 +1,15 @@
+//! The language: how programs are read, checked and printed, what their messages say, and
+//! the pages about it that are generated.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[allow(dead_code)]
+#[path = "../../crates/scene/src/vision/forest/writer.rs"]
+mod forests;
+
+mod docs;
+mod errors;
+mod examples;
+mod limits;
+mod parse;
+mod reading;

@@ -1,0 +1,18 @@
+//! Geometry, drawing, and what is read from photographs and files.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[allow(dead_code)]
+#[path = "../../crates/scene/src/vision/forest/writer.rs"]
+mod forests;
+#[path = "../../examples/detail_price/subjects.rs"]
+mod subjects;
+
+mod armature;
+mod autorig;
+mod caches;
+mod detail;
+mod detectors;
+mod drawing;
+mod gltf;
+mod keypoints;
