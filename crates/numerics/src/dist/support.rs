@@ -1,6 +1,7 @@
 //! The spaces of values. Their maps to unconstrained space are in `transform.rs`.
 
-use super::{Datum, triangle};
+use super::Datum;
+use super::joint::triangle;
 use core::f64::consts::{PI, TAU};
 use std::fmt;
 use std::sync::Arc;

@@ -6,8 +6,9 @@
 //! the nearest points inside, so coordinates are always finite. Mapping back always gives
 //! a point strictly inside.
 
+use super::joint::{ascending, triangle};
 use super::support::wrap_angle;
-use super::{Datum, Support, ascending, triangle};
+use super::{Datum, Support};
 use crate::num::log1p_exp;
 
 /// Coordinates are clamped to this magnitude: e^-700 is near the smallest normal double.

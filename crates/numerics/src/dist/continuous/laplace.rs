@@ -1,0 +1,75 @@
+//! The Laplace distribution: exponential on both sides of its location.
+
+use crate::dist::draw::standard;
+use crate::dist::param::{finite, positive};
+use crate::dist::tails::{CdfSlopes, Tails};
+use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::rng::Stream;
+use smallvec::smallvec;
+
+/// `laplace(location, scale)`. At the location, where the density has a kink, the
+/// derivative is taken as 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Laplace {
+    location: f64,
+    scale: f64,
+    log_norm: f64,
+}
+
+impl Laplace {
+    /// Creates the distribution around this location, where the scale is the mean
+    /// distance from it; fails unless the location is finite and the scale positive and
+    /// finite.
+    pub fn new(location: f64, scale: f64) -> Result<Laplace, ParamError> {
+        let (location, scale) =
+            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        Ok(Laplace { location, scale, log_norm: -core::f64::consts::LN_2 - libm::log(scale) })
+    }
+}
+
+impl Scalar for Laplace {
+    const NAME: &'static str = "laplace";
+
+    fn number_support(&self) -> Support {
+        Support::Real
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let size = -self.scale * libm::log(rng.open_uniform());
+        let x = if rng.next_u64() & 1 == 0 { self.location + size } else { self.location - size };
+        x.clamp(f64::MIN, f64::MAX)
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if x.is_finite() {
+            self.log_norm - standard(x, self.location, self.scale).abs()
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let z = standard(x, self.location, self.scale);
+        let sign = if z == 0.0 { 0.0 } else { z.signum() };
+        Slope::new(-sign / self.scale, [sign / self.scale, (z.abs() - 1.0) / self.scale])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let z = standard(x, self.location, self.scale);
+        let tails = Tails::from_below(-z.abs() - core::f64::consts::LN_2);
+        Some(if z < 0.0 { tails } else { tails.swapped() })
+    }
+
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
+        Some(smallvec![-1.0, -standard(x, self.location, self.scale)])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        Some(self.location)
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        Some(core::f64::consts::SQRT_2 * self.scale)
+    }
+}

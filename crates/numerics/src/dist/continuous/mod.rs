@@ -1,0 +1,20 @@
+//! Continuous distributions of one number.
+
+pub(in crate::dist) mod beta;
+pub(in crate::dist) mod cauchy;
+pub(in crate::dist) mod exponential;
+pub(in crate::dist) mod flat;
+pub(in crate::dist) mod gamma;
+pub(in crate::dist) mod half_cauchy;
+pub(in crate::dist) mod half_normal;
+pub(in crate::dist) mod interval;
+pub(in crate::dist) mod inv_gamma;
+pub(in crate::dist) mod laplace;
+pub(in crate::dist) mod lognormal;
+pub(in crate::dist) mod normal;
+pub(in crate::dist) mod student_t;
+pub(in crate::dist) mod truncated;
+pub(in crate::dist) mod truncated_normal;
+pub(in crate::dist) mod uniform;
+pub(in crate::dist) mod von_mises;
+pub(in crate::dist) mod weibull;

@@ -1,0 +1,76 @@
+//! The Bernoulli distribution.
+
+use crate::dist::param::probability;
+use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
+use crate::rng::Stream;
+
+/// `flip(p)`: true with probability `p`. Observed numbers 1 and 0 count as true and
+/// false.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flip {
+    p: f64,
+}
+
+impl Flip {
+    /// Creates the distribution with this probability of true; fails unless it is in [0,
+    /// 1].
+    pub fn new(p: f64) -> Result<Flip, ParamError> {
+        Ok(Flip { p: probability("flip", "p", p)? })
+    }
+
+    /// Returns the log probability of a truth value.
+    #[inline]
+    pub fn log_probability(&self, x: bool) -> f64 {
+        if x { libm::log(self.p) } else { libm::log1p(-self.p) }
+    }
+
+    /// Converts an observed value to a truth value: data often use 1 and 0 for true and
+    /// false.
+    fn truth(x: &Datum) -> Option<bool> {
+        match x {
+            Datum::Bool(x) => Some(*x),
+            Datum::Num(1.0) => Some(true),
+            Datum::Num(0.0) => Some(false),
+            _ => None,
+        }
+    }
+
+    /// Returns the derivative of the log probability with respect to `p`, where it is
+    /// finite.
+    #[inline]
+    pub(in crate::dist) fn slope(&self, x: bool) -> f64 {
+        if x { 1.0 / self.p } else { -1.0 / (1.0 - self.p) }
+    }
+}
+
+impl Distribution for Flip {
+    fn name(&self) -> &'static str {
+        "flip"
+    }
+
+    fn support(&self) -> Support {
+        Support::Boolean
+    }
+
+    fn sample(&self, rng: &mut Stream) -> Datum {
+        Datum::Bool(rng.uniform() < self.p)
+    }
+
+    #[inline]
+    fn log_density(&self, x: &Datum) -> f64 {
+        Flip::truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
+    }
+
+    fn gradient(&self, x: &Datum) -> Option<Gradient> {
+        let x = Flip::truth(x).filter(|x| self.log_probability(*x).is_finite())?;
+        Some(Gradient { x: Vec::new(), params: vec![self.slope(x)] })
+    }
+
+    fn mean(&self) -> Option<f64> {
+        Some(self.p)
+    }
+
+    fn sd(&self) -> Option<f64> {
+        Some((self.p * (1.0 - self.p)).sqrt())
+    }
+}

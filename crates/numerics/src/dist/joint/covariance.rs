@@ -1,0 +1,294 @@
+//! Covariance functions of one variable: the usual stationary ones, their sums and
+//! products. These are not distributions.
+
+use crate::dist::ParamError;
+use crate::dist::param::positive;
+use nalgebra::DMatrix;
+use std::fmt;
+use std::ops::{Add, Mul};
+use std::sync::Arc;
+
+/// A positive semi-definite function of two points. The variance at a point is `sd^2`.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Covariance {
+    /// sd^2 exp(-d^2 / (2 length^2)).
+    SqExp {
+        /// The length scale, in units of the points.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 (1 + r) exp(-r), r = sqrt(3) d / length.
+    Matern32 {
+        /// The length scale, in units of the points.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 (1 + r + r^2 / 3) exp(-r), r = sqrt(5) d / length.
+    Matern52 {
+        /// The length scale, in units of the points.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 exp(-2 sin^2(pi d / period) / length^2).
+    Periodic {
+        /// The period, in units of the points.
+        period: f64,
+        /// The dimensionless length scale: values stay similar over about length period /
+        /// (2 pi).
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 for a point of a list and itself; 0 for two points, even if they coincide.
+    White {
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// The sum of two covariance functions.
+    Sum(Arc<(Covariance, Covariance)>),
+    /// The product of two covariance functions.
+    Product(Arc<(Covariance, Covariance)>),
+}
+
+use Covariance::*;
+
+impl Covariance {
+    /// Creates the squared exponential; fails unless both parameters are positive and
+    /// finite.
+    pub fn sq_exp(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(SqExp {
+            length: positive("sq_exp", "length", length)?,
+            sd: positive("sq_exp", "sd", sd)?,
+        })
+    }
+
+    /// Creates Matérn's function with nu = 3/2; fails unless both parameters are positive
+    /// and finite.
+    pub fn matern32(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(Matern32 {
+            length: positive("matern32", "length", length)?,
+            sd: positive("matern32", "sd", sd)?,
+        })
+    }
+
+    /// Creates Matérn's function with nu = 5/2; fails unless both parameters are positive
+    /// and finite.
+    pub fn matern52(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(Matern52 {
+            length: positive("matern52", "length", length)?,
+            sd: positive("matern52", "sd", sd)?,
+        })
+    }
+
+    /// Creates the periodic function (MacKay 1998); fails unless all parameters are
+    /// positive and finite.
+    pub fn periodic(period: f64, length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        let period = positive("periodic", "period", period)?;
+        Ok(Periodic {
+            period,
+            length: positive("periodic", "length", length)?,
+            sd: positive("periodic", "sd", sd)?,
+        })
+    }
+
+    /// Creates white noise; fails unless the standard deviation is positive and finite.
+    pub fn white(sd: f64) -> Result<Covariance, ParamError> {
+        Ok(White { sd: positive("white", "sd", sd)? })
+    }
+
+    /// Returns the variance at a point.
+    pub fn variance(&self) -> f64 {
+        match self {
+            SqExp { sd, .. }
+            | Matern32 { sd, .. }
+            | Matern52 { sd, .. }
+            | Periodic { sd, .. }
+            | White { sd } => sd * sd,
+            Sum(two) => two.0.variance() + two.1.variance(),
+            Product(two) => two.0.variance() * two.1.variance(),
+        }
+    }
+
+    /// Returns the covariance of two different points of a list, at distance `d`.
+    pub fn at_distance(&self, d: f64) -> f64 {
+        match self {
+            SqExp { length, sd } => {
+                let r = d / length;
+                sd * sd * libm::exp(-0.5 * r * r)
+            }
+            Matern32 { length, sd } => {
+                let r = (3f64.sqrt() * (d / length)).min(1e3);
+                sd * sd * (1.0 + r) * libm::exp(-r)
+            }
+            Matern52 { length, sd } => {
+                let r = (5f64.sqrt() * (d / length)).min(1e3);
+                sd * sd * (1.0 + r * (1.0 + r / 3.0)) * libm::exp(-r)
+            }
+            Periodic { period, length, sd } => {
+                // The remainder is exact, so distant points keep their phase. It is the
+                // one nearest to 0, so points that are whole periods apart are as
+                // accurate as near ones.
+                let s = libm::sin(core::f64::consts::PI * (libm::remainder(d, *period) / period))
+                    / length;
+                sd * sd * libm::exp(-2.0 * s * s)
+            }
+            White { .. } => 0.0,
+            Sum(two) => two.0.at_distance(d) + two.1.at_distance(d),
+            Product(two) => two.0.at_distance(d) * two.1.at_distance(d),
+        }
+    }
+
+    /// Returns the number of parameters: for a sum or product, those of the left side,
+    /// then those of the right.
+    pub fn param_count(&self) -> usize {
+        match self {
+            SqExp { .. } | Matern32 { .. } | Matern52 { .. } => 2,
+            Periodic { .. } => 3,
+            White { .. } => 1,
+            Sum(two) | Product(two) => two.0.param_count() + two.1.param_count(),
+        }
+    }
+
+    /// Adds the derivatives of `by` times the covariance of two points at distance `d`,
+    /// or of a point with itself (`None`), with respect to the parameters in the order of
+    /// the constructors.
+    pub fn vjp(&self, d: Option<f64>, by: f64, out: &mut [f64]) {
+        let k = d.map_or_else(|| self.variance(), |d| self.at_distance(d));
+        // Adds the derivative `g` of the covariance with respect to parameter `i`.
+        let mut add = |i: usize, g: f64| {
+            if let Some(o) = out.get_mut(i) {
+                *o += by * g;
+            }
+        };
+        let far = d.unwrap_or(0.0);
+        match self {
+            SqExp { length, sd } => {
+                let r = far / length;
+                add(0, k * r * r / length);
+                add(1, 2.0 * k / sd);
+            }
+            Matern32 { length, sd } => {
+                let r = (3f64.sqrt() * (far / length)).min(1e3);
+                add(0, sd * sd * r * r * libm::exp(-r) / length);
+                add(1, 2.0 * k / sd);
+            }
+            Matern52 { length, sd } => {
+                let r = (5f64.sqrt() * (far / length)).min(1e3);
+                add(0, sd * sd * r * r * (1.0 + r) * libm::exp(-r) / (3.0 * length));
+                add(1, 2.0 * k / sd);
+            }
+            Periodic { period, length, sd } => {
+                let angle = core::f64::consts::PI * (libm::remainder(far, *period) / period);
+                let s = libm::sin(angle) / length;
+                // The phase is proportional to the whole distance, so its derivative with
+                // respect to the period depends on all of it.
+                add(
+                    0,
+                    4.0 * k * s * libm::cos(angle) / length * core::f64::consts::PI * far
+                        / (period * period),
+                );
+                add(1, 4.0 * k * s * s / length);
+                add(2, 2.0 * k / sd);
+            }
+            White { sd } => {
+                if d.is_none() {
+                    add(0, 2.0 * sd);
+                }
+            }
+            Sum(two) => {
+                let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
+                two.0.vjp(d, by, left);
+                two.1.vjp(d, by, right);
+            }
+            Product(two) => {
+                let value = |c: &Covariance| d.map_or_else(|| c.variance(), |d| c.at_distance(d));
+                let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
+                two.0.vjp(d, by * value(&two.1), left);
+                two.1.vjp(d, by * value(&two.0), right);
+            }
+        }
+    }
+
+    /// Returns the covariance matrix of values at these points.
+    pub fn matrix(&self, at: &[f64]) -> DMatrix<f64> {
+        let packed = self.packed(at, 0.0);
+        DMatrix::from_fn(at.len(), at.len(), |i, j| {
+            let (i, j) = (i.max(j), i.min(j));
+            packed[i * (i + 1) / 2 + j]
+        })
+    }
+
+    /// Returns the lower triangle of the covariance matrix, packed by rows, with `jitter`
+    /// added to the diagonal. Distances from the first point are evaluated once and
+    /// reused: on a regular grid these are nearly all distances.
+    pub(in crate::dist) fn packed(&self, at: &[f64], jitter: f64) -> Vec<f64> {
+        let n = at.len();
+        let mut packed = Vec::with_capacity(n * (n + 1) / 2);
+        let mut first: Vec<(f64, f64)> = Vec::with_capacity(n);
+        let diagonal = self.variance() + jitter;
+        for i in 0..n {
+            for j in 0..i {
+                let d = (at[i] - at[j]).abs();
+                let k = match first.get(i - j) {
+                    Some((known, k)) if *known == d => *k,
+                    _ => self.at_distance(d),
+                };
+                if j == 0 {
+                    first.push((d, k));
+                }
+                packed.push(k);
+            }
+            if i == 0 {
+                first.push((0.0, f64::NAN));
+            }
+            packed.push(diagonal);
+        }
+        packed
+    }
+}
+
+impl fmt::Display for Covariance {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            SqExp { length, sd } => write!(f, "sq_exp(length = {length}, sd = {sd})"),
+            Matern32 { length, sd } => write!(f, "matern32(length = {length}, sd = {sd})"),
+            Matern52 { length, sd } => write!(f, "matern52(length = {length}, sd = {sd})"),
+            Periodic { period, length, sd } => {
+                write!(f, "periodic(period = {period}, length = {length}, sd = {sd})")
+            }
+            White { sd } => write!(f, "white(sd = {sd})"),
+            Sum(two) => write!(f, "{} + {}", two.0, two.1),
+            Product(two) => {
+                for (i, part) in [&two.0, &two.1].into_iter().enumerate() {
+                    f.write_str(if i > 0 { " * " } else { "" })?;
+                    if matches!(part, Sum(_)) {
+                        write!(f, "({part})")?
+                    } else {
+                        write!(f, "{part}")?
+                    }
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl Add for Covariance {
+    type Output = Covariance;
+
+    fn add(self, other: Covariance) -> Covariance {
+        Sum(Arc::new((self, other)))
+    }
+}
+
+impl Mul for Covariance {
+    type Output = Covariance;
+
+    fn mul(self, other: Covariance) -> Covariance {
+        Product(Arc::new((self, other)))
+    }
+}

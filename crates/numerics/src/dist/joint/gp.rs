@@ -1,0 +1,115 @@
+//! A Gaussian process at given points.
+
+use crate::dist::joint::factor::Factor;
+use crate::dist::joint::gaussian::{Gaussian, gaussian_family};
+use crate::dist::param::finite;
+use crate::dist::{Covariance, ParamError};
+
+/// The largest number of points: the time to factor their covariance grows with its cube.
+const MOST_POINTS: usize = 4000;
+
+/// The default jitter, which is added to the diagonal of the covariance matrix as a
+/// fraction of the variance. It is part of the model.
+pub const JITTER: f64 = 1e-6;
+
+/// `gp(mean, cov, at)`, with a jitter of [`JITTER`] by default.
+///
+/// Its choice is stored as white noise z ~ N(0, I), with value = mean + chol(K + jitter
+/// variance I) z, so the values follow when a parameter of the covariance changes. A
+/// centred process stores the values. Gradients are with respect to the mean only.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gp(Gaussian, f64);
+
+impl Gp {
+    /// Creates the process with these means and this covariance function at these points;
+    /// fails unless there are as many means as points, all finite, and the covariance
+    /// matrix has a Cholesky factor.
+    pub fn new(
+        mean: Vec<f64>,
+        cov: &Covariance,
+        at: &[f64],
+        centred: bool,
+    ) -> Result<Gp, ParamError> {
+        Gp::with_jitter(mean, cov, at, centred, JITTER)
+    }
+
+    /// Like [`Gp::new`], with another fraction of the variance added to the diagonal;
+    /// fails also if it is negative or not finite.
+    pub fn with_jitter(
+        mean: Vec<f64>,
+        cov: &Covariance,
+        at: &[f64],
+        centred: bool,
+        jitter: f64,
+    ) -> Result<Gp, ParamError> {
+        if !(jitter >= 0.0 && jitter.is_finite()) {
+            return Err(ParamError::new("gp", "jitter", jitter, "must be finite and not negative"));
+        }
+        if mean.len() != at.len() {
+            let value = format!("{} for {}", mean.len(), at.len());
+            return Err(ParamError::new("gp", "mean", value, "must have one number per point"));
+        }
+        if at.len() > MOST_POINTS {
+            let rule = "must have at most 4000 points";
+            return Err(ParamError::new("gp", "at", at.len(), rule));
+        }
+        for m in &mean {
+            finite("gp", "mean", *m)?;
+        }
+        for x in at {
+            finite("gp", "at", *x)?;
+        }
+        let packed = cov.packed(at, jitter * cov.variance());
+        let singular = || {
+            let value = format!("{cov} at {} points", at.len());
+            ParamError::new("gp", "cov", value, "must make a positive definite matrix")
+        };
+        let factor = Factor::new(at.len(), packed).map_err(|_| singular())?;
+        Ok(Gp(Gaussian { mean: mean.into(), factor, whitened: !centred }, jitter))
+    }
+
+    /// Returns the same process in centred form, which stores values.
+    pub fn to_centred(&self) -> Gp {
+        Gp(self.0.centred(), self.1)
+    }
+
+    /// Returns derivatives with respect to the Cholesky factor, its lower triangle by
+    /// rows. For a centred process, they are those of the log density; for a whitened
+    /// one, those of a function of the value whose derivatives with respect to the value
+    /// are `by_value`.
+    pub fn factor_gradient(
+        &self,
+        stored: &crate::dist::Datum,
+        by_value: &[f64],
+    ) -> Option<Vec<f64>> {
+        self.0.factor_gradient(stored, by_value)
+    }
+
+    /// Converts derivatives with respect to the factor to those with respect to the
+    /// parameters of the covariance function `cov` at these points.
+    pub fn vjp_covariance(
+        &self,
+        cov: &Covariance,
+        at: &[f64],
+        by_factor: &[f64],
+    ) -> Option<Vec<f64>> {
+        let by = self.0.factor.vjp_cholesky(by_factor);
+        let mut out = vec![0.0; cov.param_count()];
+        let mut entries = by.into_iter();
+        for (i, x) in at.iter().enumerate() {
+            for y in &at[..i] {
+                cov.vjp(Some((x - y).abs()), entries.next()?, &mut out);
+            }
+            cov.vjp(None, entries.next()? * (1.0 + self.1), &mut out);
+        }
+        Some(out)
+    }
+
+    /// Converts derivatives with respect to the value to those with respect to the white
+    /// noise.
+    pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
+        self.0.factor.transposed_times(by)
+    }
+}
+
+gaussian_family!(Gp, "gp");
