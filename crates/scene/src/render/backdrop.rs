@@ -14,11 +14,11 @@ mod static_layer;
 
 use self::dynamic_mesh::{DynamicMesh, Tools};
 use self::static_layer::StaticLayer;
-use super::contours::Contours;
 use super::layers::{Layer, Sight, affine_bits, camera_bits};
-use super::raster::Area;
+use super::lines::contours::Contours;
+use super::lines::visibility::Depths;
+use super::pixels::raster::Area;
 use super::simd::vectorised;
-use super::visibility::Depths;
 use super::{Camera, work};
 use crate::geom::{Instance, Mesh, MeshesMark, Solid};
 use std::cell::RefCell;

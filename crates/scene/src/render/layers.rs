@@ -8,14 +8,14 @@
 //! as q grows, in `f32` too, so the nearest of the layers' depths is the depth of a full
 //! drawing, and the contours are those of a full drawing, bit for bit.
 
-use super::candidates::Candidates;
-use super::contours::Contours;
-use super::extraction::{Room, extract_mesh};
-use super::frame::{depth_of, to_depth};
-use super::project::{DepthRange, Lens, Placement, Projected};
-use super::raster::{Area, Wanted, draw_mesh};
+use super::lines::contours::Contours;
+use super::lines::extraction::{Room, extract_mesh};
+use super::lines::visibility::{BESIDE, Depths, Piece};
+use super::pixels::candidates::Candidates;
+use super::pixels::frame::{depth_of, to_depth};
+use super::pixels::project::{DepthRange, Lens, Placement, Projected};
+use super::pixels::raster::{Area, Wanted, draw_mesh};
 use super::simd::vectorised;
-use super::visibility::{BESIDE, Depths, Piece};
 use super::{Camera, Projection, work};
 use crate::geom::{Affine, Instance, Mesh, Solid};
 use std::cell::RefCell;

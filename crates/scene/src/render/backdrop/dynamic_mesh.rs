@@ -4,13 +4,13 @@
 use super::static_layer::StaticLayer;
 use crate::geom::{Instance, Mesh};
 use crate::render::Camera;
-use crate::render::candidates::Candidates;
-use crate::render::contours::Contours;
-use crate::render::extraction::Room;
 use crate::render::layers::{Layer, Sight, affine_bits};
-use crate::render::project::{DepthRange, Projected};
-use crate::render::raster::Area;
-use crate::render::visibility::Depths;
+use crate::render::lines::contours::Contours;
+use crate::render::lines::extraction::Room;
+use crate::render::lines::visibility::Depths;
+use crate::render::pixels::candidates::Candidates;
+use crate::render::pixels::project::{DepthRange, Projected};
+use crate::render::pixels::raster::Area;
 use std::sync::{Arc, Weak};
 
 /// Scratch memory for drawing a layer.

@@ -2,9 +2,9 @@
 //! pixels at which they are tested.
 
 use crate::render::Camera;
-use crate::render::project::DepthRange;
-use crate::render::raster::Area;
-use crate::render::visibility::{DepthTest, Depths, Piece};
+use crate::render::lines::visibility::{DepthTest, Depths, Piece};
+use crate::render::pixels::project::DepthRange;
+use crate::render::pixels::raster::Area;
 use std::sync::Arc;
 
 /// Relative half width of the first interval of depth ranges that a static layer is

@@ -5,11 +5,11 @@
 //! `nearness` is 1 / depth for a pinhole and -depth for a parallel projection: linear
 //! over the image inside a triangle, and larger for nearer points in both.
 
-use super::place::{Extent, Place, place, rounded};
-use super::simd::vectorised;
-use super::triangle::Triangle;
-use super::{Camera, Projection};
 use crate::geom::{Affine, Mesh, Run, Solid, Topology};
+use crate::render::pixels::place::{Extent, Place, place, rounded};
+use crate::render::pixels::triangle::Triangle;
+use crate::render::simd::vectorised;
+use crate::render::{Camera, Projection};
 use glam::{DMat3, DVec3, Vec3};
 
 /// Vertices processed at a time: enough that loops over them are not fully unrolled, and
@@ -21,7 +21,7 @@ const HUGE: f64 = 1e9;
 
 /// A point in the image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(in crate::render) struct Point {
     /// Pixels from the left edge.
     pub x: f64,
     /// Pixels from the top edge.
@@ -41,7 +41,7 @@ impl Point {
 
 /// A camera's projection from camera coordinates to the image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lens {
+pub(in crate::render) struct Lens {
     pub pinhole: bool,
     /// Focal length in pixels, or pixels per unit.
     pub scale: f64,
@@ -79,7 +79,7 @@ impl Lens {
 
 /// The part of a segment in camera coordinates that is beyond the near plane; `None` if
 /// there is none.
-pub(super) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> {
+pub(in crate::render) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> {
     let near = -Camera::NEAR;
     if from.z > near && to.z > near {
         return None;
@@ -95,7 +95,7 @@ pub(super) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> 
 
 /// The transform from an instance's mesh to camera coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Placement {
+pub(in crate::render) struct Placement {
     m: DMat3,
     t: DVec3,
     /// Cofactors of `m` times the sign of its determinant: maps outward normals to
@@ -142,7 +142,7 @@ impl Placement {
 
 /// Nearest and farthest depth of the usable vertices beyond the near plane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DepthRange {
+pub(in crate::render) struct DepthRange {
     pub near: f64,
     pub far: f64,
 }
@@ -173,7 +173,7 @@ impl DepthRange {
 /// positions ([`Place`]) are computed in double precision. Buffers are reused, so nothing
 /// is allocated once they have grown.
 #[derive(Default)]
-pub(super) struct Projected {
+pub(in crate::render) struct Projected {
     x: Vec<f32>,
     y: Vec<f32>,
     nearness: Vec<f32>,
@@ -185,7 +185,7 @@ pub(super) struct Projected {
 
 /// The vertices of one mesh in the image.
 #[derive(Clone, Copy)]
-pub(super) struct Vertices<'a> {
+pub(in crate::render) struct Vertices<'a> {
     x: &'a [f32],
     y: &'a [f32],
     nearness: &'a [f32],
@@ -405,7 +405,11 @@ impl Vertices<'_> {
 }
 
 /// Projects every vertex of a solid, instance by instance.
-pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Projected) -> DepthRange {
+pub(in crate::render) fn project(
+    solid: &Solid,
+    camera: &Camera,
+    out: &mut Projected,
+) -> DepthRange {
     out.clear();
     let lens = Lens::new(camera);
     solid.instances().iter().fold(DepthRange::EMPTY, |range, instance| {
@@ -415,7 +419,7 @@ pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Projected) -> De
 
 /// Which vertices of a mesh face the camera. Reused from mesh to mesh.
 #[derive(Default)]
-pub(super) struct Fronts {
+pub(in crate::render) struct Fronts {
     /// Positive where the outward normal points towards the camera, zero where it is
     /// perpendicular to the line of sight; linear in the position.
     pub facing: Vec<f64>,

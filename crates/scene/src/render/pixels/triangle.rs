@@ -1,21 +1,21 @@
 //! Drawing the nearness of triangles.
 //!
-//! [`super::coverage`] decides which pixels a triangle covers, from rounded corners;
+//! [`crate::render::pixels::coverage`] decides which pixels a triangle covers, from rounded corners;
 //! nearness is computed from the unrounded ones. Drawing eight pixels at a time and
 //! drawing by runs give the same numbers.
 
-use super::coverage::Coverage;
-use super::pixel_bitmap::PixelBitmap;
-use super::place::{Extent, Place};
-use super::project::Point;
-use super::raster::Area;
-use super::simd_raster::{LANES, all_bits};
+use crate::render::pixels::coverage::Coverage;
+use crate::render::pixels::pixel_bitmap::PixelBitmap;
+use crate::render::pixels::place::{Extent, Place};
+use crate::render::pixels::project::Point;
+use crate::render::pixels::raster::Area;
+use crate::render::pixels::simd_raster::{LANES, all_bits};
 use glam::Vec4;
 use pulp::bytemuck::cast;
 use wide::{f32x8, i32x8};
 
 /// A run of pixels in one row, over which nearness is linear.
-pub(super) struct Run {
+pub(in crate::render) struct Run {
     pub row: usize,
     pub from: usize,
     pub to: usize,
@@ -42,7 +42,7 @@ fn within(q: f32, [lo, hi]: [f32; 2]) -> f32 {
 }
 
 /// Nearness over a triangle, linear in the image.
-pub(super) struct Plane {
+pub(in crate::render) struct Plane {
     /// The value at the first column, in the row of the first corner.
     first: f64,
     /// Its change per row, and the first corner's y.
@@ -109,7 +109,7 @@ impl Plane {
 
 /// Writes a face into the lanes set in `nearer`, which begin at index `at` of a buffer.
 #[inline(always)]
-pub(super) fn put_face(faces: &mut [u32], at: usize, face: u32, nearer: f32x8) {
+pub(in crate::render) fn put_face(faces: &mut [u32], at: usize, face: u32, nearer: f32x8) {
     let Some(pixels) = faces.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
         return;
     };
@@ -121,7 +121,7 @@ pub(super) fn put_face(faces: &mut [u32], at: usize, face: u32, nearer: f32x8) {
 
 /// As [`Plane::keep`], with the same nearness in all lanes.
 #[inline(always)]
-pub(super) fn keep_all(buffer: &mut [f32], at: usize, nearness: f32, outside: i32x8) {
+pub(in crate::render) fn keep_all(buffer: &mut [f32], at: usize, nearness: f32, outside: i32x8) {
     let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
         return;
     };
@@ -131,26 +131,26 @@ pub(super) fn keep_all(buffer: &mut [f32], at: usize, nearness: f32, outside: i3
 
 /// Whether a triangle has no area.
 #[inline(always)]
-pub(super) fn is_flat(points: &[Point; 3]) -> bool {
+pub(in crate::render) fn is_flat(points: &[Point; 3]) -> bool {
     let area = area(points);
     area == 0.0 || !area.is_finite()
 }
 
 /// Twice the area in pixels; negative when counter-clockwise as seen in the image.
 #[inline(always)]
-pub(super) fn area([a, b, c]: &[Point; 3]) -> f64 {
+pub(in crate::render) fn area([a, b, c]: &[Point; 3]) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
 
 /// A triangle that is ready to be drawn.
-pub(super) struct Triangle {
+pub(in crate::render) struct Triangle {
     pub points: [Point; 3],
     coverage: Coverage,
     plane: Plane,
 }
 
 impl Triangle {
-    /// As [`Triangle::new`], in an image of some [`size`](super::place::size).
+    /// As [`Triangle::new`], in an image of some [`size`](crate::render::pixels::place::size).
     #[inline(always)]
     pub fn within(
         points: [Point; 3],
@@ -264,7 +264,7 @@ impl Triangle {
 
 /// The indices of the bits that are set.
 #[inline(always)]
-pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
+pub(in crate::render) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let i = word.trailing_zeros();
         word &= word.wrapping_sub(1);
@@ -274,9 +274,9 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::place::{place, size};
     use super::*;
     use crate::render::Camera;
+    use crate::render::pixels::place::{place, size};
     use crate::render::testing::Uniform;
 
     fn at(x: f64, y: f64) -> Point {

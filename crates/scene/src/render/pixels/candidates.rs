@@ -4,20 +4,20 @@
 //! Unpredictable branches are avoided: lists are written branch-free, and triangles are
 //! set up many at a time.
 
-use super::coverage::is_turned;
-use super::pixel_bitmap::PixelBitmap;
-use super::place::Extent;
-use super::project::Vertices;
-use super::raster::{Area, Wanted};
-use super::simd_raster::{Batch, Kind, LANES};
-use super::triangle::{Plane, is_flat, keep_all, put_face};
 use crate::geom::{Patches, Topology};
+use crate::render::pixels::coverage::is_turned;
+use crate::render::pixels::pixel_bitmap::PixelBitmap;
+use crate::render::pixels::place::Extent;
+use crate::render::pixels::project::Vertices;
+use crate::render::pixels::raster::{Area, Wanted};
+use crate::render::pixels::simd_raster::{Batch, Kind, LANES};
+use crate::render::pixels::triangle::{Plane, is_flat, keep_all, put_face};
 use glam::Vec4;
 
 /// The triangles of a mesh whose bounding boxes contain pixel centres, with these boxes.
 /// Reused from picture to picture.
 #[derive(Default)]
-pub(super) struct Candidates {
+pub(in crate::render) struct Candidates {
     faces: Vec<u32>,
     extents: Vec<Extent>,
     count: usize,

@@ -5,9 +5,9 @@
 //! the choice of that face is held fixed. [`View::vjp_mask`] accounts for the motion of
 //! the outline.
 
-use super::View;
-use super::project::{Projected, project};
-use super::raster::{each_triangle, empty};
+use crate::render::View;
+use crate::render::pixels::project::{Projected, project};
+use crate::render::pixels::raster::{each_triangle, empty};
 use glam::DVec3;
 
 impl View {

@@ -7,21 +7,21 @@
 use glam::{Vec4, Vec4Swizzles};
 
 /// Base-2 logarithm of [`UNIT`].
-pub(super) const BITS: u32 = 10;
+pub(in crate::render) const BITS: u32 = 10;
 /// Units of rounded positions per pixel.
-pub(super) const UNIT: i32 = 1 << BITS;
+pub(in crate::render) const UNIT: i32 = 1 << BITS;
 
 /// A position relative to the centre of the first pixel, rounded to 1/1024 of a pixel: x,
 /// y, -x, -y, so that a single minimum gives least and greatest coordinates. Exact in
 /// single precision; clamped to [`BOUND`].
-pub(super) type Place = Vec4;
+pub(in crate::render) type Place = Vec4;
 
 /// Beyond any image, in pixels.
 const BOUND: f32 = 16384.0;
 
 /// Rounds a coordinate in pixels, relative to the centre of the first pixel.
 #[inline(always)]
-pub(super) fn rounded(v: f64) -> f32 {
+pub(in crate::render) fn rounded(v: f64) -> f32 {
     // Adding and subtracting this rounds to the nearest integer.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     let (v, bound) = (v - 0.5, f64::from(BOUND));
@@ -32,7 +32,7 @@ pub(super) fn rounded(v: f64) -> f32 {
 
 /// Rounds a position in pixels.
 #[inline(always)]
-pub(super) fn place(x: f64, y: f64) -> Place {
+pub(in crate::render) fn place(x: f64, y: f64) -> Place {
     let (x, y) = (rounded(x), rounded(y));
     Vec4::new(x, y, -x, -y)
 }
@@ -41,7 +41,7 @@ pub(super) fn place(x: f64, y: f64) -> Place {
 /// last: left, top, right, bottom. Kept in the lowest bits of single-precision numbers,
 /// which is how they are computed.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Extent(Vec4);
+pub(in crate::render) struct Extent(Vec4);
 
 /// Adding this to a number leaves the nearest integer in the lowest 16 bits of the sum.
 const LOW_BITS: f32 = 8_388_608.0;
@@ -81,7 +81,7 @@ impl Extent {
 }
 
 /// Width and height of an image, twice.
-pub(super) fn size(width: u32, height: u32) -> Vec4 {
+pub(in crate::render) fn size(width: u32, height: u32) -> Vec4 {
     let (width, height) = (width as f32, height as f32);
     Vec4::new(width, height, width, height)
 }
@@ -89,7 +89,7 @@ pub(super) fn size(width: u32, height: u32) -> Vec4 {
 /// Whether a position, or the least coordinates of several, are within the bounds, so
 /// that nothing was clamped.
 #[inline(always)]
-pub(super) fn is_near(least: Place) -> bool {
+pub(in crate::render) fn is_near(least: Place) -> bool {
     least.cmpgt(Vec4::splat(-BOUND)).all()
 }
 

@@ -1,15 +1,15 @@
 //! The pixels of small triangles, which are nearly all of a fine mesh: many triangles are
 //! set up at a time, and eight pixels of a row are tested at a time.
 //!
-//! Gives the same pixels as [`super::coverage`]: the edge functions are the same, in
+//! Gives the same pixels as [`crate::render::pixels::coverage`]: the edge functions are the same, in
 //! 32-bit integers.
 
-use super::place::{Extent, Place, UNIT};
+use crate::render::pixels::place::{Extent, Place, UNIT};
 use pulp::bytemuck::cast;
 use wide::{f32x8, i32x8};
 
 /// Pixels tested at a time.
-pub(super) const LANES: usize = 8;
+pub(in crate::render) const LANES: usize = 8;
 /// Triangles set up at a time.
 const MOST: usize = 64;
 /// Triangles narrower and lower than this, in pixels, are small.
@@ -17,7 +17,7 @@ const SMALL: f32 = 16.0;
 
 /// Triangles with their edge functions, which are not negative inside. Reused from batch
 /// to batch.
-pub(super) struct Batch {
+pub(in crate::render) struct Batch {
     count: usize,
     faces: [u32; MOST],
     extents: [Extent; MOST],
@@ -32,7 +32,7 @@ pub(super) struct Batch {
 /// How a triangle is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
-pub(super) enum Kind {
+pub(in crate::render) enum Kind {
     /// Not at all: it shows a back face that need not be drawn, or has no area.
     Nothing = 0,
     /// By lanes.
@@ -66,7 +66,7 @@ impl Batch {
     /// Calls `draw` for the triangles of a list that may cover pixels: the batch, the
     /// index in it, the face, its extent and how to draw it. `right` is the column past
     /// the last one of the buffer, at least [`LANES`]; `back` as in
-    /// [`Coverage::new`](super::coverage::Coverage::new).
+    /// [`Coverage::new`](crate::render::pixels::coverage::Coverage::new).
     #[inline(always)]
     pub fn each(
         &mut self,
@@ -197,16 +197,16 @@ impl Batch {
 
 /// Sets all bits of the lanes whose sign bit is set, and clears the others.
 #[inline(always)]
-pub(super) fn all_bits(signs: i32x8) -> f32x8 {
+pub(in crate::render) fn all_bits(signs: i32x8) -> f32x8 {
     cast(signs >> 31)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::place::{place, size};
-    use super::super::simd::portable;
-    use super::super::triangle::{Plane, Triangle};
     use super::*;
+    use crate::render::pixels::place::{place, size};
+    use crate::render::pixels::triangle::{Plane, Triangle};
+    use crate::render::simd::portable;
     use crate::render::testing::Uniform;
 
     /// The same pixels and numbers as by runs, over several batches, with and without

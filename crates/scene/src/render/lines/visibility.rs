@@ -7,10 +7,10 @@
 //! object's depth range is computed when the piece is made, so a piece can be kept and
 //! tested again when something else has moved.
 
-use super::project::DepthRange;
+use crate::render::pixels::project::DepthRange;
 
 /// Distance from a piece to the positions tested, in pixels.
-pub(super) const BESIDE: f64 = 1.2;
+pub(in crate::render) const BESIDE: f64 = 1.2;
 
 /// Depth tolerance as a fraction of the object's depth range.
 const TOLERANCE: f64 = 0.006;
@@ -24,7 +24,7 @@ const SILHOUETTE_SLACK: f64 = 0.15;
 
 /// On which sides a piece is tested.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum TestSides {
+pub(in crate::render) enum TestSides {
     /// On the outward side only; `slack` is how much nearer (scene units) the piece's own
     /// face reaches.
     Outward {
@@ -59,8 +59,8 @@ const NOWHERE: u32 = u32::MAX;
 /// A piece of contour that may be hidden; a function of its own mesh, placement and
 /// camera alone.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
-    /// As in [`Contours`](super::Contours).
+pub(in crate::render) struct Piece {
+    /// As in [`Contours`](crate::render::Contours).
     pub x: f32,
     pub y: f32,
     pub tx: f32,
@@ -76,7 +76,7 @@ pub(super) struct Piece {
 /// A depth test without its pixel: everything that decides its result, except the depth
 /// there and the depth range.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct DepthTest {
+pub(in crate::render) struct DepthTest {
     depth: f64,
     slack: f64,
     /// The piece tested, as numbered by the caller.
@@ -107,7 +107,7 @@ impl Piece {
 
 /// Makes the pieces of an image of a given size.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Image {
+pub(in crate::render) struct Image {
     width: usize,
     height: usize,
 }
@@ -160,7 +160,7 @@ impl Image {
 }
 
 /// A depth image to test pieces against.
-pub(super) struct Depths<'a> {
+pub(in crate::render) struct Depths<'a> {
     depth: &'a [f32],
     tolerance: f64,
     /// Largest slack of silhouettes and of edges.

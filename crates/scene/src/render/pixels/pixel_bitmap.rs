@@ -1,12 +1,12 @@
 //! A set of pixels of an image, with a fast test of whether a rectangle contains any of
 //! them.
 
-use super::Camera;
-use super::simd::vectorised;
+use crate::render::Camera;
+use crate::render::simd::vectorised;
 
 /// A set of pixels. Reused from image to image.
 #[derive(Default)]
-pub(super) struct PixelBitmap {
+pub(in crate::render) struct PixelBitmap {
     /// A bit for each pixel, row by row, and at least one spare word.
     words: Vec<u64>,
     /// For each pixel, the side of the smallest square with the pixel in its upper left

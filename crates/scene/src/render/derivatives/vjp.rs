@@ -7,17 +7,17 @@
 //! shorter there (`junctions`). Nothing is drawn: the pieces of the meshes are extracted
 //! again, and the visible ones are recognised by their values.
 
-use super::extraction::{Origin, Room, extract_mesh};
-use super::junctions::{End, moved_ends};
-use super::project::{Lens, Placement, Projected};
-use super::silhouette_derivative::{STEADY, SilhouetteDerivative};
-use super::visibility::Piece;
-use super::{Camera, Contours};
 use crate::geom::{Instance, Solid};
+use crate::render::derivatives::junctions::{End, moved_ends};
+use crate::render::derivatives::silhouette_derivative::{STEADY, SilhouetteDerivative};
+use crate::render::lines::extraction::{Origin, Room, extract_mesh};
+use crate::render::lines::visibility::Piece;
+use crate::render::pixels::project::{Lens, Placement, Projected};
+use crate::render::{Camera, Contours};
 use glam::DVec3;
 
 /// A piece of contour, hidden or not, and its origin on the surface.
-pub(super) struct Extracted<'a> {
+pub(in crate::render) struct Extracted<'a> {
     pub piece: Piece,
     pub origin: Origin,
     /// What the ends of its segment lie on.
@@ -43,7 +43,7 @@ impl Contours {
     }
 
     /// As [`Contours::vjp`], with another angle than [`STEADY`].
-    pub(super) fn vjp_with(
+    pub(in crate::render) fn vjp_with(
         &self,
         solid: &Solid,
         camera: &Camera,
@@ -67,7 +67,7 @@ impl Contours {
     }
 
     /// As [`Contours::vjp`], with each piece fixed to its points of the surface.
-    pub(super) fn vjp_fixed(
+    pub(in crate::render) fn vjp_fixed(
         &self,
         solid: &Solid,
         camera: &Camera,

@@ -1,22 +1,24 @@
 //! The rasteriser: cuts the triangles of a solid at the near plane and draws their
 //! nearness.
 //!
-//! It does no shading and keeps no state. [`super::triangle`] documents which pixels a
+//! It does no shading and keeps no state. [`crate::render::pixels::triangle`] documents which pixels a
 //! triangle covers.
 
-use super::Camera;
-use super::candidates::Candidates;
-use super::pixel_bitmap::PixelBitmap;
-use super::place::{Extent, place, size};
-use super::project::{DepthRange, Lens, Placement, Point, Projected, Vertices, project};
-use super::simd::vectorised;
-use super::simd_raster::LANES;
-use super::triangle::Triangle;
 use crate::geom::{Mesh, Solid};
+use crate::render::Camera;
+use crate::render::pixels::candidates::Candidates;
+use crate::render::pixels::pixel_bitmap::PixelBitmap;
+use crate::render::pixels::place::{Extent, place, size};
+use crate::render::pixels::project::{
+    DepthRange, Lens, Placement, Point, Projected, Vertices, project,
+};
+use crate::render::pixels::simd_raster::LANES;
+use crate::render::pixels::triangle::Triangle;
+use crate::render::simd::vectorised;
 use glam::DVec3;
 
 /// Where a triangle comes from.
-pub(super) struct Source {
+pub(in crate::render) struct Source {
     /// Index of the instance in the solid.
     pub instance: usize,
     /// Face of the instance's mesh.
@@ -24,11 +26,12 @@ pub(super) struct Source {
 }
 
 /// Corner weights of a triangle that was not cut.
-pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+pub(in crate::render) const WHOLE: [[f64; 3]; 3] =
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Calls `draw` for each triangle that may touch the image, cut at the near plane.
 /// `projected` must come from [`project`].
-pub(super) fn each_triangle(
+pub(in crate::render) fn each_triangle(
     solid: &Solid,
     camera: &Camera,
     projected: &Projected,
@@ -86,7 +89,7 @@ fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
 /// Calls `draw` for the triangles of a mesh whose vertices are not all beyond the near
 /// plane. `draw` gets the face and, for each corner of the triangle, the weights of the
 /// face's three corners: the identity unless the near plane cut it.
-pub(super) fn cut_triangles(
+pub(in crate::render) fn cut_triangles(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
@@ -149,7 +152,7 @@ fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
 
 /// Draws nearness alone into `buffer` (row by row, cleared here) and returns the depth
 /// range of the vertices.
-pub(super) fn draw_nearness(
+pub(in crate::render) fn draw_nearness(
     solid: &Solid,
     camera: &Camera,
     projected: &mut Projected,
@@ -180,7 +183,7 @@ pub(super) fn draw_nearness(
 
 /// Where the exact nearness of a mesh is needed.
 #[derive(Clone, Copy)]
-pub(super) enum Wanted<'a> {
+pub(in crate::render) enum Wanted<'a> {
     /// Everywhere.
     All,
     /// At the marked pixels of the whole image; the values of others are unspecified.
@@ -214,7 +217,7 @@ impl<'a> Wanted<'a> {
 }
 
 /// Draws the nearness of one mesh into `buffer` (the rows of the area, cleared here).
-pub(super) fn draw_mesh(
+pub(in crate::render) fn draw_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
@@ -230,7 +233,7 @@ pub(super) fn draw_mesh(
 
 /// Merges the nearness of one mesh into the rows of an area, keeping the nearer value;
 /// with marked pixels, the area must be the whole image.
-pub(super) fn fill_mesh(
+pub(in crate::render) fn fill_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
@@ -254,7 +257,7 @@ pub(super) fn fill_mesh(
 /// As [`fill_mesh`] in the whole image, for a mesh with all vertices beyond the near
 /// plane. Also writes the face into `faces` at each pixel where this mesh is nearer than
 /// `buffer`.
-pub(super) fn fill_faces(
+pub(in crate::render) fn fill_faces(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
@@ -273,7 +276,7 @@ pub(super) fn fill_faces(
 
 /// A rectangle of pixels inside an image: columns `left..right`, rows `top..bottom`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Area {
+pub(in crate::render) struct Area {
     pub left: usize,
     pub right: usize,
     pub top: usize,
@@ -338,7 +341,7 @@ impl Area {
 }
 
 /// The nearness of a pixel that shows nothing.
-pub(super) fn empty(camera: &Camera) -> f32 {
+pub(in crate::render) fn empty(camera: &Camera) -> f32 {
     if Lens::new(camera).pinhole { 0.0 } else { f32::NEG_INFINITY }
 }
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::geom::{Affine, Mesh};
 use crate::render::Projection;
-use crate::render::raster::each_triangle;
+use crate::render::pixels::raster::each_triangle;
 use crate::render::testing::{Uniform, cases, cuboid, lathe, solid, sphere};
 use std::sync::Arc;
 

@@ -7,12 +7,12 @@
 //! lists have one entry per piece, all finite, positions inside the image, tangents of
 //! unit length.
 
-use super::extraction::{Room, extract_mesh};
-use super::project::{DepthRange, Placement, Projected, project};
-use super::sparse_depth::SparseDepth;
-use super::visibility::{Depths, Piece};
-use super::{Camera, backdrop, layers, work};
 use crate::geom::Solid;
+use crate::render::lines::extraction::{Room, extract_mesh};
+use crate::render::lines::visibility::{Depths, Piece};
+use crate::render::pixels::project::{DepthRange, Placement, Projected, project};
+use crate::render::pixels::sparse_depth::SparseDepth;
+use crate::render::{Camera, backdrop, layers, work};
 use std::cell::RefCell;
 
 /// Visible contour pieces in an image. A piece's object side lies to the right of its
@@ -63,7 +63,7 @@ impl Contours {
     }
 
     /// As [`Contours::of`], but draws everything.
-    pub(super) fn drawn(solid: &Solid, camera: &Camera) -> Contours {
+    pub(in crate::render) fn drawn(solid: &Solid, camera: &Camera) -> Contours {
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
@@ -102,7 +102,7 @@ impl Contours {
 
     /// As [`Contours::of`], with the depth image of the same solid and camera already
     /// drawn.
-    pub(super) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {
+    pub(in crate::render) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let depths = Depths::new(depth, camera.width, camera.height, range.extent());
@@ -113,7 +113,7 @@ impl Contours {
     }
 
     /// No pieces yet, with room for about as many as were `found` the last time.
-    pub(super) fn with_room(camera: &Camera, found: usize) -> Contours {
+    pub(in crate::render) fn with_room(camera: &Camera, found: usize) -> Contours {
         let room = || Vec::with_capacity(found + found / 8 + 16);
         let (width, height) = (camera.width, camera.height);
         Contours { x: room(), y: room(), tx: room(), ty: room(), length: room(), width, height }
@@ -121,7 +121,7 @@ impl Contours {
 
     /// Adds a visible piece.
     #[inline]
-    pub(super) fn push(&mut self, piece: &Piece) {
+    pub(in crate::render) fn push(&mut self, piece: &Piece) {
         self.x.push(piece.x);
         self.y.push(piece.y);
         self.tx.push(piece.tx);
@@ -130,13 +130,13 @@ impl Contours {
     }
 
     /// Removes all pieces.
-    pub(super) fn clear(&mut self) {
+    pub(in crate::render) fn clear(&mut self) {
         let Contours { x, y, tx, ty, length, .. } = self;
         [x, y, tx, ty, length].into_iter().for_each(Vec::clear);
     }
 
     /// Adds another's pieces.
-    pub(super) fn append(&mut self, other: &Contours) {
+    pub(in crate::render) fn append(&mut self, other: &Contours) {
         self.x.extend_from_slice(&other.x);
         self.y.extend_from_slice(&other.y);
         self.tx.extend_from_slice(&other.tx);

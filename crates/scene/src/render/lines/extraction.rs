@@ -5,12 +5,12 @@
 //! which pieces are visible. Invariant: every piece is finite, inside the image, at most
 //! 1.5 pixels long, and a function of mesh, placement and camera alone.
 
-use super::Camera;
-use super::project::{Fronts, Lens, Placement, Point, Vertices, beyond_near};
-use super::silhouette::{self, Crossed};
-use super::simd::vectorised;
-use super::visibility::{Image, Piece, TestSides};
 use crate::geom::{Edge, Mesh};
+use crate::render::Camera;
+use crate::render::lines::silhouette::{self, Crossed};
+use crate::render::lines::visibility::{Image, Piece, TestSides};
+use crate::render::pixels::project::{Fronts, Lens, Placement, Point, Vertices, beyond_near};
+use crate::render::simd::vectorised;
 
 /// Whether a point is usable and beyond the near plane.
 fn usable(p: &Point) -> bool {
@@ -18,10 +18,10 @@ fn usable(p: &Point) -> bool {
 }
 
 /// Where on the surface a piece comes from: a fraction of a segment between two points of
-/// a face or edge. [`super::silhouette_derivative`] describes how silhouettes move
+/// a face or edge. [`crate::render::derivatives::silhouette_derivative`] describes how silhouettes move
 /// besides following these points.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Origin {
+pub(in crate::render) struct Origin {
     /// Vertices of the mesh; for an edge, the second one twice.
     pub corners: [u32; 3],
     /// The segment's ends, as weights of the corners.
@@ -37,14 +37,14 @@ pub(super) struct Origin {
 
 /// Scratch memory for the extraction. Reused from mesh to mesh.
 #[derive(Default)]
-pub(super) struct Room {
+pub(in crate::render) struct Room {
     fronts: Fronts,
     crossed: Crossed,
 }
 
 /// Calls `out` for every piece of a mesh, in the order of its faces and then its edges.
 /// `vertices` are the mesh's own in the image.
-pub(super) fn extract_mesh(
+pub(in crate::render) fn extract_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,

@@ -4,7 +4,7 @@
 //! Not a physical renderer and not used in inference. Every pixel of the frame gives one
 //! pixel of the picture.
 
-use super::Frame;
+use crate::render::Frame;
 use image::{Rgb, RgbImage};
 
 /// The background's colour.

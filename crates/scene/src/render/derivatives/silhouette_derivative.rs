@@ -6,19 +6,19 @@
 //! contour sideways. Invariant: exact (except for `steady`) where the vertices move
 //! together as a rigid body.
 
-use super::extraction::Origin;
-use super::{Camera, Projection};
 use crate::geom::{Instance, Solid};
+use crate::render::lines::extraction::Origin;
+use crate::render::{Camera, Projection};
 use glam::{DMat3, DVec3};
 
 /// The angle between the normals of a face's corners, in radians, below which sliding is
 /// damped: a rotation that moves limbs by about a pixel takes silhouettes over such faces
 /// and on to the next, and what one face adds another takes away.
-pub(super) const STEADY: f64 = 0.1;
+pub(in crate::render) const STEADY: f64 = 0.1;
 
 /// Derivatives with respect to rotations of normals, collected before they are mapped to
 /// vertices.
-pub(super) struct SilhouetteDerivative {
+pub(in crate::render) struct SilhouetteDerivative {
     /// With respect to a rotation of each vertex's normal about the world axes.
     turns: Vec<DVec3>,
     /// The square of [`STEADY`].

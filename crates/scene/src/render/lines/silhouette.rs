@@ -1,15 +1,15 @@
 //! Smooth silhouettes: in each face that they cross, the zero set of the (interpolated)
 //! facing, for many faces at a time.
 
-use super::project::{Lens, Placement, Point, Vertices, beyond_near};
 use crate::geom::{Mesh, Patches, Run, Topology};
+use crate::render::pixels::project::{Lens, Placement, Point, Vertices, beyond_near};
 use glam::DVec3;
 
 /// As [`MOST`], for the last faces of a mesh and for small meshes.
 const FEW: usize = 16;
 /// Faces processed at a time: a compile-time constant, so that loops over them are
 /// vectorised.
-pub(super) const MOST: usize = 64;
+pub(in crate::render) const MOST: usize = 64;
 
 /// As many bytes as the longest run has vertices, each 1.
 const EACH: u128 = u128::MAX / 255;
@@ -19,7 +19,7 @@ type Row = [f64; MOST];
 
 /// The faces that silhouettes cross, and the segment in each. Reused from mesh to mesh.
 #[derive(Default)]
-pub(super) struct Crossed {
+pub(in crate::render) struct Crossed {
     faces: Vec<u32>,
     count: usize,
     batch: Batch,
@@ -27,7 +27,7 @@ pub(super) struct Crossed {
 
 /// Segments of silhouettes in the image, for a batch of faces. Pairs are the two ends,
 /// triples of rows the axes.
-pub(super) struct Batch {
+pub(in crate::render) struct Batch {
     /// The vertices of each face; the sign of facing of the first one differs from the
     /// others'.
     pub corners: [[u32; 3]; MOST],

@@ -4,17 +4,17 @@
 //! triangles that share an edge neither overlap nor leave gaps, at any size: a pixel
 //! belongs to a triangle if its centre is inside, and centres on an edge go to the
 //! triangle to the right of or below it (the top-left rule). This module handles any
-//! triangle, by runs; [`super::simd_raster`] handles small ones of meshes that the near
+//! triangle, by runs; [`crate::render::pixels::simd_raster`] handles small ones of meshes that the near
 //! plane does not cut.
 
-use super::crossing::{Crossing, Int};
-use super::place::{BITS, Extent, Place, UNIT, is_near};
-use super::project::Point;
+use crate::render::lines::crossing::{Crossing, Int};
+use crate::render::pixels::place::{BITS, Extent, Place, UNIT, is_near};
+use crate::render::pixels::project::Point;
 
 /// Corner coordinates are clamped to this, in units.
 const FARTHEST: i64 = 1 << 60;
 /// The pixels that a triangle covers.
-pub(super) struct Coverage {
+pub(in crate::render) struct Coverage {
     places: [Place; 3],
     /// Whether the corners are clockwise as seen in the image.
     clockwise: bool,
@@ -61,7 +61,7 @@ fn far_turn(places: &[Place; 3], points: &[Point; 3]) -> f64 {
 
 /// Whether corners are known to have the orientation `back`, as in [`Coverage::new`].
 #[inline(always)]
-pub(super) fn is_turned(places: [Place; 3], back: f64) -> bool {
+pub(in crate::render) fn is_turned(places: [Place; 3], back: f64) -> bool {
     let [a, b, c] = places;
     is_near(a.min(b).min(c)) & (turn(places) * back > 0.0)
 }

@@ -7,7 +7,7 @@
 //! outline is taken from the contours: where a coarse mesh covers pixels beyond its
 //! smooth silhouette, that part of it is missed.
 
-use super::{Contours, View};
+use crate::render::{Contours, View};
 use glam::DVec3;
 
 /// Distance from a piece at which to test for the background, in pixels.

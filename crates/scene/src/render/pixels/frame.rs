@@ -4,13 +4,13 @@
 //! entries, row by row from the top, finite exactly where something is visible; the other
 //! channels have as many entries, or none if they were not requested.
 
-use super::candidates::Candidates;
-use super::project::{Lens, Placement, Point, Projected, project};
-use super::raster::{Area, WHOLE, cut_triangles, draw_nearness, empty, fill_faces};
-use super::simd::vectorised;
-use super::triangle::area;
-use super::{Camera, work};
 use crate::geom::{Mesh, Solid};
+use crate::render::pixels::candidates::Candidates;
+use crate::render::pixels::project::{Lens, Placement, Point, Projected, project};
+use crate::render::pixels::raster::{Area, WHOLE, cut_triangles, draw_nearness, empty, fill_faces};
+use crate::render::pixels::triangle::area;
+use crate::render::simd::vectorised;
+use crate::render::{Camera, work};
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
 
@@ -90,12 +90,12 @@ impl Frame {
 
 /// Depth from nearness.
 #[inline(always)]
-pub(super) fn depth_of(pinhole: bool, nearness: f32) -> f32 {
+pub(in crate::render) fn depth_of(pinhole: bool, nearness: f32) -> f32 {
     if pinhole { 1.0 / nearness } else { -nearness }
 }
 
 /// Converts nearness to depth, in place.
-pub(super) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
+pub(in crate::render) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
     let pinhole = Lens::new(camera).pinhole;
     vectorised(
         #[inline(always)]

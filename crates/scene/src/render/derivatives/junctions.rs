@@ -8,10 +8,10 @@
 //! nearer piece at the end is searched for. Invariant: contributions are added in the
 //! order of the pieces.
 
-use super::Camera;
-use super::extraction::Origin;
-use super::project::{Lens, Vertices};
-use super::vjp::Extracted;
+use crate::render::Camera;
+use crate::render::derivatives::vjp::Extracted;
+use crate::render::lines::extraction::Origin;
+use crate::render::pixels::project::{Lens, Vertices};
 use rustc_hash::FxHashMap;
 
 /// How far from the last visible piece the nearer contour may be, in pixels: depth tests
@@ -35,7 +35,7 @@ const BAND: f64 = 4.0;
 /// What the end of a segment lies on: a vertex, or an edge between two, identified by
 /// positions in the image, which parts that share a seam have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct End([u64; 2]);
+pub(in crate::render) struct End([u64; 2]);
 
 impl End {
     /// Those of both ends of a segment.
@@ -62,7 +62,7 @@ type Links = Vec<[Option<usize>; 2]>;
 
 /// The derivatives with respect to each piece, with those with respect to the lengths of
 /// contours passed on to the pieces that hide their ends.
-pub(super) fn moved_ends(
+pub(in crate::render) fn moved_ends(
     extracted: &[Extracted<'_>],
     camera: &Camera,
     by_piece: &[[f64; 4]],

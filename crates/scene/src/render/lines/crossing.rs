@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 
 /// Integers of some width.
-pub(super) trait Int:
+pub(in crate::render) trait Int:
     Copy
     + Ord
     + From<i32>
@@ -37,7 +37,7 @@ int!(i32, i64, i128);
 
 /// Where an edge crosses a row, kept as quotient and remainder so that rows need no
 /// division.
-pub(super) struct Crossing<N> {
+pub(in crate::render) struct Crossing<N> {
     /// Which side is inside: the right (1), the left (-1), or the whole row or none of it
     /// (0).
     side: i32,

@@ -3,18 +3,18 @@
 //!
 //! Invariant: the depth of a marked pixel is that of the full depth image, bit for bit.
 
-use super::Camera;
-use super::candidates::Candidates;
-use super::frame::depth_of;
-use super::pixel_bitmap::PixelBitmap;
-use super::project::{Lens, Placement, Projected};
-use super::raster::{Area, Wanted, empty, fill_mesh};
-use super::triangle::bits;
 use crate::geom::Solid;
+use crate::render::Camera;
+use crate::render::pixels::candidates::Candidates;
+use crate::render::pixels::frame::depth_of;
+use crate::render::pixels::pixel_bitmap::PixelBitmap;
+use crate::render::pixels::project::{Lens, Placement, Projected};
+use crate::render::pixels::raster::{Area, Wanted, empty, fill_mesh};
+use crate::render::pixels::triangle::bits;
 
 /// Marked pixels of an image, and their depth. Reused from image to image.
 #[derive(Default)]
-pub(super) struct SparseDepth {
+pub(in crate::render) struct SparseDepth {
     bitmap: PixelBitmap,
     /// Nearness, then depth; meaningless at unmarked pixels.
     depth: Vec<f32>,

@@ -1,0 +1,13 @@
+//! From triangles to pixels: projection, coverage, depth, shading.
+
+pub(in crate::render) mod candidates;
+pub(in crate::render) mod coverage;
+pub(in crate::render) mod frame;
+pub(in crate::render) mod pixel_bitmap;
+pub(in crate::render) mod place;
+pub(in crate::render) mod project;
+pub(in crate::render) mod raster;
+pub(in crate::render) mod shade;
+pub(in crate::render) mod simd_raster;
+pub(in crate::render) mod sparse_depth;
+pub(in crate::render) mod triangle;
