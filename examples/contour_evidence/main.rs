@@ -90,7 +90,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn comparators(
-    map: &pcadlang::vision::contour_map::ContourMap,
+    map: &pcadlang::vision::ContourMap,
     size: u32,
     full: bool,
 ) -> Result<Vec<(String, Score)>, Box<dyn std::error::Error>> {

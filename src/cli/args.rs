@@ -2,13 +2,13 @@
 
 mod values;
 
-use super::compare::Compare;
 use super::detect::Detect;
-use super::files::program_name;
 use super::manual::{Completions, Man};
 use super::people::PersonArgs;
-use super::report::Report;
-use super::show::Show;
+use super::reopening::compare::Compare;
+use super::reopening::report::Report;
+use super::reopening::show::Show;
+use super::running::files::program_name;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
 use pcadlang::tradeoff::Quality;
@@ -114,7 +114,7 @@ pub enum QualityArg {
 
 impl QualityArg {
     fn parser() -> impl TypedValueParser<Value = QualityArg> {
-        PossibleValuesParser::new(super::quality::names()).map(|name| {
+        PossibleValuesParser::new(super::running::quality::names()).map(|name| {
             let known = Quality::ALL.into_iter().find(|q| q.name() == name);
             known.map_or(QualityArg::Own, QualityArg::Known)
         })

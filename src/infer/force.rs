@@ -1,8 +1,8 @@
 //! `force @a = v`: sets a choice at the start of a chain. Its prior score is kept, and
 //! kernels may change it.
 
+use super::calls::selection::fail;
 use super::plan::RunOptions;
-use super::selection::fail;
 use crate::lang::code::{Code, Force};
 use crate::lang::error::RunError;
 use crate::rng::{Purpose, StreamKey};

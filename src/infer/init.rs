@@ -1,12 +1,12 @@
 //! Initial states: traces of positive probability, and an explanation when none is found.
 
-use super::build::arguments;
-use super::expr::{PlanEnv, evaluate};
+use super::calls::build::arguments;
+use super::calls::expr::{PlanEnv, evaluate};
+use super::calls::selection::fail;
 use super::kernel::StepContext;
 use super::kernels::ProgramKernel;
 use super::kernels::program_kernel::proposes;
 use super::plan::{ChainError, RunOptions, argument, call};
-use super::selection::fail;
 use crate::lang::address::Address;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;

@@ -59,7 +59,7 @@ impl Recorder {
             Some(exprs) => {
                 for e in exprs {
                     let Some(operand) = code.queries.get(&e.span) else {
-                        return Err(super::selection::fail(
+                        return Err(super::calls::selection::fail(
                             e.span,
                             "this cannot be collected".into(),
                         ));

@@ -8,7 +8,6 @@
 #![doc = include_str!("guide.md")]
 
 mod choices;
-mod enumeration;
 mod eval;
 mod explain;
 mod gradient;
@@ -17,7 +16,6 @@ mod inspect;
 mod invalidate;
 mod journal;
 mod limits;
-mod local_density;
 mod marginal;
 mod node;
 mod observed;
@@ -27,9 +25,8 @@ mod propagate;
 mod propose;
 mod query;
 mod save;
-mod scaffold;
 mod select;
-mod set_in_place;
+mod shortcuts;
 mod surrogate;
 
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
@@ -46,13 +43,13 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 use crate::lang::code::Code;
 pub use crate::lang::error::RunError;
 use crate::lang::value::Value;
-pub(crate) use enumeration::Enumeration;
 #[doc(hidden)]
 pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
 pub(crate) use marginal::{Elimination, Explored, Marginal};
 use node::NONE;
+pub(crate) use shortcuts::enumeration::Enumeration;
 use std::sync::Arc;
 
 /// One execution of a program: the values of its choices and everything computed from

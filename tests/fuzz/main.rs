@@ -4,7 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 #[allow(dead_code)]
-#[path = "../../crates/scene/src/vision/forest/writer.rs"]
+#[path = "../../crates/scene/src/vision/detect/forest/writer.rs"]
 mod forests;
 #[allow(dead_code)]
 #[path = "../../crates/detectors/src/nn/tests/writer.rs"]

@@ -3,7 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 #[allow(dead_code)]
-#[path = "../../crates/scene/src/vision/forest/writer.rs"]
+#[path = "../../crates/scene/src/vision/detect/forest/writer.rs"]
 mod forests;
 #[path = "../../examples/detail_price/subjects.rs"]
 mod subjects;

@@ -8,7 +8,7 @@ mod dataset;
 mod observed;
 
 use super::args::{Evaluate, Inputs, Job};
-use super::job::{CHECKPOINT, Interrupt, RunMode};
+use super::running::job::{CHECKPOINT, Interrupt, RunMode};
 use super::{Failure, inputs, job, plain, quality, term};
 use super::{edges, resume};
 use dataset::Case;

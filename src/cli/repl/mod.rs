@@ -11,7 +11,7 @@ mod sixel;
 mod testing;
 
 use super::args::{Graphics, Inputs, Job, Repl, Sampling};
-use super::reopened::Reopened;
+use super::reopening::reopened::Reopened;
 use super::{Failure, has_colors, inputs, plain, term};
 use editor::{Lines, Typed, is_whole};
 use pcadlang::report::number;

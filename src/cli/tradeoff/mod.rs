@@ -14,7 +14,7 @@ mod work;
 
 use super::args::Tradeoff;
 use super::evaluate::known;
-use super::job::{self, Interrupt};
+use super::running::job::{self, Interrupt};
 use super::{Failure, inputs, plain};
 use cases::Case;
 use folder::Folder;

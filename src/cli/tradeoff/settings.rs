@@ -59,7 +59,7 @@ pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>
 /// own, `NAME.settings.json`.
 fn files(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
     let named = a.settings.iter().map(|path| {
-        let text = String::from_utf8(crate::cli::files::read(path)?)
+        let text = String::from_utf8(crate::cli::running::files::read(path)?)
             .map_err(|_| plain(format!("{}: not text", path.display())))?;
         Ok((path.display().to_string(), text))
     });

@@ -21,8 +21,8 @@ use super::program_kernel::{
     Image, Played, ProgramKernel, Source, log_density, log_volume, sampled, values,
 };
 use crate::dist::Datum;
+use crate::infer::calls::selection::fail;
 use crate::infer::kernel::{Outcome, StepContext, accepts, recoverable};
-use crate::infer::selection::fail;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::trace::{Address, Change, Target, Trace, TraceResult};

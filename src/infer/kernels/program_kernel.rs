@@ -10,9 +10,9 @@
 //! in it.
 
 use crate::dist::{Datum, Dist};
-use crate::infer::expr::{PlanEnv, evaluate};
+use crate::infer::calls::expr::{PlanEnv, evaluate};
+use crate::infer::calls::selection::{address, fail};
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, accepts, recoverable};
-use crate::infer::selection::{address, fail};
 use crate::lang::code::Code;
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;

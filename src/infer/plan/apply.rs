@@ -3,11 +3,11 @@
 use super::place::Doing;
 use super::runner::{Flow, Instance, Runner};
 use super::{ChainError, call};
-use crate::infer::build::{arguments, build, is_constant};
+use crate::infer::calls::build::{arguments, build, is_constant};
+use crate::infer::calls::selection::fail;
 use crate::infer::draws::KernelStats;
 use crate::infer::kernel::{Outcome, StepContext};
 use crate::infer::kernels::program_kernel::proposes;
-use crate::infer::selection::fail;
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};

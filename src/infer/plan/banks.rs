@@ -2,9 +2,9 @@
 //! them.
 
 use super::{RunOptions, argument, call};
-use crate::infer::expr::{PlanEnv, evaluate};
+use crate::infer::calls::expr::{PlanEnv, evaluate};
+use crate::infer::calls::selection::fail;
 use crate::infer::neighbours::Neighbours;
-use crate::infer::selection::fail;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind};

@@ -3,13 +3,13 @@
 use super::checkpoint::Checkpoint;
 use super::place::{Doing, PlanPosition};
 use super::{ChainError, ChainResult, Progress, RunOptions};
+use crate::infer::calls::expr::{PlanEnv, evaluate};
+use crate::infer::calls::selection::{fail, selector};
 use crate::infer::draws::{DrawRow, KernelStats, Sink};
-use crate::infer::expr::{PlanEnv, evaluate};
 use crate::infer::kernel::{Kernel, StepContext};
 use crate::infer::plain::Plain;
 use crate::infer::population::Population;
 use crate::infer::record::Recorder;
-use crate::infer::selection::{fail, selector};
 use crate::infer::sites::Sites;
 use crate::infer::state::StateError;
 use crate::lang::code::Code;

@@ -4,7 +4,7 @@
 use super::ChainError;
 use super::place::Doing;
 use super::runner::{Flow, PASS, PASSES, Runner};
-use crate::infer::selection::fail;
+use crate::infer::calls::selection::fail;
 use crate::lang::value::Value;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::syntax::ast::{Arg, Expr, KStmt};

@@ -8,7 +8,7 @@
 use super::compounds::{mixture, ordered, truncated};
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
-use super::matrix::Matrix;
+use super::linear::matrix::Matrix;
 use super::{Arg, Args, Kind, Row, Scalar, Type, arg, opt};
 use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
 use crate::lang::error::Fault;

@@ -5,35 +5,33 @@
 //! table. The functions are pure: equal arguments give bit-identical results on every
 //! platform.
 
-mod aliases;
 mod args;
 mod compounds;
 mod covariance;
 pub mod data;
-mod definite;
 mod derivative;
 mod distributions;
-pub mod doc;
 mod elementwise;
 pub mod examples;
+mod finding;
 mod forms;
 mod host;
 mod inference;
 mod interp;
+mod linear;
 mod list;
 mod log_density;
 mod math;
-mod matrix;
 mod operators;
 mod reduce;
 mod row;
-pub mod search;
 mod table;
 
 pub use args::Args;
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
 pub use derivative::{ArgAdjoints, Binary, Derivative, Reduction, Vjp};
+pub use finding::{doc, search};
 pub use host::{HostItem, PreviousEvaluation, State};
 pub(crate) use reduce::dot;
 pub(crate) use row::{Arg, Row, arg, function, opt};

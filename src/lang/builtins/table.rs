@@ -2,9 +2,10 @@
 //!
 //! This is not a scope: lowering handles names in the program that shadow them.
 
+use super::linear::{definite, matrix};
 use super::{
-    Builtin, Row, Text, covariance, data, definite, distributions, examples, forms, inference,
-    interp, list, log_density, math, matrix, operators, reduce,
+    Builtin, Row, Text, covariance, data, distributions, examples, forms, inference, interp, list,
+    log_density, math, operators, reduce,
 };
 use crate::lang::value::Value;
 use indexmap::{Equivalent, IndexMap};

@@ -10,9 +10,9 @@ mod gradient;
 mod reverse;
 
 use self::reverse::Reverse;
-use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, ContourDelta, Element, Elements, check};
 use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
+use super::pictures::contour_map::ContourMap;
 use pcadlang_numerics::num::LN_SQRT_2PI;
 use pcadlang_numerics::num::simd::vectorised;
 use pcadlang_numerics::platform::threads::side_by_side;

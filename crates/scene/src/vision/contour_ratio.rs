@@ -19,9 +19,9 @@ mod ratio;
 
 use self::background::scores;
 use self::match_capacity::{MatchCapacity, NO_GROUP};
-use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, ContourDelta, Elements, check};
 use super::field::{CHANNELS, Edge, Edges, channels_of, turn_between};
+use super::pictures::contour_map::ContourMap;
 use pcadlang_numerics::platform::threads::side_by_side;
 
 pub use self::match_capacity::Scratch;

@@ -6,8 +6,8 @@
 //! pixel is missing is assumed to be independent of the scene.
 
 use super::error::{VisionError, read_bytes};
-use super::npy;
-use super::photo::{Limits, decode_dynamic};
+use super::pictures::npy;
+use super::pictures::photo::{Limits, decode_dynamic};
 use pcadlang_numerics::num::LN_SQRT_2PI;
 use pcadlang_numerics::rng::Stream;
 use std::path::Path;

@@ -4,8 +4,8 @@
 //! detector nor a likelihood. Invariant: every sample is finite, within 0..=100, and
 //! interpolation is continuous.
 
-use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, check_size, diagonal};
+use super::pictures::contour_map::ContourMap;
 
 /// Minimum number of samples on the longer side of a field. At 256, the error of bilinear
 /// interpolation of |d| is at most 0.1 % of the diagonal.

@@ -3,7 +3,7 @@
 //! in the program.
 
 use super::error::{VisionError, read_bytes};
-use super::photo::{Limits, decode_dynamic};
+use super::pictures::photo::{Limits, decode_dynamic};
 use super::{npy, resize};
 use pcadlang_numerics::rng::Stream;
 use std::path::Path;

@@ -8,49 +8,37 @@
 
 pub mod candidates;
 pub mod chamfer;
-pub mod color;
-pub mod contour_map;
 pub mod contour_ratio;
 pub mod depth;
-pub mod detector;
+pub mod detect;
 pub mod distance_transform;
 pub mod elements;
 pub mod error;
-pub mod exif;
 pub mod features;
 mod field;
-pub mod file_detector;
-pub mod forest;
-pub mod gradient;
 pub mod keypoints;
 pub mod mask;
 mod nearest;
-mod network_options;
-pub mod nms;
-pub mod npy;
-#[cfg(feature = "onnx")]
-pub mod onnx;
-pub mod photo;
+pub mod pictures;
 pub mod region;
-pub mod resize;
-pub mod soft_map;
-mod thin;
 
 #[cfg(test)]
 mod testing;
 
 pub use chamfer::{Chamfer, ChamferOptions};
-pub use contour_map::ContourMap;
 pub use contour_ratio::{ContourRatio, ContourRatioOptions};
 pub use depth::{DepthLikelihood, DepthMap};
-pub use detector::{ContourDetector, GradientDetector};
+pub use detect::detector::{ContourDetector, GradientDetector};
+pub use detect::file_detector::{FileDetector, NetworkOptions};
+pub use detect::forest::Forest;
+pub use detect::soft_map::SoftMap;
+pub use detect::{file_detector, gradient, nms, soft_map};
 pub use distance_transform::{DistanceMap, distance_transform};
 pub use elements::{ComparatorError, ContourDelta, Elements};
 pub use error::VisionError;
-pub use file_detector::{FileDetector, NetworkOptions};
-pub use forest::Forest;
 pub use keypoints::{KeypointLikelihood, KeypointOptions, Keypoints};
 pub use mask::{Mask, MaskLikelihood};
-pub use photo::{Limits, Photo};
+pub use pictures::contour_map::ContourMap;
+pub use pictures::photo::{Limits, Photo};
+pub use pictures::{color, exif, npy, photo, resize};
 pub use region::{Region, RegionOptions};
-pub use soft_map::SoftMap;

@@ -2,8 +2,8 @@
 //! as observed maps. Positions are fractions of the frame, so that the same scene exists
 //! at every resolution.
 
-use super::contour_map::ContourMap;
 use super::elements::Elements;
+use super::pictures::contour_map::ContourMap;
 
 /// Elements that own their lists.
 #[derive(Debug, Clone, Default)]

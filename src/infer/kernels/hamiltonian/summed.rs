@@ -11,8 +11,8 @@
 //! no density, from wherever it is reached.
 
 use super::{Point, System};
+use crate::infer::calls::selection::fail;
 use crate::infer::kernel::{Outcome, StepContext, recoverable};
-use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use crate::trace::{

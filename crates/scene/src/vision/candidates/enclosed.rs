@@ -6,7 +6,7 @@ use super::rim::Edges;
 use super::score::suppressed;
 use super::{Candidate, CandidateOptions, LEAST, OVERLAP};
 use crate::vision::ContourMap;
-use crate::vision::gradient::Gradient;
+use crate::vision::detect::gradient::Gradient;
 
 /// How far points are extended along their contour, to close the gaps between them,
 /// pixels.

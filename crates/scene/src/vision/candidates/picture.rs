@@ -2,8 +2,8 @@
 //! of lightness, and gradients.
 
 use crate::vision::Photo;
-use crate::vision::color::linear_to_labs;
-use crate::vision::gradient::{Gradient, colour_gradient, derivatives, smoothed};
+use crate::vision::detect::gradient::{Gradient, colour_gradient, derivatives, smoothed};
+use crate::vision::pictures::color::linear_to_labs;
 
 /// Standard deviation, pixels, of the smoothing before colours are compared (Felzenszwalb
 /// & Huttenlocher 2004, section 4).

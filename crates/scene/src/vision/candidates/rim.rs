@@ -2,7 +2,7 @@
 //! camera. The outline shows only the far half; if the near half is an edge, its height
 //! determines the tilt, which the outline does not.
 
-use crate::vision::gradient::Gradient;
+use crate::vision::detect::gradient::Gradient;
 
 /// Step and number of candidate tilts, radians from level.
 const STEP: f64 = 0.025;

@@ -20,7 +20,7 @@ pub use palette::Quantised;
 
 use self::counts::DirichletMultinomial;
 use super::elements::{ComparatorError, check, check_size};
-use super::photo::Photo;
+use super::pictures::photo::Photo;
 use pcadlang_numerics::rng::Stream;
 
 /// Options of [`Region`].

@@ -5,9 +5,9 @@
 //! Invariant: every label is below the number of colours, and the same picture gives the
 //! same labels on every machine.
 
-use crate::vision::color::linear_to_labs;
 use crate::vision::elements::{ComparatorError, check_size};
-use crate::vision::photo::LinearImage;
+use crate::vision::pictures::color::linear_to_labs;
+use crate::vision::pictures::photo::LinearImage;
 use pcadlang_numerics::num::simd::vectorised;
 
 /// Approximate maximum number of pixels, evenly spaced, that clusters are fitted to; all

@@ -9,7 +9,7 @@
 //! second order), except for `3 z^2 - 1`, which is close to `z` on the visible half.
 //! Invariant: the result is finite.
 
-use crate::vision::photo::LinearImage;
+use crate::vision::pictures::photo::LinearImage;
 use pcadlang_numerics::num::simd::vectorised;
 
 /// Number of functions of the normal.

@@ -1,0 +1,144 @@
+//! Structured forests (Dollár & Zitnick 2013, "Structured forests for fast edge
+//! detection", ICCV, 1841-1848): decision trees that read patches of 32 x 32 pixels and
+//! predict the edges in their central 16 x 16; predictions of overlapping patches are
+//! averaged. Forests are read from OpenCV's files (`model.yml.gz`); there is no training
+//! here.
+//!
+//! The result equals that of OpenCV's code for pictures whose sides are multiples of 4.
+//! Other pictures are padded to such sides, as in the authors' own code; OpenCV resamples
+//! them by non-integer factors.
+
+mod features;
+mod read;
+mod trees;
+mod yaml;
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod writer;
+
+use crate::vision::VisionError;
+use crate::vision::detect::soft_map::{Shows, SoftMap};
+use crate::vision::pictures::photo::Photo;
+use crate::vision::pictures::resize::fitted;
+use features::Features;
+use std::fmt;
+
+/// The parameters of a forest: sizes in pixels, and the computation of its features.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ForestOptions {
+    /// Distance from one patch to the next in pixels.
+    pub stride: usize,
+    /// Factor by which features are smaller than the picture.
+    pub shrink: usize,
+    /// The side of the patches that trees read.
+    pub patch: usize,
+    /// The side of the central part that trees predict.
+    pub inner: usize,
+    /// Number of gradient orientations.
+    pub orientations: usize,
+    /// The radius of the smoothing before gradients are taken.
+    pub gradient_smoothing: usize,
+    /// The radius of the smoothing of features, in pixels of the picture.
+    pub smoothing: usize,
+    /// The radius of the smoothing of features that are compared with each other, in
+    /// pixels of the picture.
+    pub similarity_smoothing: usize,
+    /// The radius within which gradients are normalised.
+    pub normalization: usize,
+    /// Number of positions along each side of a patch whose features are compared.
+    pub grid: usize,
+    /// The number of trees.
+    pub trees: usize,
+    /// Number of trees that are evaluated per patch.
+    pub evaluated: usize,
+}
+
+impl ForestOptions {
+    /// Number of features of a pixel: three of colour, and at two scales the gradient's
+    /// magnitude and its parts by direction.
+    fn channels(&self) -> usize {
+        2 * (self.orientations + 1) + 3
+    }
+
+    /// The side of a patch in pixels of the features.
+    fn cells(&self) -> usize {
+        self.patch / self.shrink
+    }
+
+    /// Number of features that are used individually.
+    fn plain(&self) -> usize {
+        self.cells() * self.cells() * self.channels()
+    }
+
+    /// Number of differences of features between two positions of the grid.
+    fn pairs(&self) -> usize {
+        let places = self.grid * self.grid;
+        places * places.saturating_sub(1) / 2 * self.channels()
+    }
+}
+
+/// A node of a tree. The first child has a larger index than its parent, so every path
+/// ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Node {
+    /// The feature that is compared.
+    feature: u32,
+    /// Smaller values lead to the left child.
+    threshold: f32,
+    /// The left child; the right one is the next node. 0: a leaf.
+    left: u32,
+}
+
+/// A structured forest.
+#[derive(Clone, PartialEq)]
+pub struct Forest {
+    options: ForestOptions,
+    /// The nodes of all trees; all trees have the same number of nodes.
+    nodes: Vec<Node>,
+    /// Start of the edge pixels of each node in `pixels`, and finally their end.
+    begins: Vec<u32>,
+    /// Edge pixels, as column-major indices into the central part of a patch.
+    pixels: Vec<u16>,
+}
+
+impl fmt::Debug for Forest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Forest")
+            .field("options", &self.options)
+            .field("nodes", &self.nodes.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Forest {
+    /// Reads OpenCV's YAML (`model.yml`), optionally compressed by gzip (`model.yml.gz`).
+    ///
+    /// # Errors
+    /// If the text is not a forest, or the forest is invalid: children before their
+    /// parents, or unknown features.
+    pub fn read(bytes: &[u8]) -> Result<Forest, VisionError> {
+        read::forest(bytes).map_err(VisionError::Detector)
+    }
+
+    /// Whether bytes begin like such a file.
+    pub fn is_forest(bytes: &[u8]) -> bool {
+        read::is_gzip(bytes) || bytes.starts_with(b"%YAML")
+    }
+
+    /// The parameters of the forest.
+    pub fn options(&self) -> &ForestOptions {
+        &self.options
+    }
+
+    /// Computes the probability of each pixel of a photograph to be on an edge, at a
+    /// longer side of at most `size` pixels.
+    pub fn map(&self, photo: &Photo, size: u32) -> SoftMap {
+        let (width, height) = fitted(photo.width(), photo.height(), size);
+        let small = photo.srgb(width, height);
+        let features = Features::of(&small, width as usize, height as usize, &self.options);
+        let values = trees::edges(self, &features, width as usize, height as usize);
+        SoftMap { width, height, values, shows: Shows::Contours }
+    }
+}

@@ -1,0 +1,239 @@
+//! The gradient of a colour picture: smoothing and differentiation by Gaussians, and the
+//! structure tensor over the channels (Di Zenzo 1986, "A note on the gradient of a
+//! multi-image", CVGIP 33, 116-125). The picture is mirrored at its borders.
+
+use pcadlang_numerics::num::simd::vectorised;
+
+/// Gradient magnitude and direction of every pixel, in row-major order.
+#[derive(Clone, Debug)]
+pub struct Gradient {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Square root of the tensor's larger eigenvalue: change per pixel, at least 0.
+    pub magnitude: Vec<f32>,
+    /// The structure tensor, `[xx, xy, yy]`: products of changes per pixel, summed over
+    /// the channels.
+    pub tensor: Vec<[f32; 3]>,
+}
+
+impl Gradient {
+    /// Returns the direction of strongest change as a unit vector of arbitrary sign. It
+    /// is computed on demand, because few pixels need it. Outside the picture it points
+    /// to the right.
+    pub fn normal(&self, pixel: usize) -> [f32; 2] {
+        self.tensor.get(pixel).map_or([1.0, 0.0], |&[a, b, c]| principal(a, b, c).1)
+    }
+}
+
+/// Returns samples of a Gaussian at `-r..=r` with sum 1, and of its derivative, scaled to
+/// be exact on linear ramps; `r` is three standard deviations. The standard deviation is
+/// clamped to 0.1..=100 pixels.
+fn kernels(sigma: f32) -> (Vec<f64>, Vec<f64>) {
+    let s = if sigma.is_nan() { 0.1 } else { f64::from(sigma).clamp(0.1, 100.0) };
+    let r = (3.0 * s).ceil() as i32;
+    let g: Vec<f64> = (-r..=r).map(|i| libm::exp(-0.5 * f64::from(i * i) / (s * s))).collect();
+    let sum: f64 = g.iter().sum();
+    let smooth: Vec<f64> = g.iter().map(|v| v / sum).collect();
+    let slope: Vec<f64> = smooth.iter().zip(-r..=r).map(|(v, i)| v * f64::from(i)).collect();
+    let ramp: f64 = slope.iter().zip(-r..=r).map(|(v, i)| v * f64::from(i)).sum();
+    (smooth, slope.iter().map(|v| v / ramp).collect())
+}
+
+/// Returns position `i` of a line of `n`, mirrored at its ends (the end pixels count
+/// twice).
+pub(in crate::vision) fn mirrored(i: i64, n: i64) -> usize {
+    let m = i.rem_euclid(2 * n);
+    (if m < n { m } else { 2 * n - 1 - m }) as usize
+}
+
+/// Number of values that a filter processes at a time.
+const LANES: usize = 16;
+
+/// Sums `line[i + k] * kernel[k]` over k into `out[i]`, in the order of k and in double
+/// precision. `line` is padded for the kernel and for whole lanes beyond `out`.
+#[inline(always)]
+fn convolve(line: &[f64], kernel: &[f64], out: &mut [f32]) {
+    for (n, out) in out.chunks_mut(LANES).enumerate() {
+        let mut sums = [0.0f64; LANES];
+        for (window, c) in line[n * LANES..].windows(LANES).zip(kernel) {
+            sums.iter_mut().zip(window).for_each(|(s, v)| *s += c * v);
+        }
+        out.iter_mut().zip(sums).for_each(|(o, s)| *o = s as f32);
+    }
+}
+
+/// Filters the rows by a kernel of odd length.
+fn along_rows(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
+    let reach = kernel.len() / 2;
+    let source: Vec<usize> =
+        (0..width + 2 * reach).map(|i| mirrored(i as i64 - reach as i64, width as i64)).collect();
+    let mut line = vec![0.0f64; source.len() + LANES];
+    let mut out = vec![0.0f32; data.len()];
+    vectorised(
+        #[inline(always)]
+        || {
+            for (row, out) in data.chunks_exact(width).zip(out.chunks_exact_mut(width)) {
+                line[reach..reach + width]
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(l, v)| *l = f64::from(*v));
+                for i in (0..reach).chain(reach + width..source.len()) {
+                    line[i] = f64::from(row[source[i]]);
+                }
+                convolve(&line, kernel, out);
+            }
+        },
+    );
+    out
+}
+
+/// Filters the columns by a kernel of odd length.
+fn along_columns(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
+    let (height, reach) = (data.len() / width, (kernel.len() / 2) as i64);
+    let mut out = vec![0.0f32; data.len()];
+    let mut sums = vec![0.0f64; width];
+    vectorised(
+        #[inline(always)]
+        || {
+            for (j, out) in out.chunks_exact_mut(width).enumerate() {
+                sums.fill(0.0);
+                for (c, k) in kernel.iter().zip(-reach..) {
+                    let row = mirrored(j as i64 + k, height as i64) * width;
+                    let row = &data[row..row + width];
+                    sums.iter_mut().zip(row).for_each(|(s, v)| *s += c * f64::from(*v));
+                }
+                out.iter_mut().zip(&sums).for_each(|(o, s)| *o = *s as f32);
+            }
+        },
+    );
+    out
+}
+
+/// The pixels of a channel; empty for a picture without pixels.
+fn pixels(width: u32, height: u32, data: &[f32]) -> &[f32] {
+    &data[..width as usize * height as usize]
+}
+
+/// Smooths a channel (at least `width * height` values) by a Gaussian of `sigma` pixels.
+pub fn smoothed(width: u32, height: u32, data: &[f32], sigma: f32) -> Vec<f32> {
+    let (smooth, _) = kernels(sigma);
+    let w = (width as usize).max(1);
+    along_columns(w, &along_rows(w, pixels(width, height, data), &smooth), &smooth)
+}
+
+/// Returns the derivatives along x and y of a channel smoothed by a Gaussian of `sigma`
+/// pixels.
+pub fn derivatives(width: u32, height: u32, data: &[f32], sigma: f32) -> (Vec<f32>, Vec<f32>) {
+    let (smooth, slope) = kernels(sigma);
+    let (w, data) = ((width as usize).max(1), pixels(width, height, data));
+    let filter = |x: &[f64], y: &[f64]| along_columns(w, &along_rows(w, data, x), y);
+    (filter(&slope, &smooth), filter(&smooth, &slope))
+}
+
+/// Returns the larger eigenvalue of the symmetric matrix `[[a, b], [b, c]]` and its unit
+/// eigenvector.
+pub fn principal(a: f32, b: f32, c: f32) -> (f32, [f32; 2]) {
+    let angle = 0.5 * libm::atan2(2.0 * f64::from(b), f64::from(a) - f64::from(c));
+    (most(a, b, c), [libm::cos(angle) as f32, libm::sin(angle) as f32])
+}
+
+/// The larger eigenvalue.
+fn most(a: f32, b: f32, c: f32) -> f32 {
+    let (a, b, c) = (f64::from(a), f64::from(b), f64::from(c));
+    (0.5 * (a + c + libm::hypot(a - c, 2.0 * b))) as f32
+}
+
+/// Returns the gradient of a picture of several channels, smoothed by a Gaussian of
+/// `sigma` pixels.
+pub fn colour_gradient<const N: usize>(
+    width: u32,
+    height: u32,
+    pixels: &[[f32; N]],
+    sigma: f32,
+) -> Gradient {
+    let mut tensor = vec![[0.0f32; 3]; pixels.len()];
+    for c in 0..N {
+        let channel: Vec<f32> = pixels.iter().map(|p| p[c]).collect();
+        let (gx, gy) = derivatives(width, height, &channel, sigma);
+        for (t, (&x, &y)) in tensor.iter_mut().zip(gx.iter().zip(&gy)) {
+            *t = [t[0] + x * x, t[1] + x * y, t[2] + y * y];
+        }
+    }
+    let magnitude = tensor.iter().map(|&[a, b, c]| most(a, b, c).max(0.0).sqrt()).collect();
+    Gradient { width, height, magnitude, tensor }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ramps_have_their_slope_inside() {
+        let (w, h) = (24u32, 20u32);
+        let data: Vec<[f32; 2]> = (0..w * h)
+            .map(|i| {
+                let (x, y) = ((i % w) as f32, (i / w) as f32);
+                [3.0 * x + 4.0 * y, 1.0]
+            })
+            .collect();
+        let g = colour_gradient(w, h, &data, 1.2);
+        for j in 5..15 {
+            for i in 5..19 {
+                let k = j * w as usize + i;
+                assert!((g.magnitude[k] - 5.0).abs() < 1e-4);
+                let dot = g.normal(k)[0] * 0.6 + g.normal(k)[1] * 0.8;
+                assert!((dot.abs() - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn filters_are_sums_in_the_order_of_the_kernel() {
+        let (smooth, slope) = kernels(1.3);
+        let sum = |kernel: &[f64], at: &dyn Fn(i64) -> f32| {
+            let reach = (kernel.len() / 2) as i64;
+            kernel.iter().zip(-reach..).fold(0.0, |s, (c, k)| s + c * f64::from(at(k))) as f32
+        };
+        for (w, h) in [(1usize, 1usize), (3, 2), (16, 7), (37, 23)] {
+            let data: Vec<f32> =
+                (0..w * h).map(|i| ((i * 7919) % 613) as f32 / 7.0 - 40.0).collect();
+            let (rows, columns) = (along_rows(w, &data, &slope), along_columns(w, &data, &smooth));
+            for i in 0..w * h {
+                let (x, y) = ((i % w) as i64, (i / w) as i64);
+                let row = sum(&slope, &|k| data[y as usize * w + mirrored(x + k, w as i64)]);
+                let column = sum(&smooth, &|k| data[mirrored(y + k, h as i64) * w + x as usize]);
+                assert_eq!((rows[i], columns[i]), (row, column), "{w} x {h}");
+            }
+        }
+    }
+
+    #[test]
+    fn opposite_channels_do_not_cancel() {
+        // A step of equal luminance: the mean of the channels is constant.
+        let data: Vec<[f32; 2]> =
+            (0..400).map(|i| if i % 20 < 10 { [0.0, 8.0] } else { [8.0, 0.0] }).collect();
+        let g = colour_gradient(20, 20, &data, 1.0);
+        let one: Vec<[f32; 1]> = data.iter().map(|p| [p[0]]).collect();
+        let single = colour_gradient(20, 20, &one, 1.0);
+        let k = 10 * 20 + 10;
+        assert!(
+            (g.magnitude[k] - 2f32.sqrt() * single.magnitude[k]).abs() < 1e-4
+                && g.magnitude[k] > 3.0
+        );
+    }
+
+    #[test]
+    fn flat_pictures_have_none_and_tiny_ones_work() {
+        for (w, h) in [(1, 1), (1, 30), (30, 1), (2, 3)] {
+            let g = colour_gradient(w, h, &vec![[7.0f32; 3]; (w * h) as usize], 2.0);
+            assert!(g.magnitude.iter().all(|m| *m < 1e-4), "{w} x {h}");
+        }
+        for sigma in [f32::NAN, f32::INFINITY, -1.0] {
+            assert!(smoothed(3, 2, &[1.0; 6], sigma).iter().all(|v| (v - 1.0).abs() < 1e-5));
+        }
+        assert!(smoothed(0, 0, &[], 1.0).is_empty());
+        assert_eq!([-1, -2, 0, 2, 3, 5, 6].map(|i| mirrored(i, 3)), [0, 1, 0, 2, 2, 0, 0]);
+    }
+}

@@ -1,0 +1,8 @@
+//! Pictures and maps: reading, colours, sizes.
+
+pub mod color;
+pub mod contour_map;
+pub mod exif;
+pub mod npy;
+pub mod photo;
+pub mod resize;

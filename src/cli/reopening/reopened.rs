@@ -1,0 +1,119 @@
+//! A run reopened from its folder: the command that began it, with all settings, and its
+//! states.
+
+use crate::cli::args::{Cli, Command, Job};
+use crate::cli::{Failure, plain};
+use clap::Parser;
+use pcadlang::Model;
+use pcadlang::infer::KeptTrace;
+use pcadlang::trace::{SavedTrace, Trace};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The file of the kept states: JSON, one per line.
+pub const TRACES: &str = "traces.jsonl";
+
+/// The folder of a run.
+pub struct Reopened {
+    folder: PathBuf,
+    /// The job, including everything that `--time` or `--quality` filled in.
+    pub job: Job,
+    /// The arguments of `pcadlang run`.
+    pub arguments: Vec<String>,
+}
+
+/// Returns the arguments of `pcadlang run` that repeat a job: everything that its draws
+/// depend on.
+pub fn arguments(job: &Job) -> Vec<String> {
+    let (g, s) = (&job.inputs, &job.sampling);
+    let mut all = vec![g.program.clone()];
+    let mut add = |name: &str, value: String| all.extend([format!("--{name}"), value]);
+    let path = |p: &PathBuf| p.display().to_string();
+    g.sets.iter().for_each(|(k, v)| add("set", format!("{k}={v}")));
+    g.camera.iter().for_each(|p| add("camera", path(p)));
+    g.edges.iter().for_each(|e| add("edges", e.clone()));
+    g.who.person.iter().for_each(|n| add("person", n.to_string()));
+    g.who.near.iter().for_each(|b| add("box", b.map(|x| x.to_string()).join(",")));
+    g.who.models.iter().for_each(|p| add("models", path(p)));
+    g.allowed.allow_read.iter().for_each(|p| add("allow-read", path(p)));
+    g.allowed.limits.iter().for_each(|(k, n)| add("limit", format!("{k}={n}")));
+    job.observe.iter().for_each(|o| add("observe", o.clone()));
+    job.observe_contours.iter().for_each(|p| add("observe-contours", path(p)));
+    job.keypoints.iter().for_each(|k| add("keypoints", k.clone()));
+    job.features_from.iter().for_each(|c| add("features-from", c.clone()));
+    add("seed", s.seed.to_string());
+    add("chains", s.chains().to_string());
+    s.steps.iter().for_each(|n| add("steps", n.to_string()));
+    s.warmup.iter().for_each(|n| add("warmup", n.to_string()));
+    s.time.iter().for_each(|t| add("time", format!("{}ms", t.as_millis())));
+    add("quality", "own".into());
+    all
+}
+
+impl Reopened {
+    /// Opens the run in a folder. Relative paths in its command refer to the current
+    /// directory.
+    ///
+    /// # Errors
+    /// If the folder does not contain a run, or one of a version that did not record its
+    /// command.
+    pub fn open(folder: &Path) -> Result<Reopened, Failure> {
+        let run = crate::cli::running::resume::run(folder)?;
+        let told = || {
+            let hint = "run it again with this version; `evaluate` keeps the pictures of its cases";
+            Failure::Plain(
+                format!("{}: the folder does not record its command", folder.display()),
+                Some(hint.into()),
+            )
+        };
+        let kept = run["arguments"].as_array().ok_or_else(told)?;
+        let arguments: Vec<String> =
+            kept.iter().filter_map(|a| a.as_str().map(str::to_owned)).collect();
+        let typed =
+            ["pcadlang", "run"].into_iter().map(str::to_owned).chain(arguments.iter().cloned());
+        match Cli::try_parse_from(typed) {
+            Ok(Cli { command: Command::Run(run) }) => {
+                Ok(Reopened { folder: folder.to_owned(), job: run.job, arguments })
+            }
+            _ => Err(plain(format!(
+                "{}: this version does not have the command it was run with",
+                folder.display()
+            ))),
+        }
+    }
+
+    /// Reads the kept states.
+    ///
+    /// # Errors
+    /// If their file cannot be read.
+    pub fn traces(&self) -> Result<Vec<KeptTrace>, Failure> {
+        let path = self.folder.join(TRACES);
+        let text = std::fs::read_to_string(&path)
+            .map_err(|e| plain(format!("cannot read {}: {e}", path.display())))?;
+        let one = |(i, line): (usize, &str)| {
+            serde_json::from_str(line)
+                .map_err(|e| plain(format!("{}: line {}: {e}", path.display(), i + 1)))
+        };
+        text.lines().enumerate().map(one).collect()
+    }
+
+    /// Reads the best state.
+    ///
+    /// # Errors
+    /// If the state was not written, or cannot be read.
+    pub fn best(&self) -> Result<SavedTrace, Failure> {
+        let path = self.folder.join("best.trace.json");
+        let bytes = crate::cli::running::files::read(&path)?;
+        serde_json::from_slice(&bytes).map_err(|e| plain(format!("{}: {e}", path.display())))
+    }
+
+    /// Loads a state as a trace of the program.
+    ///
+    /// # Errors
+    /// If the program, its data or its settings are no longer those of the run.
+    pub fn trace(&self, model: &Model, saved: &SavedTrace) -> Result<Trace, Failure> {
+        let loaded =
+            Trace::load(Arc::clone(model.code()), model.hash(), saved, model.limits().clone());
+        loaded.map_err(|e| plain(format!("a state of {}: {e}", self.folder.display())))
+    }
+}

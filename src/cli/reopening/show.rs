@@ -1,0 +1,102 @@
+//! `pcadlang show`: a state of a finished run as a picture, a mesh or a list.
+
+use crate::cli::reopening::reopened::Reopened;
+use crate::cli::{Failure, files, job, plain, scene};
+use clap::Args;
+use pcadlang::geom::{glb, obj};
+use pcadlang::report::pictures::png;
+use pcadlang::report::{number, table};
+use pcadlang::session::over;
+use pcadlang::vision::Photo;
+use std::path::{Path, PathBuf};
+
+/// `show`.
+#[derive(Args, Debug)]
+pub struct Show {
+    /// The folder of the run
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Which kept state, numbered from 1 as listed by `show RUN` [default: the best
+    /// state]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub draw: Option<u32>,
+    /// The file to write: the picture over the photograph (.png) or the mesh (.obj,
+    /// .glb). Without it, the choices are printed
+    #[arg(short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// The maximum number of choices listed.
+const LISTED: usize = 200;
+
+/// Shows a state of a run.
+pub fn show(a: &Show) -> Result<(), Failure> {
+    let run = Reopened::open(&a.run)?;
+    let kept = run.traces()?;
+    let saved = match a.draw {
+        None => run.best()?,
+        Some(n) => {
+            let found = kept.get(n as usize - 1);
+            let there =
+                format!("{} states of {} are kept (--keep of `run`)", kept.len(), a.run.display());
+            found
+                .ok_or_else(|| Failure::Plain(format!("no kept state {n}"), Some(there)))?
+                .trace
+                .clone()
+        }
+    };
+    let ready = job::prepare(&run.job, true)?;
+    let mut trace = run.trace(&ready.model, &saved)?;
+    let Some(out) = &a.out else {
+        print_line!("pcadlang run {}", quoted(&run.arguments));
+        for (k, n) in kept.iter().zip(1..).filter(|_| a.draw.is_none()) {
+            print_line!(
+                "{n}: chain {}, draw {}, log joint {}",
+                k.chain,
+                k.draw,
+                number(k.log_joint)
+            );
+        }
+        let choices = trace.choices();
+        let row = |(address, value, score): &(_, pcadlang::lang::value::Value, f64)| {
+            vec![format!("{address}"), pcadlang::session::short(value), number(*score)]
+        };
+        let mut rows = vec![["choice", "value", "log density"].map(str::to_owned).to_vec()];
+        rows.extend(choices.iter().take(LISTED).map(row));
+        print_text!("{}", table::aligned(&rows));
+        if choices.len() > LISTED {
+            print_line!("… and {} more", choices.len() - LISTED);
+        }
+        return Ok(());
+    };
+    let draws = scene::predictive(run.job.sampling.seed, 0);
+    let view =
+        scene::view(&mut trace, draws, None).ok_or_else(|| plain("the program has no view"))?;
+    let mesh = || view.solid().to_mesh().map_err(|e| plain(format!("cannot make a mesh: {e}")));
+    let bytes = match out.extension().and_then(|e| e.to_str()) {
+        Some("png") => {
+            let (camera, photo) = (view.camera(), ready.photo());
+            let size = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
+            png(&over(&view, photo.map(Photo::rgb), size)).map_err(|e| plain(e.to_string()))?
+        }
+        Some("obj") => obj::write(&mesh()?).into_bytes(),
+        Some("glb") => glb::write(&mesh()?),
+        _ => {
+            return Err(plain(format!(
+                "{}: the file name must end in .png, .obj or .glb",
+                out.display()
+            )));
+        }
+    };
+    files::write(Path::new(out), &bytes)
+}
+
+/// Quotes arguments for a shell.
+pub fn quoted(arguments: &[String]) -> String {
+    let plain = |a: &String| {
+        !a.is_empty() && a.chars().all(|c| c.is_ascii_alphanumeric() || "_-./=:,#+@".contains(c))
+    };
+    let one =
+        |a: &String| if plain(a) { a.clone() } else { format!("'{}'", a.replace('\'', "'\\''")) };
+    arguments.iter().map(one).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,12 @@
+//! Runs: their inputs, chains, progress and results.
+
+pub(in crate::cli) mod best;
+pub(in crate::cli) mod files;
+pub(in crate::cli) mod inputs;
+pub(in crate::cli) mod job;
+pub(in crate::cli) mod keypoints;
+pub(in crate::cli) mod places;
+pub(in crate::cli) mod progress;
+pub(in crate::cli) mod quality;
+pub(in crate::cli) mod resume;
+pub(in crate::cli) mod run;

@@ -1,0 +1,32 @@
+//! Names of built-ins in other systems (Stan, PyMC, BUGS, numpy), for the search of the
+//! reference.
+
+/// Built-ins with their other names. Underscores and dots separate words, as in queries.
+pub(in crate::lang::builtins) const ALIASES: &[(&str, &str)] = &[
+    (
+        "log_density",
+        "normal_lpdf poisson_lpmf bernoulli_logit_lpmf lpdf lpmf logp logpdf logpmf log_prob target score pointwise likelihood",
+    ),
+    ("log_joint", "lp__ target logp"),
+    ("factor", "target potential"),
+    ("truncated", "t[ truncate truncation bounded bounds censored lower upper cut i("),
+    ("truncated_normal", "t[ truncate truncation bounded bounds"),
+    ("flat", "improper uninformative half line halfflat half_flat positive lower upper"),
+    ("half_normal", "positive"),
+    ("ordered", "sorted ascending increasing positive_ordered"),
+    ("cholesky", "cholesky_decompose decomposition chol factor cov matrix"),
+    ("solve", "mdivide mdivide_left mdivide_left_spd inverse linear system backslash linalg"),
+    ("logdet", "log_determinant determinant log_determinant_spd slogdet det linalg"),
+    ("gp", "gaussian process jitter nugget"),
+    ("mv_normal", "multi_normal multi_normal_cholesky mvnormal multivariate"),
+    ("lkj", "lkj_corr_cholesky correlation"),
+    ("neg_binomial", "negative binomial nb overdispersed"),
+    ("flip", "bernoulli coin"),
+    ("matmul", "matrix multiply multiplication times mm"),
+    ("fold", "scan recurrence recursion accumulate reduce cumulative time series autoregressive"),
+    ("log_sum_exp", "logsumexp mixture softmax"),
+    ("expit", "inv_logit sigmoid logistic"),
+    ("iid", "independent plate shape replicate"),
+    ("von_mises", "circular angle"),
+    ("half_cauchy", "halfcauchy positive"),
+];

@@ -1,0 +1,475 @@
+//! Weights of other values of a choice by local densities (see
+//! [`crate::lang::local_density`]), without changing the trace.
+//!
+//! The scores are computed by the same functions as in an update and quantised in the
+//! same way, so the weights agree to the last bit. A case that a local density does not
+//! cover is left to [`crate::trace::shortcuts::enumeration`] or an update.
+
+use crate::dist::{Datum, Dist};
+use crate::lang::builtins::{Args, Builtin, Kind, Scalar};
+use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
+use crate::lang::index::place;
+use crate::lang::local_density::{
+    Instruction, KeptAlternative, LocalDensity, PARAMETERS, REGISTERS, Source,
+};
+use crate::lang::value::Value;
+use crate::num::ExactSum;
+use crate::trace::graph::Graph;
+use crate::trace::node::*;
+use crate::trace::propose::Weight;
+use smallvec::SmallVec;
+
+/// The local densities that together give the effect of another value of a choice.
+pub(crate) type LocalDensities<'c> = SmallVec<[Placed<'c>; 4]>;
+
+/// A local density in a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Placed<'c> {
+    /// The first node of the frame.
+    pub base: NodeId,
+    /// The node that has the value: the choice, or an element of a container that is the
+    /// choice.
+    pub entry: NodeId,
+    pub local_density: &'c LocalDensity,
+}
+
+/// The maximum number of other frames that may read the choice.
+const READERS: usize = 4;
+
+/// A value in a local density.
+#[derive(Clone, Copy)]
+pub(crate) enum Register<'a> {
+    Num(f64),
+    Bool(bool),
+    Other(&'a Value),
+}
+
+/// The evaluation of a local density on the nodes of one frame.
+pub(crate) struct Evaluation<'a, const N: usize> {
+    graph: &'a Graph,
+    code: &'a Code,
+    base: NodeId,
+    registers: [Register<'a>; N],
+    /// A bit for each filled register.
+    filled: u32,
+    /// The selections that take their other alternative.
+    pub turned: SmallVec<[NodeId; 4]>,
+    /// The scores, by node.
+    pub scores: SmallVec<[(NodeId, f64); 8]>,
+    pub prior: ExactSum,
+    pub likelihood: ExactSum,
+}
+
+impl Graph {
+    /// Returns the local densities that together give the effect of another value of a
+    /// choice; `None` if there are none in this state.
+    pub fn local_densities<'c>(
+        &self,
+        code: &'c Code,
+        target: NodeId,
+    ) -> Option<LocalDensities<'c>> {
+        let facts = self.slot_facts(code, target);
+        let finite = self.prior.is_fine() && self.likelihood.is_fine();
+        if !self.incremental
+            || !finite
+            || self.execution_log.is_some()
+            || !self.is_plain_choice(target)
+        {
+            return None;
+        }
+        let mut all = LocalDensities::new();
+        self.add_local_density(
+            target,
+            target - facts.slot,
+            facts.local_density.as_deref()?,
+            &mut all,
+        )?;
+        let readers = &self.outside[self.nodes[target as usize].outside as usize].users;
+        if readers.len() > READERS {
+            return None;
+        }
+        for (i, m) in readers.iter().enumerate() {
+            let node = &self.nodes[*m as usize];
+            if node.state != State::Clean || readers[..i].contains(m) {
+                continue;
+            }
+            // An element of a container: its value is that of the choice.
+            let Op::Index { .. } = self.op(code, *m) else { return None };
+            let Some(Side::Deps(deps)) = node.side.as_deref() else { return None };
+            if deps.as_slice() != [target] {
+                return None;
+            }
+            let facts = self.slot_facts(code, *m);
+            if self.is_read_outside(*m) {
+                return None;
+            }
+            self.add_local_density(*m, m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
+        }
+        Some(all)
+    }
+
+    /// Adds a local density, if it covers everything that depends on its value.
+    fn add_local_density<'c>(
+        &self,
+        entry: NodeId,
+        base: NodeId,
+        local_density: &'c LocalDensity,
+        all: &mut LocalDensities<'c>,
+    ) -> Option<()> {
+        if local_density.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
+            return None;
+        }
+        // Two local densities in one frame could change the same score.
+        if !local_density.instructions.is_empty()
+            && all.iter().any(|p| p.base == base && !p.local_density.instructions.is_empty())
+        {
+            return None;
+        }
+        all.push(Placed { base, entry, local_density });
+        Some(())
+    }
+
+    /// Returns an evaluation of local densities, for [`Evaluation::weigh`].
+    pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a, REGISTERS> {
+        Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
+    }
+
+    /// Returns the distribution of a choice whose parameters are single numbers or
+    /// evaluated arrays.
+    pub fn simple_dist(&self, code: &Code, n: NodeId) -> Option<Dist> {
+        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else {
+            return None;
+        };
+        let mut read = [Register::Num(0.0); PARAMETERS];
+        let read = read.get_mut(..args.len())?;
+        let mut e = Evaluation::new(self, code, []);
+        e.base = n - self.slot_facts(code, n).slot;
+        for (to, o) in read.iter_mut().zip(args) {
+            *to = e.read(Source::Operand(*o))?;
+        }
+        family(code.builtins.get(*builtin), read)
+    }
+}
+
+impl<'a> Evaluation<'a, REGISTERS> {
+    /// Returns the log weight of a value of the choice relative to the current one, with
+    /// the likelihood raised to a power; `None` if the local densities do not cover it.
+    pub fn weigh(
+        &mut self,
+        target: NodeId,
+        local_densities: &LocalDensities,
+        dist: &Dist,
+        value: &Datum,
+        power: f64,
+    ) -> Option<f64> {
+        self.begin(Register::of_datum(value)?);
+        self.prior.sub(self.graph.nodes[target as usize].score);
+        self.prior.add(dist.log_density_stored(value));
+        local_densities
+            .iter()
+            .try_for_each(|placed| self.run(placed, local_densities.len() == 1))?;
+        Some(Weight::beside(&self.prior, &self.likelihood, power))
+    }
+
+    /// Starts with a value of the choice.
+    pub fn begin(&mut self, value: Register<'a>) {
+        self.registers[0] = value;
+        self.turned.clear();
+        self.scores.clear();
+        self.prior = ExactSum::default();
+        self.likelihood = ExactSum::default();
+    }
+
+    /// Runs a local density. With `may_choose`, selections may take their other
+    /// alternative.
+    pub fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
+        let local_density = placed.local_density;
+        (self.base, self.filled) = (placed.base, 1);
+        let mut next = 0;
+        while let Some(instruction) = local_density.instructions.get(next) {
+            next += 1;
+            match *instruction {
+                Instruction::SkipUnevaluated { slot, to } => {
+                    if self.node(slot).state != State::Clean {
+                        next = to as usize;
+                    }
+                }
+                Instruction::Recall { slot, into, to } => {
+                    let node = self.node(slot);
+                    if node.state == State::Clean {
+                        self.fill(into, Register::of(&node.value));
+                        next = to as usize;
+                    }
+                }
+                Instruction::Unary { f, x, into } => {
+                    self.fill(into, Register::Num(f(self.number(x)?)))
+                }
+                Instruction::Binary { f, x, y, into } => {
+                    self.fill(into, Register::Num(f(self.number(x)?, self.number(y)?)));
+                }
+                Instruction::Test { f, x, y, into } => {
+                    self.fill(into, Register::Bool(f(self.number(x)?, self.number(y)?)));
+                }
+                Instruction::Logic { f, x, into } => {
+                    self.fill(into, Register::Bool(f(self.truth(x)?)))
+                }
+                Instruction::Index { base, key, into } => {
+                    self.fill(into, element(self.read(base)?, self.number(key)?)?);
+                }
+                Instruction::Branch { slot, cond, otherwise } => {
+                    let holds = self.truth(cond)?;
+                    let node = self.node(slot);
+                    let other =
+                        node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
+                    if other && !self.turned.contains(&(self.base + slot)) {
+                        if self.turned.is_empty() && !(may_choose && self.can_choose(local_density))
+                        {
+                            return None;
+                        }
+                        self.turned.push(self.base + slot);
+                    }
+                    if !holds {
+                        next = otherwise as usize;
+                    }
+                }
+                Instruction::Go { to } => next = to as usize,
+                Instruction::Copy { from, into } => self.fill(into, self.read(from)?),
+                Instruction::Draw { slot, builtin, ref parameters } => {
+                    if !self.graph.is_plain_choice(self.base + slot) {
+                        return None;
+                    }
+                    let score = self.log_density(
+                        builtin,
+                        parameters,
+                        Register::of(&self.node(slot).value),
+                    )?;
+                    self.prior.sub(self.node(slot).score);
+                    self.prior.add(score);
+                    self.scores.push((self.base + slot, score));
+                }
+                Instruction::Observe { slot, builtin, ref parameters, value } => {
+                    let n = self.base + slot;
+                    let replaced = self.graph.replaced(self.code, n).map(Register::of);
+                    let value = replaced.map_or_else(|| self.read(value), Some)?;
+                    let score = self.log_density(builtin, parameters, value)?;
+                    self.graph.take_score(n, &mut self.likelihood);
+                    self.likelihood.add(score);
+                    self.scores.push((n, score));
+                }
+                Instruction::Factor { slot, weight } => {
+                    let weight = self.number(weight).filter(|w| !w.is_nan())?;
+                    self.likelihood.sub(self.node(slot).score);
+                    self.likelihood.add(weight);
+                    self.scores.push((self.base + slot, weight));
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// Whether a register has been filled.
+    pub fn is_filled(&self, r: u8) -> bool {
+        self.filled & (1 << r) != 0
+    }
+
+    /// Returns the contents of a register.
+    pub fn register(&self, r: u8) -> Register<'a> {
+        self.registers[r as usize]
+    }
+
+    #[inline(always)]
+    fn fill(&mut self, into: u8, value: Register<'a>) {
+        self.registers[into as usize] = value;
+        self.filled |= 1 << into;
+    }
+
+    /// Whether its selections can take their other alternatives without releasing
+    /// anything except computations.
+    fn can_choose(&self, local_density: &LocalDensity) -> bool {
+        let is_taken = |h: &KeptAlternative| {
+            let node = self.node(h.selection);
+            node.state == State::Clean && h.first == (node.flags & OTHERWISE == 0)
+        };
+        let is_kept = |h: &KeptAlternative| {
+            let Some(n) = self.graph.resolve(self.frame(), h.operand) else { return true };
+            let node = &self.graph.nodes[n as usize];
+            if node.refs > h.times || !is_taken(h) {
+                return true;
+            }
+            let now = local_density
+                .held
+                .iter()
+                .filter(|other| other.operand == h.operand && is_taken(other))
+                .count();
+            let holds_nothing =
+                matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
+            node.refs as usize > now || holds_nothing
+        };
+        local_density.computed.iter().all(|slot| self.node(*slot).side.is_none())
+            && local_density.held.iter().all(is_kept)
+    }
+
+    /// The log density of a single number or boolean.
+    fn log_density(
+        &self,
+        builtin: u32,
+        parameters: &[Source; PARAMETERS],
+        x: Register,
+    ) -> Option<f64> {
+        let builtin = self.code.builtins.get(builtin);
+        let parameters = parameters.get(..builtin.args.len())?;
+        match (builtin.scalar, x) {
+            (_, Register::Num(x)) if x.is_nan() => None,
+            (Some(Scalar::Family { log_density, .. }), Register::Num(x)) => {
+                let mut space = [0.0; PARAMETERS];
+                let numbers = &mut space[..parameters.len()];
+                for (to, from) in numbers.iter_mut().zip(parameters) {
+                    *to = self.number(*from)?;
+                }
+                log_density(numbers, x)
+            }
+            (Some(Scalar::Weights { log_probability, .. }), Register::Num(x)) => {
+                match self.read(*parameters.first()?)? {
+                    Register::Other(Value::Array(weights)) if parameters.len() == 1 => {
+                        log_probability(weights, x)
+                    }
+                    _ => None,
+                }
+            }
+            _ => {
+                let mut space = [Register::Num(0.0); PARAMETERS];
+                let read = &mut space[..parameters.len()];
+                for (to, from) in read.iter_mut().zip(parameters) {
+                    *to = self.read(*from)?;
+                }
+                let dist = family(builtin, read)?;
+                match x {
+                    _ if !dist.is_scalar() => None,
+                    Register::Num(x) => Some(dist.log_density_num(x)),
+                    Register::Bool(b) => Some(dist.log_density_bool(b)),
+                    Register::Other(_) => None,
+                }
+            }
+        }
+    }
+}
+
+impl<'a, const N: usize> Evaluation<'a, N> {
+    fn new(graph: &'a Graph, code: &'a Code, registers: [Register<'a>; N]) -> Self {
+        Evaluation {
+            graph,
+            code,
+            base: 0,
+            registers,
+            filled: 0,
+            turned: SmallVec::new(),
+            scores: SmallVec::new(),
+            prior: ExactSum::default(),
+            likelihood: ExactSum::default(),
+        }
+    }
+
+    #[inline(always)]
+    fn node(&self, slot: Slot) -> &'a Node {
+        &self.graph.nodes[(self.base + slot) as usize]
+    }
+
+    fn frame(&self) -> FrameId {
+        self.graph.nodes[self.base as usize].frame
+    }
+
+    #[inline(always)]
+    fn read(&self, s: Source) -> Option<Register<'a>> {
+        let node = match s {
+            Source::Register(r) => return Some(self.registers[r as usize]),
+            Source::Operand(Operand::Const(i)) => {
+                return Some(Register::of(self.code.const_value(i)));
+            }
+            Source::Operand(Operand::Local(slot)) => self.node(slot),
+            Source::Operand(o) => &self.graph.nodes[self.graph.resolve(self.frame(), o)? as usize],
+        };
+        (node.state == State::Clean).then(|| Register::of(&node.value))
+    }
+
+    #[inline(always)]
+    fn number(&self, s: Source) -> Option<f64> {
+        match self.read(s)? {
+            Register::Num(x) => Some(x),
+            _ => None,
+        }
+    }
+
+    fn truth(&self, s: Source) -> Option<bool> {
+        match self.read(s)? {
+            Register::Bool(b) => Some(b),
+            _ => None,
+        }
+    }
+}
+
+impl<'a> Register<'a> {
+    pub fn of_datum(x: &Datum) -> Option<Self> {
+        match x {
+            Datum::Num(x) => Some(Register::Num(*x)),
+            Datum::Bool(b) => Some(Register::Bool(*b)),
+            _ => None,
+        }
+    }
+
+    pub fn to_value(self) -> Value {
+        match self {
+            Register::Num(x) => Value::Num(x),
+            Register::Bool(b) => Value::Bool(b),
+            Register::Other(v) => v.clone(),
+        }
+    }
+
+    fn of(v: &'a Value) -> Self {
+        match v {
+            Value::Num(x) => Register::Num(*x),
+            Value::Bool(b) => Register::Bool(*b),
+            v => Register::Other(v),
+        }
+    }
+}
+
+/// Returns the parameters, if all of them are numbers.
+#[inline]
+fn numbers<'s>(parameters: &[Register], space: &'s mut [f64; PARAMETERS]) -> Option<&'s [f64]> {
+    let numbers = space.get_mut(..parameters.len())?;
+    for (to, from) in numbers.iter_mut().zip(parameters) {
+        let Register::Num(x) = from else { return None };
+        *to = *x;
+    }
+    Some(numbers)
+}
+
+/// Returns the distribution with these parameters.
+fn family(builtin: &Builtin, parameters: &[Register]) -> Option<Dist> {
+    if let Some(Scalar::Family { make, .. }) = builtin.scalar {
+        return make(numbers(parameters, &mut [0.0; PARAMETERS])?);
+    }
+    if let (Some(Scalar::Weights { make, .. }), [Register::Other(Value::Array(w))]) =
+        (builtin.scalar, parameters)
+    {
+        return make(w);
+    }
+    let Kind::Distribution(make) = builtin.kind else { return None };
+    let owned: SmallVec<[Value; PARAMETERS]> = parameters.iter().map(|r| r.to_value()).collect();
+    let values: SmallVec<[&Value; PARAMETERS]> = owned.iter().collect();
+    make(&Args { builtin, values: &values }).ok()
+}
+
+/// Returns an element of an array, if the index is in range.
+fn element(base: Register, key: f64) -> Option<Register> {
+    let Register::Other(base) = base else { return None };
+    match base {
+        Value::Array(xs) => place(xs.len(), key).map(|i| Register::Num(xs[i])),
+        Value::List(xs) => place(xs.len(), key).map(|i| Register::of(&xs[i])),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+#[path = "local_density_tests.rs"]
+mod tests;
