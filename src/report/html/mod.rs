@@ -10,7 +10,6 @@ mod tables;
 
 use super::{Mode, Quantity};
 use crate::infer::draws::KernelStats;
-pub use encode::base64;
 use encode::escaped;
 use std::fmt::Write;
 
