@@ -1,7 +1,7 @@
 //! Encodes the contents of a page as text: escaped text, coordinates.
 
 /// Escapes a text for use inside an element or a quoted attribute.
-pub(super) fn escaped(text: &str) -> String {
+pub(in crate::report) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

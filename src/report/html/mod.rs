@@ -10,7 +10,7 @@ mod tables;
 
 use super::{Mode, Quantity};
 use crate::infer::draws::KernelStats;
-use encode::escaped;
+pub(super) use encode::escaped;
 use std::fmt::Write;
 
 /// The contents of a page.
