@@ -17,6 +17,7 @@ use pcadlang::Program;
 use pcadlang::infer::draws::{Column, DrawRow, Sink};
 use pcadlang::infer::{Progress, RunOptions};
 use pcadlang::lang::load;
+use pcadlang::report::svg::Svg;
 use pcadlang::vision::candidates::{CandidateOptions, candidates};
 use pcadlang::vision::{Limits, photo};
 use std::fmt::Write;
@@ -171,50 +172,29 @@ fn figure(moments: &[f64], both: &[(&str, &str, Vec<[f64; 5]>)]) -> String {
     let y = |l: f64| {
         height - bottom - ((l - low) / (high - low)).clamp(0.0, 1.0) * (height - bottom - 20.0)
     };
-    let mut s = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-         font-family=\"system-ui, sans-serif\" font-size=\"12\"><rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n"
-    );
+    let mut s = Svg::file(width, height);
     for t in [0.01f64, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].into_iter().filter(|t| t.ln() <= ends.1) {
-        let _ = writeln!(
-            s,
-            "<text x=\"{:.0}\" y=\"{}\" text-anchor=\"middle\">{t} s</text>",
-            x(t),
-            height - 20.0
-        );
+        s.text((x(t), height - 20.0), "middle", "", &format!("{t} s"));
     }
     for i in 0..=4 {
         let l = low + (high - low) * f64::from(i) / 4.0;
-        let _ = writeln!(
-            s,
-            "<text x=\"{}\" y=\"{:.0}\" text-anchor=\"end\">{l:.0}</text>",
-            left - 6.0,
-            y(l) + 4.0
-        );
+        s.text((left - 6.0, y(l) + 4.0), "end", "", &format!("{l:.0}"));
     }
     for (i, (name, colour, q)) in both.iter().enumerate() {
         let there: Vec<usize> = (0..q.len()).filter(|j| q[*j][2].is_finite()).collect();
-        let point = |j: usize, k: usize| format!("{:.1},{:.1}", x(moments[j]), y(q[j][k]));
+        let point = |j: usize, k: usize| (x(moments[j]), y(q[j][k]));
         for (lo, hi) in [(0, 4), (1, 3)] {
             let up = there.iter().map(|j| point(*j, lo));
-            let band: Vec<String> = up.chain(there.iter().rev().map(|j| point(*j, hi))).collect();
-            let _ = writeln!(
-                s,
-                "<polygon points=\"{}\" fill=\"{colour}\" opacity=\"0.2\"/>",
-                band.join(" ")
-            );
+            let down = there.iter().rev().map(|j| point(*j, hi));
+            s.area(up.chain(down), &format!("fill=\"{colour}\" opacity=\"0.2\""));
         }
-        let line: Vec<String> = there.iter().map(|j| point(*j, 2)).collect();
-        let _ = writeln!(
-            s,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>\n\
-             <text x=\"{}\" y=\"{}\" fill=\"{colour}\">{name}: median, middle half, 90 %</text>",
-            line.join(" "),
-            left + 10.0,
-            30 + 18 * i
-        );
+        let line = there.iter().map(|j| point(*j, 2));
+        s.line(line, &format!("stroke=\"{colour}\" stroke-width=\"2\""), "");
+        let label = format!("{name}: median, middle half, 90 %");
+        let at = (left + 10.0, 30.0 + 18.0 * i as f64);
+        s.text(at, "start", &format!("fill=\"{colour}\""), &label);
     }
-    s + "</svg>\n"
+    s.end()
 }
 
 fn main() -> Result<(), String> {

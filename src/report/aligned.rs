@@ -10,10 +10,10 @@
 //! chain.
 
 use super::atomic_write::begin;
-use super::csv::{CsvSink, DrawReader, named};
+use super::csv::{Contents, CsvError, CsvSink, DrawReader};
 use crate::infer::draws::{Column, DrawRow, Sink, merged};
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 
 /// Returns the name of the file of a chain's draws; chains are counted from 0.
@@ -25,18 +25,6 @@ pub(super) fn draws_name(chain: u32) -> String {
 /// changed.
 pub(super) fn all_name(chain: u32) -> String {
     format!("draws-{}.csv", u64::from(chain) + 1)
-}
-
-/// The contents of a chain's file.
-#[derive(Default)]
-pub(super) struct Found {
-    comments: String,
-    /// The union of the columns of its draws.
-    pub(super) columns: Vec<Column>,
-    /// Whether the file has only one line of names.
-    plain: bool,
-    /// The number of its draws.
-    pub(super) draws: u64,
 }
 
 /// Brings the files of `chains` chains to the same columns and, if `even`, to the same
@@ -53,7 +41,7 @@ pub fn align(dir: &Path, chains: u32, even: bool) -> io::Result<Option<u64>> {
     let keep = if even { fewest } else { most };
     let columns = found.iter().fold(Vec::new(), |all, f| merged(&all, &f.columns));
     for (chain, f) in (0..chains).zip(&found).filter(|(_, f)| f.draws > 0) {
-        if f.draws > keep || !f.plain || f.columns != columns {
+        if f.draws > keep || f.heads != 1 || f.columns != columns {
             rewrite(dir, chain, f, &columns, keep)?;
         }
     }
@@ -75,37 +63,28 @@ pub(super) fn restore(dir: &Path, chain: u32) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns an error if it cannot be read.
-pub(super) fn look(path: &Path) -> io::Result<Found> {
-    let mut found = Found { plain: true, ..Found::default() };
-    for line in BufReader::new(File::open(path)?).lines() {
-        let line = line?;
-        if line.starts_with('#') {
-            found.comments.push_str(&line);
-            found.comments.push('\n');
-        } else if let Some(columns) = named(&line) {
-            found.plain &= found.columns.is_empty();
-            found.columns = merged(&found.columns, &columns);
-        } else {
-            found.draws += 1;
-        }
-    }
-    Ok(found)
+pub(super) fn look(path: &Path) -> io::Result<Contents> {
+    Contents::of(BufReader::new(File::open(path)?)).map_err(CsvError::into_io)
 }
 
 /// Rewrites a chain's file with its first draws in the given columns, and keeps the old
 /// file.
-fn rewrite(dir: &Path, chain: u32, found: &Found, columns: &[Column], keep: u64) -> io::Result<()> {
+fn rewrite(
+    dir: &Path,
+    chain: u32,
+    found: &Contents,
+    columns: &[Column],
+    keep: u64,
+) -> io::Result<()> {
     let path = dir.join(draws_name(chain));
-    let file = File::open(&path)?;
-    let end = file.metadata()?.len();
-    let mut reader = DrawReader::new(BufReader::new(file), columns, end);
+    let mut reader = DrawReader::new(BufReader::new(File::open(&path)?), columns, u64::MAX);
     let new = begin(dir, &draws_name(chain), |file| {
         let mut out = BufWriter::new(file);
         out.write_all(found.comments.as_bytes())?;
         let mut sink = CsvSink::bare(out);
         sink.columns(columns)?;
         for draw in 0..keep.min(found.draws) {
-            let Some(row) = reader.next_row().map_err(io::Error::other)? else { break };
+            let Some(row) = reader.next_row().map_err(CsvError::into_io)? else { break };
             sink.draw(&DrawRow { chain, draw, ..row })?;
         }
         sink.flush()

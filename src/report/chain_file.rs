@@ -6,7 +6,7 @@
 
 use super::aligned::{draws_name, restore};
 use super::checkpoint::SavedChain;
-use super::csv::{CsvSink, DrawReader};
+use super::csv::{CsvSink, DrawReader, as_written};
 use super::rundir::RunDir;
 use super::sinks::Memory;
 use crate::infer::Checkpoint;
@@ -88,8 +88,8 @@ impl ChainFiles<'_> {
         let mut memory = memory.clone();
         memory.columns(checkpoint.columns())?;
         let mut rows = 0;
-        let mut reader =
-            DrawReader::new(BufReader::new(&file), checkpoint.columns(), saved.draws_end);
+        let columns = as_written(checkpoint.columns());
+        let mut reader = DrawReader::new(BufReader::new(&file), &columns, saved.draws_end);
         while let Some(row) =
             reader.next_row().map_err(|e| about(&name, e, io::ErrorKind::InvalidData))?
         {

@@ -24,6 +24,8 @@ pub mod pictures;
 mod reread;
 mod rundir;
 mod sinks;
+#[doc(hidden)]
+pub mod svg;
 pub mod table;
 mod warnings;
 pub mod zarr;

@@ -4,7 +4,7 @@
 //! left out for its summary.
 
 use super::aligned::{all_name, draws_name, look};
-use super::csv::DrawReader;
+use super::csv::{CsvError, DrawReader};
 use super::draws::{ChainDraws, Quantity, widen};
 use super::rundir::RunDir;
 use super::sinks::Memory;
@@ -47,12 +47,10 @@ pub fn reread(dir: &RunDir, room: usize) -> io::Result<Vec<ChainDraws>> {
 fn read(dir: &RunDir, name: &str, chain: u32, mut memory: Memory) -> io::Result<()> {
     let path = dir.file(name);
     let columns = look(&path)?.columns;
-    let file = File::open(&path)?;
-    let end = file.metadata()?.len();
     memory.columns(&columns)?;
-    let mut reader = DrawReader::new(BufReader::new(file), &columns, end);
+    let mut reader = DrawReader::new(BufReader::new(File::open(&path)?), &columns, u64::MAX);
     let mut draw = 0;
-    while let Some(row) = reader.next_row().map_err(io::Error::other)? {
+    while let Some(row) = reader.next_row().map_err(CsvError::into_io)? {
         memory.draw(&DrawRow { chain, draw, ..row })?;
         draw += 1;
     }

@@ -3,7 +3,7 @@
 //! Invariant: only finite numbers are written, for any rows.
 
 use super::rows::Row;
-use std::fmt::Write;
+use crate::report::svg::Svg;
 
 const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 460.0;
@@ -11,6 +11,8 @@ const HEIGHT: f64 = 460.0;
 const LEFT: f64 = 58.0;
 const BOTTOM: f64 = 40.0;
 const EDGE: f64 = 16.0;
+/// The style of the labels of the axes.
+const GREY: &str = "fill=\"#555\"";
 
 /// Maps times and errors to positions in the picture.
 struct Axes {
@@ -48,10 +50,7 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
         .fold(1e-9, f64::max);
     let top = (most * 1.02).min(f64::MAX);
     let axes = Axes { time: (low, high), top };
-    let mut s = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
-         font-family=\"system-ui, sans-serif\" font-size=\"12\"><rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fff\"/>\n"
-    );
+    let mut s = Svg::file(WIDTH, HEIGHT);
     grid(&mut s, &axes, error);
     let names = || {
         let mut names: Vec<&str> = shown.iter().map(|r| r.setting.as_str()).collect();
@@ -59,17 +58,9 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
         names
     };
     for name in names() {
-        let line: Vec<String> = shown
-            .iter()
-            .filter(|r| r.setting == name)
-            .map(|r| format!("{:.1},{:.1}", axes.x(r.seconds), axes.y(r.error)))
-            .collect();
-        let _ = writeln!(
-            s,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"#bbb\" stroke-width=\"0.8\"><title>{}</title></polyline>",
-            line.join(" "),
-            text(name)
-        );
+        let line = shown.iter().filter(|r| r.setting == name);
+        let line = line.map(|r| (axes.x(r.seconds), axes.y(r.error)));
+        s.line(line, "stroke=\"#bbb\" stroke-width=\"0.8\"", name);
     }
     let ends: Vec<&&Row> = shown.iter().filter(|r| r.end).collect();
     for r in &ends {
@@ -77,50 +68,34 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
         let (x, y) = (axes.x(r.seconds), axes.y(r.error));
         if r.low.is_finite() && r.high.is_finite() {
             let (low, high) = (axes.y(r.low), axes.y(r.high));
-            let _ = write!(
-                s,
-                "<path d=\"M{x:.1},{low:.1}V{high:.1}\" stroke=\"{colour}\" stroke-width=\"{width}\"/>"
-            );
+            let style = format!("stroke=\"{colour}\" stroke-width=\"{width}\"");
+            s.path(&format!("M{x:.1},{low:.1}V{high:.1}"), &style);
         }
         let radius = if r.front { 4.0 } else { 2.0 };
         let title = format!(
             "{}: {:.3} ({:.3} to {:.3}) after {:.2} s",
             r.setting, r.error, r.low, r.high, r.seconds
         );
-        let _ = writeln!(
-            s,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{colour}\"><title>{}</title></circle>",
-            text(&title)
-        );
+        s.dot((x, y), radius, &format!("fill=\"{colour}\""), &title);
     }
     let mut front: Vec<(f64, f64)> =
         ends.iter().filter(|r| r.front).map(|r| (r.seconds, r.error)).collect();
     front.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let points: Vec<String> =
-        front.iter().map(|(t, e)| format!("{:.1},{:.1}", axes.x(*t), axes.y(*e))).collect();
-    let _ = writeln!(
-        s,
-        "<polyline points=\"{}\" fill=\"none\" stroke=\"#d55e00\" stroke-width=\"1.6\"/>",
-        points.join(" ")
-    );
+    let front = front.iter().map(|(t, e)| (axes.x(*t), axes.y(*e)));
+    s.line(front, "stroke=\"#d55e00\" stroke-width=\"1.6\"", "");
     for (setting, label) in named {
         if let Some(r) = ends.iter().find(|r| r.setting == *setting) {
             let (x, y) = (axes.x(r.seconds), axes.y(r.error));
             // Labels near the right edge are placed to the left of their dots.
             let (x, anchor) = if x > WIDTH - 90.0 { (x - 8.0, "end") } else { (x + 8.0, "start") };
-            let _ = writeln!(
-                s,
-                "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
-                y - 6.0,
-                text(label)
-            );
+            s.text((x, y - 6.0), anchor, "", label);
         }
     }
-    s + "</svg>\n"
+    s.end()
 }
 
 /// Draws the grid lines and labels of both axes.
-fn grid(s: &mut String, axes: &Axes, error: &str) {
+fn grid(s: &mut Svg, axes: &Axes, error: &str) {
     let (low, high) = axes.time;
     for power in low.floor() as i32..=high.ceil() as i32 {
         for (i, digit) in [1.0, 2.0, 5.0].into_iter().enumerate() {
@@ -130,36 +105,24 @@ fn grid(s: &mut String, axes: &Axes, error: &str) {
             }
             let x = axes.x(t);
             let colour = if i == 0 { "#ddd" } else { "#eee" };
-            let _ =
-                write!(s, "<path d=\"M{x:.1},{EDGE}V{}\" stroke=\"{colour}\"/>", HEIGHT - BOTTOM);
-            let y = HEIGHT - BOTTOM + 15.0;
-            let _ = writeln!(
-                s,
-                "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\" fill=\"#555\">{t}</text>"
-            );
+            let line = format!("M{x:.1},{EDGE}V{}", HEIGHT - BOTTOM);
+            s.path(&line, &format!("stroke=\"{colour}\""));
+            s.text((x, HEIGHT - BOTTOM + 15.0), "middle", GREY, &t.to_string());
         }
     }
     let step = step(axes.top);
     for i in 0..=(axes.top / step) as u32 {
         let e = f64::from(i) * step;
         let y = axes.y(e);
-        let _ = write!(s, "<path d=\"M{LEFT},{y:.1}H{}\" stroke=\"#eee\"/>", WIDTH - EDGE);
+        s.path(&format!("M{LEFT},{y:.1}H{}", WIDTH - EDGE), "stroke=\"#eee\"");
         // Avoids labels such as 0.30000000000000004.
         let e = if e < 1e6 { (e * 1e9).round() / 1e9 } else { e };
-        let (x, y) = (LEFT - 6.0, y + 4.0);
-        let _ = writeln!(
-            s,
-            "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"#555\">{e}</text>"
-        );
+        s.text((LEFT - 6.0, y + 4.0), "end", GREY, &e.to_string());
     }
-    let (x, y) = ((LEFT + WIDTH) / 2.0, HEIGHT - 6.0);
-    let _ = writeln!(s, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\">seconds</text>");
+    s.text(((LEFT + WIDTH) / 2.0, HEIGHT - 6.0), "middle", "", "seconds");
     let middle = (HEIGHT - BOTTOM) / 2.0;
-    let _ = writeln!(
-        s,
-        "<text x=\"14\" y=\"{middle}\" text-anchor=\"middle\" transform=\"rotate(-90 14 {middle})\">{}</text>",
-        text(error)
-    );
+    let turned = format!("transform=\"rotate(-90 14 {middle})\"");
+    s.text((14.0, middle), "middle", &turned, error);
 }
 
 /// Returns a round step for the grid lines, of which about five to ten fit.
@@ -168,10 +131,6 @@ fn step(top: f64) -> f64 {
     let power = 10f64.powf(rough.log10().floor());
     let digit = [1.0, 2.0, 5.0, 10.0].into_iter().find(|d| d * power >= rough).unwrap_or(10.0);
     digit * power
-}
-
-fn text(s: &str) -> String {
-    s.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 #[cfg(test)]

@@ -130,18 +130,3 @@ pub fn skinned(body: &Armature, to_file: DMat3, root: &Value) -> Vec<u8> {
     });
     glb(w, document)
 }
-
-/// Encodes bytes in base64 (RFC 4648, section 4).
-pub fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::new();
-    for three in bytes.chunks(3) {
-        let bits =
-            three.iter().fold(0u32, |b, x| b << 8 | u32::from(*x)) << (8 * (3 - three.len()));
-        for k in 0..4 {
-            let letter = char::from(LETTERS[(bits >> (18 - 6 * k) & 63) as usize]);
-            out.push(if k <= three.len() { letter } else { '=' });
-        }
-    }
-    out
-}

@@ -12,6 +12,7 @@ mod networks;
 #[path = "../../fuzz/src/lib.rs"]
 mod targets;
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use common::{folder, gltf};
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage, RgbaImage};
 use pcadlang::Program;
@@ -130,7 +131,7 @@ fn bodies() -> Vec<Vec<u8>> {
     };
     let (mut within, buffer) = document();
     within["buffers"][0]["uri"] =
-        format!("data:application/octet-stream;base64,{}", gltf::base64(&buffer)).into();
+        format!("data:application/octet-stream;base64,{}", BASE64_STANDARD.encode(&buffer)).into();
     let (mut beside, _) = document();
     beside["buffers"][0]["uri"] = "x.bin".into();
     let (inside, buffer) = document();

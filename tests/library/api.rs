@@ -16,7 +16,7 @@ const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/host/entry.rs", &[], &["src/host"]),
     ("src/host/previous.rs", &[], &["src/host"]),
     ("src/scene/scene_view.rs", &[], &["src/host"]),
-    ("src/infer/host_kernel.rs", &["KernelCall"], &["src/host", "src/infer"]),
+    ("src/infer/calls/host_kernel.rs", &["KernelCall"], &["src/host", "src/infer"]),
     ("src/lang/builtins/mod.rs", &["Type"], &["src/host"]),
     ("src/lang/builtins/args.rs", &["Args"], &["src/host"]),
     ("src/lang/adjoint.rs", &["Adjoint"], &["src/host"]),

@@ -51,7 +51,7 @@ fn modules_depend_one_way() {
         ("standard", &[&["standard", "host", "scene"], &lang]),
         ("report", &[&["report", "infer"], &below]),
         ("score", &[&["score"]]),
-        ("tradeoff", &[&["tradeoff"], &below]),
+        ("tradeoff", &[&["tradeoff", "report"], &below]),
         (
             "model",
             &[

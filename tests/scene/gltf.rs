@@ -4,6 +4,7 @@
 use crate::common::folder;
 use crate::common::gltf as files;
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use files::{Writer, glb, skinned};
 use glam::{DMat3, DVec3, Vec3};
 use pcadlang::geom::armature::{Armature, JointPose, Rules, rig_from_json};
@@ -185,7 +186,7 @@ fn buffers_lie_anywhere() {
     assert_eq!(load(d.to_string().as_bytes(), &FileFrame::default(), &beside).unwrap(), inside);
     assert_eq!(read(d.to_string().as_bytes()).unwrap_err(), "cannot read a b.bin");
     d["buffers"][0]["uri"] =
-        format!("data:application/octet-stream;base64,{}", files::base64(&bytes)).into();
+        format!("data:application/octet-stream;base64,{}", BASE64_STANDARD.encode(&bytes)).into();
     assert_eq!(read(d.to_string().as_bytes()).unwrap(), inside);
     d["buffers"][0]["uri"] = "https://example.org/a.bin".into();
     assert!(read(d.to_string().as_bytes()).unwrap_err().ends_with("only files are supported"));

@@ -1,19 +1,19 @@
 //! Inline images of iTerm2, which other terminals support too: a file in base64.
 
-use pcadlang::report::html::base64;
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 
 /// Encodes a PNG for display at the cursor.
 pub fn encode(png: &[u8]) -> String {
     format!(
         "\x1b]1337;File=inline=1;size={};preserveAspectRatio=1:{}\x07\n",
         png.len(),
-        base64(png)
+        BASE64_STANDARD.encode(png)
     )
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{noise, png_of, unbase64};
+    use super::super::testing::{noise, png_of};
     use super::*;
 
     #[test]
@@ -27,6 +27,9 @@ mod tests {
             .unwrap();
         let (settings, data) = body.split_once(':').unwrap();
         assert!(settings.contains("inline=1") && settings.contains(&format!("size={}", png.len())));
-        assert_eq!(image::load_from_memory(&unbase64(data)).unwrap().to_rgb8(), picture);
+        assert_eq!(
+            image::load_from_memory(&BASE64_STANDARD.decode(data).unwrap()).unwrap().to_rgb8(),
+            picture
+        );
     }
 }

@@ -1,13 +1,13 @@
 //! The graphics protocol of kitty: a PNG in base64, in chunks of 4096 characters.
 
-use pcadlang::report::html::base64;
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 
 /// The maximum length of a chunk; the protocol requires a multiple of 4.
 const CHUNK: usize = 4096;
 
 /// Encodes a PNG for display at the cursor.
 pub fn encode(png: &[u8]) -> String {
-    let data = base64(png);
+    let data = BASE64_STANDARD.encode(png);
     let chunks: Vec<&str> =
         data.as_bytes().chunks(CHUNK).filter_map(|c| std::str::from_utf8(c).ok()).collect();
     let mut out = String::with_capacity(data.len() + 64 * chunks.len());
@@ -24,7 +24,7 @@ pub fn encode(png: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{noise, png_of, unbase64};
+    use super::super::testing::{noise, png_of};
     use super::*;
 
     #[test]
@@ -41,7 +41,8 @@ mod tests {
             assert!(chunk.len() <= CHUNK && (chunk.len() % 4 == 0));
             data += chunk;
         }
-        let back = image::load_from_memory(&unbase64(&data)).unwrap().to_rgb8();
+        let back =
+            image::load_from_memory(&BASE64_STANDARD.decode(&data).unwrap()).unwrap().to_rgb8();
         assert_eq!(back, picture);
     }
 }

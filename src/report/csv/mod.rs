@@ -18,10 +18,11 @@ mod read;
 mod stream;
 mod write;
 
+pub(crate) use names::as_written;
 pub use names::column_names;
-pub(crate) use read::named;
+pub(crate) use read::Contents;
 pub use read::{CsvError, read};
-pub use stream::{DrawReader, StreamError};
+pub use stream::DrawReader;
 pub use write::CsvSink;
 
 /// The columns about the draw itself, which come first.

@@ -47,6 +47,11 @@ fn csv_safe(name: &str) -> String {
     out
 }
 
+/// Returns these columns under the names that they have in a file.
+pub(crate) fn as_written(wanted: &[Column]) -> Vec<Column> {
+    columns(&column_names(wanted).iter().map(String::as_str).collect::<Vec<_>>())
+}
+
 /// Returns the columns of a line of names: the inverse of [`column_names`] for names that
 /// it did not change.
 pub(super) fn columns(names: &[&str]) -> Vec<Column> {

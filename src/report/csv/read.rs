@@ -1,14 +1,20 @@
-//! Reads a chain's draws.
+//! Reads a chain's draws, also while they are still being written: an incomplete last
+//! line is left out.
 
 use super::DRAW_COLUMNS;
 use super::names::columns;
-use crate::infer::draws::{Column, DrawRow, Layout, merged, width};
+use super::stream::DrawReader;
+use crate::infer::draws::{Column, DrawRow, merged, width};
 use crate::report::ChainDraws;
+use std::io::{self, BufRead, Take};
 use thiserror::Error;
 
 /// An error in a file of draws. Lines are counted from 1.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Debug, Error)]
 pub enum CsvError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
     /// The line of names does not start with the columns about the draw.
     #[error(
         "line {line}: not a file of draws by pcadlang: its columns do not start with lp__, accept_stat__, …"
@@ -37,77 +43,165 @@ pub enum CsvError {
     },
 }
 
-/// Reads the output of [`super::CsvSink`], also while it is still being written: an
-/// incomplete last line is left out.
-///
-/// # Errors
-/// Returns an error if a complete line is malformed.
-pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
-    let mut chain = ChainDraws::default();
-    let mut id = 0;
-    let mut layout: Option<(usize, Vec<Column>)> = None;
-    let finished = text.split_inclusive('\n').filter_map(|l| l.strip_suffix('\n'));
-    for (line, text) in finished.enumerate().map(|(i, l)| (i + 1, l.trim_end_matches('\r'))) {
-        if let Some(comment) = text.strip_prefix('#') {
-            if let Some((key, value)) = comment.split_once('=') {
-                let (key, value) = (key.trim(), value.trim());
-                if key == "id" {
-                    id = value.parse().unwrap_or(1_u32).saturating_sub(1);
-                }
-                chain.comments.push((key.to_owned(), value.to_owned()));
-            }
-        } else if let Some(now) = named(text) {
-            // Earlier draws lack the columns that are added later.
-            let all =
-                if chain.columns.is_empty() { now.clone() } else { merged(&chain.columns, &now) };
-            chain.widen(all);
-            layout = Some((width(&now), now));
-        } else {
-            let Some((expected, now)) = &layout else { return Err(CsvError::Columns { line }) };
-            let row = numbers(text, line, *expected)?;
-            let values = match now == &chain.columns {
-                true => row.values,
-                false => Layout::new(now, &chain.columns).apply(&row.values),
-            };
-            chain.rows.push(DrawRow { chain: id, draw: chain.rows.len() as u64, values, ..row });
+impl CsvError {
+    /// Converts the error for callers that have errors of reading and writing only.
+    pub(crate) fn into_io(self) -> io::Error {
+        match self {
+            CsvError::Io(e) => e,
+            other => io::Error::other(other),
         }
     }
-    Ok(chain)
+}
+
+/// A complete line of a file of draws.
+pub(super) enum Line<'a> {
+    /// A comment, without its `#`.
+    Comment(&'a str),
+    /// The recorded columns, from a line of names.
+    Names(Vec<Column>),
+    /// A draw.
+    Draw(Numbers<'a>),
+}
+
+/// The text of a draw, and how many recorded numbers it must have.
+pub(super) struct Numbers<'a> {
+    text: &'a str,
+    line: usize,
+    pub width: usize,
+}
+
+/// Reads the complete lines in the first bytes of a file.
+pub(super) struct Lines<R> {
+    from: Take<R>,
+    text: String,
+    /// The length of the lines read so far, in bytes.
+    pub position: u64,
+    /// The number of the lines read so far.
+    pub count: usize,
+    /// The number of recorded numbers after the last line of names.
+    width: Option<usize>,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// Creates a reader; nothing at or after byte `end` is read.
+    pub fn new(from: R, end: u64) -> Self {
+        Lines { from: from.take(end), text: String::new(), position: 0, count: 0, width: None }
+    }
+
+    /// Reads the next line; returns `None` at the end or at an incomplete line.
+    pub fn next_line(&mut self) -> Result<Option<Line<'_>>, CsvError> {
+        self.text.clear();
+        let length = self.from.read_line(&mut self.text)?;
+        let Some(text) = self.text.strip_suffix('\n') else { return Ok(None) };
+        self.position += length as u64;
+        self.count += 1;
+        let (text, line) = (text.trim_end_matches('\r'), self.count);
+        Ok(Some(if let Some(comment) = text.strip_prefix('#') {
+            Line::Comment(comment)
+        } else if let Some(columns) = named(text) {
+            self.width = Some(width(&columns));
+            Line::Names(columns)
+        } else {
+            let width = self.width.ok_or(CsvError::Columns { line })?;
+            Line::Draw(Numbers { text, line, width })
+        }))
+    }
 }
 
 /// Returns the recorded columns of a line of names; `None` for any other line.
-pub(crate) fn named(text: &str) -> Option<Vec<Column>> {
+fn named(text: &str) -> Option<Vec<Column>> {
     let names: Vec<&str> = text.split(',').collect();
     names.strip_prefix(&DRAW_COLUMNS).map(columns)
 }
 
-/// Parses a draw with `expected` recorded numbers; the chain and the number of the draw
-/// are left at 0.
-pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRow, CsvError> {
-    let parse = |s: &str| {
-        s.parse::<f64>().map_err(|_| CsvError::Number { line, text: s.chars().take(40).collect() })
-    };
-    let all = text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
-    match &all[..] {
-        [log_joint, acceptance, divergent, log_prior, log_likelihood, step, values @ ..]
-            if values.len() == expected =>
-        {
-            Ok(DrawRow {
-                chain: 0,
-                draw: 0,
-                step: *step as u64,
-                log_joint: *log_joint,
-                log_prior: *log_prior,
-                log_likelihood: *log_likelihood,
-                acceptance: *acceptance,
-                divergent: *divergent as u64,
-                values: values.to_vec(),
-            })
-        }
-        _ => {
-            Err(CsvError::Width { line, found: all.len(), expected: expected + DRAW_COLUMNS.len() })
+impl Numbers<'_> {
+    /// Parses the draw; its chain and its number are left at 0.
+    pub fn parse(&self) -> Result<DrawRow, CsvError> {
+        let line = self.line;
+        let parse = |s: &str| {
+            let not = |_| CsvError::Number { line, text: s.chars().take(40).collect() };
+            s.parse::<f64>().map_err(not)
+        };
+        let all = self.text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
+        match &all[..] {
+            [log_joint, acceptance, divergent, log_prior, log_likelihood, step, values @ ..]
+                if values.len() == self.width =>
+            {
+                Ok(DrawRow {
+                    chain: 0,
+                    draw: 0,
+                    step: *step as u64,
+                    log_joint: *log_joint,
+                    log_prior: *log_prior,
+                    log_likelihood: *log_likelihood,
+                    acceptance: *acceptance,
+                    divergent: *divergent as u64,
+                    values: values.to_vec(),
+                })
+            }
+            _ => {
+                let expected = self.width + DRAW_COLUMNS.len();
+                Err(CsvError::Width { line, found: all.len(), expected })
+            }
         }
     }
+}
+
+/// What a file of draws has beside its numbers.
+#[derive(Default)]
+pub(crate) struct Contents {
+    /// The lines of comments.
+    pub comments: String,
+    /// The union of the columns of its draws.
+    pub columns: Vec<Column>,
+    /// The number of lines of names.
+    pub heads: usize,
+    /// The number of its draws.
+    pub draws: u64,
+}
+
+impl Contents {
+    /// Reads a file without parsing its numbers.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be read, or has draws before the line of names.
+    pub fn of(from: impl BufRead) -> Result<Contents, CsvError> {
+        let mut found = Contents::default();
+        let mut lines = Lines::new(from, u64::MAX);
+        while let Some(line) = lines.next_line()? {
+            match line {
+                Line::Comment(text) => found.comments += &format!("#{text}\n"),
+                Line::Names(columns) => {
+                    found.heads += 1;
+                    found.columns = merged(&found.columns, &columns);
+                }
+                Line::Draw(_) => found.draws += 1,
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// Reads the output of [`super::CsvSink`], also while it is still being written: an
+/// incomplete last line is left out. Draws lack the columns that are added after them.
+///
+/// # Errors
+/// Returns an error if a complete line is malformed.
+pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
+    let Contents { comments, columns, .. } = Contents::of(text.as_bytes())?;
+    let pair = |line: &str| {
+        let (key, value) = line.strip_prefix('#')?.split_once('=')?;
+        Some((key.trim().to_owned(), value.trim().to_owned()))
+    };
+    let comments: Vec<(String, String)> = comments.lines().filter_map(pair).collect();
+    let id = comments.iter().find(|(key, _)| key == "id");
+    let chain = id.map_or(0, |(_, id)| id.parse().unwrap_or(1_u32).saturating_sub(1));
+    let mut reader = DrawReader::new(text.as_bytes(), &columns, u64::MAX);
+    let mut rows = Vec::new();
+    while let Some(row) = reader.next_row()? {
+        rows.push(DrawRow { chain, draw: rows.len() as u64, ..row });
+    }
+    Ok(ChainDraws { comments, columns, rows, ..ChainDraws::default() })
 }
 
 #[cfg(test)]
@@ -133,11 +227,22 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        assert_eq!(read("a,b\n1,2\n"), Err(CsvError::Columns { line: 1 }));
-        let short = format!("{HEAD}1,2,3\n");
-        assert_eq!(read(&short), Err(CsvError::Width { line: 3, found: 3, expected: 9 }));
+        let error = |text: &str| read(text).unwrap_err().to_string();
+        assert!(error("a,b\n1,2\n").starts_with("line 1: not a file of draws by pcadlang"));
+        assert_eq!(error(&format!("{HEAD}1,2,3\n")), "line 3: 3 numbers, but 9 columns");
         let word = format!("{HEAD}1,2,3,4,5,6,x,6,7\n");
-        assert_eq!(read(&word), Err(CsvError::Number { line: 3, text: "x".into() }));
+        assert_eq!(error(&word), "line 3: `x` is not a number");
         assert_eq!(read("").unwrap(), ChainDraws::default());
+    }
+
+    #[test]
+    fn a_file_is_looked_through_without_its_numbers() {
+        let more = HEAD.split_once('\n').map_or("", |(_, names)| names).replace(",v.2", ",v.2,y");
+        let text = format!("{HEAD}1,2,3,4,5,6,7,8,x\n{more}1\n# steps = 9\r\n1,2,3");
+        let found = Contents::of(text.as_bytes()).unwrap();
+        assert_eq!((found.draws, found.heads), (2, 2), "half a line is none");
+        assert_eq!(found.comments, "# id = 3\n# steps = 9\n");
+        let names: Vec<&str> = found.columns.iter().map(|c| &*c.name).collect();
+        assert_eq!(names, ["x", "v", "y"]);
     }
 }

@@ -1,84 +1,59 @@
 //! Reads draws one at a time, however many there are.
 
-use super::names::column_names;
-use super::read::{CsvError, named, numbers};
+use super::read::{CsvError, Line, Lines};
 use crate::infer::draws::{Column, DrawRow, Layout, merged, width};
-use std::io::{self, BufRead, Read};
-
-/// The reasons why the next draw cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum StreamError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// A line is malformed.
-    #[error(transparent)]
-    Csv(#[from] CsvError),
-}
+use std::io::BufRead;
 
 /// Reads the draws in the first `end` bytes of a file.
 pub struct DrawReader<R> {
-    from: R,
+    lines: Lines<R>,
     /// The columns of the returned draws, under their names in the file.
     columns: Vec<Column>,
-    position: u64,
-    end: u64,
-    line: usize,
-    text: String,
-    /// The number of numbers in the lines after the last line of names, and the positions
-    /// of these numbers in `columns`.
-    layout: Option<(usize, Layout)>,
+    /// The positions of the file's numbers in `columns`.
+    layout: Layout,
 }
 
 impl<R: BufRead> DrawReader<R> {
-    /// Creates a reader of the output of [`super::CsvSink`] with these columns, or with
-    /// fewer before more were added; nothing at or after byte `end` is read.
+    /// Creates a reader of the output of [`super::CsvSink`] with these columns, under
+    /// their names in the file, or with fewer before more were added; nothing at or after
+    /// byte `end` is read.
     pub fn new(from: R, columns: &[Column], end: u64) -> Self {
-        let names = column_names(columns);
-        let columns = super::names::columns(&names.iter().map(String::as_str).collect::<Vec<_>>());
-        DrawReader { from, columns, position: 0, end, line: 0, text: String::new(), layout: None }
+        let (columns, layout) = (columns.to_vec(), Layout::new(&[], &[]));
+        DrawReader { lines: Lines::new(from, end), columns, layout }
     }
 
     /// Returns the length of all complete lines read so far, in bytes.
     pub fn position(&self) -> u64 {
-        self.position
+        self.lines.position
     }
 
     /// Reads the next draw; returns `None` at the end or at an incomplete line.
     ///
     /// # Errors
     /// Returns an error if the file cannot be read, or a line is malformed.
-    pub fn next_row(&mut self) -> Result<Option<DrawRow>, StreamError> {
+    pub fn next_row(&mut self) -> Result<Option<DrawRow>, CsvError> {
+        let DrawReader { lines, columns, layout } = self;
         loop {
-            self.text.clear();
-            let length =
-                self.from.by_ref().take(self.end - self.position).read_line(&mut self.text)?;
-            if !self.text.ends_with('\n') {
-                return Ok(None);
-            }
-            self.position += length as u64;
-            self.line += 1;
-            let text = self.text.trim_end_matches(['\n', '\r']);
-            if text.starts_with('#') {
-                continue;
-            }
-            if let Some(now) = named(text) {
-                let wider = merged(&self.columns, &now);
-                if wider != self.columns {
-                    let (found, expected) = (width(&wider), width(&self.columns));
-                    return Err(CsvError::Width { line: self.line, found, expected }.into());
+            let line = lines.count + 1;
+            match lines.next_line()? {
+                None => return Ok(None),
+                Some(Line::Comment(_)) => {}
+                Some(Line::Names(now)) => {
+                    let wider = merged(columns, &now);
+                    if wider != *columns {
+                        let (found, expected) = (width(&wider), width(columns));
+                        return Err(CsvError::Width { line, found, expected });
+                    }
+                    *layout = Layout::new(&now, columns);
                 }
-                self.layout = Some((width(&now), Layout::new(&now, &self.columns)));
-                continue;
+                Some(Line::Draw(numbers)) => {
+                    let row = numbers.parse()?;
+                    return Ok(Some(match layout.is_same(numbers.width) {
+                        true => row,
+                        false => DrawRow { values: layout.apply(&row.values), ..row },
+                    }));
+                }
             }
-            let Some((expected, layout)) = &self.layout else {
-                return Err(CsvError::Columns { line: self.line }.into());
-            };
-            let row = numbers(text, self.line, *expected)?;
-            return Ok(Some(match layout.is_same(*expected) {
-                true => row,
-                false => DrawRow { values: layout.apply(&row.values), ..row },
-            }));
         }
     }
 }
@@ -89,7 +64,7 @@ mod tests {
 
     const TEXT: &str = "# id = 1\nlp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n-1,1,0,-2,1,5,0.5,1,2\n-3,1,0,-2,1,9,inf,1,2\n";
 
-    fn rows(text: &str, end: usize) -> Result<(usize, u64), StreamError> {
+    fn rows(text: &str, end: usize) -> Result<(usize, u64), CsvError> {
         let mut reader = DrawReader::new(
             text.as_bytes(),
             &[Column::scalar("x"), Column::vector("v", 2)],

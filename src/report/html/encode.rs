@@ -1,24 +1,7 @@
-//! Encodes the contents of a page as text: escaped text, pictures in base64 (RFC 4648),
-//! coordinates.
-
-const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-
-/// Encodes bytes in base64 with padding.
-pub fn base64(bytes: &[u8]) -> String {
-    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let at = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
-        let word = at(0) << 16 | at(1) << 8 | at(2);
-        for k in 0..4 {
-            let digit = ALPHABET[(word >> (18 - 6 * k) & 63) as usize];
-            out.push(if k > chunk.len() { '=' } else { char::from(digit) });
-        }
-    }
-    out
-}
+//! Encodes the contents of a page as text: escaped text, coordinates.
 
 /// Escapes a text for use inside an element or a quoted attribute.
-pub(super) fn escaped(text: &str) -> String {
+pub(in crate::report) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -67,16 +50,6 @@ pub(super) fn coordinates(positions: &[[f32; 3]]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn vectors_of_the_standard() {
-        for (text, code) in
-            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
-        {
-            assert_eq!(base64(text.as_bytes()), code);
-        }
-        assert_eq!(base64(&[0xfb, 0xff, 0xfe]), "+//+");
-    }
 
     #[test]
     fn coordinates_keep_four_digits_of_the_largest() {

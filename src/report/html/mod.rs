@@ -10,8 +10,7 @@ mod tables;
 
 use super::{Mode, Quantity};
 use crate::infer::draws::KernelStats;
-pub use encode::base64;
-use encode::escaped;
+pub(super) use encode::escaped;
 use std::fmt::Write;
 
 /// The contents of a page.

@@ -1,7 +1,8 @@
 //! The pictures of a page and its mesh.
 
-use super::encode::{base64, coordinates, escaped};
+use super::encode::{coordinates, escaped};
 use super::{MeshData, Page, Picture};
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use std::fmt::Write;
 
 const VIEWER: &str = include_str!("viewer.js");
@@ -9,7 +10,7 @@ const VIEWER: &str = include_str!("viewer.js");
 /// Returns the file of a picture as a `data:` URL.
 pub(super) fn source(file: &[u8]) -> String {
     let kind = if file.starts_with(b"\xff\xd8") { "jpeg" } else { "png" };
-    format!("data:image/{kind};base64,{}", base64(file))
+    format!("data:image/{kind};base64,{}", BASE64_STANDARD.encode(file))
 }
 
 pub(super) fn pictures(p: &Page) -> String {

@@ -3,6 +3,7 @@
 //! Invariant: only finite numbers are written, whatever the draws are. Draws that are not
 //! finite are not shown.
 
+use crate::report::svg::Svg;
 use crate::report::{Quantity, number};
 use std::fmt::Write;
 
@@ -20,18 +21,16 @@ const BINS: usize = 40;
 /// The number of bars of a histogram of ranks.
 const RANK_BINS: usize = 20;
 
-fn open(title: &str) -> String {
-    format!(
-        "<svg viewBox=\"0 0 {WIDTH} {WHOLE}\" width=\"{WIDTH}\" height=\"{WHOLE}\" role=\"img\"><title>{title}</title>\
-         <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" class=\"field\"/>"
-    )
+fn open(title: &str) -> Svg {
+    let mut s = Svg::inline(WIDTH, WHOLE, title);
+    s.field(WIDTH, HEIGHT, "class=\"field\"");
+    s
 }
 
 /// Writes a label below the plot, at its left or right end.
-fn label(s: &mut String, right: bool, text: &str) {
+fn label(s: &mut Svg, right: bool, text: &str) {
     let (x, anchor) = if right { (WIDTH, "end") } else { (0.0, "start") };
-    let _ =
-        write!(s, "<text x=\"{x}\" y=\"{}\" text-anchor=\"{anchor}\">{text}</text>", WHOLE - 3.0);
+    s.text((x, WHOLE - 3.0), anchor, "", text);
 }
 
 /// Returns the smallest and the largest finite draw.
@@ -59,6 +58,11 @@ fn steps(heights: &[f64]) -> String {
     path
 }
 
+/// Returns the style of a chain's line.
+fn stroke(chain: usize) -> String {
+    format!("class=\"{}\" fill=\"none\" stroke=\"currentColor\"", color(chain))
+}
+
 fn color(chain: usize) -> &'static str {
     COLORS[chain % COLORS.len()]
 }
@@ -69,30 +73,18 @@ pub(super) fn traces(q: &Quantity) -> String {
     if let Some(ends) = range(q) {
         for (c, xs) in q.chains.iter().enumerate() {
             let across = WIDTH / (xs.len().max(2) - 1) as f64;
-            let mut points = String::new();
-            for (i, x) in xs
-                .iter()
-                .enumerate()
-                .step_by(xs.len().div_ceil(POINTS).max(1))
+            let some = xs.iter().enumerate().step_by(xs.len().div_ceil(POINTS).max(1));
+            let points = some
                 .filter(|(_, x)| x.is_finite())
-            {
-                let _ = write!(
-                    points,
-                    "{:.1},{:.1} ",
-                    across * i as f64,
-                    HEIGHT - 2.0 - (HEIGHT - 4.0) * place(*x, ends)
-                );
-            }
-            let color = color(c);
-            let _ = write!(
-                s,
-                "<polyline class=\"{color}\" points=\"{points}\" fill=\"none\" stroke=\"currentColor\" stroke-width=\"0.8\"/>"
-            );
+                .map(|(i, x)| (across * i as f64, HEIGHT - 2.0 - (HEIGHT - 4.0) * place(*x, ends)));
+            let style =
+                format!("class=\"{}\" stroke=\"currentColor\" stroke-width=\"0.8\"", color(c));
+            s.line(points, &style, "");
         }
         label(&mut s, false, &format!("{} to {}", number(ends.0), number(ends.1)));
         label(&mut s, true, &format!("{} draws", q.chains.iter().map(Vec::len).max().unwrap_or(0)));
     }
-    s + "</svg>"
+    s.end()
 }
 
 /// Plots the distribution of the draws of each chain; the labels are the ends of the
@@ -111,17 +103,15 @@ pub(super) fn marginal(q: &Quantity) -> String {
         let all: Vec<_> = q.chains.iter().map(count).collect();
         let top = all.iter().flatten().copied().fold(1e-9, f64::max);
         for (c, bins) in all.iter().enumerate() {
-            let (path, color) = (steps(&bins.map(|b| HEIGHT - (HEIGHT - 4.0) * b / top)), color(c));
-            let _ = write!(
-                s,
-                "<g class=\"{color}\"><path d=\"{path}V{HEIGHT}H0Z\" fill=\"currentColor\" fill-opacity=\"0.15\"/>\
-                 <path d=\"{path}\" fill=\"none\" stroke=\"currentColor\"/></g>"
-            );
+            let path = steps(&bins.map(|b| HEIGHT - (HEIGHT - 4.0) * b / top));
+            let style = "fill=\"currentColor\" fill-opacity=\"0.15\"";
+            s.path(&format!("{path}V{HEIGHT}H0Z"), &format!("class=\"{}\" {style}", color(c)));
+            s.path(&path, &stroke(c));
         }
         label(&mut s, false, &number(ends.0));
         label(&mut s, true, &number(ends.1));
     }
-    s + "</svg>"
+    s.end()
 }
 
 /// Returns the number of each chain's draws with ranks in each bin, relative to a uniform
@@ -161,21 +151,16 @@ pub(super) fn ranks(q: &Quantity) -> String {
     // A uniform distribution is at a third of the height; values beyond the top are
     // clipped.
     let height = |share: f64| (HEIGHT - HEIGHT / 3.0 * share).max(2.0);
-    let level = height(1.0);
-    let _ =
-        write!(s, "<path d=\"M0,{level:.1}H{WIDTH}\" class=\"level\" stroke-dasharray=\"3 3\"/>");
+    let level = format!("M0,{:.1}H{WIDTH}", height(1.0));
+    s.path(&level, "class=\"level\" stroke-dasharray=\"3 3\"");
     for (c, shares) in
         rank_densities(&q.chains).iter().enumerate().filter(|(c, _)| !q.chains[*c].is_empty())
     {
-        let (path, color) = (steps(&shares.map(height)), color(c));
-        let _ = write!(
-            s,
-            "<path class=\"{color}\" d=\"{path}\" fill=\"none\" stroke=\"currentColor\"/>"
-        );
+        s.path(&steps(&shares.map(height)), &stroke(c));
     }
     label(&mut s, false, "lowest rank");
     label(&mut s, true, "highest");
-    s + "</svg>"
+    s.end()
 }
 
 #[cfg(test)]
@@ -201,7 +186,7 @@ mod tests {
         ] {
             let q = quantity(chains);
             for svg in [traces(&q), marginal(&q), ranks(&q)] {
-                assert!(svg.starts_with("<svg") && svg.ends_with("</svg>"));
+                assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
                 for data in svg.split("points=\"").skip(1).chain(svg.split(" d=\"").skip(1)) {
                     let data = data.split('"').next().unwrap();
                     assert!(!data.contains("NaN") && !data.contains("inf"), "{svg}");
@@ -220,7 +205,7 @@ mod tests {
             lines.iter().map(|l| l.split_whitespace().count()).collect::<Vec<_>>(),
             [334, 10]
         );
-        assert!(lines[0].starts_with("0.0,88.0 ") && lines[1].ends_with("260.0,45.0 "), "{svg}");
+        assert!(lines[0].starts_with("0.0,88.0 ") && lines[1].ends_with(" 260.0,45.0"), "{svg}");
         assert!(svg.contains(">0 to 999<") && svg.contains(">1000 draws<"));
         assert_eq!(marginal(&q).matches("fill=\"none\"").count(), 2);
     }

@@ -1,5 +1,5 @@
 //! Tables as text (RFC 4180): a header line, then one row per line; quoted fields may
-//! contain separators and line breaks.
+//! contain separators and line breaks. The crate `csv` splits the text.
 //!
 //! The separator is the one of comma, semicolon and tab that is most frequent in the
 //! header. A column holds numbers if all its fields are numbers, otherwise bools if all
@@ -7,10 +7,12 @@
 //! in a column of numbers is an error rather than a NaN that surfaces later.
 
 use crate::lang::value::{MOST_ELEMENTS, Record, Value};
+use csv::StringRecord;
+use std::io::Read;
 use std::sync::Arc;
 
-/// A row and its first line, counted from 1.
-type Row = (usize, Vec<String>);
+/// A row and its first byte.
+type Row = (usize, StringRecord);
 
 /// Parses a table into a record of arrays, one per column.
 pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
@@ -25,9 +27,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
         );
     }
     let rows: Vec<Row> = rows.collect();
-    if let Some((line, row)) = rows.iter().find(|(_, row)| row.len() != header.len()) {
+    if let Some((at, row)) = rows.iter().find(|(_, row)| row.len() != header.len()) {
         return Err(format!(
-            "line {line}: {} fields, but the header has {}",
+            "line {}: {} fields, but the header has {}",
+            line(text, *at),
             row.len(),
             header.len()
         ));
@@ -38,7 +41,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
         if name.is_empty() {
             return Err(format!("line 1: column {} has no name", i + 1));
         }
-        if table.insert(Arc::from(name), column(name, i, &rows)?).is_some() {
+        if table.insert(Arc::from(name), column(name, i, &rows, text)?).is_some() {
             return Err(format!("line 1: there are two columns `{name}`"));
         }
     }
@@ -46,20 +49,20 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
 }
 
 /// Converts a column to an array.
-fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
-    let fields = || rows.iter().map(|(line, row)| (*line, row.get(i).map_or("", |f| f.trim())));
+fn column(name: &str, i: usize, rows: &[Row], text: &str) -> Result<Value, String> {
+    let fields = || rows.iter().map(|(at, row)| (*at, row.get(i).map_or("", |f| f.trim())));
     let numbers: Vec<f64> = fields().filter_map(|(_, f)| f.parse().ok()).collect();
-    if let Some((line, _)) = fields().find(|(_, f)| f.parse::<f64>().is_ok_and(f64::is_nan)) {
-        return Err(format!("line {line}: column `{name}` is NaN; remove the row"));
+    if let Some((at, _)) = fields().find(|(_, f)| f.parse::<f64>().is_ok_and(f64::is_nan)) {
+        return Err(format!("line {}: column `{name}` is NaN; remove the row", line(text, at)));
     }
     if numbers.len() == rows.len() {
         return Ok(Value::array(numbers));
     }
-    if let Some((line, _)) = fields().find(|(_, f)| f.is_empty())
+    if let Some((at, _)) = fields().find(|(_, f)| f.is_empty())
         && fields().all(|(_, f)| f.is_empty() || f.parse::<f64>().is_ok())
         && !numbers.is_empty()
     {
-        return Err(format!("line {line}: column `{name}` is empty; remove the row"));
+        return Err(format!("line {}: column `{name}` is empty; remove the row", line(text, at)));
     }
     let bools: Vec<Value> = fields().filter_map(|(_, f)| f.parse().ok().map(Value::Bool)).collect();
     if bools.len() == rows.len() {
@@ -71,64 +74,50 @@ fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
 }
 
 /// The most frequent separator in the header; a comma if there is none.
-fn separator(text: &str) -> char {
+fn separator(text: &str) -> u8 {
     let header = text.lines().next().unwrap_or_default();
-    let count = |c: char| header.matches(c).count();
-    [';', '\t'].into_iter().fold(',', |best, c| if count(c) > count(best) { c } else { best })
+    let count = |c: u8| header.bytes().filter(|b| *b == c).count();
+    [b';', b'\t'].into_iter().fold(b',', |best, c| if count(c) > count(best) { c } else { best })
 }
 
 /// Splits the text into rows, without blank ones.
-fn rows(text: &str, separator: char) -> Result<Vec<Row>, String> {
-    let mut rows: Vec<Row> = Vec::new();
-    let (mut row, mut field) = (Vec::new(), String::new());
-    let (mut line, mut start) = (1, 1);
-    let mut fields = 0usize;
-    let mut chars = text.chars().peekable();
-    while let Some(c) = chars.next() {
-        match c {
-            '"' if field.is_empty() => {
-                let opened = line;
-                loop {
-                    match chars.next() {
-                        Some('"') if chars.next_if_eq(&'"').is_none() => break,
-                        Some(c) => {
-                            line += usize::from(c == '\n');
-                            field.push(c);
-                        }
-                        None => return Err(format!("line {opened}: a quoted field is not closed")),
-                    }
-                }
-            }
-            '\n' | '\r' => {
-                if c == '\r' {
-                    chars.next_if_eq(&'\n');
-                }
-                end_row(&mut rows, &mut row, &mut field, start);
-                fields += 1;
-                line += 1;
-                start = line;
-            }
-            c if c == separator => {
-                fields += 1;
-                if fields > MOST_ELEMENTS {
-                    return Err(format!("line {line}: more than {MOST_ELEMENTS} fields"));
-                }
-                row.push(std::mem::take(&mut field));
-            }
-            c => field.push(c),
+fn rows(text: &str, separator: u8) -> Result<Vec<Row>, String> {
+    // One more row at the end: a quoted field that is not closed swallows it.
+    const END: &str = "\nend";
+    let reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(text.as_bytes().chain(END.as_bytes()));
+    let (mut rows, mut fields): (Vec<Row>, usize) = (Vec::new(), 0);
+    for row in reader.into_records() {
+        let row = row.map_err(|e| e.to_string())?;
+        // The position is that before the line breaks between two rows.
+        let before = row.position().map_or(0, |p| p.byte() as usize).min(text.len());
+        let rest = text.get(before..).unwrap_or("").trim_start_matches(['\r', '\n']);
+        let at = text.len() - rest.len();
+        fields += row.len();
+        if fields > MOST_ELEMENTS {
+            return Err(format!("line {}: more than {MOST_ELEMENTS} fields", line(text, at)));
+        }
+        if row.len() != 1 || !row[0].trim().is_empty() {
+            rows.push((at, row));
         }
     }
-    end_row(&mut rows, &mut row, &mut field, start);
-    Ok(rows)
+    match rows.pop() {
+        Some((at, last)) if at < text.len() => {
+            let open = last.iter().next_back().and_then(|f| f.strip_suffix(END)).unwrap_or("");
+            let opened = line(text, text.len()) + 1 - line(open, open.len());
+            Err(format!("line {opened}: a quoted field is not closed"))
+        }
+        _ => Ok(rows),
+    }
 }
 
-fn end_row(rows: &mut Vec<Row>, row: &mut Vec<String>, field: &mut String, line: usize) {
-    if row.is_empty() && field.trim().is_empty() {
-        field.clear();
-        return;
-    }
-    row.push(std::mem::take(field));
-    rows.push((line, std::mem::take(row)));
+/// The line of a byte, counted from 1.
+fn line(text: &str, at: usize) -> usize {
+    let before = text.get(..at).unwrap_or(text).replace("\r\n", "\n");
+    1 + before.matches(['\r', '\n']).count()
 }
 
 #[cfg(test)]
@@ -152,6 +141,7 @@ mod tests {
         assert_eq!(read("\u{feff}a\tb\r\n1\t2\r\n\r\n"), "{ a: [1], b: [2] }");
         assert_eq!(read("x,y\n"), "{ x: [], y: [] }");
         assert_eq!(read("x\ninf\n"), "{ x: [inf] }");
+        assert_eq!(read("end\n1\nend"), "{ end: [\"1\", \"end\"] }");
     }
 
     #[test]
@@ -176,6 +166,11 @@ mod tests {
         assert_eq!(read("x,y\n1,2\n\n,3"), "line 4: column `x` is empty; remove the row");
         assert_eq!(read("x\n1\nnan"), "line 3: column `x` is NaN; remove the row");
         assert_eq!(read("x\n\"1"), "line 2: a quoted field is not closed");
+        assert_eq!(
+            read("x,y\r\n\"1\n2\",3\r\n\r\n4,\"5\n6,\"\"7\n"),
+            "line 5: a quoted field is not closed"
+        );
+        assert_eq!(read("x,y\r1,2\r \r3"), "line 4: 1 fields, but the header has 2");
         assert_eq!(parse(&[b'x', 0xff]).unwrap_err(), "not UTF-8 text (byte 1)");
     }
 }

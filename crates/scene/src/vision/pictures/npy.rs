@@ -1,6 +1,6 @@
-//! Reading numpy's `.npy` arrays (numpy.lib.format, versions 1.0 to 3.0): little-endian
-//! float32 and float64, uint8 and bool, in C order. `.npz` archives, other types and
-//! Fortran order are rejected with a message that says what to do.
+//! Numpy's `.npy` arrays (numpy.lib.format, versions 1.0 to 3.0): little-endian float32
+//! and float64, uint8 and bool, in C order. `.npz` archives, other types and Fortran
+//! order are rejected with a message that says what to do; float32 is written too.
 
 use crate::vision::error::{VisionError, read_bytes};
 use std::path::Path;
@@ -155,9 +155,9 @@ fn shape(text: &str) -> Result<Vec<usize>, VisionError> {
         .collect()
 }
 
-/// The bytes of a `.npy` file, for tests.
-/// Returns the bytes of a `.npy` file. The number of `values` must be the product of
-/// `shape`; otherwise numpy rejects the file, but this function does not panic.
+/// Returns the bytes of a `.npy` file of float32 (version 1.0). The number of `values`
+/// must be the product of `shape`; otherwise numpy rejects the file, but this function
+/// does not panic.
 pub fn f32_array(shape: &[usize], values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     let dims: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let mut header =
@@ -173,6 +173,7 @@ pub fn f32_array(shape: &[usize], values: impl IntoIterator<Item = f32>) -> Vec<
     out
 }
 
+/// The bytes of a `.npy` file, for tests.
 #[cfg(test)]
 pub(crate) fn bytes_of(version: u8, descr: &str, order: &str, shape: &str, body: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}\n");
