@@ -98,8 +98,8 @@ impl Trace {
     }
 
     /// Returns the point of a continuous choice in the unconstrained space and the log
-    /// Jacobian of the transform there, from which a [`Change::Free`] starts. `None` for
-    /// a discrete choice.
+    /// Jacobian of the transform there, from which a
+    /// [`Change::Free`](super::Change::Free) starts. `None` for a discrete choice.
     pub fn free(&self, t: Target) -> Option<(Vec<f64>, f64)> {
         self.free_unless(t, Support::is_discrete)
     }

@@ -104,6 +104,7 @@ pub trait Distribution: fmt::Debug + Send + Sync {
 
     /// Returns the value of a stored form.
     #[doc(hidden)]
+    #[allow(clippy::wrong_self_convention)] // The distribution is the map, not the result.
     fn from_noncentred(&self, s: &Datum) -> Datum {
         s.clone()
     }

@@ -341,7 +341,7 @@ impl Solid {
     }
 
     /// The vector-Jacobian product of [`Solid::centred`], with arguments as in
-    /// [`Solid::pull_placed`]. Returns the derivatives with respect to vertices and
+    /// [`Solid::vjp_placed`]. Returns the derivatives with respect to vertices and
     /// landmarks.
     pub fn vjp_centred(
         &self,

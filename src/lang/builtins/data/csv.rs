@@ -69,7 +69,7 @@ fn column(name: &str, i: usize, rows: &[Row], text: &str) -> Result<Value, Strin
         return Ok(Value::List(bools.into()));
     }
     Ok(Value::List(
-        rows.iter().map(|(_, row)| row.get(i).map_or(Value::Unit, |f| Value::str(f))).collect(),
+        rows.iter().map(|(_, row)| row.get(i).map_or(Value::Unit, Value::str)).collect(),
     ))
 }
 

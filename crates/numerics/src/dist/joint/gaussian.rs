@@ -113,6 +113,7 @@ impl Gaussian {
 
     /// Returns the value of a stored form. Noise of the wrong length is cut, or padded
     /// with zeros.
+    #[allow(clippy::wrong_self_convention)] // The distribution is the map, not the result.
     pub fn from_noncentred(&self, s: &Datum) -> Datum {
         if !self.whitened {
             return s.clone();
