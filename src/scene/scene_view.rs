@@ -18,14 +18,14 @@ use std::sync::Arc;
 /// /// The number of pixels that a solid covers, observed with some noise: a comparator with a gradient.
 /// #[derive(Debug)]
 /// struct Area {
-///     scene_view: SceneView,
+///     view: SceneView,
 ///     sd: f64,
 /// }
 ///
 /// impl Area {
 ///     fn off(&self, observed: &Value) -> Result<f64, String> {
 ///         let Value::Num(wanted) = observed else { return Err("an area is a number".into()) };
-///         Ok((self.scene_view.mask(64).iter().filter(|covered| **covered).count() as f64 - wanted) / self.sd)
+///         Ok((self.view.mask(64).iter().filter(|covered| **covered).count() as f64 - wanted) / self.sd)
 ///     }
 /// }
 ///
@@ -37,20 +37,20 @@ use std::sync::Arc;
 ///         self.off(observed).map(|z| -0.5 * z * z)
 ///     }
 ///     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
-///         let (width, height) = self.scene_view.size(64);
+///         let (width, height) = self.view.size(64);
 ///         let each = -self.off(observed).ok()? / self.sd;
-///         let by_view = self.scene_view.by_mask(64, &vec![each; (width * height) as usize]);
+///         let by_view = self.view.by_mask(64, &vec![each; (width * height) as usize]);
 ///         Some(Adjoint::List(vec![by_view, Adjoint::Unknown]))
 ///     }
 /// }
 ///
-/// let area = Entry::likelihood("area", |a| Ok(Area { scene_view: SceneView::of(a, 0)?, sd: a.positive_or(1, 20.0)? }))
-///     .argument("view", Type::Object("a view"), "What is scene_view.")
+/// let area = Entry::likelihood("area", |a| Ok(Area { view: SceneView::of(a, 0)?, sd: a.positive_or(1, 20.0)? }))
+///     .argument("view", Type::Object("a view"), "What is seen.")
 ///     .optional("sd", Type::Num, 20.0, "The noise.").unit("pixels");
 /// let text = r#"include "std/scene.pcad" as scene;
 ///     assume size ~ uniform(0.3, 2);
 ///     let ball = scene.affine(scale = size) * scene.sphere(1);
-///     observe area(scene.render(ball)) = 800 as scene_view;
+///     observe area(scene.render(ball)) = 800 as seen;
 ///     infer { warmup 60 { hmc(@size, steps = 3); } repeat 60 { hmc(@size, steps = 3); } }"#;
 /// let model = Program::parse(text)?.host(&Host::new().with(area))?.compile()?;
 /// let size = model.run(&Default::default(), 1, 1)?.quantity("size").unwrap().summary.mean;
@@ -99,16 +99,16 @@ impl SceneView {
     /// use pcadlang::host::{Entry, Host, SceneView, Type};
     /// use pcadlang::{Program, Value};
     /// let outline = Entry::function("outline", |a| {
-    ///     let scene_view = SceneView::of(a, 0)?;
-    ///     let nearest = scene_view.depth(64).into_iter().fold(f32::INFINITY, f32::min);
+    ///     let view = SceneView::of(a, 0)?;
+    ///     let nearest = view.depth(64).into_iter().fold(f32::INFINITY, f32::min);
     ///     assert!((6.9..7.1).contains(&nearest));
-    ///     let pieces = scene_view.contours(64);
+    ///     let pieces = view.contours(64);
     ///     // The derivative of the sum of the lengths with respect to each is 1.
-    ///     let by_view = scene_view.by_contours(64, &vec![[0.0, 0.0, 1.0, 0.0]; pieces.len()]);
+    ///     let by_view = view.by_contours(64, &vec![[0.0, 0.0, 1.0, 0.0]; pieces.len()]);
     ///     assert!(!by_view.is_zero());
     ///     Ok(Value::Num(pieces.iter().map(|p| p[2]).sum()))
     /// })
-    /// .argument("view", Type::Object("a view"), "What is scene_view.");
+    /// .argument("view", Type::Object("a view"), "What is seen.");
     /// let text = r#"include "std/scene.pcad" as scene;
     ///     assume shift ~ normal(0, 0.01);
     ///     observe normal(outline(scene.render(scene.affine(translate = [shift, 0, 0]) * scene.sphere(1))), 1) = 90;"#;

@@ -204,8 +204,8 @@ impl<'a> Reverse<'a> {
             };
             match self.marks[input as usize] {
                 Mark::Unseen | Mark::Target => self.open(input, &mut stack),
-                savepoint => {
-                    *active |= savepoint == Mark::Active;
+                mark => {
+                    *active |= mark == Mark::Active;
                     *next += 1;
                 }
             }

@@ -91,7 +91,7 @@ impl Trace {
                 return Ok(false);
             }
             enumerated = true;
-            match g.enumeration(&self.code, enumeration, dist, v, power) {
+            match g.log_weight_of(&self.code, enumeration, dist, v, power) {
                 Ok(w) => weight(Some(w)),
                 Err(Obstacle::Fault(e)) if e.is_recoverable() => weight(None),
                 Err(_) => return Ok(false),
@@ -169,7 +169,7 @@ impl Graph {
     }
 
     /// Returns the log weight of a value of the choice relative to the current one.
-    fn enumeration(
+    fn log_weight_of(
         &self,
         code: &Code,
         enumeration: &mut Enumeration,
