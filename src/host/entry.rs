@@ -5,8 +5,9 @@ use super::checked::Checked;
 use crate::dist::{Dist, Distribution};
 use crate::infer::{Kernel, KernelCall, KernelMaker};
 use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::data::{self, DataFormat};
 use crate::lang::builtins::{
-    Args, Argument, Builtin, Derivative, HostItem, PreviousEvaluation, Row, State, Type,
+    Args, Argument, Builtin, Derivative, HostItem, Kind, PreviousEvaluation, Row, State, Type,
 };
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Likelihood, Value};
@@ -159,6 +160,69 @@ impl Entry {
     ) -> Entry {
         let make = move |a: &Args| make(a).map(|l| Value::Likelihood(Arc::new(l)));
         Entry::new(name, "Comparing", Type::Likelihood, HostItem::Likelihood(Arc::new(make)))
+    }
+
+    /// A kind of data files: what may stand after the colon of `data d: kind;`. Its first
+    /// argument is the file; further ones are options of the format.
+    ///
+    /// ```
+    /// use pcadlang::host::{Beside, DataFormat, DataOptions, Entry, Fault, FaultKind, Host, Type};
+    /// use pcadlang::{Program, Value};
+    /// use std::sync::Arc;
+    /// /// One number a line.
+    /// #[derive(Debug)]
+    /// struct Numbers;
+    /// impl DataFormat for Numbers {
+    ///     fn load(
+    ///         &self,
+    ///         file: &str,
+    ///         bytes: &[u8],
+    ///         _: &DataOptions,
+    ///         _: &Beside,
+    ///     ) -> Result<Value, Fault> {
+    ///         let numbers: Result<Vec<f64>, _> =
+    ///             String::from_utf8_lossy(bytes).lines().map(str::parse).collect();
+    ///         numbers
+    ///             .map(Value::array)
+    ///             .map_err(|e| Fault::new(FaultKind::Other, format!("{file}: {e}")))
+    ///     }
+    /// }
+    /// let host = Host::new().with(
+    ///     Entry::data("numbers", Type::Array, Arc::new(Numbers)).about("Numbers, one a line."),
+    /// );
+    /// let file = std::env::temp_dir().join(format!("numbers-{}.txt", std::process::id()));
+    /// std::fs::write(&file, "1\n2.5\n").unwrap();
+    /// let text = "data d: numbers; predict x ~ normal(sum(d), 1);";
+    /// let program = Program::parse(text)?.host(&host)?;
+    /// assert!(program.clone().observe_file("d", &file.to_string_lossy())?.compile().is_ok());
+    /// std::fs::write(&file, "1\ntwo\n").unwrap();
+    /// let wrong = program.observe_file("d", &file.to_string_lossy()).err().unwrap();
+    /// assert!(wrong.to_string().contains("invalid float literal"));
+    /// std::fs::remove_file(&file).unwrap();
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn data(
+        name: impl Into<Cow<'static, str>>,
+        returns: Type,
+        format: Arc<dyn DataFormat>,
+    ) -> Entry {
+        let builtin = Builtin {
+            name: name.into(),
+            module: "".into(),
+            section: data::SECTION.into(),
+            args: [].into(),
+            variadic: false,
+            returns,
+            doc: "Of the host.".into(),
+            kind: Kind::Function(data::not_an_expression),
+            scalar: None,
+            derivative: Derivative::Unknown,
+            host: None,
+            format: Some(format),
+            example: None,
+        };
+        let entry = Entry { builtin, replaces: false, wrong: None };
+        entry.argument("file", Type::Str, "The path, relative to the program's folder.")
     }
 
     /// Creates a kernel for `infer` blocks; `make` maps the call as written to a kernel.

@@ -40,7 +40,9 @@ pub use crate::infer::KernelCall;
 #[doc(inline)]
 pub use crate::lang::adjoint::Adjoint;
 #[doc(inline)]
-pub use crate::lang::builtins::{Args, Type};
+pub use crate::lang::builtins::data::{Beside, DataFormat, Literal, Options as DataOptions};
+#[doc(inline)]
+pub use crate::lang::builtins::{Args, Defaults, InputHook, Type};
 #[doc(inline)]
 pub use crate::lang::error::{Fault, FaultKind};
 #[doc(inline)]
@@ -49,7 +51,7 @@ pub use entry::Entry;
 pub use previous::Previous;
 
 use crate::diag::{Diagnostic, Error, Severity, SourceMap};
-use crate::lang::builtins::{Builtin, InputHook, Table};
+use crate::lang::builtins::{Builtin, Table};
 use crate::syntax::{is_keyword, is_name};
 use std::sync::Arc;
 
@@ -73,8 +75,31 @@ impl Host {
         self
     }
 
-    /// The same with what prepares the inputs of programs.
-    pub(crate) fn hook(mut self, hook: Arc<dyn InputHook>) -> Host {
+    /// Adds a hook that prepares the inputs of programs before they are compiled.
+    ///
+    /// ```
+    /// use indexmap::IndexMap;
+    /// use pcadlang::host::{Defaults, Host, InputHook};
+    /// use pcadlang::{Program, Value};
+    /// use std::sync::Arc;
+    /// /// Gives programs the number of seconds in a day as `day`, unless they have one.
+    /// #[derive(Debug)]
+    /// struct Day;
+    /// impl InputHook for Day {
+    ///     fn prepare(&self, data: &mut IndexMap<String, Value>, _: &mut Defaults) {
+    ///         data.entry("day".into()).or_insert(Value::Num(86_400.0));
+    ///     }
+    ///     fn adapt(&self, value: Value, _: &Defaults) -> Value {
+    ///         value
+    ///     }
+    /// }
+    /// let host = Host::new().hook(Arc::new(Day));
+    /// let model = Program::parse("data day; predict t ~ uniform(0, day);")?.host(&host)?.compile()?;
+    /// assert!(model.simulate(1, 0).is_ok());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    #[must_use]
+    pub fn hook(mut self, hook: Arc<dyn InputHook>) -> Host {
         self.hooks.push(hook);
         self
     }

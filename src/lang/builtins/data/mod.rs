@@ -17,7 +17,7 @@ use crate::lang::value::Value;
 use std::fmt;
 use std::sync::Arc;
 
-const SECTION: &str = "Data files";
+pub(crate) const SECTION: &str = "Data files";
 
 /// Reads a file by its path relative to that of another, or says why it cannot.
 pub type Beside<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
@@ -105,7 +105,7 @@ pub(crate) fn unreadable(file: &str, why: &str) -> Fault {
     Fault::new(FaultKind::Other, format!("{file}: {why}"))
 }
 
-fn not_an_expression(a: &Args) -> Result<Value, Fault> {
+pub(crate) fn not_an_expression(a: &Args) -> Result<Value, Fault> {
     let name = &a.builtin.name;
     let message = format!("{name}: only `data` items can read files");
     Err(Fault::new(FaultKind::Other, message)
