@@ -13,7 +13,8 @@ use std::sync::Arc;
 /// once per size. `longer` is the longer side of the picture in pixels.
 ///
 /// ```
-/// use pcadlang::host::{Adjoint, Entry, Host, Likelihood, SceneView, Type};
+/// use pcadlang::host::{Adjoint, Entry, Host, Likelihood, Type};
+/// use pcadlang::scene::SceneView;
 /// use pcadlang::{Program, Value};
 /// /// The number of pixels that a solid covers, observed with some noise: a comparator with a gradient.
 /// #[derive(Debug)]
@@ -96,8 +97,9 @@ impl SceneView {
     /// radians, measured from right towards down.
     ///
     /// ```
-    /// use pcadlang::host::{Entry, Host, SceneView, Type};
-    /// use pcadlang::{Program, Value};
+    /// use pcadlang::host::{Entry, Host, Type};
+    /// use pcadlang::scene::SceneView;
+/// use pcadlang::{Program, Value};
     /// let outline = Entry::function("outline", |a| {
     ///     let view = SceneView::of(a, 0)?;
     ///     let nearest = view.depth(64).into_iter().fold(f32::INFINITY, f32::min);
