@@ -99,7 +99,7 @@ impl SceneView {
     /// ```
     /// use pcadlang::host::{Entry, Host, Type};
     /// use pcadlang::scene::SceneView;
-/// use pcadlang::{Program, Value};
+    /// use pcadlang::{Program, Value};
     /// let outline = Entry::function("outline", |a| {
     ///     let view = SceneView::of(a, 0)?;
     ///     let nearest = view.depth(64).into_iter().fold(f32::INFINITY, f32::min);
