@@ -151,7 +151,7 @@ impl Entry {
 
     /// Creates a family of likelihoods; `make` maps the arguments to a likelihood, which
     /// scores the observed value. A comparator is a likelihood with a view as an argument
-    /// (see [`SceneView`](crate::scene::SceneView)).
+    /// (see `SceneView` of the module `scene`).
     ///
     /// [`Likelihood::gradient`] is a list: the adjoint of each argument in turn.
     pub fn likelihood<L: Likelihood + 'static>(

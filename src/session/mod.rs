@@ -351,6 +351,3 @@ impl From<Error> for Trouble {
         Trouble::Program(Box::new(e))
     }
 }
-
-#[cfg(test)]
-mod tests;

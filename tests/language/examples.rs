@@ -21,8 +21,26 @@ fn files() -> Folder {
     f.write("model.yml.gz", forests::gzip(forests::small().yaml().as_bytes()));
     f.write("person.json", include_str!("../../examples/images/skier.keypoints.json"));
     f.succeeds(&["contours", "ball.png", "-o", "contours.png"]);
+    // Shipped files are found by their names from the current folder alone, which tests of
+    // one program share.
+    for folder in ["data", "std/human"] {
+        std::fs::create_dir_all(f.path().join(folder)).unwrap();
+    }
+    for name in SHIPPED {
+        f.write(name, pcadlang::lang::load::embedded(name).unwrap());
+    }
     f
 }
+
+/// The shipped files that examples read.
+const SHIPPED: [&str; 6] = [
+    "data/line.csv",
+    "data/dog.obj",
+    "std/human/pose_prior.json",
+    "std/human/human.lod2.obj",
+    "std/human/human.lod2.rig.json",
+    "std/human/human.lod2.morphs.json",
+];
 
 /// Splits an example into an expression and its stated value; `None` if it is a program.
 fn expression(example: &str) -> Option<(&str, &str)> {

@@ -1,1 +1,0 @@
-//! Tests of sessions, used as by a front end.
