@@ -40,6 +40,7 @@ pub use calls::selection::selected;
 pub use chains::run_chains;
 #[doc(hidden)]
 pub use default_plan::default_plan;
+#[cfg(feature = "scene")]
 pub(crate) use force::put as force;
 pub use gather::best::{BestSoFar, BestState};
 #[doc(hidden)]
@@ -49,6 +50,7 @@ pub use gather::kept::{KeptTrace, KeptTraces};
 pub(crate) use init::attempts;
 #[doc(hidden)]
 pub use init::{Start, StartError, starts};
+#[cfg(feature = "scene")]
 pub(crate) use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
 #[doc(hidden)]
