@@ -101,16 +101,7 @@ fn view(solid: &Solid, size: u32, detail: f64) -> View {
 /// diagonal.
 fn rho(chamfer: &Chamfer, view: &View, size: u32) -> f64 {
     let c = view.contours(size);
-    let elements = Elements {
-        x: &c.x,
-        y: &c.y,
-        tx: &c.tx,
-        ty: &c.ty,
-        length: &c.length,
-        width: c.width,
-        height: c.height,
-    };
-    chamfer.distance(&elements)
+    chamfer.distance(&Elements::of(&c))
 }
 
 fn map(view: &View, size: u32) -> ContourMap {

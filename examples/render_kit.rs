@@ -146,18 +146,6 @@ fn placed(solid: &Solid, pose: &Pose) -> Solid {
     solid.placed(Affine(DAffine3 { matrix3, translation: column(3) }))
 }
 
-fn elements(c: &Contours) -> Elements<'_> {
-    Elements {
-        x: &c.x,
-        y: &c.y,
-        tx: &c.tx,
-        ty: &c.ty,
-        length: &c.length,
-        width: c.width,
-        height: c.height,
-    }
-}
-
 fn ours(
     case: &Case<'_>,
     solid: &Solid,
@@ -187,7 +175,7 @@ fn ours(
     let mut scratch = Scratch::default();
     let mut likelihood = |solid: &Solid| {
         let contours = Contours::of(solid, &camera);
-        std::hint::black_box(chamfer.log_likelihood_with(&elements(&contours), &mut scratch));
+        std::hint::black_box(chamfer.log_likelihood_with(&Elements::of(&contours), &mut scratch));
     };
     case.measure("pcadlang", "likelihood", "", |i| likelihood(&at(i)));
     let Some(mesh) = solid.instances().first().map(|i| Arc::clone(&i.mesh)) else { return Ok(()) };
@@ -200,7 +188,8 @@ fn ours(
         }
         let view =
             |i: usize| View::with_detail(placed(&lasting, &poses[i % poses.len()]), camera, detail);
-        let rho = |c: &Contours| chamfer.distance(&elements(c)) * elements(c).diagonal() / 100.0;
+        let rho =
+            |c: &Contours| chamfer.distance(&Elements::of(c)) * Elements::of(c).diagonal() / 100.0;
         let off = |i: usize| {
             (rho(&view(i).contours(case.size)) - rho(&Contours::of(&at(i), &camera))).abs()
         };
@@ -211,7 +200,7 @@ fn ours(
             format!(",\"distance_off_px_median\":{median:.3},\"distance_off_px_most\":{most:.3}");
         case.measure(peer, "likelihood", &extra, |i| {
             let contours = view(i).contours(case.size);
-            std::hint::black_box(chamfer.log_likelihood(&elements(&contours)));
+            std::hint::black_box(chamfer.log_likelihood(&Elements::of(&contours)));
         });
     }
     let shapes: Vec<Vec<Vec3>> = (0..16).map(|k| deformed(&mesh, k)).collect();

@@ -6,10 +6,8 @@ use std::sync::{Arc, LazyLock};
 static TABLE: LazyLock<Arc<Table>> = LazyLock::new(|| {
     let language = Table::default();
     #[cfg(feature = "scene")]
-    let table = crate::scene::host().table(&language).unwrap_or_else(|_| Arc::new(language));
-    #[cfg(not(feature = "scene"))]
-    let table = Arc::new(language);
-    table
+    let language = crate::scene::host().added_to(&language);
+    Arc::new(language)
 });
 
 /// The table of all built-ins, without those of hosts.

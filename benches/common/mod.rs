@@ -12,8 +12,6 @@ use criterion::Criterion;
 use glam::{DVec3, Vec3};
 use image::imageops::{FilterType, resize};
 use pcadlang::geom::{Affine, Mesh, Solid};
-use pcadlang::render::Contours;
-use pcadlang::vision::elements::Elements;
 use pcadlang::vision::{Limits, Photo, photo};
 use std::path::Path;
 use std::sync::Arc;
@@ -82,17 +80,4 @@ pub fn photograph(side: u32) -> Photo {
     let photo = photo::load(&picture("skier.jpg"), &Limits::default()).expect("a photograph");
     Photo::from_rgb(resize(photo.rgb(), side, side, FilterType::Triangle))
         .expect("a photograph with pixels")
-}
-
-/// Converts contours to the form that comparators take.
-pub fn elements(c: &Contours) -> Elements<'_> {
-    Elements {
-        x: &c.x,
-        y: &c.y,
-        tx: &c.tx,
-        ty: &c.ty,
-        length: &c.length,
-        width: c.width,
-        height: c.height,
-    }
 }

@@ -4,7 +4,7 @@ use super::{BankError, command};
 use crate::Model;
 use crate::infer::in_parallel;
 use crate::lang::value::Value;
-use crate::render::{BatchRenderer, ContourSlice, Contours, Scene, View};
+use crate::render::{BatchRenderer, Scene, View};
 use crate::report::pictures::{Drawn, shaded};
 use crate::scene::{ImageValue, KeypointsValue, ViewValue};
 use crate::vision::Elements;
@@ -45,7 +45,7 @@ impl Features {
         match self {
             Features::Contours { size } => {
                 let contours = view.contours(*size);
-                Ok(features::contour_features(&features::rendered(&elements(&contours))))
+                Ok(features::contour_features(&features::rendered(&Elements::of(&contours))))
             }
             Features::Keypoints { .. } => {
                 let (width, height) = (view.camera().width, view.camera().height);
@@ -91,8 +91,7 @@ impl Features {
         let scenes: Vec<Scene> = views.iter().map(|view| view.scene(*size)).collect();
         let batch = renderer.contours(&scenes);
         in_parallel(threads, (0..batch.len()).collect(), |i| {
-            let ContourSlice { x, y, tx, ty, length, width, height } = batch.scene(i);
-            let elements = Elements { x, y, tx, ty, length, width, height };
+            let elements = Elements::from(batch.scene(i));
             Ok(features::contour_features(&features::rendered(&elements)))
         })
     }
@@ -106,18 +105,6 @@ impl Features {
             }
             other => other,
         }
-    }
-}
-
-fn elements(c: &Contours) -> Elements<'_> {
-    Elements {
-        x: &c.x,
-        y: &c.y,
-        tx: &c.tx,
-        ty: &c.ty,
-        length: &c.length,
-        width: c.width,
-        height: c.height,
     }
 }
 

@@ -4,6 +4,7 @@ use clap::Args;
 use pcadlang::lang::value::Value;
 use pcadlang::people::Person;
 use pcadlang::scene::ImageValue;
+use pcadlang::vision::keypoints::COCO;
 use std::path::PathBuf;
 
 /// Which person of a photograph is meant, and what finds people.
@@ -38,20 +39,7 @@ fn rectangle(text: &str) -> Result<[f64; 4], String> {
 
 /// The joints of a body; landmarks of faces and hands are left out, since they would
 /// outnumber them.
-const BODY: [&str; 12] = [
-    "l_shoulder",
-    "r_shoulder",
-    "l_elbow",
-    "r_elbow",
-    "l_wrist",
-    "r_wrist",
-    "l_hip",
-    "r_hip",
-    "l_knee",
-    "r_knee",
-    "l_ankle",
-    "r_ankle",
-];
+const BODY: &[&str] = COCO.split_at(5).1;
 
 /// The networks' confidence is below this for most false detections, and for few people
 /// (docs/measurements/detectors.md).

@@ -36,6 +36,18 @@ impl Entry {
         host: HostItem,
     ) -> Entry {
         let (kind, derivative) = host.entry();
+        let mut entry = Entry::bare(name, section, returns, kind);
+        (entry.builtin.derivative, entry.builtin.host) = (derivative, Some(host));
+        entry
+    }
+
+    /// An entry without arguments, with nothing of the host's behind it yet.
+    fn bare(
+        name: impl Into<Cow<'static, str>>,
+        section: &'static str,
+        returns: Type,
+        kind: Kind,
+    ) -> Entry {
         let builtin = Builtin {
             name: name.into(),
             module: "".into(),
@@ -46,8 +58,8 @@ impl Entry {
             doc: "Of the host.".into(),
             kind,
             scalar: None,
-            derivative,
-            host: Some(host),
+            derivative: Derivative::Unknown,
+            host: None,
             format: None,
             example: None,
         };
@@ -206,22 +218,9 @@ impl Entry {
         returns: Type,
         format: Arc<dyn DataFormat>,
     ) -> Entry {
-        let builtin = Builtin {
-            name: name.into(),
-            module: "".into(),
-            section: data::SECTION.into(),
-            args: [].into(),
-            variadic: false,
-            returns,
-            doc: "Of the host.".into(),
-            kind: Kind::Function(data::not_an_expression),
-            scalar: None,
-            derivative: Derivative::Unknown,
-            host: None,
-            format: Some(format),
-            example: None,
-        };
-        let entry = Entry { builtin, replaces: false, wrong: None };
+        let kind = Kind::Function(data::not_an_expression);
+        let mut entry = Entry::bare(name, data::SECTION, returns, kind);
+        entry.builtin.format = Some(format);
         entry.argument("file", Type::Str, "The path, relative to the program's folder.")
     }
 

@@ -104,6 +104,13 @@ impl Host {
         self
     }
 
+    /// These built-ins and the host's, unchecked.
+    pub(crate) fn added_to(&self, own: &Table) -> Table {
+        let mut table = own.clone().with(self.entries.iter().map(|e| Builtin::clone(&e.builtin)));
+        table.hooks.extend(self.hooks.iter().cloned());
+        table
+    }
+
     /// These built-ins and the host's.
     ///
     /// # Errors
@@ -140,12 +147,7 @@ impl Host {
             e.check_arguments().into_iter().for_each(|message| wrong(message, ""));
         }
         match diagnostics.is_empty() {
-            true => {
-                let entries = self.entries.iter().map(|e| Builtin::clone(&e.builtin));
-                let mut table = own.clone().with(entries);
-                table.hooks.extend(self.hooks.iter().cloned());
-                Ok(Arc::new(table))
-            }
+            true => Ok(Arc::new(self.added_to(own))),
             false => Err(Error { diagnostics, sources: SourceMap::new() }),
         }
     }

@@ -261,6 +261,7 @@ impl Program {
         }
         let adapted =
             |v: Value| builtins.hooks.iter().fold(v, |v, hook| hook.adapt(v, &self.defaults));
+        self.data.values_mut().for_each(|v| *v = adapted(v.clone()));
         let (reach, files) = (&self.reach, &*self.files);
         let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {

@@ -7,7 +7,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Arg, ArgAdjoints, Args, Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::{Change, Contours, Frame, View};
+use crate::render::{Change, Frame, View};
 use crate::rng::Stream;
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
@@ -185,18 +185,6 @@ pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.vjp_mask(size, gains) }.into_adjoint()
 }
 
-fn elements(c: &Contours) -> Elements<'_> {
-    Elements {
-        x: &c.x,
-        y: &c.y,
-        tx: &c.tx,
-        ty: &c.ty,
-        length: &c.length,
-        width: c.width,
-        height: c.height,
-    }
-}
-
 /// Returns the observed image, if its aspect ratio matches that of the view's picture.
 pub(super) fn image<'a>(
     observed: &'a Value,
@@ -264,9 +252,9 @@ fn step(change: &Change) -> ContourDelta<'_> {
     ContourDelta {
         from,
         to,
-        removed: elements(removed),
-        added: elements(added),
-        moving: elements(moving),
+        removed: Elements::of(removed),
+        added: Elements::of(added),
+        moving: Elements::of(moving),
         count: *count,
     }
 }
@@ -299,14 +287,15 @@ impl Likelihood for ContourOf {
         let ratio = self.prepared(observed)?;
         if let Some(change) = &*self.view.change(self.size) {
             let whole = OnceCell::new();
-            let whole = || elements(whole.get_or_init(|| self.view.contours(self.size)));
+            let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
             return Ok(RATIOS.with_borrow_mut(|known| {
                 ratio.log_likelihood_after(&step(change), whole, known.of(&ratio))
             }));
         }
         let contours = self.view.contours(self.size);
-        Ok(RATIO
-            .with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
+        Ok(RATIO.with_borrow_mut(|scratch| {
+            ratio.log_likelihood_with(&Elements::of(&contours), scratch)
+        }))
     }
 
     /// With respect to the view.
@@ -314,7 +303,7 @@ impl Likelihood for ContourOf {
         let (ratio, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
         RATIO.with_borrow_mut(|scratch| {
-            ratio.gradient(&elements(&contours), scratch, &mut by_piece)
+            ratio.gradient(&Elements::of(&contours), scratch, &mut by_piece)
         });
         Some(by_contours(&self.view, self.size, &by_piece))
     }
@@ -362,12 +351,12 @@ impl Likelihood for ChamferOf {
         CHAMFER.with_borrow_mut(|scratch| {
             if let Some(change) = &*self.view.change(self.size) {
                 let whole = OnceCell::new();
-                let whole = || elements(whole.get_or_init(|| self.view.contours(self.size)));
+                let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
                 return Ok(CHAMFERS.with_borrow_mut(|known| {
                     chamfer.log_likelihood_after(&step(change), whole, known.of(&chamfer), scratch)
                 }));
             }
-            Ok(chamfer.log_likelihood_with(&elements(&self.view.contours(self.size)), scratch))
+            Ok(chamfer.log_likelihood_with(&Elements::of(&self.view.contours(self.size)), scratch))
         })
     }
 
@@ -376,7 +365,7 @@ impl Likelihood for ChamferOf {
         let (chamfer, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
         let by_sigma = CHAMFER.with_borrow_mut(|scratch| {
-            chamfer.gradient(&elements(&contours), scratch, &mut by_piece)
+            chamfer.gradient(&Elements::of(&contours), scratch, &mut by_piece)
         });
         Some(Adjoint::List(vec![
             by_contours(&self.view, self.size, &by_piece),

@@ -20,7 +20,6 @@ pub(super) struct Inputs;
 impl InputHook for Inputs {
     fn prepare(&self, data: &mut IndexMap<String, Value>, defaults: &mut Defaults) {
         default_camera(data, defaults);
-        data.values_mut().for_each(|v| *v = self.adapt(v.clone(), defaults));
     }
 
     /// Photographs get the contours of the detector that the run chose, if it chose one.
@@ -60,9 +59,9 @@ fn default_camera(data: &mut IndexMap<String, Value>, defaults: &mut Defaults) {
     let keypoints =
         || data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()));
     if let Some((width, height)) = picture.or_else(keypoints) {
-        let camera = CameraValue(Camera::default_for(width, height));
+        let camera = Value::object(CameraValue(Camera::default_for(width, height)));
         for of in CAMERAS {
-            defaults.insert(owned(of), Value::object(CameraValue(camera.0)));
+            defaults.insert(owned(of), camera.clone());
         }
     }
 }

@@ -31,18 +31,7 @@ fn to(c: &Contours) -> impl Fn(&Contours) -> f64 {
         ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(SIZE, SIZE) };
     let chamfer = Chamfer::prepare(&map, SIZE, SIZE, &ChamferOptions::default()).unwrap();
     let pixels = f64::from(SIZE) * 2f64.sqrt() / 100.0;
-    move |c| {
-        let elements = Elements {
-            x: &c.x,
-            y: &c.y,
-            tx: &c.tx,
-            ty: &c.ty,
-            length: &c.length,
-            width: c.width,
-            height: c.height,
-        };
-        chamfer.distance(&elements) * pixels
-    }
+    move |c| chamfer.distance(&Elements::of(c)) * pixels
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 
+mod drawn;
 pub mod geom;
 pub mod render;
 pub mod vision;

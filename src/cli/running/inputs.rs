@@ -2,7 +2,6 @@
 
 use crate::cli::args::{Inputs, Job};
 use crate::cli::{Failure, files, plain};
-use image::DynamicImage;
 use pcadlang::Program;
 use pcadlang::lang::builtins::data::Options;
 use pcadlang::lang::value::Value;
@@ -91,9 +90,7 @@ pub fn observe(
         program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
     if let Some(path) = &job.observe_contours {
-        let map = ContourMap::from_image(
-            &DynamicImage::from(files::photo(path)?.rgb().clone()).to_luma8(),
-        );
+        let map = ContourMap::from_photo(&files::photo(path)?);
         let name = match &image {
             Some((name, _)) => name.clone(),
             None => only(&program, "image", "--observe")?,

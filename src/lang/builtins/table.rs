@@ -83,7 +83,7 @@ pub trait InputHook: fmt::Debug + Send + Sync {
     /// Completes the `data` items that were given and the defaults of arguments.
     fn prepare(&self, data: &mut IndexMap<String, Value>, defaults: &mut Defaults);
 
-    /// Adapts a value that a `data` item reads from a file.
+    /// Adapts the value of a `data` item, whether it was given or is read from a file.
     fn adapt(&self, value: Value, defaults: &Defaults) -> Value;
 }
 

@@ -142,9 +142,8 @@ fn image(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {
 }
 
 fn contours(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {
-    let photo = photo::decode(bytes, limits)?;
-    let grey = image::DynamicImage::from(photo.rgb().clone()).to_luma8();
-    Ok(Value::object(ImageValue::contours(ContourMap::from_image(&grey), None)))
+    photo::decode(bytes, limits)
+        .map(|p| Value::object(ImageValue::contours(ContourMap::from_photo(&p), None)))
 }
 
 fn mask(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {

@@ -4,7 +4,8 @@
 use crate::vision::detect::gradient::{principal, smoothed};
 use crate::vision::detect::nms::{EdgePoint, ridge_offset};
 use crate::vision::detect::thin::thinned;
-use image::{GrayImage, Luma};
+use crate::vision::pictures::photo::Photo;
+use image::{DynamicImage, GrayImage, Luma};
 
 /// Contour points of a picture. The five lists have the same length; all numbers are
 /// finite.
@@ -63,6 +64,11 @@ impl ContourMap {
             map.push(p.x, p.y, p.normal, strength(p.magnitude));
         }
         map
+    }
+
+    /// Reads a finished contour map from a decoded picture, by its brightness.
+    pub fn from_photo(picture: &Photo) -> Self {
+        ContourMap::from_image(&DynamicImage::from(picture.rgb().clone()).to_luma8())
     }
 
     /// Reads a finished contour map (bright = contour, 255 = strength 1). Lines thicker
