@@ -63,7 +63,7 @@ fn wide_instructions_change_nothing() {
     for round in 0..60 {
         let (thing, camera) = (scene(&mut random), camera(&mut random, round));
         let draw =
-            || (Frame::render(&thing, &camera, Channels::Depth), Contours::drawn(&thing, &camera));
+            || (Frame::render(&thing, &camera, Channels::Depth), Contours::of(&thing, &camera));
         let (wide, plain) = (draw(), portable(draw));
         assert_eq!(bits(&wide.0.depth), bits(&plain.0.depth));
         assert_same(&wide.1, &plain.1);
@@ -80,7 +80,7 @@ fn depth_at_a_few_pixels_is_depth_at_all() {
         let (thing, camera) = (scene(&mut random), camera(&mut random, round));
         let depth = Frame::render(&thing, &camera, Channels::Depth).depth;
         let all = Contours::with_depth(&thing, &camera, &depth);
-        assert_same(&Contours::drawn(&thing, &camera), &all);
+        assert_same(&Contours::of(&thing, &camera), &all);
         pieces += all.len();
     }
     assert!(pieces > 20_000, "{pieces}");

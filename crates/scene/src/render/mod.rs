@@ -4,13 +4,12 @@
 //! in this module draws random numbers, and the same input gives the same output on every
 //! machine.
 
-mod backdrop;
 mod batch;
 mod camera;
 mod camera_json;
+mod canvas;
 mod derivatives;
 mod detail;
-mod layers;
 mod lines;
 mod pixels;
 mod view;
@@ -23,9 +22,9 @@ mod testing;
 
 use pcadlang_numerics::num::simd;
 
-pub use backdrop::Change;
 pub use batch::{BatchRenderer, ContourBatch, ContourSlice, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
+pub use canvas::Change;
 pub use lines::contours::Contours;
 pub use pixels::frame::{Channels, Frame};
 pub use pixels::shade::shade;

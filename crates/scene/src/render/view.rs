@@ -5,7 +5,8 @@
 //! gets the same `Arc`.
 
 use super::detail::Drawn;
-use super::{Camera, Change, Channels, Contours, Frame, Scene, backdrop};
+use super::canvas::Canvas;
+use super::{Camera, Change, Channels, Contours, Frame, Scene};
 use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,10 +20,12 @@ pub struct View {
     camera: Camera,
     /// Tolerance of contours and depth, in pixels.
     detail: f64,
+    /// What it shares with the views before and after it.
+    canvas: Canvas,
     frames: BySize<Frame>,
     depths: BySize<Frame>,
     contours: BySize<Contours>,
-    changes: BySize<Option<Change>>,
+    changes: BySize<Change>,
 }
 
 impl View {
@@ -35,8 +38,23 @@ impl View {
     /// omitted vertex is within `detail` pixels of what is drawn, whatever the size of
     /// the picture; 0 for the full meshes.
     pub fn with_detail(solid: Solid, camera: Camera, detail: f64) -> View {
-        let (frames, depths, contours) = (Mutex::default(), Mutex::default(), Mutex::default());
-        View { solid, camera, detail, frames, depths, contours, changes: Mutex::default() }
+        View {
+            solid,
+            camera,
+            detail,
+            canvas: Canvas::default(),
+            frames: Mutex::default(),
+            depths: Mutex::default(),
+            contours: Mutex::default(),
+            changes: Mutex::default(),
+        }
+    }
+
+    /// Draws on the canvas of the view that this one follows, so that a drawing costs what
+    /// differs between the two.
+    #[must_use]
+    pub fn after(self, previous: &View) -> View {
+        View { canvas: previous.canvas.for_next(), ..self }
     }
 
     /// The solid.
@@ -73,34 +91,58 @@ impl View {
     /// counts as 1): cheaper than [`View::frame`], and reused by contours of that size
     /// that are requested later.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
-        self.frame_drawn(size).unwrap_or_else(|| {
-            let camera = self.camera.scaled_to(size);
+        self.depth_drawn(size).unwrap_or_else(|| {
+            let on_canvas = self.change_on_canvas(size).is_some();
             once(&self.depths, size, || {
-                Frame::render(&self.drawn(&camera).solid, &camera, Channels::Depth)
+                let Scene { solid, camera } = self.scene(size);
+                let depth = on_canvas.then(|| self.canvas.depth(&solid, &camera)).flatten();
+                match depth {
+                    Some(depth) => Frame::of_depth(&camera, depth),
+                    None => Frame::render(&solid, &camera, Channels::Depth),
+                }
             })
         })
     }
 
     /// The contours in the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn contours(&self, size: u32) -> Arc<Contours> {
-        once(&self.contours, size, || {
-            let frame = self.frame_drawn(size).or_else(|| find(&lock(&self.depths), size));
-            let camera = self.camera.scaled_to(size);
-            let solid = self.drawn(&camera).solid;
-            match frame {
-                Some(frame) => Contours::with_depth(&solid, &camera, &frame.depth),
-                None => Contours::of(&solid, &camera),
+        let found = find(&lock(&self.contours), size);
+        found.unwrap_or_else(|| match self.change_on_canvas(size) {
+            Some(change) if change.moving.len() == change.count => {
+                once_shared(&self.contours, size, || Arc::clone(&change.moving))
             }
+            change => once(&self.contours, size, || {
+                let Scene { solid, camera } = self.scene(size);
+                match self.depth_drawn(size).filter(|_| change.is_none()) {
+                    Some(frame) => Contours::with_depth(&solid, &camera, &frame.depth),
+                    None if change.is_some() => self.canvas.contours(&solid, &camera),
+                    None => Contours::of(&solid, &camera),
+                }
+            }),
         })
     }
 
-    /// The difference of [`View::contours`] from the contours that this thread drew last,
-    /// without building the list, in a scene most of which is stationary; `None` for
-    /// other scenes.
-    pub fn change(&self, size: u32) -> Arc<Option<Change>> {
-        once(&self.changes, size, || {
-            let camera = self.camera.scaled_to(size);
-            backdrop::change(&self.drawn(&camera).solid, &camera)
+    /// The difference of [`View::contours`] from the contours drawn last on the same
+    /// canvas, without building the list of those that stay.
+    pub fn change(&self, size: u32) -> Arc<Change> {
+        self.change_on_canvas(size).unwrap_or_else(|| {
+            let whole = Change::whole(self.contours(size), &self.camera.scaled_to(size));
+            once(&self.changes, size, || whole)
+        })
+    }
+
+    /// The change, unless the picture is better drawn in full, or its depth is known.
+    fn change_on_canvas(&self, size: u32) -> Option<Arc<Change>> {
+        let mut entries = lock(&self.changes);
+        let found = find(&entries, size);
+        found.or_else(|| {
+            if self.depth_drawn(size).is_some() {
+                return None;
+            }
+            let Scene { solid, camera } = self.scene(size);
+            let change = Arc::new(self.canvas.change(&solid, &camera)?);
+            entries.push((size, Arc::clone(&change)));
+            Some(change)
         })
     }
 
@@ -129,6 +171,11 @@ impl View {
     fn frame_drawn(&self, size: u32) -> Option<Arc<Frame>> {
         if self.detail > 0.0 { None } else { find(&lock(&self.frames), size) }
     }
+
+    /// A frame with depth at least, if one was drawn.
+    fn depth_drawn(&self, size: u32) -> Option<Arc<Frame>> {
+        self.frame_drawn(size).or_else(|| find(&lock(&self.depths), size))
+    }
 }
 
 impl std::fmt::Debug for View {
@@ -148,13 +195,17 @@ fn find<T>(entries: &[(u32, Arc<T>)], size: u32) -> Option<Arc<T>> {
 /// The entry of a size, computed under the lock if missing: a second thread waits rather
 /// than computing it again.
 fn once<T>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> T) -> Arc<T> {
+    once_shared(cache, size, || Arc::new(make()))
+}
+
+/// As [`once`], for a value that is already shared.
+fn once_shared<T>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> Arc<T>) -> Arc<T> {
     let mut entries = lock(cache);
-    if let Some(value) = find(&entries, size) {
-        return value;
-    }
-    let value = Arc::new(make());
-    entries.push((size, value.clone()));
-    value
+    find(&entries, size).unwrap_or_else(|| {
+        let value = make();
+        entries.push((size, Arc::clone(&value)));
+        value
+    })
 }
 
 #[cfg(test)]

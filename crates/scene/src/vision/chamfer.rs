@@ -204,6 +204,9 @@ impl Chamfer {
         tally: &mut Tally,
         scratch: &mut Scratch,
     ) -> f64 {
+        if step.all_move() {
+            return self.log_likelihood_with(&step.moving, scratch);
+        }
         if !step.leads_to(tally.of.as_ref()) {
             if step.follows(tally.of.as_ref()) {
                 self.count(&step.removed, -1, &mut tally.steps);

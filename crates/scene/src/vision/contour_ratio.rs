@@ -190,6 +190,9 @@ impl ContourRatio {
         whole: impl FnOnce() -> Elements<'a>,
         scratch: &mut Scratch,
     ) -> f64 {
+        if step.all_move() {
+            return self.log_likelihood_with(&step.moving, scratch);
+        }
         if !step.leads_to(scratch.of.as_ref()) {
             if step.follows(scratch.of.as_ref()) {
                 self.count(&step.removed, -1, scratch);

@@ -113,6 +113,11 @@ pub struct ContourDelta<'a> {
 }
 
 impl ContourDelta<'_> {
+    /// Whether no contours stay from step to step.
+    pub(super) fn all_move(&self) -> bool {
+        self.moving.len() == self.count
+    }
+
     /// Whether the step starts from the known contours and is shorter than starting from
     /// scratch.
     pub(super) fn follows(&self, known: Option<&Arc<()>>) -> bool {

@@ -12,7 +12,7 @@ use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{Depths, Piece};
 use crate::render::pixels::project::{DepthRange, Placement, Projected, project};
 use crate::render::pixels::sparse_depth::SparseDepth;
-use crate::render::{Camera, backdrop, layers, work};
+use crate::render::{Camera, work};
 use std::cell::RefCell;
 
 /// Visible contour pieces in an image. A piece's object side lies to the right of its
@@ -54,16 +54,8 @@ thread_local! {
 }
 
 impl Contours {
-    /// The contours of a solid in a camera's image. Draws its own depth image; for a
-    /// solid of several meshes, only what this thread has not drawn recently.
+    /// The contours of a solid in a camera's image.
     pub fn of(solid: &Solid, camera: &Camera) -> Contours {
-        backdrop::contours(solid, camera)
-            .or_else(|| layers::contours(solid, camera))
-            .unwrap_or_else(|| Contours::drawn(solid, camera))
-    }
-
-    /// As [`Contours::of`], but draws everything.
-    pub(in crate::render) fn drawn(solid: &Solid, camera: &Camera) -> Contours {
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
@@ -110,6 +102,11 @@ impl Contours {
                 |piece: &&Piece| depths.as_ref().is_some_and(|depths| depths.visible(piece));
             seen(scratch.pieces.iter().filter(visible), camera, &mut scratch.found)
         })
+    }
+
+    /// No pieces.
+    pub(in crate::render) fn empty(camera: &Camera) -> Contours {
+        Contours { width: camera.width, height: camera.height, ..Contours::default() }
     }
 
     /// No pieces yet, with room for about as many as were `found` the last time.

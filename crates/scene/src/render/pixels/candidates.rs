@@ -9,9 +9,9 @@ use crate::render::pixels::coverage::is_turned;
 use crate::render::pixels::pixel_bitmap::PixelBitmap;
 use crate::render::pixels::place::Extent;
 use crate::render::pixels::project::Vertices;
-use crate::render::pixels::raster::{Area, Wanted};
+use crate::render::pixels::raster::Area;
 use crate::render::pixels::simd_raster::{Batch, Kind, LANES};
-use crate::render::pixels::triangle::{Plane, is_flat, keep_all, put_face};
+use crate::render::pixels::triangle::{Plane, put_face};
 use glam::Vec4;
 
 /// The triangles of a mesh whose bounding boxes contain pixel centres, with these boxes.
@@ -109,11 +109,10 @@ impl Candidates {
         topology: &Topology,
         vertices: &Vertices<'_>,
         (size, back): (Vec4, f64),
-        (area, wanted): (&Area, Wanted<'_>),
+        (area, bitmap): (&Area, Option<&PixelBitmap>),
         buffer: &mut [f32],
         seen: &mut [u32],
     ) {
-        let bitmap = wanted.bitmap();
         self.find(topology, vertices, size, back, bitmap);
         let width = area.right - area.left;
         let large = |face: u32, extent: Extent, buffer: &mut [f32], seen: &mut [u32]| match vertices
@@ -140,7 +139,7 @@ impl Candidates {
                 if kind == Kind::Large {
                     return large(face, *extent, buffer, seen);
                 }
-                let (mut plane, mut flat) = (None, None);
+                let mut plane = None;
                 batch.rows(
                     i,
                     extent,
@@ -152,16 +151,6 @@ impl Candidates {
                             bitmap.window(at, LANES) as u32 & !outside.to_bitmask() == 0
                         }) {
                             return;
-                        }
-                        if let Some(least) = wanted.least(at) {
-                            // A triangle without area covers nothing, even if its rounded corners
-                            // have an area.
-                            if *flat
-                                .get_or_insert_with(|| is_flat(&vertices.corners(topology, face)))
-                            {
-                                return;
-                            }
-                            return keep_all(buffer, at, least, outside);
                         }
                         let corners =
                             || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);

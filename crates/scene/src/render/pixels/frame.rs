@@ -55,6 +55,12 @@ impl Frame {
         })
     }
 
+    /// A frame of depth alone.
+    pub(in crate::render) fn of_depth(camera: &Camera, depth: Vec<f32>) -> Frame {
+        let (width, height) = (camera.width, camera.height);
+        Frame { width, height, depth, part: Vec::new(), normal: Vec::new() }
+    }
+
     /// Whether each pixel shows the object, row by row.
     pub fn mask(&self) -> impl Iterator<Item = bool> + '_ {
         self.depth.iter().map(|d| d.is_finite())

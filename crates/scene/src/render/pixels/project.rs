@@ -359,11 +359,6 @@ impl Vertices<'_> {
         self.places.iter().fold(Place::INFINITY, |a, b| a.min(*b))
     }
 
-    /// The least nearness of all vertices.
-    pub fn least_nearness(&self) -> f32 {
-        self.nearness.iter().fold(f32::INFINITY, |a, b| a.min(*b))
-    }
-
     /// Whether the whole mesh is behind the camera, or beside the picture by at least
     /// half a pixel, so that it covers no pixel and has no contours there.
     pub fn outside(&self, camera: &Camera) -> bool {

@@ -12,7 +12,6 @@ use crate::render::pixels::place::{Extent, place, size};
 use crate::render::pixels::project::{
     DepthRange, Lens, Placement, Point, Projected, Vertices, project,
 };
-use crate::render::pixels::simd_raster::LANES;
 use crate::render::pixels::triangle::Triangle;
 use crate::render::simd::vectorised;
 use glam::DVec3;
@@ -173,47 +172,12 @@ pub(in crate::render) fn draw_nearness(
                 camera,
                 &vertices,
                 candidates,
-                (&area, Wanted::All),
+                (&area, None),
                 buffer,
             );
         }
     }
     range
-}
-
-/// Where the exact nearness of a mesh is needed.
-#[derive(Clone, Copy)]
-pub(in crate::render) enum Wanted<'a> {
-    /// Everywhere.
-    All,
-    /// At the marked pixels of the whole image; the values of others are unspecified.
-    Marked(&'a PixelBitmap),
-    /// At the pixels of an area whose byte is not 0; at other pixels that the mesh
-    /// covers, any value not below this least nearness will do.
-    Exact(&'a [u8], f32),
-}
-
-impl<'a> Wanted<'a> {
-    /// The set of marked pixels, if there is one.
-    #[inline(always)]
-    pub fn bitmap(self) -> Option<&'a PixelBitmap> {
-        match self {
-            Wanted::Marked(bitmap) => Some(bitmap),
-            _ => None,
-        }
-    }
-
-    /// The least nearness, if it will do for all lanes that begin at a pixel of the area.
-    #[inline(always)]
-    pub fn least(self, at: usize) -> Option<f32> {
-        match self {
-            Wanted::Exact(exact, least) => {
-                let lanes = exact.get(at..)?.first_chunk::<LANES>()?;
-                (u64::from_ne_bytes(*lanes) == 0).then_some(least)
-            }
-            _ => None,
-        }
-    }
 }
 
 /// Draws the nearness of one mesh into `buffer` (the rows of the area, cleared here).
@@ -223,28 +187,29 @@ pub(in crate::render) fn draw_mesh(
     camera: &Camera,
     vertices: &Vertices<'_>,
     candidates: &mut Candidates,
-    (area, wanted): (&Area, Wanted<'_>),
+    area: &Area,
     buffer: &mut Vec<f32>,
 ) {
     buffer.clear();
     buffer.resize(area.pixels(), empty(camera));
-    fill_mesh(mesh, placement, camera, vertices, candidates, (area, wanted), buffer);
+    fill_mesh(mesh, placement, camera, vertices, candidates, (area, None), buffer);
 }
 
-/// Merges the nearness of one mesh into the rows of an area, keeping the nearer value;
-/// with marked pixels, the area must be the whole image.
+/// Merges the nearness of one mesh into the rows of an area, keeping the nearer value. If
+/// only the pixels of a bitmap matter, the area must be the whole image; the values at
+/// others are unspecified.
 pub(in crate::render) fn fill_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
     candidates: &mut Candidates,
-    (area, wanted): (&Area, Wanted<'_>),
+    (area, wanted): (&Area, Option<&PixelBitmap>),
     buffer: &mut [f32],
 ) {
     if !vertices.whole {
         return cut_triangles(mesh, placement, camera, vertices, |t, _, _| {
-            t.keep(buffer, area, wanted.bitmap())
+            t.keep(buffer, area, wanted)
         });
     }
     let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
@@ -270,7 +235,7 @@ pub(in crate::render) fn fill_faces(
     let (area, topology) = (Area::whole(camera), &mesh.topology);
     vectorised(
         #[inline(always)]
-        || candidates.fill::<true>(topology, vertices, how, (&area, Wanted::All), buffer, faces),
+        || candidates.fill::<true>(topology, vertices, how, (&area, None), buffer, faces),
     );
 }
 

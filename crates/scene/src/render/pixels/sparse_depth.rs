@@ -9,7 +9,7 @@ use crate::render::pixels::candidates::Candidates;
 use crate::render::pixels::frame::depth_of;
 use crate::render::pixels::pixel_bitmap::PixelBitmap;
 use crate::render::pixels::project::{Lens, Placement, Projected};
-use crate::render::pixels::raster::{Area, Wanted, empty, fill_mesh};
+use crate::render::pixels::raster::{Area, empty, fill_mesh};
 use crate::render::pixels::triangle::bits;
 
 /// Marked pixels of an image, and their depth. Reused from image to image.
@@ -57,7 +57,7 @@ impl SparseDepth {
                     camera,
                     &vertices,
                     candidates,
-                    (&area, Wanted::Marked(bitmap)),
+                    (&area, Some(bitmap)),
                     depth,
                 );
             }

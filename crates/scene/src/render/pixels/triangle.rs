@@ -119,19 +119,9 @@ pub(in crate::render) fn put_face(faces: &mut [u32], at: usize, face: u32, neare
     }
 }
 
-/// As [`Plane::keep`], with the same nearness in all lanes.
-#[inline(always)]
-pub(in crate::render) fn keep_all(buffer: &mut [f32], at: usize, nearness: f32, outside: i32x8) {
-    let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else {
-        return;
-    };
-    let (there, q) = (f32x8::new(*pixels), f32x8::splat(nearness));
-    *pixels = (q.simd_gt(there) & !all_bits(outside)).bitselect(q, there).to_array();
-}
-
 /// Whether a triangle has no area.
 #[inline(always)]
-pub(in crate::render) fn is_flat(points: &[Point; 3]) -> bool {
+fn is_flat(points: &[Point; 3]) -> bool {
     let area = area(points);
     area == 0.0 || !area.is_finite()
 }

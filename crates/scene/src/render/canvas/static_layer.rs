@@ -25,7 +25,7 @@ pub struct StaticLayer {
     pub pieces: Vec<(Piece, usize)>,
     /// Identifies the preparation of all fields below; renewed by
     /// [`StaticLayer::sort_pieces`].
-    pub settled: Arc<()>,
+    pub prepared: Arc<()>,
     /// Least and greatest depth range of the scene for which the fields below are valid.
     extents: [f64; 2],
     /// Half the relative width of this interval.
@@ -80,13 +80,13 @@ impl StaticLayer {
     /// Whether the sorted pieces are valid for a depth range.
     pub fn holds(&self, extent: f64) -> bool {
         let [least, most] = self.extents;
-        least <= extent && extent <= most
+        self.pieces.is_empty() || least <= extent && extent <= most
     }
 
     /// Sorts the pieces for an interval of depth ranges around `extent`; with `again`,
     /// for a wider interval than before.
     pub fn sort_pieces(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
-        self.settled = Arc::default();
+        self.prepared = Arc::default();
         self.width = if again { (2.0 * self.width).min(0.5) } else { self.width };
         self.extents = [extent * (1.0 - self.width), extent * (1.0 + self.width)];
         let depths = |extent: f64| Depths::new(&self.depth, camera.width, camera.height, extent);

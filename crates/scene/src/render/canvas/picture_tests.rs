@@ -1,8 +1,11 @@
-//! Backdrops against full drawings, bit for bit, and what they skip drawing.
+//! Pictures against full drawings, bit for bit, and what they skip drawing.
 
 use super::*;
 use crate::geom::Affine;
+use crate::render::canvas::layer::camera_bits;
 use crate::render::testing::{Uniform, cuboid, lathe, solid, sphere};
+use crate::geom::Mesh;
+use crate::render::{Channels, Frame};
 use glam::{DVec3, Vec3};
 
 /// A ball, a box, or an open or closed lathe.
@@ -22,9 +25,9 @@ fn somewhere(random: &mut Uniform, reach: f64, size: f64) -> Affine {
     Affine::new(at(reach), at(2.0), DVec3::splat(size))
 }
 
-/// A backdrop, and the pieces that a follower of its changes has collected.
+/// A picture, and the pieces that a follower of its changes has collected.
 struct Followed {
-    backdrop: Backdrop,
+    picture: Picture,
     tools: Tools,
     at: Arc<()>,
     /// The current pieces of the stationary meshes as bits, in some order.
@@ -40,7 +43,7 @@ fn bits(c: &Contours) -> Vec<[u32; 5]> {
 impl Followed {
     fn new(camera: &Camera) -> Followed {
         Followed {
-            backdrop: Backdrop::new(camera),
+            picture: Picture::new(camera_bits(camera)),
             tools: Tools::default(),
             at: Arc::default(),
             pieces: Vec::new(),
@@ -48,15 +51,17 @@ impl Followed {
     }
 
     /// Draws a solid, and compares the picture and its change with a full drawing.
-    /// Returns whether the backdrop drew it, and whether the change continued from the
+    /// Returns whether it was drawn incrementally, and whether the change continued from the
     /// last one.
     fn check(&mut self, solid: &Solid, camera: &Camera) -> [bool; 2] {
-        let Some(change) = self.backdrop.draw(solid, camera, &mut self.tools) else {
+        let Some(change) = self.picture.draw(solid, camera, &mut self.tools) else {
             return [false; 2];
         };
-        let (got, wanted) = (self.backdrop.contours(camera), Contours::drawn(solid, camera));
+        let (got, wanted) = (self.picture.contours(camera), Contours::of(solid, camera));
         assert_eq!(bits(&got), bits(&wanted));
         assert_eq!(change.count, wanted.len());
+        let depth = Frame::render(solid, camera, Channels::Depth).depth;
+        assert!(self.picture.depth().iter().map(|d| d.to_bits()).eq(depth.iter().map(|d| d.to_bits())));
         let follows = Arc::ptr_eq(&self.at, &change.from);
         if follows {
             for removed in bits(&change.removed) {
@@ -82,7 +87,7 @@ impl Followed {
 }
 
 #[test]
-fn backdrops_give_what_is_drawn_at_once() {
+fn pictures_give_what_is_drawn_at_once() {
     let mut random = Uniform(31);
     let (mut drawn, mut followed) = (0, 0);
     for round in 0..8 {
@@ -113,8 +118,8 @@ fn backdrops_give_what_is_drawn_at_once() {
             let (front, rest) = solids.split_at(moving);
             let nested = [front, &[Solid::group(rest)]].concat();
             let solid = if step % 2 == 0 { Solid::group(&solids) } else { Solid::group(&nested) };
-            let [by_backdrop, follows] = followers.check(&solid, &camera);
-            drawn += usize::from(by_backdrop);
+            let [incremental, follows] = followers.check(&solid, &camera);
+            drawn += usize::from(incremental);
             followed += usize::from(follows);
             if random.next() < 0.5 {
                 solids = before;
@@ -125,7 +130,7 @@ fn backdrops_give_what_is_drawn_at_once() {
 }
 
 #[test]
-fn a_scene_that_changes_altogether_is_drawn_in_another_way() {
+fn a_scene_that_changes_altogether_is_drawn_in_full() {
     let mut random = Uniform(32);
     let camera = Camera::default_for(48, 48);
     let mut scene = |count: usize| -> Vec<Solid> {
@@ -139,7 +144,7 @@ fn a_scene_that_changes_altogether_is_drawn_in_another_way() {
     followed.check(&Solid::group(&fixed), &camera);
     assert!(
         !followed.check(&Solid::group(&fixed), &camera)[0],
-        "asked for again, it is still better drawn so"
+        "requested again, it is still better drawn in full"
     );
     let mut moved = fixed.clone();
     moved[3] = sphere(7, 5);
@@ -161,12 +166,12 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     let mut took = |place: Affine| {
         let solid = Solid::group(&[fixed.clone(), ball.placed(place)]);
         let before = work::work();
-        let change = followed.backdrop.draw(&solid, &camera, &mut followed.tools);
+        let change = followed.picture.draw(&solid, &camera, &mut followed.tools);
         let spent = work::work() - before;
         if change.is_some() {
             assert_eq!(
-                bits(&followed.backdrop.contours(&camera)),
-                bits(&Contours::drawn(&solid, &camera))
+                bits(&followed.picture.contours(&camera)),
+                bits(&Contours::of(&solid, &camera))
             );
         }
         spent
@@ -193,15 +198,15 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     };
     for x in [0.5, 0.6, 0.7] {
         let solid = Solid::group(&[fixed.clone(), beam(x)]);
-        followed.backdrop.draw(&solid, &camera, &mut followed.tools);
+        followed.picture.draw(&solid, &camera, &mut followed.tools);
         let (seen, wanted) =
-            (followed.backdrop.contours(&camera), Contours::drawn(&solid, &camera));
+            (followed.picture.contours(&camera), Contours::of(&solid, &camera));
         assert_eq!(bits(&seen), bits(&wanted));
-        assert!(wanted.len() > Contours::drawn(&fixed, &camera).len());
+        assert!(wanted.len() > Contours::of(&fixed, &camera).len());
     }
     // A full drawing also skips meshes outside of the picture.
     let before = work::work();
-    let lonely = Contours::drawn(&ball.placed(at(9.0, 1.0)), &camera);
+    let lonely = Contours::of(&ball.placed(at(9.0, 1.0)), &camera);
     let spent = work::work() - before;
     assert_eq!((lonely.len(), spent.drawn, spent.outside), (0, 0, 1));
 }
@@ -248,10 +253,10 @@ fn what_looks_out_from_behind_a_wall_is_seen_on_every_side() {
         [[0.0, 0.0], [0.1, 0.0], [0.0, -0.98], [0.0, 0.98], [-0.98, 0.0], [0.98, 0.0], [0.0, 0.1]];
     for (step, [x, y]) in places.into_iter().enumerate() {
         let by = Affine::new(DVec3::new(x, y, -1.5), DVec3::ZERO, DVec3::splat(0.4));
-        let [by_backdrop, _] =
+        let [incremental, _] =
             followed.check(&Solid::group(&[fixed.clone(), ball.placed(by)]), &camera);
-        assert_eq!(by_backdrop, step > 0);
-        let seen = followed.backdrop.contours(&camera);
+        assert_eq!(incremental, step > 0);
+        let seen = followed.picture.contours(&camera);
         let beside = seen
             .x
             .iter()
@@ -284,9 +289,186 @@ fn what_only_the_depth_range_decides_is_told_anew_behind_what_stays_as_deep() {
         let by = Affine::new(DVec3::new(0.0, 0.0, nearer), DVec3::ZERO, stretched);
         let drawn = followed.check(&Solid::group(&[fixed.clone(), shield.placed(by)]), &camera);
         assert_eq!(drawn, [step > 0, step > 1]);
-        let seen = followed.backdrop.contours(&camera);
+        let seen = followed.picture.contours(&camera);
         let middle =
             seen.x.iter().zip(&seen.y).any(|(&x, &y)| (x - 32.0).abs().max((y - 32.0).abs()) < 8.0);
         assert_eq!(middle, step > 0 && range > 2.0045, "{range}");
     }
+}
+
+fn part(random: &mut Uniform) -> Arc<Mesh> {
+    let place = somewhere(random, 1.0, 0.4);
+    Arc::new(shape(random).placed(place).to_mesh().unwrap())
+}
+
+fn group(meshes: &[Arc<Mesh>], by: Affine) -> Solid {
+    let solids: Vec<_> = meshes.iter().map(|m| Solid::new(m.clone())).collect();
+    Solid::group(&solids).placed(by)
+}
+
+#[test]
+fn meshes_that_move_by_turns_are_as_drawn_at_once() {
+    let mut random = Uniform(21);
+    let mut incremental = 0;
+    for round in 0..10 {
+        let mut camera = Camera::default_for(40 + 7 * round, 96 - 5 * round);
+        if round % 3 == 2 {
+            camera.eye.z = 0.4;
+        }
+        let mut followed = Followed::new(&camera);
+        let mut meshes: Vec<_> = (0..2 + round).map(|_| part(&mut random)).collect();
+        let mut by = Affine::IDENTITY;
+        for step in 0..50 {
+            let before = (meshes.clone(), by);
+            if step % 10 == 9 {
+                let turn = DVec3::new(random.next(), random.next(), 0.3);
+                let shift = DVec3::new(0.2, 0.1, random.next());
+                by = Affine::new(shift, turn, DVec3::new(-1.0, 1.0, 1.2));
+            }
+            for _ in 0..1 + step % 3 {
+                let at = (random.next() * meshes.len() as f64) as usize;
+                meshes[at] = part(&mut random);
+            }
+            if step % 17 == 16 {
+                meshes.push(part(&mut random));
+            }
+            incremental += usize::from(followed.check(&group(&meshes, by), &camera)[0]);
+            if random.next() < 0.5 {
+                (meshes, by) = before;
+                incremental += usize::from(followed.check(&group(&meshes, by), &camera)[0]);
+            }
+        }
+    }
+    assert!(incremental > 400, "{incremental}");
+}
+
+#[test]
+fn what_did_not_move_is_not_drawn_again() {
+    let mut random = Uniform(22);
+    let camera = Camera::default_for(64, 64);
+    let mut followed = Followed::new(&camera);
+    let mut meshes: Vec<_> = (0..22).map(|_| part(&mut random)).collect();
+    let mut took = |meshes: &[Arc<Mesh>], by: Affine| {
+        let before = work::work();
+        let drawn = followed.picture.draw(&group(meshes, by), &camera, &mut followed.tools);
+        (drawn.is_some(), (work::work() - before).drawn)
+    };
+    // All move by turns, then one by one and back.
+    for i in 0..44 {
+        meshes[i % 22] = part(&mut random);
+        took(&meshes, Affine::IDENTITY);
+    }
+    for i in 0..300 {
+        let old = std::mem::replace(&mut meshes[i % 22], part(&mut random));
+        assert_eq!(took(&meshes, Affine::IDENTITY), (true, 1));
+        meshes[i % 22] = old;
+    }
+    assert_eq!(took(&meshes, Affine::IDENTITY), (true, 0));
+    // A placement of the whole that is not kept leaves the picture as it is.
+    let by = Affine::new(DVec3::new(0.0, 1e-12, 0.0), DVec3::ZERO, DVec3::ONE);
+    assert!(!took(&meshes, by).0);
+    assert_eq!(took(&meshes, Affine::IDENTITY), (true, 0));
+    // One that is kept is shown as soon as something moves in it.
+    assert!(!took(&meshes, by).0);
+    meshes[3] = part(&mut random);
+    assert_eq!(took(&meshes, by), (true, 22));
+    meshes[4] = part(&mut random);
+    assert_eq!(took(&meshes, by), (true, 1));
+}
+
+#[test]
+fn meshes_that_rest_for_long_count_as_stationary_again() {
+    let mut random = Uniform(26);
+    let camera = Camera::default_for(48, 48);
+    let mut followed = Followed::new(&camera);
+    let mut meshes: Vec<_> = (0..6).map(|_| part(&mut random)).collect();
+    for i in 0..12 {
+        meshes[i % 6] = part(&mut random);
+        followed.check(&group(&meshes, Affine::IDENTITY), &camera);
+    }
+    assert_eq!(followed.picture.dynamic.len(), 6);
+    let pair = [part(&mut random), part(&mut random)];
+    for i in 0..2 * PATIENCE as usize {
+        meshes[1] = pair[i % 2].clone();
+        followed.picture.draw(&group(&meshes, Affine::IDENTITY), &camera, &mut followed.tools);
+    }
+    assert_eq!(followed.picture.dynamic.len(), 1);
+    meshes[1] = part(&mut random);
+    assert!(followed.check(&group(&meshes, Affine::IDENTITY), &camera)[0]);
+}
+
+#[test]
+fn what_would_need_too_much_memory_is_drawn_in_full() {
+    let mut random = Uniform(24);
+    let camera = Camera::default_for(2000, 2000);
+    let mut followed = Followed::new(&camera);
+    let mut meshes: Vec<_> = (0..5).map(|_| part(&mut random)).collect();
+    let drawn: Vec<bool> = (0..6)
+        .map(|i| {
+            meshes[i % 5] = part(&mut random);
+            let solid = group(&meshes, Affine::IDENTITY);
+            followed.picture.draw(&solid, &camera, &mut followed.tools).is_some()
+        })
+        .collect();
+    assert_eq!(drawn, [false, true, true, false, false, true]);
+}
+
+#[test]
+fn what_cannot_be_seen_leaves_an_empty_picture() {
+    let camera = Camera::default_for(48, 48);
+    let mut random = Uniform(25);
+    let mut meshes: Vec<_> = (0..4).map(|_| part(&mut random)).collect();
+    for at in
+        [[0.0, 0.0, 30.0], [90.0, 0.0, 0.0], [0.0, -90.0, 0.0], [f64::NAN, 0.0, 0.0], [0.0, 0.0, -1e12]]
+    {
+        let by = Affine::new(DVec3::from_array(at), DVec3::ZERO, DVec3::ONE);
+        let mut followed = Followed::new(&camera);
+        followed.check(&group(&meshes, by), &camera);
+        meshes[2] = part(&mut random);
+        assert!(followed.check(&group(&meshes, by), &camera)[0]);
+        let picture = &followed.picture;
+        assert!(picture.count == 0 && picture.depth.iter().all(|d| *d == f32::INFINITY), "{at:?}");
+    }
+}
+
+#[test]
+fn a_mesh_between_the_centres_of_pixels_has_contours_as_soon_as_it_is_there() {
+    let camera = Camera::default_for(48, 48);
+    let cube = |half: f32, x: f64| {
+        let by = Affine::new(DVec3::new(x, 0.0, 0.0), DVec3::ZERO, DVec3::ONE);
+        Arc::new(cuboid(Vec3::splat(half)).placed(by).to_mesh().unwrap())
+    };
+    let mut followed = Followed::new(&camera);
+    let mut meshes = vec![cube(0.4, -1.0), cube(0.4, 1.0)];
+    let others = Contours::of(&group(&meshes, Affine::IDENTITY), &camera).len();
+    meshes.push(cube(0.02, 0.0));
+    // A pixel is 0.09 wide, and four of them meet in the middle. The depth range stays
+    // the same.
+    for (step, half) in [0.03, 0.02, 0.015, 0.01, 0.025].into_iter().enumerate() {
+        meshes[2] = cube(half, 0.0);
+        let drawn = followed.check(&group(&meshes, Affine::IDENTITY), &camera)[0];
+        assert_eq!(drawn, step > 0);
+        if let Some(mesh) = followed.picture.dynamic.first() {
+            assert!(mesh.now.layer.area.pixels() == 0 && followed.picture.count > others, "{half}");
+        }
+    }
+}
+
+#[test]
+fn flat_meshes_between_the_centres_of_pixels_are_seen_in_the_first_drawing() {
+    let camera = Camera::default_for(48, 48);
+    // Triangles at one depth: the range of the scene is 0 from the start.
+    let flat = |half: f32, x: f32| {
+        let corners =
+            [[-half, -half], [half, -half], [0.0, half]].map(|[u, v]| Vec3::new(x + u, v, 0.0));
+        Arc::new(Mesh::new(corners.to_vec(), vec![[0, 1, 2]], vec![0]).unwrap())
+    };
+    let mut meshes = [flat(0.4, -1.0), flat(0.4, 1.0), flat(0.03, 0.0)];
+    let mut followed = Followed::new(&camera);
+    followed.check(&group(&meshes, Affine::IDENTITY), &camera);
+    meshes[2] = flat(0.02, 0.0);
+    assert!(followed.check(&group(&meshes, Affine::IDENTITY), &camera)[0]);
+    assert_eq!(followed.picture.extent, 0.0);
+    let mesh = &followed.picture.dynamic[0];
+    assert!(mesh.now.layer.area.pixels() == 0 && !mesh.seen.is_empty());
 }

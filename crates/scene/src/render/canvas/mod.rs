@@ -1,0 +1,121 @@
+//! What successive drawings of one scene share. A view that follows another one in a node
+//! of a trace takes over its canvas, so a drawing costs what the change costs.
+//!
+//! The meshes of a scene are **layers** of a picture. Those that stand still are merged
+//! into one static layer, whose pieces of contour are indexed by the pixels at which their
+//! visibility is tested. When a mesh moves, depth is recomposed only where it was and is,
+//! only the pieces tested there are tested again, and the difference is reported as a
+//! [`Change`].
+//!
+//! Invariant: a picture depends on the solid and the camera alone, bit for bit: a canvas
+//! only saves work.
+
+mod dynamic_mesh;
+mod layer;
+mod meshes;
+mod picture;
+mod static_layer;
+
+use self::picture::{Picture, Tools};
+use super::{Camera, Contours};
+use crate::geom::Solid;
+use crate::render::canvas::layer::camera_bits;
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+
+/// The number of pictures that a canvas keeps: several cameras, or several sizes.
+const PICTURES: usize = 4;
+
+/// A shared canvas. Clones draw on the same one; a new canvas is empty.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Canvas(Arc<Mutex<Pictures>>);
+
+/// The pictures of a canvas, the one drawn last first.
+#[derive(Default)]
+struct Pictures {
+    pictures: Vec<Picture>,
+    tools: Tools,
+}
+
+impl std::fmt::Debug for Pictures {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Pictures").field("count", &self.pictures.len()).finish()
+    }
+}
+
+/// The contours of a drawing: all pieces of the moving meshes, and the difference of the
+/// stationary meshes' pieces from the previous drawing of the same picture.
+#[derive(Debug)]
+pub struct Change {
+    /// Identifies the previous contours. If the drawing started over, a new identity that
+    /// nobody holds; `removed` and `added` are then empty.
+    pub from: Arc<()>,
+    /// Identifies the current contours.
+    pub to: Arc<()>,
+    /// Pieces of stationary meshes that are no longer visible.
+    pub removed: Contours,
+    /// Pieces of stationary meshes that have become visible.
+    pub added: Contours,
+    /// All visible pieces of the moving meshes.
+    pub moving: Arc<Contours>,
+    /// Number of visible pieces now, of all meshes.
+    pub count: usize,
+}
+
+impl Change {
+    /// Contours that no earlier drawing helps to count.
+    pub(super) fn whole(contours: Arc<Contours>, camera: &Camera) -> Change {
+        let (from, [removed, added]) = (Arc::default(), [(); 2].map(|()| Contours::empty(camera)));
+        let count = contours.len();
+        Change { to: Arc::clone(&from), from, removed, added, moving: contours, count }
+    }
+}
+
+impl Canvas {
+    /// The canvas for the drawings that follow: this one, or an empty one while another
+    /// thread draws on it, since forks that run side by side would wait for each other.
+    #[must_use]
+    pub fn for_next(&self) -> Canvas {
+        match self.0.try_lock() {
+            Err(TryLockError::WouldBlock) => Canvas::default(),
+            _ => self.clone(),
+        }
+    }
+
+    /// The contours of a solid in a camera's picture, as [`Contours::of`].
+    pub fn contours(&self, solid: &Solid, camera: &Camera) -> Contours {
+        self.draw(solid, camera, |picture, _| picture.contours(camera))
+            .unwrap_or_else(|| Contours::of(solid, camera))
+    }
+
+    /// The change from the previous contours in this picture; `None` if the solid is
+    /// better drawn in full.
+    pub(super) fn change(&self, solid: &Solid, camera: &Camera) -> Option<Change> {
+        self.draw(solid, camera, |_, change| change)
+    }
+
+    /// The depth of a solid, row by row; `None` if it is better drawn in full.
+    pub(super) fn depth(&self, solid: &Solid, camera: &Camera) -> Option<Vec<f32>> {
+        self.draw(solid, camera, |picture, _| picture.depth().to_vec())
+    }
+
+    fn draw<T>(
+        &self,
+        solid: &Solid,
+        camera: &Camera,
+        take: impl FnOnce(&Picture, Change) -> T,
+    ) -> Option<T> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let Pictures { pictures, tools } = &mut *all;
+        let eye = camera_bits(camera);
+        match pictures.iter().position(|p| p.is_of(&eye)) {
+            Some(at) => pictures[..=at].rotate_right(1),
+            None => {
+                pictures.truncate(PICTURES - 1);
+                pictures.insert(0, Picture::new(eye));
+            }
+        }
+        let picture = pictures.first_mut()?;
+        let change = picture.draw(solid, camera, tools)?;
+        Some(take(picture, change))
+    }
+}
