@@ -1,8 +1,10 @@
 //! Bodies: shaping and posing armatures, and rigging meshes.
 
 use super::shapes::vector_of;
-use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, body_vjps, fault, native};
-use crate::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, autorig};
+use super::{
+    ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, body_vjps, fault, incremental, native,
+};
+use crate::geom::armature::{Armature, JointPose, Posed, Rules, Stretch, Turn, autorig};
 use crate::lang::builtins::{Args, Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Record, Value};
@@ -14,7 +16,7 @@ const BODY: &str = "an armature";
 const FACTORS: &str = "a record of numbers, or of three numbers each";
 
 pub(super) const TABLE: &[Row] = &[
-    native(
+    incremental(
         "skin",
         SECTION,
         &[
@@ -35,11 +37,13 @@ pub(super) const TABLE: &[Row] = &[
          T(-head). A location acts as an inverse kinematics handle: it turns the joint's \
          ancestors, up to the next joint in `stop_at`, by equal amounts towards it; the remainder \
          moves the joint itself.",
-        |a| {
+        |a, previous| {
             let body = armature(a)?;
             let rules = Rules { stops: stops(a, body)?, inherit_scale: a.bool_or(3, false)? };
             let pose = pose(a, body)?;
-            body.posed(&pose, &rules).map(|s| Value::object(SolidValue(s))).map_err(fault)
+            let before = previous.and_then(|p| p.state.downcast_ref::<Posed>());
+            let (solid, posed) = body.posed_after(&pose, &rules, before).map_err(fault)?;
+            Ok((Value::object(SolidValue(solid)), Arc::new(posed)))
         },
     )
     .vjp(body_vjps::skin),

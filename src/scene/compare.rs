@@ -1,22 +1,25 @@
 //! Likelihoods of observed pictures given a view.
 
 use super::adjoints::BySolid;
+use super::kept::{Kept, delta};
 use super::observed::{DepthValue, ImageValue, MaskValue};
-use super::{VIEW, ViewValue, native};
+use super::{VIEW, ViewValue, incremental, native};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Arg, ArgAdjoints, Args, Row, Type, arg, opt};
+use crate::lang::builtins::{
+    Arg, ArgAdjoints, Args, PreviousEvaluation, Row, State, Type, arg, opt,
+};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::{Change, Frame, View};
+use crate::render::{Frame, View};
 use crate::rng::Stream;
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
-    Chamfer, ChamferOptions, ContourDelta, ContourRatio, ContourRatioOptions, DepthLikelihood,
-    DepthMap, Elements, MaskLikelihood, VisionError,
+    Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
+    Elements, MaskLikelihood, VisionError,
 };
 use std::cell::{OnceCell, RefCell};
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 pub(super) const SECTION: &str = "Comparing";
 pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
@@ -25,7 +28,7 @@ pub(super) const SIZE: Arg =
         .unit("pixels");
 
 pub(super) const TABLE: &[Row] = &[
-    native(
+    incremental(
         "contour",
         SECTION,
         &[
@@ -49,7 +52,7 @@ pub(super) const TABLE: &[Row] = &[
         contour,
     )
     .vjp(|_, _, by| Some(by_view(by.clone(), 6))),
-    native(
+    incremental(
         "chamfer",
         SECTION,
         &[
@@ -141,7 +144,7 @@ fn optional(a: &Args, i: usize) -> Result<Option<f64>, Fault> {
     if a.given(i) { a.num(i).map(Some) } else { Ok(None) }
 }
 
-fn contour(a: &Args) -> Result<Value, Fault> {
+fn contour(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
     let d = ContourRatioOptions::default();
     let options = ContourRatioOptions {
         foreground: a.num_or(2, d.foreground)?,
@@ -151,10 +154,17 @@ fn contour(a: &Args) -> Result<Value, Fault> {
         weight: a.num_or(6, d.weight)?,
         ..d
     };
-    likelihood(ContourOf { view: view(a)?, size: size(a, 1)?, options })
+    let kept = Kept::after(previous);
+    let value = likelihood(ContourOf {
+        view: view(a)?,
+        size: size(a, 1)?,
+        options,
+        kept: Arc::clone(&kept),
+    })?;
+    Ok((value, kept))
 }
 
-fn chamfer(a: &Args) -> Result<Value, Fault> {
+fn chamfer(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
     let mode = match a.choice(2, &["mean", "sum"])? {
         "sum" => Mode::Sum,
         _ => Mode::Mean,
@@ -166,7 +176,14 @@ fn chamfer(a: &Args) -> Result<Value, Fault> {
         truncate: optional(a, 4)?,
         oriented: optional(a, 5)?,
     };
-    likelihood(ChamferOf { view: view(a)?, size: size(a, 6)?, options })
+    let kept = Kept::after(previous);
+    let value = likelihood(ChamferOf {
+        view: view(a)?,
+        size: size(a, 6)?,
+        options,
+        kept: Arc::clone(&kept),
+    })?;
+    Ok((value, kept))
 }
 
 /// The adjoints of a likelihood's arguments: `by` for the view, unknown for `others`
@@ -216,47 +233,6 @@ pub(super) fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<
 thread_local! {
     static RATIO: RefCell<contour_ratio::Scratch> = RefCell::default();
     static CHAMFER: RefCell<chamfer::Scratch> = RefCell::default();
-    static RATIOS: RefCell<RecentScores<ContourRatio, contour_ratio::Scratch>> = RefCell::default();
-    static CHAMFERS: RefCell<RecentScores<Chamfer, chamfer::Tally>> = RefCell::default();
-}
-
-/// A thread's records of the contours that recent comparators scored last, most recent
-/// first.
-struct RecentScores<C, T>(Vec<(Weak<C>, T)>);
-
-/// The maximum number of comparators of a kind that a thread remembers.
-const FOLLOWED: usize = 8;
-
-impl<C, T> Default for RecentScores<C, T> {
-    fn default() -> Self {
-        RecentScores(Vec::new())
-    }
-}
-
-impl<C, T: Default> RecentScores<C, T> {
-    /// Returns the record of a comparator, which moves to the front.
-    fn of(&mut self, comparator: &Arc<C>) -> &mut T {
-        match self.0.iter().position(|(c, _)| std::ptr::eq(c.as_ptr(), Arc::as_ptr(comparator))) {
-            Some(at) => self.0[..=at].rotate_right(1),
-            None => {
-                self.0.truncate(FOLLOWED - 1);
-                self.0.insert(0, (Arc::downgrade(comparator), T::default()));
-            }
-        }
-        &mut self.0[0].1
-    }
-}
-
-fn step(change: &Change) -> ContourDelta<'_> {
-    let Change { from, to, removed, added, moving, count } = change;
-    ContourDelta {
-        from,
-        to,
-        removed: Elements::of(removed),
-        added: Elements::of(added),
-        moving: Elements::of(moving),
-        count: *count,
-    }
 }
 
 #[derive(Debug)]
@@ -264,6 +240,7 @@ struct ContourOf {
     view: Arc<View>,
     size: u32,
     options: ContourRatioOptions,
+    kept: Arc<Kept<ContourRatio, contour_ratio::Scratch>>,
 }
 
 impl ContourOf {
@@ -284,18 +261,10 @@ impl Likelihood for ContourOf {
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let ratio = self.prepared(observed)?;
-        if let Some(change) = &*self.view.change(self.size) {
-            let whole = OnceCell::new();
-            let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
-            return Ok(RATIOS.with_borrow_mut(|known| {
-                ratio.log_likelihood_after(&step(change), whole, known.of(&ratio))
-            }));
-        }
-        let contours = self.view.contours(self.size);
-        Ok(RATIO.with_borrow_mut(|scratch| {
-            ratio.log_likelihood_with(&Elements::of(&contours), scratch)
-        }))
+        let (ratio, change) = (self.prepared(observed)?, self.view.change(self.size));
+        let whole = OnceCell::new();
+        let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
+        Ok(self.kept.with(&ratio, |kept| ratio.log_likelihood_after(&delta(&change), whole, kept)))
     }
 
     /// With respect to the view.
@@ -324,6 +293,7 @@ struct ChamferOf {
     view: Arc<View>,
     size: u32,
     options: ChamferOptions,
+    kept: Arc<Kept<Chamfer, chamfer::Tally>>,
 }
 
 impl ChamferOf {
@@ -347,17 +317,15 @@ impl Likelihood for ChamferOf {
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let chamfer = self.prepared(observed)?;
-        CHAMFER.with_borrow_mut(|scratch| {
-            if let Some(change) = &*self.view.change(self.size) {
-                let whole = OnceCell::new();
-                let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
-                return Ok(CHAMFERS.with_borrow_mut(|known| {
-                    chamfer.log_likelihood_after(&step(change), whole, known.of(&chamfer), scratch)
-                }));
-            }
-            Ok(chamfer.log_likelihood_with(&Elements::of(&self.view.contours(self.size)), scratch))
-        })
+        let (chamfer, change) = (self.prepared(observed)?, self.view.change(self.size));
+        let whole = OnceCell::new();
+        let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
+        let score = |tally: &mut _| {
+            CHAMFER.with_borrow_mut(|scratch| {
+                chamfer.log_likelihood_after(&delta(&change), whole, tally, scratch)
+            })
+        };
+        Ok(self.kept.with(&chamfer, score))
     }
 
     /// With respect to the view and sigma.
@@ -474,7 +442,11 @@ impl DepthOf {
             ));
         };
         same_shape((depth.depth.width(), depth.depth.height()), &self.view, "scene.depth")?;
-        let frame = self.view.frame(self.size);
+        // Simplified meshes have other depths.
+        let frame = match self.view.detail() {
+            0.0 => self.view.depth(self.size),
+            _ => self.view.frame(self.size),
+        };
         let prepared = depth.prepared.get(
             (self.options, frame.width, frame.height),
             |([sd, outlier, near, far], w, h)| {

@@ -18,6 +18,7 @@ mod examples;
 #[cfg(test)]
 mod gradient_tests;
 mod inputs;
+mod kept;
 mod objects;
 mod observed;
 mod people;
@@ -34,7 +35,7 @@ pub use scene_view::SceneView;
 
 use crate::geom::GeomError;
 use crate::host::{Entry, Host};
-use crate::lang::builtins::{Arg, Args, Row, Type, function};
+use crate::lang::builtins::{Arg, Args, PreviousEvaluation, Row, State, Type, function};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use std::sync::Arc;
@@ -57,6 +58,18 @@ const fn native(
     f: fn(&Args) -> Result<Value, Fault>,
 ) -> Row {
     Row { module: "scene", ..function(name, section, args, returns, doc, f) }
+}
+
+/// A function of this module that may start from its previous evaluation.
+const fn incremental(
+    name: &'static str,
+    section: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    f: fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault>,
+) -> Row {
+    Row { module: "scene", ..Row::incremental(name, section, args, returns, doc, f) }
 }
 
 /// The scene as a host: its functions, its kinds of data, and how it prepares inputs.

@@ -1,7 +1,7 @@
 //! Cameras and views.
 
 use super::shapes::vector;
-use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, native};
+use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, incremental, native};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::Fault;
@@ -73,7 +73,7 @@ pub(super) const TABLE: &[Row] = &[
             })))
         },
     ),
-    native(
+    incremental(
         "render",
         SECTION,
         &[
@@ -91,7 +91,7 @@ pub(super) const TABLE: &[Row] = &[
         ],
         VIEW,
         "A solid seen by a camera. It is rendered only when a likelihood or report needs it.",
-        |a| {
+        |a, previous| {
             let solid = a.object::<SolidValue>(0, "a solid")?;
             let camera = match a.given(1) {
                 true => a.object::<CameraValue>(1, "a camera")?.0,
@@ -104,11 +104,13 @@ pub(super) const TABLE: &[Row] = &[
                 );
                 return Err(Fault::domain(message));
             }
-            Ok(Value::object(ViewValue(Arc::new(View::with_detail(
-                solid.0.clone(),
-                camera,
-                detail,
-            )))))
+            let view = View::with_detail(solid.0.clone(), camera, detail);
+            let view = match previous.and_then(|p| p.value.downcast::<ViewValue>()) {
+                Some(previous) => view.after(&previous.0),
+                None => view,
+            };
+            // The view holds all that the next one needs.
+            Ok((Value::object(ViewValue(Arc::new(view))), Arc::new(())))
         },
     )
     .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),

@@ -126,7 +126,7 @@ fn no_such(a: &Args) -> Fault {
     Fault::type_error(format!("`{}` cannot be called here", a.builtin.full_name()))
 }
 
-fn call_host(a: &Args) -> Result<Value, Fault> {
+pub(super) fn call_host(a: &Args) -> Result<Value, Fault> {
     match &a.builtin.host {
         Some(HostItem::Function { call, .. } | HostItem::Likelihood(call)) => call(a),
         Some(HostItem::Incremental { call, .. }) => call(a, None).map(|(value, _)| value),

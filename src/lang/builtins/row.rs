@@ -2,7 +2,11 @@
 //! converted to entries of the table.
 
 use super::data::DataFormat;
-use super::{Args, Argument, Builtin, Derivative, Kind, Scalar, Type, Vjp};
+use super::host::call_host;
+use super::{
+    Args, Argument, Builtin, Derivative, HostItem, Kind, PreviousEvaluation, Scalar, State, Type,
+    Vjp,
+};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::sync::Arc;
@@ -47,6 +51,9 @@ pub struct Row {
     pub kind: Kind,
     pub scalar: Option<Scalar>,
     pub derivative: Derivative,
+    /// How it starts from its previous evaluation, for an incremental function.
+    pub incremental:
+        Option<fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault>>,
     /// How files are read, for a kind of data.
     pub format: Option<fn() -> Arc<dyn DataFormat>>,
 }
@@ -85,8 +92,23 @@ impl Row {
             kind,
             scalar: None,
             derivative,
+            incremental: None,
             format: None,
         }
+    }
+
+    /// An incremental function in the language's own namespace: it returns its value with the
+    /// state that it keeps, and may start from its previous evaluation, which only saves work.
+    pub const fn incremental(
+        name: &'static str,
+        section: &'static str,
+        args: &'static [Arg],
+        returns: Type,
+        doc: &'static str,
+        f: fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault>,
+    ) -> Row {
+        let kind = Kind::Function(call_host);
+        Row { incremental: Some(f), ..Row::new(kind, name, section, args, returns, doc) }
     }
 
     /// Adds its action on single numbers.
@@ -136,7 +158,9 @@ impl From<&Row> for Builtin {
             kind: r.kind,
             scalar: r.scalar,
             derivative: r.derivative,
-            host: None,
+            host: r
+                .incremental
+                .map(|call| HostItem::Incremental { call: Arc::new(call), vjp: None }),
             format: r.format.map(|format| format()),
             example: None,
         }

@@ -11,8 +11,7 @@ use super::edges::pair_edges;
 use super::real::Real;
 use super::{Edge, Mesh, Topology};
 use glam::{DVec3, Vec3};
-use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A smooth piece of the path.
 #[derive(Clone, Debug, Default)]
@@ -147,30 +146,28 @@ struct Shared {
 const KEPT: usize = 16;
 /// The maximum size of a cached topology, in triangles.
 const KEPT_TRIANGLES: usize = 200_000;
-thread_local! {
-    static CACHE: RefCell<Vec<(Signature, Shared)>> = const { RefCell::new(Vec::new()) };
-}
+static CACHE: Mutex<Vec<(Signature, Shared)>> = Mutex::new(Vec::new());
 
-/// Returns the shared data from this thread's cache, or makes it.
+/// Returns the shared data of a signature, of which they are a function, from the cache
+/// of all threads, or makes it.
 fn cached(signature: Signature, make: impl FnOnce() -> Shared) -> Shared {
-    let found = CACHE.with_borrow_mut(|cache| {
-        let i = cache.iter().position(|(s, _)| *s == signature)?;
+    let cache = || CACHE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut known = cache();
+    if let Some(i) = known.iter().position(|(s, _)| *s == signature) {
         // The most recently used is last.
-        cache[i..].rotate_left(1);
-        cache.last().map(|(_, shared)| shared.clone())
-    });
-    found.unwrap_or_else(|| {
-        let made = make();
-        if made.topology.triangles.len() <= KEPT_TRIANGLES {
-            CACHE.with_borrow_mut(|cache| {
-                if cache.len() == KEPT {
-                    cache.remove(0);
-                }
-                cache.push((signature, made.clone()));
-            });
+        known[i..].rotate_left(1);
+        return known[known.len() - 1].1.clone();
+    }
+    drop(known);
+    let made = make();
+    if made.topology.triangles.len() <= KEPT_TRIANGLES {
+        let mut known = cache();
+        if known.len() == KEPT {
+            known.remove(0);
         }
-        made
-    })
+        known.push((signature, made.clone()));
+    }
+    made
 }
 
 fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topology {

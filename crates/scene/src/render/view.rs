@@ -4,8 +4,8 @@
 //! image size the frame, the depth and the contours are computed once, and every caller
 //! gets the same `Arc`.
 
-use super::detail::Drawn;
 use super::canvas::Canvas;
+use super::detail::Drawn;
 use super::{Camera, Change, Channels, Contours, Frame, Scene};
 use crate::geom::Solid;
 use glam::DVec3;

@@ -7,7 +7,7 @@
 //! precision. Invariant: the meshes of a pose do not depend on earlier poses.
 
 use super::morph::{Anchor, Morph};
-use super::recent;
+use super::posed::Posed;
 use super::{JointPose, Keypoint, RestGradient, Rig, Rules};
 use crate::geom::detail::{self, Detail, Level, Levels};
 use crate::geom::{Affine, GeomError, Instance, Landmark, Mesh, Solid, Topology, edges, outer};
@@ -290,22 +290,36 @@ impl Armature {
     /// A pose that is not finite, or that moves vertices beyond the range of single
     /// precision.
     pub fn posed(self: &Arc<Self>, pose: &[JointPose], rules: &Rules) -> Result<Solid, GeomError> {
+        self.posed_after(pose, rules, None).map(|(solid, _)| solid)
+    }
+
+    /// As [`Armature::posed`], from a pose before, whose meshes are shared by the parts that
+    /// move as in it.
+    ///
+    /// # Errors
+    /// As [`Armature::posed`].
+    pub fn posed_after(
+        self: &Arc<Self>,
+        pose: &[JointPose],
+        rules: &Rules,
+        before: Option<&Posed>,
+    ) -> Result<(Solid, Posed), GeomError> {
         let transforms = self.rig.transforms(pose, rules)?;
         let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
         if !single.iter().all(|t| t.is_finite()) {
             return Err(GeomError::domain("the pose moves the body too far away"));
         }
+        let (posed, parts) = Posed::new(self, single, before);
         let body = Arc::clone(self);
-        let solid = Solid::of_parts(move || recent::parts(&body, &single));
-        let body = Arc::clone(self);
-        Ok(solid.with_landmarks_of(move || {
+        let solid = Solid::of_parts(parts).with_landmarks_of(move || {
             let keypoints = body.rig.keypoints().iter();
             let landmark = |k: &Keypoint| Landmark {
                 name: Arc::clone(&k.name),
                 position: transforms[k.joint].transform_point3(k.rest),
             };
             keypoints.map(landmark).collect::<Vec<_>>()
-        }))
+        });
+        Ok((solid, posed))
     }
 
     /// Pulls derivatives with respect to the body at rest back to the amount of a morph;

@@ -16,10 +16,10 @@ mod meshes;
 mod picture;
 mod static_layer;
 
+use self::layer::camera_bits;
 use self::picture::{Picture, Tools};
 use super::{Camera, Contours};
 use crate::geom::Solid;
-use crate::render::canvas::layer::camera_bits;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 /// The number of pictures that a canvas keeps: several cameras, or several sizes.

@@ -151,7 +151,9 @@ impl Picture {
             work::count(|work| work.kept += (count - changed.len()) as u64);
             for (index, instance) in &changed {
                 let found = self.dynamic.binary_search_by_key(index, |m| m.index);
-                let Some(mesh) = found.ok().and_then(|at| self.dynamic.get_mut(at)) else { continue };
+                let Some(mesh) = found.ok().and_then(|at| self.dynamic.get_mut(at)) else {
+                    continue;
+                };
                 self.areas.push(mesh.now.layer.area);
                 mesh.move_to(instance, camera, tools, Some(static_layer));
                 self.areas.push(mesh.now.layer.area);
@@ -308,8 +310,7 @@ impl Picture {
         let clock = self.clock;
         let moved = |m: &DynamicMesh| m.moved == clock;
         let anything = !same_extent || self.dynamic.iter().any(moved);
-        let Picture { static_layer, dynamic, depth, extent, rows, pixels, areas, again, .. } =
-            self;
+        let Picture { static_layer, dynamic, depth, extent, rows, pixels, areas, again, .. } = self;
         let (static_layer, width) = (static_layer.as_mut()?, camera.width as usize);
         Area::join(areas);
         work::count(|work| {

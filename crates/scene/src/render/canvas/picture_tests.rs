@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::geom::Affine;
+use crate::geom::Mesh;
 use crate::render::canvas::layer::camera_bits;
 use crate::render::testing::{Uniform, cuboid, lathe, solid, sphere};
-use crate::geom::Mesh;
 use crate::render::{Channels, Frame};
 use glam::{DVec3, Vec3};
 
@@ -61,7 +61,9 @@ impl Followed {
         assert_eq!(bits(&got), bits(&wanted));
         assert_eq!(change.count, wanted.len());
         let depth = Frame::render(solid, camera, Channels::Depth).depth;
-        assert!(self.picture.depth().iter().map(|d| d.to_bits()).eq(depth.iter().map(|d| d.to_bits())));
+        assert!(
+            self.picture.depth().iter().map(|d| d.to_bits()).eq(depth.iter().map(|d| d.to_bits()))
+        );
         let follows = Arc::ptr_eq(&self.at, &change.from);
         if follows {
             for removed in bits(&change.removed) {
@@ -199,8 +201,7 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     for x in [0.5, 0.6, 0.7] {
         let solid = Solid::group(&[fixed.clone(), beam(x)]);
         followed.picture.draw(&solid, &camera, &mut followed.tools);
-        let (seen, wanted) =
-            (followed.picture.contours(&camera), Contours::of(&solid, &camera));
+        let (seen, wanted) = (followed.picture.contours(&camera), Contours::of(&solid, &camera));
         assert_eq!(bits(&seen), bits(&wanted));
         assert!(wanted.len() > Contours::of(&fixed, &camera).len());
     }
@@ -418,9 +419,13 @@ fn what_cannot_be_seen_leaves_an_empty_picture() {
     let camera = Camera::default_for(48, 48);
     let mut random = Uniform(25);
     let mut meshes: Vec<_> = (0..4).map(|_| part(&mut random)).collect();
-    for at in
-        [[0.0, 0.0, 30.0], [90.0, 0.0, 0.0], [0.0, -90.0, 0.0], [f64::NAN, 0.0, 0.0], [0.0, 0.0, -1e12]]
-    {
+    for at in [
+        [0.0, 0.0, 30.0],
+        [90.0, 0.0, 0.0],
+        [0.0, -90.0, 0.0],
+        [f64::NAN, 0.0, 0.0],
+        [0.0, 0.0, -1e12],
+    ] {
         let by = Affine::new(DVec3::from_array(at), DVec3::ZERO, DVec3::ONE);
         let mut followed = Followed::new(&camera);
         followed.check(&group(&meshes, by), &camera);

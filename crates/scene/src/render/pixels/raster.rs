@@ -166,15 +166,7 @@ pub(in crate::render) fn draw_nearness(
         let placement = Placement::new(camera, &item.affine);
         let vertices = projected.mesh(i);
         if !vertices.outside(camera) {
-            fill_mesh(
-                &item.mesh,
-                &placement,
-                camera,
-                &vertices,
-                candidates,
-                (&area, None),
-                buffer,
-            );
+            fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, None), buffer);
         }
     }
     range

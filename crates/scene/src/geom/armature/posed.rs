@@ -1,0 +1,60 @@
+//! The meshes of a posed body, by part. A pose shares the mesh of each part that moves as
+//! in the pose before it; renderers draw shared meshes once.
+
+use super::Armature;
+use crate::geom::Instance;
+use glam::Affine3A;
+use std::sync::{Arc, OnceLock};
+
+/// A pose's transforms and meshes, from which the next pose starts. Meshes are made when
+/// they are needed.
+#[derive(Debug)]
+pub struct Posed(Arc<Pose>);
+
+#[derive(Debug)]
+struct Pose {
+    body: Arc<Armature>,
+    transforms: Vec<Affine3A>,
+    parts: OnceLock<Vec<Instance>>,
+}
+
+/// The bits that identify a transform. Equal numbers do not suffice: 0 and -0 can produce
+/// results that differ in the sign of zeros.
+fn bits(t: &Affine3A) -> [u32; 12] {
+    t.to_cols_array().map(f32::to_bits)
+}
+
+impl Pose {
+    /// The mesh of each part; those that moved in the same way in `before` are its.
+    fn parts(&self, before: Option<&Pose>) -> &[Instance] {
+        self.parts.get_or_init(|| {
+            let before = before.and_then(|b| b.parts.get().map(|parts| (&b.transforms, parts)));
+            let make = |(i, part): (usize, &super::body::Part)| {
+                let moved = |t: &[Affine3A], j: &u16| t.get(usize::from(*j)).map(bits);
+                let same = before.and_then(|(transforms, parts)| {
+                    let mut joints = part.joints.iter();
+                    let same = joints.all(|j| moved(transforms, j) == moved(&self.transforms, j));
+                    parts.get(i).filter(|_| same).cloned()
+                });
+                same.unwrap_or_else(|| self.body.skinned(i, &self.transforms))
+            };
+            self.body.parts().iter().enumerate().map(make).collect()
+        })
+    }
+}
+
+impl Posed {
+    /// A pose of a body, and the maker of its meshes. Of the pose before, only meshes that
+    /// are already made are used, so that no chain of poses is kept.
+    pub(super) fn new(
+        body: &Arc<Armature>,
+        transforms: Vec<Affine3A>,
+        before: Option<&Posed>,
+    ) -> (Posed, impl FnOnce() -> Vec<Instance> + Send + 'static) {
+        let before = before.filter(|b| Arc::ptr_eq(&b.0.body, body) && b.0.parts.get().is_some());
+        let before = before.map(|b| Arc::clone(&b.0));
+        let pose = Arc::new(Pose { body: Arc::clone(body), transforms, parts: OnceLock::new() });
+        let own = Arc::clone(&pose);
+        (Posed(pose), move || own.parts(before.as_deref()).to_vec())
+    }
+}
