@@ -16,6 +16,7 @@ use glam::{DVec3, Vec3};
 use pcadlang::geom::armature::{JointPose, Rules};
 use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, View};
+use std::cell::RefCell;
 use std::hint::black_box;
 use std::sync::Arc;
 
@@ -98,6 +99,7 @@ fn body(c: &mut Criterion) {
     let parts: Vec<_> =
         BODY.iter().map(|&(m, a, half, radius)| Arc::new(spindle(m, a, half, radius))).collect();
     let pose = Affine::new(DVec3::new(0.05, 0.02, 0.1), DVec3::new(0.1, 0.4, 0.05), DVec3::ONE);
+    let last = RefCell::new(Arc::new(View::new(Solid::group(&[]), camera)));
     let view = |moved: &[usize], by: f32| {
         let solids: Vec<_> = (0..parts.len())
             .map(|i| match moved.contains(&i) {
@@ -108,7 +110,10 @@ fn body(c: &mut Criterion) {
                 }
             })
             .collect();
-        View::new(Solid::group(&solids).placed(pose), camera)
+        let view = View::new(Solid::group(&solids).placed(pose), camera).after(&last.borrow());
+        let view = Arc::new(view);
+        last.replace(Arc::clone(&view));
+        view
     };
     let all: Vec<usize> = (0..parts.len()).collect();
     let mut step = 0u32;

@@ -13,6 +13,7 @@ use glam::DVec3;
 use pcadlang::geom::armature::{JointPose, Rules};
 use pcadlang::geom::{Affine, GeomError};
 use pcadlang::render::{Camera, View};
+use std::cell::RefCell;
 use std::time::Instant;
 
 fn median(mut xs: Vec<f64>) -> f64 {
@@ -31,10 +32,15 @@ fn main() -> Result<(), GeomError> {
     for lod in ["human.lod2", "human.lod1", "human"].into_iter().filter(|lod| chosen(0, lod)) {
         let body = shipped::human(lod)?;
         let joints = body.rig().joints();
+        let (solid, posed) = body.posed_after(&[], &rules, None)?;
+        let state = RefCell::new((posed, View::new(solid.placed(place), camera)));
+        // As in a trace: each pose starts from the one before.
         let draw = |pose: &[JointPose]| -> Result<f64, GeomError> {
             let begun = Instant::now();
-            let view = View::new(body.posed(pose, &rules)?.placed(place), camera);
+            let (solid, posed) = body.posed_after(pose, &rules, Some(&state.borrow().0))?;
+            let view = View::new(solid.placed(place), camera).after(&state.borrow().1);
             std::hint::black_box(view.contours(128).len());
+            state.replace((posed, view));
             Ok(begun.elapsed().as_secs_f64() * 1e6)
         };
         // The rotation differs slightly each time, so that no cached result can be used.

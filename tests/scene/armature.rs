@@ -7,8 +7,8 @@
 use crate::subjects::shipped;
 use glam::{DAffine3, DVec3};
 use pcadlang::geom::Affine;
-use pcadlang::geom::armature::{Armature, JointPose, Rules, Stretch, Turn};
-use pcadlang::render::{Camera, View};
+use pcadlang::geom::armature::{Armature, JointPose, Posed, Rules, Stretch, Turn};
+use pcadlang::render::{Camera, Contours, View};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -92,11 +92,12 @@ fn a_pose_that_differs_in_one_joint_shares_all_other_parts() {
     let body = body("human.lod2");
     let pose = poses()["p500"].clone();
     let rules = Rules::default();
-    let before = body.posed(&pose, &rules).unwrap();
+    let (before, posed) = body.posed_after(&pose, &rules, None).unwrap();
+    assert!(!before.instances().is_empty(), "meshes are made when they are first needed");
     let hand = body.rig().find("hand_l").unwrap();
     let mut other = pose.clone();
     other[hand] = JointPose::turned(DVec3::new(0.5, 0.2, 0.1));
-    let after = body.posed(&other, &rules).unwrap();
+    let (after, _) = body.posed_after(&other, &rules, Some(&posed)).unwrap();
     let moved = |a: &pcadlang::geom::Solid, b: &pcadlang::geom::Solid| {
         a.instances()
             .iter()
@@ -106,19 +107,10 @@ fn a_pose_that_differs_in_one_joint_shares_all_other_parts() {
     };
     // The hand, and the forearm, whose last vertices follow the hand.
     assert!((1..=2).contains(&moved(&before, &after)), "{}", moved(&before, &after));
-    assert_eq!(
-        moved(&before, &body.posed(&pose, &rules).unwrap()),
-        0,
-        "the way back finds the old meshes"
-    );
-    // Sharing does not change results: another thread, with empty caches, makes the same
-    // meshes.
-    let elsewhere = || {
-        let solid = body.posed(&other, &rules).unwrap();
-        assert!(!solid.instances().is_empty(), "meshes are made where somebody first looks");
-        solid
-    };
-    let fresh = std::thread::scope(|s| s.spawn(elsewhere).join().unwrap());
+    let (again, _) = body.posed_after(&pose, &rules, Some(&posed)).unwrap();
+    assert_eq!(moved(&before, &again), 0, "the same pose shares all meshes");
+    // Sharing does not change results.
+    let fresh = body.posed(&other, &rules).unwrap();
     for (a, b) in after.instances().iter().zip(fresh.instances()) {
         assert!(*a.mesh == *b.mesh && !Arc::ptr_eq(&a.mesh, &b.mesh));
     }
@@ -131,18 +123,23 @@ fn incremental_contours_of_a_moving_body_equal_full_ones() {
     let camera = Camera::default_for(128, 128);
     let place =
         Affine::new(DVec3::new(0.1, -1.8, 0.0), DVec3::new(0.1, 0.4, 0.0), DVec3::splat(2.0));
-    let draw = |pose: &[JointPose]| {
-        let view = View::new(body.posed(pose, &rules).unwrap().placed(place), camera);
-        (*view.contours(128)).clone()
-    };
+    let mut state: Option<(Posed, View)> = None;
     let mut pose = poses()["p001"].clone();
     for step in 0..60usize {
         let (joint, back) = ((step * 7) % pose.len(), pose.clone());
         let wave = |a: f64| libm::sin(step as f64 * a);
         pose[joint] = JointPose::turned(DVec3::new(wave(0.7), wave(1.1), wave(1.9)) * 0.6);
-        let here = draw(&pose);
-        let fresh = std::thread::scope(|s| s.spawn(|| draw(&pose)).join().unwrap());
-        assert!(here == fresh, "step {step}");
+        let (before, last) = (state.as_ref().map(|s| &s.0), state.as_ref().map(|s| &s.1));
+        let (solid, posed) = body.posed_after(&pose, &rules, before).unwrap();
+        let view = View::new(solid.placed(place), camera);
+        let view = match last {
+            Some(last) => view.after(last),
+            None => view,
+        };
+        let here = view.contours(128);
+        let fresh = body.posed(&pose, &rules).unwrap().placed(place);
+        assert!(*here == Contours::of(&fresh, &camera), "step {step}");
+        state = Some((posed, view));
         assert!(!here.x.is_empty());
         if step % 3 == 0 {
             pose = back;

@@ -5,6 +5,7 @@
 use glam::{DVec3, Vec3};
 use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
+use std::cell::RefCell;
 use std::sync::Arc;
 
 /// Uniform numbers in 0..1, reproducible in every run.
@@ -137,6 +138,7 @@ fn what_was_drawn_before_changes_nothing() {
         let cameras = [camera(&mut random), camera(&mut random)];
         let mut meshes: Vec<_> = (0..3 + random.below(20)).map(|_| part(&mut random)).collect();
         let (mut by, mut eye) = (pose(&mut random), 0);
+        let mut last: Option<View> = None;
         for _ in 0..40 {
             let before = (meshes.clone(), by, eye);
             match random.below(8) {
@@ -152,21 +154,26 @@ fn what_was_drawn_before_changes_nothing() {
                 }
             }
             let (solid, camera) = (group(&meshes, by), cameras[eye]);
-            // Through a view or directly, at random.
-            let here = match random.next() < 0.5 {
-                true => Contours::of(&solid, &camera),
-                false => (*View::new(solid.clone(), camera)
-                    .contours(camera.width.max(camera.height)))
-                .clone(),
+            let size = camera.width.max(camera.height);
+            let view = View::new(solid.clone(), camera);
+            let view = match &last {
+                Some(last) => view.after(last),
+                None => view,
             };
-            // Another thread has not drawn anything before.
-            let there =
-                std::thread::scope(|s| s.spawn(|| Contours::of(&solid, &camera)).join().unwrap());
+            // What is requested first changes nothing either.
+            let depth = (random.next() < 0.3).then(|| view.depth(size));
+            let change = (random.next() < 0.5).then(|| view.change(size).count);
+            let (here, there) = (view.contours(size), Contours::of(&solid, &camera));
             assert_eq!(bits(&here), bits(&there));
+            assert!(change.is_none_or(|count| count == there.len()));
+            let frame = Frame::render(&solid, &camera, Channels::Depth);
+            assert!(depth.is_none_or(|depth| *depth == frame));
+            assert_eq!(*view.depth(size), frame);
             // A view with a frame uses the depth of that frame.
-            let view = View::new(solid, camera);
-            view.frame(camera.width.max(camera.height));
-            assert_eq!(bits(&here), bits(&view.contours(camera.width.max(camera.height))));
+            let framed = View::new(solid, camera);
+            framed.frame(size);
+            assert_eq!(bits(&here), bits(&framed.contours(size)));
+            last = Some(view);
             if random.next() < 0.6 {
                 (meshes, by, eye) = before;
             }
@@ -179,12 +186,19 @@ fn a_part_that_moves_there_and_back_gives_the_first_picture() {
     let mut random = Uniform(43);
     let mut meshes: Vec<_> = (0..9).map(|_| part(&mut random)).collect();
     let camera = Camera::default_for(96, 96);
-    let first = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
+    let last = RefCell::new(View::new(group(&meshes, Affine::IDENTITY), camera));
+    let draw = |meshes: &[Arc<Mesh>]| {
+        let view = View::new(group(meshes, Affine::IDENTITY), camera).after(&last.borrow());
+        let contours = view.contours(96);
+        last.replace(view);
+        contours
+    };
+    let first = draw(&meshes);
     let old = std::mem::replace(&mut meshes[4], part(&mut random));
-    let moved = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
+    let moved = draw(&meshes);
     // The same mesh at another address.
     meshes[4] = Arc::new((*old).clone());
-    let copy = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
+    let copy = draw(&meshes);
     assert_ne!(bits(&first), bits(&moved));
     assert_eq!(bits(&first), bits(&copy));
     assert!(

@@ -9,11 +9,34 @@ mod shapes;
 
 use crate::subjects::shipped;
 use pcadlang::geom::Mesh;
-use pcadlang::render::{Contours, Frame};
+use pcadlang::geom::Solid;
+use pcadlang::render::{Camera, Contours, Frame, View};
+use std::sync::Arc;
 
 /// Runs a function on a new thread, whose caches are empty.
 pub fn afresh<T: Send>(make: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|s| s.spawn(make).join().unwrap())
+}
+
+/// Views that follow one another, each drawn from the one before.
+#[derive(Default)]
+pub struct Views(Option<View>);
+
+impl Views {
+    /// The next view.
+    pub fn next(&mut self, solid: &Solid, camera: &Camera) -> &View {
+        let view = View::new(solid.clone(), *camera);
+        let view = match &self.0 {
+            Some(before) => view.after(before),
+            None => view,
+        };
+        self.0.insert(view)
+    }
+
+    /// The contours of the next view, at its full size.
+    pub fn contours(&mut self, solid: &Solid, camera: &Camera) -> Arc<Contours> {
+        self.next(solid, camera).contours(camera.width.max(camera.height))
+    }
 }
 
 pub fn contour_bits(c: &Contours) -> Vec<u32> {
