@@ -1,4 +1,4 @@
-//! A mesh that moves relative to a backdrop: its layer at the current and the previous
+//! A mesh that moves in front of the static layer: its layer at the current and the previous
 //! placement.
 
 use super::layer::{Layer, affine_bits};

@@ -358,7 +358,7 @@ impl Picture {
                             now.iter().zip(before).zip(static_layer.iter().zip(nearest)).zip(again);
                         for (((now, before), (static_layer, nearest)), again) in lists {
                             // Where both depths are nearer than `nearest`, every test of the
-                            // backdrop fails before and after, so the change does not matter.
+                            // static layer fails before and after, so the change does not matter.
                             // Where a dynamic mesh is in front, results may also change with the
                             // depth range.
                             let hidden = (now < nearest) & (before < nearest);

@@ -30,7 +30,7 @@ pub struct StaticLayer {
     extents: [f64; 2],
     /// Half the relative width of this interval.
     width: f64,
-    /// Pieces that the backdrop does not hide at the greatest of these depth ranges, with
+    /// Pieces that the layer does not hide at the greatest of these depth ranges, with
     /// the index of their mesh.
     live: Vec<(Piece, usize)>,
     /// For each live piece, the sides on which it passes its test, and whether it is
