@@ -9,7 +9,7 @@ mod common;
 use common::{photograph, picture, pose, short, vase};
 use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::render::{Camera, Channels, Contours, Frame};
-use pcadlang::vision::Elements;
+use pcadlang::vision::ContourSlice;
 use pcadlang::vision::features::{Query, contour_features, observed, rendered};
 use pcadlang::vision::{
     Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
@@ -46,7 +46,7 @@ fn contours(c: &mut Criterion) {
     for size in [128, SIDE] {
         let contours =
             Contours::of(&vase().placed(pose(&mut 0.0)), &Camera::default_for(size, size));
-        let elements = Elements::of(&contours);
+        let elements = contours.slice();
         for (name, options) in chamfers() {
             let chamfer = Chamfer::prepare(&map, size, size, &options).expect("a chamfer");
             let mut scratch = chamfer::Scratch::default();

@@ -23,7 +23,7 @@ use pcadlang::geom::Solid;
 use pcadlang::render::{Camera, View};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
-use pcadlang::vision::elements::Elements;
+use pcadlang::vision::elements::ContourSlice;
 use std::error::Error;
 use subjects::Subject;
 
@@ -101,7 +101,7 @@ fn view(solid: &Solid, size: u32, detail: f64) -> View {
 /// diagonal.
 fn rho(chamfer: &Chamfer, view: &View, size: u32) -> f64 {
     let c = view.contours(size);
-    chamfer.distance(&Elements::of(&c))
+    chamfer.distance(&c.slice())
 }
 
 fn map(view: &View, size: u32) -> ContourMap {

@@ -22,7 +22,7 @@ use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
-use pcadlang::vision::elements::Elements;
+use pcadlang::vision::elements::ContourSlice;
 use plain::Plain;
 use std::error::Error;
 use std::path::Path;
@@ -175,7 +175,7 @@ fn ours(
     let mut scratch = Scratch::default();
     let mut likelihood = |solid: &Solid| {
         let contours = Contours::of(solid, &camera);
-        std::hint::black_box(chamfer.log_likelihood_with(&Elements::of(&contours), &mut scratch));
+        std::hint::black_box(chamfer.log_likelihood_with(&contours.slice(), &mut scratch));
     };
     case.measure("pcadlang", "likelihood", "", |i| likelihood(&at(i)));
     let Some(mesh) = solid.instances().first().map(|i| Arc::clone(&i.mesh)) else { return Ok(()) };
@@ -188,8 +188,7 @@ fn ours(
         }
         let view =
             |i: usize| View::with_detail(placed(&lasting, &poses[i % poses.len()]), camera, detail);
-        let rho =
-            |c: &Contours| chamfer.distance(&Elements::of(c)) * Elements::of(c).diagonal() / 100.0;
+        let rho = |c: &Contours| chamfer.distance(&c.slice()) * c.slice().diagonal() / 100.0;
         let off = |i: usize| {
             (rho(&view(i).contours(case.size)) - rho(&Contours::of(&at(i), &camera))).abs()
         };
@@ -200,7 +199,7 @@ fn ours(
             format!(",\"distance_off_px_median\":{median:.3},\"distance_off_px_most\":{most:.3}");
         case.measure(peer, "likelihood", &extra, |i| {
             let contours = view(i).contours(case.size);
-            std::hint::black_box(chamfer.log_likelihood(&Elements::of(&contours)));
+            std::hint::black_box(chamfer.log_likelihood(&contours.slice()));
         });
     }
     let shapes: Vec<Vec<Vec3>> = (0..16).map(|k| deformed(&mesh, k)).collect();

@@ -10,12 +10,12 @@ mod outline;
 
 use lathe::{Lathe, Numbers};
 use outline::{Outline, overlap};
+use pcadlang::vision::ContourSlice;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
 use pcadlang::vision::contour_ratio::{self, ContourRatio, ContourRatioOptions};
-use pcadlang::vision::elements::Elements;
 use std::time::Instant;
 
-type Score = Box<dyn FnMut(&Elements<'_>) -> f64>;
+type Score = Box<dyn FnMut(&ContourSlice<'_>) -> f64>;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -95,15 +95,16 @@ fn comparators(
     full: bool,
 ) -> Result<Vec<(String, Score)>, Box<dyn std::error::Error>> {
     let mut all: Vec<(String, Score)> = Vec::new();
-    let chamfer =
-        |name: &str, o: ChamferOptions| -> Result<(String, Score), Box<dyn std::error::Error>> {
-            let c = Chamfer::prepare(map, size, size, &o)?;
-            let mut scratch = Scratch::default();
-            Ok((
-                name.to_string(),
-                Box::new(move |e: &Elements<'_>| c.log_likelihood_with(e, &mut scratch)) as Score,
-            ))
-        };
+    let chamfer = |name: &str,
+                   o: ChamferOptions|
+     -> Result<(String, Score), Box<dyn std::error::Error>> {
+        let c = Chamfer::prepare(map, size, size, &o)?;
+        let mut scratch = Scratch::default();
+        Ok((
+            name.to_string(),
+            Box::new(move |e: &ContourSlice<'_>| c.log_likelihood_with(e, &mut scratch)) as Score,
+        ))
+    };
     let ratio = |name: &str,
                  o: ContourRatioOptions|
      -> Result<(String, Score), Box<dyn std::error::Error>> {
@@ -111,7 +112,7 @@ fn comparators(
         let mut scratch = contour_ratio::Scratch::default();
         Ok((
             name.to_string(),
-            Box::new(move |e: &Elements<'_>| c.log_likelihood_with(e, &mut scratch)) as Score,
+            Box::new(move |e: &ContourSlice<'_>| c.log_likelihood_with(e, &mut scratch)) as Score,
         ))
     };
     let (co, ro) = (ChamferOptions::default, ContourRatioOptions::default);

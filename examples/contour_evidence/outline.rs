@@ -1,7 +1,7 @@
 //! Silhouettes as sub-pixel outlines: the level 0.5 of a blurred mask, by marching
 //! squares.
 
-use pcadlang::vision::elements::Elements;
+use pcadlang::vision::ContourSlice;
 
 /// The elements of an outline.
 #[derive(Default)]
@@ -49,9 +49,9 @@ impl Outline {
     }
 
     /// Returns the elements in the form that comparators take.
-    pub fn elements(&self) -> Elements<'_> {
+    pub fn elements(&self) -> ContourSlice<'_> {
         let (width, height) = (self.size as u32, self.size as u32);
-        Elements {
+        ContourSlice {
             x: &self.x,
             y: &self.y,
             tx: &self.tx,

@@ -7,7 +7,6 @@ use crate::lang::value::Value;
 use crate::render::{BatchRenderer, Scene, View};
 use crate::report::pictures::{Drawn, shaded};
 use crate::scene::{ImageValue, KeypointsValue, ViewValue};
-use crate::vision::Elements;
 use crate::vision::features::{self, Query};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -45,7 +44,7 @@ impl Features {
         match self {
             Features::Contours { size } => {
                 let contours = view.contours(*size);
-                Ok(features::contour_features(&features::rendered(&Elements::of(&contours))))
+                Ok(features::contour_features(&features::rendered(&contours.slice())))
             }
             Features::Keypoints { .. } => {
                 let (width, height) = (view.camera().width, view.camera().height);
@@ -91,7 +90,7 @@ impl Features {
         let scenes: Vec<Scene> = views.iter().map(|view| view.scene(*size)).collect();
         let batch = renderer.contours(&scenes);
         in_parallel(threads, (0..batch.len()).collect(), |i| {
-            let elements = Elements::from(batch.scene(i));
+            let elements = batch.scene(i);
             Ok(features::contour_features(&features::rendered(&elements)))
         })
     }

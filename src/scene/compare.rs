@@ -1,7 +1,7 @@
 //! Likelihoods of observed pictures given a view.
 
 use super::adjoints::BySolid;
-use super::kept::{Kept, delta};
+use super::kept::Kept;
 use super::observed::{DepthValue, ImageValue, MaskValue};
 use super::{VIEW, ViewValue, incremental, native};
 use crate::lang::adjoint::Adjoint;
@@ -16,7 +16,7 @@ use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
     Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    Elements, MaskLikelihood, VisionError,
+    MaskLikelihood, VisionError,
 };
 use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
@@ -263,17 +263,15 @@ impl Likelihood for ContourOf {
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let (ratio, change) = (self.prepared(observed)?, self.view.change(self.size));
         let whole = OnceCell::new();
-        let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
-        Ok(self.kept.with(&ratio, |kept| ratio.log_likelihood_after(&delta(&change), whole, kept)))
+        let whole = || whole.get_or_init(|| self.view.contours(self.size)).slice();
+        Ok(self.kept.with(&ratio, |kept| ratio.log_likelihood_after(&change, whole, kept)))
     }
 
     /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (ratio, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
-        RATIO.with_borrow_mut(|scratch| {
-            ratio.gradient(&Elements::of(&contours), scratch, &mut by_piece)
-        });
+        RATIO.with_borrow_mut(|scratch| ratio.gradient(&contours.slice(), scratch, &mut by_piece));
         Some(by_contours(&self.view, self.size, &by_piece))
     }
 
@@ -319,10 +317,10 @@ impl Likelihood for ChamferOf {
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let (chamfer, change) = (self.prepared(observed)?, self.view.change(self.size));
         let whole = OnceCell::new();
-        let whole = || Elements::of(whole.get_or_init(|| self.view.contours(self.size)));
+        let whole = || whole.get_or_init(|| self.view.contours(self.size)).slice();
         let score = |tally: &mut _| {
             CHAMFER.with_borrow_mut(|scratch| {
-                chamfer.log_likelihood_after(&delta(&change), whole, tally, scratch)
+                chamfer.log_likelihood_after(&change, whole, tally, scratch)
             })
         };
         Ok(self.kept.with(&chamfer, score))
@@ -332,9 +330,8 @@ impl Likelihood for ChamferOf {
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (chamfer, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
-        let by_sigma = CHAMFER.with_borrow_mut(|scratch| {
-            chamfer.gradient(&Elements::of(&contours), scratch, &mut by_piece)
-        });
+        let by_sigma = CHAMFER
+            .with_borrow_mut(|scratch| chamfer.gradient(&contours.slice(), scratch, &mut by_piece));
         Some(Adjoint::List(vec![
             by_contours(&self.view, self.size, &by_piece),
             Adjoint::Num(by_sigma),

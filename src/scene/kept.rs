@@ -1,8 +1,6 @@
 //! What a comparator keeps from one score to the next.
 
 use crate::lang::builtins::PreviousEvaluation;
-use crate::render::Change;
-use crate::vision::{ContourDelta, Elements};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
@@ -33,18 +31,5 @@ impl<C: Send + Sync + 'static, T: Default + Send + 'static> Kept<C, T> {
             *kept = (Some(Arc::clone(comparator)), T::default());
         }
         f(&mut kept.1)
-    }
-}
-
-/// A change of drawn contours as comparators read it.
-pub(super) fn delta(change: &Change) -> ContourDelta<'_> {
-    let Change { from, to, removed, added, moving, count } = change;
-    ContourDelta {
-        from,
-        to,
-        removed: Elements::of(removed),
-        added: Elements::of(added),
-        moving: Elements::of(moving),
-        count: *count,
     }
 }

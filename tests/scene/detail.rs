@@ -13,7 +13,7 @@ use pcadlang::geom::Solid;
 use pcadlang::render::{Camera, Contours, View};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
-use pcadlang::vision::elements::Elements;
+use pcadlang::vision::elements::ContourSlice;
 use std::sync::Arc;
 use subjects::Subject;
 
@@ -31,7 +31,7 @@ fn to(c: &Contours) -> impl Fn(&Contours) -> f64 {
         ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(SIZE, SIZE) };
     let chamfer = Chamfer::prepare(&map, SIZE, SIZE, &ChamferOptions::default()).unwrap();
     let pixels = f64::from(SIZE) * 2f64.sqrt() / 100.0;
-    move |c| chamfer.distance(&Elements::of(c)) * pixels
+    move |c| chamfer.distance(&c.slice()) * pixels
 }
 
 #[test]

@@ -3,7 +3,7 @@
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 
-mod drawn;
+mod contours;
 pub mod geom;
 pub mod render;
 pub mod vision;

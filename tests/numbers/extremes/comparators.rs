@@ -7,8 +7,8 @@ use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::vision::chamfer::Mode;
 use pcadlang::vision::keypoints::{Detection, RelativeDepthLikelihood};
 use pcadlang::vision::{
-    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
-    DepthMap, Elements, GradientDetector, KeypointLikelihood, KeypointOptions, Mask,
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, ContourSlice,
+    DepthLikelihood, DepthMap, GradientDetector, KeypointLikelihood, KeypointOptions, Mask,
     MaskLikelihood, Photo, Region, RegionOptions, distance_transform,
 };
 
@@ -37,9 +37,9 @@ impl Pieces {
         all.fold(Pieces::new(size), Pieces::with)
     }
 
-    fn elements(&self) -> Elements<'_> {
+    fn elements(&self) -> ContourSlice<'_> {
         let [x, y, tx, ty, length] = &self.lists;
-        Elements { x, y, tx, ty, length, width: self.size.0, height: self.size.1 }
+        ContourSlice { x, y, tx, ty, length, width: self.size.0, height: self.size.1 }
     }
 
     fn map(&self) -> ContourMap {

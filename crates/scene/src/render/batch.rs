@@ -7,6 +7,7 @@
 //! of threads: they are those of [`Contours::of`].
 
 use super::{Camera, Contours};
+use crate::contours::ContourSlice;
 use crate::geom::Solid;
 use pcadlang_numerics::platform::threads::Pool;
 
@@ -45,25 +46,6 @@ pub struct ContourBatch {
     pub ends: Vec<usize>,
     /// Width and height of each scene's picture.
     pub sizes: Vec<[u32; 2]>,
-}
-
-/// Borrowed lists of pieces of contour.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContourSlice<'a> {
-    /// As in [`Contours`]; all lists have the same length.
-    pub x: &'a [f32],
-    /// As in [`Contours`].
-    pub y: &'a [f32],
-    /// As in [`Contours`].
-    pub tx: &'a [f32],
-    /// As in [`Contours`].
-    pub ty: &'a [f32],
-    /// As in [`Contours`].
-    pub length: &'a [f32],
-    /// Width of the picture.
-    pub width: u32,
-    /// Height of the picture.
-    pub height: u32,
 }
 
 impl ContourBatch {

@@ -22,10 +22,9 @@ mod testing;
 
 use pcadlang_numerics::num::simd;
 
-pub use batch::{BatchRenderer, ContourBatch, ContourSlice, Cores, Scene};
+pub use crate::contours::{ContourChange, ContourSlice, Contours};
+pub use batch::{BatchRenderer, ContourBatch, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
-pub use canvas::Change;
-pub use lines::contours::Contours;
 pub use pixels::frame::{Channels, Frame};
 pub use pixels::shade::shade;
 pub use view::View;

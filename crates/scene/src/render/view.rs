@@ -6,7 +6,7 @@
 
 use super::canvas::Canvas;
 use super::detail::Drawn;
-use super::{Camera, Change, Channels, Contours, Frame, Scene};
+use super::{Camera, Channels, ContourChange, Contours, Frame, Scene};
 use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -25,7 +25,7 @@ pub struct View {
     frames: BySize<Frame>,
     depths: BySize<Frame>,
     contours: BySize<Contours>,
-    changes: BySize<Change>,
+    changes: BySize<ContourChange>,
 }
 
 impl View {
@@ -124,15 +124,15 @@ impl View {
 
     /// The difference of [`View::contours`] from the contours drawn last on the same
     /// canvas, without building the list of those that stay.
-    pub fn change(&self, size: u32) -> Arc<Change> {
+    pub fn change(&self, size: u32) -> Arc<ContourChange> {
         self.change_on_canvas(size).unwrap_or_else(|| {
-            let whole = Change::whole(self.contours(size), &self.camera.scaled_to(size));
+            let whole = ContourChange::whole(self.contours(size));
             once(&self.changes, size, || whole)
         })
     }
 
     /// The change, unless the picture is better drawn in full, or its depth is known.
-    fn change_on_canvas(&self, size: u32) -> Option<Arc<Change>> {
+    fn change_on_canvas(&self, size: u32) -> Option<Arc<ContourChange>> {
         let mut entries = lock(&self.changes);
         let found = find(&entries, size);
         found.or_else(|| {

@@ -10,9 +10,10 @@ mod gradient;
 mod reverse;
 
 use self::reverse::Reverse;
-use super::elements::{ComparatorError, ContourDelta, Element, Elements, check};
+use super::elements::{ComparatorError, Element, check};
 use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use super::pictures::contour_map::ContourMap;
+use crate::contours::{ContourChange, ContourSlice};
 use pcadlang_numerics::num::LN_SQRT_2PI;
 use pcadlang_numerics::num::simd::vectorised;
 use pcadlang_numerics::platform::threads::side_by_side;
@@ -173,24 +174,24 @@ impl Chamfer {
     /// Returns the distance in percent of the diagonal: the length-weighted mean over the
     /// elements of the distance to the observed contours, averaged with that of the other
     /// direction if symmetric. With nothing in view it is 100.
-    pub fn distance(&self, elements: &Elements<'_>) -> f64 {
+    pub fn distance(&self, elements: &ContourSlice<'_>) -> f64 {
         self.distance_with(elements, &mut Scratch::default())
     }
 
     /// [`Chamfer::distance`] without allocation once the scratch has grown.
-    pub fn distance_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
+    pub fn distance_with(&self, elements: &ContourSlice<'_>, scratch: &mut Scratch) -> f64 {
         self.mean(self.forward(elements), self.back(elements, scratch))
     }
 
     /// Returns the log-likelihood. `Mean`: log normal(distance; 0, sigma). `Sum`: the sum
     /// of that of every element's distance times its length in percent of the diagonal;
     /// with nothing in view, that of a diagonal's length of contour at distance 100.
-    pub fn log_likelihood(&self, elements: &Elements<'_>) -> f64 {
+    pub fn log_likelihood(&self, elements: &ContourSlice<'_>) -> f64 {
         self.log_likelihood_with(elements, &mut Scratch::default())
     }
 
     /// [`Chamfer::log_likelihood`] without allocation once the scratch has grown.
-    pub fn log_likelihood_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
+    pub fn log_likelihood_with(&self, elements: &ContourSlice<'_>, scratch: &mut Scratch) -> f64 {
         self.score(self.forward(elements), self.back(elements, scratch))
     }
 
@@ -199,27 +200,27 @@ impl Chamfer {
     /// (unless symmetric); otherwise `whole` must give all contours.
     pub fn log_likelihood_after<'a>(
         &self,
-        step: &ContourDelta<'_>,
-        whole: impl Fn() -> Elements<'a>,
+        step: &ContourChange,
+        whole: impl Fn() -> ContourSlice<'a>,
         tally: &mut Tally,
         scratch: &mut Scratch,
     ) -> f64 {
         if step.all_move() {
-            return self.log_likelihood_with(&step.moving, scratch);
+            return self.log_likelihood_with(&step.moving.slice(), scratch);
         }
         if !step.leads_to(tally.of.as_ref()) {
             if step.follows(tally.of.as_ref()) {
-                self.count(&step.removed, -1, &mut tally.steps);
-                self.count(&step.added, 1, &mut tally.steps);
+                self.count(&step.removed.slice(), -1, &mut tally.steps);
+                self.count(&step.added.slice(), 1, &mut tally.steps);
             } else {
                 tally.steps = Steps::default();
                 self.count(&whole(), 1, &mut tally.steps);
-                self.count(&step.moving, -1, &mut tally.steps);
+                self.count(&step.moving.slice(), -1, &mut tally.steps);
             }
             tally.of = Some(step.to.clone());
         }
         let mut steps = tally.steps;
-        self.count(&step.moving, 1, &mut steps);
+        self.count(&step.moving.slice(), 1, &mut steps);
         let back = self.reverse.as_ref().and_then(|_| self.back(&whole(), scratch));
         self.score(steps.sums(), back)
     }
@@ -281,14 +282,14 @@ impl Chamfer {
         (d, [dx * self.grid.sx, dy * self.grid.sy, turn])
     }
 
-    fn forward(&self, elements: &Elements<'_>) -> ChamferSums {
+    fn forward(&self, elements: &ContourSlice<'_>) -> ChamferSums {
         let mut steps = Steps::default();
         self.count(elements, 1, &mut steps);
         steps.sums()
     }
 
     /// Adds (`sign` 1) or subtracts (-1) the contributions of elements.
-    fn count(&self, elements: &Elements<'_>, sign: i64, steps: &mut Steps) {
+    fn count(&self, elements: &ContourSlice<'_>, sign: i64, steps: &mut Steps) {
         let mut own = *steps;
         *steps = vectorised(
             #[inline(always)]
@@ -305,7 +306,7 @@ impl Chamfer {
         );
     }
 
-    fn back(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> Option<ChamferSums> {
+    fn back(&self, elements: &ContourSlice<'_>, scratch: &mut Scratch) -> Option<ChamferSums> {
         let reverse = self.reverse.as_ref()?;
         let mut sums = ChamferSums::default();
         reverse.each(elements, self.turn(), scratch, |length, distance, _| {

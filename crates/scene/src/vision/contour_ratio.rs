@@ -19,9 +19,10 @@ mod ratio;
 
 use self::background::scores;
 use self::match_capacity::{MatchCapacity, NO_GROUP};
-use super::elements::{ComparatorError, ContourDelta, Elements, check};
+use super::elements::{ComparatorError, check};
 use super::field::{CHANNELS, Edge, Edges, channels_of, turn_between};
 use super::pictures::contour_map::ContourMap;
+use crate::contours::{ContourChange, ContourSlice};
 use pcadlang_numerics::platform::threads::side_by_side;
 
 pub use self::match_capacity::Scratch;
@@ -169,12 +170,12 @@ impl ContourRatio {
     /// `nothing` percent of contour without a nearby edge (-1254.9 with the defaults),
     /// which is below any ordinary contour; with at least `least` percent of contour in
     /// view there is no penalty.
-    pub fn log_likelihood(&self, elements: &Elements<'_>) -> f64 {
+    pub fn log_likelihood(&self, elements: &ContourSlice<'_>) -> f64 {
         self.log_likelihood_with(elements, &mut Scratch::default())
     }
 
     /// [`ContourRatio::log_likelihood`] without allocation once the scratch has grown.
-    pub fn log_likelihood_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
+    pub fn log_likelihood_with(&self, elements: &ContourSlice<'_>, scratch: &mut Scratch) -> f64 {
         scratch.begin(self.capacity.groups());
         self.count(elements, 1, scratch);
         self.score(scratch)
@@ -186,34 +187,34 @@ impl ContourRatio {
     /// comparator.
     pub fn log_likelihood_after<'a>(
         &self,
-        step: &ContourDelta<'_>,
-        whole: impl FnOnce() -> Elements<'a>,
+        step: &ContourChange,
+        whole: impl FnOnce() -> ContourSlice<'a>,
         scratch: &mut Scratch,
     ) -> f64 {
         if step.all_move() {
-            return self.log_likelihood_with(&step.moving, scratch);
+            return self.log_likelihood_with(&step.moving.slice(), scratch);
         }
         if !step.leads_to(scratch.of.as_ref()) {
             if step.follows(scratch.of.as_ref()) {
-                self.count(&step.removed, -1, scratch);
-                self.count(&step.added, 1, scratch);
+                self.count(&step.removed.slice(), -1, scratch);
+                self.count(&step.added.slice(), 1, scratch);
             } else {
                 scratch.begin(self.capacity.groups());
                 self.count(&whole(), 1, scratch);
-                self.count(&step.moving, -1, scratch);
+                self.count(&step.moving.slice(), -1, scratch);
             }
             scratch.of = Some(step.to.clone());
         }
         scratch.score_matches(&self.capacity);
         let before = scratch.savepoint();
-        self.count(&step.moving, 1, scratch);
+        self.count(&step.moving.slice(), 1, scratch);
         let score = self.score(scratch);
         scratch.restore(before);
         score
     }
 
     /// Adds (`sign` 1) or subtracts (-1) the contributions of elements.
-    fn count(&self, elements: &Elements<'_>, sign: i64, scratch: &mut Scratch) {
+    fn count(&self, elements: &ContourSlice<'_>, sign: i64, scratch: &mut Scratch) {
         let samples = self.grid.width as usize * self.grid.height as usize;
         // Integer sums are exact: a sum of individually rounded terms does not depend on
         // their order.

@@ -3,29 +3,8 @@
 //! renderer and does not depend on meshes. Invariant: elements that are not finite or lie
 //! outside the picture have weight 0, so NaN cannot enter a score.
 
-use std::sync::Arc;
+use crate::contours::ContourSlice;
 use thiserror::Error;
-
-/// Rendered pieces of contour in a frame of `width` x `height` pixels. The centre of
-/// pixel (0, 0) is (0.5, 0.5); y points down. If the slices differ in length, the
-/// shortest one counts.
-#[derive(Debug, Clone, Copy)]
-pub struct Elements<'a> {
-    /// Horizontal positions of the pieces' middles, in pixels.
-    pub x: &'a [f32],
-    /// Vertical positions of the pieces' middles, in pixels.
-    pub y: &'a [f32],
-    /// Unit tangents, horizontal part. The sign of a tangent does not matter.
-    pub tx: &'a [f32],
-    /// Unit tangents, vertical part.
-    pub ty: &'a [f32],
-    /// Lengths in pixels, about 1.
-    pub length: &'a [f32],
-    /// Width of the frame in pixels.
-    pub width: u32,
-    /// Height of the frame in pixels.
-    pub height: u32,
-}
 
 /// One element, in pixels of its frame.
 #[derive(Debug, Clone, Copy)]
@@ -47,20 +26,10 @@ pub(super) struct Element {
     pub index: usize,
 }
 
-impl Elements<'_> {
+impl ContourSlice<'_> {
     /// Length of the frame's diagonal in pixels.
     pub fn diagonal(&self) -> f64 {
         diagonal(self.width, self.height)
-    }
-
-    /// The number of elements.
-    pub fn len(&self) -> usize {
-        self.x.len().min(self.y.len()).min(self.tx.len()).min(self.ty.len()).min(self.length.len())
-    }
-
-    /// Whether there are no elements.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The elements that are finite, have a positive length, and are at least partly in
@@ -78,7 +47,7 @@ impl Elements<'_> {
     }
 }
 
-impl Elements<'_> {
+impl ContourSlice<'_> {
     /// Returns the derivatives of an element's weight with respect to its x and y: within
     /// half a pixel of the border, those of the nearest side.
     pub(super) fn view_slope(&self, e: &Element) -> [f64; 2] {
@@ -91,43 +60,6 @@ impl Elements<'_> {
             slope[axis] = sign;
         }
         slope
-    }
-}
-
-/// A change from one set of rendered contours to another. A set is identified by the
-/// address of its `Arc`.
-#[derive(Debug, Clone, Copy)]
-pub struct ContourDelta<'a> {
-    /// Identifies the contours before.
-    pub from: &'a Arc<()>,
-    /// Identifies the contours now.
-    pub to: &'a Arc<()>,
-    /// Contours that disappeared, excluding moving ones.
-    pub removed: Elements<'a>,
-    /// Contours that appeared, excluding moving ones.
-    pub added: Elements<'a>,
-    /// All moving contours; given in full at every step.
-    pub moving: Elements<'a>,
-    /// Number of elements now.
-    pub count: usize,
-}
-
-impl ContourDelta<'_> {
-    /// Whether no contours stay from step to step.
-    pub(super) fn all_move(&self) -> bool {
-        self.moving.len() == self.count
-    }
-
-    /// Whether the step starts from the known contours and is shorter than starting from
-    /// scratch.
-    pub(super) fn follows(&self, known: Option<&Arc<()>>) -> bool {
-        self.removed.len() + self.added.len() < self.count
-            && known.is_some_and(|known| Arc::ptr_eq(known, self.from))
-    }
-
-    /// Whether the step ends at the known contours.
-    pub(super) fn leads_to(&self, known: Option<&Arc<()>>) -> bool {
-        known.is_some_and(|known| Arc::ptr_eq(known, self.to))
     }
 }
 
@@ -189,7 +121,7 @@ mod tests {
     #[test]
     fn in_view_drops_what_cannot_be_scored() {
         let nan = f32::NAN;
-        let e = Elements {
+        let e = ContourSlice {
             x: &[5.0, nan, 5.0, 5.0, -3.0, 0.0, 5.0],
             y: &[5.0, 5.0, 5.0, 5.0, 5.0, 5.0, f32::INFINITY],
             tx: &[1.0, 1.0, nan, 1.0, 1.0, 1.0, 1.0],
@@ -205,15 +137,22 @@ mod tests {
     #[test]
     fn the_shortest_list_counts() {
         let long: &[f32] = &[1.0; 3];
-        let all =
-            Elements { x: long, y: long, tx: long, ty: long, length: long, width: 9, height: 9 };
+        let all = ContourSlice {
+            x: long,
+            y: long,
+            tx: long,
+            ty: long,
+            length: long,
+            width: 9,
+            height: 9,
+        };
         let two: &[f32] = &[1.0; 2];
         for e in [
-            Elements { x: two, ..all },
-            Elements { y: two, ..all },
-            Elements { tx: two, ..all },
-            Elements { ty: two, ..all },
-            Elements { length: two, ..all },
+            ContourSlice { x: two, ..all },
+            ContourSlice { y: two, ..all },
+            ContourSlice { tx: two, ..all },
+            ContourSlice { ty: two, ..all },
+            ContourSlice { length: two, ..all },
         ] {
             assert_eq!((e.len(), e.in_view().count()), (2, 2));
         }

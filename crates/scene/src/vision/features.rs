@@ -7,7 +7,7 @@
 //! need not agree. This is not a comparator: features have no density. Invariant:
 //! features are finite, and their number does not depend on the picture.
 
-use super::{ContourMap, Elements, distance_transform};
+use super::{ContourMap, ContourSlice, distance_transform};
 
 /// Side in pixels of the square in which distances are computed.
 const SIDE: usize = 64;
@@ -46,7 +46,7 @@ fn centred(x: f32, y: f32, width: u32, height: u32) -> [f32; 2] {
 }
 
 /// Converts rendered contours to strokes.
-pub fn rendered(e: &Elements) -> Vec<Stroke> {
+pub fn rendered(e: &ContourSlice) -> Vec<Stroke> {
     let longer = e.width.max(e.height).max(1) as f32;
     let stroke = |p: super::elements::Element| Stroke {
         at: centred(p.x, p.y, e.width, e.height),
@@ -253,7 +253,7 @@ mod tests {
         let tx: Vec<f32> = y.iter().map(|y| (y - cy) / r).collect();
         let ty: Vec<f32> = x.iter().map(|x| (cx - x) / r).collect();
         let length = vec![1.0; n];
-        rendered(&Elements { x: &x, y: &y, tx: &tx, ty: &ty, length: &length, width, height })
+        rendered(&ContourSlice { x: &x, y: &y, tx: &tx, ty: &ty, length: &length, width, height })
     }
 
     #[test]
@@ -290,7 +290,7 @@ mod tests {
         let (x, y): (&[f32], &[f32]) = (&[64.0, 0.0], &[25.0, 50.0]);
         let (tx, ty): (&[f32], &[f32]) = (&[1.0, 0.0], &[0.0, 1.0]);
         let drawn =
-            rendered(&Elements { x, y, tx, ty, length: &[2.0, 1.0], width: 128, height: 100 });
+            rendered(&ContourSlice { x, y, tx, ty, length: &[2.0, 1.0], width: 128, height: 100 });
         let inside = Stroke { at: [0.0, -0.1953125], along: [1.0, 0.0], length: 2.0 / 128.0 };
         let border = Stroke { at: [-0.5, 0.0], along: [0.0, 1.0], length: 0.5 / 128.0 };
         assert_eq!(drawn, [inside, border]);

@@ -25,6 +25,7 @@ pub mod region;
 #[cfg(test)]
 mod testing;
 
+pub use crate::contours::{ContourChange, ContourSlice};
 pub use chamfer::{Chamfer, ChamferOptions};
 pub use contour_ratio::{ContourRatio, ContourRatioOptions};
 pub use depth::{DepthLikelihood, DepthMap};
@@ -34,7 +35,7 @@ pub use detect::forest::Forest;
 pub use detect::soft_map::SoftMap;
 pub use detect::{file_detector, gradient, nms, soft_map};
 pub use distance_transform::{DistanceMap, distance_transform};
-pub use elements::{ComparatorError, ContourDelta, Elements};
+pub use elements::ComparatorError;
 pub use error::VisionError;
 pub use keypoints::{KeypointLikelihood, KeypointOptions, Keypoints};
 pub use mask::{Mask, MaskLikelihood};

@@ -2,8 +2,8 @@
 //! as observed maps. Positions are fractions of the frame, so that the same scene exists
 //! at every resolution.
 
-use super::elements::Elements;
 use super::pictures::contour_map::ContourMap;
+use crate::contours::{ContourChange, ContourSlice, Contours};
 
 /// Elements that own their lists.
 #[derive(Debug, Clone, Default)]
@@ -18,6 +18,11 @@ pub(super) struct Pieces {
 }
 
 impl Pieces {
+    fn into_contours(self) -> Contours {
+        let Pieces { x, y, tx, ty, length, width, height } = self;
+        Contours { x, y, tx, ty, length, width, height }
+    }
+
     pub fn new(width: u32, height: u32) -> Self {
         Pieces { width, height, ..Pieces::default() }
     }
@@ -44,8 +49,8 @@ impl Pieces {
         self
     }
 
-    pub fn elements(&self) -> Elements<'_> {
-        Elements {
+    pub fn elements(&self) -> ContourSlice<'_> {
+        ContourSlice {
             x: &self.x,
             y: &self.y,
             tx: &self.tx,
@@ -98,7 +103,7 @@ impl Pieces {
     /// Counts the derivatives with respect to x, y, length and angle that differ from
     /// central differences of a score. Some may differ where a difference straddles a
     /// kink.
-    pub fn differing(&self, found: &[[f64; 4]], score: impl Fn(&Elements<'_>) -> f64) -> usize {
+    pub fn differing(&self, found: &[[f64; 4]], score: impl Fn(&ContourSlice<'_>) -> f64) -> usize {
         let h = 1.0f32 / 128.0;
         let differs = |i: usize, k: usize| {
             let at = |by: f32| score(&self.nudged(i, k, by).elements());
@@ -148,10 +153,7 @@ pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
 
 /// Calls `each` with steps in which some of the pieces appear, disappear or move, and
 /// with all pieces that are there after the step.
-pub(super) fn comings_and_goings(
-    all: &Pieces,
-    mut each: impl FnMut(&super::elements::ContourDelta<'_>, &Pieces),
-) {
+pub(super) fn comings_and_goings(all: &Pieces, mut each: impl FnMut(&ContourChange, &Pieces)) {
     let only = |keep: &dyn Fn(usize) -> bool| {
         let mut some = Pieces::new(all.width, all.height);
         for i in (0..all.x.len()).filter(|i| keep(*i)) {
@@ -171,11 +173,9 @@ pub(super) fn comings_and_goings(
         let moving = only(&|i| moves(i) && there(step, i));
         let to = std::sync::Arc::new(());
         let ([removed, added, moving], count) =
-            ([&removed, &added, &moving].map(Pieces::elements), whole.x.len());
-        each(
-            &super::elements::ContourDelta { from: &from, to: &to, removed, added, moving, count },
-            &whole,
-        );
+            ([removed, added, moving].map(Pieces::into_contours), whole.x.len());
+        let moving = std::sync::Arc::new(moving);
+        each(&ContourChange { from, to: to.clone(), removed, added, moving, count }, &whole);
         from = to;
     }
 }

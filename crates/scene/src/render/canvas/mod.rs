@@ -5,7 +5,7 @@
 //! into one static layer, whose pieces of contour are indexed by the pixels at which their
 //! visibility is tested. When a mesh moves, depth is recomposed only where it was and is,
 //! only the pieces tested there are tested again, and the difference is reported as a
-//! [`Change`].
+//! [`ContourChange`].
 //!
 //! Invariant: a picture depends on the solid and the camera alone, bit for bit: a canvas
 //! only saves work.
@@ -18,7 +18,7 @@ mod static_layer;
 
 use self::layer::camera_bits;
 use self::picture::{Picture, Tools};
-use super::{Camera, Contours};
+use super::{Camera, ContourChange, Contours};
 use crate::geom::Solid;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
@@ -42,34 +42,6 @@ impl std::fmt::Debug for Pictures {
     }
 }
 
-/// The contours of a drawing: all pieces of the moving meshes, and the difference of the
-/// stationary meshes' pieces from the previous drawing of the same picture.
-#[derive(Debug)]
-pub struct Change {
-    /// Identifies the previous contours. If the drawing started over, a new identity that
-    /// nobody holds; `removed` and `added` are then empty.
-    pub from: Arc<()>,
-    /// Identifies the current contours.
-    pub to: Arc<()>,
-    /// Pieces of stationary meshes that are no longer visible.
-    pub removed: Contours,
-    /// Pieces of stationary meshes that have become visible.
-    pub added: Contours,
-    /// All visible pieces of the moving meshes.
-    pub moving: Arc<Contours>,
-    /// Number of visible pieces now, of all meshes.
-    pub count: usize,
-}
-
-impl Change {
-    /// Contours that no earlier drawing helps to count.
-    pub(super) fn whole(contours: Arc<Contours>, camera: &Camera) -> Change {
-        let (from, [removed, added]) = (Arc::default(), [(); 2].map(|()| Contours::empty(camera)));
-        let count = contours.len();
-        Change { to: Arc::clone(&from), from, removed, added, moving: contours, count }
-    }
-}
-
 impl Canvas {
     /// The canvas for the drawings that follow: this one, or an empty one while another
     /// thread draws on it, since forks that run side by side would wait for each other.
@@ -89,7 +61,7 @@ impl Canvas {
 
     /// The change from the previous contours in this picture; `None` if the solid is
     /// better drawn in full.
-    pub(super) fn change(&self, solid: &Solid, camera: &Camera) -> Option<Change> {
+    pub(super) fn change(&self, solid: &Solid, camera: &Camera) -> Option<ContourChange> {
         self.draw(solid, camera, |_, change| change)
     }
 
@@ -102,7 +74,7 @@ impl Canvas {
         &self,
         solid: &Solid,
         camera: &Camera,
-        take: impl FnOnce(&Picture, Change) -> T,
+        take: impl FnOnce(&Picture, ContourChange) -> T,
     ) -> Option<T> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Pictures { pictures, tools } = &mut *all;

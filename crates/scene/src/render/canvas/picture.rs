@@ -4,7 +4,6 @@
 //! relies on the depth tests being monotone, in `f64` too: a piece hidden by another mesh
 //! or at a smaller depth range stays hidden with both.
 
-use super::Change;
 use super::dynamic_mesh::DynamicMesh;
 use super::layer::Layer;
 use super::meshes::Meshes;
@@ -16,7 +15,7 @@ use crate::render::pixels::candidates::Candidates;
 use crate::render::pixels::project::Projected;
 use crate::render::pixels::raster::Area;
 use crate::render::simd::vectorised;
-use crate::render::{Camera, Contours, work};
+use crate::render::{Camera, ContourChange, Contours, work};
 use std::sync::Arc;
 
 /// Limit on a static layer's memory, in pieces; scenes of more pieces are drawn in full.
@@ -107,7 +106,12 @@ impl Picture {
 
     /// Shows a solid and returns the change. `None` if the solid is better drawn in full:
     /// most of its meshes have moved since the last drawing, or it needs too much memory.
-    pub fn draw(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<Change> {
+    pub fn draw(
+        &mut self,
+        solid: &Solid,
+        camera: &Camera,
+        tools: &mut Tools,
+    ) -> Option<ContourChange> {
         self.clock += 1;
         let count = solid.mesh_count();
         let most = |some: &[(usize, &Instance)]| 2 * some.len() > count;
@@ -269,7 +273,7 @@ impl Picture {
     }
 
     /// Composes the whole picture and tests all pieces.
-    fn begin(&mut self, camera: &Camera) -> Option<Change> {
+    fn begin(&mut self, camera: &Camera) -> Option<ContourChange> {
         let Picture { static_layer, dynamic, depth, extent, .. } = self;
         let static_layer = static_layer.as_mut()?;
         work::count(|work| {
@@ -284,7 +288,7 @@ impl Picture {
         self.still = static_layer.test_all(&depths);
         dynamic.iter_mut().for_each(|mesh| mesh.look(&depths));
         self.at = Arc::default();
-        let none = || Contours::empty(camera);
+        let none = || Contours::new(camera.width, camera.height);
         Some(self.change(camera, Arc::default(), [none(), none()]))
     }
 
@@ -294,18 +298,18 @@ impl Picture {
         camera: &Camera,
         from: Arc<()>,
         [removed, added]: [Contours; 2],
-    ) -> Change {
+    ) -> ContourChange {
         let mut moving =
             Contours::with_room(camera, self.dynamic.iter().map(|m| m.seen.len()).sum());
         self.dynamic.iter().for_each(|mesh| moving.append(&mesh.seen));
         self.count = self.still + moving.len();
         let (to, moving) = (Arc::clone(&self.at), Arc::new(moving));
-        Change { from, to, removed, added, moving, count: self.count }
+        ContourChange { from, to, removed, added, moving, count: self.count }
     }
 
     /// Recomposes the picture where meshes have moved, and repeats the depth tests where
     /// they were and are.
-    fn step(&mut self, camera: &Camera, extents: [f64; 2]) -> Option<Change> {
+    fn step(&mut self, camera: &Camera, extents: [f64; 2]) -> Option<ContourChange> {
         let same_extent = extents[0].to_bits() == extents[1].to_bits();
         let clock = self.clock;
         let moved = |m: &DynamicMesh| m.moved == clock;

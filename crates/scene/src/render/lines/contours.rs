@@ -7,6 +7,7 @@
 //! lists have one entry per piece, all finite, positions inside the image, tangents of
 //! unit length.
 
+use crate::contours::Contours;
 use crate::geom::Solid;
 use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{Depths, Piece};
@@ -14,27 +15,6 @@ use crate::render::pixels::project::{DepthRange, Placement, Projected, project};
 use crate::render::pixels::sparse_depth::SparseDepth;
 use crate::render::{Camera, work};
 use std::cell::RefCell;
-
-/// Visible contour pieces in an image. A piece's object side lies to the right of its
-/// tangent as seen in the image (outward is `(ty, -tx)`); creases with both faces
-/// visible, and boundaries, have an arbitrary orientation.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Contours {
-    /// Middle of each piece, pixels from the left edge.
-    pub x: Vec<f32>,
-    /// Middle of each piece, pixels from the top edge.
-    pub y: Vec<f32>,
-    /// Unit tangent, component to the right.
-    pub tx: Vec<f32>,
-    /// Unit tangent, downward component.
-    pub ty: Vec<f32>,
-    /// Length of each piece in pixels, at most 1.5.
-    pub length: Vec<f32>,
-    /// Image width in pixels.
-    pub width: u32,
-    /// Image height in pixels.
-    pub height: u32,
-}
 
 /// Buffers reused from call to call.
 #[derive(Default)]
@@ -104,11 +84,6 @@ impl Contours {
         })
     }
 
-    /// No pieces.
-    pub(in crate::render) fn empty(camera: &Camera) -> Contours {
-        Contours { width: camera.width, height: camera.height, ..Contours::default() }
-    }
-
     /// No pieces yet, with room for about as many as were `found` the last time.
     pub(in crate::render) fn with_room(camera: &Camera, found: usize) -> Contours {
         let room = || Vec::with_capacity(found + found / 8 + 16);
@@ -124,36 +99,6 @@ impl Contours {
         self.tx.push(piece.tx);
         self.ty.push(piece.ty);
         self.length.push(piece.length);
-    }
-
-    /// Removes all pieces.
-    pub(in crate::render) fn clear(&mut self) {
-        let Contours { x, y, tx, ty, length, .. } = self;
-        [x, y, tx, ty, length].into_iter().for_each(Vec::clear);
-    }
-
-    /// Adds another's pieces.
-    pub(in crate::render) fn append(&mut self, other: &Contours) {
-        self.x.extend_from_slice(&other.x);
-        self.y.extend_from_slice(&other.y);
-        self.tx.extend_from_slice(&other.tx);
-        self.ty.extend_from_slice(&other.ty);
-        self.length.extend_from_slice(&other.length);
-    }
-
-    /// Number of pieces.
-    pub fn len(&self) -> usize {
-        self.x.len()
-    }
-
-    /// Whether there are no pieces.
-    pub fn is_empty(&self) -> bool {
-        self.x.is_empty()
-    }
-
-    /// Sum of the lengths, in pixels.
-    pub fn total_length(&self) -> f64 {
-        self.length.iter().map(|&l| f64::from(l)).sum()
     }
 }
 

@@ -2,10 +2,11 @@
 //! is piecewise smooth: on grid lines, and where a different piece becomes the nearest,
 //! they are one-sided.
 
-use super::super::elements::{Element, Elements};
+use super::super::elements::Element;
 use super::super::field::{PER_RADIAN, channel};
 use super::reverse::Piece;
 use super::{Chamfer, Mode, NOTHING, Scratch};
+use crate::contours::ContourSlice;
 
 impl Chamfer {
     /// Computes the derivatives of [`Chamfer::log_likelihood`] with respect to each
@@ -13,7 +14,7 @@ impl Chamfer {
     /// `out`, and returns the derivative with respect to sigma.
     pub fn gradient(
         &self,
-        elements: &Elements<'_>,
+        elements: &ContourSlice<'_>,
         scratch: &mut Scratch,
         out: &mut Vec<[f64; 4]>,
     ) -> f64 {
@@ -89,7 +90,7 @@ impl Chamfer {
     }
 }
 
-fn by_index(elements: &Elements<'_>) -> Vec<Option<Element>> {
+fn by_index(elements: &ContourSlice<'_>) -> Vec<Option<Element>> {
     let mut all = vec![None; elements.len()];
     elements.in_view().for_each(|e| all[e.index] = Some(e));
     all

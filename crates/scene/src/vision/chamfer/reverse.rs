@@ -3,8 +3,8 @@
 //! points; it does not render. Invariant: the result does not depend on the order of the
 //! elements, and every candidate that could be the nearest is examined.
 
-use super::super::elements::Elements;
 use super::super::field::{Edge, Edges, channel, turn_between};
+use crate::contours::ContourSlice;
 
 /// Number of buckets along the longer side.
 const BUCKETS: f32 = 12.0;
@@ -138,7 +138,7 @@ impl Reverse {
     /// suddenly. With nothing in view, distances are infinite.
     pub fn each(
         &self,
-        elements: &Elements<'_>,
+        elements: &ContourSlice<'_>,
         turn: f32,
         scratch: &mut Scratch,
         mut f: impl FnMut(f32, f32, Option<[&Piece; 2]>),

@@ -2,10 +2,10 @@
 //! the interpolated table and of the groups' matched scores. On grid lines, where the
 //! score has a kink, they are one-sided.
 
-use super::super::elements::Elements;
 use super::super::field::{PER_RADIAN, channels_of};
 use super::match_capacity::NO_GROUP;
 use super::{ContourRatio, Scratch};
+use crate::contours::ContourSlice;
 
 impl ContourRatio {
     /// Computes the derivatives of [`ContourRatio::log_likelihood`] with respect to each
@@ -13,7 +13,7 @@ impl ContourRatio {
     /// `out`.
     pub fn gradient(
         &self,
-        elements: &Elements<'_>,
+        elements: &ContourSlice<'_>,
         scratch: &mut Scratch,
         out: &mut Vec<[f64; 4]>,
     ) {
