@@ -22,7 +22,7 @@ use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
-use pcadlang::vision::elements::ContourSlice;
+use pcadlang::vision::ContourSlice;
 use plain::Plain;
 use std::error::Error;
 use std::path::Path;
