@@ -16,9 +16,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 use values::{duration, limit, pair};
 
+/// The help text on exit codes.
+const EXIT_CODES: &str = "\
+Exit codes: 0 success, 1 an error in the program, its data or a file, 2 an error in the command line, \
+3 interrupted (results so far are kept), 130 interrupted twice.";
+
 /// A probabilistic CAD language: Bayesian inference of 3D scenes from photographs.
 #[derive(Debug, Parser)]
-#[command(name = "pcadlang", version, max_term_width = 100, after_help = super::EXIT_CODES)]
+#[command(name = "pcadlang", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]

@@ -3,9 +3,10 @@
 //! module makes a table and a file.
 
 use crate::cli::args::{Job, Predict};
+use crate::cli::failure::{Failure, plain};
 use crate::cli::running::job::{self, Interrupt, Ready, write};
 use crate::cli::running::progress::{self, Ending};
-use crate::cli::{Failure, plain, quality};
+use crate::cli::running::quality;
 use pcadlang::Model;
 use pcadlang::infer::draws::{Discard, Sink};
 use pcadlang::infer::predictive::{

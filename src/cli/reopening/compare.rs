@@ -1,9 +1,10 @@
 //! `pcadlang compare`: two runs side by side: their different settings, their quantities
 //! and their pictures.
 
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::show::quoted;
 use crate::cli::running::places::sized;
-use crate::cli::{Failure, files, plain, resume};
+use crate::cli::running::{files, resume};
 use clap::Args;
 use pcadlang::report::pictures::{captioned_sheet, png};
 use pcadlang::report::{number, table};

@@ -3,10 +3,11 @@
 //!
 //! Invariant: a missing or broken file is left out of the page, and does not prevent it.
 
+use crate::cli::failure::Failure;
 use crate::cli::reopening::date::readable;
 use crate::cli::reopening::show::quoted;
 use crate::cli::running::job::write;
-use crate::cli::{Failure, places};
+use crate::cli::running::places;
 use image::RgbImage;
 use pcadlang::geom::obj;
 use pcadlang::infer::draws::KernelStats;

@@ -2,7 +2,7 @@
 //! states.
 
 use crate::cli::args::{Cli, Command, Job};
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use clap::Parser;
 use pcadlang::Model;
 use pcadlang::infer::KeptTrace;

@@ -1,7 +1,8 @@
 //! `pcadlang report`: rebuilds the page of a run from the contents of its folder.
 
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::{PAGE, write_page};
-use crate::cli::{Failure, files, job, plain, resume};
+use crate::cli::running::{files, job, resume};
 use clap::Args;
 use pcadlang::report::{Quantity, RunDir, modes, quantities, rename, reread, warnings};
 use serde_json::{Value, json};

@@ -1,9 +1,9 @@
 //! Observed data as files beside the best state: the photograph, its contours, and the
 //! joints detected in it.
 
+use crate::cli::failure::{Failure, plain};
 use crate::cli::running::job::write;
 use crate::cli::running::places::sized;
-use crate::cli::{Failure, plain};
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::crop_imm;

@@ -1,7 +1,9 @@
 //! `pcadlang show`: a state of a finished run as a picture, a mesh or a list.
 
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::reopened::Reopened;
-use crate::cli::{Failure, files, job, plain, scene};
+use crate::cli::running::{files, job};
+use crate::cli::scene;
 use clap::Args;
 use pcadlang::geom::{glb, obj};
 use pcadlang::report::pictures::png;

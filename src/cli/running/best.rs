@@ -3,10 +3,11 @@
 //!
 //! The run itself is in `job`.
 
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::seen::show_seen;
 use crate::cli::running::job::write;
 use crate::cli::running::progress::Ending;
-use crate::cli::{Failure, plain, scene};
+use crate::cli::scene;
 use image::GrayImage;
 use pcadlang::Model;
 use pcadlang::geom::{Mesh, Solid, glb, obj};

@@ -1,6 +1,6 @@
 //! Reads and writes files, with error messages that name them.
 
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use pcadlang::lang::load::{embedded, reason};
 use pcadlang::lang::reach::read_file;
 use pcadlang::vision::{Limits, Photo, photo};

@@ -5,13 +5,16 @@
 //! complete.
 
 use crate::cli::args::Job;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::{PROGRAM, write_page};
 use crate::cli::reopening::reopened::{TRACES, arguments};
+use crate::cli::reopening::{date, seen};
 use crate::cli::running::best::{disagreement, keep_best, outside, show_best};
 use crate::cli::running::keypoints::Joints;
 use crate::cli::running::places::{best_of_each, show_places};
 use crate::cli::running::progress::{self, Ending};
-use crate::cli::{Failure, date, edges, files, inputs, people, plain, seen};
+use crate::cli::running::{files, inputs};
+use crate::cli::{edges, people};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{

@@ -1,8 +1,9 @@
 //! A picture of each mode, if the chains are in several: the best state of the mode's
 //! chains over the photograph.
 
+use crate::cli::failure::{Failure, plain};
 use crate::cli::running::job::write;
-use crate::cli::{Failure, plain, scene};
+use crate::cli::scene;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang::Model;

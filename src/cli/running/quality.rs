@@ -5,7 +5,7 @@
 //! line and the presets only, not on the machine.
 
 use crate::cli::args::{Job, QualityArg, Sampling};
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use pcadlang::lang::load;
 use pcadlang::tradeoff::{Choice, Presets, Quality};
 use std::path::Path;

@@ -1,10 +1,11 @@
 //! `pcadlang run`: one run, its folder, and the summary printed at the end.
 
 use crate::cli::args::{Job, Run};
+use crate::cli::failure::{Failure, plain};
 use crate::cli::print::paragraph;
 use crate::cli::programs::explain::{Explanation, explain};
 use crate::cli::running::job::{self, Interrupt, Outcome, RunMode};
-use crate::cli::{Failure, plain, quality, resume};
+use crate::cli::running::{quality, resume};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
