@@ -1,13 +1,13 @@
 //! The command line.
 
+mod reopening;
 mod values;
+
+pub use reopening::{Compare, Report, Show};
 
 use super::detect::Detect;
 use super::manual::{Completions, Man};
 use super::people::PersonArgs;
-use super::reopening::compare::Compare;
-use super::reopening::report::Report;
-use super::reopening::show::Show;
 use super::running::files::program_name;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -119,7 +119,8 @@ pub enum QualityArg {
 
 impl QualityArg {
     fn parser() -> impl TypedValueParser<Value = QualityArg> {
-        PossibleValuesParser::new(super::running::quality::names()).map(|name| {
+        let names = Quality::ALL.map(Quality::name).into_iter().chain(["own"]);
+        PossibleValuesParser::new(names).map(|name| {
             let known = Quality::ALL.into_iter().find(|q| q.name() == name);
             known.map_or(QualityArg::Own, QualityArg::Known)
         })

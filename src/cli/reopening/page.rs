@@ -5,8 +5,8 @@
 
 use crate::cli::failure::Failure;
 use crate::cli::reopening::date::readable;
-use crate::cli::reopening::show::quoted;
-use crate::cli::running::job::write;
+use crate::cli::reopening::reopened::quoted;
+use crate::cli::running::files::write_in;
 use crate::cli::running::places;
 use image::RgbImage;
 use pcadlang::geom::obj;
@@ -77,7 +77,7 @@ pub fn write_page(
         mesh: mesh.as_ref().map(|m| MeshData { positions: &positions, triangles: &m.triangles }),
         program: &String::from_utf8_lossy(&program),
     });
-    write(dir, PAGE, html.as_bytes())
+    write_in(dir, PAGE, html.as_bytes())
 }
 
 fn text(v: &Value) -> &str {

@@ -50,6 +50,16 @@ pub fn arguments(job: &Job) -> Vec<String> {
     all
 }
 
+/// Quotes arguments for a shell.
+pub fn quoted(arguments: &[String]) -> String {
+    let plain = |a: &String| {
+        !a.is_empty() && a.chars().all(|c| c.is_ascii_alphanumeric() || "_-./=:,#+@".contains(c))
+    };
+    let one =
+        |a: &String| if plain(a) { a.clone() } else { format!("'{}'", a.replace('\'', "'\\''")) };
+    arguments.iter().map(one).collect::<Vec<_>>().join(" ")
+}
+
 impl Reopened {
     /// Opens the run in a folder. Relative paths in its command refer to the current
     /// directory.

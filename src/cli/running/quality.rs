@@ -7,7 +7,7 @@
 use crate::cli::args::{Job, QualityArg, Sampling};
 use crate::cli::failure::{Failure, plain};
 use pcadlang::lang::load;
-use pcadlang::tradeoff::{Choice, Presets, Quality};
+use pcadlang::tradeoff::{Choice, Presets};
 use std::path::Path;
 use std::time::Duration;
 
@@ -124,11 +124,6 @@ pub fn again(job: &Job) -> String {
     let chains =
         job.sampling.chains.filter(|n| *n != Sampling::CHAINS).map(|n| format!(" --chains {n}"));
     sets.chain(chains).collect()
-}
-
-/// Returns the values of `--quality`.
-pub fn names() -> Vec<&'static str> {
-    Quality::ALL.map(Quality::name).into_iter().chain(["own"]).collect()
 }
 
 #[cfg(test)]
