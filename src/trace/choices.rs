@@ -139,22 +139,4 @@ impl Choices {
             m.removed.clear();
         }
     }
-
-    pub fn undo_add(&mut self, n: NodeId, hash: u64) {
-        if self.by_address.get(&hash) == Some(&n) {
-            self.by_address.remove(&hash);
-        }
-    }
-
-    pub fn undo_remove(&mut self, n: NodeId, hash: u64) {
-        self.by_address.insert(hash, n);
-    }
-
-    pub fn undo_shadow(&mut self, hash: u64, n: NodeId) {
-        self.by_address.insert(hash, n);
-    }
-
-    pub fn undo_targets(&mut self, selection: u32, before: Listed) {
-        self.selections[selection as usize].listed = before;
-    }
 }

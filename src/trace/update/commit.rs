@@ -137,12 +137,17 @@ impl Graph {
                         self.outside[node.outside as usize].gone -= 1;
                     }
                 }
-                Entry::ChoiceAdded(n, hash) => self.choices.undo_add(n, hash),
-                Entry::ChoiceRemoved(n, hash) => self.choices.undo_remove(n, hash),
-                Entry::TargetsReplaced { selection, before } => {
-                    self.choices.undo_targets(selection, before)
+                Entry::ChoiceAdded(n, hash) => {
+                    if self.choices.find(hash) == Some(n) {
+                        self.choices.by_address.remove(&hash);
+                    }
                 }
-                Entry::AddressShadowed(hash, n) => self.choices.undo_shadow(hash, n),
+                Entry::ChoiceRemoved(n, hash) | Entry::AddressShadowed(hash, n) => {
+                    self.choices.by_address.insert(hash, n);
+                }
+                Entry::TargetsReplaced { selection, before } => {
+                    self.choices.selections[selection as usize].listed = before;
+                }
                 Entry::Observed(hash, old) => self.undo_observed(hash, old),
             }
         }

@@ -8,7 +8,7 @@
 
 use super::morph::{Anchor, Morph};
 use super::recent;
-use super::{JointPose, Keypoint, RestGradient, Rig, Rules};
+use super::{JointPose, Keypoint, Rig, Rules};
 use crate::geom::detail::{self, Detail, Level, Levels};
 use crate::geom::{Affine, GeomError, Instance, Landmark, Mesh, Solid, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
@@ -102,6 +102,19 @@ pub struct Armature {
     rig: Rig,
     surface: Arc<LazySurface>,
     skin: Arc<Skin>,
+}
+
+/// Derivatives with respect to a body at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RestGradient {
+    /// With respect to each joint's head.
+    pub heads: Vec<DVec3>,
+    /// With respect to each joint's tail.
+    pub tails: Vec<DVec3>,
+    /// With respect to each keypoint.
+    pub keypoints: Vec<DVec3>,
+    /// With respect to each vertex; an empty list stands for zeros.
+    pub vertices: Vec<DVec3>,
 }
 
 impl Armature {

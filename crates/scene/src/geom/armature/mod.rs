@@ -12,11 +12,11 @@ mod rig_json;
 mod stretch;
 mod torque;
 
-pub use body::{Armature, Influence, MOST_WEIGHTS};
+pub use body::{Armature, Influence, MOST_WEIGHTS, RestGradient};
 pub use kinematics::JointGradient;
 pub use morph::Morph;
 pub use pose::{JointPose, Rules, Turn};
 pub use rig::{Joint, Keypoint, MOST_JOINTS, NamedJoint, Rig};
 pub use rig_json::{RigFile, morphs_from_json, rig_from_json};
 pub use stretch::Stretch;
-pub use torque::{BodyGradient, RestGradient};
+pub use torque::BodyGradient;
