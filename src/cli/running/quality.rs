@@ -130,6 +130,7 @@ pub fn again(job: &Job) -> String {
 mod tests {
     use super::*;
     use crate::cli::args::Inputs;
+    use pcadlang::tradeoff::Quality;
 
     fn job(quality: Option<QualityArg>, time: Option<f64>) -> Job {
         let inputs = Inputs {

@@ -78,7 +78,7 @@ impl Person {
 }
 
 /// Returns the interpolated probability at a position of a window's mask; 0 outside.
-fn at(mask: &[f32], [u, v]: [f64; 2]) -> f32 {
+pub(super) fn at(mask: &[f32], [u, v]: [f64; 2]) -> f32 {
     let (x, y) = (u * SIDE as f64, v * SIDE as f64);
     let most = SIDE as f64 - 1.0;
     if !(0.0..=most).contains(&x) || !(0.0..=most).contains(&y) {

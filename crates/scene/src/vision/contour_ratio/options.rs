@@ -2,8 +2,8 @@
 
 use crate::vision::elements::{ComparatorError, check};
 
-/// Options of [`ContourRatio`](super::ContourRatio). Lengths are percent of the image diagonal. The defaults
-/// were chosen on ten pictures of 256 x 256 pixels.
+/// Options of [`ContourRatio`](super::ContourRatio). Lengths are percent of the image
+/// diagonal. The defaults were chosen on ten pictures of 256 x 256 pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContourRatioOptions {
     /// Fraction of pieces that have a matching observed edge, above 0 and below 1.
