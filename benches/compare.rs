@@ -9,7 +9,6 @@ mod common;
 use common::{photograph, picture, pose, short, vase};
 use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::render::{Camera, Channels, Contours, Frame};
-use pcadlang::vision::ContourSlice;
 use pcadlang::vision::features::{Query, contour_features, observed, rendered};
 use pcadlang::vision::{
     Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,

@@ -23,7 +23,6 @@ use pcadlang::geom::Solid;
 use pcadlang::render::{Camera, View};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
-use pcadlang::vision::ContourSlice;
 use std::error::Error;
 use subjects::Subject;
 

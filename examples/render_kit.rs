@@ -15,6 +15,8 @@
 mod clock;
 #[path = "render_kit/plain.rs"]
 mod plain;
+#[path = "render_kit/raw.rs"]
+mod raw;
 
 use clock::processor_seconds;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -22,19 +24,11 @@ use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
-use pcadlang::vision::ContourSlice;
 use plain::Plain;
+use raw::{Pose, Raw, load, words};
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
-
-type Pose = [f32; 16];
-
-/// The vertices and triangles of a file.
-pub struct Raw {
-    vertices: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -70,25 +64,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
-}
-
-fn words(path: &Path) -> Result<Vec<u32>, Box<dyn Error>> {
-    let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    Ok(bytes.as_chunks().0.iter().map(|c| u32::from_le_bytes(*c)).collect())
-}
-
-fn load(path: &Path) -> Result<Raw, Box<dyn Error>> {
-    let words = words(path)?;
-    let too_short = || format!("{}: too short", path.display());
-    let (n, m) = match words[..] {
-        [n, m, ..] => (n as usize, m as usize),
-        _ => return Err(too_short().into()),
-    };
-    let vertices = words.get(2..2 + 3 * n).ok_or_else(too_short)?;
-    let triangles = words.get(2 + 3 * n..2 + 3 * (n + m)).ok_or_else(too_short)?;
-    let vertices =
-        vertices.as_chunks().0.iter().map(|v: &[u32; 3]| v.map(f32::from_bits)).collect();
-    Ok(Raw { vertices, triangles: triangles.as_chunks().0.to_vec() })
 }
 
 /// A mesh and the size of its picture in pixels.

@@ -1,7 +1,7 @@
 //! A plain rasteriser like those of the peers: edge functions for each pixel, contours
 //! where depth jumps or bends, and the mean of the distance transform at contour pixels.
 
-use super::{Pose, Raw};
+use super::raw::{Pose, Raw};
 use pcadlang::vision::distance_transform::distance_transform;
 
 /// A neighbour that is farther by more than this fraction is behind.

@@ -1,13 +1,13 @@
 //! The command line.
 
+mod reopening;
 mod values;
+
+pub use reopening::{Compare, Report, Show};
 
 use super::detect::Detect;
 use super::manual::{Completions, Man};
 use super::people::PersonArgs;
-use super::reopening::compare::Compare;
-use super::reopening::report::Report;
-use super::reopening::show::Show;
 use super::running::files::program_name;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -16,9 +16,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 use values::{duration, limit, pair};
 
+/// The help text on exit codes.
+const EXIT_CODES: &str = "\
+Exit codes: 0 success, 1 an error in the program, its data or a file, 2 an error in the command line, \
+3 interrupted (results so far are kept), 130 interrupted twice.";
+
 /// A probabilistic CAD language: Bayesian inference of 3D scenes from photographs.
 #[derive(Debug, Parser)]
-#[command(name = "pcadlang", version, max_term_width = 100, after_help = super::EXIT_CODES)]
+#[command(name = "pcadlang", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -114,7 +119,8 @@ pub enum QualityArg {
 
 impl QualityArg {
     fn parser() -> impl TypedValueParser<Value = QualityArg> {
-        PossibleValuesParser::new(super::running::quality::names()).map(|name| {
+        let names = Quality::ALL.map(Quality::name).into_iter().chain(["own"]);
+        PossibleValuesParser::new(names).map(|name| {
             let known = Quality::ALL.into_iter().find(|q| q.name() == name);
             known.map_or(QualityArg::Own, QualityArg::Known)
         })

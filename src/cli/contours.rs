@@ -1,7 +1,9 @@
 //! `pcadlang contours`.
 
 use super::args::Contours;
-use super::{Failure, edges, files, plain};
+use super::edges;
+use super::failure::{Failure, plain};
+use super::running::files;
 use pcadlang::report::pictures::png;
 use pcadlang::scene::DetectorValue;
 use pcadlang::vision::{FileDetector, GradientDetector};

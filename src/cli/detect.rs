@@ -1,6 +1,7 @@
 //! `pcadlang detect`.
 
-use super::{Failure, files, plain};
+use super::failure::{Failure, plain};
+use super::running::files;
 use clap::Args;
 use image::RgbImage;
 use pcadlang::people::{FindOptions, PeopleFinder, Person, json, networks};

@@ -1,6 +1,7 @@
 //! `--edges`: a contour detector that replaces the built-in one.
 
-use super::{Failure, files};
+use super::failure::Failure;
+use super::running::files;
 use pcadlang::lang::builtins::data::Options;
 use pcadlang::scene::DetectorValue;
 use pcadlang::standard;

@@ -1,7 +1,8 @@
 //! `pcadlang learn`: a bank of scenes from the prior.
 
 use super::args::{FeatureKind, Learn};
-use super::{Failure, inputs, job, plain, progress};
+use super::failure::{Failure, plain};
+use super::running::{inputs, job, progress};
 use pcadlang::bank::{self, BankError, Features};
 use pcadlang::lang::load::reason;
 use pcadlang::report::seconds;

@@ -1,8 +1,8 @@
 //! `pcadlang completions` and `pcadlang man`.
 
-use super::args::Cli;
-use super::{Failure, files, plain};
-use clap::{Args, CommandFactory, ValueHint};
+use super::failure::{Failure, plain};
+use super::running::files;
+use clap::{Args, Command, ValueHint};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -22,15 +22,15 @@ pub struct Man {
 }
 
 /// Prints the completion script of a shell.
-pub fn completions(a: &Completions) -> Result<(), Failure> {
+pub fn completions(a: &Completions, mut command: Command) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(a.shell, &mut Cli::command(), "pcadlang", &mut script);
+    clap_complete::generate(a.shell, &mut command, "pcadlang", &mut script);
     print(&script)
 }
 
 /// Prints the manual page of the command, or writes those of all commands to a folder.
-pub fn man(a: &Man) -> Result<(), Failure> {
-    let mut command = Cli::command().disable_help_subcommand(true);
+pub fn man(a: &Man, command: Command) -> Result<(), Failure> {
+    let mut command = command.disable_help_subcommand(true);
     command.build();
     let Some(folder) = &a.out else { return print(&page(&command)?) };
     std::fs::create_dir_all(folder)
@@ -44,7 +44,7 @@ pub fn man(a: &Man) -> Result<(), Failure> {
 }
 
 /// Renders a manual page.
-fn page(command: &clap::Command) -> Result<Vec<u8>, Failure> {
+fn page(command: &Command) -> Result<Vec<u8>, Failure> {
     let mut text = Vec::new();
     let source = concat!("pcadlang ", env!("CARGO_PKG_VERSION"));
     let rendered = clap_mangen::Man::new(command.clone()).source(source).render(&mut text);

@@ -8,6 +8,7 @@ mod contours;
 mod detect;
 mod edges;
 mod evaluate;
+mod failure;
 mod learn;
 mod manual;
 mod people;
@@ -21,50 +22,11 @@ mod term;
 mod tradeoff;
 
 use args::{Cli, Command};
-use pcadlang::Error;
+use clap::CommandFactory;
 use programs::{calibrate, check, doc, fmt, predict, watch};
-use reopening::{compare, date, report, seen, show};
-use running::{files, inputs, job, places, progress, quality, resume, run};
-use std::fmt::{Display, Formatter};
+use reopening::{compare, report, show};
+use running::run;
 use std::process::ExitCode;
-use term::has_colors;
-
-/// Why a command failed.
-pub enum Failure {
-    /// Diagnostics with source locations.
-    Program(Box<Error>),
-    /// Any other error: a message and an optional hint.
-    Plain(String, Option<String>),
-    /// The user interrupted the command; results so far are kept.
-    Interrupted,
-}
-
-/// The message, without colours or a final line break.
-impl Display for Failure {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Failure::Program(e) => f.write_str(e.to_string().trim_end()),
-            Failure::Plain(message, _) => f.write_str(message),
-            Failure::Interrupted => f.write_str("interrupted"),
-        }
-    }
-}
-
-impl From<Error> for Failure {
-    fn from(e: Error) -> Self {
-        Failure::Program(Box::new(e))
-    }
-}
-
-/// Makes a failure from a message without a hint.
-fn plain(message: impl Into<String>) -> Failure {
-    Failure::Plain(message.into(), None)
-}
-
-/// The help text on exit codes.
-pub const EXIT_CODES: &str = "\
-Exit codes: 0 success, 1 an error in the program, its data or a file, 2 an error in the command line, \
-3 interrupted (results so far are kept), 130 interrupted twice.";
 
 /// Runs a command and returns its exit code.
 pub fn main(cli: Cli) -> ExitCode {
@@ -83,8 +45,8 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Doc(a) => doc::doc(&a),
         Command::Repl(a) => repl::repl(&a),
         Command::Fmt(a) => fmt::fmt(&a),
-        Command::Completions(a) => manual::completions(&a),
-        Command::Man(a) => manual::man(&a),
+        Command::Completions(a) => manual::completions(&a, Cli::command()),
+        Command::Man(a) => manual::man(&a, Cli::command()),
         Command::Show(a) => show::show(&a),
         Command::Compare(a) => compare::compare(&a),
         Command::Report(a) => report::report(&a),

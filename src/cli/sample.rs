@@ -2,7 +2,9 @@
 //! et al. 2014.
 
 use super::args::Sample;
-use super::{Failure, files, inputs, plain, scene};
+use super::failure::{Failure, plain};
+use super::running::{files, inputs};
+use super::scene;
 use pcadlang::lang::value::Value;
 use pcadlang::report::pictures::{contact_sheet, png, shaded};
 use pcadlang::report::{number, table};

@@ -1,6 +1,6 @@
 //! Properties of the terminal, and error messages.
 
-use super::Failure;
+use super::failure::Failure;
 use pcadlang::diag::render;
 use std::io::IsTerminal;
 

@@ -5,8 +5,7 @@
 //! of one element or of arrays, which print as their elements. Patterns with wildcards
 //! and the address literals of programs are in other modules.
 
-use super::code::segment_hash;
-use super::key::{Key, mix};
+use super::key::{Key, hash_str, mix};
 use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -31,6 +30,11 @@ pub struct AddressSegment {
 
 /// The hash of the empty address.
 pub(crate) const ROOT_HASH: u64 = 0x7063_6164_6c61_6e67;
+
+/// Returns the hash of a segment without its keys.
+pub(super) fn segment_hash(name: &str, occurrence: u32) -> u64 {
+    mix(hash_str(0x5e67_3a11, name), u64::from(occurrence))
+}
 
 impl Address {
     /// Returns a 64-bit hash, the same on every platform, which keys the random stream of

@@ -1,6 +1,8 @@
-//! Indexing of plain values: arrays by position, records by name, objects by field.
+//! Indexing of plain values: arrays by position, records by name, objects by field; and
+//! the way back, for adjoints.
 
-use super::error::{Fault, FaultKind};
+use super::adjoint::Adjoint;
+use super::fault::{Fault, FaultKind};
 use super::value::Value;
 use std::sync::Arc;
 
@@ -71,4 +73,76 @@ pub fn xyz(v: [f64; 3]) -> Value {
     Value::Record(Arc::new(
         ["x", "y", "z"].into_iter().map(Arc::from).zip(v.map(Value::Num)).collect(),
     ))
+}
+
+impl Adjoint {
+    /// Adds to the part that indexing a value with these keys selects, one key after the
+    /// other.
+    #[doc(hidden)]
+    pub fn add_at(&mut self, base: &Value, keys: &[Value], by: Adjoint) {
+        let Some((key, rest)) = keys.split_first() else { return self.add(by) };
+        if by.is_zero() {
+            return;
+        }
+        match (base, key) {
+            (Value::Array(_) | Value::List(_), Value::Num(i)) => {
+                let (n, i) = (base.len().unwrap_or(0), *i as usize);
+                let mut inner = Adjoint::Zero;
+                inner.add_at(&base.element(i).unwrap_or_default(), rest, by);
+                self.add_element(n, i, inner);
+            }
+            (Value::Array(_) | Value::List(_), Value::Array(at)) => {
+                let n = base.len().unwrap_or(0);
+                for (k, i) in at.iter().enumerate() {
+                    // The remaining keys index into the array of selected elements.
+                    let part = if rest.is_empty() { by.element(k) } else { Adjoint::Unknown };
+                    self.add_element(n, *i as usize, part);
+                }
+            }
+            (Value::Record(r), Value::Str(name)) => {
+                let mut inner = Adjoint::Zero;
+                inner.add_at(r.get(name).unwrap_or(&Value::Unit), rest, by);
+                self.add_field(name, inner);
+            }
+            _ => *self = Adjoint::Unknown,
+        }
+    }
+
+    /// Adds to the adjoint of element `i` of an array, or of field `i` of a record.
+    #[doc(hidden)]
+    pub fn add_position(&mut self, base: &Value, i: usize, by: Adjoint) {
+        match base {
+            Value::Record(r) => {
+                if let Some((name, _)) = r.get_index(i) {
+                    self.add_field(name, by);
+                }
+            }
+            _ => self.add_element(base.len().unwrap_or(0), i, by),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn indexing_goes_back_to_where_it_came_from() {
+        let base = Value::record([("x", Value::array(vec![1.0, 2.0])), ("y", Value::Num(3.0))]);
+        let mut a = Adjoint::Zero;
+        a.add_at(&base, &[Value::str("x"), Value::Num(1.0)], Adjoint::Num(4.0));
+        a.add_at(&base, &[Value::str("y")], Adjoint::Num(5.0));
+        assert_eq!(a.field("x").numbers(2), [0.0, 4.0]);
+        assert_eq!(a.field("y"), Adjoint::Num(5.0));
+        let mut picked = Adjoint::Zero;
+        let xs = Value::array(vec![1.0, 2.0, 3.0]);
+        picked.add_at(
+            &xs,
+            &[Value::array(vec![2.0, 2.0, 0.0])],
+            Adjoint::Array(vec![1.0, 10.0, 100.0]),
+        );
+        assert_eq!(picked.numbers(3), [100.0, 0.0, 11.0]);
+        picked.add(Adjoint::Unknown);
+        assert!(picked.is_unknown());
+    }
 }

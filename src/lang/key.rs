@@ -1,7 +1,7 @@
 //! Keys, which identify the elements of containers, the passes of loops and the entries
 //! of `mem`.
 
-use super::error::Fault;
+use super::fault::Fault;
 use super::value::Value;
 use serde::{Deserialize, Serialize};
 use std::fmt;

@@ -5,6 +5,8 @@
 //! the shipped programs are embedded, so that they work in any folder. A user's file
 //! takes precedence over an embedded one of the same name.
 
+pub use super::reach::Loader;
+
 use super::reach::Outside;
 use crate::diag::{Diagnostic, IntoDiagnostic, SourceMap};
 use crate::syntax::ast::{ItemKind, Program};
@@ -12,15 +14,6 @@ use crate::syntax::parse;
 use crate::syntax::span::{FileId, Span};
 use std::io;
 use std::path::Path;
-
-/// A source of files.
-pub trait Loader: Send + Sync {
-    /// Returns the bytes of a file.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    fn read(&self, path: &str) -> io::Result<Vec<u8>>;
-}
 
 /// A loader without files: only embedded ones are found.
 #[derive(Clone, Copy, Debug, Default)]

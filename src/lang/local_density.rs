@@ -9,7 +9,7 @@
 //! returns a result.
 
 use super::builtins::{Scalar, Table};
-use super::code::{DistSpec, Op, Operand, Slot, SlotFacts};
+use super::code::{DistSpec, Op, Operand, Slot};
 
 /// The number of registers of a local density.
 pub const REGISTERS: usize = 16;
@@ -93,14 +93,14 @@ pub struct LocalDensity {
 }
 
 impl LocalDensity {
-    /// Returns the local density of a slot of a block, if there is one.
+    /// Returns the local density of a slot of a block, if there is one; `dependents` are
+    /// the slots that depend on it, in an order of evaluation.
     pub(super) fn new(
         ops: &[Op],
-        slots: &[SlotFacts],
+        dependents: Vec<Slot>,
         from: Slot,
         builtins: &Table,
     ) -> Option<LocalDensity> {
-        let dependents = super::scaffold::dependents(ops, slots, from)?;
         let mut compiler = Compiler {
             ops,
             builtins,

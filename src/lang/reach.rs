@@ -2,10 +2,18 @@
 //! outside. Symbolic links and `..` are resolved before paths are compared. A file that
 //! is replaced between the comparison and the reading is not detected.
 
-use super::load::Loader;
 use std::fmt;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+
+/// A source of files.
+pub trait Loader: Send + Sync {
+    /// Returns the bytes of a file.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    fn read(&self, path: &str) -> io::Result<Vec<u8>>;
+}
 
 /// The folders and files that a program may read; by default none.
 #[derive(Clone, Debug, Default)]

@@ -43,11 +43,11 @@ pub use draws::{ChainDraws, Quantity, quantities};
 #[doc(hidden)]
 pub use hash::{bytes_hash, text_hash};
 #[doc(hidden)]
-pub use modes::{DISAGREE, Mode, modes, modes_table, r_hat_text};
+pub use modes::{DISAGREE, Mode, modes, modes_table};
 #[doc(hidden)]
 pub use moments::{Moments, Point};
 #[doc(hidden)]
-pub use number::{number, seconds};
+pub use number::{number, r_hat_text, seconds};
 #[doc(hidden)]
 pub use reread::{rename, reread};
 pub use rundir::{RunDir, RunDirError};

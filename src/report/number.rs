@@ -30,6 +30,17 @@ pub fn seconds(s: f64) -> String {
     }
 }
 
+/// Formats an R-hat for people; that of chains in different modes can be arbitrarily
+/// large.
+pub fn r_hat_text(r: f64) -> String {
+    match r {
+        r if r.is_nan() => "-".into(),
+        r if r > 100.0 => ">100".into(),
+        r if r >= 10.0 => format!("{r:.1}"),
+        r => format!("{r:.3}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -53,5 +64,11 @@ mod tests {
             (seconds(0.5), seconds(61.0), seconds(125.0)),
             ("0.50 s".into(), "61 s".into(), "2 min 5 s".into())
         );
+    }
+
+    #[test]
+    fn r_hat_reads_well() {
+        let texts = [f64::NAN, 1.0042, 12.345, 3e6, f64::INFINITY].map(r_hat_text);
+        assert_eq!(texts, ["-", "1.004", "12.3", ">100", ">100"]);
     }
 }

@@ -1,10 +1,8 @@
 //! The tables at the end of a run: aligned text, at most [`COLUMNS`] wide.
 
-use super::{Quantity, number};
+use super::{Quantity, number, r_hat_text, seconds};
 use crate::infer::draws::{KernelStats, SiteStats};
 use std::fmt::Write;
-
-pub use super::warnings::warnings;
 
 /// The maximum width of a table of a run, in characters.
 pub const COLUMNS: usize = 100;
@@ -65,7 +63,7 @@ fn summaries(quantities: &[Quantity], seconds: Option<f64>) -> String {
         let cells =
             [q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess];
         let rate = seconds.and_then(|t| per_second(s.ess_bulk, t)).map_or("-".into(), whole);
-        rows.push(row(cells, [rate, super::r_hat_text(s.r_hat)]));
+        rows.push(row(cells, [rate, r_hat_text(s.r_hat)]));
     }
     let mut text = aligned(&narrowed(rows));
     if left_out > 0 {
@@ -125,7 +123,7 @@ pub fn kernels(kernels: &[KernelStats]) -> String {
             k.proposals.to_string(),
             rate,
             k.failed.to_string(),
-            super::seconds(k.seconds),
+            seconds(k.seconds),
         ]);
     }
     let mut text = aligned(&narrowed(rows));

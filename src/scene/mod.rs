@@ -7,7 +7,6 @@
 
 mod adjoints;
 mod bodies;
-mod body_vjps;
 mod candidates;
 mod compare;
 mod compare_depths;
@@ -25,7 +24,6 @@ mod people;
 mod region;
 mod scene_view;
 mod seeing;
-mod shape_vjps;
 mod shapes;
 
 pub use inputs::{CAMERAS, DETECTOR_DEFAULT};

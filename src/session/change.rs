@@ -1,7 +1,9 @@
 //! Manual changes of the state: `:flip`, `:set`, `:draw`.
 
 use super::look::{ROWS, addressed, more};
-use super::{Reply, Session, Trouble, shown};
+use super::reply::{Reply, Trouble};
+use super::shown;
+use super::state::Session;
 use crate::infer::{StepContext, accepts};
 use crate::report::number;
 use crate::rng::{Purpose, StreamKey};

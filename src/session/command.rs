@@ -1,6 +1,7 @@
 //! The commands, which begin with a colon.
 
-use super::{Reply, Request, Session, Trouble};
+use super::reply::{Reply, Request, Trouble};
+use super::state::Session;
 use crate::diag::nearest;
 use crate::lang::builtins::search::search;
 use crate::lang::builtins::{Builtin, Table, doc};

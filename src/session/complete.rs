@@ -1,6 +1,7 @@
 //! Completion of the word at the cursor, depending on its context.
 
-use super::{COMMANDS, Session};
+use super::command::COMMANDS;
+use super::state::Session;
 use crate::lang::builtins::{Kind, Type};
 use crate::lang::code::BlockKind;
 use crate::syntax::{Class, STATEMENTS, classes};

@@ -1,10 +1,13 @@
 //! Directives: they are added to the program, and the trace is rebuilt with the choices
 //! that it had.
 
+use super::export::{exported, exported_operand};
 use super::redefine::{
     Key, Space, forgotten, items, key, to_forget, users, with_item, without_item,
 };
-use super::{INPUT, Reply, Session, Trouble, exported, exported_operand, shown};
+use super::reply::{Reply, Trouble};
+use super::shown;
+use super::state::{INPUT, Session};
 use crate::diag::SourceMap;
 use crate::lang::code::{BlockKind, Operand};
 use crate::lang::load::reason;

@@ -1,6 +1,7 @@
 //! `:save` and `:load`: the program as a `.pcad` file, with the trace beside it.
 
-use super::{Reply, Request, Session, Trouble};
+use super::reply::{Reply, Request, Trouble};
+use super::state::Session;
 use crate::lang::load::reason;
 use crate::report::write_file;
 use crate::trace::{SavedTrace, Trace};

@@ -1,13 +1,15 @@
 //! `:trace`: the choices of the state.
 
-use super::{INPUT, Reply, Session, Trouble, shown};
+use super::reply::{Reply, Trouble};
+use super::shown;
+use super::state::{INPUT, Session};
 use crate::diag::{SourceMap, nearest};
 use crate::infer::selected;
 use crate::model::Error;
 use crate::report::number;
 use crate::report::table::aligned;
 use crate::syntax::parse_expr;
-use crate::trace::{Address, Selector, Target, Trace};
+use crate::trace::{Address, Selector, Target};
 use std::borrow::Cow;
 
 /// The maximum number of rows of a table.
@@ -94,18 +96,6 @@ impl Session {
 /// Counts the rows that are left out of a table.
 pub(super) fn more(rows: usize, what: &str) -> String {
     if rows > ROWS { format!("… and {} more {what}\n", rows - ROWS) } else { String::new() }
-}
-
-/// Describes a state of probability zero.
-pub(super) fn impossible(t: &Trace) -> String {
-    let found = t.impossible();
-    let names: Vec<String> = found.iter().take(5).map(|(a, _)| a.to_string()).collect();
-    let more =
-        if found.len() > 5 { format!(" and {} more", found.len() - 5) } else { String::new() };
-    format!(
-        "note: this state has probability zero, by {}{more}; `:draw` draws another one\n",
-        names.join(", ")
-    )
 }
 
 /// Turns a plain name or path, such as `x` or `t["x"]`, into an address, `@x`; other

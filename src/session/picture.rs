@@ -1,14 +1,9 @@
-//! `:render`: a picture of the scene, which is rendered only when a front end asks for
-//! its pixels.
+//! A picture of the scene, which is rendered only when a front end asks for its pixels.
 
-use super::{Reply, Session, Trouble};
-use crate::bank;
-use crate::diag::nearest;
-use crate::lang::code::{Code, Operand};
 use crate::lang::value::Located;
 use crate::render::{Contours, Frame, View};
 use crate::report::pictures::{self, Drawn, Strokes};
-use crate::scene::{ImageValue, ViewValue};
+use crate::scene::ViewValue;
 use image::RgbImage;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,8 +11,8 @@ use std::sync::Arc;
 /// A view, drawn over the photograph if there is one.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    view: Arc<View>,
-    photo: Option<Arc<RgbImage>>,
+    pub(super) view: Arc<View>,
+    pub(super) photo: Option<Arc<RgbImage>>,
     /// The file that the user named, if any.
     pub file: Option<PathBuf>,
 }
@@ -77,58 +72,4 @@ pub fn strokes(c: &Contours) -> Strokes<'_> {
         ty: &c.ty,
         length: &c.length,
     }
-}
-
-impl Session {
-    /// `:render [name] [file]`.
-    pub(super) fn render(&mut self, text: &str) -> Result<Reply, Trouble> {
-        let mut words: Vec<&str> = text.split_whitespace().collect();
-        let is_file = |w: &&str| [".png", ".PNG"].iter().any(|e| w.ends_with(e));
-        let file = words.last().copied().filter(is_file).map(|f| f.trim_matches('"'));
-        words.truncate(words.len() - usize::from(file.is_some()));
-        let draws = self.looks();
-        let operand = match words[..] {
-            [] => bank::picture(&mut self.trace, draws).ok_or_else(|| {
-                Trouble::plain("the program has no view and no solid")
-                    .hint("let view = scene.render(solid);")
-            })?,
-            [name] => self.global(name)?,
-            _ => return Err(Trouble::plain("`:render` takes a name and a file that ends in .png")),
-        };
-        let values =
-            self.trace.query(&[operand], draws).map_err(|e| Trouble::run(&self.model, *e))?;
-        let Some(view) = values.first().and_then(|v| bank::as_view(v, None)) else {
-            let what = values.first().map_or("nothing", |v| v.type_name());
-            return Err(Trouble::plain(format!(
-                "`{text}` is {what}: only views and solids can be seen"
-            )));
-        };
-        let picture =
-            Picture { view, photo: photo(self.model.code()), file: file.map(PathBuf::from) };
-        Ok(Reply { picture: Some(picture), ..Reply::default() })
-    }
-
-    fn global(&self, name: &str) -> Result<Operand, Trouble> {
-        let globals = &self.model.code().globals;
-        globals.get(name).copied().ok_or_else(|| {
-            let trouble = Trouble::plain(format!("there is no `{name}`"));
-            match nearest(name, globals.keys().map(|n| &**n)) {
-                Some(n) => trouble.hint(format!("did you mean `{n}`?")),
-                None => trouble,
-            }
-        })
-    }
-}
-
-/// Returns the first photograph among a program's data.
-fn photo(code: &Code) -> Option<Arc<RgbImage>> {
-    let of = |o: &Operand| match o {
-        Operand::Const(i) => code
-            .const_value(*i)
-            .downcast::<ImageValue>()?
-            .as_photo()
-            .map(|p| Arc::new(p.rgb().clone())),
-        _ => None,
-    };
-    code.globals.values().find_map(of)
 }

@@ -1,6 +1,7 @@
 //! `:plot x`: a text plot of a quantity of the last inference.
 
-use super::{Reply, Session, Trouble};
+use super::reply::{Reply, Trouble};
+use super::state::Session;
 use crate::diag::nearest;
 use crate::report::{Quantity, number, quantities};
 

@@ -1,7 +1,7 @@
 //! The names that a program's items bind, for replacing items when a name is bound again,
 //! and for removing them.
 
-use super::Trouble;
+use super::reply::Trouble;
 use crate::diag::{SourceMap, nearest};
 use crate::syntax::ast::{Item, ItemKind, StmtKind};
 use crate::syntax::{Class, classes, parse, print_expr};

@@ -1,6 +1,6 @@
 //! Replies of a session, and its errors.
 
-use super::Picture;
+use super::picture::Picture;
 use crate::lang::error::RunError;
 use crate::model::{Error, Model};
 use crate::syntax::span::Span;
@@ -85,6 +85,12 @@ impl Trouble {
             true => Trouble::Plain(e.message, e.hint),
             false => model.run_error(e).into(),
         }
+    }
+}
+
+impl From<Error> for Trouble {
+    fn from(e: Error) -> Self {
+        Trouble::Program(Box::new(e))
     }
 }
 

@@ -5,79 +5,27 @@
 //! twice. The last state of a run becomes the session's state when a foreground run ends
 //! or a background run is stopped; `:undo` goes back.
 
-use super::draws::{DrawCounts, SampledDraws};
-use super::{INPUT, Reply, Session, Trouble};
+use super::background::{Background, Finished};
+use super::draws::SampledDraws;
+use super::reply::{Reply, Trouble};
+use super::state::{INPUT, Session};
 use crate::bank::BankFiles;
-use crate::infer::draws::{KernelStats, SiteStats};
-use crate::infer::{ChainError, ChainResult, Progress, RunOptions, run_from};
+use crate::infer::{Progress, RunOptions, run_from};
 use crate::model::{Model, Program};
 use crate::platform::clock::Instant;
-use crate::report::{ChainDraws, number, quantities, seconds, table};
+use crate::report::{ChainDraws, number, seconds, table};
 use crate::syntax::ast::KStmt;
 use crate::trace::{Limits, Stop};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::thread::JoinHandle;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
 /// The polling interval while waiting for a run.
 const PAUSE: Duration = Duration::from_millis(100);
 /// How often a kernel is applied that is given without a plan or a number of steps.
 const TIMES: u64 = 1000;
-
-/// A running chain.
-pub(super) struct Background {
-    /// The plan, as described in messages.
-    what: String,
-    number: u32,
-    /// The session's model at the start, to which the result belongs.
-    base: Arc<Model>,
-    /// The model that is run; it differs from `base` if the plan was typed.
-    model: Arc<Model>,
-    progress: Arc<Progress>,
-    /// The number of steps after which the run ends, if given.
-    steps: Option<u64>,
-    kept: SampledDraws,
-    began: Instant,
-    /// Receives a message when the run is over; `is_done` is then true.
-    done: Receiver<()>,
-    is_done: Arc<AtomicBool>,
-    thread: JoinHandle<Result<ChainResult, ChainError>>,
-}
-
-/// The results of the last run.
-pub(super) struct Finished {
-    what: String,
-    steps: u64,
-    warmup: u64,
-    counts: DrawCounts,
-    kernels: Vec<KernelStats>,
-    sites: Vec<SiteStats>,
-    seconds: f64,
-    pub draws: ChainDraws,
-}
-
-/// The progress of inference.
-#[derive(Clone, Debug)]
-pub struct Status {
-    /// Kernel applications so far.
-    pub steps: u64,
-    /// Draws so far.
-    pub draws: u64,
-    /// The best log joint density of the draws.
-    pub best: Option<f64>,
-    /// The elapsed time.
-    pub elapsed: Duration,
-    /// The phase: starting, warm-up or sampling.
-    pub phase: &'static str,
-    /// How much of the phase is done, and the total: steps while sampling a given number
-    /// of them, otherwise passes of the plan's loop. The total is 0 if it is unknown.
-    pub done: (u64, u64),
-    /// Whether the run has ended.
-    pub is_done: bool,
-}
 
 /// A run to start.
 struct Job {
@@ -379,108 +327,5 @@ impl Session {
             text += &format!("\n{sites}");
         }
         Ok(Reply::text(text))
-    }
-}
-
-impl Status {
-    /// Formats the phase and its progress, such as "warm-up, 300 of 1000".
-    pub fn part(&self) -> String {
-        match self.done {
-            (_, 0) => self.phase.to_owned(),
-            (done, of) => format!("{}, {done} of {of}", self.phase),
-        }
-    }
-}
-
-impl Background {
-    fn status(&self) -> Status {
-        let seen = self.kept.counts();
-        Status {
-            steps: self.progress.steps.load(Ordering::Relaxed),
-            draws: seen.draws,
-            best: seen.best,
-            elapsed: self.began.elapsed(),
-            phase: self.phase(),
-            done: self.part(),
-            is_done: self.is_done.load(Ordering::SeqCst),
-        }
-    }
-
-    fn phase(&self) -> &'static str {
-        match &self.progress {
-            p if p.started.load(Ordering::Relaxed) == 0 => "starting",
-            p if p.warming.load(Ordering::Relaxed) > 0 => "warm-up",
-            _ => "sampling",
-        }
-    }
-
-    /// Returns how much of the phase is done, and the total.
-    fn part(&self) -> (u64, u64) {
-        let number = |n: &AtomicU64| n.load(Ordering::Relaxed);
-        match self.steps {
-            Some(steps) if self.phase() == "sampling" => (self.kept.counts().last_step, steps),
-            _ => (number(&self.progress.pass), number(&self.progress.passes)),
-        }
-    }
-
-    /// Explains why there are no draws yet.
-    fn no_draws(&self) -> String {
-        format!("run {} has no draws yet: {}\n", self.number, self.status().part())
-    }
-
-    /// Describes the run in one line.
-    fn line(&self) -> String {
-        let (s, seen) = (self.status(), self.kept.counts());
-        let state = match s.is_done {
-            true => "done; `:stop` keeps its state".to_owned(),
-            false => s.part(),
-        };
-        let mut line = format!("run {}, {}: {} steps", self.number, self.what, s.steps);
-        line += &drawn(&seen);
-        format!("{line}; {state}\n")
-    }
-}
-
-/// Formats the number of draws, the fraction of new states, and the best log joint
-/// density.
-fn drawn(seen: &DrawCounts) -> String {
-    let Some(best) = seen.best.filter(|_| seen.draws > 0) else { return String::new() };
-    let share = 100.0 * seen.moved as f64 / seen.draws as f64;
-    format!(", {} draws ({share:.0}% new states), best log joint {}", seen.draws, number(best))
-}
-
-/// The number of quantities in the table after inference.
-const MEANS: usize = 12;
-
-impl Finished {
-    /// Formats means and intervals of the recorded quantities.
-    fn means(&self) -> String {
-        if self.draws.rows.len() < 2 {
-            return String::new();
-        }
-        let mut all = quantities(std::slice::from_ref(&self.draws));
-        let left_out = all.len().saturating_sub(MEANS);
-        all.truncate(MEANS);
-        let more = match left_out {
-            0 => String::new(),
-            n => format!("… and {n} more: `:plot NAME`\n"),
-        };
-        table::means(&all) + &more
-    }
-
-    /// Describes the run in one line.
-    fn line(&self) -> String {
-        let warmup = if self.warmup > 0 {
-            format!(" after {} of warm-up", self.warmup)
-        } else {
-            String::new()
-        };
-        let (tried, accepted) =
-            self.kernels.iter().fold((0, 0), |(p, a), k| (p + k.proposals, a + k.accepted));
-        let accepted = match tried {
-            0 => String::new(),
-            _ => format!(", {:.0}% of proposals accepted", 100.0 * accepted as f64 / tried as f64),
-        };
-        format!("{}: {} steps{warmup}{accepted}{}\n", self.what, self.steps, drawn(&self.counts))
     }
 }

@@ -1,7 +1,9 @@
 //! `:why @a`: what a choice depends on, and what depends on it.
 
 use super::look::{ROWS, more};
-use super::{Reply, Session, Trouble, shown};
+use super::reply::{Reply, Trouble};
+use super::shown;
+use super::state::Session;
 use crate::report::number;
 use crate::report::table::aligned;
 use crate::trace::{Effect, Term};

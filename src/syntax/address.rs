@@ -10,8 +10,7 @@
 use super::ast::{Address, Expr, ExprKind, Key, Segment, SegmentName};
 use super::deep::Deep;
 use super::error::{AddressError, SyntaxError, SyntaxErrorKind};
-use super::lexer::Lexer;
-use super::parse::parse_range;
+use super::scan::Lexer;
 use super::span::Span;
 use super::token::{Token, is_name};
 use std::rc::Rc;
@@ -148,7 +147,8 @@ impl<'s> Scanner<'_, 's> {
             self.lexer.errors.push(SyntaxError::new(SyntaxErrorKind::TooDeep, span));
             return Ok(Expr { kind: ExprKind::Error, span });
         }
-        let (expr, errors) = parse_range(self.lexer.text, start..start + length, file, level);
+        let parse = self.lexer.parse_key;
+        let (expr, errors) = parse(self.lexer.text, start..start + length, file, level);
         self.lexer.errors.extend(errors);
         self.depth = self.depth.max(expr.depth);
         Ok(expr.node)

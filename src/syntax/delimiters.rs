@@ -5,13 +5,10 @@
 //! error instead of a parse error at the end of the file. Brackets that match are left
 //! unchanged; if they do not, indentation and keywords show where one is missing.
 
-use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
+use super::error::{MAX_ERRORS, MAX_NESTING, SyntaxError, SyntaxErrorKind};
 use super::lexer::Lexeme;
 use super::span::{FileId, Span};
 use super::token::Token;
-
-/// The maximum number of brackets that may be open at a time.
-pub const MAX_NESTING: usize = 200;
 
 /// An open bracket.
 #[derive(Clone, Copy)]

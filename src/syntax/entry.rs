@@ -1,7 +1,7 @@
 //! Queries about text that is still being written in an editor or at a prompt: the
 //! classes of its tokens, and whether it is incomplete.
 
-use super::lexer::lex;
+use super::parse::lex;
 use super::span::FileId;
 use super::token::Token;
 use std::ops::Range;

@@ -1,10 +1,7 @@
 //! Syntax errors and their messages. The advice on text that does not fit the grammar is
 //! in [`advice`](super::advice).
 
-use super::advice::Advice;
 use super::deep::MAX_DEPTH;
-use super::delimiters::MAX_NESTING;
-use super::lexer::MAX_TOKENS;
 use super::span::Span;
 use super::token::Foreign;
 use crate::diag::{Diagnostic, IntoDiagnostic, too_large};
@@ -12,6 +9,10 @@ use crate::diag::{Diagnostic, IntoDiagnostic, too_large};
 /// The maximum number of errors reported for a text; a last one then says that there are
 /// more.
 pub const MAX_ERRORS: usize = 20;
+/// The maximum number of brackets that may be open at a time.
+pub const MAX_NESTING: usize = 200;
+/// The maximum number of tokens in a file.
+pub const MAX_TOKENS: usize = 1 << 20;
 
 /// A syntax error and its place.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +87,19 @@ pub enum SyntaxErrorKind {
     DrawTarget,
     /// Further errors are not reported.
     TooManyErrors,
+}
+
+/// The wording of an error, if it can be better than "unexpected …, expected …".
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Advice {
+    /// What is wrong.
+    pub message: Option<String>,
+    /// The label at its place.
+    pub label: Option<String>,
+    /// What to do instead.
+    pub hint: Option<String>,
+    /// The index of the token to point at, if it is not the one that did not fit.
+    pub place: Option<usize>,
 }
 
 /// The kinds of errors in address literals.

@@ -7,14 +7,12 @@
 //! offsets in the whole text.
 
 use super::address;
-use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
-use super::span::{FileId, Span};
-use super::token::{Foreign, Open, Token, is_name};
+use super::error::{MAX_ERRORS, MAX_TOKENS, SyntaxError, SyntaxErrorKind};
+use super::scan::{Lexer, ParseKey};
+use super::span::FileId;
+use super::token::{Foreign, Open, Token};
 use logos::Logos;
 use std::ops::Range;
-
-/// The maximum number of tokens in a file.
-pub const MAX_TOKENS: usize = 1 << 20;
 
 /// A token and its byte range.
 #[derive(Clone, Debug)]
@@ -24,27 +22,15 @@ pub(crate) struct Lexeme<'s> {
     pub end: usize,
 }
 
-/// The state of the lexer.
-pub(crate) struct Lexer<'s> {
-    /// The whole text of the file.
-    pub text: &'s str,
-    /// The end of the part being lexed.
-    pub end: usize,
-    pub file: FileId,
-    /// The number of addresses around this text: keys may be expressions, which may
-    /// contain addresses.
-    pub level: u32,
-    pub errors: Vec<SyntaxError>,
-}
-
 /// Returns the tokens of `text[range]` and the errors in it.
-pub(crate) fn lex(
+pub(super) fn lex(
     text: &str,
     range: Range<usize>,
     file: FileId,
     level: u32,
+    parse_key: ParseKey,
 ) -> (Vec<Lexeme<'_>>, Vec<SyntaxError>) {
-    let mut lexer = Lexer { text, end: range.end, file, level, errors: Vec::new() };
+    let mut lexer = Lexer { text, end: range.end, file, level, parse_key, errors: Vec::new() };
     let mut lexemes = Vec::new();
     let byte_order_mark = range.start == 0 && text.starts_with('\u{feff}');
     let base = range.start + if byte_order_mark { '\u{feff}'.len_utf8() } else { 0 };
@@ -89,22 +75,6 @@ pub(crate) fn lex(
 }
 
 impl<'s> Lexer<'s> {
-    pub fn error(&mut self, kind: SyntaxErrorKind, start: usize, end: usize) {
-        self.errors.push(SyntaxError::new(kind, Span::new(self.file, start, end)));
-    }
-
-    /// Returns the text from byte `at` to the end of the part being lexed.
-    pub fn rest(&self, at: usize) -> &'s str {
-        self.text.get(at..self.end).unwrap_or("")
-    }
-
-    /// Returns the name that starts at byte `at`.
-    pub fn name(&self, at: usize) -> Option<&'s str> {
-        let rest = self.rest(at);
-        let length = rest.bytes().take_while(|b| b.is_ascii_alphanumeric() || *b == b'_').count();
-        Some(&rest[..length]).filter(|name| is_name(name))
-    }
-
     /// Scans the lexeme that starts at `start` and whose opening delimiter ends at `at`.
     /// Returns its token, if it makes one, and its end.
     fn scan(&mut self, open: Open, start: usize, at: usize) -> (Option<Token<'s>>, usize) {

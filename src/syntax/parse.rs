@@ -6,11 +6,22 @@ use super::deep::Deep;
 use super::delimiters::{Balanced, balance};
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 use super::grammar::ExpressionParser;
-use super::lexer::lex;
-use super::recover::{Tokens, parse_program};
+use super::lexer::{self, Lexeme};
+use super::recover::{explain, parse_program};
 use super::span::{FileId, Span};
+use super::tokens::Tokens;
 use crate::diag::MAX_SOURCE_BYTES;
 use std::ops::Range;
+
+/// Returns the tokens of `text[range]`, inside `level` addresses, and the errors in it.
+pub(crate) fn lex(
+    text: &str,
+    range: Range<usize>,
+    file: FileId,
+    level: u32,
+) -> (Vec<Lexeme<'_>>, Vec<SyntaxError>) {
+    lexer::lex(text, range, file, level, parse_range)
+}
 
 /// Parses a file.
 ///
@@ -78,7 +89,7 @@ pub(crate) fn parse_range(
         Ok(expr) => expr,
         Err(error) => {
             if errors.is_empty() {
-                errors.push(tokens.explain(&error));
+                errors.push(explain(&tokens, &error));
             }
             hole
         }

@@ -1,7 +1,7 @@
 //! String literals: `"…"` on one line, with the escapes `\n \t \r \" \\ \u{1f600}`.
 
 use super::error::SyntaxErrorKind;
-use super::lexer::Lexer;
+use super::scan::Lexer;
 use std::fmt::Write;
 use std::sync::Arc;
 

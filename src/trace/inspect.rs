@@ -3,7 +3,7 @@
 
 use super::node::{self, NONE, State};
 use super::{Address, Selection, Selector, Target, Trace};
-use super::{choices, eval};
+use super::{eval, update};
 use crate::dist::{Datum, Dist, Support};
 use crate::lang::code::{DistSpec, Op};
 use crate::lang::value::{Likelihood, Located, Value};
@@ -64,7 +64,7 @@ impl Trace {
     pub fn address(&self, t: Target) -> Address {
         let mut a = self.graph.address(&self.code, t.node);
         if t.element != NONE {
-            choices::push_key(&mut a, t.element);
+            update::push_key(&mut a, t.element);
         }
         a
     }

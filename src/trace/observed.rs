@@ -10,7 +10,7 @@
 use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
-use super::propagate::Failure;
+use super::update::Failure;
 use super::{Address, Draws, Trace, TraceResult, Weight};
 use crate::dist::{Datum, Dist, Support};
 use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};

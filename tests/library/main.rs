@@ -6,5 +6,6 @@ mod common;
 
 mod api;
 mod architecture;
+mod circles;
 mod embedding;
 mod session;

@@ -13,7 +13,6 @@ use pcadlang::geom::Solid;
 use pcadlang::render::{Camera, Contours, View};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
-use pcadlang::vision::ContourSlice;
 use std::sync::Arc;
 use subjects::Subject;
 

@@ -16,10 +16,10 @@ pub use exact::ExactSum;
 pub use hash::fnv1a;
 pub use incomplete::{chi_square_tail, upper_gamma};
 pub use log_tails::{beta_tails, gamma_tails};
-pub use saddle::{deviance, stirling_error};
+pub use saddle::{LN_SQRT_2PI, deviance, stirling_error};
 pub use special::{
-    LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma,
-    log_diff_exp, log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
+    digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp,
+    log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
 };
 pub use tails::{log_scaled_i0, mills_ratio, one_minus_i1_over_i0};
 

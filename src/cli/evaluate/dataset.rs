@@ -3,7 +3,8 @@
 //! Invariant: no other files of a dataset are opened. Ground truth beside the pictures,
 //! or in other fields of `annotations.json`, cannot reach a run.
 
-use crate::cli::{Failure, files, plain};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files;
 use pcadlang::lang::load::reason;
 use pcadlang::report::evaluation::{MARK, PREDICTIONS, TABLE};
 use serde::Deserialize;

@@ -8,9 +8,12 @@ mod dataset;
 mod observed;
 
 use super::args::{Evaluate, Inputs, Job};
+use super::edges;
+use super::failure::{Failure, plain};
 use super::running::job::{CHECKPOINT, Interrupt, RunMode};
-use super::{Failure, inputs, job, plain, quality, term};
-use super::{edges, resume};
+use super::running::resume;
+use super::running::{inputs, job, quality};
+use super::term;
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
 pub use observed::{Detections, Items, observations_for};

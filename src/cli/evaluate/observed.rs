@@ -1,7 +1,8 @@
 //! The observations of a case, as arguments of `--observe`.
 
 use super::dataset::Case;
-use crate::cli::{Failure, files, plain};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files;
 use pcadlang::Program;
 use serde_json::{Map, Value};
 use std::path::PathBuf;

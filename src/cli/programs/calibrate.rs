@@ -3,10 +3,11 @@
 //! module runs them and prints the results.
 
 use crate::cli::args::{Check, Inputs, Job, Sampling};
+use crate::cli::failure::{Failure, plain};
 use crate::cli::people::PersonArgs;
+use crate::cli::running::inputs;
 use crate::cli::running::job::{Interrupt, machine_threads};
 use crate::cli::running::progress::{self, Ending};
-use crate::cli::{Failure, inputs, plain};
 use pcadlang::infer::calibration::{
     CalibrationError, FALSE_ALARMS, Geweke, PlanSampler, RANKS, Sampler, Sbc, Settings, geweke, sbc,
 };

@@ -1,7 +1,8 @@
 //! `pcadlang check`.
 
 use crate::cli::args::Check;
-use crate::cli::{Failure, has_colors};
+use crate::cli::failure::Failure;
+use crate::cli::term::has_colors;
 use pcadlang::Program;
 use pcadlang::diag::render;
 
@@ -44,7 +45,7 @@ pub fn check(a: &Check) -> Result<(), Failure> {
     if failed.is_empty() {
         Ok(())
     } else {
-        Err(crate::cli::plain(format!(
+        Err(crate::cli::failure::plain(format!(
             "{} of {} programs have mistakes: {}",
             failed.len(),
             a.programs.len(),

@@ -1,7 +1,7 @@
 //! `pcadlang doc`.
 
 use crate::cli::args::Doc;
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use pcadlang::lang::builtins::search::search;
 use pcadlang::lang::builtins::{Table, doc as docs};
 use pcadlang::standard;

@@ -1,7 +1,9 @@
 //! `pcadlang fmt`.
 
 use crate::cli::args::Fmt;
-use crate::cli::{Failure, files, has_colors, plain};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files;
+use crate::cli::term::has_colors;
 use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
 use pcadlang::lang::load::reason;
 use pcadlang::report::write_file;

@@ -3,9 +3,11 @@
 //! module makes a table and a file.
 
 use crate::cli::args::{Job, Predict};
-use crate::cli::running::job::{self, Interrupt, Ready, write};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files::write_in;
+use crate::cli::running::job::{self, Interrupt, Ready};
 use crate::cli::running::progress::{self, Ending};
-use crate::cli::{Failure, plain, quality};
+use crate::cli::running::quality;
 use pcadlang::Model;
 use pcadlang::infer::draws::{Discard, Sink};
 use pcadlang::infer::predictive::{
@@ -52,7 +54,7 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
         None => RunDir::fresh(Path::new("runs"), &format!("{stem}-predictive")),
     };
     let dir = dir.map_err(|e| plain(e.to_string()))?;
-    write(&dir, "predictive.csv", csv(&now, &draws).as_bytes())?;
+    write_in(&dir, "predictive.csv", csv(&now, &draws).as_bytes())?;
     print_text!("{}", compared(what, &now, &draws));
     for (name, what) in silent {
         print_line!("note: {name} is {what}, so it is left out");

@@ -1,8 +1,10 @@
 //! `pcadlang check --watch`.
 
 use crate::cli::args::Check;
+use crate::cli::failure::Failure;
+use crate::cli::programs::check;
 use crate::cli::running::job::Interrupt;
-use crate::cli::{Failure, check, term};
+use crate::cli::term;
 use pcadlang::diag::SourceMap;
 use pcadlang::lang::load::{Loader, load};
 use pcadlang::lang::reach::Reach;

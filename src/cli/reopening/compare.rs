@@ -1,28 +1,15 @@
 //! `pcadlang compare`: two runs side by side: their different settings, their quantities
 //! and their pictures.
 
-use crate::cli::reopening::show::quoted;
+use crate::cli::args::Compare;
+use crate::cli::failure::{Failure, plain};
+use crate::cli::reopening::reopened::quoted;
 use crate::cli::running::places::sized;
-use crate::cli::{Failure, files, plain, resume};
-use clap::Args;
+use crate::cli::running::{files, resume};
 use pcadlang::report::pictures::{captioned_sheet, png};
 use pcadlang::report::{number, table};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-
-/// `compare`.
-#[derive(Args, Debug)]
-pub struct Compare {
-    /// The folder of a run
-    #[arg(value_name = "A")]
-    pub a: PathBuf,
-    /// The folder of another run
-    #[arg(value_name = "B")]
-    pub b: PathBuf,
-    /// A file to write their overlays to, side by side (.png)
-    #[arg(short, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-}
+use std::path::Path;
 
 /// The maximum number of quantities listed, those that differ most.
 const LISTED: usize = 40;

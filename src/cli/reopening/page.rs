@@ -3,10 +3,11 @@
 //!
 //! Invariant: a missing or broken file is left out of the page, and does not prevent it.
 
+use crate::cli::failure::Failure;
 use crate::cli::reopening::date::readable;
-use crate::cli::reopening::show::quoted;
-use crate::cli::running::job::write;
-use crate::cli::{Failure, places};
+use crate::cli::reopening::reopened::quoted;
+use crate::cli::running::files::write_in;
+use crate::cli::running::places;
 use image::RgbImage;
 use pcadlang::geom::obj;
 use pcadlang::infer::draws::KernelStats;
@@ -76,7 +77,7 @@ pub fn write_page(
         mesh: mesh.as_ref().map(|m| MeshData { positions: &positions, triangles: &m.triangles }),
         program: &String::from_utf8_lossy(&program),
     });
-    write(dir, PAGE, html.as_bytes())
+    write_in(dir, PAGE, html.as_bytes())
 }
 
 fn text(v: &Value) -> &str {

@@ -2,7 +2,7 @@
 //! states.
 
 use crate::cli::args::{Cli, Command, Job};
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use clap::Parser;
 use pcadlang::Model;
 use pcadlang::infer::KeptTrace;
@@ -48,6 +48,16 @@ pub fn arguments(job: &Job) -> Vec<String> {
     s.time.iter().for_each(|t| add("time", format!("{}ms", t.as_millis())));
     add("quality", "own".into());
     all
+}
+
+/// Quotes arguments for a shell.
+pub fn quoted(arguments: &[String]) -> String {
+    let plain = |a: &String| {
+        !a.is_empty() && a.chars().all(|c| c.is_ascii_alphanumeric() || "_-./=:,#+@".contains(c))
+    };
+    let one =
+        |a: &String| if plain(a) { a.clone() } else { format!("'{}'", a.replace('\'', "'\\''")) };
+    arguments.iter().map(one).collect::<Vec<_>>().join(" ")
 }
 
 impl Reopened {

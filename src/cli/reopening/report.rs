@@ -1,19 +1,11 @@
 //! `pcadlang report`: rebuilds the page of a run from the contents of its folder.
 
+use crate::cli::args::Report;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::{PAGE, write_page};
-use crate::cli::{Failure, files, job, plain, resume};
-use clap::Args;
+use crate::cli::running::{files, job, resume};
 use pcadlang::report::{Quantity, RunDir, modes, quantities, rename, reread, warnings};
 use serde_json::{Value, json};
-use std::path::PathBuf;
-
-/// `report`.
-#[derive(Args, Debug)]
-pub struct Report {
-    /// The folder of the run
-    #[arg(value_name = "RUN")]
-    pub run: PathBuf,
-}
 
 /// Rebuilds the page of a run.
 pub fn report(a: &Report) -> Result<(), Failure> {

@@ -1,9 +1,9 @@
 //! Observed data as files beside the best state: the photograph, its contours, and the
 //! joints detected in it.
 
-use crate::cli::running::job::write;
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files::write_in;
 use crate::cli::running::places::sized;
-use crate::cli::{Failure, plain};
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::crop_imm;
@@ -30,14 +30,14 @@ pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Resul
         let mut bytes = Vec::new();
         let small = sized(photo.rgb(), w.max(h).min(LARGEST));
         JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&small).map_err(told)?;
-        write(dir, "photo.jpg", &bytes)?;
+        write_in(dir, "photo.jpg", &bytes)?;
         if let Some(joints) = joints(photo.rgb(), located) {
-            write(dir, "joints.png", &png(&joints).map_err(told)?)?;
+            write_in(dir, "joints.png", &png(&joints).map_err(told)?)?;
         }
     }
     match image.seen().or_else(|| found(image)) {
         Some(map) => {
-            write(dir, "photo_contours.png", &png(&lines(&map, (width, height))).map_err(told)?)
+            write_in(dir, "photo_contours.png", &png(&lines(&map, (width, height))).map_err(told)?)
         }
         None => Ok(()),
     }

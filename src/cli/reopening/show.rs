@@ -1,30 +1,16 @@
 //! `pcadlang show`: a state of a finished run as a picture, a mesh or a list.
 
-use crate::cli::reopening::reopened::Reopened;
-use crate::cli::{Failure, files, job, plain, scene};
-use clap::Args;
+use crate::cli::args::Show;
+use crate::cli::failure::{Failure, plain};
+use crate::cli::reopening::reopened::{Reopened, quoted};
+use crate::cli::running::{files, job};
+use crate::cli::scene;
 use pcadlang::geom::{glb, obj};
 use pcadlang::report::pictures::png;
 use pcadlang::report::{number, table};
 use pcadlang::session::over;
 use pcadlang::vision::Photo;
-use std::path::{Path, PathBuf};
-
-/// `show`.
-#[derive(Args, Debug)]
-pub struct Show {
-    /// The folder of the run
-    #[arg(value_name = "RUN")]
-    pub run: PathBuf,
-    /// Which kept state, numbered from 1 as listed by `show RUN` [default: the best
-    /// state]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub draw: Option<u32>,
-    /// The file to write: the picture over the photograph (.png) or the mesh (.obj,
-    /// .glb). Without it, the choices are printed
-    #[arg(short, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-}
+use std::path::Path;
 
 /// The maximum number of choices listed.
 const LISTED: usize = 200;
@@ -89,14 +75,4 @@ pub fn show(a: &Show) -> Result<(), Failure> {
         }
     };
     files::write(Path::new(out), &bytes)
-}
-
-/// Quotes arguments for a shell.
-pub fn quoted(arguments: &[String]) -> String {
-    let plain = |a: &String| {
-        !a.is_empty() && a.chars().all(|c| c.is_ascii_alphanumeric() || "_-./=:,#+@".contains(c))
-    };
-    let one =
-        |a: &String| if plain(a) { a.clone() } else { format!("'{}'", a.replace('\'', "'\\''")) };
-    arguments.iter().map(one).collect::<Vec<_>>().join(" ")
 }

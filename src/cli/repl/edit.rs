@@ -1,6 +1,6 @@
 //! `:edit`: the program in the user's own editor.
 
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -11,8 +11,11 @@ mod sixel;
 mod testing;
 
 use super::args::{Graphics, Inputs, Job, Repl, Sampling};
+use super::failure::{Failure, plain};
 use super::reopening::reopened::Reopened;
-use super::{Failure, has_colors, inputs, plain, term};
+use super::running::inputs;
+use super::term;
+use super::term::has_colors;
 use editor::{Lines, Typed, is_whole};
 use pcadlang::report::number;
 use pcadlang::session::{Reply, Request, Session, Status, Trouble};

@@ -1,8 +1,9 @@
 //! Shows pictures in the terminal, or writes them to files.
 
 use super::super::args::Graphics;
-use super::super::{Failure, files, plain};
 use super::{blocks, iterm, kitty, sixel};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang::report::pictures::png;

@@ -3,10 +3,11 @@
 //!
 //! The run itself is in `job`.
 
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::seen::show_seen;
-use crate::cli::running::job::write;
+use crate::cli::running::files::write_in;
 use crate::cli::running::progress::Ending;
-use crate::cli::{Failure, plain, scene};
+use crate::cli::scene;
 use image::GrayImage;
 use pcadlang::Model;
 use pcadlang::geom::{Mesh, Solid, glb, obj};
@@ -51,7 +52,7 @@ pub fn show_best(
     let draws = scene::predictive(seed, 0);
     let mut trace = scene::rebuilt(model, &best.choices, draws)?;
     let saved = serde_json::to_vec(&trace.save(model.hash())).unwrap_or_default();
-    write(dir, "best.trace.json", &saved)?;
+    write_in(dir, "best.trace.json", &saved)?;
     let mut shown = Shown::default();
     if let Some(view) = scene::view(&mut trace, draws, None) {
         let located = trace.located();
@@ -97,25 +98,25 @@ fn draw(
     let size = width.max(height);
     let frame = view.frame(size);
     let shape = [frame.height as usize, frame.width as usize];
-    write(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
+    write_in(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
     let normals = npy::f32_array(&[shape[0], shape[1], 3], frame.normal.iter().flatten().copied());
-    write(dir, "normals.npy", &normals)?;
+    write_in(dir, "normals.npy", &normals)?;
     let bytes = frame.mask().map(|m| if m { 255 } else { 0 }).collect();
     let encode = |p: Result<Vec<u8>, image::ImageError>| p.map_err(|e| plain(e.to_string()));
     if let Some(mask) = GrayImage::from_raw(frame.width, frame.height, bytes) {
-        write(dir, "mask.png", &encode(png(&mask))?)?;
+        write_in(dir, "mask.png", &encode(png(&mask))?)?;
     }
     let mut over = over(view, photo.map(Photo::rgb), (width, height));
     detected(&mut over, located, (width, height));
     let lines = pictures::contours(frame.width, frame.height, &strokes(&view.contours(size)));
-    write(dir, "overlay.png", &encode(png(&over))?)?;
-    write(dir, "contours.png", &encode(png(&lines))?)?;
+    write_in(dir, "overlay.png", &encode(png(&over))?)?;
+    write_in(dir, "contours.png", &encode(png(&lines))?)?;
     let (spread, agreement) = frequency(chains, seed, 128);
     shown.agreement = agreement;
-    write(dir, "uncertainty.png", &encode(png(&spread))?)?;
+    write_in(dir, "uncertainty.png", &encode(png(&spread))?)?;
     if let Some(mesh) = mesh(view.solid()) {
-        write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
-        write(dir, "best.glb", &glb::write(&mesh))?;
+        write_in(dir, "best.obj", obj::write(&mesh).as_bytes())?;
+        write_in(dir, "best.glb", &glb::write(&mesh))?;
         shown.inside = inside(&mesh, camera);
     }
     Ok(())
@@ -207,7 +208,7 @@ fn export(
     let Some(value) = values.first() else { return Ok(()) };
     let name = x.file.trim_start_matches(['/', '.']).replace('/', "_");
     match exported(value, &name) {
-        Ok(bytes) => write(dir, &name, &bytes),
+        Ok(bytes) => write_in(dir, &name, &bytes),
         Err(e) => {
             error_line!("warning: cannot write the mesh: {e}");
             Ok(())

@@ -1,8 +1,9 @@
 //! Reads and writes files, with error messages that name them.
 
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use pcadlang::lang::load::{embedded, reason};
 use pcadlang::lang::reach::read_file;
+use pcadlang::report::RunDir;
 use pcadlang::vision::{Limits, Photo, photo};
 use std::path::Path;
 
@@ -15,6 +16,11 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     std::fs::write(path, bytes)
         .map_err(|e| plain(format!("cannot write {}: {}", path.display(), reason(&e))))
+}
+
+/// Writes a file of a run.
+pub fn write_in(dir: &RunDir, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    dir.write(name, bytes).map_err(|e| plain(format!("{e}; earlier output is kept")))
 }
 
 /// Reads a photograph.

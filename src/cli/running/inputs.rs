@@ -1,7 +1,8 @@
 //! Makes a program with its data from the command line.
 
 use crate::cli::args::{Inputs, Job};
-use crate::cli::{Failure, files, plain};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files;
 use pcadlang::Program;
 use pcadlang::lang::builtins::data::Options;
 use pcadlang::lang::value::Value;

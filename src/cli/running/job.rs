@@ -5,13 +5,17 @@
 //! complete.
 
 use crate::cli::args::Job;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::{PROGRAM, write_page};
 use crate::cli::reopening::reopened::{TRACES, arguments};
+use crate::cli::reopening::{date, seen};
 use crate::cli::running::best::{disagreement, keep_best, outside, show_best};
+use crate::cli::running::files::write_in;
 use crate::cli::running::keypoints::Joints;
 use crate::cli::running::places::{best_of_each, show_places};
 use crate::cli::running::progress::{self, Ending};
-use crate::cli::{Failure, date, edges, files, inputs, people, plain, seen};
+use crate::cli::running::{files, inputs};
+use crate::cli::{edges, people};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
@@ -263,12 +267,7 @@ fn recorded(record: &Map<String, Value>, state: &str, more: Value) -> Value {
 }
 
 fn write_run(dir: &RunDir, run: &Value) -> Result<(), Failure> {
-    write(dir, "run.json", &serde_json::to_vec_pretty(run).unwrap_or_default())
-}
-
-/// Writes a file of a run.
-pub fn write(dir: &RunDir, name: &str, bytes: &[u8]) -> Result<(), Failure> {
-    dir.write(name, bytes).map_err(|e| plain(format!("{e}; earlier output is kept")))
+    write_in(dir, "run.json", &serde_json::to_vec_pretty(run).unwrap_or_default())
 }
 
 /// Records in `run.json` that a run failed, and why.
@@ -307,7 +306,7 @@ pub fn perform(
     manner: RunMode,
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
-    write(dir, PROGRAM, ready.model.text().as_bytes())?;
+    write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
     fill(job, ready, dir, record, interrupt, manner).inspect_err(|failure| {
         // An error in writing the record must not hide the first error.
         let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
@@ -395,7 +394,7 @@ fn fill(
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let modes = modes(&quantities, Some(&evidence));
-    let mut warnings = table::warnings(&quantities, &modes, &kernels, chains.len());
+    let mut warnings = pcadlang::report::warnings(&quantities, &modes, &kernels, chains.len());
     let person = job.inputs.who.person.unwrap_or(1);
     if *chooses {
         warnings
@@ -417,10 +416,10 @@ fn fill(
         "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
         "modes": modes, "warnings": warnings, "approximate": approximate, "every": every,
     });
-    write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
+    write_in(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
     let elapsed = begun.elapsed().as_secs_f64();
     if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, &modes, elapsed)) {
-        write(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
+        write_in(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
     }
     let mut more = counts(&chains, best.as_deref(), &quantities);
     more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
@@ -471,7 +470,7 @@ fn write_traces(dir: &RunDir, kept: &KeptTraces) -> Result<(), Failure> {
         .iter()
         .filter_map(|k| serde_json::to_string(k).ok())
         .fold(String::new(), |s, k| s + &k + "\n");
-    if lines.is_empty() { Ok(()) } else { write(dir, TRACES, lines.as_bytes()) }
+    if lines.is_empty() { Ok(()) } else { write_in(dir, TRACES, lines.as_bytes()) }
 }
 
 /// Lists the approximations of a run, in its likelihoods and by its time limit.

@@ -1,8 +1,9 @@
 //! A picture of each mode, if the chains are in several: the best state of the mode's
 //! chains over the photograph.
 
-use crate::cli::running::job::write;
-use crate::cli::{Failure, plain, scene};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files::write_in;
+use crate::cli::scene;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang::Model;
@@ -96,7 +97,7 @@ pub fn show_places(
     }
     let encoded = |picture: &RgbImage| png(picture).map_err(|e| plain(e.to_string()));
     for (place, picture) in places.iter().zip(&pictures) {
-        write(dir, &name(place.number), &encoded(picture)?)?;
+        write_in(dir, &name(place.number), &encoded(picture)?)?;
     }
-    write(dir, "modes.png", &encoded(&captioned_sheet(&pictures, COLUMNS, &captions))?)
+    write_in(dir, "modes.png", &encoded(&captioned_sheet(&pictures, COLUMNS, &captions))?)
 }

@@ -5,9 +5,9 @@
 //! line and the presets only, not on the machine.
 
 use crate::cli::args::{Job, QualityArg, Sampling};
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use pcadlang::lang::load;
-use pcadlang::tradeoff::{Choice, Presets, Quality};
+use pcadlang::tradeoff::{Choice, Presets};
 use std::path::Path;
 use std::time::Duration;
 
@@ -126,15 +126,11 @@ pub fn again(job: &Job) -> String {
     sets.chain(chains).collect()
 }
 
-/// Returns the values of `--quality`.
-pub fn names() -> Vec<&'static str> {
-    Quality::ALL.map(Quality::name).into_iter().chain(["own"]).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cli::args::Inputs;
+    use pcadlang::tradeoff::Quality;
 
     fn job(quality: Option<QualityArg>, time: Option<f64>) -> Job {
         let inputs = Inputs {

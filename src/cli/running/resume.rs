@@ -1,6 +1,6 @@
 //! Earlier runs in a folder, and whether their settings are the same.
 
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use pcadlang::report::{RunDir, RunDirError, evaluation};
 use serde_json::{Map, Value};
 use std::path::Path;

@@ -1,10 +1,12 @@
 //! `pcadlang run`: one run, its folder, and the summary printed at the end.
 
 use crate::cli::args::{Job, Run};
+use crate::cli::failure::{Failure, plain};
 use crate::cli::print::paragraph;
 use crate::cli::programs::explain::{Explanation, explain};
+use crate::cli::running::files::write_in;
 use crate::cli::running::job::{self, Interrupt, Outcome, RunMode};
-use crate::cli::{Failure, plain, quality, resume};
+use crate::cli::running::{quality, resume};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
@@ -43,7 +45,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));
     if let Some(explained) = &explained {
         let text = serde_json::to_vec_pretty(&explained.json()).unwrap_or_default();
-        job::write(&dir, "explained.json", &text)?;
+        write_in(&dir, "explained.json", &text)?;
     }
     show(a, job, &dir, &outcome, explained.as_ref());
     if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }

@@ -6,7 +6,8 @@
 use super::truth::{self, Truth};
 use crate::cli::args::Tradeoff;
 use crate::cli::evaluate::{Dataset, Detections, Items, Layout, observations_for};
-use crate::cli::{Failure, files, inputs, plain};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::{files, inputs};
 use pcadlang::Program;
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,7 @@
 //!
 //! Invariant: every run in the journal is complete; all other files are rebuilt from it.
 
-use crate::cli::{Failure, plain};
+use crate::cli::failure::{Failure, plain};
 use pcadlang::report::write_file;
 use pcadlang::tradeoff::RunRecord;
 use serde_json::{Map, Value};

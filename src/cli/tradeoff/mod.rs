@@ -14,8 +14,9 @@ mod work;
 
 use super::args::Tradeoff;
 use super::evaluate::known;
+use super::failure::{Failure, plain};
+use super::running::inputs;
 use super::running::job::{self, Interrupt};
-use super::{Failure, inputs, plain};
 use cases::Case;
 use folder::Folder;
 use pcadlang::report::{bytes_hash, seconds, text_hash};

@@ -1,7 +1,8 @@
 //! The settings to try, and their programs.
 
 use crate::cli::args::{Inputs, Tradeoff};
-use crate::cli::{Failure, inputs, plain};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::inputs;
 use pcadlang::lang::load;
 use pcadlang::tradeoff::{Plan, Setting};
 use serde_json::{Map, Value, json};

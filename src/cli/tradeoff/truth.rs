@@ -1,6 +1,7 @@
 //! Reads ground truth.
 
-use crate::cli::{Failure, files, plain};
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::files;
 use indexmap::IndexMap;
 use pcadlang::render::{Camera, Projection};
 use pcadlang::score::{JointsTruth, Normal, Reference, Surface, SurfaceTruth};

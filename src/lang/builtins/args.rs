@@ -1,19 +1,10 @@
 //! Access to the arguments of a built-in, with errors that name the argument.
 
-use super::Builtin;
-use super::elementwise::truth;
+use super::builtin::Args;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{MOST_ELEMENTS, Object, Record, Value};
 use std::borrow::Cow;
 use std::sync::Arc;
-
-/// The arguments of one call, in the table's order; omitted ones are `nothing`.
-pub struct Args<'a> {
-    /// The called built-in.
-    pub builtin: &'a Builtin,
-    /// The values.
-    pub values: &'a [&'a Value],
-}
 
 /// Numbers, borrowed if the value is already an array of numbers.
 type Numbers<'a> = Cow<'a, [f64]>;
@@ -231,6 +222,15 @@ impl<'a> Args<'a> {
     /// Reads an object of type `T`; `wanted` describes it in messages.
     pub fn object<T: Object>(&self, i: usize, wanted: &str) -> Result<&'a T, Fault> {
         self.get(i).downcast::<T>().ok_or_else(|| self.wrong(i, wanted))
+    }
+}
+
+/// Returns a number, or a bool as 0 or 1.
+fn truth(v: &Value) -> Option<f64> {
+    match v {
+        Value::Num(x) => Some(*x),
+        Value::Bool(b) => Some(f64::from(u8::from(*b))),
+        _ => None,
     }
 }
 

@@ -1,62 +1,12 @@
 //! Reverse-mode derivatives of built-ins: vector-Jacobian products of functions of
 //! numbers, element by element or not.
 
-use super::Args;
+use super::builtin::{ArgAdjoints, Args, Derivative};
 use super::elementwise::{array_len, part};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
 use crate::num::Column;
 use smallvec::{SmallVec, smallvec};
-
-/// The adjoints of a call's arguments, in order; omitted trailing ones are zero.
-pub type ArgAdjoints = SmallVec<[Adjoint; 4]>;
-
-/// Maps the arguments, the result and its adjoint to the adjoints of the arguments;
-/// `None` where they are unknown.
-pub type Vjp = fn(&Args, &Value, &Adjoint) -> Option<ArgAdjoints>;
-
-/// The derivative of a function.
-#[derive(Clone, Copy, Debug)]
-pub enum Derivative {
-    /// Unknown.
-    Unknown,
-    /// Zero wherever it exists: comparing, counting, rounding, and results without
-    /// numbers.
-    Zero,
-    /// Its vector-Jacobian product.
-    Product(Vjp),
-    /// dy/dx, as a function of x and y, of a function of one number applied element by
-    /// element.
-    Unary(fn(f64, f64) -> f64),
-    /// The partial derivatives of a function of two numbers, applied element by element.
-    Binary(&'static Binary),
-    /// The derivatives of a function of an array with a single number as its result.
-    Reduction(&'static Reduction),
-}
-
-/// A function of two numbers, with loops over numbers in a buffer (see `of_pairs`).
-#[derive(Debug)]
-pub struct Binary {
-    /// dz/dx and dz/dy, as functions of x, y and z.
-    pub slopes: fn(f64, f64, f64) -> [f64; 2],
-    /// Computes results in a buffer: the arguments are the buffer, the columns of x and
-    /// y, and the index and number of the results.
-    pub forward: fn(&mut [f64], Column, Column, usize, usize),
-    /// Adds to the adjoints of the arguments: takes the buffer, the adjoints at the same
-    /// indices, and the rest as for `forward`.
-    pub reverse: fn(&[f64], &mut [f64], Column, Column, usize, usize),
-    /// The vector-Jacobian product for results that are objects.
-    pub objects: Option<Vjp>,
-}
-
-/// A function of an array with a single number as its result.
-#[derive(Debug)]
-pub struct Reduction {
-    /// The function.
-    pub value: fn(&[f64]) -> f64,
-    /// Writes its partial derivatives, one per element, given the array and the result.
-    pub slopes: fn(&[f64], f64, &mut [f64]),
-}
 
 impl Derivative {
     /// Returns the adjoints of the arguments of a call, given its result and its adjoint.
@@ -83,7 +33,8 @@ macro_rules! of_pairs {
         of_pairs!($row, $f, $slopes, None)
     };
     ($row:expr, $f:expr, $slopes:expr, $objects:expr) => {{
-        use $crate::lang::builtins::derivative::{Binary, each_pair, vjp_pairs};
+        use $crate::lang::builtins::Binary;
+        use $crate::lang::builtins::derivative::{each_pair, vjp_pairs};
         let form: &'static Binary = &const {
             Binary {
                 slopes: $slopes,

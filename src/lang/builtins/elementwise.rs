@@ -115,15 +115,6 @@ pub(super) fn array_len(v: &Value) -> Option<usize> {
     }
 }
 
-/// Returns a number, or a bool as 0 or 1.
-pub(super) fn truth(v: &Value) -> Option<f64> {
-    match v {
-        Value::Num(x) => Some(*x),
-        Value::Bool(b) => Some(f64::from(u8::from(*b))),
-        _ => None,
-    }
-}
-
 /// The error that an argument, or an element of it, is not a number.
 pub(super) fn not_a_number(a: &Args, i: usize, found: &Value) -> Fault {
     match array_len(a.get(i)) {

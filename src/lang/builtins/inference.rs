@@ -4,14 +4,23 @@
 //! This module declares and documents them; the engine implements them. They are not
 //! values of the model.
 
-use super::{Arg, Kind, Row, Type, arg, opt};
+use super::{Arg, Builtin, Kind, Row, Type, arg, opt};
 
 const KERNELS: &str = "Kernels";
 const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// Names that this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] = &["acceptance", "rhat", "ess", "snapshot"];
+const PLANNED: &[&str] = &["acceptance", "rhat", "ess", "snapshot"];
+
+impl Builtin {
+    /// Whether this version only checks and documents it but cannot run it.
+    pub fn is_planned(&self) -> bool {
+        matches!(self.kind, Kind::Inference)
+            && self.host.is_none()
+            && PLANNED.contains(&&*self.name)
+    }
+}
 
 const fn name(
     name: &'static str,

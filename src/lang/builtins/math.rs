@@ -3,7 +3,7 @@
 
 use super::derivative::{of_pairs, one_of};
 use super::elementwise::{mapped, numeric};
-use super::reduce::{largest, smallest};
+use super::reduce::{larger, largest, smaller, smallest};
 use super::{Arg, ArgAdjoints, Args, Derivative, Row, Scalar, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
@@ -157,17 +157,6 @@ fn sign(x: f64) -> f64 {
 
 fn step(x: f64) -> f64 {
     if x.is_nan() { x } else { f64::from(u8::from(x >= 0.0)) }
-}
-
-/// The smaller of two numbers, NaN if either is (std's `min` ignores NaN, which would
-/// hide a mistake).
-pub(super) fn smaller(x: f64, y: f64) -> f64 {
-    if x < y || x.is_nan() { x } else { y }
-}
-
-/// The larger of two numbers, NaN if either is.
-pub(super) fn larger(x: f64, y: f64) -> f64 {
-    if x > y || x.is_nan() { x } else { y }
 }
 
 fn extreme(

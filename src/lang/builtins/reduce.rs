@@ -1,9 +1,8 @@
 //! Reductions of an array of numbers to one number, and cumulative sums. Sums run from
 //! left to right.
 
-use super::derivative::{Reduction, times};
-use super::math::{larger, smaller};
-use super::{Arg, Derivative, Row, Type, arg, function};
+use super::derivative::times;
+use super::{Arg, Derivative, Reduction, Row, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
 use smallvec::smallvec;
@@ -138,4 +137,15 @@ pub(super) fn largest(xs: &[f64]) -> f64 {
 /// The smallest element; inf if empty.
 pub(super) fn smallest(xs: &[f64]) -> f64 {
     xs.iter().copied().fold(f64::INFINITY, smaller)
+}
+
+/// The smaller of two numbers, NaN if either is (std's `min` ignores NaN, which would
+/// hide a mistake).
+pub(super) fn smaller(x: f64, y: f64) -> f64 {
+    if x < y || x.is_nan() { x } else { y }
+}
+
+/// The larger of two numbers, NaN if either is.
+pub(super) fn larger(x: f64, y: f64) -> f64 {
+    if x > y || x.is_nan() { x } else { y }
 }

@@ -1,13 +1,13 @@
 //! The rows in which the language's own built-ins are declared: constants that are
 //! converted to entries of the table.
 
-use super::data::DataFormat;
-use super::host::call_host;
-use super::{
+use super::builtin::{
     Args, Argument, Builtin, Derivative, HostItem, Kind, PreviousEvaluation, Scalar, State, Type,
     Vjp,
 };
-use crate::lang::error::Fault;
+use super::call::call_host;
+use super::data::DataFormat;
+use crate::lang::fault::Fault;
 use crate::lang::value::Value;
 use std::sync::Arc;
 

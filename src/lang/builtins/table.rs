@@ -2,11 +2,7 @@
 //!
 //! This is not a scope: lowering handles names in the program that shadow them.
 
-use super::linear::{definite, matrix};
-use super::{
-    Builtin, Row, Text, covariance, data, distributions, examples, forms, inference, interp, list,
-    log_density, math, operators, reduce,
-};
+use super::{Builtin, Text};
 use crate::lang::value::Value;
 use indexmap::{Equivalent, IndexMap};
 use rustc_hash::{FxBuildHasher, FxHashMap};
@@ -36,29 +32,6 @@ const CONSTANTS: &[Constant] = &[
         doc: "Positive infinity; `-inf` is the log of zero.",
     },
 ];
-
-/// The language's own built-ins, in the order of the reference.
-pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    let own: [&[Row]; 13] = [
-        operators::TABLE,
-        math::TABLE,
-        reduce::TABLE,
-        list::TABLE,
-        interp::TABLE,
-        matrix::TABLE,
-        definite::TABLE,
-        distributions::TABLE,
-        log_density::TABLE,
-        covariance::TABLE,
-        forms::TABLE,
-        data::TABLE,
-        inference::TABLE,
-    ];
-    own.into_iter().flatten().map(|row| {
-        let builtin = Builtin::from(row);
-        Builtin { example: examples::of(row.name), ..builtin }
-    })
-}
 
 /// The module and name of a built-in.
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
@@ -95,15 +68,12 @@ pub struct Table {
     pub hooks: Vec<Arc<dyn InputHook>>,
 }
 
-impl Default for Table {
-    /// The built-ins of the language alone.
-    fn default() -> Self {
-        let table = Table { entries: IndexMap::default(), hooks: Vec::new() };
-        table.with(all())
-    }
-}
-
 impl Table {
+    /// A table without entries.
+    pub(super) fn empty() -> Self {
+        Table { entries: IndexMap::default(), hooks: Vec::new() }
+    }
+
     /// The table with more built-ins; one of the same module and name replaces an earlier
     /// one.
     #[must_use]

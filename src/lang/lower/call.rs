@@ -1,9 +1,9 @@
 //! Calls of built-ins, forms, named functions and function values, with their arguments
 //! matched and checked.
 
+use super::lowerer::{AddHint, Lowerer, Typed};
 use super::scope::Meaning;
 use super::types::{accepts, shown};
-use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::{Form, Kind, Type};
 use crate::lang::code::{BlockKind, Callee, Op, Operand, Probe};
 use crate::lang::value::Value;

@@ -1,7 +1,7 @@
 //! Random choices: `x ~ d`, and `t[k] ~ d` with the container `t` of its elements.
 
+use super::lowerer::{AddHint, Lowerer, Typed};
 use super::scope::{Meaning, ScopeKind};
-use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::Type;
 use crate::lang::code::{DistSpec, Op, Operand, Slot, Source, SourceKey};
 use crate::lang::value::Value;

@@ -1,8 +1,8 @@
 //! Expressions.
 
+use super::lowerer::{AddHint, Lowerer, Typed};
 use super::scope::{Meaning, Scope, ScopeKind};
 use super::types::shown;
-use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::{Kind, Type};
 use crate::lang::code::{BlockKind, Op, Operand};
 use crate::lang::index::index_value;

@@ -4,7 +4,7 @@
 //! Only messages are produced here; nothing in this file decides whether a program is
 //! correct.
 
-use super::{AddHint, Lowerer};
+use super::lowerer::{AddHint, Lowerer};
 use crate::diag::{Diagnostic, nearest};
 use crate::lang::builtins::{Builtin, Kind};
 use crate::syntax::ast::{Arg, ItemKind, Name, Stmt, StmtKind};

@@ -1,8 +1,9 @@
 //! The top level of a file: includes, parameters, data, functions, statements.
 
+use super::interface::inspect;
+use super::lowerer::{AddHint, Export, Lowerer, Pending, Plan, Report, Typed};
 use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
 use super::types::{accepts, declared, shown};
-use super::{AddHint, Export, Lowerer, Pending, Plan, Report, Typed};
 use crate::diag::{IntoDiagnostic, nearest};
 use crate::lang::builtins::Type;
 use crate::lang::builtins::data::Options;
@@ -12,10 +13,16 @@ use crate::syntax::ast::{
     Declaration, Expr, ExprKind, FnDecl, Item, ItemKind, Lambda, Stmt, StmtKind,
 };
 use crate::syntax::parse_expr;
+use crate::syntax::span::Spanned;
 use std::sync::Arc;
 
 /// The possible types of a parameter.
 const TYPES: [&str; 5] = ["number", "int", "bool", "string", "array"];
+
+/// Returns the text of a spanned string.
+fn text(s: &Spanned<Arc<str>>) -> Arc<str> {
+    Arc::clone(&s.node)
+}
 
 /// Returns the name by which a later `forget` can remove an item.
 fn forgettable(item: &Item) -> Option<&crate::syntax::ast::Name> {
@@ -98,13 +105,11 @@ impl Lowerer<'_> {
                     self.plans.push(Plan { name, body: body.clone().into() });
                 }
                 ItemKind::Report { exprs, file } if index == 0 => {
-                    self.reports.push(Report {
-                        exprs: exprs.clone(),
-                        file: file.as_ref().map(super::text),
-                    });
+                    self.reports
+                        .push(Report { exprs: exprs.clone(), file: file.as_ref().map(text) });
                 }
                 ItemKind::Export { expr, file } if index == 0 => {
-                    self.exports.push(Export { expr: expr.clone(), file: super::text(file) });
+                    self.exports.push(Export { expr: expr.clone(), file: text(file) });
                 }
                 ItemKind::Infer { .. } | ItemKind::Report { .. } | ItemKind::Export { .. } => {}
                 ItemKind::Stmt(s) => self.stmt(s),
@@ -417,7 +422,7 @@ impl Lowerer<'_> {
 
     /// Reports `--set` and `--observe` names that no file declares.
     pub fn unused_inputs(&mut self) {
-        let interface = super::inspect(self.loaded, &self.code.builtins);
+        let interface = inspect(self.loaded, &self.code.builtins);
         let params: Vec<&str> = interface.params.iter().map(|p| p.name.as_str()).collect();
         let items: Vec<&str> = interface.data.iter().map(|d| d.name.as_str()).collect();
         let mut unknown = Vec::new();

@@ -6,10 +6,10 @@
 //! inference blocks, which see everything before them. Nothing is evaluated here except
 //! the defaults of `param` and `data` given by the host.
 //!
-//! There is one file per concern: `scope` names and sites, `items` the top level, `stmt`
-//! statements, `draw` random choices and containers, `expr` expressions, `call` calls,
-//! `plan` inference blocks, `select` selections, `types` static types, `hints`
-//! suggestions for unknown names, `interface` parameters and data.
+//! There is one file per concern: `lowerer` the state, `scope` and `names` names and
+//! sites, `items` the top level, `stmt` statements, `draw` random choices and containers,
+//! `expr` expressions, `call` calls, `plan` inference blocks, `select` selections, `types`
+//! static types, `hints` suggestions for unknown names, `interface` parameters and data.
 
 mod call;
 mod draw;
@@ -17,6 +17,8 @@ mod expr;
 mod hints;
 mod interface;
 mod items;
+mod lowerer;
+mod names;
 mod plan;
 mod scope;
 mod select;
@@ -24,71 +26,15 @@ mod stmt;
 mod types;
 
 pub use interface::{DataItem, Interface, ParamItem, inspect};
+pub use lowerer::{Export, Inputs, Plan, ReadData, Report};
 
-use super::builtins::Table;
-use super::builtins::data::Options;
-use super::code::{Block, BlockId, BlockKind, Code, Eager, Op, Operand, Slot};
-use super::error::Fault;
+use super::code::{Block, BlockKind, Code};
 use super::load::Loaded;
-use super::value::Value;
 use crate::diag::{Diagnostic, SourceMap};
-use crate::syntax::ast::{Expr, FnDecl, KStmt, KernelDecl, Name};
-use crate::syntax::span::{Span, Spanned};
 use indexmap::{IndexMap, IndexSet};
-use rustc_hash::FxHashMap;
-use scope::{Body, Module, Scope};
+use lowerer::{AddHint, Lowerer};
+use scope::{Body, Module, Scope, ScopeKind};
 use std::sync::Arc;
-
-/// Reads a data file, given its kind (`image`, `csv`, …), its path as written, the folder
-/// of the program, and the reading options.
-pub type ReadData<'a> = &'a dyn Fn(&str, &str, &str, &Options) -> Result<Value, Fault>;
-
-/// The external inputs of a program.
-pub struct Inputs<'a> {
-    /// The built-ins it sees.
-    pub builtins: Arc<Table>,
-    /// `--set name=value`, the value as text.
-    pub sets: &'a [(String, String)],
-    /// The `data` items that are given, by name.
-    pub data: IndexMap<String, Value>,
-    /// The reader for `data d = csv("file")`.
-    pub read: ReadData<'a>,
-    /// Whether a `data` item without a value is an error; false when a program is only
-    /// checked.
-    pub needs_data: bool,
-    /// Default values for omitted arguments, by full name of the built-in and name of the
-    /// argument.
-    pub defaults: FxHashMap<(String, String), Value>,
-    /// What runs even if nothing depends on it.
-    pub eager: Eager,
-}
-
-/// An inference block.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// Its name, if it has one.
-    pub name: Option<Arc<str>>,
-    /// Its statements.
-    pub body: Arc<[KStmt]>,
-}
-
-/// `report e, … as "file";`
-#[derive(Clone, Debug)]
-pub struct Report {
-    /// What to report.
-    pub exprs: Vec<Expr>,
-    /// The file, if named.
-    pub file: Option<Arc<str>>,
-}
-
-/// `export e to "file";`
-#[derive(Clone, Debug)]
-pub struct Export {
-    /// What to export.
-    pub expr: Expr,
-    /// The file.
-    pub file: Arc<str>,
-}
 
 /// A program ready to run.
 #[derive(Debug)]
@@ -136,7 +82,7 @@ pub fn compile(
         roots: IndexSet::new(),
     };
     l.code.blocks.push(Block::new(BlockKind::Root, None));
-    l.scopes.push(Scope::new(0, scope::ScopeKind::Root));
+    l.scopes.push(Scope::new(0, ScopeKind::Root));
     l.bodies.push(Body::default());
     l.unit(0);
     l.function_bodies();
@@ -151,111 +97,4 @@ pub fn compile(
     l.code.kernels = l.kernels.into_values().collect();
     l.code.finish();
     Ok(Compiled { code: Arc::new(l.code), plans: l.plans, reports: l.reports, exports: l.exports })
-}
-
-/// A named function whose body is lowered when all top-level names are known.
-struct Pending {
-    module: usize,
-    block: BlockId,
-    decl: FnDecl,
-}
-
-struct Lowerer<'a> {
-    code: Code,
-    inputs: Inputs<'a>,
-    loaded: &'a Loaded,
-    map: &'a mut SourceMap,
-    errors: Vec<Diagnostic>,
-    modules: Vec<Module>,
-    module: usize,
-    /// The enclosing lexical blocks; the first is the top level.
-    scopes: Vec<Scope>,
-    /// The enclosing function bodies; the first is the top level.
-    bodies: Vec<Body>,
-    pending: Vec<Pending>,
-    plans: Vec<Plan>,
-    kernels: IndexMap<Arc<str>, KernelDecl>,
-    reports: Vec<Report>,
-    exports: Vec<Export>,
-    used_sets: Vec<String>,
-    used_data: Vec<String>,
-    /// First segments of addresses, with which a selection may begin.
-    roots: IndexSet<Arc<str>>,
-}
-
-/// An operand and its static type.
-#[derive(Clone, Copy, Debug)]
-struct Typed {
-    at: Operand,
-    ty: super::builtins::Type,
-}
-
-impl Lowerer<'_> {
-    fn error(
-        &mut self,
-        message: impl Into<String>,
-        span: Span,
-        label: impl Into<String>,
-    ) -> &mut Diagnostic {
-        self.errors.push(Diagnostic::error(message, span, label));
-        let last = self.errors.len() - 1;
-        &mut self.errors[last]
-    }
-
-    /// Returns the block being built.
-    fn block(&self) -> BlockId {
-        self.scopes.last().map_or(0, |s| s.block)
-    }
-
-    /// Appends an operation to the block being built.
-    fn push(&mut self, op: Op, span: Span) -> Slot {
-        let block = self.block();
-        self.code.blocks[block as usize].push(op, span)
-    }
-
-    fn new_block(&mut self, kind: BlockKind) -> BlockId {
-        let parent = Some(self.block());
-        self.code.blocks.push(Block::new(kind, parent));
-        self.code.blocks.len() as BlockId - 1
-    }
-
-    fn constant(&mut self, v: Value) -> Typed {
-        let ty = types::of_value(&v);
-        Typed { at: self.code.constant(v), ty }
-    }
-
-    /// Returns a placeholder for something that could not be lowered and whose error was
-    /// reported.
-    fn nothing(&mut self) -> Typed {
-        Typed { at: self.code.constant(Value::Unit), ty: super::builtins::Type::Any }
-    }
-
-    /// Returns the name under which a name of the current module appears in reports.
-    fn global_name(&self, name: &Name) -> Arc<str> {
-        match &self.modules[self.module].prefix {
-            Some(p) => Arc::from(format!("{p}/{}", name.node)),
-            None => Arc::clone(&name.node),
-        }
-    }
-}
-
-/// Adds hints and labels to a diagnostic in place.
-trait AddHint {
-    fn hint_also(&mut self, hint: impl Into<String>);
-    fn point_at(&mut self, span: Span, text: &str);
-}
-
-impl AddHint for Diagnostic {
-    fn hint_also(&mut self, hint: impl Into<String>) {
-        self.hints.push(hint.into());
-    }
-
-    fn point_at(&mut self, span: Span, text: &str) {
-        self.labels.push(crate::diag::Label { span, text: text.into(), primary: false });
-    }
-}
-
-/// Returns the text of a spanned string.
-fn text(s: &Spanned<Arc<str>>) -> Arc<str> {
-    Arc::clone(&s.node)
 }

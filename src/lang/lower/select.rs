@@ -1,6 +1,6 @@
 //! Selections of choices; the addresses and tags in them must occur in the program.
 
-use super::{AddHint, Lowerer};
+use super::lowerer::{AddHint, Lowerer};
 use crate::diag::nearest;
 use crate::syntax::ast::{Address, BinaryOp, Expr, ExprKind, Key, SegmentName};
 use crate::syntax::span::Span;

@@ -1,8 +1,8 @@
 //! Statements of the model.
 
+use super::lowerer::{AddHint, Lowerer, Typed};
 use super::scope::{Meaning, Scope, ScopeKind};
 use super::types::shown;
-use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::Type;
 use crate::lang::code::{BlockKind, DistSpec, Force, Op, Operand, SiteTag};
 use crate::lang::value::Value;

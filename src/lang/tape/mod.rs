@@ -18,22 +18,11 @@ mod op;
 
 pub use build::Builder;
 pub use form::Form;
+pub use op::ScoreSums;
 
 use crate::dist::{Datum, Support};
 use crate::lang::value::Value;
-use crate::num::ExactSum;
 use op::Op;
-
-/// The sums of the scores on a tape.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ScoreSums {
-    /// The log prior of the choices on the tape.
-    pub prior: ExactSum,
-    /// The log density of the observations and factors on the tape.
-    pub likelihood: ExactSum,
-    /// The log Jacobians of the transforms.
-    pub jacobian: ExactSum,
-}
 
 /// An input of a tape: a value that is the image of unconstrained coordinates under its
 /// support.

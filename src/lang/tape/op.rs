@@ -1,6 +1,5 @@
 //! The operations of a tape, forwards and backwards.
 
-use super::ScoreSums;
 use super::form::{Form, call_from, vjp_call};
 use crate::dist::{Batch, Dist};
 use crate::lang::builtins::{Binary, Builtin, PreviousEvaluation, Reduction, times};
@@ -9,6 +8,17 @@ use crate::lang::value::Value;
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
 use std::sync::Arc;
+
+/// The sums of the scores on a tape.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScoreSums {
+    /// The log prior of the choices on the tape.
+    pub prior: ExactSum,
+    /// The log density of the observations and factors on the tape.
+    pub likelihood: ExactSum,
+    /// The log Jacobians of the transforms.
+    pub jacobian: ExactSum,
+}
 
 /// An operation; the numbers it reads precede those it writes.
 #[derive(Debug)]

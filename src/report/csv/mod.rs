@@ -13,15 +13,17 @@
 //! Invariant: the file is readable at any moment, because every line is passed to the
 //! system in one call and the reader leaves out an incomplete last line.
 
+mod lines;
 mod names;
 mod read;
 mod stream;
 mod write;
 
+pub use lines::CsvError;
 pub(crate) use names::as_written;
 pub use names::column_names;
 pub(crate) use read::Contents;
-pub use read::{CsvError, read};
+pub use read::read;
 pub use stream::DrawReader;
 pub use write::CsvSink;
 

@@ -1,6 +1,6 @@
 //! Reads draws one at a time, however many there are.
 
-use super::read::{CsvError, Line, Lines};
+use super::lines::{CsvError, Line, Lines};
 use crate::infer::draws::{Column, DrawRow, Layout, merged, width};
 use std::io::BufRead;
 

@@ -7,24 +7,11 @@
 mod symbols;
 mod words;
 
-use super::error::{SyntaxError, SyntaxErrorKind};
+use super::error::{Advice, SyntaxError, SyntaxErrorKind};
 use super::expected;
-use super::recover::Tokens;
 use super::token::Token;
+use super::tokens::Tokens;
 use std::collections::BTreeSet;
-
-/// The wording of an error, if it can be better than "unexpected …, expected …".
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Advice {
-    /// What is wrong.
-    pub message: Option<String>,
-    /// The label at its place.
-    pub label: Option<String>,
-    /// What to do instead.
-    pub hint: Option<String>,
-    /// The index of the token to point at, if it is not the one that did not fit.
-    place: Option<usize>,
-}
 
 /// The position at which the text does not fit.
 pub(crate) struct Context<'a, 's> {

@@ -1,7 +1,7 @@
 //! The text that is formatted, read token by token, with the comments between the tokens.
 
 use super::columns::SourcePlace;
-use crate::syntax::lexer::lex;
+use crate::syntax::parse::lex;
 use crate::syntax::span::FileId;
 use std::ops::Range;
 

@@ -6,7 +6,7 @@ use crate::lang::value::{Closure, NodeRef, Value};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::propagate::{Failure, Poll};
+use crate::trace::update::{Failure, Poll};
 use smallvec::SmallVec;
 use std::sync::Arc;
 

@@ -8,8 +8,8 @@ use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::propagate::{Failure, Poll};
 use crate::trace::propose::{Change, Constraint};
+use crate::trace::update::{Failure, Poll};
 use smallvec::SmallVec;
 
 impl Graph {

@@ -6,7 +6,7 @@ use crate::lang::key::Key;
 use crate::lang::value::{NodeRef, Value};
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
-use crate::trace::propagate::{Failure, Poll};
+use crate::trace::update::{Failure, Poll};
 use indexmap::IndexMap;
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;

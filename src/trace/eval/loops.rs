@@ -7,7 +7,7 @@ use crate::lang::value::{NodeRef, Value};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::propagate::{Failure, Poll};
+use crate::trace::update::{Failure, Poll};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;

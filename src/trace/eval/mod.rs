@@ -10,7 +10,7 @@ pub(crate) use observe::Score;
 
 use super::graph::Graph;
 use super::node::*;
-use super::propagate::{Failure, Poll};
+use super::update::{Failure, Poll};
 use crate::lang::builtins::{Builtin, PreviousEvaluation};
 use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};

@@ -9,7 +9,7 @@ use crate::num::ExactSum;
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::propagate::{Failure, Poll};
+use crate::trace::update::{Failure, Poll};
 
 impl Graph {
     pub(super) fn evaluate_observe(

@@ -7,7 +7,7 @@ use crate::lang::builtins::{ArgAdjoints, Args, Builtin, Kind};
 use crate::lang::code::{Callee, Op, Operand};
 use crate::lang::value::Value;
 use crate::trace::node::*;
-use crate::trace::propagate::Failure;
+use crate::trace::update::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {

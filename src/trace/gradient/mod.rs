@@ -18,7 +18,7 @@ pub use recording::Recording;
 use super::choices::Target;
 use super::graph::Graph;
 use super::node::*;
-use super::propagate::Failure;
+use super::update::Failure;
 use crate::dist::{Datum, Dist};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::code::{Code, DistSpec, Operand};

@@ -9,7 +9,7 @@ use crate::lang::value::Value;
 use crate::num::accumulate;
 use crate::trace::choices::Target;
 use crate::trace::node::*;
-use crate::trace::propagate::Failure;
+use crate::trace::update::Failure;
 use smallvec::SmallVec;
 
 impl Reverse<'_> {

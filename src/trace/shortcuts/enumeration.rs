@@ -16,8 +16,8 @@ use crate::trace::choices::Target;
 use crate::trace::eval::Score;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
-use crate::trace::propagate::Failure;
 use crate::trace::propose::Weight;
+use crate::trace::update::Failure;
 use crate::trace::{Trace, TraceResult};
 use smallvec::SmallVec;
 

@@ -13,8 +13,8 @@ use crate::lang::value::Value;
 use crate::trace::choices::Target;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
-use crate::trace::propagate::{Failure, Poll};
 use crate::trace::propose::{Change, Pending};
+use crate::trace::update::{Failure, Poll};
 
 impl Graph {
     /// Returns the static scaffold of a choice, if it can be used in this state, and a

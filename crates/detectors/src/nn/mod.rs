@@ -11,6 +11,7 @@ mod file;
 mod flatbuffer;
 mod network;
 mod operator;
+mod read;
 mod resampling;
 mod schema;
 mod shape;

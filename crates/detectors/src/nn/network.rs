@@ -1,7 +1,7 @@
 //! Networks: operators in execution order, and the tensors between them.
 
+use super::NetworkError;
 use super::operator::{Operator, Tensor};
-use super::{NetworkError, file};
 use std::collections::HashMap;
 
 /// A network read from a file.
@@ -27,15 +27,6 @@ pub(super) struct Layer {
 }
 
 impl Network {
-    /// Reads the network in a `.tflite` file.
-    ///
-    /// # Errors
-    /// If the file is not of the format, or the network has unsupported operators or is
-    /// too large.
-    pub fn read(bytes: &[u8]) -> Result<Network, NetworkError> {
-        file::read(bytes)
-    }
-
     /// The shape of the input: 1, height, width, channels.
     pub fn input_shape(&self) -> &[usize] {
         &self.shapes[self.input]

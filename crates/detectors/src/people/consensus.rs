@@ -6,8 +6,8 @@
 //! with the view that has most agreement.
 
 use super::landmarks::{NAMED, SeenLandmark, View};
+use super::person::{Hypothesis, Landmark};
 use super::window::Window;
-use super::{Hypothesis, Landmark};
 
 /// Shoulders, elbows, wrists, hips, knees, ankles.
 const LIMBS: [usize; 12] = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28];

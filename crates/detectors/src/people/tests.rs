@@ -94,7 +94,7 @@ fn samples_are_interpolated_and_beyond_the_picture_black_or_as_at_its_edge() {
 fn masks_are_read_between_samples_up_to_the_last_ones() {
     let logit = |c: usize, r: usize| ((7 * c * c + 5 * r * r) % 13) as f32 - 6.0;
     let mask: Vec<f32> = (0..SIDE * SIDE).map(|i| logit(i % SIDE, i / SIDE)).collect();
-    let at = |c: f64, r: f64| super::at(&mask, [c / SIDE as f64, r / SIDE as f64]);
+    let at = |c: f64, r: f64| super::person::at(&mask, [c / SIDE as f64, r / SIDE as f64]);
     for c in [0, 1, 100, 254, 255] {
         for r in [0, 9, 254, 255] {
             assert_eq!(at(c as f64, r as f64), sigmoid(logit(c, r)), "{c} {r}");

@@ -2,8 +2,8 @@
 //! underflows.
 
 use super::incomplete::{not_zero, upper_fraction};
-use super::saddle::{deviance, stirling_error};
-use super::special::{LN_SQRT_2PI, ln_beta, ln_gamma, log_diff_exp};
+use super::saddle::{LN_SQRT_2PI, deviance, stirling_error};
+use super::special::{ln_beta, ln_gamma, log_diff_exp};
 
 /// The maximum parameter: the number of terms grows as its square root.
 const LARGEST: f64 = 1e8;

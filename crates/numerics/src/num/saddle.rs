@@ -1,7 +1,8 @@
 //! The terms of Loader's saddle-point form of densities (2000, "Fast and accurate
 //! computation of binomial probabilities"), in which large terms do not cancel.
 
-use super::special::LN_SQRT_2PI;
+/// ln sqrt(2 pi).
+pub const LN_SQRT_2PI: f64 = 0.918_938_533_204_672_8;
 
 /// The error of Stirling's formula for ln Gamma(x), x > 0:
 /// ln Gamma(x) - ((x - 1/2) ln x - x + ln sqrt(2 pi)). For x = n it is also the error for

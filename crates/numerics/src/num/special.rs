@@ -1,9 +1,6 @@
 //! Special functions that are stable in log space and in the tails.
 
-use super::saddle::stirling_error;
-
-/// ln sqrt(2 pi).
-pub const LN_SQRT_2PI: f64 = 0.918_938_533_204_672_8;
+use super::saddle::{LN_SQRT_2PI, stirling_error};
 
 /// ln |Gamma(x)|.
 pub fn ln_gamma(x: f64) -> f64 {

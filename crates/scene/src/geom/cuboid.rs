@@ -1,6 +1,6 @@
 //! Axis-aligned boxes: one part, with a crease at every edge.
 
-use super::lathe::SMALLEST;
+use super::mesh::SMALLEST;
 use super::{GeomError, Mesh};
 use glam::{DVec3, Vec3};
 

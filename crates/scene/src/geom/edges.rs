@@ -1,17 +1,65 @@
 //! From a triangle soup to a mesh: welding, the edge table, creases, smooth normals.
 //!
-//! The input is not checked ([`Mesh::new`] does that). Invariant: the result depends only
-//! on the order of the faces, never on that of a hash table; every edge of every face is
-//! in the table exactly once.
+//! Invariant: the result depends only on the order of the faces, never on that of a hash
+//! table; every edge of every face is in the table exactly once.
 
-use super::mesh::CREASE_DEGREES;
-use super::{Edge, Mesh, NO_FACE, Topology};
+use super::mesh::{CREASE_DEGREES, MOST_PARTS, MOST_TRIANGLES};
+use super::{Edge, GeomError, Mesh, NO_FACE, Topology};
 use glam::{DVec3, Vec3};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
+impl Mesh {
+    /// Makes a mesh from positions and triangles, with the part of each triangle. Equal
+    /// positions are merged into one point, and triangles without area are dropped.
+    /// Normals are angle-weighted means over the faces around a point, up to creases.
+    ///
+    /// # Errors
+    /// A position that is not finite; an index out of range; a part number of 65535; a
+    /// number of parts that differs from that of triangles; more than five million
+    /// triangles; no triangle with positive area.
+    pub fn new(
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        parts: Vec<u16>,
+    ) -> Result<Mesh, GeomError> {
+        if triangles.len() > MOST_TRIANGLES {
+            return Err(GeomError::invalid(format!(
+                "the mesh has {} triangles; at most {MOST_TRIANGLES} are allowed",
+                triangles.len()
+            )));
+        }
+        if parts.len() != triangles.len() {
+            return Err(GeomError::invalid("a mesh needs one part number per triangle"));
+        }
+        if parts.contains(&u16::MAX) {
+            return Err(GeomError::invalid(format!(
+                "a mesh has at most {MOST_PARTS} parts, numbered from 0"
+            )));
+        }
+        if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
+            return Err(GeomError::invalid(format!(
+                "vertex {i} of the mesh is not finite: {}",
+                positions[i]
+            )));
+        }
+        if let Some(i) =
+            triangles.iter().position(|t| t.iter().any(|v| *v as usize >= positions.len()))
+        {
+            let t = triangles[i];
+            let message = format!(
+                "triangle {i} of the mesh uses vertices {t:?}, but there are {}",
+                positions.len()
+            );
+            return Err(GeomError::invalid(message));
+        }
+        build(&positions, &triangles, &parts)
+            .ok_or_else(|| GeomError::invalid("all triangles of the mesh have zero area"))
+    }
+}
+
 /// Builds a mesh; `None` if no triangle has positive area.
-pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -> Option<Mesh> {
+fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -> Option<Mesh> {
     let weld = weld(positions);
     let mut faces = Vec::new();
     let mut kept_parts = Vec::new();

@@ -7,36 +7,11 @@
 
 use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
-use super::profile_path::{OuterPath, Tolerance, floor_height, inner_wall};
+use super::profile_path::{OuterPath, Profile, Tolerance, Wall, floor_height, inner_wall};
 use super::real::{Real, Tape};
 use super::revolve::{Strip, revolve, vjp_rings};
 use super::{GeomError, Mesh, Solid};
 use glam::DVec3;
-
-/// A profile: radii at heights, from bottom to top, in scene units.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Profile {
-    /// Heights, non-decreasing.
-    pub y: Vec<f64>,
-    /// Radii, non-negative.
-    pub r: Vec<f64>,
-}
-
-/// The wall of a vessel. A number converts to a wall and floor of that thickness.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wall<T = f64> {
-    /// The thickness of the wall, in scene units; 0 for a solid body.
-    pub thickness: T,
-    /// The height of the floor above the lower end, in scene units; at least the
-    /// thickness of the wall. The contents of a vessel raise it.
-    pub floor: T,
-}
-
-impl From<f64> for Wall {
-    fn from(thickness: f64) -> Wall {
-        Wall { thickness, floor: 0.0 }
-    }
-}
 
 /// Which ends of an object of revolution are closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,9 +32,6 @@ const MOST_POINTS: usize = 4096;
 const MOST_PROFILES: usize = 1000;
 /// The maximum height or radius, in scene units.
 const LARGEST: f64 = 1e6;
-/// The minimum size of an object, in scene units; below it, single-precision vertex data
-/// degenerate.
-pub(super) const SMALLEST: f64 = 1e-30;
 
 /// Sweeps profiles, stacked in the given order, around the y axis. A step from one to the
 /// next is closed by a ring. A wall of positive thickness makes a vessel that is open at

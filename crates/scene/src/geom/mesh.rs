@@ -4,8 +4,7 @@
 //! each has one normal; edges know the faces on both sides across such splits. Meshes of
 //! one shape share their [`Topology`].
 
-use super::edges;
-use super::{Bounds, GeomError, Patches};
+use super::{Bounds, Patches};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -149,57 +148,13 @@ pub struct Mesh {
 pub const CREASE_DEGREES: f64 = 40.0;
 /// The maximum number of triangles of a mesh.
 pub const MOST_TRIANGLES: usize = 5_000_000;
+/// The minimum size of an object, in scene units; below it, single-precision vertex data
+/// degenerate.
+pub(super) const SMALLEST: f64 = 1e-30;
 /// The maximum number of parts of a mesh; `u16::MAX` is not a part number.
 pub const MOST_PARTS: usize = u16::MAX as usize;
 
 impl Mesh {
-    /// Makes a mesh from positions and triangles, with the part of each triangle. Equal
-    /// positions are merged into one point, and triangles without area are dropped.
-    /// Normals are angle-weighted means over the faces around a point, up to creases.
-    ///
-    /// # Errors
-    /// A position that is not finite; an index out of range; a part number of 65535; a
-    /// number of parts that differs from that of triangles; more than five million
-    /// triangles; no triangle with positive area.
-    pub fn new(
-        positions: Vec<Vec3>,
-        triangles: Vec<[u32; 3]>,
-        parts: Vec<u16>,
-    ) -> Result<Mesh, GeomError> {
-        if triangles.len() > MOST_TRIANGLES {
-            return Err(GeomError::invalid(format!(
-                "the mesh has {} triangles; at most {MOST_TRIANGLES} are allowed",
-                triangles.len()
-            )));
-        }
-        if parts.len() != triangles.len() {
-            return Err(GeomError::invalid("a mesh needs one part number per triangle"));
-        }
-        if parts.contains(&u16::MAX) {
-            return Err(GeomError::invalid(format!(
-                "a mesh has at most {MOST_PARTS} parts, numbered from 0"
-            )));
-        }
-        if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(GeomError::invalid(format!(
-                "vertex {i} of the mesh is not finite: {}",
-                positions[i]
-            )));
-        }
-        if let Some(i) =
-            triangles.iter().position(|t| t.iter().any(|v| *v as usize >= positions.len()))
-        {
-            let t = triangles[i];
-            let message = format!(
-                "triangle {i} of the mesh uses vertices {t:?}, but there are {}",
-                positions.len()
-            );
-            return Err(GeomError::invalid(message));
-        }
-        edges::build(&positions, &triangles, &parts)
-            .ok_or_else(|| GeomError::invalid("all triangles of the mesh have zero area"))
-    }
-
     /// Returns the bounding box.
     pub fn bounds(&self) -> Option<Bounds> {
         Bounds::around(self.positions.iter().map(|p| p.as_dvec3()))

@@ -1,11 +1,11 @@
-//! The strips of a vessel's outer and inner wall, from profiles.
+//! Profiles, and the strips of a vessel's outer and inner wall that they make.
 //!
 //! Works in the half plane (r, y). Generic in the number type, so that a tape can give
 //! derivatives. Invariant: neighbouring points differ by more than the tolerance, so that
 //! no triangle collapses in single precision, and each strip starts where the previous
 //! one ends.
 
-use super::lathe::{Profile, SMALLEST, Wall};
+use super::mesh::SMALLEST;
 use super::real::Real;
 use super::revolve::Strip;
 
@@ -22,6 +22,31 @@ const TIP: f64 = 1e-6;
 const LEAST_BORE: f64 = 0.02;
 /// The maximum height of the floor, as a fraction of the height.
 const MOST_FILLED: f64 = 0.95;
+
+/// A profile: radii at heights, from bottom to top, in scene units.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// Heights, non-decreasing.
+    pub y: Vec<f64>,
+    /// Radii, non-negative.
+    pub r: Vec<f64>,
+}
+
+/// The wall of a vessel. A number converts to a wall and floor of that thickness.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wall<T = f64> {
+    /// The thickness of the wall, in scene units; 0 for a solid body.
+    pub thickness: T,
+    /// The height of the floor above the lower end, in scene units; at least the
+    /// thickness of the wall. The contents of a vessel raise it.
+    pub floor: T,
+}
+
+impl From<f64> for Wall {
+    fn from(thickness: f64) -> Wall {
+        Wall { thickness, floor: 0.0 }
+    }
+}
 
 /// Tolerances for merging points, in proportion to the size of an object.
 #[derive(Clone, Copy, Debug)]

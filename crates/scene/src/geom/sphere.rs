@@ -2,7 +2,7 @@
 //! sphere.
 
 use super::detail::{Detail, Turned};
-use super::lathe::SMALLEST;
+use super::mesh::SMALLEST;
 use super::revolve::{Strip, revolve};
 use super::{GeomError, Mesh, Solid};
 use glam::DVec3;

@@ -2,7 +2,8 @@
 //! 2014, section 3.2), and a diagonal metric from the variances over windows that double
 //! in length, as in Stan.
 
-use super::system::{self, Point, System};
+use super::point::Point;
+use super::system::System;
 use crate::infer::state::{StateError, holds};
 use crate::rng::Stream;
 use crate::trace::TraceResult;
@@ -213,11 +214,10 @@ impl Adaptation {
                 break;
             }
             let from = system.launch(here, &self.inverse_mass, rng);
-            let start = system::kinetic(&from, &self.inverse_mass);
+            let start = from.kinetic(&self.inverse_mass);
             let ratio = match system.leapfrog(&from, step, &self.inverse_mass)? {
                 Some(to) => {
-                    to.log_density - here.log_density + start
-                        - system::kinetic(&to, &self.inverse_mass)
+                    to.log_density - here.log_density + start - to.kinetic(&self.inverse_mass)
                 }
                 None => f64::NEG_INFINITY,
             };

@@ -1,7 +1,7 @@
 //! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps
 //! (Neal 2011).
 
-use super::{DIVERGENT, End, Hamiltonian, Path, Trajectory, system};
+use super::kernel::{DIVERGENT, End, Hamiltonian, Path, Trajectory};
 use crate::infer::kernel::{SiteSelection, accepts};
 use crate::trace::TraceResult;
 
@@ -35,7 +35,7 @@ impl Trajectory for Leaps {
         // point.
         let step = *step * (0.9 + 0.2 * rng.uniform());
         let mut point = system.launch(here, inverse_mass, rng);
-        let energy = system::kinetic(&point, inverse_mass);
+        let energy = point.kinetic(inverse_mass);
         let mut there = true;
         for _ in 0..self.0 {
             match system.leapfrog(&point, step, inverse_mass)? {
@@ -47,7 +47,7 @@ impl Trajectory for Leaps {
             }
         }
         let ratio = if there {
-            point.log_density - here.log_density + energy - system::kinetic(&point, inverse_mass)
+            point.log_density - here.log_density + energy - point.kinetic(inverse_mass)
         } else {
             f64::NEG_INFINITY
         };

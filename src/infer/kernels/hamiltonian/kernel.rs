@@ -2,13 +2,18 @@
 //! adaptation and memory.
 
 use super::adapt::Adaptation;
+use super::memory::Memory;
+use super::point::Point;
 use super::summed::with_alternatives;
-use super::{Memory, Point, System};
+use super::system::System;
 use crate::infer::kernel::{Kernel, Outcome, Pick, Registered, SiteSelection, StepContext};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
 use crate::trace::{Marginal, Selector, Trace, TraceResult};
 use std::sync::Arc;
+
+/// The energy error from which a trajectory counts as divergent (Stan's bound).
+pub(super) const DIVERGENT: f64 = 1000.0;
 
 /// How a kernel follows a trajectory.
 pub(super) trait Trajectory {

@@ -7,7 +7,7 @@
 //! the kernel works without a tape for a while. This affects results only in the last
 //! bits of gradients.
 
-use super::system::Point;
+use super::point::Point;
 use crate::trace::{Change, Recording, Target, Trace, Weight};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;

@@ -15,6 +15,7 @@ mod memory;
 mod modes;
 mod nuts;
 mod optimize;
+mod point;
 mod summed;
 mod system;
 
@@ -23,10 +24,3 @@ pub use kernel::Hamiltonian;
 pub use modes::Modes;
 pub use nuts::Nuts;
 pub use optimize::Optimize;
-
-use kernel::{End, Path, Trajectory};
-use memory::Memory;
-use system::{Point, System};
-
-/// The energy error from which a trajectory counts as divergent (Stan's bound).
-const DIVERGENT: f64 = 1000.0;

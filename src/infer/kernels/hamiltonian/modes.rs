@@ -8,8 +8,9 @@
 //! the mode it happened to climb to.
 
 use super::laplace::Laplace;
+use super::memory::Memory;
 use super::optimize::{Past, ascend};
-use super::{Memory, System};
+use super::system::System;
 use crate::dist::Datum;
 use crate::infer::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,

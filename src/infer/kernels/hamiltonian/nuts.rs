@@ -2,7 +2,9 @@
 //! sampling over the trajectory and the generalised stopping rule, checked across
 //! subtrees as well (Betancourt 2017; as in Stan).
 
-use super::{DIVERGENT, End, Hamiltonian, Path, Point, System, Trajectory, system};
+use super::kernel::{DIVERGENT, End, Hamiltonian, Path, Trajectory};
+use super::point::Point;
+use super::system::System;
 use crate::infer::kernel::SiteSelection;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
@@ -84,7 +86,7 @@ impl Walk<'_, '_> {
             self.divergent = true;
             return Ok(None);
         };
-        let log_weight = self.energy - (system::kinetic(&point, self.mass) - point.log_density);
+        let log_weight = self.energy - (point.kinetic(self.mass) - point.log_density);
         self.acceptance += libm::exp(log_weight.min(0.0));
         if log_weight.is_nan() || log_weight <= -DIVERGENT {
             self.divergent = true;
@@ -129,7 +131,7 @@ impl Trajectory for Doubling {
         let Path { system, here, step, inverse_mass: mass, rng } = path;
         let step = *step;
         let start = system.launch(here, mass, rng);
-        let energy = system::kinetic(&start, mass) - here.log_density;
+        let energy = start.kinetic(mass) - here.log_density;
         let mut walk =
             Walk { system, mass, step, energy, acceptance: 0.0, leaps: 0.0, divergent: false, rng };
         // In order of time: `first` is the earliest point.

@@ -5,7 +5,9 @@
 //! that of the density in the unconstrained space, in which the other kernels of this
 //! family move.
 
-use super::{Memory, Point, System};
+use super::memory::Memory;
+use super::point::Point;
+use super::system::System;
 use crate::infer::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::trace::{Trace, TraceResult};

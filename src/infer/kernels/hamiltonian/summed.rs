@@ -10,7 +10,8 @@
 //! duration of the move, and removed after it. A point that needs any further choices has
 //! no density, from wherever it is reached.
 
-use super::{Point, System};
+use super::memory::Layout;
+use super::point::Point;
 use crate::infer::calls::selection::fail;
 use crate::infer::kernel::{Outcome, StepContext, recoverable};
 use crate::num::log_sum_exp;
@@ -24,6 +25,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct Summed {
     marginal: Marginal,
+    layout: Arc<Layout>,
     /// The changes that lead back to where the system began, and the evaluation and log
     /// density there.
     start: Vec<(Target, Change)>,
@@ -59,52 +61,63 @@ pub(super) fn with_alternatives(
     outcome
 }
 
-impl System<'_> {
-    /// Sums choices out from now on, and fills in the force at the present point; false
+impl Summed {
+    /// Sums choices out from now on, and fills in the force at the present point; `None`
     /// if there is no finite density and gradient.
-    pub(super) fn sum_out(&mut self, marginal: Marginal, point: &mut Point) -> TraceResult<bool> {
-        let here = |t: &Target| Some((*t, Change::Set(self.trace.stored(*t)?)));
-        let start = self.layout.targets.iter().filter_map(here).collect();
-        self.summed = Some(Summed { marginal, start, begun: None, origin: 0.0, last: None });
-        let begun = self.evaluate_summed(point)?;
-        self.trace.rollback();
-        let there = begun.is_some();
-        if let Some(summed) = &mut self.summed {
-            summed.origin = point.log_density;
-            summed.begun = begun;
-        }
-        point.log_density = 0.0;
-        Ok(there)
+    pub fn begin(
+        marginal: Marginal,
+        trace: &mut Trace,
+        at: &StepContext,
+        layout: &Arc<Layout>,
+        point: &mut Point,
+    ) -> TraceResult<Option<Self>> {
+        let here = |t: &Target| Some((*t, Change::Set(trace.stored(*t)?)));
+        let start = layout.targets.iter().filter_map(here).collect();
+        let layout = Arc::clone(layout);
+        let mut summed = Summed { marginal, layout, start, begun: None, origin: 0.0, last: None };
+        summed.begun = summed.view_with_force(trace, at, point)?;
+        trace.rollback();
+        summed.origin = std::mem::take(&mut point.log_density);
+        Ok(summed.begun.is_some().then_some(summed))
+    }
+
+    /// The changes that set these coordinates.
+    fn changes(&self, y: &[f64]) -> Vec<(Target, Change)> {
+        let mut changes = Vec::new();
+        self.layout.changes(y, &mut changes);
+        changes
     }
 
     /// Proposes a point with the groups at these joint values.
     fn put(
-        &mut self,
+        &self,
+        (trace, at): (&mut Trace, &StepContext),
         elimination: &Elimination,
-        at: &[(Target, Change)],
+        to: &[(Target, Change)],
         values: &[usize],
     ) -> TraceResult<Option<Weight>> {
-        let mut changes = at.to_vec();
-        if let Some(summed) = &self.summed {
-            summed.marginal.changes(elimination, values, &mut changes);
-        }
-        let w = recoverable(self.trace.propose(&changes, self.at.draws(0)))?;
+        let mut changes = to.to_vec();
+        self.marginal.changes(elimination, values, &mut changes);
+        let w = recoverable(trace.propose(&changes, at.draws(0)))?;
         Ok(w.filter(|w| w.appeared + w.vanished == 0))
     }
 
     /// Evaluates a point; `None` if it has no density.
-    fn view(&mut self, at: &[(Target, Change)]) -> TraceResult<Option<View>> {
-        let Some(summed) = &mut self.summed else { return Ok(None) };
-        let known = Arc::clone(&summed.marginal.elimination);
+    fn view(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        to: &[(Target, Change)],
+    ) -> TraceResult<Option<View>> {
+        let known = Arc::clone(&self.marginal.elimination);
         if !known.structure_moves
-            && let Some(view) = self.look(known, at)?
+            && let Some(view) = self.look(trace, at, known, to)?
         {
             return Ok(Some(view));
         }
         // The structure at the point may be different.
-        let Some(summed) = &mut self.summed else { return Ok(None) };
-        match self.trace.explore(at, true, &mut summed.marginal, self.at.draws(0))? {
-            Explored::Elimination(elimination) => self.look(elimination.into(), at),
+        match trace.explore(to, true, &mut self.marginal, at.draws(0))? {
+            Explored::Elimination(elimination) => self.look(trace, at, elimination.into(), to),
             Explored::Structure(_) | Explored::Impossible => Ok(None),
         }
     }
@@ -112,19 +125,23 @@ impl System<'_> {
     /// Evaluates a point with an elimination that may not be valid there; `None` if it is
     /// not, or if there is no density.
     fn look(
-        &mut self,
+        &self,
+        trace: &mut Trace,
+        at: &StepContext,
         elimination: Arc<Elimination>,
-        at: &[(Target, Change)],
+        to: &[(Target, Change)],
     ) -> TraceResult<Option<View>> {
         let mut conditional: Vec<Vec<f64>> =
             elimination.seen().map(|s| vec![f64::NEG_INFINITY; s.len()]).collect();
         let (mut base, mut jacobian, mut terms) = (0.0, 0.0, Vec::new());
         for (k, values) in elimination.assignments.iter().enumerate() {
-            let Some(w) = self.put(&elimination, at, values)? else { return Ok(None) };
-            if self.summed.as_ref().is_some_and(|s| !self.trace.has_same_values(&s.marginal)) {
+            let Some(w) = self.put((trace, at), &elimination, to, values)? else {
+                return Ok(None);
+            };
+            if !trace.has_same_values(&self.marginal) {
                 return Ok(None);
             }
-            let rest = self.trace.parts(&elimination, self.at.power, &mut terms);
+            let rest = trace.parts(&elimination, at.power, &mut terms);
             if k == 0 {
                 (base, jacobian) = (rest, w.log_jacobian);
             } else if w.log_jacobian.to_bits() != jacobian.to_bits() {
@@ -154,19 +171,23 @@ impl System<'_> {
     /// Fills in the log density and force at a point with the choices summed out,
     /// whichever of their values are pending. Returns the evaluation; `None` if there is
     /// no finite density or gradient.
-    fn evaluate_summed(&mut self, point: &mut Point) -> TraceResult<Option<View>> {
-        let at = self.memory.changes(&point.y, false, &self.layout).to_vec();
-        let Some(view) = self.view(&at)? else { return Ok(None) };
-        let origin = self.summed.as_ref().map_or(0.0, |s| s.origin);
-        point.log_density = view.log_density - origin;
+    fn view_with_force(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        point: &mut Point,
+    ) -> TraceResult<Option<View>> {
+        let to = self.changes(&point.y);
+        let Some(view) = self.view(trace, at, &to)? else { return Ok(None) };
+        point.log_density = view.log_density - self.origin;
         point.gradient.clear();
         point.gradient.resize(point.y.len(), 0.0);
-        let (elimination, layout) = (Arc::clone(&view.elimination), Arc::clone(&self.layout));
+        let (elimination, targets) = (&view.elimination, &self.layout.targets);
         let mut part = Vec::with_capacity(point.y.len());
         for (k, values) in elimination.assignments.iter().enumerate().rev() {
             // The last evaluation is still pending.
             if k + 1 < elimination.assignments.len()
-                && self.put(&elimination, &at, values)?.is_none()
+                && self.put((trace, at), elimination, &to, values)?.is_none()
             {
                 return Ok(None);
             }
@@ -175,55 +196,59 @@ impl System<'_> {
             let weights: Vec<f64> =
                 weights.map(|((first, c), v)| if first { libm::exp(c[*v]) } else { 0.0 }).collect();
             let base = f64::from(u8::from(k == 0));
-            let weight = |n: u32| self.trace.group_of(&elimination, n).map_or(base, |i| weights[i]);
+            let weight = |n: u32| trace.group_of(elimination, n).map_or(base, |i| weights[i]);
             part.clear();
-            self.trace.weighted_gradient(&layout.targets, self.at.power, &weight, &mut part)?;
+            trace.weighted_gradient(targets, at.power, &weight, &mut part)?;
             point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g += p);
         }
         // Each evaluation includes the Jacobians, which count only once.
         part.clear();
-        self.trace.weighted_gradient(&layout.targets, self.at.power, &|_| 0.0, &mut part)?;
+        trace.weighted_gradient(targets, at.power, &|_| 0.0, &mut part)?;
         let more = elimination.assignments.len() as f64 - 1.0;
         point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g -= more * p);
         Ok(point.gradient.iter().all(|g| g.is_finite()).then_some(view))
     }
 
     /// Fills in the log density and force at a point; false if they do not exist.
-    pub(super) fn goes_summed(&mut self, point: &mut Point) -> TraceResult<bool> {
-        let view = self.evaluate_summed(point)?;
-        let there = view.is_some();
-        if let Some(summed) = &mut self.summed {
-            summed.last = view.map(|v| (point.y.clone(), v));
-        }
-        Ok(there)
+    pub fn evaluate(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        point: &mut Point,
+    ) -> TraceResult<bool> {
+        let view = self.view_with_force(trace, at, point)?;
+        self.last = view.map(|v| (point.y.clone(), v));
+        Ok(self.last.is_some())
     }
 
     /// Makes a point, or the initial one, the state of the trace, with the choices drawn
     /// from their conditional there.
-    pub(super) fn finish_summed(mut self, to: Option<&Point>) -> TraceResult<bool> {
-        let mut rng = self.at.within(0).stream();
-        let at = match (to, &mut self.summed) {
-            (Some(p), _) => self.memory.changes(&p.y, false, &self.layout).to_vec(),
-            (None, Some(summed)) => std::mem::take(&mut summed.start),
-            (None, None) => return Ok(false),
+    pub fn finish_at(
+        mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        to: Option<&Point>,
+    ) -> TraceResult<bool> {
+        let mut rng = at.within(0).stream();
+        let changes = match to {
+            Some(p) => self.changes(&p.y),
+            None => std::mem::take(&mut self.start),
         };
-        let (begun, last) =
-            self.summed.as_mut().map_or((None, None), |s| (s.begun.take(), s.last.take()));
-        let view = match (to, last) {
-            (None, _) => begun,
+        let view = match (to, self.last.take()) {
+            (None, _) => self.begun.take(),
             (Some(p), Some((y, view))) if bits(&y).eq(bits(&p.y)) => Some(view),
-            _ => self.view(&at)?,
+            _ => self.view(trace, at, &changes)?,
         };
         let Some(view) = view else {
-            self.trace.rollback();
+            trace.rollback();
             return Ok(false);
         };
         let drawn: Vec<usize> = view.conditional.iter().map(|c| draw(c, &mut rng)).collect();
-        let there = self.put(&view.elimination, &at, &drawn)?.is_some();
+        let there = self.put((trace, at), &view.elimination, &changes, &drawn)?.is_some();
         if there {
-            self.trace.commit()
+            trace.commit()
         } else {
-            self.trace.rollback()
+            trace.rollback()
         }
         Ok(there && to.is_some())
     }

@@ -5,6 +5,7 @@
 //! trace, with bit-for-bit equal densities. A transition ends with a proposal either way.
 
 use super::memory::{Layout, Memory};
+use super::point::Point;
 use super::summed::Summed;
 use crate::infer::kernel::{StepContext, recoverable};
 use crate::num::ExactSum;
@@ -12,28 +13,16 @@ use crate::rng::Stream;
 use crate::trace::{Marginal, Target, Trace, TraceResult};
 use std::sync::Arc;
 
-/// A position with its log density and force, and the momentum at it.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Point {
-    pub y: Vec<f64>,
-    pub gradient: Vec<f64>,
-    pub momentum: Vec<f64>,
-    /// The momentum times the inverse mass.
-    pub velocity: Vec<f64>,
-    /// The log density in the unconstrained space, relative to that of the trace's state.
-    pub log_density: f64,
-}
-
 /// A trace as a dynamical system; proposals are pending until [`System::finish_at`].
 pub(super) struct System<'a> {
-    pub(super) trace: &'a mut Trace,
-    pub(super) at: &'a StepContext,
-    pub(super) memory: &'a mut Memory,
-    pub(super) layout: Arc<Layout>,
+    trace: &'a mut Trace,
+    at: &'a StepContext,
+    memory: &'a mut Memory,
+    layout: Arc<Layout>,
     /// Whether the memory has a tape of the trace's state.
     taped: bool,
     jacobian: f64,
-    pub(super) summed: Option<Summed>,
+    summed: Option<Summed>,
 }
 
 impl<'a> System<'a> {
@@ -82,8 +71,8 @@ impl<'a> System<'a> {
         let mut system =
             System { trace, at, memory, layout, taped, jacobian: jacobian.value(), summed: None };
         if let Some(marginal) = marginal {
-            let there = system.sum_out(marginal, point)?;
-            return Ok(if there { system.usable(here) } else { None });
+            system.summed = Summed::begin(marginal, system.trace, at, &system.layout, point)?;
+            return Ok(if system.summed.is_some() { system.usable(here) } else { None });
         }
         if !taped {
             system.memory.give_up();
@@ -118,8 +107,8 @@ impl<'a> System<'a> {
         if point.y.iter().any(|x| !x.is_finite()) {
             return Ok(false);
         }
-        if self.summed.is_some() {
-            return self.goes_summed(point);
+        if let Some(summed) = &mut self.summed {
+            return summed.evaluate(self.trace, self.at, point);
         }
         if self.taped
             && let Some(w) = self.memory.weigh(&point.y)
@@ -207,8 +196,8 @@ impl<'a> System<'a> {
     /// Makes a point the state of the trace, or leaves the trace where it was; draws the
     /// choices that were summed out.
     pub fn finish_at(mut self, to: Option<&Point>) -> TraceResult<bool> {
-        if self.summed.is_some() {
-            return self.finish_summed(to);
+        if let Some(summed) = self.summed.take() {
+            return summed.finish_at(self.trace, self.at, to);
         }
         let Some(point) = to else {
             self.trace.rollback();
@@ -224,9 +213,4 @@ impl<'a> System<'a> {
         }
         Ok(there)
     }
-}
-
-/// The kinetic energy.
-pub(super) fn kinetic(at: &Point, inverse_mass: &[f64]) -> f64 {
-    0.5 * at.momentum.iter().zip(inverse_mass).map(|(p, m)| p * p * m).sum::<f64>()
 }

@@ -6,61 +6,18 @@
 //! formats get bytes.
 
 mod csv;
+mod format;
 mod json;
-mod options;
+mod kinds;
 
-pub use options::{Literal, Options};
+pub use format::{Beside, DataFormat, Literal, Options};
 
-use super::{Arg, Args, Builtin, Row, Table, Type, arg, function};
+use super::{Arg, Args, Row, Type, arg, function};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
-use std::fmt;
 use std::sync::Arc;
 
 pub(crate) const SECTION: &str = "Data files";
-
-/// Reads a file by its path relative to that of another, or says why it cannot.
-pub type Beside<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
-
-/// How the files of a kind of data are read; the kind's name, options and documentation are
-/// its row in the table of built-ins.
-pub trait DataFormat: fmt::Debug + Send + Sync {
-    /// Reads a value from the bytes of a file. `file` is its name in messages, and `beside`
-    /// reads files by paths relative to it.
-    ///
-    /// # Errors
-    /// If the bytes are not in this format: a message that names the file.
-    fn load(
-        &self,
-        file: &str,
-        bytes: &[u8],
-        options: &Options,
-        beside: &Beside,
-    ) -> Result<Value, Fault>;
-
-    /// The value of a `data` item that is given no file, if this kind can do without.
-    fn without_file(&self) -> Option<Value> {
-        None
-    }
-
-    /// The file to read for a path, which may also name an entry in it (`file#entry`).
-    fn path_of<'a>(&self, path: &'a str) -> &'a str {
-        path
-    }
-
-    /// Checks the value of an option that the kind's row lists.
-    ///
-    /// # Errors
-    /// A message for the user if the value does not fit.
-    fn check_option(&self, _name: &str, _value: &Literal) -> Result<(), String> {
-        Ok(())
-    }
-
-    /// A call of the kind with its options, for hints.
-    fn example(&self) -> Option<&'static str> {
-        None
-    }
-}
 
 /// The argument of kinds that take nothing but a path.
 pub(crate) const FILE: &[Arg] =
@@ -110,45 +67,4 @@ pub(crate) fn not_an_expression(a: &Args) -> Result<Value, Fault> {
     let message = format!("{name}: only `data` items can read files");
     Err(Fault::new(FaultKind::Other, message)
         .with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
-}
-
-impl Table {
-    /// The kinds of data: what may stand after the colon of `data d: kind;`.
-    pub fn kinds(&self) -> impl Iterator<Item = &str> + Clone {
-        self.iter().filter(|b| b.format.is_some()).map(|b| &*b.name)
-    }
-
-    /// The built-in that is a kind of data.
-    pub(crate) fn kind(&self, name: &str) -> Option<&Builtin> {
-        self.find("", name).map(|i| self.get(i)).filter(|b| b.format.is_some())
-    }
-
-    /// The file to read for data of a kind.
-    pub fn path_of<'a>(&self, kind: &str, path: &'a str) -> &'a str {
-        match self.kind(kind).and_then(|b| b.format.as_ref()) {
-            Some(format) => format.path_of(path),
-            None => path,
-        }
-    }
-
-    /// Reads data of a kind from the bytes of a file: see [`DataFormat::load`].
-    ///
-    /// # Errors
-    /// An unknown kind, or bytes that are not of that kind.
-    pub fn load(
-        &self,
-        kind: &str,
-        file: &str,
-        bytes: &[u8],
-        options: &Options,
-        beside: &Beside,
-    ) -> Result<Value, Fault> {
-        match self.kind(kind).and_then(|b| b.format.as_ref()) {
-            Some(format) => format.load(file, bytes, options, beside),
-            None => {
-                let fault = Fault::type_error(format!("there is no data of type `{kind}`"));
-                Err(fault.with_nearest(kind, "there are", self.kinds()))
-            }
-        }
-    }
 }

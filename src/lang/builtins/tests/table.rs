@@ -62,7 +62,7 @@ const KEYWORDS: &[&str] = &[
 #[test]
 fn every_entry_is_well_formed() {
     let mut seen = HashSet::new();
-    for b in crate::lang::builtins::table::all() {
+    for b in crate::lang::builtins::language::all() {
         let name = b.full_name();
         assert!(seen.insert(name.clone()), "{name} is there twice");
         assert!(!KEYWORDS.contains(&&*b.name), "{name} is a keyword");
@@ -126,7 +126,7 @@ fn no_function_panics_on_values_of_any_type() {
 fn forms_for_single_numbers_are_the_functions_themselves() {
     let numbers = [-2.5, -1.0, -0.0, 0.0, 0.3, 1.0, 7.0, f64::INFINITY, f64::NAN];
     let mut seen = 0;
-    for b in crate::lang::builtins::table::all() {
+    for b in crate::lang::builtins::language::all() {
         let Some(scalar) = b.scalar else { continue };
         let call = |values: &[Value]| {
             let values: Vec<&Value> = values.iter().collect();

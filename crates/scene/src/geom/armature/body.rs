@@ -7,10 +7,9 @@
 //! precision. Invariant: the meshes of a pose do not depend on earlier poses.
 
 use super::morph::{Anchor, Morph};
-use super::posed::Posed;
-use super::{JointPose, Keypoint, RestGradient, Rig, Rules};
+use super::{JointPose, Rig, Rules};
 use crate::geom::detail::{self, Detail, Level, Levels};
-use crate::geom::{Affine, GeomError, Instance, Landmark, Mesh, Solid, Topology, edges, outer};
+use crate::geom::{Affine, GeomError, Instance, Mesh, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock, OnceLock};
 
@@ -102,6 +101,19 @@ pub struct Armature {
     rig: Rig,
     surface: Arc<LazySurface>,
     skin: Arc<Skin>,
+}
+
+/// Derivatives with respect to a body at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RestGradient {
+    /// With respect to each joint's head.
+    pub heads: Vec<DVec3>,
+    /// With respect to each joint's tail.
+    pub tails: Vec<DVec3>,
+    /// With respect to each keypoint.
+    pub keypoints: Vec<DVec3>,
+    /// With respect to each vertex; an empty list stands for zeros.
+    pub vertices: Vec<DVec3>,
 }
 
 impl Armature {
@@ -280,46 +292,6 @@ impl Armature {
             surface: Arc::new(LazyLock::new(Box::new(surface))),
             skin: Arc::clone(&self.skin),
         }
-    }
-
-    /// Returns the body in a pose: one instance per part, numbered by joint, and the
-    /// keypoints as landmarks. Parts that one of this thread's last poses moved in the
-    /// same way share its meshes.
-    ///
-    /// # Errors
-    /// A pose that is not finite, or that moves vertices beyond the range of single
-    /// precision.
-    pub fn posed(self: &Arc<Self>, pose: &[JointPose], rules: &Rules) -> Result<Solid, GeomError> {
-        self.posed_after(pose, rules, None).map(|(solid, _)| solid)
-    }
-
-    /// As [`Armature::posed`], from a pose before, whose meshes are shared by the parts that
-    /// move as in it.
-    ///
-    /// # Errors
-    /// As [`Armature::posed`].
-    pub fn posed_after(
-        self: &Arc<Self>,
-        pose: &[JointPose],
-        rules: &Rules,
-        before: Option<&Posed>,
-    ) -> Result<(Solid, Posed), GeomError> {
-        let transforms = self.rig.transforms(pose, rules)?;
-        let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
-        if !single.iter().all(|t| t.is_finite()) {
-            return Err(GeomError::domain("the pose moves the body too far away"));
-        }
-        let (posed, parts) = Posed::new(self, single, before);
-        let body = Arc::clone(self);
-        let solid = Solid::of_parts(parts).with_landmarks_of(move || {
-            let keypoints = body.rig.keypoints().iter();
-            let landmark = |k: &Keypoint| Landmark {
-                name: Arc::clone(&k.name),
-                position: transforms[k.joint].transform_point3(k.rest),
-            };
-            keypoints.map(landmark).collect::<Vec<_>>()
-        });
-        Ok((solid, posed))
     }
 
     /// Pulls derivatives with respect to the body at rest back to the amount of a morph;

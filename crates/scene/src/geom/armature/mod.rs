@@ -12,7 +12,7 @@ mod rig_json;
 mod stretch;
 mod torque;
 
-pub use body::{Armature, Influence, MOST_WEIGHTS};
+pub use body::{Armature, Influence, MOST_WEIGHTS, RestGradient};
 pub use kinematics::JointGradient;
 pub use morph::Morph;
 pub use pose::{JointPose, Rules, Turn};
@@ -20,4 +20,4 @@ pub use posed::Posed;
 pub use rig::{Joint, Keypoint, MOST_JOINTS, NamedJoint, Rig};
 pub use rig_json::{RigFile, morphs_from_json, rig_from_json};
 pub use stretch::Stretch;
-pub use torque::{BodyGradient, RestGradient};
+pub use torque::BodyGradient;

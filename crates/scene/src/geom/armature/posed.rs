@@ -1,9 +1,10 @@
 //! The meshes of a posed body, by part. A pose shares the mesh of each part that moves as
 //! in the pose before it; renderers draw shared meshes once.
 
-use super::Armature;
-use crate::geom::Instance;
-use glam::Affine3A;
+use super::body::{Armature, Part};
+use super::{JointPose, Keypoint, Rules};
+use crate::geom::{GeomError, Instance, Landmark, Solid};
+use glam::{Affine3A, DAffine3};
 use std::sync::{Arc, OnceLock};
 
 /// A pose's transforms and meshes, from which the next pose starts. Meshes are made when
@@ -29,7 +30,7 @@ impl Pose {
     fn parts(&self, before: Option<&Pose>) -> &[Instance] {
         self.parts.get_or_init(|| {
             let before = before.and_then(|b| b.parts.get().map(|parts| (&b.transforms, parts)));
-            let make = |(i, part): (usize, &super::body::Part)| {
+            let make = |(i, part): (usize, &Part)| {
                 let moved = |t: &[Affine3A], j: &u16| t.get(usize::from(*j)).map(bits);
                 let same = before.and_then(|(transforms, parts)| {
                     let mut joints = part.joints.iter();
@@ -56,5 +57,47 @@ impl Posed {
         let pose = Arc::new(Pose { body: Arc::clone(body), transforms, parts: OnceLock::new() });
         let own = Arc::clone(&pose);
         (Posed(pose), move || own.parts(before.as_deref()).to_vec())
+    }
+}
+
+impl Armature {
+    /// Returns the body in a pose: one instance per part, numbered by joint, and the
+    /// keypoints as landmarks. Parts that one of this thread's last poses moved in the
+    /// same way share its meshes.
+    ///
+    /// # Errors
+    /// A pose that is not finite, or that moves vertices beyond the range of single
+    /// precision.
+    pub fn posed(self: &Arc<Self>, pose: &[JointPose], rules: &Rules) -> Result<Solid, GeomError> {
+        self.posed_after(pose, rules, None).map(|(solid, _)| solid)
+    }
+
+    /// As [`Armature::posed`], from a pose before, whose meshes are shared by the parts that
+    /// move as in it.
+    ///
+    /// # Errors
+    /// As [`Armature::posed`].
+    pub fn posed_after(
+        self: &Arc<Self>,
+        pose: &[JointPose],
+        rules: &Rules,
+        before: Option<&Posed>,
+    ) -> Result<(Solid, Posed), GeomError> {
+        let transforms = self.rig().transforms(pose, rules)?;
+        let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
+        if !single.iter().all(|t| t.is_finite()) {
+            return Err(GeomError::domain("the pose moves the body too far away"));
+        }
+        let (posed, parts) = Posed::new(self, single, before);
+        let body = Arc::clone(self);
+        let solid = Solid::of_parts(parts).with_landmarks_of(move || {
+            let keypoints = body.rig().keypoints().iter();
+            let landmark = |k: &Keypoint| Landmark {
+                name: Arc::clone(&k.name),
+                position: transforms[k.joint].transform_point3(k.rest),
+            };
+            keypoints.map(landmark).collect::<Vec<_>>()
+        });
+        Ok((solid, posed))
     }
 }

@@ -2,22 +2,9 @@
 //! points into torques about joints, in time linear in the number of joints.
 //! [`Rig::transforms_vjp`] is the general method, for any pose.
 
-use super::{Armature, Influence, JointPose, Rules, Turn};
+use super::{Armature, Influence, JointPose, RestGradient, Rules, Turn};
 use crate::geom::GeomError;
 use glam::{DMat3, DVec3, Vec3};
-
-/// Derivatives with respect to a body at rest.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RestGradient {
-    /// With respect to each joint's head.
-    pub heads: Vec<DVec3>,
-    /// With respect to each joint's tail.
-    pub tails: Vec<DVec3>,
-    /// With respect to each keypoint.
-    pub keypoints: Vec<DVec3>,
-    /// With respect to each vertex; an empty list stands for zeros.
-    pub vertices: Vec<DVec3>,
-}
 
 /// Derivatives with respect to the inputs of posing.
 #[derive(Clone, Debug, PartialEq)]

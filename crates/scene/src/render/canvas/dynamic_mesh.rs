@@ -1,8 +1,7 @@
 //! A mesh that moves in front of the static layer: its layer at the current and the previous
 //! placement.
 
-use super::layer::{Layer, affine_bits};
-use super::picture::Tools;
+use super::layer::{Layer, Tools, affine_bits};
 use super::static_layer::StaticLayer;
 use crate::geom::{Instance, Mesh};
 use crate::render::lines::visibility::Depths;

@@ -5,14 +5,22 @@
 //! as q grows, in `f32` too, so the nearest of the layers' depths is the depth of a full
 //! drawing, and the contours are those of a full drawing, bit for bit.
 
-use super::picture::Tools;
 use crate::geom::{Affine, Instance};
-use crate::render::lines::extraction::extract_mesh;
+use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{BESIDE, Piece};
+use crate::render::pixels::candidates::Candidates;
 use crate::render::pixels::frame::to_depth;
-use crate::render::pixels::project::{DepthRange, Lens, Placement};
+use crate::render::pixels::project::{DepthRange, Lens, Placement, Projected};
 use crate::render::pixels::raster::{Area, draw_mesh};
 use crate::render::{Camera, Projection, work};
+
+/// Scratch memory for drawing a layer.
+#[derive(Default)]
+pub struct Tools {
+    pub projected: Projected,
+    pub candidates: Candidates,
+    pub room: Room,
+}
 
 /// The contribution of one mesh to a picture.
 #[derive(Default)]

@@ -16,8 +16,8 @@ mod meshes;
 mod picture;
 mod static_layer;
 
-use self::layer::camera_bits;
-use self::picture::{Picture, Tools};
+use self::layer::{Tools, camera_bits};
+use self::picture::Picture;
 use super::{Camera, ContourChange, Contours};
 use crate::geom::Solid;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};

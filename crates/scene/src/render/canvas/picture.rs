@@ -5,14 +5,11 @@
 //! or at a smaller depth range stays hidden with both.
 
 use super::dynamic_mesh::DynamicMesh;
-use super::layer::Layer;
+use super::layer::{Layer, Tools};
 use super::meshes::Meshes;
 use super::static_layer::StaticLayer;
 use crate::geom::{Instance, Solid};
-use crate::render::lines::extraction::Room;
 use crate::render::lines::visibility::Depths;
-use crate::render::pixels::candidates::Candidates;
-use crate::render::pixels::project::Projected;
 use crate::render::pixels::raster::Area;
 use crate::render::simd::vectorised;
 use crate::render::{Camera, ContourChange, Contours, work};
@@ -28,14 +25,6 @@ const MOST_PIXELS: usize = 1 << 23;
 /// A mesh that has not moved in so many drawings counts as stationary again, if most
 /// meshes count as moving.
 const PATIENCE: u64 = 1024;
-
-/// Scratch memory for drawing a layer.
-#[derive(Default)]
-pub struct Tools {
-    pub projected: Projected,
-    pub candidates: Candidates,
-    pub room: Room,
-}
 
 /// The state of one camera's picture.
 pub(super) struct Picture {

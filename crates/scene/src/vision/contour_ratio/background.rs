@@ -8,7 +8,7 @@
 //! densities are interpolated linearly between window centres and between bin centres.
 
 use super::super::field::Edges;
-use super::ContourRatioOptions;
+use super::options::ContourRatioOptions;
 use super::ratio::Ratio;
 use pcadlang_numerics::num::simd::vectorised;
 

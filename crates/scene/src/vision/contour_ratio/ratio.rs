@@ -7,7 +7,7 @@
 //! the nearest single precision number, about once in many thousand scores, the plain
 //! formula decides.
 
-use super::ContourRatioOptions;
+use super::options::ContourRatioOptions;
 use pcadlang_numerics::num::simd::vectorised;
 use std::f64::consts::{LN_2, LOG2_E, PI};
 

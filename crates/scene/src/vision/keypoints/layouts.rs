@@ -6,7 +6,7 @@
 
 use super::names::{COCO, MEDIAPIPE, usual};
 use super::node::Node;
-use super::people::Person;
+use super::people::{People, Person};
 use super::{Keypoint, Keypoints, KeypointsError};
 use serde_json::Value;
 use std::sync::Arc;
@@ -18,8 +18,21 @@ const POINT: &str = "[x, y] or [x, y, confidence], or null if it was not found";
 /// Names of the field with MediaPipe's landmarks.
 const MEDIAPIPE_KEYS: [&str; 2] = ["pose_landmarks", "landmarks"];
 
+impl People {
+    /// Reads a file in one of the layouts of the [parent module](super).
+    ///
+    /// # Errors
+    /// If it is not JSON, has an unknown layout, or contains an invalid value; the
+    /// message has its path.
+    pub fn parse(bytes: &[u8]) -> Result<People, KeypointsError> {
+        let document = serde_json::from_slice(bytes)
+            .map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
+        people(&Node::root(&document)).map(|all| People { all })
+    }
+}
+
 /// Returns all people of a document.
-pub(super) fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
+fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
     match root.value {
         Value::Null => Ok(Vec::new()),
         Value::Array(items) => match items.first() {

@@ -1,8 +1,7 @@
 //! The people in a file, and the choice of one of them.
 
 use super::error::first;
-use super::node::Node;
-use super::{Keypoints, KeypointsError, layouts};
+use super::{Keypoints, KeypointsError};
 
 /// The people of a file, in the order of the file.
 #[derive(Clone, Debug, Default)]
@@ -31,17 +30,6 @@ pub fn split_id(path: &str) -> (&str, Option<&str>) {
 }
 
 impl People {
-    /// Reads a file in one of the layouts of the [parent module](super).
-    ///
-    /// # Errors
-    /// If it is not JSON, has an unknown layout, or contains an invalid value; the
-    /// message has its path.
-    pub fn parse(bytes: &[u8]) -> Result<People, KeypointsError> {
-        let document = serde_json::from_slice(bytes)
-            .map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
-        layouts::people(&Node::root(&document)).map(|all| People { all })
-    }
-
     /// The number of people, including those that were searched for but not detected.
     pub fn len(&self) -> usize {
         self.all.len()

@@ -2,7 +2,7 @@
 //! scales, normalised by the gradients around them and split by direction. All are
 //! smaller than the picture, and smoothed lightly or strongly.
 
-use super::ForestOptions;
+use super::options::ForestOptions;
 use crate::vision::detect::gradient::mirrored;
 
 /// A channel: width, height, and its values in row-major order.

@@ -1,10 +1,16 @@
 //! Shapes and placements.
 
-use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_vjps};
-use crate::geom::{Affine, Caps, Landmark, Profile, Solid, Wall, cuboid};
-use crate::lang::builtins::{Args, Row, Type, arg, opt};
+mod args;
+mod vjps;
+
+pub(super) use args::{vector, vector_of};
+
+use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native};
+use crate::geom::{Affine, Landmark, Solid, cuboid};
+use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
+use args::{LatheArgs, lathe_args};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -45,7 +51,7 @@ pub(super) const TABLE: &[Row] = &[
             Solid::lathe(&profiles, sides, wall, caps).map(solid).map_err(fault)
         },
     )
-    .vjp(shape_vjps::lathe),
+    .vjp(vjps::lathe),
     native(
         "sphere",
         SECTION,
@@ -60,7 +66,7 @@ pub(super) const TABLE: &[Row] = &[
             Solid::sphere(a.num(0)?, sides).map(solid).map_err(fault)
         },
     )
-    .vjp(shape_vjps::sphere),
+    .vjp(vjps::sphere),
     native(
         "box",
         SECTION,
@@ -69,7 +75,7 @@ pub(super) const TABLE: &[Row] = &[
         "A box centred at the origin.",
         |a| cuboid(vector(a, 0, DVec3::ONE)?).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault),
     )
-    .vjp(shape_vjps::cuboid),
+    .vjp(vjps::cuboid),
     native(
         "group",
         SECTION,
@@ -96,7 +102,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(SolidValue(Solid::group(&members))))
         },
     )
-    .vjp(shape_vjps::group),
+    .vjp(vjps::group),
     native(
         "centred",
         SECTION,
@@ -111,7 +117,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(SolidValue(s.0.centred(a.bool_or(1, false)?))))
         },
     )
-    .vjp(shape_vjps::centred),
+    .vjp(vjps::centred),
     native(
         "landmarks",
         SECTION,
@@ -136,7 +142,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(SolidValue(s.0.clone().with_landmarks(points))))
         },
     )
-    .vjp(shape_vjps::landmarks),
+    .vjp(vjps::landmarks),
     native(
         "affine",
         SECTION,
@@ -156,84 +162,9 @@ pub(super) const TABLE: &[Row] = &[
             Ok(Value::object(AffineValue(placed)))
         },
     )
-    .vjp(shape_vjps::affine),
+    .vjp(vjps::affine),
 ];
 
 fn solid(solid: Solid) -> Value {
     Value::object(SolidValue(solid))
-}
-
-/// Reads three numbers, or one for all three, or returns a default.
-pub(super) fn vector(a: &Args, i: usize, default: DVec3) -> Result<DVec3, Fault> {
-    match a.get(i) {
-        Value::Unit => Ok(default),
-        Value::Num(x) => Ok(DVec3::splat(*x)),
-        _ => match a.array(i)?[..] {
-            [x, y, z] => Ok(DVec3::new(x, y, z)),
-            _ => Err(a.wrong_length(i, "3 numbers")),
-        },
-    }
-}
-
-/// Reads three numbers, one for all three, or a record of x, y and z.
-pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
-    match v {
-        Value::Num(x) => Some(DVec3::splat(*x)),
-        Value::Array(xs) => <[f64; 3]>::try_from(&**xs).ok().map(DVec3::from_array),
-        Value::Record(r) => {
-            let part = |name: &str| match r.get(name) {
-                Some(Value::Num(x)) => Some(*x),
-                _ => None,
-            };
-            Some(DVec3::new(part("x")?, part("y")?, part("z")?))
-        }
-        _ => None,
-    }
-}
-
-/// The arguments of `lathe`.
-pub(super) struct LatheArgs {
-    pub profiles: Vec<Profile>,
-    pub sides: u32,
-    pub wall: Wall,
-    pub caps: Caps,
-}
-
-pub(super) fn lathe_args(a: &Args) -> Result<LatheArgs, Fault> {
-    let profiles = profiles(a)?;
-    let sides = if a.given(1) { a.int_in(1, 3, 1024)? as u32 } else { 48 };
-    let caps = match a.choice(3, &["both", "bottom", "top", "none"])? {
-        "bottom" => Caps::Bottom,
-        "top" => Caps::Top,
-        "none" => Caps::None,
-        _ => Caps::Both,
-    };
-    let wall = Wall { thickness: a.num_or(2, 0.0)?, floor: a.num_or(4, 0.0)? };
-    Ok(LatheArgs { profiles, sides, wall, caps })
-}
-
-/// Reads one profile or an array of them.
-fn profiles(a: &Args) -> Result<Vec<Profile>, Fault> {
-    let wanted = "profiles such as { y: [0, 1], r: [0.5, 0.4] }";
-    let one = |v: &Value| {
-        let Value::Record(record) = v else { return Err(a.element_wrong(0, wanted, v)) };
-        let numbers = |name: &str| match record.get(name) {
-            Some(Value::Array(xs)) => Ok(xs.to_vec()),
-            Some(Value::Num(x)) => Ok(vec![*x]),
-            Some(v) => Err(a.element_wrong(0, wanted, v)),
-            None => Err(Fault::type_error(format!(
-                "scene.lathe: a profile needs the field `{name}`: {wanted}"
-            ))),
-        };
-        let (y, mut r) = (numbers("y")?, numbers("r")?);
-        if r.len() == 1 {
-            r.resize(y.len(), r[0]);
-        }
-        Ok(Profile { y, r })
-    };
-    match a.get(0) {
-        v @ Value::Record(_) => Ok(vec![one(v)?]),
-        Value::List(all) => all.iter().map(one).collect(),
-        _ => Err(a.wrong(0, wanted)),
-    }
 }

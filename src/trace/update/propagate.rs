@@ -5,13 +5,13 @@
 //! structure before what depends on it, and runs again only if something it reads has
 //! changed.
 
-use super::graph::Graph;
-use super::journal::Entry;
-use super::node::*;
 use crate::lang::builtins::PreviousEvaluation;
 use crate::lang::code::{Code, Op};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
+use crate::trace::graph::Graph;
+use crate::trace::journal::Entry;
+use crate::trace::node::*;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;

@@ -1,72 +1,17 @@
-//! The host's part of a built-in: closures with their captured state.
+//! Calls of built-ins, those of hosts included.
 //!
-//! The table has plain functions for them, as for other built-ins ([`HostItem::entry`]);
-//! these find the closure through the built-in in their [`Args`]. Callers of built-ins
-//! therefore need not know about hosts.
+//! A host's part of a built-in is a closure with its captured state. The table has plain
+//! functions for them, as for other built-ins ([`HostItem::entry`]); these find the
+//! closure through the built-in in their [`Args`]. Callers need not know about hosts.
 
-use super::{ArgAdjoints, Args, Builtin, Derivative, Kind};
+use super::builtin::{
+    ArgAdjoints, Args, Builtin, Derivative, HostItem, Incremental, Kind, PreviousEvaluation,
+};
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::error::Fault;
-use crate::lang::value::Value;
-use std::any::Any;
-use std::fmt;
+use crate::lang::fault::Fault;
+use crate::lang::value::{MOST_ELEMENTS, MOST_NESTED, Value};
 use std::sync::Arc;
-
-/// The state that a function keeps between evaluations.
-pub type State = Arc<dyn Any + Send + Sync>;
-
-type Function = dyn Fn(&Args) -> Result<Value, Fault> + Send + Sync;
-type Incremental =
-    dyn Fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> + Send + Sync;
-type Make = dyn Fn(&Args) -> Result<Dist, Fault> + Send + Sync;
-type Product = dyn Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync;
-
-/// An evaluation from which a later one may resume. It is stored with its result (in a
-/// node of a trace or an operation of a tape) and immutable, so that restoring an earlier
-/// state of the trace restores it as well.
-pub struct PreviousEvaluation {
-    /// The arguments.
-    pub args: Vec<Value>,
-    /// The result.
-    pub value: Value,
-    /// The state that the function kept.
-    pub state: State,
-}
-
-impl fmt::Debug for PreviousEvaluation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Before")
-            .field("args", &self.args)
-            .field("value", &self.value)
-            .finish_non_exhaustive()
-    }
-}
-
-/// A host's part of a built-in.
-#[derive(Clone)]
-pub enum HostItem {
-    /// A function.
-    Function {
-        /// The function.
-        call: Arc<Function>,
-        /// Its vector-Jacobian product.
-        vjp: Option<Arc<Product>>,
-    },
-    /// A function that may resume from an earlier evaluation.
-    Incremental {
-        /// The function.
-        call: Arc<Incremental>,
-        /// Its vector-Jacobian product.
-        vjp: Option<Arc<Product>>,
-    },
-    /// A family of distributions.
-    Family(Arc<Make>),
-    /// A family of likelihoods.
-    Likelihood(Arc<Function>),
-    /// A maker of kernels; only `infer` knows its type.
-    Kernel(State),
-}
 
 impl HostItem {
     /// Returns the kind and derivative for the table.
@@ -86,6 +31,40 @@ impl HostItem {
 }
 
 impl Builtin {
+    /// Calls it with one value per argument.
+    ///
+    /// # Errors
+    /// If the arguments are invalid, or it is a form or a name for inference.
+    pub(crate) fn apply(&self, values: &[&Value]) -> Result<Value, Fault> {
+        let args = Args { builtin: self, values };
+        match self.kind {
+            Kind::Function(f) => f(&args),
+            Kind::Distribution(_) => self.distribution(values).map(|d| Value::Dist(Arc::new(d))),
+            Kind::Form(_) | Kind::Inference => Err(Fault::type_error(format!(
+                "`{}` cannot be used as a function value",
+                self.name
+            ))),
+        }
+    }
+
+    /// Makes a distribution of this family from values.
+    ///
+    /// # Errors
+    /// If the arguments are invalid, or the distribution has too many parts or is nested
+    /// too deeply.
+    pub(crate) fn distribution(&self, values: &[&Value]) -> Result<Dist, Fault> {
+        let args = Args { builtin: self, values };
+        let Kind::Distribution(make) = self.kind else {
+            return Err(Fault::type_error(format!("`{}` is not a distribution", self.name)));
+        };
+        let d = make(&args)?;
+        match d.parts(MOST_NESTED, MOST_ELEMENTS) {
+            Some(n) if n <= MOST_ELEMENTS => Ok(d),
+            Some(_) => Err(args.too_large("parts", MOST_ELEMENTS)),
+            None => Err(args.too_large("nested distributions", MOST_NESTED as usize)),
+        }
+    }
+
     /// Calls an incremental host function, from an earlier evaluation if given; returns
     /// `None` for any other built-in.
     #[inline]

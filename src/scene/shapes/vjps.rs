@@ -1,13 +1,13 @@
 //! Vector-Jacobian products of shapes and placements: from the vertices of surfaces and
 //! landmarks to sizes and profiles.
 
-use super::SolidValue;
-use super::adjoints::{BySolid, shaped};
-use super::shapes::{LatheArgs, lathe_args, vector};
+use super::args::{LatheArgs, lathe_args, vector};
 use crate::geom::{Mesh, Profile, Solid, vjp_cuboid, vjp_lathe, vjp_sphere};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{ArgAdjoints, Args};
 use crate::lang::value::Value;
+use crate::scene::SolidValue;
+use crate::scene::adjoints::{BySolid, shaped};
 use glam::{DMat3, DVec3};
 use smallvec::smallvec;
 use std::sync::Arc;

@@ -6,10 +6,10 @@
 //! ([`super::propagate`]) re-runs stale nodes on demand and stops where values come out
 //! equal.
 
-use super::graph::Graph;
-use super::node::*;
 use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
 use crate::lang::value::Value;
+use crate::trace::graph::Graph;
+use crate::trace::node::*;
 
 impl Graph {
     /// Invalidates a choice or observation that is about to change, and everything that
@@ -159,7 +159,7 @@ impl Graph {
     /// Whether a stale choice may get another value without being a target: a whitened
     /// one moves with its distribution, and one whose key, length or kind changes is
     /// resampled.
-    pub(super) fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
+    pub fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
         let node = &self.nodes[n as usize];
         let Op::Draw { dist, keys, .. } = self.op(code, n) else { return false };
         let stale = |o: &Operand| {
@@ -192,7 +192,7 @@ impl Graph {
         }
     }
 
-    pub(super) fn make_stale(&mut self, code: &Code, n: NodeId) {
+    pub fn make_stale(&mut self, code: &Code, n: NodeId) {
         self.save(n);
         self.nodes[n as usize].state = State::Stale;
         let facts = self.slot_facts(code, n);

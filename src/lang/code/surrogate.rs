@@ -1,7 +1,8 @@
 //! Programs in which the coarse surrogates of observations (`with coarse = …`) replace
 //! them: the first stage of delayed acceptance.
 
-use super::code::{Code, DistSpec, Op, Operand};
+use super::op::{DistSpec, Op, Operand};
+use super::program::Code;
 use super::slots::SlotFacts;
 
 impl Code {

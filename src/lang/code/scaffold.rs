@@ -5,27 +5,28 @@
 //! that depend on the choice are the same in every state, and an update can go through
 //! them in order instead of invalidating and re-evaluating on demand.
 
-use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, StaticScaffold};
+use super::op::{DistSpec, Op, Operand, Slot};
+use super::slots::{SlotFacts, StaticScaffold};
 use smallvec::SmallVec;
 
 /// The maximum length of the list; one bit per slot in [`StaticScaffold::conditional`].
 const LONGEST: usize = u64::BITS as usize;
 
 /// Returns the static scaffold of the choice in slot `from` of a block, if it is the same
-/// in every state. `asked` tells which slots are always needed.
+/// in every state, given the slots that depend on it in `order`. `asked` tells which
+/// slots are always needed.
 pub(super) fn scaffold(
     ops: &[Op],
-    slots: &[SlotFacts],
+    order: &[Slot],
     asked: &[bool],
     from: Slot,
 ) -> Option<StaticScaffold> {
-    let order = dependents(ops, slots, from)?;
     // The address of a keyed choice may change.
     if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty()))
     {
         return None;
     }
-    let is_closed = reads_inside(ops, from, &order);
+    let is_closed = reads_inside(ops, from, order);
     let bits = order.iter().enumerate().filter(|(_, s)| !asked[**s as usize]);
     let conditional = bits.fold(0, |all, (i, _)| all | 1 << i);
     let decides = |o: &Operand| matches!(o, Operand::Local(s) if *s == from || order.contains(s));

@@ -1,14 +1,14 @@
 //! Vector-Jacobian products of bodies: from surfaces and keypoints to poses, shapes and
 //! proportions.
 
-use super::adjoints::{BySolid, armature_adjoint, by_armature, from_points, shaped as like};
-use super::bodies::{armature, joint, pose, stops, stretches};
-use super::objects::affine_adjoint;
-use super::{AffineValue, SolidValue};
+use super::args::{armature, joint, pose, stops, stretches};
 use crate::geom::armature::{Armature, JointGradient, Rules, Stretch};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{ArgAdjoints, Args};
 use crate::lang::value::Value;
+use crate::scene::adjoints::{BySolid, armature_adjoint, by_armature, from_points, shaped as like};
+use crate::scene::objects::affine_adjoint;
+use crate::scene::{AffineValue, SolidValue};
 use glam::{DMat3, DVec3};
 use smallvec::smallvec;
 use std::sync::Arc;

@@ -1,56 +1,17 @@
-//! Static facts about the slots of lowered code that updates need: which slots read a
-//! slot, what it reads, whether it is an effect, and the static scaffold and local
-//! density of a choice.
+//! The facts about slots, derived from the operations of a whole program.
 
-use super::code::{Block, Callee, Code, Eager, Op, Operand, Slot};
-use super::local_density::LocalDensity;
-use super::value::Value;
-
-/// Static facts about a slot.
-#[derive(Clone, Debug, Default)]
-pub struct SlotFacts {
-    /// The slot.
-    pub slot: Slot,
-    /// Whether it runs even if nothing depends on it.
-    pub is_effect: bool,
-    /// Whether it is a random choice.
-    pub is_draw: bool,
-    /// Whether it is the result of its block.
-    pub is_result: bool,
-    /// The slots it reads whenever it is evaluated: the number of levels out, and the
-    /// slot there; `None` if they depend on the state.
-    pub reads: Option<Box<[(u16, Slot)]>>,
-    /// The slots of the same block that have it as an operand.
-    pub users: Box<[Slot]>,
-    /// For a choice that only computations of its own block depend on: its static
-    /// scaffold.
-    pub scaffold: Option<StaticScaffold>,
-    /// For a choice or an element of an array: the scores of its block as a function of
-    /// its value.
-    pub local_density: Option<Box<LocalDensity>>,
-}
-
-/// The part of a choice's scaffold that lies in its own block, if that is the same in
-/// every state.
-#[derive(Clone, Debug)]
-pub struct StaticScaffold {
-    /// The slots that depend on the choice, each after those it reads, up to and
-    /// including observations and other choices.
-    pub slots: Box<[Slot]>,
-    /// Whether none of them reads from another block.
-    pub is_closed: bool,
-    /// A bit mask of the slots that may not be needed any more when conditions have
-    /// changed, so they must not run before the conditions.
-    pub conditional: u64,
-    /// Whether the condition of a selection depends on the choice.
-    pub switches: bool,
-}
+use super::op::{Callee, Op, Operand, Slot};
+use super::program::{Block, Code, Eager};
+use super::slots::SlotFacts;
+use super::{flatten, scaffold};
+use crate::lang::local_density::LocalDensity;
+use crate::lang::value::Value;
 
 impl Code {
     /// Derives the facts about all slots from the operations, among them users and
     /// effects.
     pub fn finish(&mut self) {
-        super::flatten::flatten(self);
+        flatten::flatten(self);
         let effects = self.effects();
         for (block, is_effect) in self.blocks.iter_mut().zip(effects) {
             block.effects =
@@ -89,16 +50,17 @@ impl Code {
             }
             let (ops, slots) =
                 (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
-            let asked = super::scaffold::always_asked(ops, slots);
+            let asked = scaffold::always_asked(ops, slots);
             let found: Vec<_> = (0..slots.len() as Slot)
                 .filter(|s| matches!(ops[*s as usize], Op::Draw { .. } | Op::Index { .. }))
-                .map(|s| {
-                    let scaffold = if slots[s as usize].is_draw {
-                        super::scaffold::scaffold(ops, slots, &asked, s)
-                    } else {
-                        None
+                .filter_map(|s| {
+                    let dependents = scaffold::dependents(ops, slots, s)?;
+                    let scaffold = match slots[s as usize].is_draw {
+                        true => scaffold::scaffold(ops, &dependents, &asked, s),
+                        false => None,
                     };
-                    (s, scaffold, LocalDensity::new(ops, slots, s, &self.builtins).map(Box::new))
+                    let density = LocalDensity::new(ops, dependents, s, &self.builtins);
+                    Some((s, scaffold, density.map(Box::new)))
                 })
                 .collect();
             for (slot, scaffold, local_density) in found {
@@ -165,26 +127,6 @@ impl Code {
             b.ops.iter().map(|op| op_observes(op, &observes, escaped_observes)).collect()
         };
         self.blocks.iter().map(of).collect()
-    }
-}
-
-impl Op {
-    /// Returns the locations of its operands, if it holds exactly those that it always
-    /// reads.
-    pub(super) fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
-        if matches!(
-            self,
-            Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather
-        ) {
-            return None;
-        }
-        let mut reads = Vec::new();
-        self.operands(|o| match o {
-            Operand::Const(_) => {}
-            Operand::Local(slot) => reads.push((0, slot)),
-            Operand::Outer { up, slot } => reads.push((up, slot)),
-        });
-        Some(reads.into())
     }
 }
 

@@ -6,8 +6,9 @@
 //! two results. Evaluation is on demand, so the other branch is still not run, and
 //! choices that only it reads are not drawn.
 
-use super::code::{Block, BlockKind, Code, Op, Operand, Slot};
-use super::value::Value;
+use super::op::{Op, Operand, Slot};
+use super::program::{Block, BlockKind, Code};
+use crate::lang::value::Value;
 
 /// Flattens every block, inner ones first.
 pub(super) fn flatten(code: &mut Code) {
