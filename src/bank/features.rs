@@ -5,7 +5,7 @@ use crate::Model;
 use crate::infer::in_parallel;
 use crate::lang::value::Value;
 use crate::render::{BatchRenderer, Scene, View};
-use crate::report::pictures::{Drawn, shaded};
+use crate::report::pictures::shaded;
 use crate::scene::{ImageValue, KeypointsValue, ViewValue};
 use crate::vision::features::{self, Query};
 use serde::{Deserialize, Serialize};
@@ -60,15 +60,7 @@ impl Features {
                 }
             }
             Features::Command { command, size } => {
-                let f = view.frame(*size);
-                let drawn = Drawn {
-                    width: f.width,
-                    height: f.height,
-                    depth: &f.depth,
-                    normal: &f.normal,
-                    part: &f.part,
-                };
-                command::features(command, &shaded(&drawn))
+                command::features(command, &shaded(&view.frame(*size)))
             }
         }
     }

@@ -8,7 +8,6 @@ use super::scene;
 use pcadlang::lang::value::Value;
 use pcadlang::report::pictures::{contact_sheet, png, shaded};
 use pcadlang::report::{number, table};
-use pcadlang::session::drawn;
 use pcadlang::trace::Trace;
 use std::sync::Arc;
 
@@ -22,7 +21,7 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
         let mut trace = Trace::prior(Arc::clone(model.code()), model.limits().clone());
         let view = scene::view(&mut trace, draws, None);
         match view {
-            Some(view) => pictures.push(shaded(&drawn(&view.frame(a.size)))),
+            Some(view) => pictures.push(shaded(&view.frame(a.size))),
             None => {
                 let mut row = vec![(i + 1).to_string()];
                 for (name, o) in &model.code().assumed {

@@ -30,7 +30,7 @@ pub use background::Status;
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use export::{exported, exported_operand};
-pub use picture::{Picture, detected, drawn, over, strokes};
+pub use picture::{Picture, detected, over};
 pub use reply::{Reply, Request, Trouble};
 pub use shown::short;
 pub use state::Session;

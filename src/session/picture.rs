@@ -1,8 +1,8 @@
 //! A picture of the scene, which is rendered only when a front end asks for its pixels.
 
 use crate::lang::value::Located;
-use crate::render::{Contours, Frame, View};
-use crate::report::pictures::{self, Drawn, Strokes};
+use crate::render::View;
+use crate::report::pictures;
 use crate::scene::ViewValue;
 use image::RgbImage;
 use std::path::PathBuf;
@@ -39,7 +39,7 @@ impl Picture {
 pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u32)) -> RgbImage {
     let large = pictures::picture_size(width, height);
     let (contours, picture) = (view.contours(width.max(height)), view.frame(large.0.max(large.1)));
-    let mut out = pictures::overlay(photo, &drawn(&picture), &strokes(&contours));
+    let mut out = pictures::overlay(photo, &picture, &contours.slice());
     let marked = ViewValue(Arc::clone(view));
     let points: Vec<[f64; 2]> = marked.landmarks(width, height).filter_map(|(_, at)| at).collect();
     pictures::dots(&mut out, (width, height), &points, pictures::OF_SCENE);
@@ -54,22 +54,4 @@ pub fn detected(out: &mut RgbImage, located: &[Located], (width, height): (u32, 
     let seen: Vec<_> = lines.iter().map(|[_, seen]| *seen).collect();
     pictures::limbs(out, (width, height), &lines, pictures::DETECTED);
     pictures::dots(out, (width, height), &seen, pictures::DETECTED);
-}
-
-/// Converts a frame for the reports.
-pub fn drawn(f: &Frame) -> Drawn<'_> {
-    Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal, part: &f.part }
-}
-
-/// Converts contours for the reports.
-pub fn strokes(c: &Contours) -> Strokes<'_> {
-    Strokes {
-        width: c.width,
-        height: c.height,
-        x: &c.x,
-        y: &c.y,
-        tx: &c.tx,
-        ty: &c.ty,
-        length: &c.length,
-    }
 }

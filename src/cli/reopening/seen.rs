@@ -8,8 +8,9 @@ use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::crop_imm;
 use pcadlang::lang::value::Located;
+use pcadlang::render::ContourSlice;
 use pcadlang::report::RunDir;
-use pcadlang::report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, Strokes, png};
+use pcadlang::report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, png};
 use pcadlang::scene::ImageValue;
 use pcadlang::vision::ContourMap;
 
@@ -83,7 +84,7 @@ fn lines(map: &ContourMap, (width, height): (u32, u32)) -> RgbImage {
     pictures::contours(
         width,
         height,
-        &Strokes { width: map.width, height: map.height, x, y, tx, ty, length: &length },
+        &ContourSlice { width: map.width, height: map.height, x, y, tx, ty, length: &length },
     )
 }
 

@@ -17,7 +17,7 @@ use pcadlang::render::{Camera, View};
 use pcadlang::report::RunDir;
 use pcadlang::report::pictures::{self, png};
 use pcadlang::scene::{ImageValue, ViewValue};
-use pcadlang::session::{detected, exported, exported_operand, over, strokes};
+use pcadlang::session::{detected, exported, exported_operand, over};
 use pcadlang::trace::Trace;
 use pcadlang::vision::{Photo, npy};
 use std::sync::Arc;
@@ -108,7 +108,7 @@ fn draw(
     }
     let mut over = over(view, photo.map(Photo::rgb), (width, height));
     detected(&mut over, located, (width, height));
-    let lines = pictures::contours(frame.width, frame.height, &strokes(&view.contours(size)));
+    let lines = pictures::contours(frame.width, frame.height, &view.contours(size).slice());
     write_in(dir, "overlay.png", &encode(png(&over))?)?;
     write_in(dir, "contours.png", &encode(png(&lines))?)?;
     let (spread, agreement) = frequency(chains, seed, 128);

@@ -1,6 +1,7 @@
 //! Limbs: lines from joint to joint.
 
-use super::strokes::{Strokes, draw_strokes};
+use super::strokes::draw_strokes;
+use crate::render::ContourSlice;
 use image::RgbImage;
 
 /// Draws lines between points. Positions are in pixels of a picture of `width` x `height`
@@ -19,7 +20,7 @@ pub fn limbs(
     let length = vec![1.0; ends.len()];
     draw_strokes(
         out,
-        &Strokes { width, height, x: &x, y: &y, tx: &tx, ty: &ty, length: &length },
+        &ContourSlice { width, height, x: &x, y: &y, tx: &tx, ty: &ty, length: &length },
         color,
     );
 }

@@ -15,8 +15,8 @@ mod surface;
 pub use dots::{DETECTED, OF_SCENE, dots};
 pub use limbs::limbs;
 pub use sheet::{captioned_sheet, contact_sheet};
-pub use strokes::{Strokes, contours};
-pub use surface::{Drawn, frequency, mask, overlay, shaded};
+pub use strokes::contours;
+pub use surface::{frequency, mask, overlay, shaded};
 
 /// Pictures are enlarged until their longer side has this many pixels.
 pub const LONGER_SIDE: u32 = 768;

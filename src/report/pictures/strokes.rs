@@ -1,29 +1,11 @@
 //! Contours: short straight strokes, drawn with anti-aliasing.
 
 use super::{LONGER_SIDE, mix};
+use crate::render::ContourSlice;
 use image::RgbImage;
 
-/// Short straight strokes of contours, in pixels of a picture of `width` x `height`.
-#[derive(Clone, Copy, Debug)]
-pub struct Strokes<'a> {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// The x coordinates of the centres.
-    pub x: &'a [f32],
-    /// The y coordinates of the centres.
-    pub y: &'a [f32],
-    /// The x components of the unit tangents.
-    pub tx: &'a [f32],
-    /// The y components of the unit tangents.
-    pub ty: &'a [f32],
-    /// Lengths.
-    pub length: &'a [f32],
-}
-
 /// Draws bright contours on black, like a contour map.
-pub fn contours(width: u32, height: u32, strokes: &Strokes) -> RgbImage {
+pub fn contours(width: u32, height: u32, strokes: &ContourSlice) -> RgbImage {
     let mut out = RgbImage::new(width, height);
     draw_strokes(&mut out, strokes, [255.0; 3]);
     out
@@ -32,7 +14,7 @@ pub fn contours(width: u32, height: u32, strokes: &Strokes) -> RgbImage {
 /// Draws strokes, scaled to the picture, about 2 pixels wide in one of [`LONGER_SIDE`].
 /// Coverage falls linearly from 1 to 0 over one pixel across the edge of a stroke; where
 /// strokes meet, the larger coverage counts, so joints are not visible.
-pub(super) fn draw_strokes(out: &mut RgbImage, s: &Strokes, color: [f32; 3]) {
+pub(super) fn draw_strokes(out: &mut RgbImage, s: &ContourSlice, color: [f32; 3]) {
     let (width, height) = (out.width() as usize, out.height() as usize);
     let (w, h) = (width as f32, height as f32);
     let (sx, sy) = (w / s.width.max(1) as f32, h / s.height.max(1) as f32);
@@ -77,8 +59,13 @@ pub(super) fn draw_strokes(out: &mut RgbImage, s: &Strokes, color: [f32; 3]) {
 mod tests {
     use super::*;
 
-    fn one<'a>(x: &'a [f32], y: &'a [f32], t: &'a [[f32; 1]; 2], length: &'a [f32]) -> Strokes<'a> {
-        Strokes { width: 20, height: 20, x, y, tx: &t[0], ty: &t[1], length }
+    fn one<'a>(
+        x: &'a [f32],
+        y: &'a [f32],
+        t: &'a [[f32; 1]; 2],
+        length: &'a [f32],
+    ) -> ContourSlice<'a> {
+        ContourSlice { width: 20, height: 20, x, y, tx: &t[0], ty: &t[1], length }
     }
 
     #[test]

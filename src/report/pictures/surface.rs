@@ -1,25 +1,11 @@
 //! The surface of a draw: shaded, over a photograph, as a mask, and how often draws cover
 //! each pixel.
 
-use super::strokes::{Strokes, draw_strokes};
+use super::strokes::draw_strokes;
 use super::{LONGER_SIDE, mix};
+use crate::render::{ContourSlice, Frame};
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, Luma, Rgb, RgbImage};
-
-/// A rendered scene: row by row, `width` x `height` pixels.
-#[derive(Clone, Copy, Debug)]
-pub struct Drawn<'a> {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// Depth along the viewing axis, infinite outside the object.
-    pub depth: &'a [f32],
-    /// Unit normals in the camera's frame: x right, y up, z towards the camera.
-    pub normal: &'a [[f32; 3]],
-    /// The visible part of the scene, counted from 0; if empty, everything is one part.
-    pub part: &'a [u16],
-}
 
 /// The opacity of the surface over the photograph.
 const OVER: f32 = 0.55;
@@ -44,7 +30,7 @@ fn light([x, y, z]: [f32; 3]) -> f32 {
 }
 
 /// Returns the colour of a pixel; `None` outside the object.
-fn shade(d: &Drawn, i: usize) -> Option<[f32; 3]> {
+fn shade(d: &Frame, i: usize) -> Option<[f32; 3]> {
     if !d.depth.get(i)?.is_finite() {
         return None;
     }
@@ -64,7 +50,7 @@ fn vivid(c: [f32; 3]) -> [f32; 3] {
 /// Draws the surface over the photograph, half transparent, with its contours on top. The
 /// result has the drawing's size, but a small picture is enlarged to [`LONGER_SIDE`] so
 /// that details are visible.
-pub fn overlay(photo: Option<&RgbImage>, drawn: &Drawn, strokes: &Strokes) -> RgbImage {
+pub fn overlay(photo: Option<&RgbImage>, drawn: &Frame, strokes: &ContourSlice) -> RgbImage {
     let mut out = match photo.filter(|p| p.width() > 0 && p.height() > 0) {
         Some(p) if p.dimensions() == (drawn.width, drawn.height) => p.clone(),
         Some(p) => resize(p, drawn.width, drawn.height, FilterType::CatmullRom),
@@ -84,7 +70,7 @@ pub fn overlay(photo: Option<&RgbImage>, drawn: &Drawn, strokes: &Strokes) -> Rg
 }
 
 /// Draws the shaded surface on a light background.
-pub fn shaded(drawn: &Drawn) -> RgbImage {
+pub fn shaded(drawn: &Frame) -> RgbImage {
     let mut out = RgbImage::from_pixel(drawn.width, drawn.height, Rgb([250; 3]));
     for (i, p) in out.pixels_mut().enumerate() {
         if let Some(s) = shade(drawn, i) {
@@ -95,7 +81,7 @@ pub fn shaded(drawn: &Drawn) -> RgbImage {
 }
 
 /// Draws the object white on black.
-pub fn mask(drawn: &Drawn) -> GrayImage {
+pub fn mask(drawn: &Frame) -> GrayImage {
     let on = |i: usize| drawn.depth.get(i).is_some_and(|z| z.is_finite());
     from_fn(drawn.width, drawn.height, |i| if on(i) { 255 } else { 0 })
 }
@@ -118,8 +104,8 @@ fn from_fn(width: u32, height: u32, value: impl Fn(usize) -> u8) -> GrayImage {
 mod tests {
     use super::*;
 
-    fn none() -> Strokes<'static> {
-        Strokes { width: 2, height: 2, x: &[], y: &[], tx: &[], ty: &[], length: &[] }
+    fn none() -> ContourSlice<'static> {
+        ContourSlice { width: 2, height: 2, x: &[], y: &[], tx: &[], ty: &[], length: &[] }
     }
 
     #[test]
@@ -127,7 +113,7 @@ mod tests {
         let mut depth = vec![f32::INFINITY; 768 * 2];
         depth[1] = 3.0;
         let normal = vec![[0.0, 0.0, 1.0]; 768 * 2];
-        let drawn = Drawn { width: 768, height: 2, depth: &depth, normal: &normal, part: &[] };
+        let drawn = Frame { width: 768, height: 2, depth, normal, part: vec![] };
         for ground in [[0, 0, 0], [200, 10, 90]] {
             let o = overlay(Some(&RgbImage::from_pixel(768, 2, Rgb(ground))), &drawn, &none());
             assert_eq!(o.get_pixel(0, 0).0, ground);
@@ -141,11 +127,10 @@ mod tests {
 
     #[test]
     fn small_pictures_are_enlarged() {
-        let (depth, normal) = ([1.0; 4], [[0.0, 0.0, 1.0]; 4]);
-        let drawn =
-            Drawn { width: 2, height: 2, depth: &depth, normal: &normal, part: &[0, 1, 2, 3] };
+        let (depth, normal) = (vec![1.0; 4], vec![[0.0, 0.0, 1.0]; 4]);
+        let drawn = Frame { width: 2, height: 2, depth, normal, part: vec![0, 1, 2, 3] };
         assert_eq!(overlay(None, &drawn, &none()).dimensions(), (768, 768));
-        let empty = Drawn { width: 0, height: 0, depth: &[], normal: &[], part: &[] };
+        let empty = Frame { width: 0, height: 0, depth: vec![], normal: vec![], part: vec![] };
         assert_eq!(overlay(None, &empty, &none()).dimensions(), (0, 0));
     }
 
@@ -162,12 +147,12 @@ mod tests {
 
     #[test]
     fn parts_differ_and_short_buffers_are_background() {
-        let drawn = Drawn {
+        let drawn = Frame {
             width: 3,
             height: 1,
-            depth: &[1.0; 2],
-            normal: &[[0.0, 0.0, 1.0]; 2],
-            part: &[0, 1],
+            depth: vec![1.0; 2],
+            normal: vec![[0.0, 0.0, 1.0]; 2],
+            part: vec![0, 1],
         };
         let s = shaded(&drawn);
         assert_ne!(s.get_pixel(0, 0), s.get_pixel(1, 0));
