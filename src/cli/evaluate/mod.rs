@@ -8,12 +8,10 @@ mod dataset;
 mod observed;
 
 use super::args::{Evaluate, Inputs, Job};
-use super::edges;
 use super::failure::{Failure, plain};
 use super::running::job::{CHECKPOINT, Interrupt, RunMode};
-use super::running::resume;
-use super::running::{inputs, job, quality};
-use super::term;
+use super::running::{inputs, job, quality, resume};
+use super::{edges, term};
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
 pub use observed::{Detections, Items, observations_for};
