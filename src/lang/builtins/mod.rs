@@ -39,7 +39,7 @@ pub use table::{Constant, Defaults, InputHook, Table};
 
 use super::error::Fault;
 use super::value::{MOST_ELEMENTS, MOST_NESTED, Value};
-use crate::dist::Dist;
+use crate::dist::{Dist, Numbers};
 use smallvec::SmallVec;
 use std::borrow::Cow;
 use std::fmt;
@@ -160,12 +160,7 @@ pub enum Scalar {
     /// A function of a truth value.
     Logic(fn(bool) -> bool),
     /// A family of distributions with numbers as parameters.
-    Family {
-        /// Makes the distribution; `None` if a parameter is invalid.
-        make: fn(&[f64]) -> Option<Dist>,
-        /// The log density of a number, without keeping the distribution.
-        log_density: fn(&[f64], f64) -> Option<f64>,
-    },
+    Family(Numbers),
     /// A distribution over 0, 1, … with an array of weights.
     Weights {
         /// Makes the distribution; `None` if the weights are invalid.

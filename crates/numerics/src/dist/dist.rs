@@ -1,96 +1,8 @@
-//! Any distribution, by value: most scalar families are stored inline, the others behind
-//! a pointer.
+//! The methods of a distribution of any family.
 
-use super::*;
+use super::families::each;
+use super::{CdfSlopes, Datum, Dist, Distribution, Gradient, Support, Tails};
 use crate::rng::Stream;
-use std::sync::Arc;
-
-/// A distribution of any family, at most 48 bytes.
-#[derive(Clone, Debug)]
-#[allow(missing_docs)]
-pub enum Dist {
-    Normal(Normal),
-    LogNormal(LogNormal),
-    Uniform(Uniform),
-    Beta(Beta),
-    Gamma(Gamma),
-    Exponential(Exponential),
-    HalfNormal(HalfNormal),
-    HalfCauchy(HalfCauchy),
-    StudentT(StudentT),
-    InvGamma(InvGamma),
-    Cauchy(Cauchy),
-    Laplace(Laplace),
-    VonMises(VonMises),
-    Weibull(Weibull),
-    NegBinomial(NegBinomial),
-    Geometric(Geometric),
-    Flat(Flat),
-    Flip(Flip),
-    UniformDiscrete(UniformDiscrete),
-    Binomial(Binomial),
-    Poisson(Poisson),
-    Categorical(Categorical),
-    TruncatedNormal(Arc<TruncatedNormal>),
-    Truncated(Arc<Truncated>),
-    Multinomial(Arc<Multinomial>),
-    Lkj(Arc<Lkj>),
-    Wishart(Arc<Wishart>),
-    Ordered(Arc<Ordered>),
-    Mixture(Arc<Mixture>),
-    Dirichlet(Arc<Dirichlet>),
-    MvNormal(Arc<MvNormal>),
-    Gp(Arc<Gp>),
-    Iid(Arc<Iid>),
-    Product(Arc<Product>),
-    /// A distribution provided by a host program.
-    Custom(Arc<dyn Distribution>),
-}
-
-const _: () = assert!(size_of::<Dist>() <= 48);
-
-/// Evaluates the same expression for every family.
-macro_rules! each {
-    ($dist:expr, $d:ident => $body:expr) => {
-        match $dist {
-            Dist::Normal($d) => $body,
-            Dist::LogNormal($d) => $body,
-            Dist::Uniform($d) => $body,
-            Dist::Beta($d) => $body,
-            Dist::Gamma($d) => $body,
-            Dist::Exponential($d) => $body,
-            Dist::HalfNormal($d) => $body,
-            Dist::HalfCauchy($d) => $body,
-            Dist::StudentT($d) => $body,
-            Dist::InvGamma($d) => $body,
-            Dist::Cauchy($d) => $body,
-            Dist::Laplace($d) => $body,
-            Dist::VonMises($d) => $body,
-            Dist::Weibull($d) => $body,
-            Dist::NegBinomial($d) => $body,
-            Dist::Geometric($d) => $body,
-            Dist::Flat($d) => $body,
-            Dist::TruncatedNormal($d) => $body,
-            Dist::Truncated($d) => $body,
-            Dist::Multinomial($d) => $body,
-            Dist::Lkj($d) => $body,
-            Dist::Wishart($d) => $body,
-            Dist::Ordered($d) => $body,
-            Dist::Mixture($d) => $body,
-            Dist::Flip($d) => $body,
-            Dist::UniformDiscrete($d) => $body,
-            Dist::Binomial($d) => $body,
-            Dist::Poisson($d) => $body,
-            Dist::Categorical($d) => $body,
-            Dist::Dirichlet($d) => $body,
-            Dist::MvNormal($d) => $body,
-            Dist::Gp($d) => $body,
-            Dist::Iid($d) => $body,
-            Dist::Product($d) => $body,
-            Dist::Custom($d) => $body,
-        }
-    };
-}
 
 /// Defines inherent methods that forward to [`Distribution`].
 macro_rules! forward {
@@ -141,6 +53,18 @@ impl Dist {
         mean() -> Option<f64>;
         /// See [`Distribution::sd`].
         sd() -> Option<f64>;
+        /// See [`Distribution::cdf_slopes`].
+        #[doc(hidden)]
+        cdf_slopes(x: f64) -> Option<CdfSlopes>;
+        /// See [`Distribution::param_count`].
+        param_count() -> usize;
+        /// Returns whether the support of the continuous values depends on the parameters.
+        has_moving_support() -> bool;
+        /// See [`Distribution::from_noncentred_vjp`].
+        from_noncentred_vjp(by: &[f64]) -> Option<Vec<f64>>;
+        /// Returns the number of independent elements, each of which is a separate choice;
+        /// `None` if the distribution is a single choice.
+        elements() -> Option<usize>;
     }
 
     /// Returns the log density of a number.
@@ -152,83 +76,74 @@ impl Dist {
     /// Returns the log probability of a truth value.
     #[inline]
     pub fn log_density_bool(&self, x: bool) -> f64 {
-        match self {
-            Dist::Flip(d) => d.log_probability(x),
-            _ => self.log_density(&Datum::Bool(x)),
+        self.log_density(&Datum::Bool(x))
+    }
+
+    /// Returns the log probabilities on both sides of a number; `None` if they are not
+    /// known.
+    pub(super) fn tails(&self, x: f64) -> Option<Tails> {
+        match x {
+            f64::INFINITY => Some(Tails::ALL_BELOW),
+            f64::NEG_INFINITY => Some(Tails::NONE_BELOW),
+            x => each!(self, d => d.tails(x)),
         }
     }
 
-    /// Returns the number of independent elements, each of which is a separate choice;
-    /// `None` if the distribution is a single choice.
-    pub fn elements(&self) -> Option<usize> {
-        match self {
-            Dist::Iid(d) => Some(d.len()),
-            Dist::Product(d) => Some(d.len()),
-            _ => None,
-        }
+    /// For a number x(y) that is stored as an unconstrained coordinate y: returns the
+    /// derivatives with respect to the parameters, with y fixed, of f(x(y)) + log
+    /// |dx/dy|, where `by` is df/dx. `None` if they are not known.
+    pub fn by_bounds(&self, x: &Datum, by: f64) -> Option<Vec<f64>> {
+        let x = x.num()?;
+        // With respect to the lower and the upper bound.
+        let (lo, hi) = match self.support() {
+            // x = lo + (hi - lo) p, log |dx/dy| = log (hi - lo) + log p + log (1 - p).
+            Support::Interval { lo, hi } => {
+                let (width, p) = (hi - lo, (x - lo) / (hi - lo));
+                (by * (1.0 - p) - 1.0 / width, by * p + 1.0 / width)
+            }
+            Support::AtLeast { .. } => (by, 0.0),
+            Support::AtMost { .. } => (0.0, by),
+            _ => (0.0, 0.0),
+        };
+        each!(self, d => d.by_bounds(lo, hi))
     }
 
     /// Returns the distribution of element `i`, or `self` if that element does not exist.
     pub fn element(&self, i: usize) -> Dist {
-        match self {
-            Dist::Iid(d) => d.one().clone(),
-            Dist::Product(d) => d.parts().get(i).unwrap_or(self).clone(),
-            _ => self.clone(),
-        }
-    }
-
-    /// Returns how many distributions it is made of, including repeats; `None` if they
-    /// are nested deeper than `depth`. May stop counting above `most`.
-    pub fn parts(&self, depth: u32, most: usize) -> Option<usize> {
-        let inside = |parts: &[Dist]| {
-            let mut sum = 0usize;
-            for p in parts.iter().filter(|p| p.is_compound()) {
-                sum = sum.saturating_add(p.parts(depth.checked_sub(1)?, most)?);
-                if sum > most {
-                    break;
-                }
-            }
-            Some(sum.saturating_add(parts.len()))
-        };
-        match self {
-            Dist::Iid(d) => Some(inside(std::slice::from_ref(d.one()))?.saturating_mul(d.len())),
-            Dist::Ordered(d) => Some(inside(d.distinct())?.saturating_mul(d.repeats())),
-            Dist::Truncated(d) => inside(std::slice::from_ref(d.base())),
-            Dist::Product(d) => inside(d.parts()),
-            Dist::Mixture(d) => inside(d.components()),
-            _ => Some(1),
-        }
-    }
-
-    /// Returns whether it is made of other distributions.
-    fn is_compound(&self) -> bool {
-        matches!(
-            self,
-            Dist::Iid(_)
-                | Dist::Ordered(_)
-                | Dist::Truncated(_)
-                | Dist::Product(_)
-                | Dist::Mixture(_)
-        )
+        each!(self, d => d.element(i)).unwrap_or(self).clone()
     }
 
     /// Returns the log density of element `i`; -inf if it does not exist.
     #[inline]
     pub fn element_log_density(&self, i: usize, x: &Datum) -> f64 {
         match self {
-            Dist::Iid(d) if i < d.len() => d.one().log_density(x),
-            Dist::Product(d) => d.parts().get(i).map_or(f64::NEG_INFINITY, |p| p.log_density(x)),
-            _ => f64::NEG_INFINITY,
+            Dist::Iid(d) if i >= d.len() => f64::NEG_INFINITY,
+            d => each!(d, d => d.element(i)).map_or(f64::NEG_INFINITY, |p| p.log_density(x)),
         }
+    }
+
+    /// Returns how many distributions it is made of, including repeats; `None` if they
+    /// are nested deeper than `depth`. May stop counting above `most`.
+    pub fn parts(&self, depth: u32, most: usize) -> Option<usize> {
+        let Some((parts, repeats)) = each!(self, d => d.made_of()) else { return Some(1) };
+        let mut sum = 0usize;
+        for p in parts.iter().filter(|p| p.is_compound()) {
+            sum = sum.saturating_add(p.parts(depth.checked_sub(1)?, most)?);
+            if sum > most {
+                break;
+            }
+        }
+        Some(sum.saturating_add(parts.len()).saturating_mul(repeats))
+    }
+
+    /// Returns whether it is made of other distributions.
+    fn is_compound(&self) -> bool {
+        each!(self, d => d.made_of()).is_some()
     }
 
     /// Returns the same distribution in centred form, which stores values, as elements of
     /// a product do.
     pub fn centred(self) -> Dist {
-        match self {
-            Dist::Gp(d) if d.is_stored_whitened() => Dist::Gp(Arc::new(d.to_centred())),
-            Dist::MvNormal(d) if d.is_stored_whitened() => Dist::MvNormal(Arc::new(d.to_centred())),
-            other => other,
-        }
+        each!(&self, d => d.centred()).unwrap_or(self)
     }
 }

@@ -13,9 +13,9 @@ mod dist;
 mod distribution;
 mod draw;
 mod families;
+mod family;
 mod joint;
 mod param;
-mod reverse;
 mod scalar;
 mod support;
 mod tails;
@@ -48,9 +48,9 @@ pub use discrete::multinomial::Multinomial;
 pub use discrete::neg_binomial::NegBinomial;
 pub use discrete::poisson::Poisson;
 pub use discrete::uniform_discrete::UniformDiscrete;
-pub use dist::Dist;
 pub use distribution::{Distribution, Gradient};
-pub use families::{FAMILIES, Family, ParamDoc};
+pub use families::{Dist, FAMILIES};
+pub use family::{Family, Named, Numbers, ParamDoc, ParamKind};
 pub use joint::covariance::Covariance;
 pub use joint::dirichlet::Dirichlet;
 pub use joint::factor::Factor;
@@ -67,6 +67,11 @@ pub use param::ParamError;
 pub use scalar::{Scalar, Slope};
 pub use support::{MAX_ENUMERATED, Support};
 pub use tails::{CdfSlopes, Tails};
+
+// For the families, which import everything above.
+use crate::rng::Stream;
+use smallvec::smallvec;
+use std::sync::Arc;
 
 #[cfg(test)]
 mod tests;

@@ -135,10 +135,10 @@ impl Gaussian {
 
 /// Implements [`crate::dist::Distribution`] for a family that wraps a [`Gaussian`].
 macro_rules! gaussian_family {
-    ($family:ident, $name:literal) => {
+    ($family:ident) => {
         impl $crate::dist::Distribution for $family {
             fn name(&self) -> &'static str {
-                $name
+                <$family as $crate::dist::Named>::NAME
             }
 
             fn support(&self) -> $crate::dist::Support {
@@ -151,6 +151,14 @@ macro_rules! gaussian_family {
 
             fn is_stored_whitened(&self) -> bool {
                 self.0.whitened
+            }
+
+            fn from_noncentred_vjp(&self, by: &[f64]) -> Option<Vec<f64>> {
+                Some(self.0.factor.transposed_times(by))
+            }
+
+            fn centred(&self) -> Option<$crate::dist::Dist> {
+                self.0.whitened.then(|| self.to_centred().into())
             }
 
             $crate::dist::joint::gaussian::forward! {

@@ -3,7 +3,7 @@
 use crate::dist::joint::factor::Factor;
 use crate::dist::joint::gaussian::{Gaussian, gaussian_family};
 use crate::dist::param::finite;
-use crate::dist::{Covariance, ParamError};
+use crate::dist::*;
 
 /// The largest number of points: the time to factor their covariance grows with its cube.
 const MOST_POINTS: usize = 4000;
@@ -43,15 +43,15 @@ impl Gp {
         jitter: f64,
     ) -> Result<Gp, ParamError> {
         if !(jitter >= 0.0 && jitter.is_finite()) {
-            return Err(ParamError::new("gp", "jitter", jitter, "must be finite and not negative"));
+            return Err(Self::bad("jitter", jitter, "must be finite and not negative"));
         }
         if mean.len() != at.len() {
             let value = format!("{} for {}", mean.len(), at.len());
-            return Err(ParamError::new("gp", "mean", value, "must have one number per point"));
+            return Err(Self::bad("mean", value, "must have one number per point"));
         }
         if at.len() > MOST_POINTS {
             let rule = "must have at most 4000 points";
-            return Err(ParamError::new("gp", "at", at.len(), rule));
+            return Err(Self::bad("at", at.len(), rule));
         }
         for m in &mean {
             finite("gp", "mean", *m)?;
@@ -62,7 +62,7 @@ impl Gp {
         let packed = cov.packed(at, jitter * cov.variance());
         let singular = || {
             let value = format!("{cov} at {} points", at.len());
-            ParamError::new("gp", "cov", value, "must make a positive definite matrix")
+            Self::bad("cov", value, "must make a positive definite matrix")
         };
         let factor = Factor::new(at.len(), packed).map_err(|_| singular())?;
         Ok(Gp(Gaussian { mean: mean.into(), factor, whitened: !centred }, jitter))
@@ -104,12 +104,6 @@ impl Gp {
         }
         Some(out)
     }
-
-    /// Converts derivatives with respect to the value to those with respect to the white
-    /// noise.
-    pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
-        self.0.factor.transposed_times(by)
-    }
 }
 
-gaussian_family!(Gp, "gp");
+gaussian_family!(Gp);

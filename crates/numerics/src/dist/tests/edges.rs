@@ -113,18 +113,18 @@ fn zoo() -> Vec<Dist> {
     ];
     let mut all: Vec<Dist> = cases.iter().map(|(f, p)| make(f, p)).collect();
     let parts = all[..3].to_vec();
-    all.push(Dist::Product(Arc::new(Product::new(parts).unwrap())));
-    all.push(Dist::Iid(Arc::new(Iid::new(make("normal", &[0.0, 1.0]), 3).unwrap())));
+    all.push(Dist::from(Product::new(parts).unwrap()));
+    all.push(Dist::from(Iid::new(make("normal", &[0.0, 1.0]), 3).unwrap()));
     let identity = nalgebra::DMatrix::identity(3, 3);
-    all.push(Dist::MvNormal(Arc::new(MvNormal::from_cov(&[0.0; 3], &identity).unwrap())));
+    all.push(Dist::from(MvNormal::from_cov(&[0.0; 3], &identity).unwrap()));
     let whitened = MvNormal::from_cov(&[0.0; 3], &identity).unwrap().to_whitened();
-    all.push(Dist::MvNormal(Arc::new(whitened)));
+    all.push(Dist::from(whitened));
     let scale = square(3, &[1e-100, 0.0, 0.0, 1e100, 1e100, 0.0, 0.0, 0.0, 1.0]);
     for df in [2.0001, 3.0, 1e300] {
-        all.push(Dist::Wishart(Arc::new(Wishart::new(df, &scale).unwrap())));
+        all.push(Dist::from(Wishart::new(df, &scale).unwrap()));
     }
     for one in [make("cauchy", &[0.0, 1e300]), make("uniform", &[0.0, 1.0]), make("flat", &[])] {
-        all.push(Dist::Ordered(Arc::new(Ordered::new(one, 3).unwrap())));
+        all.push(Dist::from(Ordered::new(one, 3).unwrap()));
     }
     for (family, p, lo, hi) in [
         ("gamma", &[2.0, 1.0][..], 3000.0, INF),
@@ -148,13 +148,13 @@ fn zoo() -> Vec<Dist> {
         make("cauchy", &[0.0, 1e300]),
         make("gamma", &[1e-3, 1.0]),
     ];
-    all.push(Dist::Mixture(Arc::new(Mixture::new(&[1.0, 1e-300, 0.0], extremes).unwrap())));
+    all.push(Dist::from(Mixture::new(&[1.0, 1e-300, 0.0], extremes).unwrap()));
     let gp = |centred| {
         Gp::new(vec![0.0; 3], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0, 1.0], centred)
             .unwrap()
     };
-    all.push(Dist::Gp(Arc::new(gp(false))));
-    all.push(Dist::Gp(Arc::new(gp(true))));
+    all.push(Dist::from(gp(false)));
+    all.push(Dist::from(gp(true)));
     all
 }
 
@@ -349,7 +349,7 @@ fn finite_supports_list_their_values() {
 #[test]
 fn elements_are_distributions_of_their_own() {
     let parts = vec![make("normal", &[0.0, 1.0]), make("flip", &[0.3])];
-    let product = Dist::Product(Arc::new(Product::new(parts.clone()).unwrap()));
+    let product = Dist::from(Product::new(parts.clone()).unwrap());
     assert_eq!(product.elements(), Some(2));
     assert_eq!(parts[0].elements(), None);
     let x = Datum::List(vec![Datum::Num(0.4), Datum::Bool(true)].into());
@@ -357,10 +357,10 @@ fn elements_are_distributions_of_their_own() {
     assert_eq!(sum, product.log_density(&x));
     assert_eq!(product.element(1).log_density_bool(true), parts[1].log_density_bool(true));
     assert_eq!(product.element_log_density(2, &Datum::Num(0.0)), NEVER);
-    let none = Dist::Iid(Arc::new(Iid::new(parts[0].clone(), 0).unwrap()));
+    let none = Dist::from(Iid::new(parts[0].clone(), 0).unwrap());
     assert_eq!(none.log_density(&none.sample(&mut stream(602))), 0.0);
     let gp =
         Gp::new(vec![0.0; 2], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0], false).unwrap();
-    let two = Dist::Iid(Arc::new(Iid::new(Dist::Gp(Arc::new(gp)), 2).unwrap()));
+    let two = Dist::from(Iid::new(Dist::from(gp), 2).unwrap());
     assert!(!two.element(0).is_stored_whitened() && two.is_gaussian());
 }
