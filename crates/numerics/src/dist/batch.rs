@@ -63,8 +63,9 @@ pub(super) trait Member<const N: usize>:
 
     fn log_density(&self, x: f64) -> f64;
 
-    /// Returns the derivatives of the log density.
-    fn slope(&self, x: f64) -> Slope;
+    /// Returns the derivatives with respect to the number (0 if it is discrete) and to the
+    /// parameters.
+    fn slopes(&self, x: f64) -> (f64, [f64; N]);
 }
 
 impl<T, const N: usize> Member<N> for T
@@ -82,19 +83,12 @@ where
     }
 
     #[inline]
-    fn slope(&self, x: f64) -> Slope {
-        Scalar::slope(self, x)
+    fn slopes(&self, x: f64) -> (f64, [f64; N]) {
+        let slope = self.slope(x);
+        let mut params = [0.0; N];
+        params.iter_mut().zip(&slope.params).for_each(|(p, s)| *p = *s);
+        (slope.x.unwrap_or(0.0), params)
     }
-}
-
-/// Returns the derivatives with respect to the number (0 if it is discrete) and to the
-/// parameters.
-#[inline]
-fn slopes<const N: usize>(d: &impl Member<N>, x: f64) -> (f64, [f64; N]) {
-    let slope = d.slope(x);
-    let mut params = [0.0; N];
-    params.iter_mut().zip(&slope.params).for_each(|(p, s)| *p = *s);
-    (slope.x.unwrap_or(0.0), params)
 }
 
 /// Distributions, one for all numbers or one for each, with the parameters they were made
@@ -139,7 +133,7 @@ impl<T: Member<N>, const N: usize> Component for Members<T, N> {
 
     fn slopes_num(&self, x: f64, params: &mut [f64; 3]) -> f64 {
         let Some((_, d)) = self.0.first() else { return 0.0 };
-        let (by, own) = slopes(d, x);
+        let (by, own) = d.slopes(x);
         params.iter_mut().zip(own).for_each(|(p, s)| *p = s);
         by
     }
@@ -180,7 +174,7 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         let columns = <&[Column; N]>::try_from(params).ok();
         let (mut of_x, mut of_params) = (0.0, [0.0; N]);
         for i in 0..n {
-            let (gx, gp) = slopes(&self.0[if each { i } else { 0 }].1, x.get(buffer, i));
+            let (gx, gp) = self.0[if each { i } else { 0 }].1.slopes(x.get(buffer, i));
             if x.live {
                 if x.step == 0 { of_x += gx } else { by[x.at + i] += gx * weight }
             }

@@ -6,65 +6,43 @@ use crate::rng::Stream;
 
 /// Defines inherent methods that forward to [`Distribution`].
 macro_rules! forward {
-    ($($(#[$doc:meta])* $name:ident($($arg:ident: $ty:ty),*) -> $out:ty;)*) => {
-        $($(#[$doc])* pub fn $name(&self, $($arg: $ty),*) -> $out { each!(self, d => d.$name($($arg),*)) })*
-    };
+    ($($(#[$attribute:meta])* $name:ident($($arg:ident: $ty:ty),*) -> $out:ty;)*) => {$(
+        #[doc = concat!("See [`Distribution::", stringify!($name), "`].")]
+        $(#[$attribute])*
+        pub fn $name(&self, $($arg: $ty),*) -> $out {
+            each!(self, d => d.$name($($arg),*))
+        }
+    )*};
 }
 
 impl Dist {
     forward! {
-        /// See [`Distribution::name`].
         name() -> &str;
-        /// See [`Distribution::support`].
         support() -> Support;
-        /// See [`Distribution::sample`].
         sample(rng: &mut Stream) -> Datum;
-        /// See [`Distribution::log_density`].
         #[inline]
         log_density(x: &Datum) -> f64;
-        /// See [`Distribution::gradient`].
         gradient(x: &Datum) -> Option<Gradient>;
-        /// See [`Distribution::is_gaussian`].
+        param_count() -> usize;
+        has_moving_support() -> bool;
         is_gaussian() -> bool;
-        /// See [`Distribution::whiten`].
         whiten(x: &Datum) -> Option<Vec<f64>>;
-        /// See [`Distribution::colour`].
         colour(z: &[f64]) -> Option<Datum>;
-        /// See [`Distribution::is_scalar`].
         is_scalar() -> bool;
-        /// See [`Distribution::is_improper`].
         is_improper() -> bool;
-        /// See [`Distribution::is_stored_whitened`].
         is_stored_whitened() -> bool;
-        /// See [`Distribution::sample_stored`].
         sample_stored(rng: &mut Stream) -> Datum;
-        /// See [`Distribution::log_density_stored`].
         #[inline]
         log_density_stored(s: &Datum) -> f64;
-        /// See [`Distribution::gradient_stored`].
         gradient_stored(s: &Datum) -> Option<Gradient>;
-        /// See [`Distribution::from_noncentred`].
         from_noncentred(s: &Datum) -> Datum;
-        /// See [`Distribution::to_noncentred`].
+        from_noncentred_vjp(by: &[f64]) -> Option<Vec<f64>>;
         to_noncentred(value: &Datum) -> Option<Datum>;
-        /// See [`Distribution::stored_support`].
         stored_support() -> Support;
-        /// See [`Distribution::mean`].
         mean() -> Option<f64>;
-        /// See [`Distribution::sd`].
         sd() -> Option<f64>;
-        /// See [`Distribution::cdf_slopes`].
         #[doc(hidden)]
         cdf_slopes(x: f64) -> Option<CdfSlopes>;
-        /// See [`Distribution::param_count`].
-        param_count() -> usize;
-        /// Returns whether the support of the continuous values depends on the parameters.
-        has_moving_support() -> bool;
-        /// See [`Distribution::from_noncentred_vjp`].
-        from_noncentred_vjp(by: &[f64]) -> Option<Vec<f64>>;
-        /// Returns the number of independent elements, each of which is a separate choice;
-        /// `None` if the distribution is a single choice.
-        elements() -> Option<usize>;
     }
 
     /// Returns the log density of a number.
@@ -76,7 +54,10 @@ impl Dist {
     /// Returns the log probability of a truth value.
     #[inline]
     pub fn log_density_bool(&self, x: bool) -> f64 {
-        self.log_density(&Datum::Bool(x))
+        match self {
+            Dist::Flip(d) => d.log_probability(x),
+            _ => self.log_density(&Datum::Bool(x)),
+        }
     }
 
     /// Returns the log probabilities on both sides of a number; `None` if they are not
@@ -108,17 +89,32 @@ impl Dist {
         each!(self, d => d.by_bounds(lo, hi))
     }
 
+    /// Returns the number of independent elements, each of which is a separate choice;
+    /// `None` if the distribution is a single choice.
+    pub fn elements(&self) -> Option<usize> {
+        match self {
+            Dist::Iid(d) => Some(d.len()),
+            Dist::Product(d) => Some(d.len()),
+            _ => None,
+        }
+    }
+
     /// Returns the distribution of element `i`, or `self` if that element does not exist.
     pub fn element(&self, i: usize) -> Dist {
-        each!(self, d => d.element(i)).unwrap_or(self).clone()
+        match self {
+            Dist::Iid(d) => d.one().clone(),
+            Dist::Product(d) => d.parts().get(i).unwrap_or(self).clone(),
+            _ => self.clone(),
+        }
     }
 
     /// Returns the log density of element `i`; -inf if it does not exist.
     #[inline]
     pub fn element_log_density(&self, i: usize, x: &Datum) -> f64 {
         match self {
-            Dist::Iid(d) if i >= d.len() => f64::NEG_INFINITY,
-            d => each!(d, d => d.element(i)).map_or(f64::NEG_INFINITY, |p| p.log_density(x)),
+            Dist::Iid(d) if i < d.len() => d.one().log_density(x),
+            Dist::Product(d) => d.parts().get(i).map_or(f64::NEG_INFINITY, |p| p.log_density(x)),
+            _ => f64::NEG_INFINITY,
         }
     }
 

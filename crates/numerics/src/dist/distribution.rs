@@ -178,17 +178,4 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     fn made_of(&self) -> Option<(&[Dist], usize)> {
         None
     }
-
-    /// Returns the number of independent elements, each of which is a separate choice;
-    /// `None` if the distribution is a single choice.
-    #[doc(hidden)]
-    fn elements(&self) -> Option<usize> {
-        None
-    }
-
-    /// Returns the distribution of element `i`.
-    #[doc(hidden)]
-    fn element(&self, _i: usize) -> Option<&Dist> {
-        None
-    }
 }

@@ -1,8 +1,7 @@
 //! What the table of families is made of, and the macro that turns its rows into the
 //! type of all distributions, their constructors and their documentation.
 
-use super::Datum;
-use super::{Dist, Distribution, ParamError};
+use super::{Datum, Dist, Distribution, ParamError};
 
 /// The kind of values that a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,6 +16,12 @@ pub struct Tails {
 /// One derivative per parameter.
 pub type CdfSlopes = SmallVec<[f64; 3]>;
 
+impl From<(f64, f64)> for Tails {
+    fn from((below, above): (f64, f64)) -> Tails {
+        Tails { below, above }
+    }
+}
+
 impl Tails {
     /// All of the probability lies below.
     pub const ALL_BELOW: Tails = Tails { below: 0.0, above: f64::NEG_INFINITY };

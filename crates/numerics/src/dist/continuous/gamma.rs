@@ -66,12 +66,12 @@ impl Scalar for Gamma {
     }
 
     fn tails(&self, x: f64) -> Option<Tails> {
-        gamma_tails(self.shape, self.rate * x).map(|(below, above)| Tails { below, above })
+        gamma_tails(self.shape, self.rate * x).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
-        let tails = |a| gamma_tails(a, self.rate * x).map(|(below, above)| Tails { below, above });
+        let tails = |a| gamma_tails(a, self.rate * x).map(Tails::from);
         Some(smallvec![speed_by_differences(self.shape, own, tails)?, x / self.rate])
     }
 

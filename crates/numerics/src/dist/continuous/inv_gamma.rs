@@ -68,12 +68,12 @@ impl Scalar for InvGamma {
         if x <= 0.0 {
             return Some(Tails::NONE_BELOW);
         }
-        gamma_tails(self.shape, self.scale / x).map(|(above, below)| Tails { below, above })
+        gamma_tails(self.shape, self.scale / x).map(|t| Tails::from(t).swapped())
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
-        let tails = |a| gamma_tails(a, self.scale / x).map(|(above, below)| Tails { below, above });
+        let tails = |a| gamma_tails(a, self.scale / x).map(|t| Tails::from(t).swapped());
         Some(smallvec![speed_by_differences(self.shape, own, tails)?, -x / self.scale])
     }
 

@@ -115,8 +115,7 @@ impl Scalar for Binomial {
         if k >= self.n {
             return Some(Tails::ALL_BELOW);
         }
-        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p)
-            .map(|(below, above)| Tails { below, above })
+        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {

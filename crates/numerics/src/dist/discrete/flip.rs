@@ -48,8 +48,8 @@ impl Member<1> for Flip {
     }
 
     #[inline]
-    fn slope(&self, x: f64) -> Slope {
-        Slope::discrete([self.by_p(x != 0.0)])
+    fn slopes(&self, x: f64) -> (f64, [f64; 1]) {
+        (0.0, [self.by_p(x != 0.0)])
     }
 }
 

@@ -67,15 +67,11 @@ impl Scalar for NegBinomial {
             return Some(Tails::NONE_BELOW);
         }
         let k = libm::floor(x);
-        beta_tails(self.r, k + 1.0, self.p, 1.0 - self.p)
-            .map(|(below, above)| Tails { below, above })
+        beta_tails(self.r, k + 1.0, self.p, 1.0 - self.p).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
-        let tails = |r| {
-            beta_tails(r, x + 1.0, self.p, 1.0 - self.p)
-                .map(|(below, above)| Tails { below, above })
-        };
+        let tails = |r| beta_tails(r, x + 1.0, self.p, 1.0 - self.p).map(Tails::from);
         let by_r = speed_by_differences(self.r, self.log_density_num(x), tails)?;
         Some(smallvec![by_r, (self.r + x) / self.p])
     }

@@ -77,7 +77,7 @@ impl Scalar for Poisson {
             return Some(Tails::NONE_BELOW);
         }
         let k = libm::floor(x);
-        gamma_tails(k + 1.0, self.rate).map(|(above, below)| Tails { below, above })
+        gamma_tails(k + 1.0, self.rate).map(|t| Tails::from(t).swapped())
     }
 
     fn cdf_slopes(&self, _x: f64) -> Option<CdfSlopes> {

@@ -96,12 +96,4 @@ impl Distribution for Iid {
     fn made_of(&self) -> Option<(&[Dist], usize)> {
         Some((std::slice::from_ref(&self.one), self.n))
     }
-
-    fn elements(&self) -> Option<usize> {
-        Some(self.n)
-    }
-
-    fn element(&self, _i: usize) -> Option<&Dist> {
-        Some(&self.one)
-    }
 }

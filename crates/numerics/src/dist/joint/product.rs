@@ -93,14 +93,6 @@ impl Distribution for Product {
     fn made_of(&self) -> Option<(&[Dist], usize)> {
         Some((&self.parts, 1))
     }
-
-    fn elements(&self) -> Option<usize> {
-        Some(self.parts.len())
-    }
-
-    fn element(&self, i: usize) -> Option<&Dist> {
-        self.parts.get(i)
-    }
 }
 
 /// Sums the log densities of the elements; -inf if an element is impossible.
