@@ -54,8 +54,8 @@ pub(super) trait Component: Batch {
 pub(super) trait Member<const N: usize>:
     Clone + fmt::Debug + Send + Sync + TryFrom<[f64; N], Error = ParamError>
 {
-    /// Returns the distribution with these parameters, which may reuse results from `self`;
-    /// `None` if they are outside its domain.
+    /// Returns the distribution with these parameters, which may reuse results from
+    /// `self`; `None` if they are outside its domain.
     #[inline]
     fn moved(&self, params: [f64; N]) -> Option<Self> {
         Self::try_from(params).ok()
@@ -63,8 +63,8 @@ pub(super) trait Member<const N: usize>:
 
     fn log_density(&self, x: f64) -> f64;
 
-    /// Returns the derivatives with respect to the number (0 if it is discrete) and to the
-    /// parameters.
+    /// Returns the derivatives with respect to the number (0 if it is discrete) and to
+    /// the parameters.
     fn slopes(&self, x: f64) -> (f64, [f64; N]);
 }
 

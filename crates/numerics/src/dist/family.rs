@@ -105,8 +105,8 @@ pub trait Named {
 ///   before `of` makes the distribution; for `other`, each with its [`ParamKind`];
 /// - what users read about it.
 ///
-/// Inline families of numbers are also scored in batches. The macro is given a `$` for the
-/// macro `each` that it defines.
+/// Inline families of numbers are also scored in batches. The macro is given a `$` for
+/// the macro `each` that it defines.
 macro_rules! families {
     (
         $d:tt
@@ -120,8 +120,8 @@ macro_rules! families {
             density $formula:literal;
         )*
     ) => {
-        /// A distribution of any family, at most 48 bytes: most scalar families are stored
-        /// inline, the others behind a pointer.
+        /// A distribution of any family, at most 48 bytes: most scalar families are
+        /// stored inline, the others behind a pointer.
         #[derive(Clone, Debug)]
         #[allow(missing_docs)]
         pub enum Dist {
@@ -211,8 +211,8 @@ macro_rules! family {
     };
     (new numbers $Family:ident $($p:ident: $check:ident)*) => {
         impl $Family {
-            /// Creates the distribution; fails if a parameter is outside its domain, which
-            /// [`FAMILIES`] describes.
+            /// Creates the distribution; fails if a parameter is outside its domain,
+            /// which [`FAMILIES`] describes.
             #[inline]
             pub fn new($($p: f64),*) -> Result<$Family, ParamError> {
                 $(let $p = param::$check(Self::NAME, stringify!($p), $p)?;)*

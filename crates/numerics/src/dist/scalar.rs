@@ -64,8 +64,8 @@ pub trait Scalar: Named + fmt::Debug + Send + Sync {
     }
 
     /// Returns the derivatives with respect to the parameters of a function of the bounds
-    /// of the support, given those with respect to the bounds; `None` if the bounds do not
-    /// depend on the parameters.
+    /// of the support, given those with respect to the bounds; `None` if the bounds do
+    /// not depend on the parameters.
     fn by_bounds(&self, _lo: f64, _hi: f64) -> Option<CdfSlopes> {
         None
     }
@@ -80,8 +80,8 @@ pub trait Scalar: Named + fmt::Debug + Send + Sync {
         None
     }
 
-    /// Returns the distribution with these parameters, if it can reuse results that `self`
-    /// has computed from its own.
+    /// Returns the distribution with these parameters, if it can reuse results that
+    /// `self` has computed from its own.
     #[inline]
     fn reused(&self, _params: &[f64]) -> Option<Self>
     where

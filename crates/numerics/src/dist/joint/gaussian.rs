@@ -136,6 +136,20 @@ impl Gaussian {
 /// Implements [`crate::dist::Distribution`] for a family that wraps a [`Gaussian`].
 macro_rules! gaussian_family {
     ($family:ident) => {
+        impl $family {
+            /// Returns derivatives with respect to the Cholesky factor, its lower triangle
+            /// by rows. For a centred distribution, they are those of the log density; for
+            /// a whitened one, those of a function of the value whose derivatives with
+            /// respect to the value are `by_value`.
+            pub fn factor_gradient(
+                &self,
+                stored: &$crate::dist::Datum,
+                by_value: &[f64],
+            ) -> Option<Vec<f64>> {
+                self.0.factor_gradient(stored, by_value)
+            }
+        }
+
         impl $crate::dist::Distribution for $family {
             fn name(&self) -> &'static str {
                 <$family as $crate::dist::Named>::NAME

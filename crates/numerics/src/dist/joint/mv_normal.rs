@@ -57,7 +57,7 @@ impl MvNormal {
 
     fn make(mean: &[f64], factor: Factor) -> Result<MvNormal, ParamError> {
         for m in mean {
-            finite("mv_normal", "mean", *m)?;
+            finite(Self::NAME, "mean", *m)?;
         }
         Ok(MvNormal(Gaussian { mean: mean.into(), factor, whitened: false }))
     }
@@ -70,18 +70,6 @@ impl MvNormal {
     /// Returns the same distribution in centred form, which stores values.
     pub fn to_centred(&self) -> MvNormal {
         MvNormal(self.0.centred())
-    }
-
-    /// Returns derivatives with respect to the Cholesky factor, its lower triangle by
-    /// rows. For a centred distribution, they are those of the log density; for a
-    /// whitened one, those of a function of the value whose derivatives with respect to
-    /// the value are `by_value`.
-    pub fn factor_gradient(
-        &self,
-        stored: &crate::dist::Datum,
-        by_value: &[f64],
-    ) -> Option<Vec<f64>> {
-        self.0.factor_gradient(stored, by_value)
     }
 
     /// Converts derivatives with respect to the factor to those with respect to the
