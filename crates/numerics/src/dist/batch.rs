@@ -104,6 +104,7 @@ impl<T: Member<N> + 'static, const N: usize> Members<T, N> {
         width: usize,
         own: fn(&Dist) -> Option<&T>,
     ) -> Option<Box<dyn Component>> {
+        const { assert!(N <= 3, "a mixture keeps the derivatives by at most 3 parameters") };
         let one = |p: &Dist| Some((None, own(p)?.clone()));
         let all: Vec<_> = parts.iter().map(one).collect::<Option<_>>()?;
         (width == 0 || width == N).then(|| Box::new(Members::<T, N>(all)) as Box<dyn Component>)

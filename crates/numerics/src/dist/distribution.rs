@@ -163,6 +163,7 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     /// For a value mean + L z made from white noise z: returns the derivatives with
     /// respect to z of a function whose derivatives with respect to the value are `by`.
     #[doc(hidden)]
+    #[allow(clippy::wrong_self_convention)] // The distribution is the map, not the result.
     fn from_noncentred_vjp(&self, _by: &[f64]) -> Option<Vec<f64>> {
         None
     }
