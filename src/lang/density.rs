@@ -232,16 +232,6 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
             _ if covariance == Some(i) => Adjoint::Unknown,
             // The jitter.
             Value::Num(_) if i == 4 && matches!(dist, Dist::Gp(_)) => Adjoint::Unknown,
-            // An omitted bound still has a place among the parameters.
-            Value::Unit
-                if matches!(
-                    dist,
-                    Dist::TruncatedNormal(_) | Dist::Truncated(_) | Dist::Flat(_)
-                ) =>
-            {
-                take(1);
-                Adjoint::Zero
-            }
             Value::Num(_) if matches!(dist, Dist::Gp(_)) => {
                 Adjoint::Num(take(params.len()).map_or(0.0, |all| all.iter().sum()))
             }

@@ -1,7 +1,7 @@
 //! A built-in, and what it is made of.
 
 use super::data::DataFormat;
-use crate::dist::Dist;
+use crate::dist::{Dist, Numbers};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::fault::Fault;
 use crate::lang::value::Value;
@@ -127,12 +127,7 @@ pub enum Scalar {
     /// A function of a truth value.
     Logic(fn(bool) -> bool),
     /// A family of distributions with numbers as parameters.
-    Family {
-        /// Makes the distribution; `None` if a parameter is invalid.
-        make: fn(&[f64]) -> Option<Dist>,
-        /// The log density of a number, without keeping the distribution.
-        log_density: fn(&[f64], f64) -> Option<f64>,
-    },
+    Family(Numbers),
     /// A distribution over 0, 1, … with an array of weights.
     Weights {
         /// Makes the distribution; `None` if the weights are invalid.

@@ -1,7 +1,7 @@
 //! Distributions composed of other distributions.
 
 use super::Args;
-use super::distributions::{UNBOUNDED, fault};
+use super::distributions::made;
 use super::elementwise::array_len;
 use crate::dist::{self, Dist};
 use crate::lang::error::Fault;
@@ -19,7 +19,7 @@ fn distributions(a: &Args, i: usize) -> Result<Vec<Dist>, Fault> {
 
 /// `n` numbers of a single distribution, or one of each in an array, in ascending order.
 pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
-    let made = match a.get(0) {
+    made(match a.get(0) {
         Value::Dist(d) if a.given(1) => dist::Ordered::new(Dist::clone(d), a.count(1)?),
         Value::Dist(_) => {
             let hint = "ordered(normal(0, 1), 3) is three numbers; list different priors: ordered([d1, d2])";
@@ -32,25 +32,23 @@ pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
         }
         Value::List(_) | Value::Array(_) => dist::Ordered::of(distributions(a, 0)?),
         _ => return Err(a.wrong(0, "a distribution or an array of distributions")),
-    };
-    made.map(|d| Dist::Ordered(Arc::new(d))).map_err(fault)
+    })
 }
 
 /// A distribution truncated to an interval, element by element if a bound is an array.
 pub(super) fn truncated(a: &Args) -> Result<Dist, Fault> {
     let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
     let mut columns: [Option<Arc<[f64]>>; 2] = [None, None];
-    let mut bounds = UNBOUNDED;
+    let mut bounds = [0.0; 2];
     for i in 0..2 {
         match a.get(i + 1) {
-            Value::Unit => {}
             Value::Num(x) => bounds[i] = *x,
             v if array_len(v).is_some() => columns[i] = Some(a.array(i + 1)?),
             _ => return Err(a.wrong(i + 1, "a number or an array of numbers")),
         }
     }
     let Some(n) = columns.iter().flatten().map(|xs| xs.len()).next() else {
-        return dist::truncated(d, bounds[0], bounds[1]).map_err(fault);
+        return made(dist::truncated(d, bounds[0], bounds[1]));
     };
     let expected = d.elements().unwrap_or(n);
     if let Some(i) = columns.iter().position(|c| c.as_ref().is_some_and(|xs| xs.len() != expected))
@@ -60,14 +58,14 @@ pub(super) fn truncated(a: &Args) -> Result<Dist, Fault> {
     let mut elements = Vec::with_capacity(n);
     for k in 0..n {
         let [lo, hi] = [0, 1].map(|i| columns[i].as_ref().map_or(bounds[i], |xs| xs[k]));
-        let made = dist::truncated(&d.element(k), lo, hi);
-        elements.push(made.map_err(|e| Fault::domain(format!("{e} (element {k})")))?);
+        let one = dist::truncated(&d.element(k), lo, hi);
+        elements.push(one.map_err(|e| Fault::domain(format!("{e} (element {k})")))?);
     }
-    dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
+    made(dist::Product::new(elements))
 }
 
 /// A weighted mixture of distributions.
 pub(super) fn mixture(a: &Args) -> Result<Dist, Fault> {
     let components = distributions(a, 1)?;
-    dist::Mixture::new(&a.array(0)?, components).map(|d| Dist::Mixture(Arc::new(d))).map_err(fault)
+    made(dist::Mixture::new(&a.array(0)?, components))
 }

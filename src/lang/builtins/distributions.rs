@@ -1,5 +1,5 @@
-//! The distributions: one built-in per family of [`crate::dist`], which implements and
-//! documents it.
+//! The distributions: one built-in per row of the table of families in [`crate::dist`],
+//! which documents it.
 //!
 //! This module reads the parameters from values. An array as a parameter makes a product
 //! of independent elements, each with its own address. A parameter outside its domain is
@@ -9,252 +9,89 @@ use super::compounds::{mixture, ordered, truncated};
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::linear::matrix::Matrix;
-use super::{Arg, Args, Kind, Row, Scalar, Type, arg, opt};
-use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
+use super::{Args, Argument, Builtin, Kind, Row, Scalar, Type};
+use crate::dist::{self, Dist, FAMILIES, Family, ParamDoc, ParamError, ParamKind};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
+use smallvec::{SmallVec, smallvec};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-const SECTION: &str = "Distributions";
+/// The built-ins of all families.
+pub(super) fn all() -> impl Iterator<Item = Builtin> {
+    FAMILIES.iter().map(builtin)
+}
 
-/// The row of a family whose parameters are all numbers, with the documentation in
-/// `dist`.
-macro_rules! scalar {
-    ($name:literal, [$($p:ident),+], $made:expr) => {
-        other(
-            $name,
-            &const { params::<{ [$(stringify!($p)),+].len() }>($name) },
-            |a| elementwise(a, &[], |[$($p),+]| $made),
-        )
-        .scalar(Scalar::Family {
-            make: |parameters| match *parameters {
-                [$($p),+] => $made.ok(),
-                _ => None,
-            },
-            log_density: |parameters, x| match *parameters {
-                [$($p),+] => $made.ok().map(|d| d.log_density_num(x)),
-                _ => None,
-            },
-        })
+fn builtin(f: &Family) -> Builtin {
+    let kind = Kind::Distribution(reader(f.name));
+    Builtin {
+        args: f.params.iter().map(argument).collect(),
+        scalar: scalar(f),
+        ..Builtin::from(&Row::new(kind, f.name, "Distributions", &[], Type::Dist, f.doc))
+    }
+}
+
+fn argument(p: &ParamDoc) -> Argument {
+    let (ty, value) = match p.kind {
+        ParamKind::Numbers => (Type::Nums, p.default.and_then(|d| d.parse().ok()).map(Value::Num)),
+        ParamKind::Number => (Type::Num, None),
+        ParamKind::Integer => (Type::Int, None),
+        ParamKind::Bool => (Type::Bool, None),
+        ParamKind::Array => (Type::Array, None),
+        ParamKind::Distribution => (Type::Dist, None),
+        ParamKind::Covariance => (Type::Covariance, None),
+        ParamKind::Any => (Type::Any, None),
     };
+    Argument {
+        name: p.name.into(),
+        ty,
+        unit: p.unit.into(),
+        default: p.default.map(Into::into),
+        value: value.unwrap_or_default(),
+        doc: p.doc.into(),
+    }
 }
 
-/// The row of any other family.
-const fn other(
-    name: &'static str,
-    args: &'static [Arg],
-    make: fn(&Args) -> Result<Dist, Fault>,
-) -> Row {
-    Row::new(Kind::Distribution(make), name, SECTION, args, Type::Dist, family(name).doc)
+fn scalar(f: &Family) -> Option<Scalar> {
+    match f.name {
+        "categorical" => Some(Scalar::Weights {
+            make: |weights| dist::Categorical::new(Arc::clone(weights)).map(Dist::from).ok(),
+            log_probability: |weights, x| dist::Categorical::log_probability(weights, x).ok(),
+        }),
+        _ => f.numbers.map(Scalar::Family),
+    }
 }
 
-pub(super) const TABLE: &[Row] = &[
-    scalar!("normal", [mean, sd], dist::Normal::new(mean, sd).map(Dist::Normal)),
-    scalar!("lognormal", [mu, sigma], dist::LogNormal::new(mu, sigma).map(Dist::LogNormal)),
-    scalar!("uniform", [lo, hi], dist::Uniform::new(lo, hi).map(Dist::Uniform)),
-    scalar!("beta", [a, b], dist::Beta::new(a, b).map(Dist::Beta)),
-    scalar!("gamma", [shape, rate], dist::Gamma::new(shape, rate).map(Dist::Gamma)),
-    scalar!("exponential", [rate], dist::Exponential::new(rate).map(Dist::Exponential)),
-    scalar!("half_normal", [sd], dist::HalfNormal::new(sd).map(Dist::HalfNormal)),
-    scalar!(
-        "half_cauchy",
-        [location, scale],
-        dist::HalfCauchy::new(location, scale).map(Dist::HalfCauchy)
-    ),
-    scalar!(
-        "student_t",
-        [df, location, scale],
-        dist::StudentT::new(df, location, scale).map(Dist::StudentT)
-    ),
-    other(
-        "truncated_normal",
-        &[
-            arg("mean", Type::Nums, "The mean before truncation."),
-            arg("sd", Type::Nums, "The standard deviation before truncation, positive."),
-            opt("lo", Type::Nums, "-inf", "The lower bound."),
-            opt("hi", Type::Nums, "inf", "The upper bound, above `lo`."),
-        ],
-        |a| {
-            elementwise(a, &[0.0, 1.0, f64::NEG_INFINITY, f64::INFINITY], |[mean, sd, lo, hi]| {
-                dist::TruncatedNormal::new(mean, sd, lo, hi)
-                    .map(|d| Dist::TruncatedNormal(Arc::new(d)))
-            })
+/// Returns what makes a distribution from values: for families whose parameters are not
+/// all numbers, a function of their own.
+fn reader(family: &str) -> fn(&Args) -> Result<Dist, Fault> {
+    match family {
+        "truncated" => truncated,
+        "categorical" => |a| made(dist::Categorical::new(a.array(0)?)),
+        "dirichlet" => |a| made(dist::Dirichlet::new(&a.array(0)?)),
+        "multinomial" => |a| made(dist::Multinomial::new(a.num(0)?, &a.array(1)?)),
+        "lkj" => |a| made(dist::Lkj::new(a.num(0)?, a.num(1)?)),
+        "wishart" => |a| {
+            let scale = Matrix::read(a, 1)?.dense();
+            made(dist::Wishart::new(a.num(0)?, &scale))
         },
-    ),
-    other(
-        "truncated",
-        &[
-            arg("d", Type::Dist, "A distribution of numbers."),
-            opt("lo", Type::Nums, "-inf", "The lower bound."),
-            opt(
-                "hi",
-                Type::Nums,
-                "inf",
-                "The upper bound, above `lo`; of integers it may be `lo`.",
-            ),
-        ],
-        truncated,
-    ),
-    scalar!("inv_gamma", [shape, scale], dist::InvGamma::new(shape, scale).map(Dist::InvGamma)),
-    scalar!("cauchy", [location, scale], dist::Cauchy::new(location, scale).map(Dist::Cauchy)),
-    scalar!("laplace", [location, scale], dist::Laplace::new(location, scale).map(Dist::Laplace)),
-    other(
-        "von_mises",
-        &[
-            arg("mean", Type::Nums, "The mean direction: any finite number.").unit("radians"),
-            arg("concentration", Type::Nums, "The concentration, not negative; 0 is uniform."),
-        ],
-        |a| elementwise(a, &[], |[mean, k]| dist::VonMises::new(mean, k).map(Dist::VonMises)),
-    ),
-    scalar!("weibull", [shape, scale], dist::Weibull::new(shape, scale).map(Dist::Weibull)),
-    scalar!("neg_binomial", [r, p], dist::NegBinomial::new(r, p).map(Dist::NegBinomial)),
-    scalar!("geometric", [p], dist::Geometric::new(p).map(Dist::Geometric)),
-    other(
-        "flat",
-        &[
-            opt("lo", Type::Nums, "-inf", "The lower bound."),
-            opt("hi", Type::Nums, "inf", "The upper bound; at most one of them is finite."),
-        ],
-        |a| elementwise(a, &UNBOUNDED, |[lo, hi]| dist::Flat::new(lo, hi).map(Dist::Flat)),
-    ),
-    scalar!("flip", [p], dist::Flip::new(p).map(Dist::Flip)),
-    scalar!(
-        "uniform_discrete",
-        [lo, hi],
-        dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)
-    ),
-    scalar!("binomial", [n, p], dist::Binomial::new(n, p).map(Dist::Binomial)),
-    scalar!("poisson", [rate], dist::Poisson::new(rate).map(Dist::Poisson)),
-    other(
-        "categorical",
-        &[arg("weights", Type::Array, "One weight for each of 0, 1, …; they need not sum to 1.")],
-        |a| dist::Categorical::new(a.array(0)?).map(Dist::Categorical).map_err(fault),
-    )
-    .scalar(Scalar::Weights {
-        make: |weights| dist::Categorical::new(Arc::clone(weights)).map(Dist::Categorical).ok(),
-        log_probability: |weights, x| dist::Categorical::log_probability(weights, x).ok(),
-    }),
-    other(
-        "dirichlet",
-        &[arg("alpha", Type::Array, "One positive concentration per component.")],
-        |a| dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault),
-    ),
-    other(
-        "multinomial",
-        &[
-            arg("n", Type::Int, "The number of draws."),
-            arg("weights", Type::Array, "One weight per category; they need not sum to 1."),
-        ],
-        |a| {
-            dist::Multinomial::new(a.num(0)?, &a.array(1)?)
-                .map(|d| Dist::Multinomial(Arc::new(d)))
-                .map_err(fault)
-        },
-    ),
-    other(
-        "lkj",
-        &[
-            arg("n", Type::Int, "The number of rows, from 1 to 1000."),
-            arg(
-                "eta",
-                Type::Num,
-                "The shape, positive: 1 is uniform over correlation matrices, larger values favour independence.",
-            ),
-        ],
-        |a| dist::Lkj::new(a.num(0)?, a.num(1)?).map(|d| Dist::Lkj(Arc::new(d))).map_err(fault),
-    ),
-    other(
-        "wishart",
-        &[
-            arg("df", Type::Num, "The degrees of freedom, above the number of rows minus 1."),
-            arg(
-                "scale_chol",
-                Type::Array,
-                "The lower triangular Cholesky factor of the scale matrix, an array of rows.",
-            ),
-        ],
-        wishart,
-    ),
-    other(
-        "mv_normal",
-        &[
-            arg("mean", Type::Array, "The mean vector."),
-            opt(
-                "cov",
-                Type::Array,
-                "none",
-                "The covariance matrix, an array of rows; give either `cov` or `chol`.",
-            ),
-            opt(
-                "chol",
-                Type::Array,
-                "none",
-                "The lower triangular Cholesky factor of the covariance.",
-            ),
-            opt(
-                "whitened",
-                Type::Bool,
-                "false",
-                "Non-centred: stores the white noise z of mean + chol z, so that the value \
-                 follows changes of the mean and covariance.",
-            ),
-        ],
-        mv_normal,
-    ),
-    other(
-        "gp",
-        &[
-            arg("mean", Type::Nums, "The mean: one number, or one per point."),
-            arg("cov", Type::Covariance, "The covariance function, such as `sq_exp(length)`."),
-            arg("at", Type::Array, "The points."),
-            opt(
-                "centred",
-                Type::Bool,
-                "false",
-                "Centred: stores the values instead of the underlying white noise.",
-            ),
-            opt("jitter", Type::Num, "1e-6", "Added to the diagonal of the covariance matrix.")
-                .unit("fraction of the variance"),
-        ],
-        gp,
-    ),
-    other(
-        "iid",
-        &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "The number of values.")],
-        |a| {
+        "mv_normal" => mv_normal,
+        "gp" => gp,
+        "iid" => |a| {
             let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
-            dist::Iid::new(Dist::clone(d), a.count(1)?)
-                .map(|d| Dist::Iid(Arc::new(d)))
-                .map_err(fault)
+            made(dist::Iid::new(Dist::clone(d), a.count(1)?))
         },
-    ),
-    other(
-        "ordered",
-        &[
-            arg("d", Type::Any, "A distribution of continuous numbers, or an array of them."),
-            opt(
-                "n",
-                Type::Int,
-                "none",
-                "The number of values from a single distribution; an array gives one of each.",
-            ),
-        ],
-        ordered,
-    ),
-    other(
-        "mixture",
-        &[
-            arg("weights", Type::Array, "One weight per component; they need not sum to 1."),
-            arg("components", Type::Array, "Distributions over the same kind of values."),
-        ],
-        mixture,
-    ),
-];
+        "ordered" => ordered,
+        "mixture" => mixture,
+        _ => elementwise,
+    }
+}
 
-/// The bounds of the whole real line.
-pub(super) const UNBOUNDED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+/// A distribution of any family, or the fault of its parameters.
+pub(super) fn made<T: Into<Dist>>(made: Result<T, ParamError>) -> Result<Dist, Fault> {
+    made.map(Into::into).map_err(fault)
+}
 
 /// The support and density of a family, for the reference.
 pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
@@ -276,37 +113,34 @@ pub(super) fn fault(e: ParamError) -> Fault {
     }
 }
 
-/// A distribution of a number, or a product of them if a parameter is an array. Omitted
-/// parameters take their defaults.
-fn elementwise<const N: usize>(
-    a: &Args,
-    defaults: &[f64],
-    make: fn([f64; N]) -> Result<Dist, ParamError>,
-) -> Result<Dist, Fault> {
-    let mut parameters = [0.0; N];
-    for (i, p) in parameters.iter_mut().enumerate() {
-        match (a.get(i), defaults.get(i)) {
-            (Value::Num(x), _) => *p = *x,
-            (Value::Unit, Some(default)) => *p = *default,
-            _ => return product(a, defaults, make),
+/// A distribution of a number, or a product of them if a parameter is an array.
+fn elementwise(a: &Args) -> Result<Dist, Fault> {
+    let Some(Scalar::Family(family)) = a.builtin.scalar else {
+        return Err(Fault::type_error(format!("{}: made of more than numbers", a.builtin.name)));
+    };
+    let count = a.builtin.args.len();
+    let mut parameters: SmallVec<[f64; 4]> = SmallVec::new();
+    for i in 0..count {
+        match a.get(i) {
+            Value::Num(x) => parameters.push(*x),
+            _ => return product(a, count, family.make),
         }
     }
-    make(parameters).map_err(fault)
+    (family.make)(&parameters).map_err(fault)
 }
 
-fn product<const N: usize>(
+fn product(
     a: &Args,
-    defaults: &[f64],
-    make: fn([f64; N]) -> Result<Dist, ParamError>,
+    count: usize,
+    make: fn(&[f64]) -> Result<Dist, ParamError>,
 ) -> Result<Dist, Fault> {
-    let mut parameters = [0.0; N];
-    let mut columns: [Option<Arc<[f64]>>; N] = [const { None }; N];
+    let mut parameters: SmallVec<[f64; 4]> = smallvec![0.0; count];
+    let mut columns: SmallVec<[Option<Arc<[f64]>>; 4]> = smallvec![None; count];
     // The argument index of the first array, and its length.
     let mut first: Option<(usize, usize)> = None;
-    for i in 0..N {
+    for i in 0..count {
         match a.get(i) {
             Value::Num(x) => parameters[i] = *x,
-            Value::Unit if i < defaults.len() => parameters[i] = defaults[i],
             v if array_len(v).is_some() => {
                 let xs = a.array(i)?;
                 let (k, n) = *first.get_or_insert((i, xs.len()));
@@ -329,15 +163,15 @@ fn product<const N: usize>(
                 *p = xs[k];
             }
         }
-        let made = match (elements.last(), &parameters[..]) {
+        let one = match (elements.last(), &parameters[..]) {
             // All elements are of one family; an equal standard deviation reuses the
             // logarithm.
-            (Some(Dist::Normal(d)), [mean, sd]) => d.near(*mean, *sd).map(Dist::Normal),
-            _ => make(parameters),
+            (Some(Dist::Normal(d)), [mean, sd]) => d.near(*mean, *sd).map(Dist::from),
+            _ => make(&parameters),
         };
-        elements.push(made.map_err(|e| Fault::domain(format!("{e} (element {k})")))?);
+        elements.push(one.map_err(|e| Fault::domain(format!("{e} (element {k})")))?);
     }
-    dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
+    made(dist::Product::new(elements))
 }
 
 /// The maximum number of multivariate normals cached per thread.
@@ -380,19 +214,12 @@ fn mv_normal(a: &Args) -> Result<Dist, Fault> {
 
 fn new_mv_normal(a: &Args, whitened: bool) -> Result<Dist, Fault> {
     let mean = a.array(0)?;
-    let made = match (a.given(1), a.given(2)) {
+    let d = match (a.given(1), a.given(2)) {
         (true, false) => dist::MvNormal::from_cov(&mean, &square(a, 1, mean.len())?),
         (false, true) => dist::MvNormal::from_chol(&mean, &square(a, 2, mean.len())?),
         _ => return Err(Fault::type_error("mv_normal: give either `cov` or `chol`")),
     };
-    let stored = |d: dist::MvNormal| if whitened { d.to_whitened() } else { d };
-    made.map(|d| Dist::MvNormal(Arc::new(stored(d)))).map_err(fault)
-}
-
-fn wishart(a: &Args) -> Result<Dist, Fault> {
-    let m = Matrix::read(a, 1)?;
-    let scale = nalgebra::DMatrix::from_fn(m.rows.len(), m.width, |i, j| m.rows[i][j]);
-    dist::Wishart::new(a.num(0)?, &scale).map(|d| Dist::Wishart(Arc::new(d))).map_err(fault)
+    made(d.map(|d| if whitened { d.to_whitened() } else { d }))
 }
 
 /// Reads a square matrix of size `n`, the length of the mean.
@@ -404,7 +231,7 @@ fn square(a: &Args, i: usize, n: usize) -> Result<nalgebra::DMatrix<f64>, Fault>
             "mv_normal: `{name}` must be {n} x {n} like the mean, got {rows} x {columns}"
         )));
     }
-    Ok(nalgebra::DMatrix::from_fn(n, n, |i, j| m.rows[i][j]))
+    Ok(m.dense())
 }
 
 fn gp(a: &Args) -> Result<Dist, Fault> {
@@ -421,41 +248,5 @@ fn gp(a: &Args) -> Result<Dist, Fault> {
     }
     let centred = a.bool_or(3, false)?;
     let jitter = a.num_or(4, dist::JITTER)?;
-    dist::Gp::with_jitter(mean, cov, &at, centred, jitter)
-        .map(|d| Dist::Gp(Arc::new(d)))
-        .map_err(fault)
-}
-
-/// Finds a family by name at compile time.
-const fn family(name: &str) -> &'static Family {
-    let mut i = 0;
-    while i < FAMILIES.len() {
-        if same_text(FAMILIES[i].name, name) {
-            return &FAMILIES[i];
-        }
-        i += 1;
-    }
-    panic!("no such distribution")
-}
-
-const fn same_text(a: &str, b: &str) -> bool {
-    let (a, b) = (a.as_bytes(), b.as_bytes());
-    let mut i = 0;
-    while i < a.len() && i < b.len() && a[i] == b[i] {
-        i += 1;
-    }
-    i == a.len() && i == b.len()
-}
-
-/// The parameters of a family as arguments.
-const fn params<const N: usize>(name: &str) -> [Arg; N] {
-    let family = family(name);
-    assert!(family.params.len() == N, "the distribution has a different number of parameters");
-    let mut args = [arg("", Type::Nums, ""); N];
-    let mut i = 0;
-    while i < N {
-        args[i] = arg(family.params[i].name, Type::Nums, family.params[i].doc);
-        i += 1;
-    }
-    args
+    made(dist::Gp::with_jitter(mean, cov, &at, centred, jitter))
 }

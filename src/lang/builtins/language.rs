@@ -8,7 +8,7 @@ use super::{
 
 /// The language's own built-ins, in the order of the reference.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    let own: [&[Row]; 13] = [
+    let functions: [&[Row]; 7] = [
         operators::TABLE,
         math::TABLE,
         reduce::TABLE,
@@ -16,17 +16,12 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
         interp::TABLE,
         matrix::TABLE,
         definite::TABLE,
-        distributions::TABLE,
-        log_density::TABLE,
-        covariance::TABLE,
-        forms::TABLE,
-        data::TABLE,
-        inference::TABLE,
     ];
-    own.into_iter().flatten().map(|row| {
-        let builtin = Builtin::from(row);
-        Builtin { example: examples::of(row.name), ..builtin }
-    })
+    let rest: [&[Row]; 5] =
+        [log_density::TABLE, covariance::TABLE, forms::TABLE, data::TABLE, inference::TABLE];
+    let rows = |tables: Vec<&'static [Row]>| tables.into_iter().flatten().map(Builtin::from);
+    let all = rows(functions.into()).chain(distributions::all()).chain(rows(rest.into()));
+    all.map(|builtin| Builtin { example: examples::of(&builtin.name), ..builtin })
 }
 
 impl Default for Table {

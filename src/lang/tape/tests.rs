@@ -33,7 +33,7 @@ fn recorded(guarded: bool) -> Tape {
     }
     let product = crate::dist::Product::new(vec![normal(2.0, 2.0), normal(4.0, 2.0)]).unwrap();
     let seen = Form::Fixed(Value::array(vec![0.5, 0.7]));
-    let dist = Dist::Product(std::sync::Arc::new(product));
+    let dist = Dist::from(product);
     b.family(&builtin(&table, "normal"), vec![mean, s], &dist, &seen, true).unwrap();
     b.finish()
 }

@@ -6,7 +6,7 @@
 //! cover is left to [`crate::trace::shortcuts::enumeration`] or an update.
 
 use crate::dist::{Datum, Dist};
-use crate::lang::builtins::{Args, Builtin, Kind, Scalar};
+use crate::lang::builtins::{Args, Argument, Builtin, Kind, Scalar};
 use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
 use crate::lang::index::place;
 use crate::lang::local_density::{
@@ -320,13 +320,13 @@ impl<'a> Evaluation<'a, REGISTERS> {
         let parameters = parameters.get(..builtin.args.len())?;
         match (builtin.scalar, x) {
             (_, Register::Num(x)) if x.is_nan() => None,
-            (Some(Scalar::Family { log_density, .. }), Register::Num(x)) => {
+            (Some(Scalar::Family(family)), Register::Num(x)) => {
                 let mut space = [0.0; PARAMETERS];
                 let numbers = &mut space[..parameters.len()];
-                for (to, from) in numbers.iter_mut().zip(parameters) {
-                    *to = self.number(*from)?;
+                for ((to, from), arg) in numbers.iter_mut().zip(parameters).zip(&*builtin.args) {
+                    *to = self.read(*from)?.number_or_default(arg)?;
                 }
-                log_density(numbers, x)
+                (family.log_density)(numbers, x)
             }
             (Some(Scalar::Weights { log_probability, .. }), Register::Num(x)) => {
                 match self.read(*parameters.first()?)? {
@@ -424,6 +424,16 @@ impl<'a> Register<'a> {
         }
     }
 
+    /// Returns the number; the default if the argument is omitted.
+    #[inline(always)]
+    fn number_or_default(self, arg: &Argument) -> Option<f64> {
+        match (self, &arg.value) {
+            (Register::Num(x), _) => Some(x),
+            (Register::Other(Value::Unit), Value::Num(x)) => Some(*x),
+            _ => None,
+        }
+    }
+
     fn of(v: &'a Value) -> Self {
         match v {
             Value::Num(x) => Register::Num(*x),
@@ -433,21 +443,12 @@ impl<'a> Register<'a> {
     }
 }
 
-/// Returns the parameters, if all of them are numbers.
-#[inline]
-fn numbers<'s>(parameters: &[Register], space: &'s mut [f64; PARAMETERS]) -> Option<&'s [f64]> {
-    let numbers = space.get_mut(..parameters.len())?;
-    for (to, from) in numbers.iter_mut().zip(parameters) {
-        let Register::Num(x) = from else { return None };
-        *to = *x;
-    }
-    Some(numbers)
-}
-
 /// Returns the distribution with these parameters.
 fn family(builtin: &Builtin, parameters: &[Register]) -> Option<Dist> {
-    if let Some(Scalar::Family { make, .. }) = builtin.scalar {
-        return make(numbers(parameters, &mut [0.0; PARAMETERS])?);
+    if let Some(Scalar::Family(family)) = builtin.scalar {
+        let numbers = parameters.iter().zip(&*builtin.args).map(|(p, a)| p.number_or_default(a));
+        let numbers: SmallVec<[f64; PARAMETERS]> = numbers.collect::<Option<_>>()?;
+        return (family.make)(&numbers).ok();
     }
     if let (Some(Scalar::Weights { make, .. }), [Register::Other(Value::Array(w))]) =
         (builtin.scalar, parameters)

@@ -5,7 +5,6 @@ use super::points::Points;
 use super::table::{agree, rows};
 use crate::common::families::{datum, made};
 use pcadlang::dist::{Categorical, Datum, Dist, Flat, Flip, Iid, Ordered};
-use std::sync::Arc;
 
 #[test]
 fn log_densities_agree_with_the_table() {
@@ -112,8 +111,8 @@ fn log_densities_agree_with_formulas() {
         let one = made("normal", &[0.0, scale]);
         let xs = [-scale, 0.5 * scale, 2.0 * scale];
         let sum: f64 = xs.iter().map(|x| one.log_density_num(*x)).sum();
-        let iid = Dist::Iid(Arc::new(Iid::new(one.clone(), 3).unwrap()));
-        let ordered = Dist::Ordered(Arc::new(Ordered::new(one, 3).unwrap()));
+        let iid = Dist::from(Iid::new(one.clone(), 3).unwrap());
+        let ordered = Dist::from(Ordered::new(one, 3).unwrap());
         let cases = [
             (&iid, xs, sum),
             (&ordered, xs, sum + 6f64.ln()),

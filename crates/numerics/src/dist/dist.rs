@@ -1,146 +1,48 @@
-//! Any distribution, by value: most scalar families are stored inline, the others behind
-//! a pointer.
+//! The methods of a distribution of any family.
 
-use super::*;
+use super::families::each;
+use super::{CdfSlopes, Datum, Dist, Distribution, Gradient, Support, Tails};
 use crate::rng::Stream;
-use std::sync::Arc;
-
-/// A distribution of any family, at most 48 bytes.
-#[derive(Clone, Debug)]
-#[allow(missing_docs)]
-pub enum Dist {
-    Normal(Normal),
-    LogNormal(LogNormal),
-    Uniform(Uniform),
-    Beta(Beta),
-    Gamma(Gamma),
-    Exponential(Exponential),
-    HalfNormal(HalfNormal),
-    HalfCauchy(HalfCauchy),
-    StudentT(StudentT),
-    InvGamma(InvGamma),
-    Cauchy(Cauchy),
-    Laplace(Laplace),
-    VonMises(VonMises),
-    Weibull(Weibull),
-    NegBinomial(NegBinomial),
-    Geometric(Geometric),
-    Flat(Flat),
-    Flip(Flip),
-    UniformDiscrete(UniformDiscrete),
-    Binomial(Binomial),
-    Poisson(Poisson),
-    Categorical(Categorical),
-    TruncatedNormal(Arc<TruncatedNormal>),
-    Truncated(Arc<Truncated>),
-    Multinomial(Arc<Multinomial>),
-    Lkj(Arc<Lkj>),
-    Wishart(Arc<Wishart>),
-    Ordered(Arc<Ordered>),
-    Mixture(Arc<Mixture>),
-    Dirichlet(Arc<Dirichlet>),
-    MvNormal(Arc<MvNormal>),
-    Gp(Arc<Gp>),
-    Iid(Arc<Iid>),
-    Product(Arc<Product>),
-    /// A distribution provided by a host program.
-    Custom(Arc<dyn Distribution>),
-}
-
-const _: () = assert!(size_of::<Dist>() <= 48);
-
-/// Evaluates the same expression for every family.
-macro_rules! each {
-    ($dist:expr, $d:ident => $body:expr) => {
-        match $dist {
-            Dist::Normal($d) => $body,
-            Dist::LogNormal($d) => $body,
-            Dist::Uniform($d) => $body,
-            Dist::Beta($d) => $body,
-            Dist::Gamma($d) => $body,
-            Dist::Exponential($d) => $body,
-            Dist::HalfNormal($d) => $body,
-            Dist::HalfCauchy($d) => $body,
-            Dist::StudentT($d) => $body,
-            Dist::InvGamma($d) => $body,
-            Dist::Cauchy($d) => $body,
-            Dist::Laplace($d) => $body,
-            Dist::VonMises($d) => $body,
-            Dist::Weibull($d) => $body,
-            Dist::NegBinomial($d) => $body,
-            Dist::Geometric($d) => $body,
-            Dist::Flat($d) => $body,
-            Dist::TruncatedNormal($d) => $body,
-            Dist::Truncated($d) => $body,
-            Dist::Multinomial($d) => $body,
-            Dist::Lkj($d) => $body,
-            Dist::Wishart($d) => $body,
-            Dist::Ordered($d) => $body,
-            Dist::Mixture($d) => $body,
-            Dist::Flip($d) => $body,
-            Dist::UniformDiscrete($d) => $body,
-            Dist::Binomial($d) => $body,
-            Dist::Poisson($d) => $body,
-            Dist::Categorical($d) => $body,
-            Dist::Dirichlet($d) => $body,
-            Dist::MvNormal($d) => $body,
-            Dist::Gp($d) => $body,
-            Dist::Iid($d) => $body,
-            Dist::Product($d) => $body,
-            Dist::Custom($d) => $body,
-        }
-    };
-}
 
 /// Defines inherent methods that forward to [`Distribution`].
 macro_rules! forward {
-    ($($(#[$doc:meta])* $name:ident($($arg:ident: $ty:ty),*) -> $out:ty;)*) => {
-        $($(#[$doc])* pub fn $name(&self, $($arg: $ty),*) -> $out { each!(self, d => d.$name($($arg),*)) })*
-    };
+    ($($(#[$attribute:meta])* $name:ident($($arg:ident: $ty:ty),*) -> $out:ty;)*) => {$(
+        #[doc = concat!("See [`Distribution::", stringify!($name), "`].")]
+        $(#[$attribute])*
+        pub fn $name(&self, $($arg: $ty),*) -> $out {
+            each!(self, d => d.$name($($arg),*))
+        }
+    )*};
 }
 
 impl Dist {
     forward! {
-        /// See [`Distribution::name`].
         name() -> &str;
-        /// See [`Distribution::support`].
         support() -> Support;
-        /// See [`Distribution::sample`].
         sample(rng: &mut Stream) -> Datum;
-        /// See [`Distribution::log_density`].
         #[inline]
         log_density(x: &Datum) -> f64;
-        /// See [`Distribution::gradient`].
         gradient(x: &Datum) -> Option<Gradient>;
-        /// See [`Distribution::is_gaussian`].
+        param_count() -> usize;
+        has_moving_support() -> bool;
         is_gaussian() -> bool;
-        /// See [`Distribution::whiten`].
         whiten(x: &Datum) -> Option<Vec<f64>>;
-        /// See [`Distribution::colour`].
         colour(z: &[f64]) -> Option<Datum>;
-        /// See [`Distribution::is_scalar`].
         is_scalar() -> bool;
-        /// See [`Distribution::is_improper`].
         is_improper() -> bool;
-        /// See [`Distribution::is_stored_whitened`].
         is_stored_whitened() -> bool;
-        /// See [`Distribution::sample_stored`].
         sample_stored(rng: &mut Stream) -> Datum;
-        /// See [`Distribution::log_density_stored`].
         #[inline]
         log_density_stored(s: &Datum) -> f64;
-        /// See [`Distribution::gradient_stored`].
         gradient_stored(s: &Datum) -> Option<Gradient>;
-        /// See [`Distribution::from_noncentred`].
         from_noncentred(s: &Datum) -> Datum;
-        /// See [`Distribution::to_noncentred`].
+        from_noncentred_vjp(by: &[f64]) -> Option<Vec<f64>>;
         to_noncentred(value: &Datum) -> Option<Datum>;
-        /// See [`Distribution::stored_support`].
         stored_support() -> Support;
-        /// See [`Distribution::mean`].
         mean() -> Option<f64>;
-        /// See [`Distribution::sd`].
         sd() -> Option<f64>;
+        #[doc(hidden)]
+        cdf_slopes(x: f64) -> Option<CdfSlopes>;
     }
 
     /// Returns the log density of a number.
@@ -156,6 +58,35 @@ impl Dist {
             Dist::Flip(d) => d.log_probability(x),
             _ => self.log_density(&Datum::Bool(x)),
         }
+    }
+
+    /// Returns the log probabilities on both sides of a number; `None` if they are not
+    /// known.
+    pub(super) fn tails(&self, x: f64) -> Option<Tails> {
+        match x {
+            f64::INFINITY => Some(Tails::ALL_BELOW),
+            f64::NEG_INFINITY => Some(Tails::NONE_BELOW),
+            x => each!(self, d => d.tails(x)),
+        }
+    }
+
+    /// For a number x(y) that is stored as an unconstrained coordinate y: returns the
+    /// derivatives with respect to the parameters, with y fixed, of f(x(y)) + log
+    /// |dx/dy|, where `by` is df/dx. `None` if they are not known.
+    pub fn by_bounds(&self, x: &Datum, by: f64) -> Option<Vec<f64>> {
+        let x = x.num()?;
+        // With respect to the lower and the upper bound.
+        let (lo, hi) = match self.support() {
+            // x = lo + (hi - lo) p, log |dx/dy| = log (hi - lo) + log p + log (1 - p).
+            Support::Interval { lo, hi } => {
+                let (width, p) = (hi - lo, (x - lo) / (hi - lo));
+                (by * (1.0 - p) - 1.0 / width, by * p + 1.0 / width)
+            }
+            Support::AtLeast { .. } => (by, 0.0),
+            Support::AtMost { .. } => (0.0, by),
+            _ => (0.0, 0.0),
+        };
+        each!(self, d => d.by_bounds(lo, hi))
     }
 
     /// Returns the number of independent elements, each of which is a separate choice;
@@ -177,41 +108,6 @@ impl Dist {
         }
     }
 
-    /// Returns how many distributions it is made of, including repeats; `None` if they
-    /// are nested deeper than `depth`. May stop counting above `most`.
-    pub fn parts(&self, depth: u32, most: usize) -> Option<usize> {
-        let inside = |parts: &[Dist]| {
-            let mut sum = 0usize;
-            for p in parts.iter().filter(|p| p.is_compound()) {
-                sum = sum.saturating_add(p.parts(depth.checked_sub(1)?, most)?);
-                if sum > most {
-                    break;
-                }
-            }
-            Some(sum.saturating_add(parts.len()))
-        };
-        match self {
-            Dist::Iid(d) => Some(inside(std::slice::from_ref(d.one()))?.saturating_mul(d.len())),
-            Dist::Ordered(d) => Some(inside(d.distinct())?.saturating_mul(d.repeats())),
-            Dist::Truncated(d) => inside(std::slice::from_ref(d.base())),
-            Dist::Product(d) => inside(d.parts()),
-            Dist::Mixture(d) => inside(d.components()),
-            _ => Some(1),
-        }
-    }
-
-    /// Returns whether it is made of other distributions.
-    fn is_compound(&self) -> bool {
-        matches!(
-            self,
-            Dist::Iid(_)
-                | Dist::Ordered(_)
-                | Dist::Truncated(_)
-                | Dist::Product(_)
-                | Dist::Mixture(_)
-        )
-    }
-
     /// Returns the log density of element `i`; -inf if it does not exist.
     #[inline]
     pub fn element_log_density(&self, i: usize, x: &Datum) -> f64 {
@@ -222,13 +118,28 @@ impl Dist {
         }
     }
 
+    /// Returns how many distributions it is made of, including repeats; `None` if they
+    /// are nested deeper than `depth`. May stop counting above `most`.
+    pub fn parts(&self, depth: u32, most: usize) -> Option<usize> {
+        let Some((parts, repeats)) = each!(self, d => d.made_of()) else { return Some(1) };
+        let mut sum = 0usize;
+        for p in parts.iter().filter(|p| p.is_compound()) {
+            sum = sum.saturating_add(p.parts(depth.checked_sub(1)?, most)?);
+            if sum > most {
+                break;
+            }
+        }
+        Some(sum.saturating_add(parts.len()).saturating_mul(repeats))
+    }
+
+    /// Returns whether it is made of other distributions.
+    fn is_compound(&self) -> bool {
+        each!(self, d => d.made_of()).is_some()
+    }
+
     /// Returns the same distribution in centred form, which stores values, as elements of
     /// a product do.
     pub fn centred(self) -> Dist {
-        match self {
-            Dist::Gp(d) if d.is_stored_whitened() => Dist::Gp(Arc::new(d.to_centred())),
-            Dist::MvNormal(d) if d.is_stored_whitened() => Dist::MvNormal(Arc::new(d.to_centred())),
-            other => other,
-        }
+        each!(&self, d => d.centred()).unwrap_or(self)
     }
 }

@@ -1,8 +1,9 @@
 //! The interface of all distributions. Families over one number implement the simpler
 //! [`super::Scalar`] instead.
 
-use super::{Datum, Support};
-use crate::rng::Stream;
+use super::tails::{CdfSlopes, Tails};
+use super::{Datum, Dist, Support};
+use crate::rng::{Purpose, Stream, StreamKey};
 use std::fmt;
 
 /// The derivatives of a log density.
@@ -128,6 +129,54 @@ pub trait Distribution: fmt::Debug + Send + Sync {
 
     /// Returns the standard deviation of a number, if it exists.
     fn sd(&self) -> Option<f64> {
+        None
+    }
+
+    /// Returns the log probabilities on both sides of a finite number, if they are known.
+    #[doc(hidden)]
+    fn tails(&self, _x: f64) -> Option<Tails> {
+        None
+    }
+
+    /// Returns dP(X <= x)/da divided by the density at x, for each parameter a, where the
+    /// density is positive and finite.
+    #[doc(hidden)]
+    fn cdf_slopes(&self, _x: f64) -> Option<CdfSlopes> {
+        None
+    }
+
+    /// Returns the number of parameter derivatives in [`Distribution::gradient`]. It is
+    /// the same for all values, so it is counted at one draw.
+    #[doc(hidden)]
+    fn param_count(&self) -> usize {
+        let x = self.sample(&mut StreamKey::new(0, 0, Purpose::VALUES).stream(0, 0, 0));
+        self.gradient(&x).map_or(0, |g| g.params.len())
+    }
+
+    /// Returns the derivatives with respect to the parameters of a function of the bounds
+    /// of the support, given those with respect to the bounds.
+    #[doc(hidden)]
+    fn by_bounds(&self, _lo: f64, _hi: f64) -> Option<Vec<f64>> {
+        (!self.has_moving_support()).then(|| vec![0.0; self.param_count()])
+    }
+
+    /// For a value mean + L z made from white noise z: returns the derivatives with
+    /// respect to z of a function whose derivatives with respect to the value are `by`.
+    #[doc(hidden)]
+    #[allow(clippy::wrong_self_convention)] // The distribution is the map, not the result.
+    fn from_noncentred_vjp(&self, _by: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// Returns the same distribution in centred form, which stores values, if it is not.
+    #[doc(hidden)]
+    fn centred(&self) -> Option<Dist> {
+        None
+    }
+
+    /// Returns the distributions it is made of, and how often they are repeated.
+    #[doc(hidden)]
+    fn made_of(&self) -> Option<(&[Dist], usize)> {
         None
     }
 }

@@ -2,7 +2,7 @@
 //! implementation of [`Distribution`] on top of it.
 
 use super::tails::{CdfSlopes, Tails};
-use super::{Datum, Distribution, Gradient, Support};
+use super::{Datum, Distribution, Gradient, Named, Support};
 use crate::rng::Stream;
 use smallvec::SmallVec;
 use std::fmt;
@@ -30,15 +30,17 @@ impl Slope {
 }
 
 /// A distribution of one number.
-pub trait Scalar: fmt::Debug + Send + Sync {
-    /// The name in the language.
-    const NAME: &'static str;
-
+pub trait Scalar: Named + fmt::Debug + Send + Sync {
     /// Whether it is not normalised, see [`Distribution::is_improper`].
     const IMPROPER: bool = false;
 
+    /// The space of the values, if it is the same for all parameters.
+    const SUPPORT: Support = Support::Real;
+
     /// Returns the space of the values, which are numbers.
-    fn number_support(&self) -> Support;
+    fn number_support(&self) -> Support {
+        Self::SUPPORT
+    }
 
     /// Draws a number from the support.
     fn draw(&self, rng: &mut Stream) -> f64;
@@ -61,11 +63,32 @@ pub trait Scalar: fmt::Debug + Send + Sync {
         None
     }
 
+    /// Returns the derivatives with respect to the parameters of a function of the bounds
+    /// of the support, given those with respect to the bounds; `None` if the bounds do
+    /// not depend on the parameters.
+    fn by_bounds(&self, _lo: f64, _hi: f64) -> Option<CdfSlopes> {
+        None
+    }
+
     /// Returns the mean, if it exists.
-    fn number_mean(&self) -> Option<f64>;
+    fn number_mean(&self) -> Option<f64> {
+        None
+    }
 
     /// Returns the standard deviation, if it exists.
-    fn number_sd(&self) -> Option<f64>;
+    fn number_sd(&self) -> Option<f64> {
+        None
+    }
+
+    /// Returns the distribution with these parameters, if it can reuse results that
+    /// `self` has computed from its own.
+    #[inline]
+    fn reused(&self, _params: &[f64]) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
 
     /// Maps a number to the scale of the standard normal, for normal distributions.
     fn standardised(&self, _x: f64) -> Option<f64> {
@@ -137,5 +160,24 @@ impl<T: Scalar> Distribution for T {
 
     fn sd(&self) -> Option<f64> {
         self.number_sd()
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        Scalar::tails(self, x)
+    }
+
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
+        Scalar::cdf_slopes(self, x)
+    }
+
+    fn has_moving_support(&self) -> bool {
+        Scalar::by_bounds(self, 0.0, 0.0).is_some()
+    }
+
+    fn by_bounds(&self, lo: f64, hi: f64) -> Option<Vec<f64>> {
+        match Scalar::by_bounds(self, lo, hi) {
+            Some(by) => Some(by.to_vec()),
+            None => Some(vec![0.0; self.param_count()]),
+        }
     }
 }

@@ -136,6 +136,11 @@ impl<'a> Matrix<'a> {
         }
     }
 
+    /// Returns it as a dense matrix.
+    pub fn dense(&self) -> nalgebra::DMatrix<f64> {
+        nalgebra::DMatrix::from_fn(self.rows.len(), self.width, |i, j| self.rows[i][j])
+    }
+
     fn transposed(&self) -> Matrix<'static> {
         let column = |j: usize| Cow::Owned(self.rows.iter().map(|r| r[j]).collect());
         Matrix { rows: (0..self.width).map(column).collect(), width: self.rows.len() }

@@ -1,7 +1,7 @@
 //! The table: look-up, matching of arguments, and invariants of every entry.
 
 use super::*;
-use crate::dist::Dist;
+use crate::dist::{Dist, Numbers};
 use crate::lang::builtins::Scalar;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -151,9 +151,10 @@ fn forms_for_single_numbers_are_the_functions_themselves() {
                         (Value::Bool(f(x, y)), call(&[Value::Num(x), Value::Num(y)]))
                     }
                     Scalar::Logic(f) => (Value::Bool(f(x > 0.0)), call(&[Value::Bool(x > 0.0)])),
-                    Scalar::Family { make, log_density } => {
+                    Scalar::Family(Numbers { make, log_density }) => {
+                        let make = |p: &[f64]| make(p).ok();
                         let parameters: Vec<f64> =
-                            [x, y, x].into_iter().take(b.args.len()).collect();
+                            [x, y, x, y].into_iter().take(b.args.len()).collect();
                         let values: Vec<Value> =
                             parameters.iter().map(|x| Value::Num(*x)).collect();
                         let (found, wanted) = (

@@ -1,12 +1,9 @@
 //! The beta distribution.
 
 use crate::dist::draw::{ln_gamma_draw, x_log_y, x_log1p_y};
-use crate::dist::param::positive;
-use crate::dist::tails::{CdfSlopes, Tails, speed_by_differences};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::tails::speed_by_differences;
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, expit, ln_beta, stirling_error};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// The value of both parameters from which the saddle-point form is used.
 const LARGE: f64 = 64.0;
@@ -21,10 +18,7 @@ pub struct Beta {
 }
 
 impl Beta {
-    /// Creates the distribution with these shapes; fails unless both are positive and
-    /// finite.
-    pub fn new(a: f64, b: f64) -> Result<Beta, ParamError> {
-        let (a, b) = (positive(Self::NAME, "a", a)?, positive(Self::NAME, "b", b)?);
+    pub(in crate::dist) fn of(a: f64, b: f64) -> Result<Beta, ParamError> {
         let log_norm = if a.min(b) < LARGE {
             -ln_beta(a, b)
         } else {
@@ -38,11 +32,7 @@ impl Beta {
 }
 
 impl Scalar for Beta {
-    const NAME: &'static str = "beta";
-
-    fn number_support(&self) -> Support {
-        Support::Interval { lo: 0.0, hi: 1.0 }
-    }
+    const SUPPORT: Support = Support::Interval { lo: 0.0, hi: 1.0 };
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         let (x, y) = (ln_gamma_draw(self.a, rng), ln_gamma_draw(self.b, rng));
@@ -78,13 +68,12 @@ impl Scalar for Beta {
     }
 
     fn tails(&self, x: f64) -> Option<Tails> {
-        beta_tails(self.a, self.b, x, 1.0 - x).map(|(below, above)| Tails { below, above })
+        beta_tails(self.a, self.b, x, 1.0 - x).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
-        let tails =
-            |a, b| beta_tails(a, b, x, 1.0 - x).map(|(below, above)| Tails { below, above });
+        let tails = |a, b| beta_tails(a, b, x, 1.0 - x).map(Tails::from);
         let by_a = speed_by_differences(self.a, own, |a| tails(a, self.b))?;
         Some(smallvec![by_a, speed_by_differences(self.b, own, |b| tails(self.a, b))?])
     }

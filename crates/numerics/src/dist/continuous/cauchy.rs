@@ -1,11 +1,7 @@
 //! The Cauchy distribution: Student's t with one degree of freedom.
 
 use crate::dist::draw::{log1p_square, standard};
-use crate::dist::param::{finite, positive};
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use smallvec::smallvec;
+use crate::dist::*;
 
 /// `cauchy(location, scale)`. Its mean is undefined.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,12 +12,7 @@ pub struct Cauchy {
 }
 
 impl Cauchy {
-    /// Creates the distribution around this location, where the scale is the median
-    /// distance from it; fails unless the location is finite and the scale positive and
-    /// finite.
-    pub fn new(location: f64, scale: f64) -> Result<Cauchy, ParamError> {
-        let (location, scale) =
-            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+    pub(in crate::dist) fn of(location: f64, scale: f64) -> Result<Cauchy, ParamError> {
         Ok(Cauchy {
             location,
             scale,
@@ -44,12 +35,6 @@ pub(in crate::dist) fn cauchy_slope(x: f64, location: f64, scale: f64) -> Slope 
 }
 
 impl Scalar for Cauchy {
-    const NAME: &'static str = "cauchy";
-
-    fn number_support(&self) -> Support {
-        Support::Real
-    }
-
     fn draw(&self, rng: &mut Stream) -> f64 {
         // Small angles keep full relative precision, so draws in the tails take many
         // different values.
@@ -79,13 +64,5 @@ impl Scalar for Cauchy {
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         Some(smallvec![-1.0, -standard(x, self.location, self.scale)])
-    }
-
-    fn number_mean(&self) -> Option<f64> {
-        None
-    }
-
-    fn number_sd(&self) -> Option<f64> {
-        None
     }
 }

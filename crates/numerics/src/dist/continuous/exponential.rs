@@ -1,10 +1,6 @@
 //! The exponential distribution.
 
-use crate::dist::param::positive;
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use smallvec::smallvec;
+use crate::dist::*;
 
 /// `exponential(rate)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,20 +10,13 @@ pub struct Exponential {
 }
 
 impl Exponential {
-    /// Creates the distribution with this rate (the inverse of the mean); fails unless it
-    /// is positive and finite.
-    pub fn new(rate: f64) -> Result<Exponential, ParamError> {
-        let rate = positive(Self::NAME, "rate", rate)?;
+    pub(in crate::dist) fn of(rate: f64) -> Result<Exponential, ParamError> {
         Ok(Exponential { rate, log_rate: libm::log(rate) })
     }
 }
 
 impl Scalar for Exponential {
-    const NAME: &'static str = "exponential";
-
-    fn number_support(&self) -> Support {
-        Support::AtLeast { lo: 0.0 }
-    }
+    const SUPPORT: Support = Support::AtLeast { lo: 0.0 };
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         (-libm::log(rng.open_uniform()) / self.rate).min(f64::MAX)

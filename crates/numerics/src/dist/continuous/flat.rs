@@ -1,7 +1,6 @@
 //! The improper flat prior: its density is 1 between its bounds, so it cannot be sampled.
 
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
+use crate::dist::*;
 
 /// `flat(lo, hi)`: all numbers, or those on one side of a bound. Its log density is 0
 /// there. Its `sample` only gives a start for a chain: as in Stan, uniform(-2, 2) in the
@@ -22,11 +21,8 @@ impl Flat {
     /// The flat prior over all numbers.
     pub const EVERYWHERE: Flat = Flat { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
-    /// Creates the flat prior between these bounds, at least one of which must be
-    /// infinite. Fails otherwise, and if no number lies between the bounds.
-    pub fn new(lo: f64, hi: f64) -> Result<Flat, ParamError> {
-        let bad =
-            |rule| Err(ParamError::new(Self::NAME, "lo to hi", format!("{lo} and {hi}"), rule));
+    pub(in crate::dist) fn of(lo: f64, hi: f64) -> Result<Flat, ParamError> {
+        let bad = |rule| Err(Self::bad("lo to hi", format!("{lo} and {hi}"), rule));
         match () {
             () if lo.is_nan() || hi.is_nan() => bad("must be numbers"),
             () if lo >= hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY => {
@@ -38,15 +34,9 @@ impl Flat {
             () => Ok(Flat { lo, hi }),
         }
     }
-
-    /// Returns whether one of the bounds is finite.
-    pub(in crate::dist) fn is_bounded(&self) -> bool {
-        self.lo.is_finite() || self.hi.is_finite()
-    }
 }
 
 impl Scalar for Flat {
-    const NAME: &'static str = "flat";
     const IMPROPER: bool = true;
 
     fn number_support(&self) -> Support {
@@ -71,11 +61,7 @@ impl Scalar for Flat {
         Slope::new(0.0, [0.0, 0.0])
     }
 
-    fn number_mean(&self) -> Option<f64> {
-        None
-    }
-
-    fn number_sd(&self) -> Option<f64> {
-        None
+    fn by_bounds(&self, lo: f64, hi: f64) -> Option<CdfSlopes> {
+        (self.lo.is_finite() || self.hi.is_finite()).then(|| smallvec![lo, hi])
     }
 }

@@ -1,12 +1,9 @@
 //! The gamma distribution.
 
 use crate::dist::draw::{gamma_draw, ln_gamma_draw, representable, x_log_y};
-use crate::dist::param::positive;
-use crate::dist::tails::{CdfSlopes, Tails, speed_by_differences};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::tails::speed_by_differences;
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling_error};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// The shape from which the saddle-point form is used.
 const LARGE: f64 = 64.0;
@@ -20,11 +17,7 @@ pub struct Gamma {
 }
 
 impl Gamma {
-    /// Creates the distribution with this shape and rate (the inverse of the scale);
-    /// fails unless both are positive and finite.
-    pub fn new(shape: f64, rate: f64) -> Result<Gamma, ParamError> {
-        let (shape, rate) =
-            (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "rate", rate)?);
+    pub(in crate::dist) fn of(shape: f64, rate: f64) -> Result<Gamma, ParamError> {
         let log_norm = if shape < LARGE {
             libm::log(rate) - ln_gamma(shape)
         } else {
@@ -36,11 +29,7 @@ impl Gamma {
 }
 
 impl Scalar for Gamma {
-    const NAME: &'static str = "gamma";
-
-    fn number_support(&self) -> Support {
-        Support::Positive
-    }
+    const SUPPORT: Support = Support::Positive;
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         if self.shape < 1.0 {
@@ -77,12 +66,12 @@ impl Scalar for Gamma {
     }
 
     fn tails(&self, x: f64) -> Option<Tails> {
-        gamma_tails(self.shape, self.rate * x).map(|(below, above)| Tails { below, above })
+        gamma_tails(self.shape, self.rate * x).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
-        let tails = |a| gamma_tails(a, self.rate * x).map(|(below, above)| Tails { below, above });
+        let tails = |a| gamma_tails(a, self.rate * x).map(Tails::from);
         Some(smallvec![speed_by_differences(self.shape, own, tails)?, x / self.rate])
     }
 

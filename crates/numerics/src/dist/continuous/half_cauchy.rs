@@ -2,11 +2,7 @@
 
 use crate::dist::continuous::cauchy::cauchy_slope;
 use crate::dist::draw::log1p_square;
-use crate::dist::param::{finite, positive};
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use smallvec::smallvec;
+use crate::dist::*;
 
 /// `half_cauchy(location, scale)`, on [location, inf).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,12 +13,7 @@ pub struct HalfCauchy {
 }
 
 impl HalfCauchy {
-    /// Creates the distribution that starts at this location, where the scale is the
-    /// median distance from it; fails unless the location is finite and the scale
-    /// positive and finite.
-    pub fn new(location: f64, scale: f64) -> Result<HalfCauchy, ParamError> {
-        let (location, scale) =
-            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+    pub(in crate::dist) fn of(location: f64, scale: f64) -> Result<HalfCauchy, ParamError> {
         Ok(HalfCauchy {
             location,
             scale,
@@ -32,8 +23,6 @@ impl HalfCauchy {
 }
 
 impl Scalar for HalfCauchy {
-    const NAME: &'static str = "half_cauchy";
-
     fn number_support(&self) -> Support {
         Support::AtLeast { lo: self.location }
     }
@@ -67,11 +56,7 @@ impl Scalar for HalfCauchy {
         Some(smallvec![-1.0, -(x - self.location) / self.scale])
     }
 
-    fn number_mean(&self) -> Option<f64> {
-        None
-    }
-
-    fn number_sd(&self) -> Option<f64> {
-        None
+    fn by_bounds(&self, lo: f64, _hi: f64) -> Option<CdfSlopes> {
+        Some(smallvec![lo, 0.0])
     }
 }

@@ -1,11 +1,7 @@
 //! The half-normal distribution: the absolute value of a normal number with mean 0.
 
-use crate::dist::param::positive;
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, log_normal_cdf};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `half_normal(sd)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,20 +11,13 @@ pub struct HalfNormal {
 }
 
 impl HalfNormal {
-    /// Creates the distribution with this standard deviation of the normal number; fails
-    /// unless it is positive and finite.
-    pub fn new(sd: f64) -> Result<HalfNormal, ParamError> {
-        let sd = positive(Self::NAME, "sd", sd)?;
+    pub(in crate::dist) fn of(sd: f64) -> Result<HalfNormal, ParamError> {
         Ok(HalfNormal { sd, log_norm: core::f64::consts::LN_2 - libm::log(sd) - LN_SQRT_2PI })
     }
 }
 
 impl Scalar for HalfNormal {
-    const NAME: &'static str = "half_normal";
-
-    fn number_support(&self) -> Support {
-        Support::AtLeast { lo: 0.0 }
-    }
+    const SUPPORT: Support = Support::AtLeast { lo: 0.0 };
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         (self.sd * rng.standard_normal()).abs().min(f64::MAX)

@@ -1,12 +1,9 @@
 //! The inverse gamma distribution: the reciprocal of a gamma number.
 
 use crate::dist::draw::{ln_gamma_draw, representable};
-use crate::dist::param::positive;
-use crate::dist::tails::{CdfSlopes, Tails, speed_by_differences};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::tails::speed_by_differences;
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling_error};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// The shape from which the saddle-point form is used.
 const LARGE: f64 = 64.0;
@@ -20,11 +17,7 @@ pub struct InvGamma {
 }
 
 impl InvGamma {
-    /// Creates the distribution with this shape and scale; fails unless both are positive
-    /// and finite.
-    pub fn new(shape: f64, scale: f64) -> Result<InvGamma, ParamError> {
-        let (shape, scale) =
-            (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
+    pub(in crate::dist) fn of(shape: f64, scale: f64) -> Result<InvGamma, ParamError> {
         let log_norm = if shape < LARGE {
             -ln_gamma(shape)
         } else {
@@ -42,11 +35,7 @@ impl InvGamma {
 }
 
 impl Scalar for InvGamma {
-    const NAME: &'static str = "inv_gamma";
-
-    fn number_support(&self) -> Support {
-        Support::Positive
-    }
+    const SUPPORT: Support = Support::Positive;
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         representable(libm::exp(libm::log(self.scale) - ln_gamma_draw(self.shape, rng)))
@@ -79,12 +68,12 @@ impl Scalar for InvGamma {
         if x <= 0.0 {
             return Some(Tails::NONE_BELOW);
         }
-        gamma_tails(self.shape, self.scale / x).map(|(above, below)| Tails { below, above })
+        gamma_tails(self.shape, self.scale / x).map(|t| Tails::from(t).swapped())
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
-        let tails = |a| gamma_tails(a, self.scale / x).map(|(above, below)| Tails { below, above });
+        let tails = |a| gamma_tails(a, self.scale / x).map(|t| Tails::from(t).swapped());
         Some(smallvec![speed_by_differences(self.shape, own, tails)?, -x / self.scale])
     }
 

@@ -1,11 +1,7 @@
 //! The Laplace distribution: exponential on both sides of its location.
 
 use crate::dist::draw::standard;
-use crate::dist::param::{finite, positive};
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use smallvec::smallvec;
+use crate::dist::*;
 
 /// `laplace(location, scale)`. At the location, where the density has a kink, the
 /// derivative is taken as 0.
@@ -17,23 +13,12 @@ pub struct Laplace {
 }
 
 impl Laplace {
-    /// Creates the distribution around this location, where the scale is the mean
-    /// distance from it; fails unless the location is finite and the scale positive and
-    /// finite.
-    pub fn new(location: f64, scale: f64) -> Result<Laplace, ParamError> {
-        let (location, scale) =
-            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+    pub(in crate::dist) fn of(location: f64, scale: f64) -> Result<Laplace, ParamError> {
         Ok(Laplace { location, scale, log_norm: -core::f64::consts::LN_2 - libm::log(scale) })
     }
 }
 
 impl Scalar for Laplace {
-    const NAME: &'static str = "laplace";
-
-    fn number_support(&self) -> Support {
-        Support::Real
-    }
-
     fn draw(&self, rng: &mut Stream) -> f64 {
         let size = -self.scale * libm::log(rng.open_uniform());
         let x = if rng.next_u64() & 1 == 0 { self.location + size } else { self.location - size };

@@ -1,12 +1,8 @@
 //! The log-normal distribution: the exponential of a normal number.
 
 use crate::dist::draw::representable;
-use crate::dist::param::{finite, positive};
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, log_normal_cdf};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `lognormal(mu, sigma)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,20 +13,13 @@ pub struct LogNormal {
 }
 
 impl LogNormal {
-    /// Creates the distribution with this mean and standard deviation of the logarithm;
-    /// fails unless mu is finite and sigma positive and finite.
-    pub fn new(mu: f64, sigma: f64) -> Result<LogNormal, ParamError> {
-        let (mu, sigma) = (finite(Self::NAME, "mu", mu)?, positive(Self::NAME, "sigma", sigma)?);
+    pub(in crate::dist) fn of(mu: f64, sigma: f64) -> Result<LogNormal, ParamError> {
         Ok(LogNormal { mu, sigma, log_norm: -libm::log(sigma) - LN_SQRT_2PI })
     }
 }
 
 impl Scalar for LogNormal {
-    const NAME: &'static str = "lognormal";
-
-    fn number_support(&self) -> Support {
-        Support::Positive
-    }
+    const SUPPORT: Support = Support::Positive;
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         representable(libm::exp(self.mu + self.sigma * rng.standard_normal()))

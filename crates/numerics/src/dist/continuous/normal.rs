@@ -1,12 +1,8 @@
 //! The normal distribution.
 
 use crate::dist::draw::standard;
-use crate::dist::param::{finite, positive};
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, log_normal_cdf};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `normal(mean, sd)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,10 +13,7 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// Creates the distribution with this mean and standard deviation; fails unless the
-    /// mean is finite and the standard deviation positive and finite.
-    pub fn new(mean: f64, sd: f64) -> Result<Normal, ParamError> {
-        let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
+    pub(in crate::dist) fn of(mean: f64, sd: f64) -> Result<Normal, ParamError> {
         Ok(Normal { mean, sd, log_norm: -libm::log(sd) - LN_SQRT_2PI })
     }
 
@@ -28,20 +21,11 @@ impl Normal {
     /// standard deviation is the same.
     #[inline]
     pub fn near(&self, mean: f64, sd: f64) -> Result<Normal, ParamError> {
-        if sd.to_bits() != self.sd.to_bits() {
-            return Normal::new(mean, sd);
-        }
-        Ok(Normal { mean: finite(Self::NAME, "mean", mean)?, ..*self })
+        self.reused(&[mean, sd]).map_or_else(|| Normal::new(mean, sd), Ok)
     }
 }
 
 impl Scalar for Normal {
-    const NAME: &'static str = "normal";
-
-    fn number_support(&self) -> Support {
-        Support::Real
-    }
-
     fn draw(&self, rng: &mut Stream) -> f64 {
         (self.mean + self.sd * rng.standard_normal()).clamp(f64::MIN, f64::MAX)
     }
@@ -72,6 +56,16 @@ impl Scalar for Normal {
 
     fn number_sd(&self) -> Option<f64> {
         Some(self.sd)
+    }
+
+    #[inline]
+    fn reused(&self, params: &[f64]) -> Option<Normal> {
+        match params {
+            [mean, sd] if sd.to_bits() == self.sd.to_bits() && mean.is_finite() => {
+                Some(Normal { mean: *mean, ..*self })
+            }
+            _ => None,
+        }
     }
 
     fn standardised(&self, x: f64) -> Option<f64> {

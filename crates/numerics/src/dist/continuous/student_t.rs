@@ -1,12 +1,9 @@
 //! Student's t distribution, with a location and a scale.
 
 use crate::dist::draw::{far_square, ln_gamma_draw, standard};
-use crate::dist::param::{finite, positive};
-use crate::dist::tails::{CdfSlopes, Tails, speed_by_differences};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::tails::speed_by_differences;
+use crate::dist::*;
 use crate::num::{beta_tails, digamma, ln_beta};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `student_t(df, location, scale)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,12 +15,7 @@ pub struct StudentT {
 }
 
 impl StudentT {
-    /// Creates the distribution with these degrees of freedom, location and scale; fails
-    /// unless the location is finite and the others positive and finite.
-    pub fn new(df: f64, location: f64, scale: f64) -> Result<StudentT, ParamError> {
-        let df = positive(Self::NAME, "df", df)?;
-        let (location, scale) =
-            (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+    pub(in crate::dist) fn of(df: f64, location: f64, scale: f64) -> Result<StudentT, ParamError> {
         let log_norm = -ln_beta(0.5 * df, 0.5) - 0.5 * libm::log(df) - libm::log(scale);
         Ok(StudentT { df, location, scale, log_norm })
     }
@@ -44,12 +36,6 @@ impl StudentT {
 }
 
 impl Scalar for StudentT {
-    const NAME: &'static str = "student_t";
-
-    fn number_support(&self) -> Support {
-        Support::Real
-    }
-
     fn draw(&self, rng: &mut Stream) -> f64 {
         let z = rng.standard_normal();
         let half = 0.5 * self.df;

@@ -2,13 +2,9 @@
 
 use crate::dist::continuous::interval::{each_node, ends, from_order, integral, order, within};
 use crate::dist::param::MAX_INTEGER;
-use crate::dist::{
-    Datum, Dist, Distribution, Gradient, Iid, ParamError, Product, Scalar, Support, TruncatedNormal,
-};
+use crate::dist::*;
 use crate::num::{log_diff_exp, log_sum_exp};
-use crate::rng::Stream;
 use core::f64::consts::LN_2;
-use std::sync::Arc;
 
 /// The largest number of integers that are summed one by one.
 const FEW: f64 = 64.0;
@@ -43,23 +39,19 @@ pub fn truncated(base: &Dist, lo: f64, hi: f64) -> Result<Dist, ParamError> {
         Dist::Normal(d) => {
             check_bounds(lo, hi, false)?;
             let [mean, sd] = [d.number_mean(), d.number_sd()].map(|p| p.unwrap_or(f64::NAN));
-            Dist::TruncatedNormal(Arc::new(TruncatedNormal::new(mean, sd, lo, hi)?))
+            Dist::from(TruncatedNormal::new(mean, sd, lo, hi)?)
         }
-        Dist::Iid(d) => Dist::Iid(Arc::new(Iid::new(truncated(d.one(), lo, hi)?, d.len())?)),
+        Dist::Iid(d) => Dist::from(Iid::new(truncated(d.one(), lo, hi)?, d.len())?),
         Dist::Product(d) => {
             let parts = d
                 .parts()
                 .iter()
                 .map(|one| truncated(one, lo, hi))
                 .collect::<Result<Vec<_>, _>>()?;
-            Dist::Product(Arc::new(Product::new(parts)?))
+            Dist::from(Product::new(parts)?)
         }
-        other => Dist::Truncated(Arc::new(Truncated::new(other.clone(), lo, hi)?)),
+        other => Dist::from(Truncated::new(other.clone(), lo, hi)?),
     })
-}
-
-fn bad(parameter: &'static str, value: String, rule: &'static str) -> ParamError {
-    ParamError::new("truncated", parameter, value, rule)
 }
 
 /// Returns the reason why a distribution cannot be truncated.
@@ -73,17 +65,21 @@ fn unknown(d: &Dist) -> ParamError {
         d if d.is_scalar() => "must have a computable distribution function for these parameters",
         _ => "must be a distribution of single numbers",
     };
-    bad("d", d.name().to_owned(), rule)
+    Truncated::bad("d", d.name().to_owned(), rule)
 }
 
 fn check_bounds(lo: f64, hi: f64, discrete: bool) -> Result<(), ParamError> {
     let value = || format!("{lo} and {hi}");
     match () {
-        () if lo.is_nan() || hi.is_nan() => Err(bad("lo to hi", value(), "must be numbers")),
-        () if lo == hi && !discrete => {
-            Err(bad("lo", value(), "must be below hi: an interval without width has no density"))
+        () if lo.is_nan() || hi.is_nan() => {
+            Err(Truncated::bad("lo to hi", value(), "must be numbers"))
         }
-        () if lo > hi => Err(bad("lo", value(), "must be below hi")),
+        () if lo == hi && !discrete => Err(Truncated::bad(
+            "lo",
+            value(),
+            "must be below hi: an interval without width has no density",
+        )),
+        () if lo > hi => Err(Truncated::bad("lo", value(), "must be below hi")),
         () => Ok(()),
     }
 }
@@ -98,7 +94,8 @@ impl Truncated {
         if base.is_improper() || base.tails(0.0).is_none() {
             return Err(unknown(&base));
         }
-        let nothing = |rule| bad("lo to hi", format!("{lo} and {hi} of {}", base.name()), rule);
+        let nothing =
+            |rule| Truncated::bad("lo to hi", format!("{lo} and {hi} of {}", base.name()), rule);
         let outside = "must overlap the support of `d`";
         let support = within(&support, lo, hi).ok_or_else(|| nothing(outside))?;
         let mut d = Truncated { base, lo, hi, support, log_mass: 0.0 };
@@ -107,7 +104,7 @@ impl Truncated {
             Ok(d)
         } else {
             let rule = "must contain some of the probability of `d`, more than the smallest double";
-            Err(bad("lo to hi", format!("{lo} and {hi} of {}", d.base.name()), rule))
+            Err(Truncated::bad("lo to hi", format!("{lo} and {hi} of {}", d.base.name()), rule))
         }
     }
 
@@ -118,7 +115,7 @@ impl Truncated {
 
     /// Returns whether the lower and the upper bound of the support are those of the
     /// truncation.
-    pub(in crate::dist) fn own_bounds(&self) -> (bool, bool) {
+    fn own_bounds(&self) -> (bool, bool) {
         match ends(&self.support) {
             Some((lo, hi)) => (lo == self.lo, hi == self.hi),
             None => (false, false),
@@ -279,7 +276,7 @@ impl Truncated {
 
 impl Distribution for Truncated {
     fn name(&self) -> &'static str {
-        "truncated"
+        Self::NAME
     }
 
     fn support(&self) -> Support {
@@ -326,5 +323,23 @@ impl Distribution for Truncated {
         let own = self.own_bounds();
         g.params.extend([at(self.lo, own.0), -at(self.hi, own.1)]);
         g.params.iter().all(|p| p.is_finite()).then_some(g)
+    }
+
+    fn has_moving_support(&self) -> bool {
+        true
+    }
+
+    fn by_bounds(&self, lo: f64, hi: f64) -> Option<Vec<f64>> {
+        let (own_lo, own_hi) = self.own_bounds();
+        if self.base.has_moving_support() && !(own_lo && own_hi) {
+            return None;
+        }
+        let mut by = vec![0.0; self.base.param_count()];
+        by.extend([if own_lo { lo } else { 0.0 }, if own_hi { hi } else { 0.0 }]);
+        Some(by)
+    }
+
+    fn made_of(&self) -> Option<(&[Dist], usize)> {
+        Some((std::slice::from_ref(&self.base), 1))
     }
 }

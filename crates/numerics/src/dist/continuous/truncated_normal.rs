@@ -6,10 +6,8 @@
 
 use crate::dist::continuous::interval::integral;
 use crate::dist::draw::standard;
-use crate::dist::param::{finite, positive};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::mills_ratio;
-use crate::rng::Stream;
 use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 /// The largest distance of the interval from the mean, in units of sd: its square still
@@ -31,35 +29,26 @@ pub struct TruncatedNormal {
 }
 
 impl TruncatedNormal {
-    /// Creates the distribution from the mean and sd before truncation and the bounds.
-    /// Fails unless the mean is finite, the sd positive and finite, `lo` below `hi`, and
-    /// the interval within 1e150 sd of the mean and of positive width in units of sd.
-    pub fn new(mean: f64, sd: f64, lo: f64, hi: f64) -> Result<TruncatedNormal, ParamError> {
-        let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
+    pub(in crate::dist) fn of(
+        mean: f64,
+        sd: f64,
+        lo: f64,
+        hi: f64,
+    ) -> Result<TruncatedNormal, ParamError> {
         let bounds = || format!("{lo} and {hi}");
         if lo.is_nan() || hi.is_nan() || lo >= hi {
-            return Err(ParamError::new(Self::NAME, "lo", bounds(), "must be below hi"));
+            return Err(Self::bad("lo", bounds(), "must be below hi"));
         }
         let (low, high) = (standard(lo, mean, sd), standard(hi, mean, sd));
         if !(low < FARTHEST && high > -FARTHEST) {
-            return Err(ParamError::new(
-                Self::NAME,
-                "lo to hi",
-                bounds(),
-                "must be within 1e150 sd of the mean",
-            ));
+            return Err(Self::bad("lo to hi", bounds(), "must be within 1e150 sd of the mean"));
         }
         let mut d = TruncatedNormal { mean, sd, lo, hi, low, high, mass: 0.0 };
         d.mass = d.relative_mass();
         if d.mass > 0.0 {
             Ok(d)
         } else {
-            Err(ParamError::new(
-                Self::NAME,
-                "lo to hi",
-                bounds(),
-                "must have positive width in units of sd",
-            ))
+            Err(Self::bad("lo to hi", bounds(), "must have positive width in units of sd"))
         }
     }
 
@@ -142,8 +131,6 @@ impl TruncatedNormal {
 }
 
 impl Scalar for TruncatedNormal {
-    const NAME: &'static str = "truncated_normal";
-
     fn number_support(&self) -> Support {
         match (self.lo == f64::NEG_INFINITY, self.hi == f64::INFINITY) {
             (true, true) => Support::Real,
@@ -205,6 +192,10 @@ impl Scalar for TruncatedNormal {
         let by_sd = z * z - 1.0 - moment(self.low, at_low) + moment(self.high, at_high);
         let sd = self.sd;
         Slope::new(-z / sd, [by_mean / sd, by_sd / sd, at_low / sd, -at_high / sd])
+    }
+
+    fn by_bounds(&self, lo: f64, hi: f64) -> Option<CdfSlopes> {
+        Some(smallvec![0.0, 0.0, lo, hi])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -1,10 +1,6 @@
 //! The uniform distribution on an interval.
 
-use crate::dist::param::finite;
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use smallvec::smallvec;
+use crate::dist::*;
 
 /// `uniform(lo, hi)`, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,26 +11,16 @@ pub struct Uniform {
 }
 
 impl Uniform {
-    /// Creates the distribution between these bounds; fails unless both are finite, `lo`
-    /// is below `hi`, and their difference is finite.
-    pub fn new(lo: f64, hi: f64) -> Result<Uniform, ParamError> {
-        let (lo, hi) = (finite(Self::NAME, "lo", lo)?, finite(Self::NAME, "hi", hi)?);
+    pub(in crate::dist) fn of(lo: f64, hi: f64) -> Result<Uniform, ParamError> {
         if lo >= hi {
-            return Err(ParamError::new(
-                Self::NAME,
-                "lo",
-                format!("{lo} and {hi}"),
-                "must be below hi",
-            ));
+            return Err(Self::bad("lo", format!("{lo} and {hi}"), "must be below hi"));
         }
-        let width = finite(Self::NAME, "hi - lo", hi - lo)?;
+        let width = param::finite(Self::NAME, "hi - lo", hi - lo)?;
         Ok(Uniform { lo, hi, log_density: -libm::log(width) })
     }
 }
 
 impl Scalar for Uniform {
-    const NAME: &'static str = "uniform";
-
     fn number_support(&self) -> Support {
         Support::Interval { lo: self.lo, hi: self.hi }
     }
@@ -62,6 +48,10 @@ impl Scalar for Uniform {
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let width = self.hi - self.lo;
         Some(smallvec![-(self.hi - x) / width, -(x - self.lo) / width])
+    }
+
+    fn by_bounds(&self, lo: f64, hi: f64) -> Option<CdfSlopes> {
+        Some(smallvec![lo, hi])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -1,10 +1,8 @@
 //! The von Mises distribution: an angle around a mean direction.
 
-use crate::dist::param::finite;
 use crate::dist::support::wrap_angle;
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::{log_scaled_i0, one_minus_i1_over_i0};
-use crate::rng::Stream;
 use core::f64::consts::{PI, TAU};
 
 /// `von_mises(mean, concentration)`: an angle in radians in (-pi, pi]; uniform if the
@@ -21,18 +19,8 @@ pub struct VonMises {
 }
 
 impl VonMises {
-    /// Creates the distribution around this mean direction, which may be any finite
-    /// angle; fails unless it is finite and the concentration is finite and not negative.
-    pub fn new(mean: f64, concentration: f64) -> Result<VonMises, ParamError> {
-        let mean = wrap_angle(finite(Self::NAME, "mean", mean)?);
-        if !(concentration >= 0.0 && concentration.is_finite()) {
-            return Err(ParamError::new(
-                Self::NAME,
-                "concentration",
-                concentration,
-                "must be finite and not negative",
-            ));
-        }
+    pub(in crate::dist) fn of(mean: f64, concentration: f64) -> Result<VonMises, ParamError> {
+        let mean = wrap_angle(mean);
         let log_norm = -libm::log(TAU) - log_scaled_i0(concentration);
         Ok(VonMises { mean, concentration, log_norm })
     }
@@ -46,11 +34,7 @@ impl VonMises {
 }
 
 impl Scalar for VonMises {
-    const NAME: &'static str = "von_mises";
-
-    fn number_support(&self) -> Support {
-        Support::Circle
-    }
+    const SUPPORT: Support = Support::Circle;
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         let k = self.concentration;
@@ -86,13 +70,5 @@ impl Scalar for VonMises {
     fn slope(&self, x: f64) -> Slope {
         let pull = self.concentration * libm::sin(x - self.mean);
         Slope::new(-pull, [pull, one_minus_i1_over_i0(self.concentration) - self.fall(x)])
-    }
-
-    fn number_mean(&self) -> Option<f64> {
-        None
-    }
-
-    fn number_sd(&self) -> Option<f64> {
-        None
     }
 }

@@ -1,12 +1,8 @@
 //! The Weibull distribution.
 
 use crate::dist::draw::representable;
-use crate::dist::param::positive;
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::ln_gamma;
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `weibull(shape, scale)`: (x / scale)^shape is exponential with rate 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,11 +13,7 @@ pub struct Weibull {
 }
 
 impl Weibull {
-    /// Creates the distribution with this shape and scale; fails unless both are positive
-    /// and finite.
-    pub fn new(shape: f64, scale: f64) -> Result<Weibull, ParamError> {
-        let (shape, scale) =
-            (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
+    pub(in crate::dist) fn of(shape: f64, scale: f64) -> Result<Weibull, ParamError> {
         Ok(Weibull { shape, scale, log_norm: libm::log(shape) })
     }
 
@@ -37,11 +29,7 @@ impl Weibull {
 }
 
 impl Scalar for Weibull {
-    const NAME: &'static str = "weibull";
-
-    fn number_support(&self) -> Support {
-        Support::Positive
-    }
+    const SUPPORT: Support = Support::Positive;
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         let power = libm::log(-libm::log(rng.open_uniform())) / self.shape;

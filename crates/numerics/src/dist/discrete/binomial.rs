@@ -2,12 +2,8 @@
 //! inversion for few expected successes, otherwise transformed rejection (Hörmann 1993,
 //! "The generation of binomial random variates", BTRS).
 
-use crate::dist::param::{integer, probability};
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, beta_tails, deviance, stirling_error};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `binomial(n, p)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,13 +14,9 @@ pub struct Binomial {
 }
 
 impl Binomial {
-    /// Creates the distribution of successes in `n` trials that each succeed with
-    /// probability `p`; fails unless `n` is an integer between 0 and 2^53 and `p` is in
-    /// [0, 1].
-    pub fn new(n: f64, p: f64) -> Result<Binomial, ParamError> {
-        let (n, p) = (integer(Self::NAME, "n", n)?, probability(Self::NAME, "p", p)?);
+    pub(in crate::dist) fn of(n: f64, p: f64) -> Result<Binomial, ParamError> {
         if n < 0.0 {
-            return Err(ParamError::new(Self::NAME, "n", n, "must not be negative"));
+            return Err(Self::bad("n", n, "must not be negative"));
         }
         Ok(Binomial { n, p, error: if n > 0.0 { stirling_error(n) } else { 0.0 } })
     }
@@ -73,8 +65,6 @@ impl Binomial {
 }
 
 impl Scalar for Binomial {
-    const NAME: &'static str = "binomial";
-
     fn number_support(&self) -> Support {
         Support::Integers { lo: 0, hi: Some(self.n as i64) }
     }
@@ -125,8 +115,7 @@ impl Scalar for Binomial {
         if k >= self.n {
             return Some(Tails::ALL_BELOW);
         }
-        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p)
-            .map(|(below, above)| Tails { below, above })
+        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {

@@ -1,9 +1,6 @@
 //! The categorical distribution: an index drawn in proportion to weights.
 
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use std::sync::Arc;
+use crate::dist::*;
 
 /// `categorical(weights)`: 0, 1, … with these weights, which need not sum to 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,14 +42,9 @@ fn total(weights: &[f64]) -> Result<f64, ParamError> {
         return Ok(total);
     }
     if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
-        return Err(ParamError::new(
-            Categorical::NAME,
-            "weights",
-            w,
-            "must be finite and not negative",
-        ));
+        return Err(Categorical::bad("weights", w, "must be finite and not negative"));
     }
-    Err(ParamError::new(Categorical::NAME, "weights", total, "must have a positive, finite sum"))
+    Err(Categorical::bad("weights", total, "must have a positive, finite sum"))
 }
 
 #[inline]
@@ -69,8 +61,6 @@ fn log_probability(weights: &[f64], total: f64, x: f64) -> f64 {
 }
 
 impl Scalar for Categorical {
-    const NAME: &'static str = "categorical";
-
     fn number_support(&self) -> Support {
         Support::Integers { lo: 0, hi: Some(self.weights.len() as i64 - 1) }
     }
@@ -108,7 +98,7 @@ impl Scalar for Categorical {
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let split = (libm::floor(x).max(-1.0) + 1.0) as usize;
         let own = libm::exp(self.log_density_num(x));
-        let below = libm::exp(self.tails(x)?.below);
+        let below = libm::exp(Scalar::tails(self, x)?.below);
         let by = |i: usize| (f64::from(u8::from(i < split)) - below) / self.total / own;
         Some((0..self.weights.len()).map(by).collect())
     }

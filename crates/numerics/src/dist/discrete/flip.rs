@@ -1,8 +1,7 @@
 //! The Bernoulli distribution.
 
-use crate::dist::param::probability;
-use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
-use crate::rng::Stream;
+use crate::dist::batch::Member;
+use crate::dist::*;
 
 /// `flip(p)`: true with probability `p`. Observed numbers 1 and 0 count as true and
 /// false.
@@ -12,10 +11,8 @@ pub struct Flip {
 }
 
 impl Flip {
-    /// Creates the distribution with this probability of true; fails unless it is in [0,
-    /// 1].
-    pub fn new(p: f64) -> Result<Flip, ParamError> {
-        Ok(Flip { p: probability("flip", "p", p)? })
+    pub(in crate::dist) fn of(p: f64) -> Result<Flip, ParamError> {
+        Ok(Flip { p })
     }
 
     /// Returns the log probability of a truth value.
@@ -38,14 +35,27 @@ impl Flip {
     /// Returns the derivative of the log probability with respect to `p`, where it is
     /// finite.
     #[inline]
-    pub(in crate::dist) fn slope(&self, x: bool) -> f64 {
+    fn by_p(&self, x: bool) -> f64 {
         if x { 1.0 / self.p } else { -1.0 / (1.0 - self.p) }
+    }
+}
+
+/// Truth values count as 1 and 0.
+impl Member<1> for Flip {
+    #[inline]
+    fn log_density(&self, x: f64) -> f64 {
+        self.log_probability(x != 0.0)
+    }
+
+    #[inline]
+    fn slopes(&self, x: f64) -> (f64, [f64; 1]) {
+        (0.0, [self.by_p(x != 0.0)])
     }
 }
 
 impl Distribution for Flip {
     fn name(&self) -> &'static str {
-        "flip"
+        Self::NAME
     }
 
     fn support(&self) -> Support {
@@ -63,7 +73,7 @@ impl Distribution for Flip {
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
         let x = Flip::truth(x).filter(|x| self.log_probability(*x).is_finite())?;
-        Some(Gradient { x: Vec::new(), params: vec![self.slope(x)] })
+        Some(Gradient { x: Vec::new(), params: vec![self.by_p(x)] })
     }
 
     fn mean(&self) -> Option<f64> {

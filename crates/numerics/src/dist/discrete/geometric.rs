@@ -1,10 +1,6 @@
 //! The geometric distribution: failures before the first success.
 
-use crate::dist::discrete::neg_binomial::success;
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use smallvec::smallvec;
+use crate::dist::*;
 
 /// `geometric(p)`, which starts at 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,19 +9,13 @@ pub struct Geometric {
 }
 
 impl Geometric {
-    /// Creates the distribution with this probability of success in each trial; fails
-    /// unless it is above 0 and at most 1.
-    pub fn new(p: f64) -> Result<Geometric, ParamError> {
-        Ok(Geometric { p: success(Self::NAME, p)? })
+    pub(in crate::dist) fn of(p: f64) -> Result<Geometric, ParamError> {
+        Ok(Geometric { p })
     }
 }
 
 impl Scalar for Geometric {
-    const NAME: &'static str = "geometric";
-
-    fn number_support(&self) -> Support {
-        Support::Integers { lo: 0, hi: None }
-    }
+    const SUPPORT: Support = Support::Integers { lo: 0, hi: None };
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         if self.p == 1.0 {

@@ -1,13 +1,9 @@
 //! The multinomial distribution. Probabilities use Loader's saddle-point form; counts are
 //! drawn one category after the other.
 
-use crate::dist::param::integer;
 use crate::dist::support::are_counts;
-use crate::dist::{
-    Binomial, Categorical, Datum, Distribution, Gradient, ParamError, Scalar, Support,
-};
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, deviance, stirling_error};
-use crate::rng::Stream;
 
 /// `multinomial(n, weights)`: how many of n draws fall into each category. The weights
 /// need not sum to 1.
@@ -23,11 +19,11 @@ impl Multinomial {
     /// integer between 0 and 2^53, and all weights are finite and not negative with a
     /// positive, finite sum.
     pub fn new(n: f64, weights: &[f64]) -> Result<Multinomial, ParamError> {
-        let n = integer("multinomial", "n", n)?;
+        let n = param::integer(Self::NAME, "n", n)?;
         if n < 0.0 {
-            return Err(ParamError::new("multinomial", "n", n, "must not be negative"));
+            return Err(Self::bad("n", n, "must not be negative"));
         }
-        let one = |e| ParamError { distribution: "multinomial", ..e };
+        let one = |e| ParamError { distribution: Self::NAME, ..e };
         Categorical::new(weights).map_err(one)?;
         Ok(Multinomial { n, weights: weights.into(), total: weights.iter().sum() })
     }
@@ -63,7 +59,7 @@ impl Multinomial {
 
 impl Distribution for Multinomial {
     fn name(&self) -> &'static str {
-        "multinomial"
+        Self::NAME
     }
 
     fn support(&self) -> Support {

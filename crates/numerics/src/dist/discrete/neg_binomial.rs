@@ -2,12 +2,10 @@
 //! draws are Poisson with a gamma-distributed rate.
 
 use crate::dist::draw::ln_gamma_draw;
-use crate::dist::param::{MAX_INTEGER, positive};
-use crate::dist::tails::{CdfSlopes, Tails, speed_by_differences};
-use crate::dist::{ParamError, Poisson, Scalar, Slope, Support};
+use crate::dist::param::MAX_INTEGER;
+use crate::dist::tails::speed_by_differences;
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, ln_gamma, stirling_error};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `neg_binomial(r, p)`: the number of failures before the `r`-th success, as in scipy's
 /// `nbinom(r, p)`; `r` may be any positive number. Stan's `neg_binomial(alpha, beta)` has
@@ -20,29 +18,13 @@ pub struct NegBinomial {
 }
 
 impl NegBinomial {
-    /// Creates the distribution for `r` successes that each have probability `p`; fails
-    /// unless `r` is positive and finite and `p` above 0 and at most 1.
-    pub fn new(r: f64, p: f64) -> Result<NegBinomial, ParamError> {
-        let (r, p) = (positive(Self::NAME, "r", r)?, success(Self::NAME, p)?);
+    pub(in crate::dist) fn of(r: f64, p: f64) -> Result<NegBinomial, ParamError> {
         Ok(NegBinomial { r, p, error: stirling_error(r) })
     }
 }
 
-/// Checks a probability of success, which must not be 0: a success must occur eventually.
-pub(in crate::dist) fn success(distribution: &'static str, p: f64) -> Result<f64, ParamError> {
-    if p > 0.0 && p <= 1.0 {
-        Ok(p)
-    } else {
-        Err(ParamError::new(distribution, "p", p, "must be above 0 and at most 1"))
-    }
-}
-
 impl Scalar for NegBinomial {
-    const NAME: &'static str = "neg_binomial";
-
-    fn number_support(&self) -> Support {
-        Support::Integers { lo: 0, hi: None }
-    }
+    const SUPPORT: Support = Support::Integers { lo: 0, hi: None };
 
     /// Draws a number of failures of at most about 2^53.
     fn draw(&self, rng: &mut Stream) -> f64 {
@@ -85,15 +67,11 @@ impl Scalar for NegBinomial {
             return Some(Tails::NONE_BELOW);
         }
         let k = libm::floor(x);
-        beta_tails(self.r, k + 1.0, self.p, 1.0 - self.p)
-            .map(|(below, above)| Tails { below, above })
+        beta_tails(self.r, k + 1.0, self.p, 1.0 - self.p).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
-        let tails = |r| {
-            beta_tails(r, x + 1.0, self.p, 1.0 - self.p)
-                .map(|(below, above)| Tails { below, above })
-        };
+        let tails = |r| beta_tails(r, x + 1.0, self.p, 1.0 - self.p).map(Tails::from);
         let by_r = speed_by_differences(self.r, self.log_density_num(x), tails)?;
         Some(smallvec![by_r, (self.r + x) / self.p])
     }

@@ -2,12 +2,8 @@
 //! inversion for small rates, otherwise transformed rejection (Hörmann 1993, "The
 //! transformed rejection method for generating Poisson random variables", PTRS).
 
-use crate::dist::param::MAX_INTEGER;
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, deviance, gamma_tails, stirling_error};
-use crate::rng::Stream;
-use smallvec::smallvec;
 
 /// `poisson(rate)`; always 0 if the rate is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,22 +12,13 @@ pub struct Poisson {
 }
 
 impl Poisson {
-    /// Creates the distribution with this mean; fails unless it is between 0 and 2^53.
-    pub fn new(rate: f64) -> Result<Poisson, ParamError> {
-        if (0.0..=MAX_INTEGER).contains(&rate) {
-            Ok(Poisson { rate })
-        } else {
-            Err(ParamError::new(Self::NAME, "rate", rate, "must be between 0 and 2^53"))
-        }
+    pub(in crate::dist) fn of(rate: f64) -> Result<Poisson, ParamError> {
+        Ok(Poisson { rate })
     }
 }
 
 impl Scalar for Poisson {
-    const NAME: &'static str = "poisson";
-
-    fn number_support(&self) -> Support {
-        Support::Integers { lo: 0, hi: None }
-    }
+    const SUPPORT: Support = Support::Integers { lo: 0, hi: None };
 
     fn draw(&self, rng: &mut Stream) -> f64 {
         let rate = self.rate;
@@ -90,11 +77,10 @@ impl Scalar for Poisson {
             return Some(Tails::NONE_BELOW);
         }
         let k = libm::floor(x);
-        gamma_tails(k + 1.0, self.rate).map(|(above, below)| Tails { below, above })
+        gamma_tails(k + 1.0, self.rate).map(|t| Tails::from(t).swapped())
     }
 
-    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
-        let _ = x;
+    fn cdf_slopes(&self, _x: f64) -> Option<CdfSlopes> {
         Some(smallvec![-1.0])
     }
 

@@ -1,10 +1,6 @@
 //! The uniform distribution on a range of integers.
 
-use crate::dist::param::integer;
-use crate::dist::tails::{CdfSlopes, Tails};
-use crate::dist::{ParamError, Scalar, Slope, Support};
-use crate::rng::Stream;
-use smallvec::smallvec;
+use crate::dist::*;
 
 /// `uniform_discrete(lo, hi)`, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,25 +11,15 @@ pub struct UniformDiscrete {
 }
 
 impl UniformDiscrete {
-    /// Creates the distribution between these integers; fails unless both are integers of
-    /// at most 2^53 in magnitude and `lo` is not above `hi`.
-    pub fn new(lo: f64, hi: f64) -> Result<UniformDiscrete, ParamError> {
-        let (lo, hi) = (integer(Self::NAME, "lo", lo)?, integer(Self::NAME, "hi", hi)?);
+    pub(in crate::dist) fn of(lo: f64, hi: f64) -> Result<UniformDiscrete, ParamError> {
         if lo > hi {
-            return Err(ParamError::new(
-                Self::NAME,
-                "lo",
-                format!("{lo} and {hi}"),
-                "must not be above hi",
-            ));
+            return Err(Self::bad("lo", format!("{lo} and {hi}"), "must not be above hi"));
         }
         Ok(UniformDiscrete { lo, hi, log_probability: -libm::log(hi - lo + 1.0) })
     }
 }
 
 impl Scalar for UniformDiscrete {
-    const NAME: &'static str = "uniform_discrete";
-
     fn number_support(&self) -> Support {
         Support::Integers { lo: self.lo as i64, hi: Some(self.hi as i64) }
     }
@@ -63,8 +49,7 @@ impl Scalar for UniformDiscrete {
         Some(Tails { below: part(k - self.lo + 1.0), above: part(self.hi - k) })
     }
 
-    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
-        let _ = x;
+    fn cdf_slopes(&self, _x: f64) -> Option<CdfSlopes> {
         Some(smallvec![0.0, 0.0])
     }
 

@@ -3,9 +3,8 @@
 use crate::dist::draw::{ln_gamma_draw, x_log_y};
 use crate::dist::param::positive;
 use crate::dist::support::is_simplex;
-use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
+use crate::dist::*;
 use crate::num::{digamma, ln_gamma, log_sum_exp};
-use crate::rng::Stream;
 
 /// `dirichlet(alpha)`. The density is with respect to all proportions but the last. A
 /// proportion of 0 is a pole (+inf) if its concentration is below 1 and impossible (-inf)
@@ -21,12 +20,7 @@ impl Dirichlet {
     /// unless all are positive and have a finite sum.
     pub fn new(alpha: &[f64]) -> Result<Dirichlet, ParamError> {
         if alpha.is_empty() {
-            return Err(ParamError::new(
-                "dirichlet",
-                "alpha",
-                "none",
-                "must have one number per component",
-            ));
+            return Err(Self::bad("alpha", "none", "must have one number per component"));
         }
         for a in alpha {
             positive("dirichlet", "alpha", *a)?;
@@ -55,7 +49,7 @@ impl Dirichlet {
 
 impl Distribution for Dirichlet {
     fn name(&self) -> &'static str {
-        "dirichlet"
+        Self::NAME
     }
 
     fn support(&self) -> Support {

@@ -135,10 +135,24 @@ impl Gaussian {
 
 /// Implements [`crate::dist::Distribution`] for a family that wraps a [`Gaussian`].
 macro_rules! gaussian_family {
-    ($family:ident, $name:literal) => {
+    ($family:ident) => {
+        impl $family {
+            /// Returns derivatives with respect to the Cholesky factor, its lower triangle
+            /// by rows. For a centred distribution, they are those of the log density; for
+            /// a whitened one, those of a function of the value whose derivatives with
+            /// respect to the value are `by_value`.
+            pub fn factor_gradient(
+                &self,
+                stored: &$crate::dist::Datum,
+                by_value: &[f64],
+            ) -> Option<Vec<f64>> {
+                self.0.factor_gradient(stored, by_value)
+            }
+        }
+
         impl $crate::dist::Distribution for $family {
             fn name(&self) -> &'static str {
-                $name
+                <$family as $crate::dist::Named>::NAME
             }
 
             fn support(&self) -> $crate::dist::Support {
@@ -151,6 +165,14 @@ macro_rules! gaussian_family {
 
             fn is_stored_whitened(&self) -> bool {
                 self.0.whitened
+            }
+
+            fn from_noncentred_vjp(&self, by: &[f64]) -> Option<Vec<f64>> {
+                Some(self.0.factor.transposed_times(by))
+            }
+
+            fn centred(&self) -> Option<$crate::dist::Dist> {
+                self.0.whitened.then(|| self.to_centred().into())
             }
 
             $crate::dist::joint::gaussian::forward! {

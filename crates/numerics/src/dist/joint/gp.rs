@@ -2,8 +2,8 @@
 
 use crate::dist::joint::factor::Factor;
 use crate::dist::joint::gaussian::{Gaussian, gaussian_family};
-use crate::dist::param::finite;
-use crate::dist::{Covariance, ParamError};
+use crate::dist::param::{finite, not_negative};
+use crate::dist::*;
 
 /// The largest number of points: the time to factor their covariance grows with its cube.
 const MOST_POINTS: usize = 4000;
@@ -42,27 +42,25 @@ impl Gp {
         centred: bool,
         jitter: f64,
     ) -> Result<Gp, ParamError> {
-        if !(jitter >= 0.0 && jitter.is_finite()) {
-            return Err(ParamError::new("gp", "jitter", jitter, "must be finite and not negative"));
-        }
+        not_negative(Self::NAME, "jitter", jitter)?;
         if mean.len() != at.len() {
             let value = format!("{} for {}", mean.len(), at.len());
-            return Err(ParamError::new("gp", "mean", value, "must have one number per point"));
+            return Err(Self::bad("mean", value, "must have one number per point"));
         }
         if at.len() > MOST_POINTS {
             let rule = "must have at most 4000 points";
-            return Err(ParamError::new("gp", "at", at.len(), rule));
+            return Err(Self::bad("at", at.len(), rule));
         }
         for m in &mean {
-            finite("gp", "mean", *m)?;
+            finite(Self::NAME, "mean", *m)?;
         }
         for x in at {
-            finite("gp", "at", *x)?;
+            finite(Self::NAME, "at", *x)?;
         }
         let packed = cov.packed(at, jitter * cov.variance());
         let singular = || {
             let value = format!("{cov} at {} points", at.len());
-            ParamError::new("gp", "cov", value, "must make a positive definite matrix")
+            Self::bad("cov", value, "must make a positive definite matrix")
         };
         let factor = Factor::new(at.len(), packed).map_err(|_| singular())?;
         Ok(Gp(Gaussian { mean: mean.into(), factor, whitened: !centred }, jitter))
@@ -71,18 +69,6 @@ impl Gp {
     /// Returns the same process in centred form, which stores values.
     pub fn to_centred(&self) -> Gp {
         Gp(self.0.centred(), self.1)
-    }
-
-    /// Returns derivatives with respect to the Cholesky factor, its lower triangle by
-    /// rows. For a centred process, they are those of the log density; for a whitened
-    /// one, those of a function of the value whose derivatives with respect to the value
-    /// are `by_value`.
-    pub fn factor_gradient(
-        &self,
-        stored: &crate::dist::Datum,
-        by_value: &[f64],
-    ) -> Option<Vec<f64>> {
-        self.0.factor_gradient(stored, by_value)
     }
 
     /// Converts derivatives with respect to the factor to those with respect to the
@@ -104,12 +90,6 @@ impl Gp {
         }
         Some(out)
     }
-
-    /// Converts derivatives with respect to the value to those with respect to the white
-    /// noise.
-    pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
-        self.0.factor.transposed_times(by)
-    }
 }
 
-gaussian_family!(Gp, "gp");
+gaussian_family!(Gp);

@@ -1,9 +1,8 @@
 //! Independent elements of one distribution.
 
 use crate::dist::joint::product;
-use crate::dist::{Datum, Dist, Distribution, Gradient, ParamError, Support};
+use crate::dist::*;
 use crate::num::accumulate;
-use crate::rng::Stream;
 
 /// `iid(d, n)`. In the language, its elements are choices with their own addresses.
 ///
@@ -20,7 +19,7 @@ impl Iid {
     /// further elements have no addresses.
     pub fn new(one: Dist, n: usize) -> Result<Iid, ParamError> {
         if n >= u32::MAX as usize {
-            return Err(ParamError::new("iid", "n", n, "must be below 2^32 - 1"));
+            return Err(Self::bad("n", n, "must be below 2^32 - 1"));
         }
         Ok(Iid { one: one.centred(), n })
     }
@@ -47,7 +46,7 @@ impl Iid {
 
 impl Distribution for Iid {
     fn name(&self) -> &'static str {
-        "iid"
+        Self::NAME
     }
 
     fn support(&self) -> Support {
@@ -84,5 +83,17 @@ impl Distribution for Iid {
 
     fn is_improper(&self) -> bool {
         self.one.is_improper()
+    }
+
+    fn param_count(&self) -> usize {
+        self.one.param_count()
+    }
+
+    fn has_moving_support(&self) -> bool {
+        self.one.has_moving_support()
+    }
+
+    fn made_of(&self) -> Option<(&[Dist], usize)> {
+        Some((std::slice::from_ref(&self.one), self.n))
     }
 }

@@ -4,9 +4,8 @@
 use crate::dist::draw::{ln_gamma_draw, x_log_y};
 use crate::dist::joint::triangle;
 use crate::dist::param::{integer, positive};
-use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
+use crate::dist::*;
 use crate::num::{digamma, expit, ln_beta, ln_gamma};
-use crate::rng::Stream;
 use core::f64::consts::PI;
 
 /// The largest number of rows.
@@ -56,7 +55,7 @@ pub(in crate::dist) fn rows(distribution: &'static str, n: f64) -> Result<usize,
 
 impl Distribution for Lkj {
     fn name(&self) -> &'static str {
-        "lkj"
+        Self::NAME
     }
 
     fn support(&self) -> Support {

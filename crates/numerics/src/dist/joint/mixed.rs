@@ -1,13 +1,13 @@
 //! Batches for one mixture whose weights and component parameters lie in a buffer, as in
 //! [`crate::dist::batch`].
 
-use crate::dist::batch::{Family, family};
+use crate::dist::batch::{Component, component};
 use crate::dist::{Batch, Categorical, Dist, Mixture};
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
 
 /// A component's family and the columns of its parameters.
-type Part = (Box<dyn Family>, SmallVec<[Column; 3]>);
+type Part = (Box<dyn Component>, SmallVec<[Column; 3]>);
 
 /// A batch of numbers under one mixture.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ pub fn batch_of_mixture(
 ) -> Option<Box<dyn Batch>> {
     let part = |(d, columns): (&Dist, SmallVec<[Column; 3]>)| {
         (d.elements().is_none() && columns.iter().all(|c| c.step == 0)).then_some(())?;
-        Some((family(d, &columns)?, columns))
+        Some((component(d, &columns)?, columns))
     };
     let parts = dist.components().iter().zip(columns).map(part).collect::<Option<Vec<_>>>()?;
     let (weights_now, log_shares, total) = dist.shares();

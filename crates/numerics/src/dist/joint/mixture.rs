@@ -1,9 +1,8 @@
 //! Mixtures: a value from one of several distributions, with the component summed out.
 
 use crate::dist::continuous::interval::ends;
-use crate::dist::{Categorical, Datum, Dist, Distribution, Gradient, ParamError, Scalar, Support};
+use crate::dist::*;
 use crate::num::log_sum_exp;
-use crate::rng::Stream;
 use smallvec::SmallVec;
 
 /// `mixture(weights, components)`. The density is the weighted mean of the components'
@@ -27,8 +26,7 @@ impl Mixture {
     /// each, the weights are finite and not negative with a positive, finite sum, and the
     /// components are proper and have the same kind of values.
     pub fn new(weights: &[f64], components: Vec<Dist>) -> Result<Mixture, ParamError> {
-        let bad =
-            |parameter, value: String, rule| ParamError::new("mixture", parameter, value, rule);
+        let bad = |parameter, value: String, rule| Self::bad(parameter, value, rule);
         if weights.len() != components.len() {
             let value = format!("{} for {}", weights.len(), components.len());
             return Err(bad("weights", value, "must have one number per component"));
@@ -146,7 +144,7 @@ pub(in crate::dist) fn union(a: Support, b: Support) -> Option<Support> {
 
 impl Distribution for Mixture {
     fn name(&self) -> &'static str {
-        "mixture"
+        Self::NAME
     }
 
     fn support(&self) -> Support {
@@ -197,5 +195,37 @@ impl Distribution for Mixture {
             variance += libm::exp(*w) * (sd * sd + (m - mean) * (m - mean));
         }
         Some(variance.sqrt())
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let shares = self.log_shares.iter().zip(&self.components);
+        let likely = shares.filter(|(s, _)| **s > f64::NEG_INFINITY);
+        let all: Option<Vec<(f64, Tails)>> = likely.map(|(s, c)| Some((*s, c.tails(x)?))).collect();
+        Some(Tails::mixed(&all?))
+    }
+
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
+        let all = self.log_density(&Datum::Num(x));
+        let below = libm::exp(self.tails(x)?.below);
+        let (mut by_weight, mut rest) = (CdfSlopes::new(), CdfSlopes::new());
+        for (share, c) in self.log_shares.iter().zip(&self.components) {
+            by_weight.push((libm::exp(c.tails(x)?.below) - below) / self.total * libm::exp(-all));
+            let own = libm::exp(share + c.log_density_num(x) - all);
+            match c.cdf_slopes(x).filter(|_| own > 0.0) {
+                Some(cdf_slopes) => rest.extend(cdf_slopes.iter().map(|s| own * s)),
+                None if own > 0.0 => return None,
+                None => rest.extend(std::iter::repeat_n(0.0, c.param_count())),
+            }
+        }
+        by_weight.extend(rest);
+        Some(by_weight)
+    }
+
+    fn has_moving_support(&self) -> bool {
+        self.components.iter().any(Dist::has_moving_support)
+    }
+
+    fn made_of(&self) -> Option<(&[Dist], usize)> {
+        Some((&self.components, 1))
     }
 }

@@ -15,3 +15,16 @@ pub(in crate::dist) mod ordered;
 pub(in crate::dist) mod product;
 pub(in crate::dist) mod triangle;
 pub(in crate::dist) mod wishart;
+
+pub use covariance::Covariance;
+pub use dirichlet::Dirichlet;
+pub use factor::Factor;
+pub use gp::{Gp, JITTER};
+pub use iid::Iid;
+pub use lkj::Lkj;
+pub use mixed::batch_of_mixture;
+pub use mixture::Mixture;
+pub use mv_normal::MvNormal;
+pub use ordered::Ordered;
+pub use product::Product;
+pub use wishart::Wishart;

@@ -1,9 +1,9 @@
 //! The multivariate normal distribution.
 
-use crate::dist::ParamError;
 use crate::dist::joint::factor::{Factor, lower};
 use crate::dist::joint::gaussian::{Gaussian, gaussian_family};
 use crate::dist::param::finite;
+use crate::dist::*;
 use nalgebra::DMatrix;
 
 /// `mv_normal(mean, cov)` or `mv_normal(mean, chol)`. Gradients are with respect to the
@@ -19,32 +19,20 @@ impl MvNormal {
     /// finite and the covariance is of matching size, finite, symmetric (to 1e-9 of its
     /// largest entry) and positive definite.
     pub fn from_cov(mean: &[f64], cov: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
-        let size = || {
-            ParamError::new(
-                "mv_normal",
-                "cov",
-                shape(cov),
-                "must be square and match the length of the mean",
-            )
-        };
+        let size =
+            || Self::bad("cov", shape(cov), "must be square and match the length of the mean");
         let packed = lower(cov).filter(|_| cov.nrows() == mean.len()).ok_or_else(size)?;
         if let Some(x) = cov.iter().find(|x| !x.is_finite()) {
-            return Err(ParamError::new("mv_normal", "cov", x, "must be finite"));
+            return Err(Self::bad("cov", x, "must be finite"));
         }
         let scale = cov.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let n = mean.len();
         let symmetric =
             (0..n).all(|i| (0..i).all(|j| (cov[(i, j)] - cov[(j, i)]).abs() <= 1e-9 * scale));
         if !symmetric {
-            return Err(ParamError::new(
-                "mv_normal",
-                "cov",
-                "one that is not",
-                "must be symmetric",
-            ));
+            return Err(Self::bad("cov", "one that is not", "must be symmetric"));
         }
-        let definite =
-            || ParamError::new("mv_normal", "cov", "one that is not", "must be positive definite");
+        let definite = || Self::bad("cov", "one that is not", "must be positive definite");
         Self::make(mean, Factor::new(n, packed).map_err(|_| definite())?)
     }
 
@@ -53,8 +41,7 @@ impl MvNormal {
     /// and finite, with a positive diagonal and zeros above it.
     pub fn from_chol(mean: &[f64], chol: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
         if chol.nrows() != mean.len() || chol.ncols() != mean.len() {
-            return Err(ParamError::new(
-                "mv_normal",
+            return Err(Self::bad(
                 "chol",
                 shape(chol),
                 "must be square and match the length of the mean",
@@ -62,27 +49,15 @@ impl MvNormal {
         }
         let n = mean.len();
         if (0..n).any(|j| (0..j).any(|i| chol[(i, j)] != 0.0)) {
-            return Err(ParamError::new(
-                "mv_normal",
-                "chol",
-                "one that is not",
-                "must be lower triangular",
-            ));
+            return Err(Self::bad("chol", "one that is not", "must be lower triangular"));
         }
-        let bad = || {
-            ParamError::new(
-                "mv_normal",
-                "chol",
-                "one without",
-                "must be finite with a positive diagonal",
-            )
-        };
+        let bad = || Self::bad("chol", "one without", "must be finite with a positive diagonal");
         Self::make(mean, Factor::from_lower(chol).ok_or_else(bad)?)
     }
 
     fn make(mean: &[f64], factor: Factor) -> Result<MvNormal, ParamError> {
         for m in mean {
-            finite("mv_normal", "mean", *m)?;
+            finite(Self::NAME, "mean", *m)?;
         }
         Ok(MvNormal(Gaussian { mean: mean.into(), factor, whitened: false }))
     }
@@ -97,29 +72,11 @@ impl MvNormal {
         MvNormal(self.0.centred())
     }
 
-    /// Returns derivatives with respect to the Cholesky factor, its lower triangle by
-    /// rows. For a centred distribution, they are those of the log density; for a
-    /// whitened one, those of a function of the value whose derivatives with respect to
-    /// the value are `by_value`.
-    pub fn factor_gradient(
-        &self,
-        stored: &crate::dist::Datum,
-        by_value: &[f64],
-    ) -> Option<Vec<f64>> {
-        self.0.factor_gradient(stored, by_value)
-    }
-
     /// Converts derivatives with respect to the factor to those with respect to the
     /// entries of the covariance, its lower triangle by rows. An entry off the diagonal
     /// stands for both of its positions.
     pub fn vjp_covariance(&self, by_factor: &[f64]) -> Vec<f64> {
         self.0.factor.vjp_cholesky(by_factor)
-    }
-
-    /// Converts derivatives with respect to the value to those with respect to the white
-    /// noise.
-    pub fn vjp_noise(&self, by: &[f64]) -> Vec<f64> {
-        self.0.factor.transposed_times(by)
     }
 }
 
@@ -127,4 +84,4 @@ fn shape(m: &DMatrix<f64>) -> String {
     format!("{} x {}", m.nrows(), m.ncols())
 }
 
-gaussian_family!(MvNormal, "mv_normal");
+gaussian_family!(MvNormal);

@@ -4,9 +4,8 @@
 use crate::dist::joint::mixture::union;
 use crate::dist::joint::product;
 use crate::dist::support::is_ascending;
-use crate::dist::{Datum, Dist, Distribution, Gradient, ParamError, Support};
+use crate::dist::*;
 use crate::num::{accumulate, ln_gamma};
-use crate::rng::Stream;
 
 /// The number of draws that are tried for one in ascending order, if the parts differ.
 const TRIES: u32 = 10_000;
@@ -37,15 +36,10 @@ impl Ordered {
     /// it is over continuous numbers, and if n is above 2^32 - 2.
     pub fn new(one: Dist, n: usize) -> Result<Ordered, ParamError> {
         if !is_continuous(&one) {
-            return Err(ParamError::new(
-                "ordered",
-                "d",
-                one.name(),
-                "must be a distribution of continuous numbers",
-            ));
+            return Err(Self::bad("d", one.name(), "must be a distribution of continuous numbers"));
         }
         if n >= u32::MAX as usize {
-            return Err(ParamError::new("ordered", "n", n, "must be below 2^32 - 1"));
+            return Err(Self::bad("n", n, "must be below 2^32 - 1"));
         }
         Ok(Ordered { parts: Parts::Alike(one), n })
     }
@@ -55,13 +49,12 @@ impl Ordered {
     pub fn of(parts: Vec<Dist>) -> Result<Ordered, ParamError> {
         let rule = "must hold distributions of continuous numbers";
         if let Some(d) = parts.iter().find(|d| !is_continuous(d)) {
-            return Err(ParamError::new("ordered", "d", d.name(), rule));
+            return Err(Self::bad("d", d.name(), rule));
         }
         let around = |a: Support, d: &Dist| union(a, d.support());
         let first = parts.first().map_or(Support::Real, Dist::support);
         let support = parts.iter().try_fold(first, around);
-        let support = support
-            .ok_or_else(|| ParamError::new("ordered", "d", "different kinds of values", rule))?;
+        let support = support.ok_or_else(|| Self::bad("d", "different kinds of values", rule))?;
         Ok(Ordered { n: parts.len(), parts: Parts::Unlike(parts.into(), support) })
     }
 
@@ -84,11 +77,6 @@ impl Ordered {
         }
     }
 
-    /// Returns how often each of [`Ordered::distinct`] occurs.
-    pub(in crate::dist) fn repeats(&self) -> usize {
-        if self.is_alike() { self.n } else { 1 }
-    }
-
     /// Returns whether all numbers have the same distribution.
     fn is_alike(&self) -> bool {
         matches!(self.parts, Parts::Alike(_))
@@ -106,7 +94,7 @@ fn is_continuous(d: &Dist) -> bool {
 
 impl Distribution for Ordered {
     fn name(&self) -> &'static str {
-        "ordered"
+        Self::NAME
     }
 
     fn support(&self) -> Support {
@@ -151,5 +139,13 @@ impl Distribution for Ordered {
             true => product::slopes(self.parts(), self.n, x, |all, one| accumulate(all, &one)),
             false => product::slopes(self.parts(), self.n, x, |all, one| all.extend(one)),
         }
+    }
+
+    fn has_moving_support(&self) -> bool {
+        self.distinct().iter().any(Dist::has_moving_support)
+    }
+
+    fn made_of(&self) -> Option<(&[Dist], usize)> {
+        Some((self.distinct(), if self.is_alike() { self.n } else { 1 }))
     }
 }

@@ -1,7 +1,6 @@
 //! Independent elements, each with its own distribution, such as `normal([0, 1], 1)`.
 
-use crate::dist::{Datum, Dist, Distribution, Gradient, ParamError, Support};
-use crate::rng::Stream;
+use crate::dist::*;
 
 /// A product of distributions. In the language, its elements are choices with their own
 /// addresses.
@@ -31,6 +30,12 @@ impl Product {
     /// Returns the elements' distributions.
     pub fn parts(&self) -> &[Dist] {
         &self.parts
+    }
+}
+
+impl From<Product> for Dist {
+    fn from(d: Product) -> Dist {
+        Dist::Product(Arc::new(d))
     }
 }
 
@@ -75,6 +80,18 @@ impl Distribution for Product {
 
     fn is_improper(&self) -> bool {
         self.parts.iter().any(Dist::is_improper)
+    }
+
+    fn param_count(&self) -> usize {
+        self.parts.iter().map(Dist::param_count).sum()
+    }
+
+    fn has_moving_support(&self) -> bool {
+        self.parts.iter().any(Dist::has_moving_support)
+    }
+
+    fn made_of(&self) -> Option<(&[Dist], usize)> {
+        Some((&self.parts, 1))
     }
 }
 

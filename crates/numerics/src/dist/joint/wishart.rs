@@ -5,9 +5,8 @@ use crate::dist::draw::ln_gamma_draw;
 use crate::dist::joint::factor::Factor;
 use crate::dist::joint::triangle;
 use crate::dist::param::positive;
-use crate::dist::{Datum, Distribution, Gamma, Gradient, ParamError, Scalar, Support};
+use crate::dist::*;
 use crate::num::{LN_SQRT_2PI, digamma, ln_gamma};
-use crate::rng::Stream;
 use core::f64::consts::LN_2;
 use nalgebra::DMatrix;
 
@@ -35,38 +34,17 @@ impl Wishart {
         let n = scale_chol.nrows();
         if n == 0 || scale_chol.ncols() != n {
             let value = format!("{n} x {}", scale_chol.ncols());
-            return Err(ParamError::new(
-                "wishart",
-                "scale_chol",
-                value,
-                "must be square and not empty",
-            ));
+            return Err(Self::bad("scale_chol", value, "must be square and not empty"));
         }
         if (0..n).any(|j| (0..j).any(|i| scale_chol[(i, j)] != 0.0)) {
-            return Err(ParamError::new(
-                "wishart",
-                "scale_chol",
-                "one that is not",
-                "must be lower triangular",
-            ));
+            return Err(Self::bad("scale_chol", "one that is not", "must be lower triangular"));
         }
-        let bad = || {
-            ParamError::new(
-                "wishart",
-                "scale_chol",
-                "one without",
-                "must be finite with a positive diagonal",
-            )
-        };
+        let bad =
+            || Self::bad("scale_chol", "one without", "must be finite with a positive diagonal");
         let scale = Factor::from_lower(scale_chol).ok_or_else(bad)?;
         let df = positive("wishart", "df", df)?;
         if df <= (n - 1) as f64 {
-            return Err(ParamError::new(
-                "wishart",
-                "df",
-                df,
-                "must be above the number of rows minus 1",
-            ));
+            return Err(Self::bad("df", df, "must be above the number of rows minus 1"));
         }
         let jacobian =
             |i: usize| (i + 1) as f64 * libm::log(scale_chol[(i, i)]) + LN_SQRT_2PI * i as f64;
@@ -129,7 +107,7 @@ fn log_chi(df: f64, x: f64) -> f64 {
 
 impl Distribution for Wishart {
     fn name(&self) -> &'static str {
-        "wishart"
+        Self::NAME
     }
 
     fn support(&self) -> Support {

@@ -141,7 +141,7 @@ fn values_and_noise_map_onto_each_other() {
     let n = make("normal", &[3.0, 2.0]);
     assert_eq!(n.colour(&[0.5]), Some(Datum::Num(4.0)));
     assert_eq!(n.whiten(&Datum::Num(4.0)), Some(vec![0.5]));
-    let iid = Dist::Iid(Arc::new(Iid::new(n, 2).unwrap()));
+    let iid = Dist::from(Iid::new(n, 2).unwrap());
     assert_eq!(iid.colour(&[0.5, 0.0]), Some(vec![4.0, 3.0].into()));
     assert_eq!(iid.colour(&[0.5]), None);
     let half = make("half_normal", &[1.0]);

@@ -142,8 +142,8 @@ fn vectors_and_products() {
     let mean = [1.0, -1.0, 0.5];
     let parts = vec![make("normal", &[0.0, 2.0]), make("gamma", &[2.0, 1.0]), make("flip", &[0.2])];
     let three = |x: &[f64]| -> Datum { x.to_vec().into() };
-    let mv = Dist::MvNormal(Arc::new(MvNormal::from_cov(&mean, &cov).unwrap()));
-    let iid = Dist::Iid(Arc::new(Iid::new(make("student_t", &[3.0, 0.0, 1.0]), 3).unwrap()));
+    let mv = Dist::from(MvNormal::from_cov(&mean, &cov).unwrap());
+    let iid = Dist::from(Iid::new(make("student_t", &[3.0, 0.0, 1.0]), 3).unwrap());
     let at = [0.3, 1.7, -0.4];
     for d in [&mv, &iid] {
         let g = d.gradient(&three(&at)).unwrap();
@@ -181,4 +181,34 @@ fn vectors_and_products() {
     close(g.x[0], -0.125, "the normal element");
     close(g.x[1], 1.0 / 1.5 - 1.0, "the gamma element");
     close(g.params[4], 5.0, "the flip element");
+}
+
+#[test]
+fn bounds_move_values_as_differences_say() {
+    let (y, slope) = (0.7, 1.3);
+    // f(x) = slope x, plus the log Jacobian.
+    let f = |d: &Dist| {
+        let (x, jacobian) = d.support().from_free(&[y]);
+        slope * x.num().unwrap() + jacobian
+    };
+    for family in ["uniform", "half_cauchy"] {
+        let at = [0.5, 2.0];
+        let d = make(family, &at);
+        let (x, _) = d.support().from_free(&[y]);
+        let found = d.by_bounds(&x, slope).unwrap();
+        for i in 0..2 {
+            let moved = |h: f64| {
+                let mut p = at;
+                p[i] += h;
+                f(&make(family, &p))
+            };
+            assert!(
+                (found[i] - (moved(1e-6) - moved(-1e-6)) / 2e-6).abs() < 1e-6,
+                "{i}: {found:?}"
+            );
+        }
+    }
+    let normal = make("normal", &[0.0, 1.0]);
+    assert_eq!(normal.by_bounds(&Datum::Num(0.3), 1.0), Some(vec![0.0, 0.0]));
+    assert!(!normal.has_moving_support());
 }

@@ -219,9 +219,7 @@ fn what_is_no_factor_is_impossible() {
 #[test]
 fn whitened_vectors_follow_their_parameters() {
     let cov = square(2, &[2.0, 0.6, 0.6, 1.0]);
-    let d = |m: f64| {
-        Dist::MvNormal(Arc::new(MvNormal::from_cov(&[m, 0.0], &cov).unwrap().to_whitened()))
-    };
+    let d = |m: f64| Dist::from(MvNormal::from_cov(&[m, 0.0], &cov).unwrap().to_whitened());
     let z = d(1.0).sample_stored(&mut stream(802));
     let (near, far) = (numbers(&d(1.0).from_noncentred(&z)), numbers(&d(5.0).from_noncentred(&z)));
     assert!((far[0] - near[0] - 4.0).abs() < 1e-12 && (far[1] - near[1]).abs() < 1e-12);
@@ -234,6 +232,6 @@ fn whitened_vectors_follow_their_parameters() {
     let jacobian = 0.5 * cov.determinant().ln();
     assert!((d(1.0).log_density_stored(&z) - d(1.0).log_density(&x) - jacobian).abs() < 1e-12);
     // Elements of a product store values.
-    let two = Dist::Iid(Arc::new(Iid::new(d(1.0), 2).unwrap()));
+    let two = Dist::from(Iid::new(d(1.0), 2).unwrap());
     assert!(!two.element(0).is_stored_whitened());
 }

@@ -7,7 +7,7 @@ fn mixed(weights: &[f64], parts: Vec<Dist>) -> Mixture {
 }
 
 fn pair(mean: [f64; 2], cov: f64) -> Dist {
-    Dist::MvNormal(Arc::new(MvNormal::from_cov(&mean, &square(2, &[1.0, cov, cov, 1.0])).unwrap()))
+    Dist::from(MvNormal::from_cov(&mean, &square(2, &[1.0, cov, cov, 1.0])).unwrap())
 }
 
 #[test]
@@ -143,7 +143,7 @@ fn components_must_have_the_same_kind_of_values() {
         supports("poisson", &[1.0], "binomial", &[4.0, 0.5]),
         Support::Integers { lo: 0, hi: None }
     );
-    let vectors = Dist::Iid(Arc::new(Iid::new(number.clone(), 2).unwrap()));
+    let vectors = Dist::from(Iid::new(number.clone(), 2).unwrap());
     assert_eq!(
         mixed(&[1.0, 1.0], vec![vectors, pair([0.0; 2], 0.3)]).support(),
         Support::Vector(2)

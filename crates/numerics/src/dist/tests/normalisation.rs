@@ -162,9 +162,8 @@ fn vectors_integrate_to_one() {
     check(&Ordered::new(make("normal", &[1.0, 1.5]), 2).unwrap(), 40.0, 0.05);
     check(&Ordered::new(make("uniform", &[0.0, 3.0]), 2).unwrap(), 40.0, 0.05);
     let one = make("normal", &[0.0, 1.0]);
-    let pair = |m: f64| {
-        Dist::Product(Arc::new(Product::new(vec![make("normal", &[m, 0.7]), one.clone()]).unwrap()))
-    };
+    let pair =
+        |m: f64| Dist::from(Product::new(vec![make("normal", &[m, 0.7]), one.clone()]).unwrap());
     check(&Mixture::new(&[1.0, 3.0], vec![pair(-2.0), pair(1.0)]).unwrap(), 12.0, 0.05);
     // Components whose supports differ.
     let mixed =

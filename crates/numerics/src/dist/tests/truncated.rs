@@ -196,8 +196,7 @@ fn slopes_are_those_of_differences() {
     // A mixture, with respect to its weights and its components' parameters.
     let mix = |p: [f64; 4]| {
         let parts = vec![make("normal", &[p[2], 1.0]), make("gamma", &[2.0, p[3]])];
-        truncated(&Dist::Mixture(Arc::new(Mixture::new(&p[..2], parts).unwrap())), 0.4, 3.0)
-            .unwrap()
+        truncated(&Dist::from(Mixture::new(&p[..2], parts).unwrap()), 0.4, 3.0).unwrap()
     };
     let p = [0.7, 1.1, 0.2, 1.4];
     let g = mix(p).gradient(&Datum::Num(0.9)).unwrap();
@@ -253,7 +252,7 @@ fn supports_are_cut() {
     assert_eq!(support("poisson", &[2.0], 0.5, 3.7), Support::Integers { lo: 1, hi: Some(3) });
     assert_eq!(cut("poisson", &[2.0], 3.0, 3.0).log_density_num(3.0), 0.0);
     assert!(matches!(cut("normal", &[0.0, 1.0], 1.0, INF), Dist::TruncatedNormal(_)));
-    let three = Dist::Iid(Arc::new(Iid::new(make("gamma", &[2.0, 1.0]), 3).unwrap()));
+    let three = Dist::from(Iid::new(make("gamma", &[2.0, 1.0]), 3).unwrap());
     assert_eq!(truncated(&three, 1.0, INF).unwrap().elements(), Some(3));
 }
 
