@@ -5,7 +5,11 @@
 //! of independent elements, each with its own address. A parameter outside its domain is
 //! a recoverable fault: a proposal that leads to it is rejected.
 
-use super::compounds::{mixture, ordered, truncated};
+mod compounds;
+mod parameter_fault;
+
+use self::compounds::{mixture, ordered, truncated};
+use self::parameter_fault::{fault, made};
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::linear::matrix::Matrix;
@@ -88,29 +92,12 @@ fn reader(family: &str) -> fn(&Args) -> Result<Dist, Fault> {
     }
 }
 
-/// A distribution of any family, or the fault of its parameters.
-pub(super) fn made<T: Into<Dist>>(made: Result<T, ParamError>) -> Result<Dist, Fault> {
-    made.map(Into::into).map_err(fault)
-}
-
 /// The support and density of a family, for the reference.
 pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
     let found = FAMILIES.iter().find(|f| f.name == name);
     found.map_or(Vec::new(), |f| {
         vec![("Support", f.support.to_owned()), ("Density", f.formula.to_owned())]
     })
-}
-
-/// The fault of a parameter outside its domain, with a hint if there is one.
-pub(super) fn fault(e: ParamError) -> Fault {
-    let fault = Fault::domain(e.to_string());
-    match e.rule {
-        rule if rule.starts_with("must be positive") => {
-            fault.with_hint("for a positive parameter use half_normal, gamma or lognormal as prior, or exp of a number")
-        }
-        "must make a positive definite matrix" => fault.with_hint("use a larger `jitter`, or add `+ white(sd)`"),
-        _ => fault,
-    }
 }
 
 /// A distribution of a number, or a product of them if a parameter is an array.

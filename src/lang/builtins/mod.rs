@@ -8,7 +8,6 @@
 mod args;
 mod builtin;
 mod call;
-mod compounds;
 mod covariance;
 pub mod data;
 mod derivative;

@@ -1,9 +1,9 @@
 //! Distributions composed of other distributions.
 
-use super::Args;
-use super::distributions::made;
-use super::elementwise::array_len;
+use super::parameter_fault::made;
 use crate::dist::{self, Dist};
+use crate::lang::builtins::Args;
+use crate::lang::builtins::elementwise::array_len;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::sync::Arc;
