@@ -17,6 +17,7 @@ pub mod key;
 pub mod load;
 pub mod local_density;
 pub mod lower;
+pub mod plan;
 pub mod reach;
 mod scaffold;
 mod slots;

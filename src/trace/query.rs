@@ -2,10 +2,11 @@
 //! surrogates of observations. Choices drawn for a query are discarded afterwards.
 
 use super::graph::Graph;
-use super::node::Deps;
+use super::node::{Arguments, Deps, Frame, FrameId, NONE};
 use super::{Address, Draws, Trace, TraceResult};
-use crate::lang::code::{Code, Operand};
+use crate::lang::code::{BlockId, Code, Operand};
 use crate::lang::value::Value;
+use std::sync::Arc;
 
 impl Trace {
     /// Returns the values of top-level expressions. Choices that they need and no
@@ -17,6 +18,30 @@ impl Trace {
     #[doc(hidden)]
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
         self.asked(operands, draws, |_, values| Ok(values))
+    }
+
+    /// Evaluates a function of the program, which sees the present state, with these
+    /// arguments. One that is missing is an error only if the function reads it. Choices
+    /// that the state lacks are drawn as by [`Trace::query`].
+    pub(crate) fn call(
+        &mut self,
+        function: BlockId,
+        args: Arc<[TraceResult<Value>]>,
+        draws: Draws,
+    ) -> TraceResult<Value> {
+        let frame = |graph: &mut Graph, code: &Code| {
+            let path = graph.frames[0].path;
+            let args = Arguments::Supplied(args);
+            let (block, parent, owner, base, depth, pass) = (function, 0, NONE, 0, 1, 0);
+            let attached = true;
+            let key = None;
+            let made = Frame { block, parent, owner, base, path, depth, pass, key, args, attached };
+            graph.make_frame(code, made)
+        };
+        let result = self.code.blocks[function as usize].result;
+        let asked = result.as_slice();
+        let one = |_: &mut Trace, mut values: Vec<Value>| Ok(values.pop().unwrap_or_default());
+        self.asked_in(frame, asked, draws, one)
     }
 
     /// Like [`Trace::query`], and passes to `look` the trace with the choices that were
@@ -44,11 +69,23 @@ impl Trace {
         draws: Draws,
         used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
     ) -> TraceResult<T> {
+        self.asked_in(|_, _| Ok(0), operands, draws, used)
+    }
+
+    /// The same for expressions of a frame, which may be made for them.
+    fn asked_in<T>(
+        &mut self,
+        frame: impl FnOnce(&mut Graph, &Code) -> TraceResult<FrameId>,
+        operands: &[Operand],
+        draws: Draws,
+        used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
+    ) -> TraceResult<T> {
         self.rollback();
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.before = Some(before.clone());
-        let result = self.graph.query(&self.code, operands);
+        let result = frame(&mut self.graph, &self.code)
+            .and_then(|frame| self.graph.query(&self.code, frame, operands));
         self.graph.before = None;
         let result = result.and_then(|values| used(self, values));
         self.graph.rollback(&self.code, before);
@@ -88,18 +125,23 @@ impl Trace {
 }
 
 impl Graph {
-    pub(super) fn query(&mut self, code: &Code, operands: &[Operand]) -> TraceResult<Vec<Value>> {
+    pub(super) fn query(
+        &mut self,
+        code: &Code,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> TraceResult<Vec<Value>> {
         let mut values = Vec::with_capacity(operands.len());
         for o in operands {
-            if let Some(n) = self.resolve(0, *o) {
+            if let Some(n) = self.resolve(frame, *o) {
                 self.evaluate(code, n)?;
             }
-            if let Value::Container(r) = self.value(code, 0, *o) {
+            if let Value::Container(r) = self.value(code, frame, *o) {
                 let gather = r.node + 1;
                 self.evaluate(code, gather)?;
             }
             let mut deps = Deps::new();
-            values.push(self.plain(code, 0, *o, &mut deps).clone());
+            values.push(self.plain(code, frame, *o, &mut deps).clone());
         }
         Ok(values)
     }

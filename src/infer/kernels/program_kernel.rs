@@ -10,24 +10,28 @@
 //! in it.
 
 use crate::dist::{Datum, Dist};
-use crate::infer::calls::expr::{PlanEnv, evaluate};
-use crate::infer::calls::selection::{address, fail};
+use crate::infer::calls::error::fail;
+use crate::infer::calls::formula::{Moved, PlanEnv, address, evaluate};
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, accepts, recoverable};
-use crate::lang::code::Code;
+use crate::lang::plan::{DeclaredKernel, Formula, Path, Step, StepKind};
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, Stream, StreamKey};
-use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, KernelDecl};
-use crate::trace::{Address, Change, Draws, Target, Trace, TraceResult};
+use crate::syntax::ast::Name;
+use crate::syntax::span::Span;
+use crate::trace::{Address, Change, Draws, Limits, Target, Trace, TraceResult};
 use std::sync::Arc;
 
 /// A kernel declared by the program, with its arguments.
 #[derive(Clone, Debug)]
 pub(crate) struct ProgramKernel {
-    code: Arc<Code>,
-    pub(super) declared: KernelDecl,
-    arguments: Vec<(Arc<str>, Value)>,
+    kernels: Arc<[DeclaredKernel]>,
+    /// Its index in `kernels`.
+    index: usize,
+    arguments: Vec<Value>,
     started: Instant,
+    /// A trace that evaluates expressions of maps and reverse moves.
+    aside: Option<Trace>,
 }
 
 /// A choice that an execution proposes.
@@ -80,32 +84,37 @@ pub(super) enum Source<'a> {
 }
 
 impl ProgramKernel {
-    /// A declared kernel with the values of its parameters, in a chain that began at
-    /// `started`.
+    /// A declared kernel, by its index, with the values of its parameters, in a chain
+    /// that began at `started`.
     pub fn new(
-        code: Arc<Code>,
-        declared: KernelDecl,
-        arguments: Vec<(Arc<str>, Value)>,
+        kernels: Arc<[DeclaredKernel]>,
+        index: usize,
+        arguments: Vec<Value>,
         started: Instant,
     ) -> Self {
-        ProgramKernel { code, declared, arguments, started }
+        ProgramKernel { kernels, index, arguments, started, aside: None }
+    }
+
+    /// Its declaration.
+    pub(super) fn declared(&self) -> &DeclaredKernel {
+        &self.kernels[self.index]
     }
 
     /// Executes the body in a state. For a map, `moved` has values of choices that
-    /// replace those in the state.
+    /// replace those in the state, and the trace that evaluates expressions.
     pub(super) fn play(
         &self,
         trace: &mut Trace,
         at: &StepContext,
         source: Source,
-        moved: Option<&[(Address, Value)]>,
+        moved: Option<Moved>,
     ) -> TraceResult<Played> {
         let key = StreamKey::new(at.seed, at.chain, Purpose::PREDICT);
         let draws = Draws { key, step: at.step, substream: at.part };
         let mut play =
             Play { own: self, draws, steps: at.step, source, moved, played: Played::default() };
         let mut variables = self.arguments.clone();
-        play.body(&self.declared.body, trace, &mut variables)?;
+        play.body(&self.declared().steps, trace, &mut variables)?;
         Ok(play.played)
     }
 
@@ -113,7 +122,7 @@ impl ProgramKernel {
     /// the proposed choices: the state then need not be committed and reverted.
     fn reverse(
         &self,
-        trace: &mut Trace,
+        (trace, aside): (&mut Trace, &mut Trace),
         at: &StepContext,
         all: &[Proposed],
         new: &[Option<Datum>],
@@ -124,7 +133,8 @@ impl ProgramKernel {
             .zip(new)
             .map(|(p, x)| Some((p.address.clone(), Value::from_datum(x.as_ref()?))));
         let moved: Vec<(Address, Value)> = moved.collect::<Option<_>>()?;
-        self.play(trace, at, Source::Given(auxiliaries), Some(&moved)).ok()
+        let moved = Moved { choices: &moved, aside };
+        self.play(trace, at, Source::Given(auxiliaries), Some(moved)).ok()
     }
 
     /// Moves the trace to a proposal of the body without an acceptance test, for initial
@@ -134,10 +144,10 @@ impl ProgramKernel {
     /// As [`Kernel::step`], and if the body has a map, which only maps one state to
     /// another.
     pub fn leap(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Option<()>> {
-        if maps(&self.declared.body) {
+        if self.declared().maps {
             let message =
                 "the kernel of a start must propose choices from distributions, not by a map";
-            return Err(fail(self.declared.name.span, message.into()));
+            return Err(fail(self.declared().name.span, message.into()));
         }
         let mut rng = at.stream();
         let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
@@ -155,71 +165,55 @@ struct Play<'a> {
     draws: Draws,
     steps: u64,
     source: Source<'a>,
-    moved: Option<&'a [(Address, Value)]>,
+    moved: Option<Moved<'a>>,
     played: Played,
 }
 
 impl Play<'_> {
     /// The environment of expressions.
-    fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> PlanEnv<'b> {
-        let (code, started) = (&self.own.code, self.own.started);
-        PlanEnv {
-            code,
-            trace,
-            variables,
-            draws: self.draws,
-            started,
-            steps: self.steps,
-            moved: self.moved,
-        }
+    fn env<'b>(&'b mut self, trace: &'b mut Trace, variables: &'b [Value]) -> PlanEnv<'b> {
+        let (draws, started, steps) = (self.draws, self.own.started, self.steps);
+        let moved = self.moved.as_mut();
+        let moved = moved.map(|m| Moved { choices: m.choices, aside: &mut *m.aside });
+        PlanEnv { trace, variables, draws, started, steps, moved }
     }
 
     fn body(
         &mut self,
-        body: &[KStmt],
+        body: &[Step],
         trace: &mut Trace,
-        variables: &mut Vec<(Arc<str>, Value)>,
+        variables: &mut Vec<Value>,
     ) -> TraceResult<()> {
         let depth = variables.len();
         for s in body {
             match &s.kind {
-                KStmtKind::Let { name, expr } => {
-                    let v = evaluate(expr, &mut self.env(trace, variables))?;
-                    variables.push((Arc::clone(&name.node), v));
+                StepKind::Let(_, value) => {
+                    let v = evaluate(value, &mut self.env(trace, variables))?;
+                    variables.push(v);
                 }
-                KStmtKind::For { var, iter, body } => {
-                    let over = evaluate(iter, &mut self.env(trace, variables))?;
+                StepKind::For(items, _, body) => {
+                    let over = evaluate(items, &mut self.env(trace, variables))?;
                     for item in over.passes() {
-                        variables.push((Arc::clone(&var.node), item));
+                        variables.push(item);
                         let done = self.body(body, trace, variables);
                         variables.pop();
                         done?;
                     }
                 }
-                KStmtKind::Map { target, value } => {
+                StepKind::Map(target, value) => {
                     let image = self.image(target, trace, variables)?;
-                    let proposed =
-                        |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
-                    if self.played.images.iter().any(|(i, _)| *i == image)
-                        || self.played.all.iter().any(proposed)
-                    {
-                        return Err(fail(
-                            s.span,
-                            "this gets a new value twice in one kernel".into(),
-                        ));
-                    }
-                    let value = evaluate(value, &mut self.env(trace, variables))?;
-                    self.played.images.push((image, value));
+                    self.map(image, value, s.span, trace, variables)?;
                 }
-                KStmtKind::Propose { target, dist } => {
-                    if let ExprKind::Var(name) = &target.kind {
-                        let value = self.auxiliary(name, dist, trace, variables)?;
-                        variables.push((Arc::clone(name), value));
-                        continue;
-                    }
-                    if matches!(self.source, Source::Moved(_)) {
-                        continue;
-                    }
+                StepKind::MapDrawn(name, value) => {
+                    let image = self.auxiliary_image(name)?;
+                    self.map(image, value, s.span, trace, variables)?;
+                }
+                StepKind::Draw(name, _, dist) => {
+                    let value = self.auxiliary(&name.node, dist, trace, variables)?;
+                    variables.push(value);
+                }
+                StepKind::Propose(..) if matches!(self.source, Source::Moved(_)) => {}
+                StepKind::Propose(target, dist) => {
                     let proposed = self.proposed(target, dist, trace, variables)?;
                     let mapped = |i: &(Image, Value)| matches!(i.0, Image::Choice(_, t) if t == proposed.target);
                     let twice = self.played.all.iter().any(|p| p.target == proposed.target);
@@ -246,13 +240,33 @@ impl Play<'_> {
         Ok(())
     }
 
+    /// Assigns a new value by a map.
+    fn map(
+        &mut self,
+        image: Image,
+        value: &Formula,
+        span: Span,
+        trace: &mut Trace,
+        variables: &[Value],
+    ) -> TraceResult<()> {
+        let proposed = |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
+        if self.played.images.iter().any(|(i, _)| *i == image)
+            || self.played.all.iter().any(proposed)
+        {
+            return Err(fail(span, "this gets a new value twice in one kernel".into()));
+        }
+        let value = evaluate(value, &mut self.env(trace, variables))?;
+        self.played.images.push((image, value));
+        Ok(())
+    }
+
     /// Draws an auxiliary variable, or uses the given value.
     fn auxiliary(
         &mut self,
         name: &Arc<str>,
-        dist: &Expr,
+        dist: &Formula,
         trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
+        variables: &[Value],
     ) -> TraceResult<Value> {
         let dist = self.distribution(dist, trace, variables)?;
         let value = match &mut self.source {
@@ -266,11 +280,11 @@ impl Play<'_> {
     }
 
     fn proposed(
-        &self,
-        target: &Expr,
-        dist: &Expr,
+        &mut self,
+        target: &Path,
+        dist: &Formula,
         trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
+        variables: &[Value],
     ) -> TraceResult<Proposed> {
         let (address, found) = self.choice(target, trace, variables)?;
         if trace.elements(found).is_some() {
@@ -280,10 +294,10 @@ impl Play<'_> {
     }
 
     fn distribution(
-        &self,
-        dist: &Expr,
+        &mut self,
+        dist: &Formula,
         trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
+        variables: &[Value],
     ) -> TraceResult<Dist> {
         match evaluate(dist, &mut self.env(trace, variables))? {
             Value::Dist(d) => Ok(Dist::clone(&d)),
@@ -296,36 +310,37 @@ impl Play<'_> {
 
     /// Reads what a map assigns a new value to.
     fn image(
-        &self,
-        target: &Expr,
+        &mut self,
+        target: &Path,
         trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
+        variables: &[Value],
     ) -> TraceResult<Image> {
-        let ExprKind::Var(name) = &target.kind else {
-            let (address, found) = self.choice(target, trace, variables)?;
-            if trace.elements(found).is_some()
-                || trace.dist(found).is_some_and(|d| d.is_stored_whitened())
-            {
-                return Err(fail(target.span, format!("{address} cannot be mapped as a whole")));
-            }
-            return Ok(Image::Choice(address, found));
-        };
-        let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
+        let (address, found) = self.choice(target, trace, variables)?;
+        if trace.elements(found).is_some()
+            || trace.dist(found).is_some_and(|d| d.is_stored_whitened())
+        {
+            return Err(fail(target.span, format!("{address} cannot be mapped as a whole")));
+        }
+        Ok(Image::Choice(address, found))
+    }
+
+    fn auxiliary_image(&self, name: &Name) -> TraceResult<Image> {
+        let drawn = self.played.drawn.iter().rposition(|d| d.name == name.node);
         let not = || {
-            fail(
-                target.span,
-                format!("`{name}` is not an auxiliary variable; propose {name} ~ …; makes one"),
-            )
+            let (name, span) = (&name.node, name.span);
+            let message =
+                format!("`{name}` is not an auxiliary variable; propose {name} ~ …; makes one");
+            fail(span, message)
         };
         drawn.map(Image::Auxiliary).ok_or_else(not)
     }
 
     /// Finds a choice that can be proposed.
     fn choice(
-        &self,
-        target: &Expr,
+        &mut self,
+        target: &Path,
         trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
+        variables: &[Value],
     ) -> TraceResult<(Address, Target)> {
         let at = address(target, &mut self.env(trace, variables))?;
         let Some(found) = trace.find(&at) else {
@@ -338,26 +353,6 @@ impl Play<'_> {
         };
         Ok((at, found))
     }
-}
-
-/// Whether a kernel proposes values itself, instead of applying other kernels.
-pub(crate) fn proposes(body: &[KStmt]) -> bool {
-    body.iter().any(|s| match &s.kind {
-        KStmtKind::Propose { .. } | KStmtKind::Map { .. } => true,
-        KStmtKind::For { body, .. }
-        | KStmtKind::Repeat { body, .. }
-        | KStmtKind::Every { body, .. } => proposes(body),
-        _ => false,
-    })
-}
-
-/// Whether a kernel contains a map.
-fn maps(body: &[KStmt]) -> bool {
-    body.iter().any(|s| match &s.kind {
-        KStmtKind::Map { .. } => true,
-        KStmtKind::For { body, .. } => maps(body),
-        _ => false,
-    })
 }
 
 /// The present values of choices, as the program sees them.
@@ -400,13 +395,29 @@ pub(super) fn log_density(all: &[Proposed], values: &[Option<Datum>]) -> f64 {
 
 impl Kernel for ProgramKernel {
     fn name(&self) -> String {
-        self.declared.name.node.to_string()
+        self.declared().name.node.to_string()
     }
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
-        if maps(&self.declared.body) {
-            return self.involve(trace, at);
-        }
+        let new = || Trace::prior(Arc::clone(trace.code()), Limits::default());
+        let mut aside = self.aside.take().unwrap_or_else(new);
+        let done = match self.declared().maps {
+            true => self.involve(trace, &mut aside, at),
+            false => self.sample(trace, &mut aside, at),
+        };
+        self.aside = Some(aside);
+        done
+    }
+}
+
+impl ProgramKernel {
+    /// Makes one step by proposals from distributions.
+    fn sample(
+        &self,
+        trace: &mut Trace,
+        aside: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<Outcome> {
         let mut rng: Stream = at.stream();
         let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
         if forth.all.is_empty() {
@@ -441,7 +452,7 @@ impl Kernel for ProgramKernel {
             at.tempered(&w) + log_back - log_forth + volume - log_volume(trace, &forth.all)
         };
         if w.appeared + w.vanished == 0
-            && let Some(back) = self.reverse(trace, at, &forth.all, &new, &auxiliaries)
+            && let Some(back) = self.reverse((trace, aside), at, &forth.all, &new, &auxiliaries)
         {
             return Ok(accept_or_reject(trace, ratio(trace, Some(back)), &mut rng));
         }

@@ -4,7 +4,7 @@
 //! these find the closure through the built-in in their [`Args`]. Callers of built-ins
 //! therefore need not know about hosts.
 
-use super::{ArgAdjoints, Args, Builtin, Derivative, Kind};
+use super::{ArgAdjoints, Args, Builtin, Derivative, Inference, Kind};
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
@@ -80,7 +80,7 @@ impl HostItem {
             HostItem::Incremental { vjp, .. } => (Kind::Function(call_host), product(vjp)),
             HostItem::Family(_) => (Kind::Distribution(make_host_dist), Derivative::Unknown),
             HostItem::Likelihood(_) => (Kind::Function(call_host), Derivative::Product(vjp_host)),
-            HostItem::Kernel(_) => (Kind::Inference, Derivative::Unknown),
+            HostItem::Kernel(_) => (Kind::Inference(Inference::Host), Derivative::Unknown),
         }
     }
 }

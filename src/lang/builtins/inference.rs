@@ -4,23 +4,21 @@
 //! This module declares and documents them; the engine implements them. They are not
 //! values of the model.
 
-use super::{Arg, Kind, Row, Type, arg, opt};
+use super::{Arg, Inference, Kind, Row, Type, arg, opt};
 
 const KERNELS: &str = "Kernels";
 const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
-/// Names that this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] = &["acceptance", "rhat", "ess", "snapshot"];
-
 const fn name(
+    what: Inference,
     name: &'static str,
     section: &'static str,
     args: &'static [Arg],
     returns: Type,
     doc: &'static str,
 ) -> Row {
-    Row::new(Kind::Inference, name, section, args, returns, doc)
+    Row::new(Kind::Inference(what), name, section, args, returns, doc)
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");
@@ -37,6 +35,7 @@ const X: Arg = arg("x", Type::Any, "A numeric quantity of the model, as in `coll
 
 pub(super) const TABLE: &[Row] = &[
     name(
+        Inference::Mh,
         "mh",
         KERNELS,
         &[SEL],
@@ -44,6 +43,7 @@ pub(super) const TABLE: &[Row] = &[
         "Metropolis-Hastings that proposes a single selected choice from its prior.",
     ),
     name(
+        Inference::Block,
         "block",
         KERNELS,
         &[SEL],
@@ -51,6 +51,7 @@ pub(super) const TABLE: &[Row] = &[
         "Metropolis-Hastings that proposes all selected choices jointly from their prior.",
     ),
     name(
+        Inference::Drift,
         "drift",
         KERNELS,
         &[
@@ -66,6 +67,7 @@ pub(super) const TABLE: &[Row] = &[
         "Gaussian random walk in the unconstrained space; discrete choices move to another value.",
     ),
     name(
+        Inference::Gibbs,
         "gibbs",
         KERNELS,
         &[SEL],
@@ -73,6 +75,7 @@ pub(super) const TABLE: &[Row] = &[
         "Draws a selected finite discrete choice from its full conditional, by enumeration of its values.",
     ),
     name(
+        Inference::Elliptical,
         "elliptical",
         KERNELS,
         &[SEL],
@@ -80,6 +83,7 @@ pub(super) const TABLE: &[Row] = &[
         "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp (Murray et al. 2010).",
     ),
     name(
+        Inference::Slice,
         "slice",
         KERNELS,
         &[
@@ -101,6 +105,7 @@ pub(super) const TABLE: &[Row] = &[
         "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",
     ),
     name(
+        Inference::Hmc,
         "hmc",
         KERNELS,
         &[
@@ -112,6 +117,7 @@ pub(super) const TABLE: &[Row] = &[
         "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     ),
     name(
+        Inference::Nuts,
         "nuts",
         KERNELS,
         &[
@@ -128,6 +134,7 @@ pub(super) const TABLE: &[Row] = &[
         "The No-U-Turn sampler (Hoffman and Gelman 2014).",
     ),
     name(
+        Inference::Mala,
         "mala",
         KERNELS,
         &[SEL, MARGINAL],
@@ -135,6 +142,7 @@ pub(super) const TABLE: &[Row] = &[
         "The Metropolis-adjusted Langevin algorithm: one gradient per proposal.",
     ),
     name(
+        Inference::Knn,
         "knn",
         KERNELS,
         &[
@@ -147,6 +155,7 @@ pub(super) const TABLE: &[Row] = &[
          bank's pictures nearest to the observed one.",
     ),
     name(
+        Inference::Delayed,
         "delayed",
         KERNELS,
         &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
@@ -156,6 +165,7 @@ pub(super) const TABLE: &[Row] = &[
          2005). Exact for any surrogate that is positive wherever the likelihood is.",
     ),
     name(
+        Inference::Temper,
         "temper",
         KERNELS,
         &[
@@ -173,6 +183,7 @@ pub(super) const TABLE: &[Row] = &[
          every replica, then proposes swaps of neighbours (Geyer 1991).",
     ),
     name(
+        Inference::Smc,
         "smc",
         KERNELS,
         &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
@@ -182,6 +193,7 @@ pub(super) const TABLE: &[Row] = &[
          et al. 2010). No other kernel may change the state in between.",
     ),
     name(
+        Inference::Abc,
         "abc",
         KERNELS,
         &[
@@ -202,6 +214,7 @@ pub(super) const TABLE: &[Row] = &[
          data in root mean square (Marjoram et al. 2003).",
     ),
     name(
+        Inference::Modes,
         "modes",
         KERNELS,
         &[
@@ -242,6 +255,7 @@ pub(super) const TABLE: &[Row] = &[
          Metropolis-Hastings, Tierney 1994).",
     ),
     name(
+        Inference::Optimize,
         "optimize",
         KERNELS,
         &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
@@ -249,6 +263,7 @@ pub(super) const TABLE: &[Row] = &[
         "Climbs to a mode of the posterior: for starting points or quick answers. Not a sampler.",
     ),
     name(
+        Inference::One,
         "one",
         CHOICES,
         &[SEL],
@@ -257,6 +272,7 @@ pub(super) const TABLE: &[Row] = &[
          corrects for changes in their number.",
     ),
     name(
+        Inference::Each,
         "each",
         CHOICES,
         &[SEL],
@@ -265,6 +281,7 @@ pub(super) const TABLE: &[Row] = &[
          choice. For mh, gibbs and drift.",
     ),
     name(
+        Inference::Init,
         "init",
         CHOICES,
         &[arg("start", Type::Kernel, "`prior()` or `best_of(n)`.")],
@@ -272,6 +289,7 @@ pub(super) const TABLE: &[Row] = &[
         "Sets how a chain starts; by default, from the prior.",
     ),
     name(
+        Inference::Anneal,
         "anneal",
         CHOICES,
         &[arg("from", Type::Num, "The initial temperature, at least 1.")],
@@ -280,8 +298,9 @@ pub(super) const TABLE: &[Row] = &[
          warm-up. If several starts are kept, this is population annealing: they move in turn, \
          and are resampled by their weights.",
     ),
-    name("prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
+    name(Inference::Prior, "prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
     name(
+        Inference::BestOf,
         "best_of",
         CHOICES,
         &[
@@ -304,14 +323,23 @@ pub(super) const TABLE: &[Row] = &[
         "A start: the draw from the prior with the highest log joint density.",
     ),
     name(
+        Inference::Value,
         "value",
         CHOICES,
         &[arg("at", Type::Selection, "The address of one choice.")],
         Type::Any,
         "The current value of a choice, in user kernels and conditions.",
     ),
-    name("elapsed", MONITORS, &[], Type::Num, "The time since the chain started, in seconds."),
     name(
+        Inference::Elapsed,
+        "elapsed",
+        MONITORS,
+        &[],
+        Type::Num,
+        "The time since the chain started, in seconds.",
+    ),
+    name(
+        Inference::Steps,
         "steps",
         MONITORS,
         &[],
@@ -319,6 +347,7 @@ pub(super) const TABLE: &[Row] = &[
         "The number of kernel applications in this chain so far.",
     ),
     name(
+        Inference::Planned,
         "acceptance",
         MONITORS,
         &[],
@@ -326,6 +355,7 @@ pub(super) const TABLE: &[Row] = &[
         "The acceptance rate of this chain after warm-up.",
     ),
     name(
+        Inference::Planned,
         "rhat",
         MONITORS,
         &[X],
@@ -333,6 +363,7 @@ pub(super) const TABLE: &[Row] = &[
         "Rank-normalised split R-hat over all chains, evaluated at step barriers (Vehtari et al. 2021).",
     ),
     name(
+        Inference::Planned,
         "ess",
         MONITORS,
         &[X],
@@ -340,6 +371,7 @@ pub(super) const TABLE: &[Row] = &[
         "The bulk effective sample size over all chains (Vehtari et al. 2021).",
     ),
     name(
+        Inference::Planned,
         "snapshot",
         MONITORS,
         &[arg("view", Type::Object("view"), "The view to draw.")],
@@ -347,6 +379,7 @@ pub(super) const TABLE: &[Row] = &[
         "Writes a picture of the current view to the run's folder.",
     ),
     name(
+        Inference::Reported,
         "summary",
         MONITORS,
         &[opt("sel", Type::Selection, "@**", "The choices to summarise.")],
@@ -354,6 +387,7 @@ pub(super) const TABLE: &[Row] = &[
         "Mean, sd, interval, effective sample size and R-hat of each selected choice.",
     ),
     name(
+        Inference::Reported,
         "best",
         MONITORS,
         &[arg("x", Type::Any, "An expression of the model.")],

@@ -134,6 +134,43 @@ pub enum Form {
     LogLikelihood,
 }
 
+/// What a name of inference blocks stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Inference {
+    Mh,
+    Block,
+    Drift,
+    Gibbs,
+    Elliptical,
+    Slice,
+    Hmc,
+    Nuts,
+    Mala,
+    Knn,
+    Delayed,
+    Temper,
+    Smc,
+    Abc,
+    Modes,
+    Optimize,
+    /// A kernel of a host.
+    Host,
+    One,
+    Each,
+    Init,
+    Anneal,
+    Prior,
+    BestOf,
+    Value,
+    Elapsed,
+    Steps,
+    /// Belongs in reports.
+    Reported,
+    /// This version checks and documents it but cannot run it.
+    Planned,
+}
+
 /// The kind of a built-in.
 #[derive(Clone, Copy)]
 pub enum Kind {
@@ -144,7 +181,7 @@ pub enum Kind {
     /// A form.
     Form(Form),
     /// Known only to inference plans: kernels, starts, monitors.
-    Inference,
+    Inference(Inference),
 }
 
 /// The action of a built-in on single numbers, if that determines it completely. Compiled
@@ -224,7 +261,7 @@ impl Builtin {
             Kind::Distribution(_) => {
                 self.distribution(values).map(|d| Value::Dist(std::sync::Arc::new(d)))
             }
-            Kind::Form(_) | Kind::Inference => Err(Fault::type_error(format!(
+            Kind::Form(_) | Kind::Inference(_) => Err(Fault::type_error(format!(
                 "`{}` cannot be used as a function value",
                 self.name
             ))),
@@ -251,9 +288,7 @@ impl Builtin {
 
     /// Whether this version only checks and documents it but cannot run it.
     pub fn is_planned(&self) -> bool {
-        matches!(self.kind, Kind::Inference)
-            && self.host.is_none()
-            && inference::PLANNED.contains(&&*self.name)
+        matches!(self.kind, Kind::Inference(Inference::Planned))
     }
 
     /// Returns its name as in a program: `normal`, `scene.lathe`.

@@ -2,7 +2,7 @@
 
 use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
 use super::types::{accepts, declared, shown};
-use super::{AddHint, Export, Lowerer, Pending, Plan, Report, Typed};
+use super::{AddHint, Export, Lowerer, Pending, Report, Typed};
 use crate::diag::{IntoDiagnostic, nearest};
 use crate::lang::builtins::Type;
 use crate::lang::builtins::data::Options;
@@ -95,7 +95,7 @@ impl Lowerer<'_> {
                 // A plan of an included file belongs to that file, and is ignored here.
                 ItemKind::Infer { name, body } if index == 0 => {
                     let name = name.as_ref().map(|n| Arc::clone(&n.node));
-                    self.plans.push(Plan { name, body: body.clone().into() });
+                    self.blocks.push((name, body.clone()));
                 }
                 ItemKind::Report { exprs, file } if index == 0 => {
                     self.reports.push(Report {

@@ -8,12 +8,13 @@
 //!
 //! There is one file per concern: `scope` names and sites, `items` the top level, `stmt`
 //! statements, `draw` random choices and containers, `expr` expressions, `call` calls,
-//! `plan` inference blocks, `select` selections, `types` static types, `hints`
+//! `plan` inference blocks, `formula` their expressions, `select` selections, `types` static types, `hints`
 //! suggestions for unknown names, `interface` parameters and data.
 
 mod call;
 mod draw;
 mod expr;
+mod formula;
 mod hints;
 mod interface;
 mod items;
@@ -30,6 +31,7 @@ use super::builtins::data::Options;
 use super::code::{Block, BlockId, BlockKind, Code, Eager, Op, Operand, Slot};
 use super::error::Fault;
 use super::load::Loaded;
+use super::plan::{DeclaredKernel, Plan};
 use super::value::Value;
 use crate::diag::{Diagnostic, SourceMap};
 use crate::syntax::ast::{Expr, FnDecl, KStmt, KernelDecl, Name};
@@ -63,15 +65,6 @@ pub struct Inputs<'a> {
     pub eager: Eager,
 }
 
-/// An inference block.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// Its name, if it has one.
-    pub name: Option<Arc<str>>,
-    /// Its statements.
-    pub body: Arc<[KStmt]>,
-}
-
 /// `report e, … as "file";`
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -96,7 +89,9 @@ pub struct Compiled {
     /// The model.
     pub code: Arc<Code>,
     /// Its inference blocks, in order.
-    pub plans: Vec<Plan>,
+    pub plans: Vec<Arc<Plan>>,
+    /// The kernels it declares.
+    pub kernels: Arc<[DeclaredKernel]>,
     /// Its reports.
     pub reports: Vec<Report>,
     /// Its exports.
@@ -112,35 +107,10 @@ pub fn compile(
     inputs: Inputs,
     map: &mut SourceMap,
 ) -> Result<Compiled, Vec<Diagnostic>> {
-    let mut l = Lowerer {
-        code: Code {
-            builtins: Arc::clone(&inputs.builtins),
-            eager: inputs.eager,
-            ..Code::default()
-        },
-        inputs,
-        loaded,
-        map,
-        errors: Vec::new(),
-        modules: vec![Module::default()],
-        module: 0,
-        scopes: Vec::new(),
-        bodies: Vec::new(),
-        pending: Vec::new(),
-        plans: Vec::new(),
-        kernels: IndexMap::new(),
-        reports: Vec::new(),
-        exports: Vec::new(),
-        used_sets: Vec::new(),
-        used_data: Vec::new(),
-        roots: IndexSet::new(),
-    };
-    l.code.blocks.push(Block::new(BlockKind::Root, None));
-    l.scopes.push(Scope::new(0, scope::ScopeKind::Root));
-    l.bodies.push(Body::default());
+    let mut l = Lowerer::new(loaded, inputs, map);
     l.unit(0);
     l.function_bodies();
-    l.inference();
+    let kernels = l.inference();
     l.unused_inputs();
     if !l.errors.is_empty() {
         // Errors without a location are about the command line; they come first.
@@ -148,9 +118,25 @@ pub fn compile(
         l.errors.dedup();
         return Err(l.errors);
     }
-    l.code.kernels = l.kernels.into_values().collect();
     l.code.finish();
-    Ok(Compiled { code: Arc::new(l.code), plans: l.plans, reports: l.reports, exports: l.exports })
+    let (code, plans) = (Arc::new(l.code), l.plans);
+    Ok(Compiled { code, plans, kernels, reports: l.reports, exports: l.exports })
+}
+
+/// Compiles an inference block that reads nothing of a program, such as the default one.
+pub fn compile_plan(builtins: Arc<Table>, body: &[KStmt]) -> Plan {
+    let inputs = Inputs {
+        builtins,
+        sets: &[],
+        data: IndexMap::new(),
+        read: &|_, _, _, _| Ok(Value::Unit),
+        needs_data: false,
+        defaults: FxHashMap::default(),
+        eager: Eager::default(),
+    };
+    let (loaded, mut map) = (Loaded::default(), SourceMap::new());
+    let mut l = Lowerer::new(&loaded, inputs, &mut map);
+    Plan { steps: l.plan_body(body, &mut plan::Around::default()), ..Plan::default() }
 }
 
 /// A named function whose body is lowered when all top-level names are known.
@@ -173,8 +159,15 @@ struct Lowerer<'a> {
     /// The enclosing function bodies; the first is the top level.
     bodies: Vec<Body>,
     pending: Vec<Pending>,
-    plans: Vec<Plan>,
+    /// The inference blocks as written, by name, and compiled.
+    blocks: Vec<(Option<Arc<str>>, Vec<KStmt>)>,
+    plans: Vec<Arc<Plan>>,
     kernels: IndexMap<Arc<str>, KernelDecl>,
+    freezes: Vec<Expr>,
+    /// The number of calls of kernels so far.
+    calls: usize,
+    /// The expression of a plan that is being lowered, if any.
+    lowering: Option<formula::Lowering>,
     reports: Vec<Report>,
     exports: Vec<Export>,
     used_sets: Vec<String>,
@@ -190,7 +183,35 @@ struct Typed {
     ty: super::builtins::Type,
 }
 
-impl Lowerer<'_> {
+impl<'a> Lowerer<'a> {
+    fn new(loaded: &'a Loaded, inputs: Inputs<'a>, map: &'a mut SourceMap) -> Self {
+        let (builtins, eager) = (Arc::clone(&inputs.builtins), inputs.eager);
+        let blocks = vec![Block::new(BlockKind::Root, None)];
+        Lowerer {
+            code: Code { builtins, eager, blocks, ..Code::default() },
+            inputs,
+            loaded,
+            map,
+            errors: Vec::new(),
+            modules: vec![Module::default()],
+            module: 0,
+            scopes: vec![Scope::new(0, scope::ScopeKind::Root)],
+            bodies: vec![Body::default()],
+            pending: Vec::new(),
+            blocks: Vec::new(),
+            plans: Vec::new(),
+            kernels: IndexMap::new(),
+            freezes: Vec::new(),
+            calls: 0,
+            lowering: None,
+            reports: Vec::new(),
+            exports: Vec::new(),
+            used_sets: Vec::new(),
+            used_data: Vec::new(),
+            roots: IndexSet::new(),
+        }
+    }
+
     fn error(
         &mut self,
         message: impl Into<String>,

@@ -11,7 +11,7 @@
 //! no density, from wherever it is reached.
 
 use super::{Point, System};
-use crate::infer::calls::selection::fail;
+use crate::infer::calls::error::fail;
 use crate::infer::kernel::{Outcome, StepContext, recoverable};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
