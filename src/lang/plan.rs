@@ -48,8 +48,9 @@ pub struct Step {
 /// The kinds of statements.
 #[derive(Clone, Debug)]
 pub enum StepKind {
-    /// `init(…)`; only the first one of a block counts, before the block runs.
-    Init(Start),
+    /// `init(best_of(…))`, or `None` for `init(prior())`; only the first one of a block
+    /// counts, before the block runs.
+    Init(Option<BestOf>),
     /// `anneal(from)`
     Anneal(Formula),
     /// `warmup n { … }`
@@ -110,13 +111,15 @@ impl Step {
     }
 }
 
-/// How a chain starts.
+/// `best_of(n, keep, from)`: how a chain starts.
 #[derive(Clone, Debug)]
-pub enum Start {
-    /// `prior()`
-    Prior,
-    /// `best_of(n, keep, from)`
-    BestOf(Formula, Option<Formula>, Option<KernelCall>),
+pub struct BestOf {
+    /// The number of draws.
+    pub draws: Formula,
+    /// How many are kept.
+    pub keep: Option<Formula>,
+    /// The kernel that moves them.
+    pub from: Option<KernelCall>,
 }
 
 /// A call of a kernel.
@@ -132,6 +135,8 @@ pub struct KernelCall {
     pub kernel: Callee,
     /// One argument per parameter of the kernel.
     pub args: Box<[Argument]>,
+    /// Whether it means the same whenever it is applied.
+    pub is_constant: bool,
 }
 
 /// The kernel of a call.
@@ -154,18 +159,6 @@ pub enum Argument {
     Choices(Choices),
     /// Another kernel.
     Kernel(KernelCall),
-}
-
-impl KernelCall {
-    /// Whether it means the same whenever it is applied.
-    pub fn is_constant(&self) -> bool {
-        self.args.iter().all(|a| match a {
-            Argument::Omitted => true,
-            Argument::Value(f) => f.is_constant(),
-            Argument::Choices(c) => c.selection.is_constant(),
-            Argument::Kernel(k) => k.is_constant(),
-        })
-    }
 }
 
 /// Which of the selected choices a step moves.
@@ -257,16 +250,6 @@ impl Selection {
             _ => Err(e.span),
         }
     }
-
-    fn is_constant(&self) -> bool {
-        match self {
-            Selection::Path(path) => path.is_constant(),
-            Selection::Tag(..) => true,
-            Selection::Union(a, b) | Selection::Both(a, b) | Selection::Minus(a, b) => {
-                a.is_constant() && b.is_constant()
-            }
-        }
-    }
 }
 
 impl Path {
@@ -287,16 +270,6 @@ impl Path {
             PathSegment::Named(name, s.occurrence, s.keys.iter().map(&mut read).collect())
         };
         Path { segments: a.segments.iter().map(&mut segment).collect(), span }
-    }
-
-    fn is_constant(&self) -> bool {
-        self.segments.iter().all(|s| match s {
-            PathSegment::Deep => true,
-            PathSegment::Named(_, _, keys) => keys.iter().all(|k| match k {
-                PathKey::Computed(f) => f.is_constant(),
-                _ => true,
-            }),
-        })
     }
 }
 

@@ -111,10 +111,9 @@ impl ProgramKernel {
     ) -> TraceResult<Played> {
         let key = StreamKey::new(at.seed, at.chain, Purpose::PREDICT);
         let draws = Draws { key, step: at.step, substream: at.part };
-        let mut play =
-            Play { own: self, draws, steps: at.step, source, moved, played: Played::default() };
-        let mut variables = self.arguments.clone();
-        play.body(&self.declared().steps, trace, &mut variables)?;
+        let (steps, variables, played) = (at.step, self.arguments.clone(), Played::default());
+        let mut play = Play { own: self, trace, variables, draws, steps, source, moved, played };
+        play.body(&self.declared().steps)?;
         Ok(play.played)
     }
 
@@ -162,6 +161,8 @@ impl ProgramKernel {
 
 struct Play<'a> {
     own: &'a ProgramKernel,
+    trace: &'a mut Trace,
+    variables: Vec<Value>,
     draws: Draws,
     steps: u64,
     source: Source<'a>,
@@ -171,50 +172,45 @@ struct Play<'a> {
 
 impl Play<'_> {
     /// The environment of expressions.
-    fn env<'b>(&'b mut self, trace: &'b mut Trace, variables: &'b [Value]) -> PlanEnv<'b> {
+    fn env(&mut self) -> PlanEnv<'_> {
         let (draws, started, steps) = (self.draws, self.own.started, self.steps);
         let moved = self.moved.as_mut();
         let moved = moved.map(|m| Moved { choices: m.choices, aside: &mut *m.aside });
-        PlanEnv { trace, variables, draws, started, steps, moved }
+        PlanEnv { trace: self.trace, variables: &self.variables, draws, started, steps, moved }
     }
 
-    fn body(
-        &mut self,
-        body: &[Step],
-        trace: &mut Trace,
-        variables: &mut Vec<Value>,
-    ) -> TraceResult<()> {
-        let depth = variables.len();
+    fn body(&mut self, body: &[Step]) -> TraceResult<()> {
+        let depth = self.variables.len();
         for s in body {
             match &s.kind {
                 StepKind::Let(_, value) => {
-                    let v = evaluate(value, &mut self.env(trace, variables))?;
-                    variables.push(v);
+                    let v = evaluate(value, &mut self.env())?;
+                    self.variables.push(v);
                 }
                 StepKind::For(items, _, body) => {
-                    let over = evaluate(items, &mut self.env(trace, variables))?;
+                    let over = evaluate(items, &mut self.env())?;
                     for item in over.passes() {
-                        variables.push(item);
-                        let done = self.body(body, trace, variables);
-                        variables.pop();
+                        self.variables.push(item);
+                        let done = self.body(body);
+                        self.variables.pop();
                         done?;
                     }
                 }
                 StepKind::Map(target, value) => {
-                    let image = self.image(target, trace, variables)?;
-                    self.map(image, value, s.span, trace, variables)?;
+                    let image = self.image(target)?;
+                    self.map(image, value, s.span)?;
                 }
                 StepKind::MapDrawn(name, value) => {
                     let image = self.auxiliary_image(name)?;
-                    self.map(image, value, s.span, trace, variables)?;
+                    self.map(image, value, s.span)?;
                 }
                 StepKind::Draw(name, _, dist) => {
-                    let value = self.auxiliary(&name.node, dist, trace, variables)?;
-                    variables.push(value);
+                    let value = self.auxiliary(&name.node, dist)?;
+                    self.variables.push(value);
                 }
                 StepKind::Propose(..) if matches!(self.source, Source::Moved(_)) => {}
                 StepKind::Propose(target, dist) => {
-                    let proposed = self.proposed(target, dist, trace, variables)?;
+                    let proposed = self.proposed(target, dist)?;
                     let mapped = |i: &(Image, Value)| matches!(i.0, Image::Choice(_, t) if t == proposed.target);
                     let twice = self.played.all.iter().any(|p| p.target == proposed.target);
                     if twice || self.played.images.iter().any(mapped) {
@@ -236,39 +232,26 @@ impl Play<'_> {
                 }
             }
         }
-        variables.truncate(depth);
+        self.variables.truncate(depth);
         Ok(())
     }
 
     /// Assigns a new value by a map.
-    fn map(
-        &mut self,
-        image: Image,
-        value: &Formula,
-        span: Span,
-        trace: &mut Trace,
-        variables: &[Value],
-    ) -> TraceResult<()> {
+    fn map(&mut self, image: Image, value: &Formula, span: Span) -> TraceResult<()> {
         let proposed = |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
         if self.played.images.iter().any(|(i, _)| *i == image)
             || self.played.all.iter().any(proposed)
         {
             return Err(fail(span, "this gets a new value twice in one kernel".into()));
         }
-        let value = evaluate(value, &mut self.env(trace, variables))?;
+        let value = evaluate(value, &mut self.env())?;
         self.played.images.push((image, value));
         Ok(())
     }
 
     /// Draws an auxiliary variable, or uses the given value.
-    fn auxiliary(
-        &mut self,
-        name: &Arc<str>,
-        dist: &Formula,
-        trace: &mut Trace,
-        variables: &[Value],
-    ) -> TraceResult<Value> {
-        let dist = self.distribution(dist, trace, variables)?;
+    fn auxiliary(&mut self, name: &Arc<str>, dist: &Formula) -> TraceResult<Value> {
+        let dist = self.distribution(dist)?;
         let value = match &mut self.source {
             Source::Drawn(rng) => Value::from_datum(&dist.sample(rng)),
             Source::Given(values) | Source::Moved(values) => {
@@ -279,27 +262,16 @@ impl Play<'_> {
         Ok(value)
     }
 
-    fn proposed(
-        &mut self,
-        target: &Path,
-        dist: &Formula,
-        trace: &mut Trace,
-        variables: &[Value],
-    ) -> TraceResult<Proposed> {
-        let (address, found) = self.choice(target, trace, variables)?;
-        if trace.elements(found).is_some() {
+    fn proposed(&mut self, target: &Path, dist: &Formula) -> TraceResult<Proposed> {
+        let (address, found) = self.choice(target)?;
+        if self.trace.elements(found).is_some() {
             return Err(fail(target.span, format!("{address} cannot be proposed as a whole")));
         }
-        Ok(Proposed { address, target: found, dist: self.distribution(dist, trace, variables)? })
+        Ok(Proposed { address, target: found, dist: self.distribution(dist)? })
     }
 
-    fn distribution(
-        &mut self,
-        dist: &Formula,
-        trace: &mut Trace,
-        variables: &[Value],
-    ) -> TraceResult<Dist> {
-        match evaluate(dist, &mut self.env(trace, variables))? {
+    fn distribution(&mut self, dist: &Formula) -> TraceResult<Dist> {
+        match evaluate(dist, &mut self.env())? {
             Value::Dist(d) => Ok(Dist::clone(&d)),
             v => Err(fail(
                 dist.span,
@@ -309,15 +281,10 @@ impl Play<'_> {
     }
 
     /// Reads what a map assigns a new value to.
-    fn image(
-        &mut self,
-        target: &Path,
-        trace: &mut Trace,
-        variables: &[Value],
-    ) -> TraceResult<Image> {
-        let (address, found) = self.choice(target, trace, variables)?;
-        if trace.elements(found).is_some()
-            || trace.dist(found).is_some_and(|d| d.is_stored_whitened())
+    fn image(&mut self, target: &Path) -> TraceResult<Image> {
+        let (address, found) = self.choice(target)?;
+        if self.trace.elements(found).is_some()
+            || self.trace.dist(found).is_some_and(|d| d.is_stored_whitened())
         {
             return Err(fail(target.span, format!("{address} cannot be mapped as a whole")));
         }
@@ -336,14 +303,9 @@ impl Play<'_> {
     }
 
     /// Finds a choice that can be proposed.
-    fn choice(
-        &mut self,
-        target: &Path,
-        trace: &mut Trace,
-        variables: &[Value],
-    ) -> TraceResult<(Address, Target)> {
-        let at = address(target, &mut self.env(trace, variables))?;
-        let Some(found) = trace.find(&at) else {
+    fn choice(&mut self, target: &Path) -> TraceResult<(Address, Target)> {
+        let at = address(target, &mut self.env())?;
+        let Some(found) = self.trace.find(&at) else {
             let mut e = fail(target.span, format!("this state has no choice {at}"));
             e.hint = Some(
                 "a kernel can propose only choices that exist in the current state; mh and block can create others"

@@ -155,7 +155,7 @@ impl<'a> Runner<'a> {
                 self.instances.len() - 1
             }
         };
-        if call.is_constant() {
+        if call.is_constant {
             if self.calls.len() <= call.index {
                 self.calls.resize(call.index + 1, None);
             }

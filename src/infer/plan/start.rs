@@ -8,7 +8,7 @@ use crate::infer::kernels::ProgramKernel;
 use crate::infer::run::{ChainError, RunOptions};
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
-use crate::lang::plan::{self, Callee, Formula, KernelCall, Plan, StepKind};
+use crate::lang::plan::{BestOf, Callee, Formula, KernelCall, Plan, StepKind};
 use crate::lang::value::Value;
 use crate::trace::{Draws, Trace};
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub(super) fn start_of(
         StepKind::Init(start) => Some(start),
         _ => None,
     });
-    let Some(plan::Start::BestOf(draws, keep, from)) = init else {
+    let Some(Some(BestOf { draws, keep, from })) = init else {
         return Ok((Start::default(), None));
     };
     let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());

@@ -21,6 +21,15 @@ const fn name(
     Row::new(Kind::Inference(what), name, section, args, returns, doc)
 }
 
+const fn kernel(
+    what: Inference,
+    name: &'static str,
+    args: &'static [Arg],
+    doc: &'static str,
+) -> Row {
+    self::name(what, name, KERNELS, args, Type::Kernel, doc)
+}
+
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");
 const MARGINAL: Arg = opt(
     "marginal",
@@ -34,26 +43,21 @@ const INNER: Arg = arg("move", Type::Kernel, "The inner kernel.");
 const X: Arg = arg("x", Type::Any, "A numeric quantity of the model, as in `collect`.");
 
 pub(super) const TABLE: &[Row] = &[
-    name(
+    kernel(
         Inference::Mh,
         "mh",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Metropolis-Hastings that proposes a single selected choice from its prior.",
     ),
-    name(
+    kernel(
         Inference::Block,
         "block",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Metropolis-Hastings that proposes all selected choices jointly from their prior.",
     ),
-    name(
+    kernel(
         Inference::Drift,
         "drift",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -63,29 +67,23 @@ pub(super) const TABLE: &[Row] = &[
                 "A fixed step size in the unconstrained space, instead of one adapted in warm-up.",
             ),
         ],
-        Type::Kernel,
         "Gaussian random walk in the unconstrained space; discrete choices move to another value.",
     ),
-    name(
+    kernel(
         Inference::Gibbs,
         "gibbs",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Draws a selected finite discrete choice from its full conditional, by enumeration of its values.",
     ),
-    name(
+    kernel(
         Inference::Elliptical,
         "elliptical",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp (Murray et al. 2010).",
     ),
-    name(
+    kernel(
         Inference::Slice,
         "slice",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -101,25 +99,21 @@ pub(super) const TABLE: &[Row] = &[
                 "Expands the interval by doubling instead of stepping out: for slices much wider than `width`.",
             ),
         ],
-        Type::Kernel,
         "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",
     ),
-    name(
+    kernel(
         Inference::Hmc,
         "hmc",
-        KERNELS,
         &[
             SEL,
             opt("steps", Type::Int, "10", "The number of leapfrog steps per proposal."),
             MARGINAL,
         ],
-        Type::Kernel,
         "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     ),
-    name(
+    kernel(
         Inference::Nuts,
         "nuts",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -130,44 +124,36 @@ pub(super) const TABLE: &[Row] = &[
             ),
             MARGINAL,
         ],
-        Type::Kernel,
         "The No-U-Turn sampler (Hoffman and Gelman 2014).",
     ),
-    name(
+    kernel(
         Inference::Mala,
         "mala",
-        KERNELS,
         &[SEL, MARGINAL],
-        Type::Kernel,
         "The Metropolis-adjusted Langevin algorithm: one gradient per proposal.",
     ),
-    name(
+    kernel(
         Inference::Knn,
         "knn",
-        KERNELS,
         &[
             SEL,
             arg("bank", Type::Str, "A file made by `pcadlang learn`."),
             opt("k", Type::Int, "10", "The number of neighbours."),
         ],
-        Type::Kernel,
         "Data-driven independence proposal: a kernel density estimate over the latents of the \
          bank's pictures nearest to the observed one.",
     ),
-    name(
+    kernel(
         Inference::Delayed,
         "delayed",
-        KERNELS,
         &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
-        Type::Kernel,
         "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \
          …`; only those that pass are evaluated under the observation itself (Christen and Fox \
          2005). Exact for any surrogate that is positive wherever the likelihood is.",
     ),
-    name(
+    kernel(
         Inference::Temper,
         "temper",
-        KERNELS,
         &[
             INNER,
             opt("levels", Type::Int, "6", "The number of temperatures."),
@@ -178,24 +164,20 @@ pub(super) const TABLE: &[Row] = &[
                 "The lowest power of the likelihood; warm-up adapts the ladder of temperatures.",
             ),
         ],
-        Type::Kernel,
         "Replica exchange (parallel tempering) over powers of the likelihood: each step updates \
          every replica, then proposes swaps of neighbours (Geyer 1991).",
     ),
-    name(
+    kernel(
         Inference::Smc,
         "smc",
-        KERNELS,
         &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
-        Type::Kernel,
         "Proposes complete states by annealed sequential Monte Carlo with the inner kernel, \
          accepted by their evidence estimates (particle independent Metropolis-Hastings, Andrieu \
          et al. 2010). No other kernel may change the state in between.",
     ),
-    name(
+    kernel(
         Inference::Abc,
         "abc",
-        KERNELS,
         &[
             INNER,
             arg("eps", Type::Num, "The tolerance: the largest accepted distance."),
@@ -208,15 +190,13 @@ pub(super) const TABLE: &[Row] = &[
             ),
             opt("moves", Type::Int, "1", "The number of moves of each particle at each tolerance."),
         ],
-        Type::Kernel,
         "Approximate Bayesian computation (likelihood-free): the inner kernel targets the prior, \
          and a proposal is accepted if data simulated from it are within `eps` of the observed \
          data in root mean square (Marjoram et al. 2003).",
     ),
-    name(
+    kernel(
         Inference::Modes,
         "modes",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -245,7 +225,6 @@ pub(super) const TABLE: &[Row] = &[
                 "Observations that are replaced by their coarse surrogates during the search for modes.",
             ),
         ],
-        Type::Kernel,
         "Jumps between modes. The first step searches for them: the most probable draws of the \
          selected choices climb by L-BFGS, in rounds that each keep the better half; in warm-up \
          the state then moves to one of the modes, drawn by the Laplace estimates of their \
@@ -254,12 +233,10 @@ pub(super) const TABLE: &[Row] = &[
          proposed jointly from a mixture of Laplace approximations at the modes (independent \
          Metropolis-Hastings, Tierney 1994).",
     ),
-    name(
+    kernel(
         Inference::Optimize,
         "optimize",
-        KERNELS,
         &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
-        Type::Kernel,
         "Climbs to a mode of the posterior: for starting points or quick answers. Not a sampler.",
     ),
     name(

@@ -45,7 +45,9 @@ impl Lowerer<'_> {
         self.scopes.truncate(1);
         self.scopes.extend(scopes);
         self.code.blocks[block as usize].result = Some(result);
-        Formula { kind: self.finished(block, given), span: e.span }
+        let formula = Formula { kind: self.finished(block, given), span: e.span };
+        self.varying += usize::from(!formula.is_constant());
+        formula
     }
 
     fn parameter(&mut self, block: BlockId, index: usize, span: Span) -> Slot {

@@ -166,6 +166,8 @@ struct Lowerer<'a> {
     freezes: Vec<Expr>,
     /// The number of calls of kernels so far.
     calls: usize,
+    /// The number of expressions of plans so far whose values vary.
+    varying: usize,
     /// The expression of a plan that is being lowered, if any.
     lowering: Option<formula::Lowering>,
     reports: Vec<Report>,
@@ -203,6 +205,7 @@ impl<'a> Lowerer<'a> {
             kernels: IndexMap::new(),
             freezes: Vec::new(),
             calls: 0,
+            varying: 0,
             lowering: None,
             reports: Vec::new(),
             exports: Vec::new(),

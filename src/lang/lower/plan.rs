@@ -6,8 +6,8 @@ use super::{AddHint, Lowerer};
 use crate::lang::builtins::{self, Builtin, Inference, Kind, Type};
 use crate::lang::code::Operand;
 use crate::lang::plan::{
-    Argument, Callee, Choices, DeclaredKernel, Formula, KernelCall, Path, PathSegment, Pick, Plan,
-    Selection, Start, Step, StepKind,
+    Argument, BestOf, Callee, Choices, DeclaredKernel, Formula, KernelCall, Path, PathSegment,
+    Pick, Plan, Selection, Step, StepKind,
 };
 use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind, KernelDecl, Param};
 use crate::syntax::print_expr;
@@ -214,10 +214,11 @@ impl Lowerer<'_> {
             self.error("expected a kernel", callee.span, "not the name of a kernel");
             return None;
         };
+        let varying = self.varying;
         if let Some((i, _, k)) = self.kernels.get_full(name) {
             let k = k.clone();
             let args = self.declared_args(&k, args, e, around);
-            return Some(StepKind::Apply(self.kernel_call(e, Callee::Declared(i), args)));
+            return Some(StepKind::Apply(self.kernel_call(e, Callee::Declared(i), args, varying)));
         }
         let table = Arc::clone(&self.code.builtins);
         let found = table.find("", name);
@@ -250,7 +251,7 @@ impl Lowerer<'_> {
         }
         if what == Inference::Init {
             let start = self.matched(b, args, e.span)?.first().copied().flatten()?;
-            return self.start(&args[start].value, around).map(StepKind::Init);
+            return self.start(&args[start].value, around);
         }
         let args = self.inference_args(b, args, e.span, around)?;
         match (what, args) {
@@ -258,14 +259,23 @@ impl Lowerer<'_> {
                 Argument::Value(from) => Some(StepKind::Anneal(from)),
                 _ => None,
             },
-            (_, args) => Some(StepKind::Apply(self.kernel_call(e, Callee::Builtin(i), args))),
+            (_, args) => {
+                Some(StepKind::Apply(self.kernel_call(e, Callee::Builtin(i), args, varying)))
+            }
         }
     }
 
-    fn kernel_call(&mut self, e: &Expr, kernel: Callee, args: Box<[Argument]>) -> KernelCall {
+    /// A call of a kernel; `varying` expressions came before its arguments.
+    fn kernel_call(
+        &mut self,
+        e: &Expr,
+        kernel: Callee,
+        args: Box<[Argument]>,
+        varying: usize,
+    ) -> KernelCall {
         self.calls += 1;
-        let (index, text) = (self.calls - 1, print_expr(e).into());
-        KernelCall { index, text, span: e.span, kernel, args }
+        let (index, text, span) = (self.calls - 1, print_expr(e).into(), e.span);
+        KernelCall { index, text, span, kernel, args, is_constant: varying == self.varying }
     }
 
     /// Compiles the arguments of a kernel that the program declares.
@@ -395,35 +405,33 @@ impl Lowerer<'_> {
     }
 
     /// Compiles what `init` takes.
-    fn start(&mut self, e: &Expr, around: &Around) -> Option<Start> {
+    fn start(&mut self, e: &Expr, around: &Around) -> Option<StepKind> {
         let table = Arc::clone(&self.code.builtins);
-        let found = call(e).and_then(|(name, args)| {
-            let b = table.get(table.find("", name)?);
-            Some((b, args, b.kind))
-        });
-        let what = match found {
-            Some((b, args, Kind::Inference(what @ (Inference::Prior | Inference::BestOf)))) => {
-                (what, self.inference_args(b, args, e.span, around)?)
+        let found = call(e).and_then(|(name, args)| Some((table.get(table.find("", name)?), args)));
+        match found.map(|(b, args)| (b.kind, b, args)) {
+            Some((Kind::Inference(Inference::Prior), b, args)) => {
+                self.inference_args(b, args, e.span, around).map(|_| StepKind::Init(None))
+            }
+            Some((Kind::Inference(Inference::BestOf), b, args)) => {
+                let mut args = self.inference_args(b, args, e.span, around)?.into_iter();
+                let mut value = || match args.next() {
+                    Some(Argument::Value(f)) => Some(f),
+                    _ => None,
+                };
+                let (draws, keep) = (value()?, value());
+                let from = match args.next() {
+                    Some(Argument::Kernel(call)) => Some(call),
+                    _ => None,
+                };
+                Some(StepKind::Init(Some(BestOf { draws, keep, from })))
             }
             _ => {
                 self.error("`init` takes prior() or best_of(n)", e.span, "not a start").hint_also(
                     "init(best_of(100)); starts at the best of 100 draws from the prior",
                 );
-                return None;
+                None
             }
-        };
-        let (Inference::BestOf, args) = what else { return Some(Start::Prior) };
-        let mut args = args.into_iter();
-        let mut value = || match args.next() {
-            Some(Argument::Value(f)) => Some(f),
-            _ => None,
-        };
-        let (draws, keep) = (value()?, value());
-        let from = match args.next() {
-            Some(Argument::Kernel(call)) => Some(call),
-            _ => None,
-        };
-        Some(Start::BestOf(draws, keep, from))
+        }
     }
 
     /// Compiles a selection, optionally inside of `one(…)` or `each(…)`.
