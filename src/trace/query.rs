@@ -2,7 +2,7 @@
 //! surrogates of observations. Choices drawn for a query are discarded afterwards.
 
 use super::graph::Graph;
-use super::node::{Arguments, Deps, Frame, FrameId, NONE};
+use super::node::{Arguments, Deps, Frame, FrameId};
 use super::{Address, Draws, Trace, TraceResult};
 use crate::lang::code::{BlockId, Code, Operand};
 use crate::lang::value::Value;
@@ -17,7 +17,7 @@ impl Trace {
     /// If their evaluation fails.
     #[doc(hidden)]
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
-        self.asked(operands, draws, |_, values| Ok(values))
+        self.asked(|graph, code| graph.query(code, 0, operands), draws, |_, values| Ok(values))
     }
 
     /// Evaluates a function of the program, which sees the present state, with these
@@ -29,19 +29,14 @@ impl Trace {
         args: Arc<[TraceResult<Value>]>,
         draws: Draws,
     ) -> TraceResult<Value> {
-        let frame = |graph: &mut Graph, code: &Code| {
-            let path = graph.frames[0].path;
-            let args = Arguments::Supplied(args);
-            let (block, parent, owner, base, depth, pass) = (function, 0, NONE, 0, 1, 0);
-            let attached = true;
-            let key = None;
-            let made = Frame { block, parent, owner, base, path, depth, pass, key, args, attached };
-            graph.make_frame(code, made)
+        let args = Arguments::Supplied(args);
+        let root = self.graph.frames[0].clone();
+        let frame = Frame { block: function, parent: 0, depth: 1, args, ..root };
+        let evaluate = |graph: &mut Graph, code: &Code| {
+            let frame = graph.make_frame(code, frame)?;
+            graph.query(code, frame, code.blocks[function as usize].result.as_slice())
         };
-        let result = self.code.blocks[function as usize].result;
-        let asked = result.as_slice();
-        let one = |_: &mut Trace, mut values: Vec<Value>| Ok(values.pop().unwrap_or_default());
-        self.asked_in(frame, asked, draws, one)
+        self.asked(evaluate, draws, |_, mut values| Ok(values.pop().unwrap_or_default()))
     }
 
     /// Like [`Trace::query`], and passes to `look` the trace with the choices that were
@@ -56,27 +51,20 @@ impl Trace {
         draws: Draws,
         look: impl FnOnce(&Trace, Vec<Value>) -> T,
     ) -> TraceResult<T> {
-        self.asked(operands, draws, |trace, values| {
-            trace.graph.update_selections(&trace.code)?;
-            Ok(look(trace, values))
-        })
+        self.asked(
+            |graph, code| graph.query(code, 0, operands),
+            draws,
+            |trace, values| {
+                trace.graph.update_selections(&trace.code)?;
+                Ok(look(trace, values))
+            },
+        )
     }
 
     /// Evaluates expressions, passes them to `used`, and undoes the evaluation.
     fn asked<T>(
         &mut self,
-        operands: &[Operand],
-        draws: Draws,
-        used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
-    ) -> TraceResult<T> {
-        self.asked_in(|_, _| Ok(0), operands, draws, used)
-    }
-
-    /// The same for expressions of a frame, which may be made for them.
-    fn asked_in<T>(
-        &mut self,
-        frame: impl FnOnce(&mut Graph, &Code) -> TraceResult<FrameId>,
-        operands: &[Operand],
+        evaluate: impl FnOnce(&mut Graph, &Code) -> TraceResult<Vec<Value>>,
         draws: Draws,
         used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
     ) -> TraceResult<T> {
@@ -84,8 +72,7 @@ impl Trace {
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.before = Some(before.clone());
-        let result = frame(&mut self.graph, &self.code)
-            .and_then(|frame| self.graph.query(&self.code, frame, operands));
+        let result = evaluate(&mut self.graph, &self.code);
         self.graph.before = None;
         let result = result.and_then(|values| used(self, values));
         self.graph.rollback(&self.code, before);

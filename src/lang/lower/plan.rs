@@ -221,14 +221,11 @@ impl Lowerer<'_> {
             return Some(StepKind::Apply(self.kernel_call(e, Callee::Declared(i), args, varying)));
         }
         let table = Arc::clone(&self.code.builtins);
-        let found = table.find("", name);
-        let (i, b, what) = match found.map(|i| (i, table.get(i))) {
-            Some((i, b)) if let Kind::Inference(what) = b.kind => (i, b, what),
-            found => {
-                self.no_kernel(name, found.map(|(_, b)| b.kind), callee.span);
-                return None;
-            }
+        let Some((i, what)) = self.inference_name(name) else {
+            self.no_kernel(name, callee.span);
+            return None;
         };
+        let b = table.get(i);
         if b.returns != Type::Kernel {
             self.error(
                 format!("`{name}` is not a kernel"),
@@ -307,14 +304,23 @@ impl Lowerer<'_> {
         k.params.iter().enumerate().map(of).collect()
     }
 
+    /// The built-in of inference blocks with this name, by its index in the table.
+    fn inference_name(&self, name: &str) -> Option<(u32, Inference)> {
+        let i = self.code.builtins.find("", name)?;
+        match self.code.builtins.get(i).kind {
+            Kind::Inference(what) => Some((i, what)),
+            _ => None,
+        }
+    }
+
     /// Reports a call of something that is not a kernel.
-    fn no_kernel(&mut self, name: &Arc<str>, found: Option<Kind>, span: Span) {
-        let other = match found {
+    fn no_kernel(&mut self, name: &Arc<str>, span: Span) {
+        let table = Arc::clone(&self.code.builtins);
+        let other = match table.find("", name).map(|i| table.get(i).kind) {
             Some(Kind::Distribution(_)) => Some("a distribution"),
             Some(_) => Some("a function"),
             None => self.modules[0].names.contains_key(name).then_some("a name of the model"),
         };
-        let table = Arc::clone(&self.code.builtins);
         let is_kernel = |b: &&Builtin| {
             matches!(b.kind, Kind::Inference(what) if what != Inference::Prior)
                 && b.returns == Type::Kernel
@@ -407,13 +413,14 @@ impl Lowerer<'_> {
     /// Compiles what `init` takes.
     fn start(&mut self, e: &Expr, around: &Around) -> Option<StepKind> {
         let table = Arc::clone(&self.code.builtins);
-        let found = call(e).and_then(|(name, args)| Some((table.get(table.find("", name)?), args)));
-        match found.map(|(b, args)| (b.kind, b, args)) {
-            Some((Kind::Inference(Inference::Prior), b, args)) => {
-                self.inference_args(b, args, e.span, around).map(|_| StepKind::Init(None))
-            }
-            Some((Kind::Inference(Inference::BestOf), b, args)) => {
-                let mut args = self.inference_args(b, args, e.span, around)?.into_iter();
+        let found = call(e).and_then(|(name, args)| Some((self.inference_name(name)?, args)));
+        match found {
+            Some(((i, Inference::Prior), args)) => self
+                .inference_args(table.get(i), args, e.span, around)
+                .map(|_| StepKind::Init(None)),
+            Some(((i, Inference::BestOf), args)) => {
+                let args = self.inference_args(table.get(i), args, e.span, around)?;
+                let mut args = args.into_iter();
                 let mut value = || match args.next() {
                     Some(Argument::Value(f)) => Some(f),
                     _ => None,
@@ -475,10 +482,8 @@ impl Lowerer<'_> {
     /// Lowers an expression of the model, recorded with every draw, to a slot of the top
     /// level.
     fn query(&mut self, e: &Expr) -> Option<Operand> {
-        if let ExprKind::Call { callee, .. } = &e.kind
-            && let ExprKind::Var(name) = &callee.kind
-            && let Some(i) = self.code.builtins.find("", name)
-            && matches!(self.code.builtins.get(i).kind, Kind::Inference(_))
+        if let Some((name, _)) = call(e)
+            && self.inference_name(name).is_some()
         {
             self.error(
                 format!("`{name}` is no quantity of the model"),
@@ -504,33 +509,27 @@ impl Lowerer<'_> {
 
     /// Checks `summary(@x)`, `best(view)`, or an expression of the model.
     fn reported(&mut self, e: &Expr) {
-        if let ExprKind::Call { callee, args } = &e.kind
-            && let ExprKind::Var(name) = &callee.kind
-            && let Some(i) = self.code.builtins.find("", name)
-        {
-            let table = Arc::clone(&self.code.builtins);
-            let b = table.get(i);
-            if matches!(b.kind, Kind::Inference(_)) {
-                match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
-                    Err(message) => {
-                        self.mismatch(b, message, args, e.span);
-                    }
-                    Ok(order) => {
-                        for (p, j) in order.iter().enumerate() {
-                            let (Some(j), Some(arg)) = (j, b.args.get(p)) else { continue };
-                            match arg.ty {
-                                Type::Selection => {
-                                    self.choices(&args[*j].value, &Around::default());
-                                }
-                                _ => self.shown_query(&args[*j].value),
-                            }
-                        }
-                    }
-                }
+        let Some((i, args)) =
+            call(e).and_then(|(name, args)| Some((self.inference_name(name)?.0, args)))
+        else {
+            return self.shown_query(e);
+        };
+        let table = Arc::clone(&self.code.builtins);
+        let b = table.get(i);
+        let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
+            Ok(order) => order,
+            Err(message) => {
+                self.mismatch(b, message, args, e.span);
                 return;
             }
+        };
+        for (from, arg) in order.iter().zip(b.args.iter()) {
+            let Some(value) = from.map(|j| &args[j].value) else { continue };
+            match arg.ty {
+                Type::Selection => drop(self.choices(value, &Around::default())),
+                _ => self.shown_query(value),
+            }
         }
-        self.shown_query(e);
     }
 }
 
