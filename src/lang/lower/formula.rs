@@ -59,19 +59,25 @@ impl Lowerer<'_> {
     /// read go, and a function that only passes on a value is not needed.
     fn finished(&mut self, block: BlockId, given: Vec<Given>) -> FormulaKind {
         let (read, is_closed) = self.reads(block);
+        // A block behind it may be that of a computed key.
+        let is_last = self.code.blocks.len() == block as usize + 1;
         let b = &mut self.code.blocks[block as usize];
-        match b.result {
+        let param = |slot: Slot| match b.ops[slot as usize] {
+            Op::Param { index, .. } => Some(FormulaKind::Given(given[index as usize].clone())),
+            _ => None,
+        };
+        let simple = match b.result {
             Some(Operand::Const(i)) => {
-                self.code.blocks.truncate(block as usize);
-                return FormulaKind::Const(self.code.const_value(i).clone());
+                Some(FormulaKind::Const(self.code.consts[i as usize].clone()))
             }
-            Some(Operand::Local(slot)) => {
-                if let Op::Param { index, .. } = b.ops[slot as usize] {
-                    self.code.blocks.truncate(block as usize);
-                    return FormulaKind::Given(given[index as usize].clone());
-                }
+            Some(Operand::Local(slot)) => param(slot),
+            _ => None,
+        };
+        if let Some(simple) = simple {
+            if is_last {
+                self.code.blocks.pop();
             }
-            _ => {}
+            return simple;
         }
         let mut kept = Vec::new();
         for (slot, op) in (0..).zip(&mut b.ops) {
@@ -106,8 +112,13 @@ impl Lowerer<'_> {
             };
             block.ops.iter().for_each(|op| op.operands(&mut operand));
             block.result.into_iter().for_each(operand);
-            let reads_state = |op: &Op| matches!(op, Op::Probe(_) | Op::Call { .. });
-            is_closed &= !block.ops.iter().any(reads_state);
+            // Functions that it calls may read the state.
+            let opens = |op: &Op| match op {
+                Op::Probe(_) | Op::Call { .. } | Op::Mem { .. } => true,
+                Op::Map { .. } | Op::Fold { .. } => true,
+                _ => false,
+            };
+            is_closed &= !block.ops.iter().any(opens);
         }
         (read, is_closed)
     }
