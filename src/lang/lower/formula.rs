@@ -113,11 +113,8 @@ impl Lowerer<'_> {
             block.ops.iter().for_each(|op| op.operands(&mut operand));
             block.result.into_iter().for_each(operand);
             // Functions that it calls may read the state.
-            let opens = |op: &Op| match op {
-                Op::Probe(_) | Op::Call { .. } | Op::Mem { .. } => true,
-                Op::Map { .. } | Op::Fold { .. } => true,
-                _ => false,
-            };
+            let calls = |op: &Op| matches!(op, Op::Call { .. } | Op::Map { .. } | Op::Fold { .. });
+            let opens = |op: &Op| calls(op) || matches!(op, Op::Probe(_) | Op::Mem { .. });
             is_closed &= !block.ops.iter().any(opens);
         }
         (read, is_closed)
