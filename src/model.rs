@@ -25,12 +25,13 @@ use crate::infer::{
 };
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
-use crate::lang::lower::{Compiled, Export, Report};
+use crate::lang::lower::{Compiled, Export, Report, compile_plan};
+use crate::lang::plan::Plan;
 use crate::lang::reach::Reach;
 use crate::platform::clock;
 use crate::report::{ChainDraws, Memory, Quantity, quantities};
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::{ItemKind, KStmt};
+use crate::syntax::ast::ItemKind;
 use crate::syntax::parse;
 use crate::trace::{Draws, Limits, Trace};
 use std::sync::Arc;
@@ -171,9 +172,9 @@ impl Model {
     /// # Errors
     /// If no draw from the prior succeeds, so that the program's choices are unknown.
     #[doc(hidden)]
-    pub fn plan(&self) -> Result<(Arc<[KStmt]>, Option<String>), Error> {
+    pub fn plan(&self) -> Result<(Arc<Plan>, Option<String>), Error> {
         if let Some(p) = self.compiled.plans.first() {
-            return Ok((Arc::clone(&p.body), None));
+            return Ok((Arc::clone(p), None));
         }
         let drawn = |i| {
             let draws = Draws { key: StreamKey::new(0, 0, Purpose::START), step: i, substream: 0 };
@@ -193,7 +194,8 @@ impl Model {
             ItemKind::Infer { body, .. } => Some(body),
             _ => None,
         });
-        Ok((body.unwrap_or_default().into(), Some(text)))
+        let plan = compile_plan(Arc::clone(&self.code().builtins), &body.unwrap_or_default());
+        Ok((Arc::new(plan), Some(text)))
     }
 
     /// Runs chains and keeps their draws in memory. The draws depend on the seed, but not

@@ -4,9 +4,10 @@
 use super::draws::Sink;
 use super::init::draw_once;
 use super::parallel::in_parallel;
-use super::plan::{ChainError, ChainResult, Progress, RunOptions, run_chain};
+use super::plan::run_chain;
+use super::run::{ChainError, ChainResult, Progress, RunOptions};
 use crate::lang::code::Code;
-use crate::syntax::ast::KStmt;
+use crate::lang::plan::Plan;
 use crate::trace::Limits;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,7 +17,7 @@ use std::time::{Duration, Instant};
 /// chains than threads, each gets its part of what is left once the data are ready.
 pub fn run_chains(
     code: &Arc<Code>,
-    plan: &[KStmt],
+    plan: &Plan,
     options: &RunOptions,
     threads: usize,
     progress: &Progress,

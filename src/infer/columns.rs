@@ -5,6 +5,12 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
+/// The column of the log densities of the observed values, under the name that Stan
+/// programs and ArviZ use.
+pub const POINTWISE: &str = "log_lik";
+/// The most observed values for which log densities are recorded.
+pub const MOST_POINTS: usize = 1000;
+
 /// How many numbers a column holds in each draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Shape {

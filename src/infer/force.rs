@@ -1,8 +1,7 @@
 //! `force @a = v`: sets a choice at the start of a chain. Its prior score is kept, and
 //! kernels may change it.
 
-use super::calls::selection::fail;
-use super::plan::RunOptions;
+use super::calls::error::fail;
 use crate::lang::code::{Code, Force};
 use crate::lang::error::RunError;
 use crate::rng::{Purpose, StreamKey};
@@ -17,14 +16,10 @@ use std::sync::Arc;
 pub(crate) fn apply(
     code: &Arc<Code>,
     trace: &mut Trace,
-    options: &RunOptions,
-    chain: u32,
+    (seed, chain): (u64, u32),
 ) -> Result<(), Box<RunError>> {
-    let draws = Draws {
-        key: StreamKey::new(options.seed, chain, Purpose::START),
-        step: u64::MAX,
-        substream: 0,
-    };
+    let draws =
+        Draws { key: StreamKey::new(seed, chain, Purpose::START), step: u64::MAX, substream: 0 };
     put(&code.forces, trace, draws)
 }
 

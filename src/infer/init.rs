@@ -1,19 +1,13 @@
 //! Initial states: traces of positive probability, and an explanation when none is found.
 
-use super::calls::build::arguments;
-use super::calls::expr::{PlanEnv, evaluate};
-use super::calls::selection::fail;
 use super::kernel::StepContext;
 use super::kernels::ProgramKernel;
-use super::kernels::program_kernel::proposes;
-use super::plan::{ChainError, RunOptions, argument, call};
 use crate::lang::address::Address;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::{Expr, KStmt, KStmtKind};
 use crate::syntax::span::Span;
 use crate::trace::{Draws, Limits, Trace, TraceResult};
 use std::collections::HashMap;
@@ -192,80 +186,4 @@ fn explain(t: &Trace) -> NoStart {
         terms: zero.collect(),
         drawn: t.choices().into_iter().filter_map(single).take(6).collect(),
     }
-}
-
-/// Reads the `init` statement of a plan: how to start, and the kernel it proposes from
-/// (`from = …`), if any. Under a time limit it gets a quarter of that, as much as it
-/// leaves to warm-up.
-pub(crate) fn start_of(
-    code: &Arc<Code>,
-    plan: &[KStmt],
-    options: &RunOptions,
-) -> Result<(Start, Option<ProgramKernel>), ChainError> {
-    let init = plan.iter().find_map(|s| match &s.kind {
-        KStmtKind::Expr(e) => {
-            call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args))
-        }
-        _ => None,
-    });
-    let Some((e, args)) = init else { return Ok((Start::default(), None)) };
-    let wrong = || ChainError::Run(fail(e.span, "init takes prior() or best_of(n)".into()));
-    let [how] = args else { return Err(wrong()) };
-    let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
-    let mut count = |e: &Expr| -> Result<u64, ChainError> {
-        let (draws, started) = (Draws::default(), Instant::now());
-        let mut env = PlanEnv {
-            code,
-            trace: &mut trace,
-            variables: &[],
-            draws,
-            started,
-            steps: 0,
-            moved: None,
-        };
-        match evaluate(e, &mut env)? {
-            Value::Num(x) if x >= 1.0 => Ok(x as u64),
-            v => Err(ChainError::Run(fail(e.span, format!("expected a number of draws, got {v}")))),
-        }
-    };
-    match call(&how.value) {
-        Some(("prior", [])) => Ok((Start::default(), None)),
-        Some(("best_of", args)) => {
-            let draws = argument(args, 0, "n").map_or(Err(wrong()), &mut count)?;
-            let keep = argument(args, 1, "keep").map_or(Ok(1), &mut count)?;
-            let from = argument(args, 2, "from").map(|e| own(code, e, options)).transpose()?;
-            Ok((
-                Start {
-                    draws,
-                    keep: keep.min(draws) as usize,
-                    within: options.time.map(|t| t / 4),
-                },
-                from,
-            ))
-        }
-        _ => Err(wrong()),
-    }
-}
-
-/// The declared kernel in the `from` argument of `best_of`.
-fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<ProgramKernel, ChainError> {
-    let wrong = || {
-        let mut wrong = fail(e.span, "`from` takes a kernel declared in the program".into());
-        wrong.hint =
-            Some("kernel near() { propose @x ~ normal(2, 0.1); } infer { init(best_of(20, from = near())); … }".into());
-        ChainError::Run(wrong)
-    };
-    let (name, args) = call(e).ok_or_else(wrong)?;
-    let declared = code
-        .kernels
-        .iter()
-        .find(|k| &*k.name.node == name && proposes(&k.body))
-        .ok_or_else(wrong)?;
-    let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
-    let started = Instant::now();
-    let (draws, variables) = (Draws::default(), &[]);
-    let mut env =
-        PlanEnv { code, trace: &mut trace, variables, draws, started, steps: 0, moved: None };
-    let arguments = arguments(declared, args, e.span, &mut env)?;
-    Ok(ProgramKernel::new(Arc::clone(code), declared.clone(), arguments, started))
 }

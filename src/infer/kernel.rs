@@ -3,6 +3,7 @@
 use super::state::StateError;
 use crate::lang::error::RunError;
 use crate::lang::key::mix;
+pub use crate::lang::plan::Pick;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::trace::{Draws, Selection, Selector, Target, Trace, TraceResult, Weight};
 use serde::{Deserialize, Serialize};
@@ -163,20 +164,6 @@ pub(crate) fn inner_step(
         all.add(kernel.step(trace, &StepContext { member, ..at.within(member as u64) })?);
     }
     Ok(all)
-}
-
-/// Which of the selected choices a step moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pick {
-    /// All of them.
-    #[default]
-    All,
-    /// One of them, chosen uniformly at random (`one(sel)`).
-    One,
-    /// Each in turn, in the order of the program (`each(sel)`): a sweep of as many steps.
-    /// Moves that would change the members of the selection are rejected, so that the
-    /// order does not depend on the outcomes of the steps.
-    Each,
 }
 
 /// The choices that a kernel works on: a selection, as a whole or one member at a time.

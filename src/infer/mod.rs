@@ -23,8 +23,10 @@ mod population;
 pub mod predictive;
 mod record;
 mod resampling;
+mod run;
 mod sites;
 mod state;
+mod stats;
 mod structure;
 
 use crate::platform::threads as parallel;
@@ -35,7 +37,7 @@ pub use calls::explained::{Selecting, selecting};
 pub use calls::host_kernel::KernelCall;
 pub(crate) use calls::host_kernel::KernelMaker;
 #[doc(hidden)]
-pub use calls::selection::selected;
+pub use calls::selection::{not_a_selection, selected};
 #[doc(hidden)]
 pub use chains::run_chains;
 #[doc(hidden)]
@@ -60,9 +62,10 @@ pub use kernels::{
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
 #[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
+pub use plan::checkpoint::Checkpoint;
 #[doc(hidden)]
 pub use plan::run_from;
-pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions};
+pub use run::{ChainError, ChainResult, Progress, RunOptions};
 pub use state::StateError;
 pub(crate) use state::{pack, unpack};
 #[doc(hidden)]

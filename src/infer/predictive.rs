@@ -10,7 +10,7 @@
 use super::calibration::simulate::{replicating, state};
 use super::callback::Callback;
 use super::parallel::in_parallel;
-use super::plan::ChainError;
+use super::run::ChainError;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;

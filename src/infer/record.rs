@@ -1,10 +1,10 @@
 //! Records draws: determines the columns, and flattens values into them.
 
-use super::draws::{Column, Shape, merged};
-use crate::lang::code::Code;
+use super::columns::{Column, MOST_POINTS, POINTWISE, Shape, merged};
+use crate::lang::code::{Code, Operand};
 use crate::lang::error::RunError;
+use crate::lang::plan::{Plan, StepKind};
 use crate::lang::value::Value;
-use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind};
 use crate::trace::{Draws, Trace};
 
 /// The columns recorded with every draw.
@@ -17,16 +17,12 @@ pub(crate) struct Recorder {
     observed: Option<Vec<(u64, usize)>>,
 }
 
-/// The column of the log densities of the observed values, under the name that Stan
-/// programs and ArviZ use.
-pub const POINTWISE: &str = "log_lik";
-/// The most observed values for which log densities are recorded.
-pub const MOST_POINTS: usize = 1000;
-
 impl Recorder {
     /// A recorder for a plan.
-    pub fn new(_code: &Code, plan: &[KStmt]) -> Self {
-        Recorder { collects: plan.iter().any(collects), columns: Vec::new(), observed: None }
+    pub fn new(plan: &Plan) -> Self {
+        let is = |s: &StepKind| matches!(s, StepKind::Collect(_));
+        let collects = plan.steps.iter().any(|s| s.any(&is));
+        Recorder { collects, columns: Vec::new(), observed: None }
     }
 
     /// Whether the plan says what to collect.
@@ -50,23 +46,15 @@ impl Recorder {
         &self,
         code: &Code,
         trace: &mut Trace,
-        exprs: Option<&[Expr]>,
+        collected: Option<&[(String, Operand)]>,
         draws: Draws,
     ) -> Result<Vec<(String, Value)>, Box<RunError>> {
         let mut names = Vec::new();
         let mut operands = Vec::new();
-        match exprs {
-            Some(exprs) => {
-                for e in exprs {
-                    let Some(operand) = code.queries.get(&e.span) else {
-                        return Err(super::calls::selection::fail(
-                            e.span,
-                            "this cannot be collected".into(),
-                        ));
-                    };
-                    names.push(column_name(e));
-                    operands.push(*operand);
-                }
+        match collected {
+            Some(collected) => {
+                names.extend(collected.iter().map(|(name, _)| name.clone()));
+                operands.extend(collected.iter().map(|(_, operand)| *operand));
             }
             None => {
                 names.extend(code.assumed.iter().map(|(n, _)| n.to_string()));
@@ -195,25 +183,5 @@ fn flatten(v: &Value, out: &mut Vec<f64>) {
         Value::List(xs) => xs.iter().for_each(|x| flatten(x, out)),
         Value::Record(r) => r.values().for_each(|x| flatten(x, out)),
         _ => out.push(f64::NAN),
-    }
-}
-
-/// The name of a collected expression: a call without arguments loses its parentheses
-/// (`log_joint()`), anything else is as written.
-fn column_name(e: &Expr) -> String {
-    match &e.kind {
-        ExprKind::Call { callee, args } if args.is_empty() => column_name(callee),
-        _ => crate::syntax::print_expr(e).replace('.', "/"),
-    }
-}
-
-fn collects(s: &KStmt) -> bool {
-    match &s.kind {
-        KStmtKind::Collect(_) => true,
-        KStmtKind::Warmup { body, .. }
-        | KStmtKind::Repeat { body, .. }
-        | KStmtKind::Every { body, .. }
-        | KStmtKind::For { body, .. } => body.iter().any(collects),
-        _ => false,
     }
 }

@@ -1,8 +1,8 @@
 //! Counts of the proposals of single-site kernels, by address. Off by default
 //! ([`super::RunOptions::sites`]).
 
-use super::draws::SiteStats;
 use super::kernel::Outcome;
+use super::stats::SiteStats;
 use crate::trace::Trace;
 use rustc_hash::FxHashMap;
 

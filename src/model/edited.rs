@@ -4,7 +4,8 @@
 use super::program::Files;
 use super::{Error, Model, Program};
 use crate::diag::IntoDiagnostic;
-use crate::syntax::ast::{Item, ItemKind, KStmt, Stmt, StmtKind};
+use crate::lang::plan::{DeclaredKernel, Plan};
+use crate::syntax::ast::{Item, ItemKind, Stmt, StmtKind};
 use crate::syntax::span::FileId;
 use crate::syntax::{SyntaxError, parse, parse_expr};
 use std::sync::Arc;
@@ -113,16 +114,17 @@ impl Model {
     }
 
     /// Returns the `infer` block with this name.
-    pub fn plan_named(&self, name: &str) -> Option<Arc<[KStmt]>> {
-        self.compiled
-            .plans
-            .iter()
-            .find(|p| p.name.as_deref() == Some(name))
-            .map(|p| Arc::clone(&p.body))
+    pub fn plan_named(&self, name: &str) -> Option<Arc<Plan>> {
+        self.compiled.plans.iter().find(|p| p.name.as_deref() == Some(name)).cloned()
     }
 
     /// Returns the last `infer` block.
-    pub fn last_plan(&self) -> Option<Arc<[KStmt]>> {
-        self.compiled.plans.last().map(|p| Arc::clone(&p.body))
+    pub fn last_plan(&self) -> Option<Arc<Plan>> {
+        self.compiled.plans.last().cloned()
+    }
+
+    /// Returns the kernels that the program declares.
+    pub fn kernels(&self) -> &[DeclaredKernel] {
+        &self.compiled.kernels
     }
 }

@@ -63,9 +63,13 @@ impl Session {
             "set" if is_first => self.complete_choice(before, params()),
             "flip" | "trace" => self.complete_choice(before, self.selections()),
             "infer" if !before.contains(['(', '{']) => {
-                let kernels =
-                    self.model.code().builtins.iter().filter(|b| matches!(b.kind, Kind::Inference));
-                let own = self.model.code().kernels.iter().map(|k| k.name.node.to_string());
+                let kernels = self
+                    .model
+                    .code()
+                    .builtins
+                    .iter()
+                    .filter(|b| matches!(b.kind, Kind::Inference(_)));
+                let own = self.model.kernels().iter().map(|k| k.name.node.to_string());
                 let plans = self.model.plan_names().map(str::to_owned).collect::<Vec<_>>();
                 found(start, word, kernels.map(|b| b.name.to_string()).chain(own).chain(plans))
             }
@@ -178,8 +182,8 @@ impl Session {
         if let Some(params) = functions {
             return params.iter().map(|p| written(p)).collect();
         }
-        if let Some(k) = code.kernels.iter().find(|k| *k.name.node == *name) {
-            return k.params.iter().map(|p| written(&p.name.node)).collect();
+        if let Some(k) = self.model.kernels().iter().find(|k| *k.name.node == *name) {
+            return k.params.iter().map(|(p, _)| written(p)).collect();
         }
         let builtin = code.builtins.iter().find(|b| b.full_name() == name);
         builtin.map(|b| b.args.iter().map(|a| written(&a.name)).collect()).unwrap_or_default()

@@ -4,11 +4,12 @@ use super::reply::{Reply, Trouble};
 use super::shown;
 use super::state::{INPUT, Session};
 use crate::diag::{SourceMap, nearest};
-use crate::infer::selected;
+use crate::infer::{not_a_selection, selected};
+use crate::lang::plan::{Formula, Selection};
 use crate::model::Error;
 use crate::report::number;
 use crate::report::table::aligned;
-use crate::syntax::parse_expr;
+use crate::syntax::{parse_expr, print_expr};
 use crate::trace::{Address, Selector, Target};
 use std::borrow::Cow;
 
@@ -63,8 +64,17 @@ impl Session {
                 return Err(wrong(all, sources));
             }
         };
-        let draws = self.looks();
-        let selector = selected(&expr, &mut self.trace, draws)
+        let mut failed = None;
+        let selection = Selection::read(&expr, &mut |key| {
+            let value = self.value_of(&print_expr(key)).map_err(|e| failed = Some(e));
+            Formula::constant(value.unwrap_or_default(), key.span)
+        });
+        if let Some(trouble) = failed {
+            return Err(trouble);
+        }
+        let selector = selection
+            .map_err(not_a_selection)
+            .and_then(|s| selected(&s, &mut self.trace))
             .map_err(|e| wrong(vec![crate::diag::IntoDiagnostic::into_diagnostic(*e)], sources))?;
         let found = self.by_address(&selector);
         if !found.is_empty() {

@@ -11,10 +11,10 @@ use super::reply::{Reply, Trouble};
 use super::state::{INPUT, Session};
 use crate::bank::BankFiles;
 use crate::infer::{Progress, RunOptions, run_from};
+use crate::lang::plan::Plan;
 use crate::model::{Model, Program};
 use crate::platform::clock::Instant;
 use crate::report::{ChainDraws, number, seconds, table};
-use crate::syntax::ast::KStmt;
 use crate::trace::{Limits, Stop};
 use std::path::Path;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ const TIMES: u64 = 1000;
 struct Job {
     what: String,
     model: Arc<Model>,
-    plan: Arc<[KStmt]>,
+    plan: Arc<Plan>,
     steps: Option<u64>,
     /// A note to show first.
     note: String,
@@ -96,7 +96,7 @@ impl Session {
         Ok(Job { what, model, plan, steps, note: String::new() })
     }
 
-    fn compiled(&self, block: &str) -> Result<(Arc<[KStmt]>, Arc<Model>), Trouble> {
+    fn compiled(&self, block: &str) -> Result<(Arc<Plan>, Arc<Model>), Trouble> {
         let program: Program = self.program.and(INPUT, block)?;
         let model = program.compile()?;
         let plan =

@@ -135,6 +135,13 @@ pub struct Body {
     pub span: Span,
 }
 
+impl Body {
+    /// Whether it is an expression alone.
+    pub fn is_expression(&self) -> bool {
+        self.stmts.is_empty() && self.result.is_some()
+    }
+}
+
 /// A model statement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stmt {

@@ -6,6 +6,7 @@
 
 use crate::dist::Datum;
 use crate::lang::builtins::PreviousEvaluation;
+use crate::lang::error::RunError;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
 use crate::num::ExactSum;
@@ -263,6 +264,8 @@ pub(crate) enum Arguments {
     Fold,
     /// The values themselves (`mem`).
     Values(Arc<[Value]>),
+    /// The values, or why one is missing, which matters only if it is read.
+    Supplied(Arc<[Result<Value, Box<RunError>>]>),
 }
 
 /// One instance of a block.

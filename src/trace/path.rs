@@ -127,6 +127,8 @@ impl Graph {
             let here = &self.frames[f as usize];
             match code.blocks[here.block as usize].kind {
                 BlockKind::Root => break,
+                // A function that a plan calls.
+                _ if here.owner == NONE => break,
                 BlockKind::Function { .. } => {
                     let (Op::Call { site, .. }
                     | Op::Map { site, .. }

@@ -2,10 +2,11 @@
 //! surrogates of observations. Choices drawn for a query are discarded afterwards.
 
 use super::graph::Graph;
-use super::node::Deps;
+use super::node::{Arguments, Deps, Frame, FrameId};
 use super::{Address, Draws, Trace, TraceResult};
-use crate::lang::code::{Code, Operand};
+use crate::lang::code::{BlockId, Code, Operand};
 use crate::lang::value::Value;
+use std::sync::Arc;
 
 impl Trace {
     /// Returns the values of top-level expressions. Choices that they need and no
@@ -16,7 +17,26 @@ impl Trace {
     /// If their evaluation fails.
     #[doc(hidden)]
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
-        self.asked(operands, draws, |_, values| Ok(values))
+        self.asked(|graph, code| graph.query(code, 0, operands), draws, |_, values| Ok(values))
+    }
+
+    /// Evaluates a function of the program, which sees the present state, with these
+    /// arguments. One that is missing is an error only if the function reads it. Choices
+    /// that the state lacks are drawn as by [`Trace::query`].
+    pub(crate) fn call(
+        &mut self,
+        function: BlockId,
+        args: Arc<[TraceResult<Value>]>,
+        draws: Draws,
+    ) -> TraceResult<Value> {
+        let args = Arguments::Supplied(args);
+        let root = self.graph.frames[0].clone();
+        let frame = Frame { block: function, parent: 0, depth: 1, args, ..root };
+        let evaluate = |graph: &mut Graph, code: &Code| {
+            let frame = graph.make_frame(code, frame)?;
+            graph.query(code, frame, code.blocks[function as usize].result.as_slice())
+        };
+        self.asked(evaluate, draws, |_, mut values| Ok(values.pop().unwrap_or_default()))
     }
 
     /// Like [`Trace::query`], and passes to `look` the trace with the choices that were
@@ -31,16 +51,20 @@ impl Trace {
         draws: Draws,
         look: impl FnOnce(&Trace, Vec<Value>) -> T,
     ) -> TraceResult<T> {
-        self.asked(operands, draws, |trace, values| {
-            trace.graph.update_selections(&trace.code)?;
-            Ok(look(trace, values))
-        })
+        self.asked(
+            |graph, code| graph.query(code, 0, operands),
+            draws,
+            |trace, values| {
+                trace.graph.update_selections(&trace.code)?;
+                Ok(look(trace, values))
+            },
+        )
     }
 
     /// Evaluates expressions, passes them to `used`, and undoes the evaluation.
     fn asked<T>(
         &mut self,
-        operands: &[Operand],
+        evaluate: impl FnOnce(&mut Graph, &Code) -> TraceResult<Vec<Value>>,
         draws: Draws,
         used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
     ) -> TraceResult<T> {
@@ -48,7 +72,7 @@ impl Trace {
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.before = Some(before.clone());
-        let result = self.graph.query(&self.code, operands);
+        let result = evaluate(&mut self.graph, &self.code);
         self.graph.before = None;
         let result = result.and_then(|values| used(self, values));
         self.graph.rollback(&self.code, before);
@@ -88,18 +112,23 @@ impl Trace {
 }
 
 impl Graph {
-    pub(super) fn query(&mut self, code: &Code, operands: &[Operand]) -> TraceResult<Vec<Value>> {
+    pub(super) fn query(
+        &mut self,
+        code: &Code,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> TraceResult<Vec<Value>> {
         let mut values = Vec::with_capacity(operands.len());
         for o in operands {
-            if let Some(n) = self.resolve(0, *o) {
+            if let Some(n) = self.resolve(frame, *o) {
                 self.evaluate(code, n)?;
             }
-            if let Value::Container(r) = self.value(code, 0, *o) {
+            if let Value::Container(r) = self.value(code, frame, *o) {
                 let gather = r.node + 1;
                 self.evaluate(code, gather)?;
             }
             let mut deps = Deps::new();
-            values.push(self.plain(code, 0, *o, &mut deps).clone());
+            values.push(self.plain(code, frame, *o, &mut deps).clone());
         }
         Ok(values)
     }

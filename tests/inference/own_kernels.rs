@@ -19,6 +19,20 @@ fn proposals_of_the_program_are_paid_for() {
     assert_mean("own kernel, variance", &squares, 0.2, 0.03);
 }
 
+/// The same for proposals that read a parameter or call a function of the program.
+#[test]
+fn proposals_of_the_program_read_its_names() {
+    for proposal in ["normal(0.7 * value(@x) + 1, s)", "normal(pulled(value(@x)), s)"] {
+        let text = format!(
+            "param s = 0.8; fn pulled(x) {{ 0.7 * x + 1 }}
+             assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
+             kernel pull() {{ propose @x ~ {proposal}; }}
+             infer {{ warmup 1000 {{ pull(); }} repeat 60000 {{ pull(); collect x; }} }}"
+        );
+        assert_mean(proposal, &run(&text, 1, 2)["x"], 1.6, 0.06);
+    }
+}
+
 /// The same for a choice with which others appear and vanish, and for several choices at
 /// computed addresses.
 #[test]

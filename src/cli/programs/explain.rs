@@ -72,9 +72,8 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
             group.alone[1] += site.accepted;
         }
     }
-    let code = model.code().clone();
     let plan = model.plan().map(|(plan, _)| plan).unwrap_or_default();
-    for kernel in selecting(&code, &plan, &mut trace) {
+    for kernel in selecting(&plan, &mut trace) {
         let selection = trace.select(&kernel.selector);
         let chosen: HashSet<Target> = trace.targets(selection).iter().copied().collect();
         for (group, targets) in groups.values_mut() {

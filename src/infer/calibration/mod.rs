@@ -20,7 +20,7 @@ pub use sampler::{KernelSampler, PlanSampler, Sampler};
 pub use sbc::{RANKS, Sbc, SbcRow, sbc};
 
 use super::parallel::in_parallel;
-use super::plan::ChainError;
+use super::run::ChainError;
 use crate::trace::Limits;
 
 /// The probability that a correct sampler fails a check, over all quantities together

@@ -3,11 +3,12 @@
 use crate::infer::callback::Callback;
 use crate::infer::draws::Discard;
 use crate::infer::kernel::{Kernel, StepContext};
-use crate::infer::plan::{ChainError, Progress, RunOptions, run_chain};
+use crate::infer::plan::run_chain;
+use crate::infer::run::{ChainError, Progress, RunOptions};
 use crate::infer::{Start, starts};
 use crate::lang::code::Code;
+use crate::lang::plan::Plan;
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::KStmt;
 use crate::trace::{Draws, Limits};
 use std::sync::Arc;
 
@@ -30,8 +31,8 @@ pub trait Sampler: Sync {
 
 /// A sampler that runs the plan of a program.
 pub struct PlanSampler<'a> {
-    /// The statements of its `infer` block.
-    pub plan: &'a [KStmt],
+    /// Its `infer` block.
+    pub plan: &'a Plan,
     /// Seed, warm-up and limits; steps and callback are set by the check.
     pub options: RunOptions,
     /// Counts steps, and ends chains early when cancelled.

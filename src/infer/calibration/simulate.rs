@@ -6,7 +6,7 @@
 //! observations whose existence is random, or observed values that depend on choices.
 
 use super::{CalibrationError, Settings};
-use crate::infer::plan::ChainError;
+use crate::infer::run::ChainError;
 use crate::infer::{StartError, attempts};
 use crate::lang::code::{Code, Observed};
 use crate::lang::value::Value;
@@ -65,7 +65,7 @@ fn with_data(
     index: u32,
 ) -> Result<Simulated, CalibrationError> {
     let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
-    if !trace.code().freezes.is_empty() {
+    if trace.code().has_freezes {
         return refuse(
             "`freeze` fixes choices at the start of each chain, so their posterior cannot be checked".into(),
         );

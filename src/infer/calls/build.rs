@@ -1,21 +1,21 @@
-//! Builds kernels from their calls in inference blocks.
+//! Builds kernels from their calls in plans.
 
-use crate::infer::calls::expr::{PlanEnv, evaluate};
-use crate::infer::calls::host_kernel::build_host_kernel;
-use crate::infer::calls::selection::{fail, scope, selector};
-use crate::infer::kernel::{self, Kernel};
+use crate::infer::calls::error::{fail, fault};
+use crate::infer::calls::formula::{PlanEnv, evaluate};
+use crate::infer::calls::host_kernel::{KernelCall as HostCall, KernelMaker};
+use crate::infer::calls::selection::{scope, selector};
+use crate::infer::kernel::{Kernel, SiteSelection};
 use crate::infer::kernels::{
     Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Modes, Nuts, Optimize,
     ProgramKernel, Slice, Smc, Temper,
 };
+use crate::infer::plain::Plain;
 use crate::infer::plan::banks::neighbours;
-use crate::infer::plan::{RunOptions, argument, call};
-use crate::lang::builtins::HostItem;
-use crate::lang::error::RunError;
+use crate::infer::run::RunOptions;
+use crate::lang::builtins::{Args as Values, Builtin, HostItem, Inference, Kind};
+use crate::lang::error::{Fault, RunError};
+use crate::lang::plan::{Argument, Callee, DeclaredKernel, Formula, KernelCall};
 use crate::lang::value::Value;
-use crate::syntax::ast::{Address, Arg, Expr, ExprKind, KernelDecl, Key, Param};
-use crate::syntax::print_expr;
-use crate::syntax::span::Span;
 use crate::trace::Selector;
 use std::sync::Arc;
 
@@ -26,141 +26,127 @@ pub(in crate::infer) struct Built {
     pub signature: String,
 }
 
-/// Builds the kernel of a call. Choices that the program froze are excluded.
+/// What all kernels of a chain are built with.
+#[derive(Clone, Copy)]
+pub(in crate::infer) struct Setting<'a> {
+    /// The kernels that the program declares.
+    pub kernels: &'a Arc<[DeclaredKernel]>,
+    /// The choices that the program froze, which kernels leave out.
+    pub frozen: &'a Selector,
+    pub options: &'a RunOptions,
+}
+
+/// Builds the kernel of a call.
 ///
 /// # Errors
 /// What is wrong with the call, with its position.
 pub(in crate::infer) fn build(
-    e: &Expr,
-    frozen: &Selector,
-    options: &RunOptions,
+    call: &KernelCall,
+    setting: Setting,
     env: &mut PlanEnv,
 ) -> Result<Built, Box<RunError>> {
-    let Some((name, args)) = call(e) else {
-        return Err(fail(e.span, "expected a kernel, such as mh(one(@**))".into()));
+    let i = match call.kernel {
+        Callee::Builtin(i) => i,
+        Callee::Declared(i) => {
+            let k = &setting.kernels[i];
+            let arguments = arguments(k, call, env)?;
+            let signature = format!("{}{arguments:?}", k.name.node);
+            let kernels = Arc::clone(setting.kernels);
+            let kernel = Box::new(ProgramKernel::new(kernels, i, arguments, env.started));
+            return Ok(Built { kernel, signature });
+        }
     };
-    if let Some(k) = env.code.kernels.iter().find(|k| &*k.name.node == name) {
-        let arguments = arguments(k, args, e.span, env)?;
-        let signature = format!("{name}{arguments:?}");
-        let kernel = ProgramKernel::new(Arc::clone(env.code), k.clone(), arguments, env.started);
-        return Ok(Built { kernel: Box::new(kernel), signature });
-    }
-    let builtins = Arc::clone(&env.code.builtins);
-    let known = builtins.find("", name).map(|i| builtins.get(i));
-    if let Some(b) = known
-        && let Some(HostItem::Kernel(maker)) = &b.host
-    {
-        return build_host_kernel(e, (b, maker), args, frozen, options, env);
-    }
-    if known.is_some_and(|b| b.is_planned()) {
-        let mut e =
-            fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
-        e.hint = Some(format!("available kernels: {AVAILABLE}"));
-        return Err(e);
-    }
-    let Some(first) = args.first() else {
-        return Err(fail(e.span, format!("`{name}` needs a selection of choices, e.g. @**")));
+    let table = Arc::clone(&env.trace.code().builtins);
+    let builtin = table.get(i);
+    let mut a = Args { call, builtin, setting, env };
+    let (span, text) = (call.span, &call.text);
+    let built = |kernel, signature| Ok(Built { kernel, signature });
+    let what = match builtin.kind {
+        Kind::Inference(what) => what,
+        _ => return Err(a.not_a_kernel()),
     };
-    if name == "temper" {
-        let levels = whole(argument(args, 1, "levels"), "levels", 6, 2, 1000, env)?;
-        let hottest = positive(argument(args, 2, "hottest"), name, "hottest", env)?.unwrap_or(0.01);
-        let mut inner = Vec::with_capacity(levels as usize);
-        for _ in 0..levels {
-            inner.push(build(&first.value, frozen, options, env)?);
+    match what {
+        Inference::Host => return build_host_kernel(call, builtin, setting, a.env),
+        Inference::Planned => {
+            let message =
+                format!("the kernel `{}` is not available yet in this version", builtin.name);
+            let mut e = fail(span, message);
+            e.hint = Some(format!("available kernels: {AVAILABLE}"));
+            return Err(e);
         }
-        let signature = format!("temper({}, {levels}, {hottest})", inner[0].signature);
-        let kernel = Temper::new(inner.into_iter().map(|b| b.kernel).collect(), hottest.min(1.0));
-        return Ok(Built { kernel: Box::new(kernel), signature });
+        Inference::Temper => {
+            let levels = a.whole(1, 6, 2, 1000)?;
+            let hottest = a.positive(2)?.unwrap_or(0.01);
+            let inner = (0..levels).map(|_| a.inner()).collect::<Result<Vec<_>, _>>()?;
+            let signature = format!("temper({}, {levels}, {hottest})", inner[0].signature);
+            let inner = inner.into_iter().map(|b| b.kernel).collect();
+            return built(Box::new(Temper::new(inner, hottest.min(1.0))), signature);
+        }
+        Inference::Smc => {
+            let inner = a.inner()?;
+            let particles = a.whole(1, 100, 2, 1_000_000)?;
+            let signature = format!("smc({}, {particles})", inner.signature);
+            let frozen = setting.frozen.clone();
+            return built(
+                Box::new(Smc::new(inner.kernel, particles as usize, frozen, span)),
+                signature,
+            );
+        }
+        Inference::Delayed => {
+            let inner = a.inner()?;
+            let at = a.selector(1)?;
+            let signature = format!("delayed({}, {at:?})", inner.signature);
+            return built(Box::new(Delayed::new(inner.kernel, at, span)), signature);
+        }
+        Inference::Abc => {
+            let inner = a.inner()?;
+            let eps = a.positive(1)?.unwrap_or(f64::INFINITY);
+            if a.value(2).is_none() {
+                let signature = format!("abc({}, {eps})", inner.signature);
+                return built(Box::new(Abc::new(inner.kernel, eps, span)), signature);
+            }
+            let (particles, moves) = (a.whole(2, 100, 2, 1_000_000)?, a.whole(3, 1, 1, 10_000)?);
+            let signature = format!("abc({}, {eps}, {particles}, {moves})", inner.signature);
+            let (size, frozen) = ((particles as usize, moves), setting.frozen.clone());
+            return built(Box::new(AbcSmc::new(inner.kernel, eps, size, frozen, span)), signature);
+        }
+        _ => {}
     }
-    if name == "smc" {
-        let inner = build(&first.value, frozen, options, env)?;
-        let particles = whole(argument(args, 1, "particles"), "particles", 100, 2, 1_000_000, env)?;
-        let signature = format!("smc({}, {particles})", inner.signature);
-        let kernel = Smc::new(inner.kernel, particles as usize, frozen.clone(), e.span);
-        return Ok(Built { kernel: Box::new(kernel), signature });
-    }
-    if name == "delayed" {
-        let inner = build(&first.value, frozen, options, env)?;
-        let at = argument(args, 1, "at")
-            .ok_or_else(|| fail(e.span, "delayed needs an observation, given as `at`".into()))?;
-        let observations = selector(at, env)?;
-        let signature = format!("delayed({}, {observations:?})", inner.signature);
-        let kernel = Delayed::new(inner.kernel, observations, e.span);
-        return Ok(Built { kernel: Box::new(kernel), signature });
-    }
-    if name == "abc" {
-        let inner = build(&first.value, frozen, options, env)?;
-        let eps = positive(argument(args, 1, "eps"), name, "eps", env)?;
-        let eps = eps.ok_or_else(|| {
-            fail(e.span, "abc needs the tolerance `eps`, the largest accepted distance".into())
-        })?;
-        let Some(particles) = argument(args, 2, "particles") else {
-            let signature = format!("abc({}, {eps})", inner.signature);
-            return Ok(Built { kernel: Box::new(Abc::new(inner.kernel, eps, e.span)), signature });
-        };
-        let particles = whole(Some(particles), "particles", 100, 2, 1_000_000, env)?;
-        let moves = whole(argument(args, 3, "moves"), "moves", 1, 1, 10_000, env)?;
-        let signature = format!("abc({}, {eps}, {particles}, {moves})", inner.signature);
-        let kernel =
-            AbcSmc::new(inner.kernel, eps, (particles as usize, moves), frozen.clone(), e.span);
-        return Ok(Built { kernel: Box::new(kernel), signature });
-    }
-    let mut scope = scope(&first.value, env)?;
-    scope.selector = without(scope.selector, frozen);
-    // The printed call identifies the arguments, unless it contains names.
-    let given: Vec<Value> = match is_constant(e) {
-        true => Vec::new(),
-        false => args[1..].iter().filter_map(|a| evaluate(&a.value, env).ok()).collect(),
+    let scope = a.scope(0)?.ok_or_else(|| a.not_a_kernel())?;
+    let value = |arg: &Argument| match arg {
+        Argument::Value(f) => evaluate(f, a.env).ok(),
+        _ => None,
     };
-    let signature = format!("{} {scope:?} {given:?}", print_expr(e));
-    let kernel: Box<dyn Kernel> = match name {
-        "mh" => Box::new(Mh::new(scope)),
-        "block" => Box::new(Block::new(scope)),
-        "gibbs" => Box::new(Gibbs::new(scope)),
-        "elliptical" => Box::new(Elliptical::new(scope)),
-        "hmc" => {
-            let steps = whole(argument(args, 1, "steps"), "steps", 10, 1, 10_000, env)?;
-            Box::new(Hmc::new(scope, steps, None).summing_out(marginal(args, 2, frozen, env)?))
+    let given: Vec<Value> = call.args.iter().filter_map(value).collect();
+    let signature = format!("{text} {scope:?} {given:?}");
+    let kernel: Box<dyn Kernel> = match what {
+        Inference::Mh => Box::new(Mh::new(scope)),
+        Inference::Block => Box::new(Block::new(scope)),
+        Inference::Gibbs => Box::new(Gibbs::new(scope)),
+        Inference::Elliptical => Box::new(Elliptical::new(scope)),
+        Inference::Hmc => {
+            let steps = a.whole(1, 10, 1, 10_000)?;
+            Box::new(Hmc::new(scope, steps, None).summing_out(a.marginal(2)?))
         }
-        "mala" => Box::new(Hmc::new(scope, 1, None).summing_out(marginal(args, 1, frozen, env)?)),
-        "nuts" => {
-            let depth = whole(argument(args, 1, "max_depth"), "max_depth", 10, 1, 20, env)?;
-            Box::new(Nuts::new(scope, depth).summing_out(marginal(args, 2, frozen, env)?))
+        Inference::Mala => Box::new(Hmc::new(scope, 1, None).summing_out(a.marginal(1)?)),
+        Inference::Nuts => {
+            let depth = a.whole(1, 10, 1, 20)?;
+            Box::new(Nuts::new(scope, depth).summing_out(a.marginal(2)?))
         }
-        "knn" => Box::new(Knn::new(scope, neighbours(e, args, options, env)?)),
-        "drift" => {
-            Box::new(Drift::new(scope, positive(argument(args, 1, "scale"), name, "scale", env)?))
+        Inference::Knn => Box::new(Knn::new(scope, neighbours(call, setting.options, a.env)?)),
+        Inference::Drift => Box::new(Drift::new(scope, a.positive(1)?)),
+        Inference::Slice => Box::new(Slice::new(scope, a.positive(1)?, a.truth(2)?)),
+        Inference::Optimize => Box::new(Optimize::new(scope, a.whole(1, 100, 1, 1_000_000)?)),
+        Inference::Modes => {
+            let tries = a.whole(1, 200, 1, 1_000_000)?;
+            let keep = a.whole(2, 16, 1, 1000)?;
+            let steps = a.whole(3, 60, 1, 1_000_000)?;
+            let modes = Modes::new(scope, tries, keep, steps).climbing_first(a.scope(4)?);
+            Box::new(modes.by_surrogates_of(a.selector(5)?))
         }
-        "slice" => {
-            let width = positive(argument(args, 1, "width"), name, "width", env)?;
-            Box::new(Slice::new(
-                scope,
-                width,
-                truth(argument(args, 2, "doubling"), "doubling", env)?,
-            ))
-        }
-        "optimize" => Box::new(Optimize::new(
-            scope,
-            whole(argument(args, 1, "steps"), "steps", 100, 1, 1_000_000, env)?,
-        )),
-        "modes" => {
-            let tries = whole(argument(args, 1, "tries"), "tries", 200, 1, 1_000_000, env)?;
-            let keep = whole(argument(args, 2, "keep"), "keep", 16, 1, 1000, env)?;
-            let steps = whole(argument(args, 3, "steps"), "steps", 60, 1, 1_000_000, env)?;
-            let first = argument(args, 4, "first").map(|e| self::scope(e, env)).transpose()?;
-            let first =
-                first.map(|s| kernel::SiteSelection { selector: without(s.selector, frozen), ..s });
-            let coarse =
-                argument(args, 5, "at").map_or(Ok(Selector::Nothing), |e| selector(e, env))?;
-            Box::new(
-                Modes::new(scope, tries, keep, steps)
-                    .climbing_first(first)
-                    .by_surrogates_of(coarse),
-            )
-        }
-        _ => return Err(fail(e.span, format!("`{name}` is not a kernel"))),
+        _ => return Err(a.not_a_kernel()),
     };
-    Ok(Built { kernel, signature })
+    built(kernel, signature)
 }
 
 const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, modes, optimize";
@@ -172,93 +158,166 @@ pub(in crate::infer) fn without(selector: Selector, frozen: &Selector) -> Select
     }
 }
 
-/// The finite choices that a kernel sums out.
-fn marginal(
-    args: &[Arg],
-    place: usize,
-    frozen: &Selector,
-    env: &mut PlanEnv,
-) -> Result<Selector, Box<RunError>> {
-    let Some(e) = argument(args, place, "marginal") else { return Ok(Selector::Nothing) };
-    Ok(without(selector(e, env)?, frozen))
-}
-
-/// The values of the parameters of a declared kernel, by name.
+/// The values of the parameters of a declared kernel.
 ///
 /// # Errors
 /// If an argument is missing, or its evaluation fails.
 pub(in crate::infer) fn arguments(
-    k: &KernelDecl,
-    args: &[Arg],
-    call: Span,
+    k: &DeclaredKernel,
+    call: &KernelCall,
     env: &mut PlanEnv,
-) -> Result<Vec<(Arc<str>, Value)>, Box<RunError>> {
-    let one = |(i, p): (usize, &Param)| {
-        let given = argument(args, i, &p.name.node).or(p.default.as_ref());
-        let given = given
-            .ok_or_else(|| fail(call, format!("the argument `{}` is missing", p.name.node)))?;
-        Ok((Arc::clone(&p.name.node), evaluate(given, env)?))
-    };
-    k.params.iter().enumerate().map(one).collect()
+) -> Result<Vec<Value>, Box<RunError>> {
+    let one =
+        |(arg, (name, default)): (&Argument, &(Arc<str>, Option<Formula>))| match (arg, default) {
+            (Argument::Value(f), _) | (_, Some(f)) => evaluate(f, env),
+            _ => Err(fail(call.span, format!("the argument `{name}` is missing"))),
+        };
+    call.args.iter().zip(&k.params).map(one).collect()
 }
 
-/// A positive numeric argument of a kernel, if it is given.
-fn positive(
-    e: Option<&Expr>,
-    kernel: &str,
-    name: &str,
+/// Builds a kernel of a host.
+///
+/// # Errors
+/// What is wrong with the call, with its position.
+fn build_host_kernel(
+    call: &KernelCall,
+    builtin: &Builtin,
+    setting: Setting,
     env: &mut PlanEnv,
-) -> Result<Option<f64>, Box<RunError>> {
-    let Some(e) = e else { return Ok(None) };
-    match evaluate(e, env)? {
-        Value::Num(s) if s > 0.0 => Ok(Some(s)),
-        v => Err(fail(e.span, format!("{kernel}: `{name}` must be positive, got {v}"))),
-    }
-}
-
-/// A boolean argument of a kernel; false unless given.
-fn truth(e: Option<&Expr>, name: &str, env: &mut PlanEnv) -> Result<bool, Box<RunError>> {
-    let Some(e) = e else { return Ok(false) };
-    match evaluate(e, env)? {
-        Value::Bool(b) => Ok(b),
-        v => Err(fail(e.span, format!("`{name}` must be true or false, got {v}"))),
-    }
-}
-
-/// A whole-number argument of a kernel.
-fn whole(
-    e: Option<&Expr>,
-    name: &str,
-    default: u32,
-    least: u32,
-    most: u32,
-    env: &mut PlanEnv,
-) -> Result<u32, Box<RunError>> {
-    let Some(e) = e else { return Ok(default) };
-    match evaluate(e, env)? {
-        Value::Num(x) if x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x) => {
-            Ok(x as u32)
+) -> Result<Built, Box<RunError>> {
+    let (mut values, mut scopes, mut kernels) = (Vec::new(), Vec::new(), Vec::new());
+    let mut signature = call.text.to_string();
+    for arg in &call.args {
+        let (mut value, mut selected, mut inner) = (Value::Unit, None, None);
+        match arg {
+            Argument::Omitted => {}
+            Argument::Choices(c) => {
+                let mut s = scope(c, env)?;
+                s.selector = without(s.selector, setting.frozen);
+                signature += &format!(" {s:?}");
+                selected = Some(s);
+            }
+            Argument::Kernel(call) => {
+                let built = build(call, setting, env)?;
+                signature += &format!(" {}", built.signature);
+                inner = Some(built.kernel);
+            }
+            Argument::Value(f) => {
+                value = evaluate(f, env)?;
+                signature += &format!(" {:?}", Plain::of(&value));
+            }
         }
-        v => Err(fail(
-            e.span,
-            format!("`{name}` must be a whole number from {least} to {most}, got {v}"),
-        )),
+        values.push(value);
+        scopes.push(selected);
+        kernels.push(inner);
     }
+    let values: Vec<&Value> = values.iter().collect();
+    let args = Values { builtin, values: &values };
+    let maker = match &builtin.host {
+        Some(HostItem::Kernel(maker)) => maker.downcast_ref::<KernelMaker>(),
+        _ => None,
+    };
+    let made = match maker {
+        Some(maker) => (maker.0)(&mut HostCall { args, scopes, kernels }),
+        None => Err(Fault::type_error(format!("`{}` is not a kernel", builtin.full_name()))),
+    };
+    Ok(Built { kernel: made.map_err(|f| fault(call.span, f))?, signature })
 }
 
-/// Whether a call means the same whenever it is executed: it contains no names.
-pub(in crate::infer) fn is_constant(e: &Expr) -> bool {
-    let arguments = |args: &[Arg]| args.iter().all(|a| is_constant(&a.value));
-    match &e.kind {
-        ExprKind::Num(_) | ExprKind::Str(_) | ExprKind::Bool(_) | ExprKind::TagSel { .. } => true,
-        ExprKind::Address(a) => has_constant_keys(a),
-        ExprKind::Call { args, .. } => arguments(args),
-        ExprKind::Unary { expr, .. } => is_constant(expr),
-        ExprKind::Binary { left, right, .. } => is_constant(left) && is_constant(right),
-        _ => false,
-    }
+/// The arguments of a call of a built-in kernel, by their places.
+struct Args<'a, 'e> {
+    call: &'a KernelCall,
+    builtin: &'a Builtin,
+    setting: Setting<'a>,
+    env: &'a mut PlanEnv<'e>,
 }
 
-fn has_constant_keys(a: &Address) -> bool {
-    a.segments.iter().flat_map(|s| &s.keys).all(|k| !matches!(k, Key::Expr(_)))
+impl<'a> Args<'a, '_> {
+    fn not_a_kernel(&self) -> Box<RunError> {
+        fail(self.call.span, format!("`{}` is not a kernel", self.builtin.name))
+    }
+
+    fn value(&self, place: usize) -> Option<&'a Formula> {
+        let call = self.call;
+        match call.args.get(place) {
+            Some(Argument::Value(f)) => Some(f),
+            _ => None,
+        }
+    }
+
+    fn name(&self, place: usize) -> &'a str {
+        let builtin = self.builtin;
+        builtin.args.get(place).map_or("", |a| &a.name)
+    }
+
+    /// The kernel that this one applies.
+    fn inner(&mut self) -> Result<Built, Box<RunError>> {
+        match self.call.args.first() {
+            Some(Argument::Kernel(call)) => build(call, self.setting, self.env),
+            _ => Err(self.not_a_kernel()),
+        }
+    }
+
+    /// The choices that an argument selects, without frozen ones.
+    fn scope(&mut self, place: usize) -> Result<Option<SiteSelection>, Box<RunError>> {
+        let Some(Argument::Choices(c)) = self.call.args.get(place) else { return Ok(None) };
+        let s = scope(c, self.env)?;
+        Ok(Some(SiteSelection { selector: without(s.selector, self.setting.frozen), ..s }))
+    }
+
+    /// The finite choices that a kernel sums out; none unless given.
+    fn marginal(&mut self, place: usize) -> Result<Selector, Box<RunError>> {
+        Ok(self.scope(place)?.map_or(Selector::Nothing, |s| s.selector))
+    }
+
+    /// The observations that surrogates replace; none unless given.
+    fn selector(&mut self, place: usize) -> Result<Selector, Box<RunError>> {
+        let Some(Argument::Choices(c)) = self.call.args.get(place) else {
+            return Ok(Selector::Nothing);
+        };
+        selector(&c.selection, self.env)
+    }
+
+    /// A positive number, if it is given.
+    fn positive(&mut self, place: usize) -> Result<Option<f64>, Box<RunError>> {
+        let (kernel, name) = (&self.builtin.name, self.name(place));
+        let Some(f) = self.value(place) else { return Ok(None) };
+        let wrong = |v| fail(f.span, format!("{kernel}: `{name}` must be positive, got {v}"));
+        match evaluate(f, self.env)? {
+            Value::Num(s) if s > 0.0 => Ok(Some(s)),
+            v => Err(wrong(v)),
+        }
+    }
+
+    /// A truth value; false unless given.
+    fn truth(&mut self, place: usize) -> Result<bool, Box<RunError>> {
+        let name = self.name(place);
+        let Some(f) = self.value(place) else { return Ok(false) };
+        let wrong = |v| fail(f.span, format!("`{name}` must be true or false, got {v}"));
+        match evaluate(f, self.env)? {
+            Value::Bool(b) => Ok(b),
+            v => Err(wrong(v)),
+        }
+    }
+
+    /// A whole number.
+    fn whole(
+        &mut self,
+        place: usize,
+        default: u32,
+        least: u32,
+        most: u32,
+    ) -> Result<u32, Box<RunError>> {
+        let name = self.name(place);
+        let Some(f) = self.value(place) else { return Ok(default) };
+        let is_whole =
+            |x: f64| x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x);
+        match evaluate(f, self.env)? {
+            Value::Num(x) if is_whole(x) => Ok(x as u32),
+            v => Err(fail(
+                f.span,
+                format!("`{name}` must be a whole number from {least} to {most}, got {v}"),
+            )),
+        }
+    }
 }

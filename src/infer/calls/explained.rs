@@ -1,14 +1,9 @@
 //! Which kernels of a plan select which choices, without running it.
 
-use crate::infer::calls::expr::PlanEnv;
-use crate::infer::calls::selection::{selector, target};
-use crate::infer::plan::call;
-use crate::lang::code::Code;
-use crate::platform::clock::Instant;
-use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind};
-use crate::syntax::print_expr;
+use crate::infer::calls::formula::PlanEnv;
+use crate::infer::calls::selection::selector;
+use crate::lang::plan::{Argument, Callee, KernelCall, Plan, Selection, Step, StepKind};
 use crate::trace::{Draws, Selector, Trace};
-use std::sync::Arc;
 
 /// A kernel of a plan, and the choices it selects.
 #[derive(Clone, Debug)]
@@ -22,106 +17,81 @@ pub struct Selecting {
 
 /// The kernels of a plan, including those of warm-up, each once, in the order of the
 /// plan.
-pub fn selecting(code: &Arc<Code>, plan: &[KStmt], trace: &mut Trace) -> Vec<Selecting> {
-    let mut found = Vec::new();
-    let env = PlanEnv {
-        code,
-        trace,
-        variables: &[],
-        draws: Draws::default(),
-        started: Instant::now(),
-        steps: 0,
-        moved: None,
-    };
-    Reader { code, env, found: &mut found, within: Vec::new() }.statements(plan);
-    found
+pub fn selecting(plan: &Plan, trace: &mut Trace) -> Vec<Selecting> {
+    let env = PlanEnv::before(trace, Draws::default());
+    let mut reader = Reader { plan, env, found: Vec::new(), within: Vec::new() };
+    reader.steps(&plan.steps);
+    reader.found
 }
 
 struct Reader<'a, 'e> {
-    code: &'a Code,
+    plan: &'a Plan,
     env: PlanEnv<'e>,
-    found: &'a mut Vec<Selecting>,
+    found: Vec<Selecting>,
     /// The declared kernels being read, as one may call itself.
-    within: Vec<Arc<str>>,
+    within: Vec<usize>,
 }
 
-impl Reader<'_, '_> {
-    fn statements(&mut self, all: &[KStmt]) {
-        for statement in all {
-            match &statement.kind {
-                KStmtKind::Warmup { body, .. }
-                | KStmtKind::Repeat { body, .. }
-                | KStmtKind::Every { body, .. }
-                | KStmtKind::For { body, .. } => self.statements(body),
-                KStmtKind::Mix(arms) => arms.iter().for_each(|arm| self.kernel(&arm.kernel)),
-                KStmtKind::Expr(e) => self.kernel(e),
-                _ => {}
-            }
+impl<'a> Reader<'a, '_> {
+    fn steps(&mut self, steps: &'a [Step]) {
+        for step in steps {
+            step.calls().for_each(|call| self.kernel(call));
+            self.steps(step.body());
         }
     }
 
-    fn kernel(&mut self, e: &Expr) {
-        let Some((name, args)) = call(e) else { return };
-        if matches!(name, "init" | "anneal") {
+    fn kernel(&mut self, call: &'a KernelCall) {
+        if let Callee::Declared(i) = call.kernel {
+            if !self.within.contains(&i) {
+                let steps = &self.plan.kernels[i].steps;
+                self.within.push(i);
+                self.moved(call, steps);
+                self.steps(steps);
+                self.within.pop();
+            }
             return;
         }
-        if let Some(declared) = self.code.kernels.iter().find(|k| *k.name.node == *name) {
-            if self.within.contains(&declared.name.node) {
-                return;
+        // A kernel without a selection moves everything. A kernel that applies another
+        // one moves what that moves.
+        let mut selects = false;
+        for arg in &call.args {
+            match arg {
+                Argument::Kernel(inner) => self.kernel(inner),
+                Argument::Choices(c) => self.selects(call, &c.selection),
+                _ => continue,
             }
-            self.within.push(declared.name.node.clone());
-            self.moved(e, &declared.body);
-            self.statements(&declared.body);
-            self.within.pop();
-            return;
+            selects = true;
         }
-        // A kernel without a selection moves everything. A kernel that wraps others moves
-        // what they move.
-        let mut selected = false;
-        for arg in args {
-            let inside = call(&arg.value).is_some_and(|(inner, args)| {
-                !matches!(inner, "one" | "each") && args.iter().any(|a| target(&a.value))
-            });
-            if inside {
-                selected = true;
-                self.kernel(&arg.value);
-            } else if target(&arg.value) {
-                selected = true;
-                let all = call(&arg.value)
-                    .and_then(|(_, args)| args.first())
-                    .map_or(&arg.value, |a| &a.value);
-                let selector = selector(all, &mut self.env).unwrap_or(Selector::All);
-                self.add(print_expr(e), selector);
-            }
-        }
-        if !selected {
-            self.add(print_expr(e), Selector::All);
+        if !selects {
+            self.add(&call.text, Selector::All);
         }
     }
 
-    /// Adds what a declared kernel, called by `e`, proposes itself.
-    fn moved(&mut self, e: &Expr, body: &[KStmt]) {
-        for statement in body {
-            match &statement.kind {
-                KStmtKind::For { body, .. } => self.moved(e, body),
-                KStmtKind::Propose { target, .. } | KStmtKind::Map { target, .. }
-                    if matches!(target.kind, ExprKind::Address(_)) =>
-                {
-                    let selector = selector(target, &mut self.env).unwrap_or(Selector::All);
-                    self.add(print_expr(e), selector);
+    /// Adds what a declared kernel proposes itself.
+    fn moved(&mut self, call: &KernelCall, steps: &[Step]) {
+        for step in steps {
+            match &step.kind {
+                StepKind::For(_, _, body) => self.moved(call, body),
+                StepKind::Propose(path, _) | StepKind::Map(path, _) => {
+                    self.selects(call, &Selection::Path(path.clone()));
                 }
                 _ => {}
             }
         }
     }
 
-    fn add(&mut self, kernel: String, selector: Selector) {
+    fn selects(&mut self, call: &KernelCall, selection: &Selection) {
+        let selector = selector(selection, &mut self.env).unwrap_or(Selector::All);
+        self.add(&call.text, selector);
+    }
+
+    fn add(&mut self, kernel: &str, selector: Selector) {
         match self.found.iter_mut().find(|k| k.kernel == kernel) {
             Some(k) if k.selector == selector => {}
             Some(k) => {
                 k.selector = Selector::Union(Box::new(k.selector.clone()), Box::new(selector))
             }
-            None => self.found.push(Selecting { kernel, selector }),
+            None => self.found.push(Selecting { kernel: kernel.to_owned(), selector }),
         }
     }
 }
@@ -139,7 +109,7 @@ mod tests {
              infer { repeat 10 { both(0.5); block(@x); both(2); } }";
         let model = Model::from_text(text).unwrap();
         let (mut trace, plan) = (model.simulate(1, 0).unwrap(), model.plan().unwrap().0);
-        let found = selecting(model.code(), &plan, &mut trace);
+        let found = selecting(&plan, &mut trace);
         let names: Vec<&str> = found.iter().map(|k| &*k.kernel).collect();
         assert_eq!(names, ["drift(@x, s)", "mh(@y)", "block(@x)"]);
     }

@@ -1,23 +1,14 @@
 //! Kernels that a host defines: their calls in inference blocks, and their constructors.
 
-use crate::infer::calls::build::{Built, build, without};
-use crate::infer::calls::expr::{PlanEnv as Env, evaluate};
-use crate::infer::calls::selection::{fail, fault, scope};
 use crate::infer::kernel::{Kernel, SiteSelection};
-use crate::infer::plain::Plain;
-use crate::infer::plan::RunOptions;
-use crate::lang::builtins::{Args, Builtin, State, Type};
-use crate::lang::error::{Fault, RunError};
-use crate::lang::value::Value;
-use crate::syntax::ast::{Arg, Expr};
-use crate::syntax::print_expr;
-use crate::trace::Selector;
+use crate::lang::builtins::Args;
+use crate::lang::error::Fault;
 
 /// A call of a host's kernel in an `infer` block, with its arguments evaluated.
 pub struct KernelCall<'a> {
-    args: Args<'a>,
-    scopes: Vec<Option<SiteSelection>>,
-    kernels: Vec<Option<Box<dyn Kernel>>>,
+    pub(super) args: Args<'a>,
+    pub(super) scopes: Vec<Option<SiteSelection>>,
+    pub(super) kernels: Vec<Option<Box<dyn Kernel>>>,
 }
 
 impl KernelCall<'_> {
@@ -53,7 +44,7 @@ type Make = dyn Fn(&mut KernelCall) -> Result<Box<dyn Kernel>, Fault> + Send + S
 
 /// Constructs a host's kernel from its call; stored with its entry in the table of
 /// built-ins.
-pub(crate) struct KernelMaker(Box<Make>);
+pub(crate) struct KernelMaker(pub(super) Box<Make>);
 
 impl KernelMaker {
     pub fn new(
@@ -61,53 +52,4 @@ impl KernelMaker {
     ) -> KernelMaker {
         KernelMaker(Box::new(make))
     }
-}
-
-/// Builds the kernel of a call.
-///
-/// # Errors
-/// What is wrong with the call, with its position.
-pub(in crate::infer) fn build_host_kernel(
-    e: &Expr,
-    (builtin, maker): (&Builtin, &State),
-    args: &[Arg],
-    frozen: &Selector,
-    options: &RunOptions,
-    env: &mut Env,
-) -> Result<Built, Box<RunError>> {
-    let order = builtin.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)));
-    let order = order.map_err(|message| fail(e.span, message))?;
-    let (mut values, mut scopes, mut kernels) = (Vec::new(), Vec::new(), Vec::new());
-    let mut signature = print_expr(e);
-    for (from, arg) in order.iter().zip(builtin.args.iter()) {
-        let (mut value, mut selected, mut inner) = (Value::Unit, None, None);
-        match (from.and_then(|i| args.get(i)).map(|a| &a.value), arg.ty) {
-            (None, _) => {}
-            (Some(e), Type::Selection) => {
-                let mut s = scope(e, env)?;
-                s.selector = without(s.selector, frozen);
-                signature += &format!(" {s:?}");
-                selected = Some(s);
-            }
-            (Some(e), Type::Kernel) => {
-                let built = build(e, frozen, options, env)?;
-                signature += &format!(" {}", built.signature);
-                inner = Some(built.kernel);
-            }
-            (Some(e), _) => {
-                value = evaluate(e, env)?;
-                signature += &format!(" {:?}", Plain::of(&value));
-            }
-        }
-        values.push(value);
-        scopes.push(selected);
-        kernels.push(inner);
-    }
-    let values: Vec<&Value> = values.iter().collect();
-    let mut call = KernelCall { args: Args { builtin, values: &values }, scopes, kernels };
-    let made = match maker.downcast_ref::<KernelMaker>() {
-        Some(maker) => (maker.0)(&mut call),
-        None => Err(Fault::type_error(format!("`{}` is not a kernel", builtin.full_name()))),
-    };
-    Ok(Built { kernel: made.map_err(|f| fault(e.span, f))?, signature })
 }

@@ -2,7 +2,7 @@
 //! run.
 
 use crate::infer::callback::Callback;
-use crate::infer::plan::Progress;
+use crate::infer::run::Progress;
 use crate::infer::state::{StateError, pack, unpack};
 use crate::trace::{Constraint, Draws, Trace};
 use serde::{Deserialize, Serialize};

@@ -8,7 +8,7 @@
 //! the observed data: the posterior, as `eps` goes to 0. The distance is the root mean
 //! square of the differences between the observed and the simulated numbers.
 
-use crate::infer::calls::selection::fail;
+use crate::infer::calls::error::fail;
 use crate::infer::kernel::{Kernel, Outcome, StepContext};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::lang::code::Observed;

@@ -9,7 +9,7 @@
 //! surrogate is, as long as it has positive density wherever the observation has. The
 //! observation itself is evaluated only for moves that pass the first stage.
 
-use crate::infer::calls::selection::fail;
+use crate::infer::calls::error::fail;
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
 use crate::infer::state::StateError;
 use crate::lang::error::RunError;

@@ -21,7 +21,8 @@ use super::program_kernel::{
     Image, Played, ProgramKernel, Source, log_density, log_volume, sampled, values,
 };
 use crate::dist::Datum;
-use crate::infer::calls::selection::fail;
+use crate::infer::calls::error::fail;
+use crate::infer::calls::formula::Moved;
 use crate::infer::kernel::{Outcome, StepContext, accepts, recoverable};
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
@@ -98,12 +99,17 @@ fn near(a: &Value, b: &Value) -> bool {
 
 impl ProgramKernel {
     /// Makes one step by a map.
-    pub(super) fn involve(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
+    pub(super) fn involve(
+        &self,
+        trace: &mut Trace,
+        aside: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<Outcome> {
         trace.rollback();
         let mut rng = at.stream();
-        let forth = self.play(trace, at, Source::Drawn(&mut rng), Some(&[]))?;
+        let forth = self.play(trace, at, Source::Drawn(&mut rng), none(aside))?;
         let forth_map = mapped(&forth, trace);
-        let log_jacobian = self.log_jacobian(trace, at, &forth, &forth_map)?;
+        let log_jacobian = self.log_jacobian((trace, aside), at, &forth, &forth_map)?;
         let (mut changes, mut undo) = (Vec::new(), Vec::new());
         for m in &forth_map {
             let Some((address, t)) = &m.choice else { continue };
@@ -133,7 +139,7 @@ impl ProgramKernel {
         trace.commit();
         let auxiliaries: Vec<Value> =
             forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
-        let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), Some(&[])));
+        let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), none(aside)));
         let (log_back, wrong) = match &back {
             Ok(Some(back))
                 if back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target)) =>
@@ -181,7 +187,7 @@ impl ProgramKernel {
     }
 
     fn fault(&self, what: String) -> Box<RunError> {
-        let name = &self.declared.name;
+        let name = &self.declared().name;
         fail(
             name.span,
             format!("the map of the kernel `{}` is not an involution: {what}", name.node),
@@ -191,7 +197,7 @@ impl ProgramKernel {
     /// The log of the absolute determinant of the map's Jacobian.
     fn log_jacobian(
         &self,
-        trace: &mut Trace,
+        (trace, aside): (&mut Trace, &mut Trace),
         at: &StepContext,
         played: &Played,
         map: &[Mapped],
@@ -222,7 +228,8 @@ impl ProgramKernel {
                     .filter_map(|(m, v)| Some((m.choice.as_ref()?.0.clone(), v.clone())))
                     .collect();
                 let auxiliaries = &values[choices.len()..];
-                let there = self.play(trace, at, Source::Moved(auxiliaries), Some(&choices))?;
+                let moved = Moved { choices: &choices, aside };
+                let there = self.play(trace, at, Source::Moved(auxiliaries), Some(moved))?;
                 let image = at_new(&mapped(&there, trace), |m| &m.new);
                 if image.len() != n || there.drawn.len() != played.drawn.len() {
                     return Err(
@@ -241,6 +248,11 @@ impl ProgramKernel {
             Err(self.fault("its Jacobian is singular or not finite".into()))
         }
     }
+}
+
+/// No moved choices.
+fn none(aside: &mut Trace) -> Option<Moved<'_>> {
+    Some(Moved { choices: &[], aside })
 }
 
 /// Whether a value contains a NaN.

@@ -12,7 +12,7 @@ mod involution;
 mod knn;
 mod mh;
 mod particles;
-pub(crate) mod program_kernel;
+mod program_kernel;
 mod shape;
 mod slice;
 mod smc;

@@ -3,7 +3,7 @@
 //! Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2). How particles
 //! move from the prior to the target is left to each kernel.
 
-use crate::infer::calls::selection::fail;
+use crate::infer::calls::error::fail;
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accepts};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::lang::code::Observed;

@@ -10,24 +10,28 @@
 //! in it.
 
 use crate::dist::{Datum, Dist};
-use crate::infer::calls::expr::{PlanEnv, evaluate};
-use crate::infer::calls::selection::{address, fail};
+use crate::infer::calls::error::fail;
+use crate::infer::calls::formula::{Moved, PlanEnv, address, evaluate};
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, accepts, recoverable};
-use crate::lang::code::Code;
+use crate::lang::plan::{DeclaredKernel, Formula, Path, Step, StepKind};
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, Stream, StreamKey};
-use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, KernelDecl};
-use crate::trace::{Address, Change, Draws, Target, Trace, TraceResult};
+use crate::syntax::ast::Name;
+use crate::syntax::span::Span;
+use crate::trace::{Address, Change, Draws, Limits, Target, Trace, TraceResult};
 use std::sync::Arc;
 
 /// A kernel declared by the program, with its arguments.
 #[derive(Clone, Debug)]
 pub(crate) struct ProgramKernel {
-    code: Arc<Code>,
-    pub(super) declared: KernelDecl,
-    arguments: Vec<(Arc<str>, Value)>,
+    kernels: Arc<[DeclaredKernel]>,
+    /// Its index in `kernels`.
+    index: usize,
+    arguments: Vec<Value>,
     started: Instant,
+    /// A trace that evaluates expressions of maps and reverse moves.
+    aside: Option<Trace>,
 }
 
 /// A choice that an execution proposes.
@@ -80,32 +84,36 @@ pub(super) enum Source<'a> {
 }
 
 impl ProgramKernel {
-    /// A declared kernel with the values of its parameters, in a chain that began at
-    /// `started`.
+    /// A declared kernel, by its index, with the values of its parameters, in a chain
+    /// that began at `started`.
     pub fn new(
-        code: Arc<Code>,
-        declared: KernelDecl,
-        arguments: Vec<(Arc<str>, Value)>,
+        kernels: Arc<[DeclaredKernel]>,
+        index: usize,
+        arguments: Vec<Value>,
         started: Instant,
     ) -> Self {
-        ProgramKernel { code, declared, arguments, started }
+        ProgramKernel { kernels, index, arguments, started, aside: None }
+    }
+
+    /// Its declaration.
+    pub(super) fn declared(&self) -> &DeclaredKernel {
+        &self.kernels[self.index]
     }
 
     /// Executes the body in a state. For a map, `moved` has values of choices that
-    /// replace those in the state.
+    /// replace those in the state, and the trace that evaluates expressions.
     pub(super) fn play(
         &self,
         trace: &mut Trace,
         at: &StepContext,
         source: Source,
-        moved: Option<&[(Address, Value)]>,
+        moved: Option<Moved>,
     ) -> TraceResult<Played> {
         let key = StreamKey::new(at.seed, at.chain, Purpose::PREDICT);
         let draws = Draws { key, step: at.step, substream: at.part };
-        let mut play =
-            Play { own: self, draws, steps: at.step, source, moved, played: Played::default() };
-        let mut variables = self.arguments.clone();
-        play.body(&self.declared.body, trace, &mut variables)?;
+        let (steps, variables, played) = (at.step, self.arguments.clone(), Played::default());
+        let mut play = Play { own: self, trace, variables, draws, steps, source, moved, played };
+        play.body(&self.declared().steps)?;
         Ok(play.played)
     }
 
@@ -113,7 +121,7 @@ impl ProgramKernel {
     /// the proposed choices: the state then need not be committed and reverted.
     fn reverse(
         &self,
-        trace: &mut Trace,
+        (trace, aside): (&mut Trace, &mut Trace),
         at: &StepContext,
         all: &[Proposed],
         new: &[Option<Datum>],
@@ -124,7 +132,8 @@ impl ProgramKernel {
             .zip(new)
             .map(|(p, x)| Some((p.address.clone(), Value::from_datum(x.as_ref()?))));
         let moved: Vec<(Address, Value)> = moved.collect::<Option<_>>()?;
-        self.play(trace, at, Source::Given(auxiliaries), Some(&moved)).ok()
+        let moved = Moved { choices: &moved, aside };
+        self.play(trace, at, Source::Given(auxiliaries), Some(moved)).ok()
     }
 
     /// Moves the trace to a proposal of the body without an acceptance test, for initial
@@ -134,10 +143,10 @@ impl ProgramKernel {
     /// As [`Kernel::step`], and if the body has a map, which only maps one state to
     /// another.
     pub fn leap(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Option<()>> {
-        if maps(&self.declared.body) {
+        if self.declared().maps {
             let message =
                 "the kernel of a start must propose choices from distributions, not by a map";
-            return Err(fail(self.declared.name.span, message.into()));
+            return Err(fail(self.declared().name.span, message.into()));
         }
         let mut rng = at.stream();
         let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
@@ -152,75 +161,56 @@ impl ProgramKernel {
 
 struct Play<'a> {
     own: &'a ProgramKernel,
+    trace: &'a mut Trace,
+    variables: Vec<Value>,
     draws: Draws,
     steps: u64,
     source: Source<'a>,
-    moved: Option<&'a [(Address, Value)]>,
+    moved: Option<Moved<'a>>,
     played: Played,
 }
 
 impl Play<'_> {
     /// The environment of expressions.
-    fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> PlanEnv<'b> {
-        let (code, started) = (&self.own.code, self.own.started);
-        PlanEnv {
-            code,
-            trace,
-            variables,
-            draws: self.draws,
-            started,
-            steps: self.steps,
-            moved: self.moved,
-        }
+    fn env(&mut self) -> PlanEnv<'_> {
+        let (draws, started, steps) = (self.draws, self.own.started, self.steps);
+        let moved = self.moved.as_mut();
+        let moved = moved.map(|m| Moved { choices: m.choices, aside: &mut *m.aside });
+        PlanEnv { trace: self.trace, variables: &self.variables, draws, started, steps, moved }
     }
 
-    fn body(
-        &mut self,
-        body: &[KStmt],
-        trace: &mut Trace,
-        variables: &mut Vec<(Arc<str>, Value)>,
-    ) -> TraceResult<()> {
-        let depth = variables.len();
+    fn body(&mut self, body: &[Step]) -> TraceResult<()> {
+        let depth = self.variables.len();
         for s in body {
             match &s.kind {
-                KStmtKind::Let { name, expr } => {
-                    let v = evaluate(expr, &mut self.env(trace, variables))?;
-                    variables.push((Arc::clone(&name.node), v));
+                StepKind::Let(_, value) => {
+                    let v = evaluate(value, &mut self.env())?;
+                    self.variables.push(v);
                 }
-                KStmtKind::For { var, iter, body } => {
-                    let over = evaluate(iter, &mut self.env(trace, variables))?;
+                StepKind::For(items, _, body) => {
+                    let over = evaluate(items, &mut self.env())?;
                     for item in over.passes() {
-                        variables.push((Arc::clone(&var.node), item));
-                        let done = self.body(body, trace, variables);
-                        variables.pop();
+                        self.variables.push(item);
+                        let done = self.body(body);
+                        self.variables.pop();
                         done?;
                     }
                 }
-                KStmtKind::Map { target, value } => {
-                    let image = self.image(target, trace, variables)?;
-                    let proposed =
-                        |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
-                    if self.played.images.iter().any(|(i, _)| *i == image)
-                        || self.played.all.iter().any(proposed)
-                    {
-                        return Err(fail(
-                            s.span,
-                            "this gets a new value twice in one kernel".into(),
-                        ));
-                    }
-                    let value = evaluate(value, &mut self.env(trace, variables))?;
-                    self.played.images.push((image, value));
+                StepKind::Map(target, value) => {
+                    let image = self.image(target)?;
+                    self.map(image, value, s.span)?;
                 }
-                KStmtKind::Propose { target, dist } => {
-                    if let ExprKind::Var(name) = &target.kind {
-                        let value = self.auxiliary(name, dist, trace, variables)?;
-                        variables.push((Arc::clone(name), value));
-                        continue;
-                    }
-                    if matches!(self.source, Source::Moved(_)) {
-                        continue;
-                    }
-                    let proposed = self.proposed(target, dist, trace, variables)?;
+                StepKind::MapDrawn(name, value) => {
+                    let image = self.auxiliary_image(name)?;
+                    self.map(image, value, s.span)?;
+                }
+                StepKind::Draw(name, _, dist) => {
+                    let value = self.auxiliary(&name.node, dist)?;
+                    self.variables.push(value);
+                }
+                StepKind::Propose(..) if matches!(self.source, Source::Moved(_)) => {}
+                StepKind::Propose(target, dist) => {
+                    let proposed = self.proposed(target, dist)?;
                     let mapped = |i: &(Image, Value)| matches!(i.0, Image::Choice(_, t) if t == proposed.target);
                     let twice = self.played.all.iter().any(|p| p.target == proposed.target);
                     if twice || self.played.images.iter().any(mapped) {
@@ -242,19 +232,26 @@ impl Play<'_> {
                 }
             }
         }
-        variables.truncate(depth);
+        self.variables.truncate(depth);
+        Ok(())
+    }
+
+    /// Assigns a new value by a map.
+    fn map(&mut self, image: Image, value: &Formula, span: Span) -> TraceResult<()> {
+        let proposed = |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
+        if self.played.images.iter().any(|(i, _)| *i == image)
+            || self.played.all.iter().any(proposed)
+        {
+            return Err(fail(span, "this gets a new value twice in one kernel".into()));
+        }
+        let value = evaluate(value, &mut self.env())?;
+        self.played.images.push((image, value));
         Ok(())
     }
 
     /// Draws an auxiliary variable, or uses the given value.
-    fn auxiliary(
-        &mut self,
-        name: &Arc<str>,
-        dist: &Expr,
-        trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
-    ) -> TraceResult<Value> {
-        let dist = self.distribution(dist, trace, variables)?;
+    fn auxiliary(&mut self, name: &Arc<str>, dist: &Formula) -> TraceResult<Value> {
+        let dist = self.distribution(dist)?;
         let value = match &mut self.source {
             Source::Drawn(rng) => Value::from_datum(&dist.sample(rng)),
             Source::Given(values) | Source::Moved(values) => {
@@ -265,27 +262,16 @@ impl Play<'_> {
         Ok(value)
     }
 
-    fn proposed(
-        &self,
-        target: &Expr,
-        dist: &Expr,
-        trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
-    ) -> TraceResult<Proposed> {
-        let (address, found) = self.choice(target, trace, variables)?;
-        if trace.elements(found).is_some() {
+    fn proposed(&mut self, target: &Path, dist: &Formula) -> TraceResult<Proposed> {
+        let (address, found) = self.choice(target)?;
+        if self.trace.elements(found).is_some() {
             return Err(fail(target.span, format!("{address} cannot be proposed as a whole")));
         }
-        Ok(Proposed { address, target: found, dist: self.distribution(dist, trace, variables)? })
+        Ok(Proposed { address, target: found, dist: self.distribution(dist)? })
     }
 
-    fn distribution(
-        &self,
-        dist: &Expr,
-        trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
-    ) -> TraceResult<Dist> {
-        match evaluate(dist, &mut self.env(trace, variables))? {
+    fn distribution(&mut self, dist: &Formula) -> TraceResult<Dist> {
+        match evaluate(dist, &mut self.env())? {
             Value::Dist(d) => Ok(Dist::clone(&d)),
             v => Err(fail(
                 dist.span,
@@ -295,40 +281,31 @@ impl Play<'_> {
     }
 
     /// Reads what a map assigns a new value to.
-    fn image(
-        &self,
-        target: &Expr,
-        trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
-    ) -> TraceResult<Image> {
-        let ExprKind::Var(name) = &target.kind else {
-            let (address, found) = self.choice(target, trace, variables)?;
-            if trace.elements(found).is_some()
-                || trace.dist(found).is_some_and(|d| d.is_stored_whitened())
-            {
-                return Err(fail(target.span, format!("{address} cannot be mapped as a whole")));
-            }
-            return Ok(Image::Choice(address, found));
-        };
-        let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
+    fn image(&mut self, target: &Path) -> TraceResult<Image> {
+        let (address, found) = self.choice(target)?;
+        if self.trace.elements(found).is_some()
+            || self.trace.dist(found).is_some_and(|d| d.is_stored_whitened())
+        {
+            return Err(fail(target.span, format!("{address} cannot be mapped as a whole")));
+        }
+        Ok(Image::Choice(address, found))
+    }
+
+    fn auxiliary_image(&self, name: &Name) -> TraceResult<Image> {
+        let drawn = self.played.drawn.iter().rposition(|d| d.name == name.node);
         let not = || {
-            fail(
-                target.span,
-                format!("`{name}` is not an auxiliary variable; propose {name} ~ …; makes one"),
-            )
+            let (name, span) = (&name.node, name.span);
+            let message =
+                format!("`{name}` is not an auxiliary variable; propose {name} ~ …; makes one");
+            fail(span, message)
         };
         drawn.map(Image::Auxiliary).ok_or_else(not)
     }
 
     /// Finds a choice that can be proposed.
-    fn choice(
-        &self,
-        target: &Expr,
-        trace: &mut Trace,
-        variables: &[(Arc<str>, Value)],
-    ) -> TraceResult<(Address, Target)> {
-        let at = address(target, &mut self.env(trace, variables))?;
-        let Some(found) = trace.find(&at) else {
+    fn choice(&mut self, target: &Path) -> TraceResult<(Address, Target)> {
+        let at = address(target, &mut self.env())?;
+        let Some(found) = self.trace.find(&at) else {
             let mut e = fail(target.span, format!("this state has no choice {at}"));
             e.hint = Some(
                 "a kernel can propose only choices that exist in the current state; mh and block can create others"
@@ -338,26 +315,6 @@ impl Play<'_> {
         };
         Ok((at, found))
     }
-}
-
-/// Whether a kernel proposes values itself, instead of applying other kernels.
-pub(crate) fn proposes(body: &[KStmt]) -> bool {
-    body.iter().any(|s| match &s.kind {
-        KStmtKind::Propose { .. } | KStmtKind::Map { .. } => true,
-        KStmtKind::For { body, .. }
-        | KStmtKind::Repeat { body, .. }
-        | KStmtKind::Every { body, .. } => proposes(body),
-        _ => false,
-    })
-}
-
-/// Whether a kernel contains a map.
-fn maps(body: &[KStmt]) -> bool {
-    body.iter().any(|s| match &s.kind {
-        KStmtKind::Map { .. } => true,
-        KStmtKind::For { body, .. } => maps(body),
-        _ => false,
-    })
 }
 
 /// The present values of choices, as the program sees them.
@@ -400,13 +357,29 @@ pub(super) fn log_density(all: &[Proposed], values: &[Option<Datum>]) -> f64 {
 
 impl Kernel for ProgramKernel {
     fn name(&self) -> String {
-        self.declared.name.node.to_string()
+        self.declared().name.node.to_string()
     }
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
-        if maps(&self.declared.body) {
-            return self.involve(trace, at);
-        }
+        let new = || Trace::prior(Arc::clone(trace.code()), Limits::default());
+        let mut aside = self.aside.take().unwrap_or_else(new);
+        let done = match self.declared().maps {
+            true => self.involve(trace, &mut aside, at),
+            false => self.sample(trace, &mut aside, at),
+        };
+        self.aside = Some(aside);
+        done
+    }
+}
+
+impl ProgramKernel {
+    /// Makes one step by proposals from distributions.
+    fn sample(
+        &self,
+        trace: &mut Trace,
+        aside: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<Outcome> {
         let mut rng: Stream = at.stream();
         let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
         if forth.all.is_empty() {
@@ -441,7 +414,7 @@ impl Kernel for ProgramKernel {
             at.tempered(&w) + log_back - log_forth + volume - log_volume(trace, &forth.all)
         };
         if w.appeared + w.vanished == 0
-            && let Some(back) = self.reverse(trace, at, &forth.all, &new, &auxiliaries)
+            && let Some(back) = self.reverse((trace, aside), at, &forth.all, &new, &auxiliaries)
         {
             return Ok(accept_or_reject(trace, ratio(trace, Some(back)), &mut rng));
         }

@@ -2,16 +2,15 @@
 
 use super::place::Doing;
 use super::runner::{Flow, Instance, Runner};
-use super::{ChainError, call};
-use crate::infer::calls::build::{arguments, build, is_constant};
-use crate::infer::calls::selection::fail;
-use crate::infer::draws::KernelStats;
+use crate::infer::calls::build::{Setting, arguments, build};
+use crate::infer::calls::error::fail;
 use crate::infer::kernel::{Outcome, StepContext};
-use crate::infer::kernels::program_kernel::proposes;
+use crate::infer::run::ChainError;
+use crate::infer::stats::KernelStats;
+use crate::lang::plan::{Callee, Formula, KernelCall, Step};
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::{Arg, Expr, ExprKind, KernelDecl, MixArm};
 use smallvec::SmallVec;
 use std::sync::atomic::Ordering;
 
@@ -21,60 +20,44 @@ const MOST: usize = 10_000;
 /// The deepest nesting of statements and declared kernels, as a kernel may call itself.
 const MOST_NESTED: usize = 200;
 
-impl Runner<'_> {
-    pub(super) fn mix(&mut self, arms: &[MixArm], doing: Doing) -> Result<Flow, ChainError> {
+impl<'a> Runner<'a> {
+    pub(super) fn mix(
+        &mut self,
+        arms: &'a [(Formula, Step)],
+        doing: Doing,
+    ) -> Result<Flow, ChainError> {
         if let Doing::Kernel { arm: Some(i), .. } = doing {
-            return arms.get(i).map_or(Ok(Flow::Next), |a| self.apply(&a.kernel, Some(i), doing));
+            return arms.get(i).map_or(Ok(Flow::Next), |a| self.statement(&a.1, Some(i), doing));
         }
         let mut weights: SmallVec<[f64; 8]> = SmallVec::new();
-        for a in arms {
-            let weight = match a.weight.kind {
-                ExprKind::Num(w) => Value::Num(w),
-                _ => self.value(&a.weight)?,
-            };
-            match weight {
+        for (weight, _) in arms {
+            match self.value(weight)? {
                 Value::Num(w) if w >= 0.0 && w.is_finite() => weights.push(w),
                 v => {
-                    return Err(fail(
-                        a.weight.span,
-                        format!("a weight must be at least 0, got {v}"),
-                    )
-                    .into());
+                    let message = format!("a weight must be at least 0, got {v}");
+                    return Err(fail(weight.span, message).into());
                 }
             }
         }
         let total: f64 = weights.iter().sum();
         let key = StreamKey::new(self.options.seed, self.chain, Purpose::MIX);
         let arm = key.stream(self.step, 0, 0).weighted(&weights, total);
-        arms.get(arm).map_or(Ok(Flow::Next), |a| self.apply(&a.kernel, Some(arm), doing))
+        arms.get(arm).map_or(Ok(Flow::Next), |a| self.statement(&a.1, Some(arm), doing))
     }
 
-    /// Applies a kernel, or another statement that has the form of a call; `arm` is its
-    /// index in a `mix`.
+    /// Applies a kernel; `arm` is its index in a `mix`.
     pub(super) fn apply(
         &mut self,
-        e: &Expr,
+        call: &'a KernelCall,
         arm: Option<usize>,
         doing: Doing,
     ) -> Result<Flow, ChainError> {
-        let Some((name, args)) = call(e) else {
-            return Err(fail(e.span, "expected a kernel, such as mh(one(@**))".into()).into());
-        };
-        match name {
-            "init" => return Ok(Flow::Next),
-            "anneal" => return self.anneal(e, args),
-            _ => {}
-        }
-        let place = e as *const Expr as usize;
-        let i = match self.calls.get(&place) {
-            Some(i) => *i,
-            None => {
-                match self.code.kernels.iter().find(|k| &*k.name.node == name && !proposes(&k.body))
-                {
-                    Some(k) => return self.apply_declared(e, k, args, arm),
-                    None => self.instance(e, place)?,
-                }
+        let i = match (self.calls.get(call.index), call.kernel) {
+            (Some(Some(i)), _) => *i,
+            (_, Callee::Declared(k)) if !self.plan.kernels[k].proposes => {
+                return self.apply_declared(call, k, arm);
             }
+            _ => self.instance(call)?,
         };
         let begun = Instant::now();
         let (mut steps, mut done) = match doing {
@@ -104,23 +87,27 @@ impl Runner<'_> {
     /// Applies a kernel that the program declares in terms of other kernels.
     fn apply_declared(
         &mut self,
-        e: &Expr,
-        k: &KernelDecl,
-        args: &[Arg],
+        call: &'a KernelCall,
+        k: usize,
         arm: Option<usize>,
     ) -> Result<Flow, ChainError> {
         if self.path.len() >= MOST_NESTED {
             let message = format!(
                 "statements and kernels of the plan are nested more than {MOST_NESTED} deep"
             );
-            return Err(fail(e.span, message).into());
+            return Err(fail(call.span, message).into());
         }
+        let declared = &self.plan.kernels[k];
         self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });
+        let depth = self.depth();
         if self.resume_path.is_empty() {
-            let given = arguments(k, args, e.span, &mut self.env())?;
+            let given = arguments(declared, call, &mut self.env())?;
+            self.variables.truncate(depth);
             self.variables.extend(given);
         }
-        let flow = self.body(&k.body);
+        let outer = std::mem::replace(&mut self.base, depth);
+        let flow = self.body(&declared.steps);
+        self.base = outer;
         self.leave();
         flow
     }
@@ -142,9 +129,10 @@ impl Runner<'_> {
     }
 
     /// Returns the index of the kernel that a call denotes: a known one, or a new one.
-    fn instance(&mut self, e: &Expr, place: usize) -> Result<usize, ChainError> {
-        let (frozen, options) = (self.frozen.clone(), self.options);
-        let mut built = build(e, &frozen, options, &mut self.env())?;
+    fn instance(&mut self, call: &KernelCall) -> Result<usize, ChainError> {
+        let (frozen, kernels) = (self.frozen.clone(), &self.plan.kernels);
+        let setting = Setting { kernels, frozen: &frozen, options: self.options };
+        let mut built = build(call, setting, &mut self.env())?;
         let i = match self.instances.iter().position(|i| i.signature == built.signature) {
             Some(i) => {
                 let known = &mut self.instances[i];
@@ -158,18 +146,20 @@ impl Runner<'_> {
                 let message = format!(
                     "this run already has {MOST} kernels (a kernel with different arguments counts as another)"
                 );
-                return Err(fail(e.span, message).into());
+                return Err(fail(call.span, message).into());
             }
             None => {
-                let stats =
-                    KernelStats { name: crate::syntax::print_expr(e), ..Default::default() };
+                let stats = KernelStats { name: call.text.to_string(), ..Default::default() };
                 let (signature, kernel) = (built.signature, Some(built.kernel));
                 self.instances.push(Instance { signature, kernel, saved: Vec::new(), stats });
                 self.instances.len() - 1
             }
         };
-        if is_constant(e) {
-            self.calls.insert(place, i);
+        if call.is_constant {
+            if self.calls.len() <= call.index {
+                self.calls.resize(call.index + 1, None);
+            }
+            self.calls[call.index] = Some(i);
         }
         Ok(i)
     }

@@ -1,13 +1,16 @@
 //! Banks in plans: which ones a plan names, and the neighbours that a kernel gets from
 //! them.
 
-use super::{RunOptions, argument, call};
-use crate::infer::calls::expr::{PlanEnv, evaluate};
-use crate::infer::calls::selection::fail;
+use crate::infer::calls::error::fail;
+use crate::infer::calls::formula::{PlanEnv, evaluate};
 use crate::infer::neighbours::Neighbours;
+use crate::infer::run::RunOptions;
+use crate::lang::builtins::{Inference, Kind};
+use crate::lang::code::Code;
 use crate::lang::error::RunError;
+use crate::lang::plan::{Argument, Callee, Formula, FormulaKind, KernelCall, Step};
 use crate::lang::value::Value;
-use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind};
+use crate::syntax::span::Span;
 use std::sync::Arc;
 
 /// The number of neighbours, if a kernel does not specify it.
@@ -21,28 +24,41 @@ const MOST: f64 = 10_000.0;
 ///
 /// # Errors
 /// As [`neighbours`].
-pub(super) fn check(plan: &[KStmt], options: &RunOptions) -> Result<(), Box<RunError>> {
-    plan.iter().try_for_each(|s| match &s.kind {
-        KStmtKind::Warmup { body, .. }
-        | KStmtKind::Repeat { body, .. }
-        | KStmtKind::Every { body, .. }
-        | KStmtKind::For { body, .. } => check(body, options),
-        KStmtKind::Mix(arms) => arms.iter().try_for_each(|a| check_kernel(&a.kernel, options)),
-        KStmtKind::Expr(e) => check_kernel(e, options),
-        _ => Ok(()),
-    })
+pub(super) fn check(
+    code: &Code,
+    steps: &[Step],
+    options: &RunOptions,
+) -> Result<(), Box<RunError>> {
+    let is_knn = |call: &KernelCall| match call.kernel {
+        Callee::Builtin(i) => {
+            matches!(code.builtins.get(i).kind, Kind::Inference(Inference::Knn))
+        }
+        Callee::Declared(_) => false,
+    };
+    for step in steps {
+        for call in step.calls().filter(|call| is_knn(call)) {
+            let constant = |place| match value(call, place).map(|f| &f.kind) {
+                Some(FormulaKind::Const(v)) => Some(v),
+                _ => None,
+            };
+            let k = match (value(call, 2), constant(2)) {
+                (None, _) => K,
+                (_, Some(Value::Num(x))) => whole(*x).unwrap_or(K),
+                _ => continue,
+            };
+            if let Some(Value::Str(bank)) = constant(1) {
+                find(options, call.span, bank, k)?;
+            }
+        }
+        check(code, step.body(), options)?;
+    }
+    Ok(())
 }
 
-fn check_kernel(e: &Expr, options: &RunOptions) -> Result<(), Box<RunError>> {
-    let Some(("knn", args)) = call(e) else { return Ok(()) };
-    let k = match argument(args, 2, "k").map(|k| &k.kind) {
-        None => K,
-        Some(ExprKind::Num(x)) => whole(*x).unwrap_or(K),
-        Some(_) => return Ok(()),
-    };
-    match argument(args, 1, "bank").map(|b| &b.kind) {
-        Some(ExprKind::Str(bank)) => find(options, e, bank, k).map(|_| ()),
-        _ => Ok(()),
+fn value(call: &KernelCall, place: usize) -> Option<&Formula> {
+    match call.args.get(place) {
+        Some(Argument::Value(f)) => Some(f),
+        _ => None,
     }
 }
 
@@ -52,13 +68,13 @@ fn whole(x: f64) -> Option<usize> {
 
 fn find(
     options: &RunOptions,
-    e: &Expr,
+    span: Span,
     bank: &str,
     k: usize,
 ) -> Result<Arc<Neighbours>, Box<RunError>> {
     match &options.banks {
-        Some(banks) => banks.neighbours(bank, k).map_err(|message| fail(e.span, message)),
-        None => Err(fail(e.span, format!("knn: the bank {bank:?} is not known to this run"))),
+        Some(banks) => banks.neighbours(bank, k).map_err(|message| fail(span, message)),
+        None => Err(fail(span, format!("knn: the bank {bank:?} is not known to this run"))),
     }
 }
 
@@ -67,19 +83,18 @@ fn find(
 /// # Errors
 /// If its arguments are wrong, or the bank cannot be used.
 pub(in crate::infer) fn neighbours(
-    e: &Expr,
-    args: &[Arg],
+    call: &KernelCall,
     options: &RunOptions,
     env: &mut PlanEnv,
 ) -> Result<Arc<Neighbours>, Box<RunError>> {
-    let Some(bank) = argument(args, 1, "bank") else {
-        return Err(fail(e.span, "knn needs a bank made by `pcadlang learn`".into()));
+    let Some(bank) = value(call, 1) else {
+        return Err(fail(call.span, "knn needs a bank made by `pcadlang learn`".into()));
     };
     let name = match evaluate(bank, env)? {
         Value::Str(s) => s,
         v => return Err(fail(bank.span, format!("knn: `bank` must be a string, got {v}"))),
     };
-    let k = match argument(args, 2, "k") {
+    let k = match value(call, 2) {
         None => K,
         Some(k) => match evaluate(k, env)? {
             Value::Num(x) if whole(x).is_some() => x as usize,
@@ -91,5 +106,5 @@ pub(in crate::infer) fn neighbours(
             }
         },
     };
-    find(options, e, &name, k)
+    find(options, call.span, &name, k)
 }

@@ -1,25 +1,24 @@
-//! Runs a plan on a chain, statement by statement.
+//! Runs a plan on a chain, step by step.
 
-use super::checkpoint::Checkpoint;
 use super::place::{Doing, PlanPosition};
-use super::{ChainError, ChainResult, Progress, RunOptions};
-use crate::infer::calls::expr::{PlanEnv, evaluate};
-use crate::infer::calls::selection::{fail, selector};
+use crate::infer::calls::error::fail;
+use crate::infer::calls::formula::{PlanEnv, evaluate};
+use crate::infer::calls::selection::selector;
 use crate::infer::draws::{DrawRow, KernelStats, Sink};
 use crate::infer::kernel::{Kernel, StepContext};
 use crate::infer::plain::Plain;
 use crate::infer::population::Population;
 use crate::infer::record::Recorder;
+use crate::infer::run::{ChainError, ChainResult, Progress, RunOptions};
 use crate::infer::sites::Sites;
 use crate::infer::state::StateError;
-use crate::lang::code::Code;
+use crate::lang::code::{Code, Operand};
 use crate::lang::error::{FaultKind, RunError};
+use crate::lang::plan::{Formula, Plan, Step, StepKind, Variable};
 use crate::lang::value::{Extent, Value};
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::{Expr, KStmt, KStmtKind};
 use crate::trace::{Constraint, Draws, Limits, Selector, Stop, Trace};
-use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -59,16 +58,19 @@ impl Instance {
 
 pub(super) struct Runner<'a> {
     pub code: &'a Arc<Code>,
+    pub plan: &'a Plan,
     pub options: &'a RunOptions,
     pub progress: &'a Progress,
     pub sink: &'a mut dyn Sink,
     pub chain: u32,
     pub trace: Trace,
-    pub variables: Vec<(Arc<str>, Value)>,
+    /// The variables of the block, and of the declared kernels being applied.
+    pub variables: Vec<Value>,
+    /// Where those of the innermost declared kernel begin.
+    pub base: usize,
     pub instances: Vec<Instance>,
-    /// The index of the kernel of each call whose arguments are constant, by the call's
-    /// position.
-    pub calls: FxHashMap<usize, usize>,
+    /// The kernel of each call whose arguments are constant, once it has been built.
+    pub calls: Vec<Option<usize>>,
     pub sites: Sites,
     pub recorder: Recorder,
     pub frozen: Selector,
@@ -98,7 +100,7 @@ impl<'a> Runner<'a> {
     /// A chain at the beginning of a plan.
     pub fn new(
         code: &'a Arc<Code>,
-        plan: &[KStmt],
+        plan: &'a Plan,
         options: &'a RunOptions,
         progress: &'a Progress,
         sink: &'a mut dyn Sink,
@@ -108,16 +110,18 @@ impl<'a> Runner<'a> {
         trace.set_incremental(options.incremental);
         Runner {
             code,
+            plan,
             options,
             progress,
             sink,
             chain,
             trace,
             variables: Vec::new(),
+            base: 0,
             instances: Vec::new(),
-            calls: FxHashMap::default(),
+            calls: Vec::new(),
             sites: Sites::default(),
-            recorder: Recorder::new(code, plan),
+            recorder: Recorder::new(plan),
             frozen: Selector::Nothing,
             started,
             step: 0,
@@ -140,9 +144,9 @@ impl<'a> Runner<'a> {
     ///
     /// # Errors
     /// If the program or the sink fails.
-    pub fn run(mut self, plan: &[KStmt]) -> Result<ChainResult, ChainError> {
+    pub fn run(mut self) -> Result<ChainResult, ChainError> {
         if !self.finished {
-            let flow = match self.body(plan) {
+            let flow = match self.body(&self.plan.steps) {
                 // A step that was stopped in the middle is abandoned: the draws and
                 // checkpoints before it remain.
                 Err(ChainError::Run(e)) if e.kind == FaultKind::Stopped && self.draws > 0 => {
@@ -193,18 +197,11 @@ impl<'a> Runner<'a> {
     pub fn env(&mut self) -> PlanEnv<'_> {
         let draws = self.predictive();
         let (started, steps) = (self.started, self.step);
-        PlanEnv {
-            code: self.code,
-            trace: &mut self.trace,
-            variables: &self.variables,
-            draws,
-            started,
-            steps,
-            moved: None,
-        }
+        let variables = self.variables.get(self.base..).unwrap_or_default();
+        PlanEnv { trace: &mut self.trace, variables, draws, started, steps, moved: None }
     }
 
-    pub fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
+    pub fn value(&mut self, e: &Formula) -> Result<Value, Box<RunError>> {
         let v = evaluate(e, &mut self.env())?;
         match v.extent() {
             Extent::Fits => Ok(v),
@@ -214,7 +211,7 @@ impl<'a> Runner<'a> {
         }
     }
 
-    pub fn count(&mut self, e: &Expr) -> Result<u64, Box<RunError>> {
+    pub fn count(&mut self, e: &Formula) -> Result<u64, Box<RunError>> {
         match self.value(e)? {
             Value::Num(x) if x >= 0.0 && x == libm::trunc(x) => Ok(x as u64),
             v => Err(fail(e.span, format!("expected a whole number of repetitions, got {v}"))),
@@ -223,7 +220,7 @@ impl<'a> Runner<'a> {
 
     /// Applies the program's `freeze` statements.
     pub fn freeze(&mut self) -> Result<(), ChainError> {
-        for f in &self.code.freezes {
+        for f in &*self.plan.freezes {
             let s = selector(f, &mut self.env())?;
             self.frozen = match std::mem::replace(&mut self.frozen, Selector::Nothing) {
                 Selector::Nothing => s,
@@ -234,11 +231,11 @@ impl<'a> Runner<'a> {
     }
 
     /// Runs statements in order, starting where a checkpoint resumes.
-    pub fn body(&mut self, stmts: &[KStmt]) -> Result<Flow, ChainError> {
+    pub fn body(&mut self, steps: &'a [Step]) -> Result<Flow, ChainError> {
         let level = self.path.len();
         let mut back = self.resume_path.pop_front();
         let first = back.as_ref().map_or(0, |p| p.statement);
-        for (statement, s) in stmts.iter().enumerate().skip(first) {
+        for (statement, s) in steps.iter().enumerate().skip(first) {
             let place = back.take().unwrap_or(PlanPosition {
                 statement,
                 depth: self.variables.len(),
@@ -247,7 +244,7 @@ impl<'a> Runner<'a> {
             let doing = place.doing.clone();
             self.path.truncate(level);
             self.path.push(place);
-            match self.statement(s, doing)? {
+            match self.statement(s, None, doing)? {
                 Flow::Next => {}
                 flow => {
                     self.path.truncate(level);
@@ -268,42 +265,66 @@ impl<'a> Runner<'a> {
 
     /// Drops the variables that were added since the present statement began.
     pub fn leave(&mut self) {
-        let depth = self.path.last().map_or(0, |p| p.depth);
-        self.variables.truncate(depth);
+        self.variables.truncate(self.depth());
     }
 
-    fn statement(&mut self, s: &KStmt, doing: Doing) -> Result<Flow, ChainError> {
+    /// The number of variables when the present statement began.
+    pub fn depth(&self) -> usize {
+        self.path.last().map_or(0, |p| p.depth)
+    }
+
+    /// Binds a variable. Those of statements that have ended are dropped.
+    fn bind(&mut self, variable: Variable, value: Value) {
+        self.variables.truncate(self.base + variable);
+        self.variables.push(value);
+    }
+
+    /// The innermost loop that counts its passes: the pass, their number, and the step at
+    /// which it began.
+    pub fn innermost(&self) -> Option<(u64, u64, u64)> {
+        self.path.iter().rev().find_map(|p| match p.doing {
+            Doing::Loop { pass, of, first } => Some((pass, of, first)),
+            _ => None,
+        })
+    }
+
+    /// Runs a statement; `arm` is its index in a `mix`.
+    pub fn statement(
+        &mut self,
+        s: &'a Step,
+        arm: Option<usize>,
+        doing: Doing,
+    ) -> Result<Flow, ChainError> {
         match &s.kind {
-            KStmtKind::Warmup { count, body } => self.warmup(count, body, doing),
-            KStmtKind::Repeat { count, body } => self.repeat(count, body, doing),
-            KStmtKind::Every { count, body } => {
+            StepKind::Init(_) => Ok(Flow::Next),
+            StepKind::Anneal(from) => self.anneal(from, s.span),
+            StepKind::Warmup(count, body) => self.warmup(count, body, doing),
+            StepKind::Repeat(count, body) => self.repeat(count, body, doing),
+            StepKind::Every(count, body) => {
                 // When resuming within the body, it is known to be due.
                 if !self.resume_path.is_empty() {
                     return self.body(body);
                 }
                 let n = self.count(count)?.max(1);
-                let pass = self.variables.iter().rev().find(|(name, _)| &**name == PASS);
-                match pass {
-                    Some((_, Value::Num(i))) if (*i as u64 + 1).is_multiple_of(n) => {
-                        self.body(body)
-                    }
+                match self.innermost() {
+                    Some((pass, ..)) if (pass + 1).is_multiple_of(n) => self.body(body),
                     _ => Ok(Flow::Next),
                 }
             }
-            KStmtKind::Mix(arms) => self.mix(arms, doing),
-            KStmtKind::For { var, iter, body } => {
+            StepKind::Mix(arms) => self.mix(arms, doing),
+            StepKind::For(items, variable, body) => {
                 let (begin, items) = match doing {
                     Doing::Items { item, all: Some(all) } => {
                         (item, all.iter().map(Plain::value).collect())
                     }
-                    _ => (0, self.value(iter)?.passes()),
+                    _ => (0, self.value(items)?.passes()),
                 };
                 let all: Option<Vec<Plain>> = items.iter().map(Plain::of).collect();
                 let all: Option<Arc<[Plain]>> = all.map(Arc::from);
                 for (item, value) in items.into_iter().enumerate().skip(begin) {
                     self.note(Doing::Items { item, all: all.clone() });
                     if self.resume_path.is_empty() {
-                        self.variables.push((Arc::clone(&var.node), value));
+                        self.bind(*variable, value);
                     }
                     let flow = self.body(body)?;
                     self.leave();
@@ -315,7 +336,7 @@ impl<'a> Runner<'a> {
                 }
                 Ok(Flow::Next)
             }
-            KStmtKind::StopWhen(cond) => match self.value(cond)? {
+            StepKind::StopWhen(cond) => match self.value(cond)? {
                 Value::Bool(true) => Ok(Flow::Stop),
                 Value::Bool(false) => Ok(Flow::Next),
                 v => {
@@ -323,34 +344,42 @@ impl<'a> Runner<'a> {
                         .into())
                 }
             },
-            KStmtKind::Collect(exprs) => {
+            StepKind::Collect(columns) => {
                 if !self.in_warmup {
-                    self.record(Some(exprs))?;
+                    self.record(Some(columns))?;
                 }
                 Ok(Flow::Next)
             }
-            KStmtKind::Let { name, expr } => {
-                let v = self.value(expr)?;
-                self.variables.push((Arc::clone(&name.node), v));
+            StepKind::Let(variable, value) => {
+                let v = self.value(value)?;
+                self.bind(*variable, v);
                 Ok(Flow::Next)
             }
-            KStmtKind::Propose { .. } | KStmtKind::Map { .. } => {
+            StepKind::Propose(..)
+            | StepKind::Draw(..)
+            | StepKind::Map(..)
+            | StepKind::MapDrawn(..) => {
                 Err(fail(s.span, "`propose` belongs in a kernel".into()).into())
             }
-            KStmtKind::Expr(e) => self.apply(e, None, doing),
+            StepKind::Apply(call) => self.apply(call, arm, doing),
         }
     }
 
     /// The pass, the number of passes and the first step of a loop: at its beginning, or
     /// where a checkpoint resumes.
-    pub fn passes(&mut self, count: &Expr, doing: Doing) -> Result<(u64, u64, u64), ChainError> {
+    pub fn passes(&mut self, count: &Formula, doing: Doing) -> Result<(u64, u64, u64), ChainError> {
         match doing {
             Doing::Loop { pass, of, first } => Ok((pass, of, first)),
             _ => Ok((0, self.count(count)?, self.step)),
         }
     }
 
-    fn repeat(&mut self, count: &Expr, body: &[KStmt], doing: Doing) -> Result<Flow, ChainError> {
+    fn repeat(
+        &mut self,
+        count: &Formula,
+        body: &'a [Step],
+        doing: Doing,
+    ) -> Result<Flow, ChainError> {
         let (mut i, passes, first) = self.passes(count, doing)?;
         let outermost = self.loops == 0 && !self.in_warmup;
         let unbounded = outermost && (self.options.steps.is_some() || self.options.time.is_some());
@@ -373,20 +402,16 @@ impl<'a> Runner<'a> {
     pub fn pass(
         &mut self,
         (i, of, first): (u64, u64, u64),
-        body: &[KStmt],
+        body: &'a [Step],
     ) -> Result<Flow, ChainError> {
         self.note(Doing::Loop { pass: i, of, first });
         if self.loops == 0 {
             self.progress.pass.store(i, Ordering::Relaxed);
             self.progress.passes.store(of, Ordering::Relaxed);
         }
-        if self.resume_path.is_empty() {
-            if self.is_over() {
-                self.keep(None)?;
-                return Ok(Flow::End);
-            }
-            self.variables.push((Arc::from(PASS), Value::Num(i as f64)));
-            self.variables.push((Arc::from(PASSES), Value::Num(of as f64)));
+        if self.resume_path.is_empty() && self.is_over() {
+            self.keep(None)?;
+            return Ok(Flow::End);
         }
         self.loops += 1;
         let flow = self.body(body);
@@ -425,16 +450,16 @@ impl<'a> Runner<'a> {
         if !self.sink.takes_checkpoints() {
             return Ok(());
         }
-        if let Some(checkpoint) = Checkpoint::of(self, doing) {
+        if let Some(checkpoint) = self.checkpoint(doing) {
             self.sink.checkpoint(&checkpoint).map_err(ChainError::Sink)?;
         }
         Ok(())
     }
 
     /// Records a draw.
-    pub fn record(&mut self, exprs: Option<&[Expr]>) -> Result<(), ChainError> {
+    pub fn record(&mut self, collected: Option<&[(String, Operand)]>) -> Result<(), ChainError> {
         let draws = self.predictive();
-        let mut values = self.recorder.values(self.code, &mut self.trace, exprs, draws)?;
+        let mut values = self.recorder.values(self.code, &mut self.trace, collected, draws)?;
         if self.options.pointwise {
             self.recorder.add_pointwise(&self.trace, &mut values);
         }
@@ -471,7 +496,3 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 }
-
-/// Variables of loops, read by `every` and `anneal`; programs cannot write these names.
-pub(super) const PASS: &str = "#pass";
-pub(super) const PASSES: &str = "#passes";

@@ -1,20 +1,21 @@
 //! Warm-up: loops whose draws are discarded, in which kernels adapt and the likelihood
 //! may be annealed.
 
-use super::ChainError;
 use super::place::Doing;
-use super::runner::{Flow, PASS, PASSES, Runner};
-use crate::infer::calls::selection::fail;
+use super::runner::{Flow, Runner};
+use crate::infer::calls::error::fail;
+use crate::infer::run::ChainError;
+use crate::lang::plan::{Formula, Step};
 use crate::lang::value::Value;
 use crate::rng::{Purpose, Stream, StreamKey};
-use crate::syntax::ast::{Arg, Expr, KStmt};
+use crate::syntax::span::Span;
 use std::sync::atomic::Ordering;
 
-impl Runner<'_> {
+impl<'a> Runner<'a> {
     pub(super) fn warmup(
         &mut self,
-        count: &Expr,
-        body: &[KStmt],
+        count: &Formula,
+        body: &'a [Step],
         doing: Doing,
     ) -> Result<Flow, ChainError> {
         let (mut i, passes, first) = self.passes(count, doing)?;
@@ -42,46 +43,32 @@ impl Runner<'_> {
 
     /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a
     /// warm-up.
-    pub(super) fn anneal(&mut self, e: &Expr, args: &[Arg]) -> Result<Flow, ChainError> {
+    pub(super) fn anneal(&mut self, from: &Formula, span: Span) -> Result<Flow, ChainError> {
         if !self.in_warmup {
             return Err(fail(
-                e.span,
+                span,
                 "`anneal` is allowed only in `warmup`, whose draws are discarded".into(),
             )
             .into());
         }
-        let from = match args {
-            [a] => match self.value(&a.value)? {
-                Value::Num(t) if t >= 1.0 => t,
-                v => {
-                    return Err(fail(
-                        a.value.span,
-                        format!("expected a temperature of at least 1, got {v}"),
-                    )
-                    .into());
-                }
-            },
-            _ => {
-                return Err(fail(
-                    e.span,
-                    "anneal takes one argument, the initial temperature".into(),
-                )
-                .into());
+        let from = match self.value(from)? {
+            Value::Num(t) if t >= 1.0 => t,
+            v => {
+                let message = format!("expected a temperature of at least 1, got {v}");
+                return Err(fail(from.span, message).into());
             }
         };
-        let number = |name: &str| match self.variables.iter().rev().find(|(n, _)| &**n == name) {
-            Some((_, Value::Num(x))) => *x,
-            _ => 0.0,
-        };
+        let (pass, of, _) = self.innermost().unwrap_or_default();
+        let passed = pass as f64 / (of as f64).max(1.0);
         // Under a time limit the schedule follows the clock. The number of steps is
         // recorded, and a replay by steps counts passes instead.
         let share = match (self.options.warmup, self.options.time) {
             (Some(n), _) => self.step as f64 / (n.max(1) as f64),
             (None, Some(t)) => {
                 let clock = self.started.elapsed().as_secs_f64() / (t.as_secs_f64() / 2.0);
-                clock.max(number(PASS) / number(PASSES).max(1.0))
+                clock.max(passed)
             }
-            (None, None) => number(PASS) / number(PASSES).max(1.0),
+            (None, None) => passed,
         };
         let share = share.clamp(0.0, 1.0);
         let power = libm::pow(from, share - 1.0);

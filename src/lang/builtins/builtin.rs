@@ -101,6 +101,43 @@ pub enum Form {
     LogLikelihood,
 }
 
+/// What a name of inference blocks stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Inference {
+    Mh,
+    Block,
+    Drift,
+    Gibbs,
+    Elliptical,
+    Slice,
+    Hmc,
+    Nuts,
+    Mala,
+    Knn,
+    Delayed,
+    Temper,
+    Smc,
+    Abc,
+    Modes,
+    Optimize,
+    /// A kernel of a host.
+    Host,
+    One,
+    Each,
+    Init,
+    Anneal,
+    Prior,
+    BestOf,
+    Value,
+    Elapsed,
+    Steps,
+    /// Belongs in reports.
+    Reported,
+    /// This version checks and documents it but cannot run it.
+    Planned,
+}
+
 /// The kind of a built-in.
 #[derive(Clone, Copy)]
 pub enum Kind {
@@ -111,7 +148,7 @@ pub enum Kind {
     /// A form.
     Form(Form),
     /// Known only to inference plans: kernels, starts, monitors.
-    Inference,
+    Inference(Inference),
 }
 
 /// The action of a built-in on single numbers, if that determines it completely. Compiled

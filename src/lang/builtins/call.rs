@@ -5,7 +5,8 @@
 //! closure through the built-in in their [`Args`]. Callers need not know about hosts.
 
 use super::builtin::{
-    ArgAdjoints, Args, Builtin, Derivative, HostItem, Incremental, Kind, PreviousEvaluation,
+    ArgAdjoints, Args, Builtin, Derivative, HostItem, Incremental, Inference, Kind,
+    PreviousEvaluation,
 };
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
@@ -25,7 +26,7 @@ impl HostItem {
             HostItem::Incremental { vjp, .. } => (Kind::Function(call_host), product(vjp)),
             HostItem::Family(_) => (Kind::Distribution(make_host_dist), Derivative::Unknown),
             HostItem::Likelihood(_) => (Kind::Function(call_host), Derivative::Product(vjp_host)),
-            HostItem::Kernel(_) => (Kind::Inference, Derivative::Unknown),
+            HostItem::Kernel(_) => (Kind::Inference(Inference::Host), Derivative::Unknown),
         }
     }
 }
@@ -40,7 +41,7 @@ impl Builtin {
         match self.kind {
             Kind::Function(f) => f(&args),
             Kind::Distribution(_) => self.distribution(values).map(|d| Value::Dist(Arc::new(d))),
-            Kind::Form(_) | Kind::Inference => Err(Fault::type_error(format!(
+            Kind::Form(_) | Kind::Inference(_) => Err(Fault::type_error(format!(
                 "`{}` cannot be used as a function value",
                 self.name
             ))),

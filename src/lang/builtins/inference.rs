@@ -4,32 +4,37 @@
 //! This module declares and documents them; the engine implements them. They are not
 //! values of the model.
 
-use super::{Arg, Builtin, Kind, Row, Type, arg, opt};
+use super::{Arg, Builtin, Inference, Kind, Row, Type, arg, opt};
 
 const KERNELS: &str = "Kernels";
 const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
-/// Names that this version checks and documents but cannot run.
-const PLANNED: &[&str] = &["acceptance", "rhat", "ess", "snapshot"];
-
 impl Builtin {
     /// Whether this version only checks and documents it but cannot run it.
     pub fn is_planned(&self) -> bool {
-        matches!(self.kind, Kind::Inference)
-            && self.host.is_none()
-            && PLANNED.contains(&&*self.name)
+        matches!(self.kind, Kind::Inference(Inference::Planned))
     }
 }
 
 const fn name(
+    what: Inference,
     name: &'static str,
     section: &'static str,
     args: &'static [Arg],
     returns: Type,
     doc: &'static str,
 ) -> Row {
-    Row::new(Kind::Inference, name, section, args, returns, doc)
+    Row::new(Kind::Inference(what), name, section, args, returns, doc)
+}
+
+const fn kernel(
+    what: Inference,
+    name: &'static str,
+    args: &'static [Arg],
+    doc: &'static str,
+) -> Row {
+    self::name(what, name, KERNELS, args, Type::Kernel, doc)
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");
@@ -45,23 +50,21 @@ const INNER: Arg = arg("move", Type::Kernel, "The inner kernel.");
 const X: Arg = arg("x", Type::Any, "A numeric quantity of the model, as in `collect`.");
 
 pub(super) const TABLE: &[Row] = &[
-    name(
+    kernel(
+        Inference::Mh,
         "mh",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Metropolis-Hastings that proposes a single selected choice from its prior.",
     ),
-    name(
+    kernel(
+        Inference::Block,
         "block",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Metropolis-Hastings that proposes all selected choices jointly from their prior.",
     ),
-    name(
+    kernel(
+        Inference::Drift,
         "drift",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -71,26 +74,23 @@ pub(super) const TABLE: &[Row] = &[
                 "A fixed step size in the unconstrained space, instead of one adapted in warm-up.",
             ),
         ],
-        Type::Kernel,
         "Gaussian random walk in the unconstrained space; discrete choices move to another value.",
     ),
-    name(
+    kernel(
+        Inference::Gibbs,
         "gibbs",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Draws a selected finite discrete choice from its full conditional, by enumeration of its values.",
     ),
-    name(
+    kernel(
+        Inference::Elliptical,
         "elliptical",
-        KERNELS,
         &[SEL],
-        Type::Kernel,
         "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp (Murray et al. 2010).",
     ),
-    name(
+    kernel(
+        Inference::Slice,
         "slice",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -106,23 +106,21 @@ pub(super) const TABLE: &[Row] = &[
                 "Expands the interval by doubling instead of stepping out: for slices much wider than `width`.",
             ),
         ],
-        Type::Kernel,
         "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",
     ),
-    name(
+    kernel(
+        Inference::Hmc,
         "hmc",
-        KERNELS,
         &[
             SEL,
             opt("steps", Type::Int, "10", "The number of leapfrog steps per proposal."),
             MARGINAL,
         ],
-        Type::Kernel,
         "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     ),
-    name(
+    kernel(
+        Inference::Nuts,
         "nuts",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -133,40 +131,36 @@ pub(super) const TABLE: &[Row] = &[
             ),
             MARGINAL,
         ],
-        Type::Kernel,
         "The No-U-Turn sampler (Hoffman and Gelman 2014).",
     ),
-    name(
+    kernel(
+        Inference::Mala,
         "mala",
-        KERNELS,
         &[SEL, MARGINAL],
-        Type::Kernel,
         "The Metropolis-adjusted Langevin algorithm: one gradient per proposal.",
     ),
-    name(
+    kernel(
+        Inference::Knn,
         "knn",
-        KERNELS,
         &[
             SEL,
             arg("bank", Type::Str, "A file made by `pcadlang learn`."),
             opt("k", Type::Int, "10", "The number of neighbours."),
         ],
-        Type::Kernel,
         "Data-driven independence proposal: a kernel density estimate over the latents of the \
          bank's pictures nearest to the observed one.",
     ),
-    name(
+    kernel(
+        Inference::Delayed,
         "delayed",
-        KERNELS,
         &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
-        Type::Kernel,
         "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \
          …`; only those that pass are evaluated under the observation itself (Christen and Fox \
          2005). Exact for any surrogate that is positive wherever the likelihood is.",
     ),
-    name(
+    kernel(
+        Inference::Temper,
         "temper",
-        KERNELS,
         &[
             INNER,
             opt("levels", Type::Int, "6", "The number of temperatures."),
@@ -177,22 +171,20 @@ pub(super) const TABLE: &[Row] = &[
                 "The lowest power of the likelihood; warm-up adapts the ladder of temperatures.",
             ),
         ],
-        Type::Kernel,
         "Replica exchange (parallel tempering) over powers of the likelihood: each step updates \
          every replica, then proposes swaps of neighbours (Geyer 1991).",
     ),
-    name(
+    kernel(
+        Inference::Smc,
         "smc",
-        KERNELS,
         &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
-        Type::Kernel,
         "Proposes complete states by annealed sequential Monte Carlo with the inner kernel, \
          accepted by their evidence estimates (particle independent Metropolis-Hastings, Andrieu \
          et al. 2010). No other kernel may change the state in between.",
     ),
-    name(
+    kernel(
+        Inference::Abc,
         "abc",
-        KERNELS,
         &[
             INNER,
             arg("eps", Type::Num, "The tolerance: the largest accepted distance."),
@@ -205,14 +197,13 @@ pub(super) const TABLE: &[Row] = &[
             ),
             opt("moves", Type::Int, "1", "The number of moves of each particle at each tolerance."),
         ],
-        Type::Kernel,
         "Approximate Bayesian computation (likelihood-free): the inner kernel targets the prior, \
          and a proposal is accepted if data simulated from it are within `eps` of the observed \
          data in root mean square (Marjoram et al. 2003).",
     ),
-    name(
+    kernel(
+        Inference::Modes,
         "modes",
-        KERNELS,
         &[
             SEL,
             opt(
@@ -241,7 +232,6 @@ pub(super) const TABLE: &[Row] = &[
                 "Observations that are replaced by their coarse surrogates during the search for modes.",
             ),
         ],
-        Type::Kernel,
         "Jumps between modes. The first step searches for them: the most probable draws of the \
          selected choices climb by L-BFGS, in rounds that each keep the better half; in warm-up \
          the state then moves to one of the modes, drawn by the Laplace estimates of their \
@@ -250,14 +240,14 @@ pub(super) const TABLE: &[Row] = &[
          proposed jointly from a mixture of Laplace approximations at the modes (independent \
          Metropolis-Hastings, Tierney 1994).",
     ),
-    name(
+    kernel(
+        Inference::Optimize,
         "optimize",
-        KERNELS,
         &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
-        Type::Kernel,
         "Climbs to a mode of the posterior: for starting points or quick answers. Not a sampler.",
     ),
     name(
+        Inference::One,
         "one",
         CHOICES,
         &[SEL],
@@ -266,6 +256,7 @@ pub(super) const TABLE: &[Row] = &[
          corrects for changes in their number.",
     ),
     name(
+        Inference::Each,
         "each",
         CHOICES,
         &[SEL],
@@ -274,6 +265,7 @@ pub(super) const TABLE: &[Row] = &[
          choice. For mh, gibbs and drift.",
     ),
     name(
+        Inference::Init,
         "init",
         CHOICES,
         &[arg("start", Type::Kernel, "`prior()` or `best_of(n)`.")],
@@ -281,6 +273,7 @@ pub(super) const TABLE: &[Row] = &[
         "Sets how a chain starts; by default, from the prior.",
     ),
     name(
+        Inference::Anneal,
         "anneal",
         CHOICES,
         &[arg("from", Type::Num, "The initial temperature, at least 1.")],
@@ -289,8 +282,9 @@ pub(super) const TABLE: &[Row] = &[
          warm-up. If several starts are kept, this is population annealing: they move in turn, \
          and are resampled by their weights.",
     ),
-    name("prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
+    name(Inference::Prior, "prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
     name(
+        Inference::BestOf,
         "best_of",
         CHOICES,
         &[
@@ -313,14 +307,23 @@ pub(super) const TABLE: &[Row] = &[
         "A start: the draw from the prior with the highest log joint density.",
     ),
     name(
+        Inference::Value,
         "value",
         CHOICES,
         &[arg("at", Type::Selection, "The address of one choice.")],
         Type::Any,
         "The current value of a choice, in user kernels and conditions.",
     ),
-    name("elapsed", MONITORS, &[], Type::Num, "The time since the chain started, in seconds."),
     name(
+        Inference::Elapsed,
+        "elapsed",
+        MONITORS,
+        &[],
+        Type::Num,
+        "The time since the chain started, in seconds.",
+    ),
+    name(
+        Inference::Steps,
         "steps",
         MONITORS,
         &[],
@@ -328,6 +331,7 @@ pub(super) const TABLE: &[Row] = &[
         "The number of kernel applications in this chain so far.",
     ),
     name(
+        Inference::Planned,
         "acceptance",
         MONITORS,
         &[],
@@ -335,6 +339,7 @@ pub(super) const TABLE: &[Row] = &[
         "The acceptance rate of this chain after warm-up.",
     ),
     name(
+        Inference::Planned,
         "rhat",
         MONITORS,
         &[X],
@@ -342,6 +347,7 @@ pub(super) const TABLE: &[Row] = &[
         "Rank-normalised split R-hat over all chains, evaluated at step barriers (Vehtari et al. 2021).",
     ),
     name(
+        Inference::Planned,
         "ess",
         MONITORS,
         &[X],
@@ -349,6 +355,7 @@ pub(super) const TABLE: &[Row] = &[
         "The bulk effective sample size over all chains (Vehtari et al. 2021).",
     ),
     name(
+        Inference::Planned,
         "snapshot",
         MONITORS,
         &[arg("view", Type::Object("view"), "The view to draw.")],
@@ -356,6 +363,7 @@ pub(super) const TABLE: &[Row] = &[
         "Writes a picture of the current view to the run's folder.",
     ),
     name(
+        Inference::Reported,
         "summary",
         MONITORS,
         &[opt("sel", Type::Selection, "@**", "The choices to summarise.")],
@@ -363,6 +371,7 @@ pub(super) const TABLE: &[Row] = &[
         "Mean, sd, interval, effective sample size and R-hat of each selected choice.",
     ),
     name(
+        Inference::Reported,
         "best",
         MONITORS,
         &[arg("x", Type::Any, "An expression of the model.")],

@@ -29,7 +29,7 @@ mod row;
 mod table;
 
 pub use builtin::{
-    ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Form, HostItem, Kind,
+    ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Form, HostItem, Inference, Kind,
     PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp,
 };
 pub use covariance::CovarianceValue;

@@ -37,12 +37,9 @@ pub struct Code {
     pub samples: Vec<Operand>,
     /// `force @a = v;` statements, in order.
     pub forces: Vec<Force>,
-    /// `freeze sel;` statements, in order.
-    pub freezes: Vec<crate::syntax::ast::Expr>,
-    /// The kernels the program declares.
-    pub kernels: Vec<crate::syntax::ast::KernelDecl>,
-    /// Expressions of inference blocks, reports and exports that only read the model, by
-    /// source span.
+    /// Whether it has `freeze` statements.
+    pub has_freezes: bool,
+    /// Expressions of reports and exports, by source span.
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
     /// Observed values that replace those of the program, by the hash of the
     /// observation's address.

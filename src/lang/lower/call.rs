@@ -35,10 +35,7 @@ impl Lowerer<'_> {
                             None => self.nothing(),
                         }
                     }
-                    Kind::Inference => {
-                        self.only_in_plans(&b.name, callee.span);
-                        self.nothing()
-                    }
+                    Kind::Inference(what) => self.given(what, b, args, e, callee.span),
                 }
             }
             Target::Function(block) => {

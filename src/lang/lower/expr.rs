@@ -21,6 +21,9 @@ impl Lowerer<'_> {
             ExprKind::Bool(b) => self.constant(Value::Bool(*b)),
             ExprKind::Var(name) => self.variable(name, e.span),
             ExprKind::Address(_) | ExprKind::TagSel { .. } => {
+                if self.refused_in_plans(e.span) {
+                    return self.nothing();
+                }
                 self.error(
                     "a selection of choices is not a value of the model",
                     e.span,
@@ -55,7 +58,14 @@ impl Lowerer<'_> {
                 self.operator(name, &[(v, expr.span)], e.span)
             }
             ExprKind::Binary { op, left, right } => self.binary(*op, left, right, e.span),
+            ExprKind::If { then, otherwise, .. }
+                if [then, otherwise].iter().any(|b| !b.is_expression())
+                    && self.refused_in_plans(e.span) =>
+            {
+                self.nothing()
+            }
             ExprKind::If { cond, then, otherwise } => self.if_else(cond, then, otherwise),
+            ExprKind::Lambda(_) if self.refused_in_plans(e.span) => self.nothing(),
             ExprKind::Lambda(l) => self.lambda(l, &Arc::from("fn"), e.span),
             ExprKind::Error => self.nothing(),
         }
@@ -112,7 +122,7 @@ impl Lowerer<'_> {
                     self.error(format!("`{name}` can only be called"), span, "not a value")
                         .hint_also(format!("wrap it in a function: fn(x) {{ {name}(…) }}"));
                 }
-                Kind::Inference => self.only_in_plans(name, span),
+                Kind::Inference(_) => self.only_in_plans(name, span),
             }
             return self.nothing();
         }

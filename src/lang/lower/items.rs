@@ -1,7 +1,7 @@
 //! The top level of a file: includes, parameters, data, functions, statements.
 
 use super::interface::inspect;
-use super::lowerer::{AddHint, Export, Lowerer, Pending, Plan, Report, Typed};
+use super::lowerer::{AddHint, Export, Lowerer, Pending, Report, Typed};
 use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
 use super::types::{accepts, declared, shown};
 use crate::diag::{IntoDiagnostic, nearest};
@@ -102,7 +102,7 @@ impl Lowerer<'_> {
                 // A plan of an included file belongs to that file, and is ignored here.
                 ItemKind::Infer { name, body } if index == 0 => {
                     let name = name.as_ref().map(|n| Arc::clone(&n.node));
-                    self.plans.push(Plan { name, body: body.clone().into() });
+                    self.blocks.push((name, body.clone()));
                 }
                 ItemKind::Report { exprs, file } if index == 0 => {
                     self.reports

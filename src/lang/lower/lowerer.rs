@@ -1,6 +1,7 @@
 //! The state of lowering: what it is given, and what has been lowered so far.
 
-use super::scope::{Body, Module, Scope};
+use super::formula::Lowering;
+use super::scope::{Body, Module, Scope, ScopeKind};
 use super::types::of_value;
 use crate::diag::{Diagnostic, SourceMap};
 use crate::lang::builtins::data::Options;
@@ -8,6 +9,7 @@ use crate::lang::builtins::{Table, Type};
 use crate::lang::code::{Block, BlockId, BlockKind, Code, Eager, Op, Operand, Slot};
 use crate::lang::error::Fault;
 use crate::lang::load::Loaded;
+use crate::lang::plan::Plan;
 use crate::lang::value::Value;
 use crate::syntax::ast::{Expr, FnDecl, KStmt, KernelDecl, Name};
 use crate::syntax::span::Span;
@@ -37,15 +39,6 @@ pub struct Inputs<'a> {
     pub defaults: FxHashMap<(String, String), Value>,
     /// What runs even if nothing depends on it.
     pub eager: Eager,
-}
-
-/// An inference block.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// Its name, if it has one.
-    pub name: Option<Arc<str>>,
-    /// Its statements.
-    pub body: Arc<[KStmt]>,
 }
 
 /// `report e, … as "file";`
@@ -86,8 +79,17 @@ pub(super) struct Lowerer<'a> {
     /// The enclosing function bodies; the first is the top level.
     pub bodies: Vec<Body>,
     pub pending: Vec<Pending>,
-    pub plans: Vec<Plan>,
+    /// The inference blocks as written, by name, and compiled.
+    pub blocks: Vec<(Option<Arc<str>>, Vec<KStmt>)>,
+    pub plans: Vec<Arc<Plan>>,
     pub kernels: IndexMap<Arc<str>, KernelDecl>,
+    pub freezes: Vec<Expr>,
+    /// The number of calls of kernels so far.
+    pub calls: usize,
+    /// The number of expressions of plans so far whose values vary.
+    pub varying: usize,
+    /// The expression of a plan that is being lowered, if any.
+    pub lowering: Option<Lowering>,
     pub reports: Vec<Report>,
     pub exports: Vec<Export>,
     pub used_sets: Vec<String>,
@@ -103,7 +105,36 @@ pub(super) struct Typed {
     pub ty: Type,
 }
 
-impl Lowerer<'_> {
+impl<'a> Lowerer<'a> {
+    pub fn new(loaded: &'a Loaded, inputs: Inputs<'a>, map: &'a mut SourceMap) -> Self {
+        let (builtins, eager) = (Arc::clone(&inputs.builtins), inputs.eager);
+        let blocks = vec![Block::new(BlockKind::Root, None)];
+        Lowerer {
+            code: Code { builtins, eager, blocks, ..Code::default() },
+            inputs,
+            loaded,
+            map,
+            errors: Vec::new(),
+            modules: vec![Module::default()],
+            module: 0,
+            scopes: vec![Scope::new(0, ScopeKind::Root)],
+            bodies: vec![Body::default()],
+            pending: Vec::new(),
+            blocks: Vec::new(),
+            plans: Vec::new(),
+            kernels: IndexMap::new(),
+            freezes: Vec::new(),
+            calls: 0,
+            varying: 0,
+            lowering: None,
+            reports: Vec::new(),
+            exports: Vec::new(),
+            used_sets: Vec::new(),
+            used_data: Vec::new(),
+            roots: IndexSet::new(),
+        }
+    }
+
     pub fn error(
         &mut self,
         message: impl Into<String>,

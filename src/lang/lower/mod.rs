@@ -8,12 +8,13 @@
 //!
 //! There is one file per concern: `lowerer` the state, `scope` and `names` names and
 //! sites, `items` the top level, `stmt` statements, `draw` random choices and containers,
-//! `expr` expressions, `call` calls, `plan` inference blocks, `select` selections, `types`
-//! static types, `hints` suggestions for unknown names, `interface` parameters and data.
+//! `expr` expressions, `call` calls, `plan` inference blocks, `formula` their expressions,
+//! `select` selections, `types` static types, `hints` suggestions for unknown names, `interface` parameters and data.
 
 mod call;
 mod draw;
 mod expr;
+mod formula;
 mod hints;
 mod interface;
 mod items;
@@ -26,14 +27,18 @@ mod stmt;
 mod types;
 
 pub use interface::{DataItem, Interface, ParamItem, inspect};
-pub use lowerer::{Export, Inputs, Plan, ReadData, Report};
+pub use lowerer::{Export, Inputs, ReadData, Report};
 
-use super::code::{Block, BlockKind, Code};
+use super::builtins::Table;
+use super::code::{Code, Eager};
 use super::load::Loaded;
+use super::plan::{DeclaredKernel, Plan};
+use super::value::Value;
 use crate::diag::{Diagnostic, SourceMap};
-use indexmap::{IndexMap, IndexSet};
-use lowerer::{AddHint, Lowerer};
-use scope::{Body, Module, Scope, ScopeKind};
+use crate::syntax::ast::KStmt;
+use indexmap::IndexMap;
+use lowerer::Lowerer;
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// A program ready to run.
@@ -42,7 +47,9 @@ pub struct Compiled {
     /// The model.
     pub code: Arc<Code>,
     /// Its inference blocks, in order.
-    pub plans: Vec<Plan>,
+    pub plans: Vec<Arc<Plan>>,
+    /// The kernels it declares.
+    pub kernels: Arc<[DeclaredKernel]>,
     /// Its reports.
     pub reports: Vec<Report>,
     /// Its exports.
@@ -58,35 +65,10 @@ pub fn compile(
     inputs: Inputs,
     map: &mut SourceMap,
 ) -> Result<Compiled, Vec<Diagnostic>> {
-    let mut l = Lowerer {
-        code: Code {
-            builtins: Arc::clone(&inputs.builtins),
-            eager: inputs.eager,
-            ..Code::default()
-        },
-        inputs,
-        loaded,
-        map,
-        errors: Vec::new(),
-        modules: vec![Module::default()],
-        module: 0,
-        scopes: Vec::new(),
-        bodies: Vec::new(),
-        pending: Vec::new(),
-        plans: Vec::new(),
-        kernels: IndexMap::new(),
-        reports: Vec::new(),
-        exports: Vec::new(),
-        used_sets: Vec::new(),
-        used_data: Vec::new(),
-        roots: IndexSet::new(),
-    };
-    l.code.blocks.push(Block::new(BlockKind::Root, None));
-    l.scopes.push(Scope::new(0, ScopeKind::Root));
-    l.bodies.push(Body::default());
+    let mut l = Lowerer::new(loaded, inputs, map);
     l.unit(0);
     l.function_bodies();
-    l.inference();
+    let kernels = l.inference();
     l.unused_inputs();
     if !l.errors.is_empty() {
         // Errors without a location are about the command line; they come first.
@@ -94,7 +76,23 @@ pub fn compile(
         l.errors.dedup();
         return Err(l.errors);
     }
-    l.code.kernels = l.kernels.into_values().collect();
     l.code.finish();
-    Ok(Compiled { code: Arc::new(l.code), plans: l.plans, reports: l.reports, exports: l.exports })
+    let (code, plans) = (Arc::new(l.code), l.plans);
+    Ok(Compiled { code, plans, kernels, reports: l.reports, exports: l.exports })
+}
+
+/// Compiles an inference block that reads nothing of a program, such as the default one.
+pub fn compile_plan(builtins: Arc<Table>, body: &[KStmt]) -> Plan {
+    let inputs = Inputs {
+        builtins,
+        sets: &[],
+        data: IndexMap::new(),
+        read: &|_, _, _, _| Ok(Value::Unit),
+        needs_data: false,
+        defaults: FxHashMap::default(),
+        eager: Eager::default(),
+    };
+    let (loaded, mut map) = (Loaded::default(), SourceMap::new());
+    let mut l = Lowerer::new(&loaded, inputs, &mut map);
+    Plan { steps: l.plan_body(body, &mut plan::Around::default()), ..Plan::default() }
 }

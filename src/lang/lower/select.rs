@@ -1,8 +1,10 @@
 //! Selections of choices; the addresses and tags in them must occur in the program.
 
 use super::lowerer::{AddHint, Lowerer};
+use super::plan::Around;
 use crate::diag::nearest;
-use crate::syntax::ast::{Address, BinaryOp, Expr, ExprKind, Key, SegmentName};
+use crate::lang::plan::Selection;
+use crate::syntax::ast::{Address, BinaryOp, Expr, ExprKind, SegmentName};
 use crate::syntax::span::Span;
 use std::sync::Arc;
 
@@ -10,10 +12,17 @@ use std::sync::Arc;
 const BUILT_IN: [&str; 4] = ["continuous", "discrete", "gaussian", "finite"];
 
 impl Lowerer<'_> {
-    /// Checks a selection; `names` are variables that it may use.
-    pub fn selection(&mut self, e: &Expr, names: &[Arc<str>]) {
+    /// Compiles a selection.
+    pub fn selection(&mut self, e: &Expr, around: &Around) -> Selection {
+        self.check_selection(e);
+        let read = Selection::read(e, &mut |key| self.formula(key, around));
+        // What is wrong was reported.
+        read.unwrap_or_else(|_| Selection::Tag("".into(), None))
+    }
+
+    fn check_selection(&mut self, e: &Expr) {
         match &e.kind {
-            ExprKind::Address(a) => self.address(a, e.span, names),
+            ExprKind::Address(a) => self.address(a, e.span),
             ExprKind::TagSel { name, .. } => {
                 let known = BUILT_IN.contains(&&**name) || self.code.tags.contains(name);
                 if !known {
@@ -45,23 +54,14 @@ impl Lowerer<'_> {
                 left,
                 right,
             } => {
-                self.selection(left, names);
-                self.selection(right, names);
+                self.check_selection(left);
+                self.check_selection(right);
             }
-            ExprKind::Call { callee, args } => {
-                let name = match &callee.kind {
-                    ExprKind::Var(n) => &**n,
-                    _ => "",
-                };
-                match (name, &args[..]) {
-                    ("one" | "each", [a]) => self.selection(&a.value, names),
-                    _ => {
-                        self.error("expected a selection of choices", e.span, "not a selection")
-                            .hint_also("an address such as @**, a tag such as $affine, or one(…) or each(…) of either");
-                    }
-                }
+            ExprKind::Call { .. } => {
+                self.error("expected a selection of choices", e.span, "not a selection").hint_also(
+                    "an address such as @**, a tag such as $affine, or one(…) or each(…) of either",
+                );
             }
-            ExprKind::Var(v) if names.contains(v) => {}
             ExprKind::Var(v) => {
                 let bound = self.roots.contains(v);
                 let e = self.error("expected a selection of choices", e.span, "not a selection");
@@ -81,18 +81,7 @@ impl Lowerer<'_> {
     }
 
     /// Checks that an address begins with a name under which there are choices.
-    pub fn address(&mut self, a: &Address, span: Span, names: &[Arc<str>]) {
-        for s in &a.segments {
-            for k in &s.keys {
-                if let Key::Expr(e) = k
-                    && let ExprKind::Var(v) = &e.kind
-                    && !names.contains(v)
-                    && self.lookup(v).is_none()
-                {
-                    self.unbound(v, e.span);
-                }
-            }
-        }
+    pub fn address(&mut self, a: &Address, span: Span) {
         let Some(first) = a.segments.first() else { return };
         let SegmentName::Name(name) = &first.name else { return };
         if self.roots.contains(name) {

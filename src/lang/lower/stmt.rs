@@ -112,7 +112,8 @@ impl Lowerer<'_> {
             }
             StmtKind::Freeze(sel) => {
                 if at_root {
-                    self.code.freezes.push(sel.clone());
+                    self.freezes.push(sel.clone());
+                    self.code.has_freezes = true;
                 } else {
                     self.error(
                         "`freeze` is allowed only at the top level",

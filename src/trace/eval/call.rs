@@ -34,6 +34,10 @@ impl Graph {
                 let v = vs[i as usize].clone();
                 Ok(self.finish(code, n, v))
             }
+            (Arguments::Supplied(vs), i) if (i as usize) < vs.len() => {
+                let v = vs[i as usize].clone()?;
+                Ok(self.finish(code, n, v))
+            }
             (Arguments::Item, 0) | (Arguments::Fold, 1) => self.evaluate_item(code, n),
             (Arguments::Fold, 0) => self.evaluate_accumulator(code, n),
             _ => match default {

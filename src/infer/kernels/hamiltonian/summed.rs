@@ -12,7 +12,7 @@
 
 use super::memory::Layout;
 use super::point::Point;
-use crate::infer::calls::selection::fail;
+use crate::infer::calls::error::fail;
 use crate::infer::kernel::{Outcome, StepContext, recoverable};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;

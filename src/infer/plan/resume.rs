@@ -1,0 +1,126 @@
+//! Interrupting a chain and resuming it: from a runner to a checkpoint, and back.
+
+use super::checkpoint::{Checkpoint, SavedKernel};
+use super::place::Doing;
+use super::runner::{Instance, Runner};
+use crate::infer::draws::Sink;
+use crate::infer::plain::Plain;
+use crate::infer::run::{ChainError, Progress, RunOptions};
+use crate::infer::state::StateError;
+use crate::infer::stats::KernelStats;
+use crate::lang::code::Code;
+use crate::lang::plan::Plan;
+use crate::platform::clock::Instant;
+use crate::trace::{Draws, Trace};
+use std::sync::Arc;
+use std::time::Duration;
+
+impl<'a> Runner<'a> {
+    /// The checkpoint of a chain now, inside a statement that has got as far as `doing`;
+    /// `None` if any of its variables is not plain data.
+    pub fn checkpoint(&self, doing: Option<Doing>) -> Option<Checkpoint> {
+        let r = self;
+        let variables = r.variables.iter().map(Plain::of).collect::<Option<_>>()?;
+        let mut path = r.path.clone();
+        if let (Some(last), Some(doing)) = (path.last_mut(), doing) {
+            last.doing = doing;
+        }
+        if path.iter().any(|p| matches!(p.doing, Doing::Items { all: None, .. })) {
+            return None;
+        }
+        let kernel = |i: &Instance| {
+            let (state, log_evidence, step_size) = match &i.kernel {
+                Some(k) => (k.save(&r.trace), k.log_evidence(), k.step_size()),
+                None => (i.saved.clone(), i.stats.log_evidence, i.stats.step_size),
+            };
+            let stats = KernelStats { log_evidence, step_size, ..i.stats.clone() };
+            SavedKernel { signature: i.signature.clone(), state, stats }
+        };
+        Some(Checkpoint {
+            seed: r.options.seed,
+            chain: r.chain,
+            step: r.step,
+            warmup_steps: r.warmup_steps,
+            draws: r.draws,
+            counted: r.counted,
+            seconds: r.started.elapsed().as_secs_f64(),
+            finished: r.finished,
+            power: r.power,
+            state: r.trace.constraints(),
+            best: r.best.clone(),
+            population: r.population.clone(),
+            variables,
+            path,
+            kernels: r.instances.iter().map(kernel).collect(),
+            sites: r.sites.list(),
+            columns: r.recorder.columns().to_vec(),
+            observed: r.recorder.observed().clone(),
+            frozen: r.frozen.clone(),
+            callback: r.options.callback.as_ref().map(|w| w.save(r.chain)).unwrap_or_default(),
+        })
+    }
+
+    /// A chain that resumes from a checkpoint.
+    ///
+    /// # Errors
+    /// If the checkpoint belongs to another seed or chain, or the program fails with its
+    /// choices.
+    pub fn resume(
+        code: &'a Arc<Code>,
+        plan: &'a Plan,
+        options: &'a RunOptions,
+        progress: &'a Progress,
+        sink: &'a mut dyn Sink,
+        chain: u32,
+        c: Checkpoint,
+    ) -> Result<Self, ChainError> {
+        if (c.seed, c.chain) != (options.seed, chain) {
+            let message = format!(
+                "the checkpoint belongs to chain {} with seed {}",
+                u64::from(c.chain) + 1,
+                c.seed
+            );
+            return Err(StateError::new(message).into());
+        }
+        let count = c.state.len();
+        let (trace, _) =
+            Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits.clone())?;
+        if trace.choice_count() != count {
+            return Err(
+                StateError::new("the checkpoint's choices are not those of the program").into()
+            );
+        }
+        if let Some(callback) = &options.callback {
+            callback.load(chain, &c.callback)?;
+        }
+        let past = Duration::try_from_secs_f64(c.seconds).unwrap_or_default();
+        let now = Instant::now();
+        let started = now.checked_sub(past).unwrap_or(now);
+        let mut runner = Runner::new(
+            code,
+            plan,
+            options,
+            progress,
+            sink,
+            (chain, started),
+            (trace, c.population),
+        );
+        runner.variables = c.variables.iter().map(Plain::value).collect();
+        runner.resume_path = c.path.into();
+        let saved = |k: SavedKernel| Instance {
+            signature: k.signature,
+            kernel: None,
+            saved: k.state,
+            stats: k.stats,
+        };
+        runner.instances = c.kernels.into_iter().map(saved).collect();
+        runner.sites.load(c.sites);
+        runner.recorder.set_columns(c.columns);
+        runner.recorder.set_observed(c.observed);
+        runner.frozen = c.frozen;
+        runner.counted = c.counted;
+        (runner.step, runner.warmup_steps, runner.draws) = (c.step, c.warmup_steps, c.draws);
+        (runner.power, runner.best, runner.finished) = (c.power, c.best, c.finished);
+        Ok(runner)
+    }
+}

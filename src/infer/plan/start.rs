@@ -1,0 +1,61 @@
+//! The `init` statement of a plan.
+
+use crate::infer::calls::build::arguments;
+use crate::infer::calls::error::fail;
+use crate::infer::calls::formula::{PlanEnv, evaluate};
+use crate::infer::init::Start;
+use crate::infer::kernels::ProgramKernel;
+use crate::infer::run::{ChainError, RunOptions};
+use crate::lang::code::Code;
+use crate::lang::error::RunError;
+use crate::lang::plan::{BestOf, Callee, Formula, KernelCall, Plan, StepKind};
+use crate::lang::value::Value;
+use crate::trace::{Draws, Trace};
+use std::sync::Arc;
+
+/// Reads the `init` statement of a plan: how to start, and the kernel it proposes from
+/// (`from = …`), if any. Under a time limit it gets a quarter of that, as much as it
+/// leaves to warm-up.
+pub(super) fn start_of(
+    code: &Arc<Code>,
+    plan: &Plan,
+    options: &RunOptions,
+) -> Result<(Start, Option<ProgramKernel>), ChainError> {
+    let init = plan.steps.iter().find_map(|s| match &s.kind {
+        StepKind::Init(start) => Some(start),
+        _ => None,
+    });
+    let Some(Some(BestOf { draws, keep, from })) = init else {
+        return Ok((Start::default(), None));
+    };
+    let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
+    let mut env = PlanEnv::before(&mut trace, Draws::default());
+    let draws = count(draws, &mut env)?;
+    let keep = keep.as_ref().map_or(Ok(1), |f| count(f, &mut env))?;
+    let from = from.as_ref().map(|call| own(plan, call, &mut env)).transpose()?;
+    let within = options.time.map(|t| t / 4);
+    Ok((Start { draws, keep: keep.min(draws) as usize, within }, from))
+}
+
+fn count(f: &Formula, env: &mut PlanEnv) -> Result<u64, Box<RunError>> {
+    match evaluate(f, env)? {
+        Value::Num(x) if x >= 1.0 => Ok(x as u64),
+        v => Err(fail(f.span, format!("expected a number of draws, got {v}"))),
+    }
+}
+
+/// The declared kernel in the `from` argument of `best_of`.
+fn own(plan: &Plan, call: &KernelCall, env: &mut PlanEnv) -> Result<ProgramKernel, Box<RunError>> {
+    match call.kernel {
+        Callee::Declared(i) if plan.kernels[i].proposes => {
+            let arguments = arguments(&plan.kernels[i], call, env)?;
+            Ok(ProgramKernel::new(Arc::clone(&plan.kernels), i, arguments, env.started))
+        }
+        _ => {
+            let mut wrong = fail(call.span, "`from` takes a kernel declared in the program".into());
+            wrong.hint =
+                Some("kernel near() { propose @x ~ normal(2, 0.1); } infer { init(best_of(20, from = near())); … }".into());
+            Err(wrong)
+        }
+    }
+}
