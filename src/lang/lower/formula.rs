@@ -1,8 +1,7 @@
 //! Expressions of inference blocks: each becomes a function of the program, whose
 //! parameters are the values that the plan supplies.
 
-use super::lowerer::{AddHint, Lowerer, Typed};
-use super::plan::Around;
+use super::lowerer::{AddHint, Around, Lowerer, Lowering, Typed};
 use super::scope::{Binding, Body, Meaning, Scope, ScopeKind};
 use crate::lang::builtins::{Builtin, Inference, Type};
 use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Slot};
@@ -10,13 +9,6 @@ use crate::lang::plan::{Argument, Formula, FormulaKind, Given, Path, PathSegment
 use crate::syntax::ast::{Arg, Expr};
 use crate::syntax::span::Span;
 use std::sync::Arc;
-
-/// The expression of a plan that is being lowered.
-pub(super) struct Lowering {
-    block: BlockId,
-    given: Vec<Given>,
-    around: Around,
-}
 
 impl Lowerer<'_> {
     /// Lowers an expression of an inference block.

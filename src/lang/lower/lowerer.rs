@@ -1,6 +1,5 @@
 //! The state of lowering: what it is given, and what has been lowered so far.
 
-use super::formula::Lowering;
 use super::scope::{Body, Module, Scope, ScopeKind};
 use super::types::of_value;
 use crate::diag::{Diagnostic, SourceMap};
@@ -9,7 +8,7 @@ use crate::lang::builtins::{Table, Type};
 use crate::lang::code::{Block, BlockId, BlockKind, Code, Eager, Op, Operand, Slot};
 use crate::lang::error::Fault;
 use crate::lang::load::Loaded;
-use crate::lang::plan::Plan;
+use crate::lang::plan::{Given, Plan};
 use crate::lang::value::Value;
 use crate::syntax::ast::{Expr, FnDecl, KStmt, KernelDecl, Name};
 use crate::syntax::span::Span;
@@ -64,6 +63,31 @@ pub(super) struct Pending {
     pub module: usize,
     pub block: BlockId,
     pub decl: FnDecl,
+}
+
+/// The context of a statement of an inference block.
+#[derive(Clone, Default)]
+pub(super) struct Around {
+    /// Variables of the block.
+    pub names: Vec<Arc<str>>,
+    pub in_loop: bool,
+    pub in_warmup: bool,
+    pub in_kernel: bool,
+}
+
+impl Around {
+    /// Binds a variable.
+    pub fn bind(&mut self, name: &Arc<str>) -> usize {
+        self.names.push(Arc::clone(name));
+        self.names.len() - 1
+    }
+}
+
+/// The expression of a plan that is being lowered.
+pub(super) struct Lowering {
+    pub block: BlockId,
+    pub given: Vec<Given>,
+    pub around: Around,
 }
 
 pub(super) struct Lowerer<'a> {

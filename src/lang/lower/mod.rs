@@ -37,7 +37,7 @@ use super::value::Value;
 use crate::diag::{Diagnostic, SourceMap};
 use crate::syntax::ast::KStmt;
 use indexmap::IndexMap;
-use lowerer::Lowerer;
+use lowerer::{Around, Lowerer};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -94,5 +94,5 @@ pub fn compile_plan(builtins: Arc<Table>, body: &[KStmt]) -> Plan {
     };
     let (loaded, mut map) = (Loaded::default(), SourceMap::new());
     let mut l = Lowerer::new(&loaded, inputs, &mut map);
-    Plan { steps: l.plan_body(body, &mut plan::Around::default()), ..Plan::default() }
+    Plan { steps: l.plan_body(body, &mut Around::default()), ..Plan::default() }
 }

@@ -1,7 +1,7 @@
 //! Inference blocks, declared kernels, reports and exports: all checks, and their
 //! compilation to [plans](crate::lang::plan).
 
-use super::lowerer::{AddHint, Lowerer};
+use super::lowerer::{AddHint, Around, Lowerer};
 use super::types::shown;
 use crate::lang::builtins::{self, Builtin, Inference, Kind, Type};
 use crate::lang::code::Operand;
@@ -14,24 +14,6 @@ use crate::syntax::print_expr;
 use crate::syntax::span::{Span, Spanned};
 use smallvec::SmallVec;
 use std::sync::Arc;
-
-/// The context of a statement of an inference block.
-#[derive(Clone, Default)]
-pub(super) struct Around {
-    /// Variables of the block.
-    pub names: Vec<Arc<str>>,
-    in_loop: bool,
-    in_warmup: bool,
-    in_kernel: bool,
-}
-
-impl Around {
-    /// Binds a variable.
-    fn bind(&mut self, name: &Arc<str>) -> usize {
-        self.names.push(Arc::clone(name));
-        self.names.len() - 1
-    }
-}
 
 impl Lowerer<'_> {
     /// Checks everything except the model, and compiles the plans and declared kernels.

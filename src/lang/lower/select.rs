@@ -1,7 +1,6 @@
 //! Selections of choices; the addresses and tags in them must occur in the program.
 
-use super::lowerer::{AddHint, Lowerer};
-use super::plan::Around;
+use super::lowerer::{AddHint, Around, Lowerer};
 use crate::diag::nearest;
 use crate::lang::plan::Selection;
 use crate::syntax::ast::{Address, BinaryOp, Expr, ExprKind, SegmentName};

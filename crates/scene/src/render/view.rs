@@ -25,7 +25,8 @@ pub struct View {
     frames: BySize<Frame>,
     depths: BySize<Frame>,
     contours: BySize<Contours>,
-    changes: BySize<ContourChange>,
+    /// `None` where the picture is better drawn in full.
+    changes: Mutex<Vec<(u32, Option<Arc<ContourChange>>)>>,
 }
 
 impl View {
@@ -125,25 +126,23 @@ impl View {
     /// The difference of [`View::contours`] from the contours drawn last on the same
     /// canvas, without building the list of those that stay.
     pub fn change(&self, size: u32) -> Arc<ContourChange> {
-        self.change_on_canvas(size).unwrap_or_else(|| {
-            let whole = ContourChange::whole(self.contours(size));
-            once(&self.changes, size, || whole)
-        })
+        let whole = || Arc::new(ContourChange::whole(self.contours(size)));
+        self.change_on_canvas(size).unwrap_or_else(whole)
     }
 
     /// The change, unless the picture is better drawn in full, or its depth is known.
     fn change_on_canvas(&self, size: u32) -> Option<Arc<ContourChange>> {
-        let mut entries = lock(&self.changes);
-        let found = find(&entries, size);
-        found.or_else(|| {
-            if self.depth_drawn(size).is_some() {
-                return None;
-            }
+        let mut entries = self.changes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, change)) = entries.iter().find(|(at, _)| *at == size) {
+            return change.clone();
+        }
+        let draw = || {
             let Scene { solid, camera } = self.scene(size);
-            let change = Arc::new(self.canvas.change(&solid, &camera)?);
-            entries.push((size, Arc::clone(&change)));
-            Some(change)
-        })
+            self.canvas.change(&solid, &camera).map(Arc::new)
+        };
+        let change = if self.depth_drawn(size).is_some() { None } else { draw() };
+        entries.push((size, change.clone()));
+        change
     }
 
     /// The vector-Jacobian product of [`View::contours`] with respect to the solid's

@@ -110,7 +110,7 @@ impl Picture {
             // depends on how much it differs from the last one.
             let since = self.last.changed(solid);
             self.last.set(solid, &since);
-            if since.is_empty() || most(&since) {
+            if most(&since) {
                 return None;
             }
             self.static_layer = None;
