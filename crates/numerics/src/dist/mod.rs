@@ -5,6 +5,7 @@
 //! off the support (including values of the wrong kind) and never NaN.
 
 mod batch;
+mod clamp;
 mod continuous;
 mod datum;
 mod discrete;

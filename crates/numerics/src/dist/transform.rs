@@ -6,19 +6,11 @@
 //! the nearest points inside, so coordinates are always finite. Mapping back always gives
 //! a point strictly inside.
 
+use super::clamp::{FAR, near};
 use super::joint::{ascending, triangle};
 use super::support::wrap_angle;
 use super::{Datum, Support};
 use crate::num::log1p_exp;
-
-/// Coordinates are clamped to this magnitude: e^-700 is near the smallest normal double.
-pub(super) const FAR: f64 = 700.0;
-
-/// Clamps a coordinate to magnitude [`FAR`]; 0 for NaN.
-#[inline]
-pub(super) fn near(y: f64) -> f64 {
-    if y.is_nan() { 0.0 } else { y.clamp(-FAR, FAR) }
-}
 
 impl Support {
     /// Returns the dimension of the unconstrained space; 0 for discrete values.

@@ -1,6 +1,6 @@
 //! Shapes and data folders for this module's tests.
 
-use super::pixels::project::Point;
+use super::pixels::place::Point;
 use crate::geom::{Mesh, Solid};
 use crate::render::Contours;
 use glam::{DVec3, Vec3};

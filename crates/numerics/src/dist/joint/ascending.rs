@@ -4,7 +4,7 @@
 //! In a bounded space, the gaps are those between the numbers' unconstrained coordinates.
 
 use crate::dist::Support;
-use crate::dist::transform::{FAR, near};
+use crate::dist::clamp::{FAR, near};
 
 /// Returns the space in which coordinates are ordered: angles count as an interval.
 fn line(one: &Support) -> Support {

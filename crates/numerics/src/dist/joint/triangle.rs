@@ -8,7 +8,7 @@
 //! order.
 
 use crate::dist::Datum;
-use crate::dist::transform::{FAR, near};
+use crate::dist::clamp::{FAR, near};
 use crate::num::log1p_exp;
 
 /// The largest distance from 1 of the squared length of a row.

@@ -5,8 +5,8 @@ use super::layer::{Layer, Tools, affine_bits};
 use super::static_layer::StaticLayer;
 use crate::geom::{Instance, Mesh};
 use crate::render::lines::visibility::Depths;
+use crate::render::pixels::area::Area;
 use crate::render::pixels::project::DepthRange;
-use crate::render::pixels::raster::Area;
 use crate::render::{Camera, Contours};
 use std::sync::{Arc, Weak};
 

@@ -8,10 +8,11 @@
 use crate::geom::{Affine, Instance};
 use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{BESIDE, Piece};
+use crate::render::pixels::area::Area;
 use crate::render::pixels::candidates::Candidates;
 use crate::render::pixels::frame::to_depth;
 use crate::render::pixels::project::{DepthRange, Lens, Placement, Projected};
-use crate::render::pixels::raster::{Area, draw_mesh};
+use crate::render::pixels::raster::draw_mesh;
 use crate::render::{Camera, Projection, work};
 
 /// Scratch memory for drawing a layer.
@@ -48,7 +49,7 @@ impl Layer {
         projected.clear();
         self.range = projected.add(&instance.mesh, &placement, &Lens::new(camera));
         let vertices = projected.mesh(0);
-        self.area = Area::around(&vertices, camera);
+        self.area = vertices.area(camera);
         self.pieces.clear();
         self.depth.clear();
         self.looks = Area::default();
@@ -94,17 +95,6 @@ impl Layer {
 }
 
 impl Area {
-    /// Removes areas without pixels. If the areas overlap so much that a single one
-    /// around all of them has fewer pixels than their sum, replaces them by that one.
-    pub(super) fn join(areas: &mut Vec<Area>) {
-        areas.retain(|area| area.pixels() > 0);
-        let around = areas.iter().fold(Area::default(), |all, area| all.with(area));
-        if areas.iter().map(Area::pixels).sum::<usize>() > around.pixels() {
-            areas.clear();
-            areas.push(around);
-        }
-    }
-
     /// A rectangle that contains all pixels at which pieces are tested.
     fn looked_at(pieces: &[Piece], camera: &Camera) -> Area {
         let ends = |side: u32, at: fn(&Piece) -> f32| {

@@ -10,7 +10,7 @@ use super::meshes::Meshes;
 use super::static_layer::StaticLayer;
 use crate::geom::{Instance, Solid};
 use crate::render::lines::visibility::Depths;
-use crate::render::pixels::raster::Area;
+use crate::render::pixels::area::Area;
 use crate::render::simd::vectorised;
 use crate::render::{Camera, ContourChange, Contours, work};
 use std::sync::Arc;

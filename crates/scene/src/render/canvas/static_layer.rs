@@ -3,8 +3,8 @@
 
 use crate::render::Camera;
 use crate::render::lines::visibility::{DepthTest, Depths, Piece};
+use crate::render::pixels::area::Area;
 use crate::render::pixels::project::DepthRange;
-use crate::render::pixels::raster::Area;
 use std::sync::Arc;
 
 /// Relative half width of the first interval of depth ranges that a static layer is

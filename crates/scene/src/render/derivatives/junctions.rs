@@ -8,11 +8,25 @@
 //! nearer piece at the end is searched for. Invariant: contributions are added in the
 //! order of the pieces.
 
+use crate::geom::Instance;
 use crate::render::Camera;
-use crate::render::derivatives::vjp::Extracted;
 use crate::render::lines::extraction::Origin;
+use crate::render::lines::visibility::Piece;
 use crate::render::pixels::project::{Lens, Vertices};
 use rustc_hash::FxHashMap;
+
+/// A piece of contour, hidden or not, and its origin on the surface.
+pub(in crate::render) struct Extracted<'a> {
+    pub piece: Piece,
+    pub origin: Origin,
+    /// What the ends of its segment lie on.
+    pub ends: [End; 2],
+    /// Its index among the visible pieces.
+    pub seen: Option<usize>,
+    pub instance: &'a Instance,
+    /// The index of the instance's first vertex among all.
+    pub base: usize,
+}
 
 /// How far from the last visible piece the nearer contour may be, in pixels: depth tests
 /// are 1.2 pixels to the side and read whole pixels.

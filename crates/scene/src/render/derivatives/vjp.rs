@@ -7,27 +7,14 @@
 //! shorter there (`junctions`). Nothing is drawn: the pieces of the meshes are extracted
 //! again, and the visible ones are recognised by their values.
 
-use crate::geom::{Instance, Solid};
-use crate::render::derivatives::junctions::{End, moved_ends};
+use crate::geom::Solid;
+use crate::render::derivatives::junctions::{End, Extracted, moved_ends};
 use crate::render::derivatives::silhouette_derivative::{STEADY, SilhouetteDerivative};
 use crate::render::lines::extraction::{Origin, Room, extract_mesh};
 use crate::render::lines::visibility::Piece;
 use crate::render::pixels::project::{Lens, Placement, Projected};
 use crate::render::{Camera, Contours};
 use glam::DVec3;
-
-/// A piece of contour, hidden or not, and its origin on the surface.
-pub(in crate::render) struct Extracted<'a> {
-    pub piece: Piece,
-    pub origin: Origin,
-    /// What the ends of its segment lie on.
-    pub ends: [End; 2],
-    /// Its index among the visible pieces.
-    pub seen: Option<usize>,
-    instance: &'a Instance,
-    /// The index of the instance's first vertex among all.
-    base: usize,
-}
 
 impl Contours {
     /// The vector-Jacobian product of [`Contours::of`] for the same solid and camera:

@@ -9,7 +9,8 @@ use crate::geom::{Edge, Mesh};
 use crate::render::Camera;
 use crate::render::lines::silhouette::{self, Crossed};
 use crate::render::lines::visibility::{Image, Piece, TestSides};
-use crate::render::pixels::project::{Fronts, Lens, Placement, Point, Vertices, beyond_near};
+use crate::render::pixels::place::Point;
+use crate::render::pixels::project::{Fronts, Lens, Placement, Vertices, beyond_near};
 use crate::render::simd::vectorised;
 
 /// Whether a point is usable and beyond the near plane.

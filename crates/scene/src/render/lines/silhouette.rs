@@ -2,7 +2,8 @@
 //! facing, for many faces at a time.
 
 use crate::geom::{Mesh, Patches, Run, Topology};
-use crate::render::pixels::project::{Lens, Placement, Point, Vertices, beyond_near};
+use crate::render::pixels::place::Point;
+use crate::render::pixels::project::{Lens, Placement, Vertices, beyond_near};
 use glam::DVec3;
 
 /// As [`MOST`], for the last faces of a mesh and for small meshes.

@@ -5,11 +5,11 @@
 //! set up many at a time.
 
 use crate::geom::{Patches, Topology};
+use crate::render::pixels::area::Area;
 use crate::render::pixels::coverage::is_turned;
 use crate::render::pixels::pixel_bitmap::PixelBitmap;
 use crate::render::pixels::place::Extent;
 use crate::render::pixels::project::Vertices;
-use crate::render::pixels::raster::Area;
 use crate::render::pixels::simd_raster::{Batch, Kind, LANES};
 use crate::render::pixels::triangle::{Plane, put_face};
 use glam::Vec4;

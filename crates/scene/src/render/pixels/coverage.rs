@@ -8,8 +8,8 @@
 //! plane does not cut.
 
 use crate::render::lines::crossing::{Crossing, Int};
+use crate::render::pixels::place::Point;
 use crate::render::pixels::place::{BITS, Extent, Place, UNIT, is_near};
-use crate::render::pixels::project::Point;
 
 /// Corner coordinates are clamped to this, in units.
 const FARTHEST: i64 = 1 << 60;

@@ -5,9 +5,11 @@
 //! channels have as many entries, or none if they were not requested.
 
 use crate::geom::{Mesh, Solid};
+use crate::render::pixels::area::Area;
 use crate::render::pixels::candidates::Candidates;
-use crate::render::pixels::project::{Lens, Placement, Point, Projected, project};
-use crate::render::pixels::raster::{Area, WHOLE, cut_triangles, draw_nearness, empty, fill_faces};
+use crate::render::pixels::place::Point;
+use crate::render::pixels::project::{Lens, Placement, Projected, project};
+use crate::render::pixels::raster::{WHOLE, cut_triangles, draw_nearness, empty, fill_faces};
 use crate::render::pixels::triangle::area;
 use crate::render::simd::vectorised;
 use crate::render::{Camera, work};
@@ -159,7 +161,7 @@ fn draw_all(
             });
             continue;
         }
-        let area = Area::around(&vertices, camera);
+        let area = vertices.area(camera);
         shading.begin(camera.pixels(), mesh.topology.triangles.len(), width, &area);
         fill_faces(mesh, placement, camera, &vertices, candidates, nearness, &mut shading.faces);
         for row in area.top..area.bottom {

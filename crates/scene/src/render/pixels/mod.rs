@@ -1,5 +1,6 @@
 //! From triangles to pixels: projection, coverage, depth, shading.
 
+pub(in crate::render) mod area;
 pub(in crate::render) mod candidates;
 pub(in crate::render) mod coverage;
 pub(in crate::render) mod frame;

@@ -93,6 +93,26 @@ pub(in crate::render) fn is_near(least: Place) -> bool {
     least.cmpgt(Vec4::splat(-BOUND)).all()
 }
 
+/// A point in the image.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::render) struct Point {
+    /// Pixels from the left edge.
+    pub x: f64,
+    /// Pixels from the top edge.
+    pub y: f64,
+    /// What grows towards the camera and is linear in the picture; see `project`.
+    pub nearness: f64,
+}
+
+impl Point {
+    /// Rounds to single precision, in which vertices are stored.
+    #[inline]
+    pub fn single(self) -> Point {
+        let [x, y, nearness] = [self.x, self.y, self.nearness].map(|v| f64::from(v as f32));
+        Point { x, y, nearness }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,7 +6,8 @@
 //! over the image inside a triangle, and larger for nearer points in both.
 
 use crate::geom::{Affine, Mesh, Run, Solid, Topology};
-use crate::render::pixels::place::{Extent, Place, place, rounded};
+use crate::render::pixels::area::Area;
+use crate::render::pixels::place::{Extent, Place, Point, place, rounded, size};
 use crate::render::pixels::triangle::Triangle;
 use crate::render::simd::vectorised;
 use crate::render::{Camera, Projection};
@@ -18,26 +19,6 @@ const LANES: usize = 64;
 
 /// Vertices with a coordinate beyond this (scene units) are unusable.
 const HUGE: f64 = 1e9;
-
-/// A point in the image.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::render) struct Point {
-    /// Pixels from the left edge.
-    pub x: f64,
-    /// Pixels from the top edge.
-    pub y: f64,
-    /// See the module documentation.
-    pub nearness: f64,
-}
-
-impl Point {
-    /// Rounds to single precision, in which vertices are stored.
-    #[inline]
-    pub fn single(self) -> Point {
-        let [x, y, nearness] = [self.x, self.y, self.nearness].map(|v| f64::from(v as f32));
-        Point { x, y, nearness }
-    }
-}
 
 /// A camera's projection from camera coordinates to the image.
 #[derive(Clone, Copy, Debug)]
@@ -357,6 +338,21 @@ impl Vertices<'_> {
     /// The least coordinates of all rounded positions.
     pub fn least_of_all(&self) -> Place {
         self.places.iter().fold(Place::INFINITY, |a, b| a.min(*b))
+    }
+
+    /// All pixels that the mesh can cover. The whole image if only some of the vertices are
+    /// usable and beyond the near plane.
+    pub fn area(&self, camera: &Camera) -> Area {
+        if !self.whole {
+            let any = (0..self.len() as u32).any(|v| self.point(v).nearness < f64::INFINITY);
+            return if any { Area::whole(camera) } else { Area::default() };
+        }
+        let extent = Extent::between(self.least_of_all(), size(camera.width, camera.height));
+        if self.len() == 0 || extent.is_empty() {
+            return Area::default();
+        }
+        let [[left, right], [top, bottom]] = extent.ends();
+        Area { left, right, top, bottom }
     }
 
     /// Whether the whole mesh is behind the camera, or beside the picture by at least

@@ -6,12 +6,12 @@
 
 use crate::geom::{Mesh, Solid};
 use crate::render::Camera;
+use crate::render::pixels::area::Area;
 use crate::render::pixels::candidates::Candidates;
 use crate::render::pixels::pixel_bitmap::PixelBitmap;
-use crate::render::pixels::place::{Extent, place, size};
-use crate::render::pixels::project::{
-    DepthRange, Lens, Placement, Point, Projected, Vertices, project,
-};
+use crate::render::pixels::place::Point;
+use crate::render::pixels::place::{place, size};
+use crate::render::pixels::project::{DepthRange, Lens, Placement, Projected, Vertices, project};
 use crate::render::pixels::triangle::Triangle;
 use crate::render::simd::vectorised;
 use glam::DVec3;
@@ -229,72 +229,6 @@ pub(in crate::render) fn fill_faces(
         #[inline(always)]
         || candidates.fill::<true>(topology, vertices, how, (&area, None), buffer, faces),
     );
-}
-
-/// A rectangle of pixels inside an image: columns `left..right`, rows `top..bottom`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(in crate::render) struct Area {
-    pub left: usize,
-    pub right: usize,
-    pub top: usize,
-    pub bottom: usize,
-}
-
-impl Area {
-    /// The whole image.
-    pub fn whole(camera: &Camera) -> Area {
-        Area { left: 0, right: camera.width as usize, top: 0, bottom: camera.height as usize }
-    }
-
-    /// All pixels that a mesh with these vertices can cover. The whole image if only some
-    /// of them are usable and beyond the near plane.
-    pub fn around(vertices: &Vertices<'_>, camera: &Camera) -> Area {
-        if !vertices.whole {
-            let any =
-                (0..vertices.len() as u32).any(|v| vertices.point(v).nearness < f64::INFINITY);
-            return if any { Area::whole(camera) } else { Area::default() };
-        }
-        let extent = Extent::between(vertices.least_of_all(), size(camera.width, camera.height));
-        if vertices.len() == 0 || extent.is_empty() {
-            return Area::default();
-        }
-        let [[left, right], [top, bottom]] = extent.ends();
-        Area { left, right, top, bottom }
-    }
-
-    /// The smallest rectangle around both; one without pixels is ignored.
-    pub fn with(&self, other: &Area) -> Area {
-        match (self.pixels(), other.pixels()) {
-            (_, 0) => *self,
-            (0, _) => *other,
-            _ => Area {
-                left: self.left.min(other.left),
-                right: self.right.max(other.right),
-                top: self.top.min(other.top),
-                bottom: self.bottom.max(other.bottom),
-            },
-        }
-    }
-
-    /// The intersection of two rectangles.
-    #[inline]
-    pub fn common(&self, other: &Area) -> Area {
-        let (left, top) = (self.left.max(other.left), self.top.max(other.top));
-        let (right, bottom) =
-            (self.right.min(other.right).max(left), self.bottom.min(other.bottom).max(top));
-        Area { left, right, top, bottom }
-    }
-
-    /// Whether two rectangles have pixels in common.
-    #[inline]
-    pub fn meets(&self, other: &Area) -> bool {
-        self.common(other).pixels() > 0
-    }
-
-    /// Number of pixels.
-    pub fn pixels(&self) -> usize {
-        (self.right - self.left) * (self.bottom - self.top)
-    }
 }
 
 /// The nearness of a pixel that shows nothing.

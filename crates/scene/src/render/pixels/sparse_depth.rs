@@ -5,11 +5,12 @@
 
 use crate::geom::Solid;
 use crate::render::Camera;
+use crate::render::pixels::area::Area;
 use crate::render::pixels::candidates::Candidates;
 use crate::render::pixels::frame::depth_of;
 use crate::render::pixels::pixel_bitmap::PixelBitmap;
 use crate::render::pixels::project::{Lens, Placement, Projected};
-use crate::render::pixels::raster::{Area, empty, fill_mesh};
+use crate::render::pixels::raster::{empty, fill_mesh};
 use crate::render::pixels::triangle::bits;
 
 /// Marked pixels of an image, and their depth. Reused from image to image.

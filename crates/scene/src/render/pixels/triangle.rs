@@ -4,11 +4,11 @@
 //! nearness is computed from the unrounded ones. Drawing eight pixels at a time and
 //! drawing by runs give the same numbers.
 
+use crate::render::pixels::area::Area;
 use crate::render::pixels::coverage::Coverage;
 use crate::render::pixels::pixel_bitmap::PixelBitmap;
+use crate::render::pixels::place::Point;
 use crate::render::pixels::place::{Extent, Place};
-use crate::render::pixels::project::Point;
-use crate::render::pixels::raster::Area;
 use crate::render::pixels::simd_raster::{LANES, all_bits};
 use glam::Vec4;
 use pulp::bytemuck::cast;
