@@ -1,8 +1,8 @@
 //! Likelihoods of observed pictures given a view.
 
 use super::adjoints::BySolid;
-use super::kept::Kept;
 use super::observed::{DepthValue, ImageValue, MaskValue};
+use super::shared_tally::SharedTally;
 use super::{VIEW, ViewValue, incremental, native};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{
@@ -154,14 +154,14 @@ fn contour(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, St
         weight: a.num_or(6, d.weight)?,
         ..d
     };
-    let kept = Kept::after(previous);
+    let tally = SharedTally::after(previous);
     let value = likelihood(ContourOf {
         view: view(a)?,
         size: size(a, 1)?,
         options,
-        kept: Arc::clone(&kept),
+        tally: Arc::clone(&tally),
     })?;
-    Ok((value, kept))
+    Ok((value, tally))
 }
 
 fn chamfer(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
@@ -176,14 +176,14 @@ fn chamfer(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, St
         truncate: optional(a, 4)?,
         oriented: optional(a, 5)?,
     };
-    let kept = Kept::after(previous);
+    let tally = SharedTally::after(previous);
     let value = likelihood(ChamferOf {
         view: view(a)?,
         size: size(a, 6)?,
         options,
-        kept: Arc::clone(&kept),
+        tally: Arc::clone(&tally),
     })?;
-    Ok((value, kept))
+    Ok((value, tally))
 }
 
 /// The adjoints of a likelihood's arguments: `by` for the view, unknown for `others`
@@ -240,7 +240,7 @@ struct ContourOf {
     view: Arc<View>,
     size: u32,
     options: ContourRatioOptions,
-    kept: Arc<Kept<ContourRatio, contour_ratio::Scratch>>,
+    tally: Arc<SharedTally<ContourRatio, contour_ratio::Scratch>>,
 }
 
 impl ContourOf {
@@ -264,7 +264,7 @@ impl Likelihood for ContourOf {
         let (ratio, change) = (self.prepared(observed)?, self.view.change(self.size));
         let whole = OnceCell::new();
         let whole = || whole.get_or_init(|| self.view.contours(self.size)).slice();
-        Ok(self.kept.with(&ratio, |kept| ratio.log_likelihood_after(&change, whole, kept)))
+        Ok(self.tally.with(&ratio, |tally| ratio.log_likelihood_after(&change, whole, tally)))
     }
 
     /// With respect to the view.
@@ -291,7 +291,7 @@ struct ChamferOf {
     view: Arc<View>,
     size: u32,
     options: ChamferOptions,
-    kept: Arc<Kept<Chamfer, chamfer::Tally>>,
+    tally: Arc<SharedTally<Chamfer, chamfer::Tally>>,
 }
 
 impl ChamferOf {
@@ -323,7 +323,7 @@ impl Likelihood for ChamferOf {
                 chamfer.log_likelihood_after(&change, whole, tally, scratch)
             })
         };
-        Ok(self.kept.with(&chamfer, score))
+        Ok(self.tally.with(&chamfer, score))
     }
 
     /// With respect to the view and sigma.

@@ -17,7 +17,7 @@ mod examples;
 #[cfg(test)]
 mod gradient_tests;
 mod inputs;
-mod kept;
+
 mod objects;
 mod observed;
 mod people;
@@ -25,6 +25,7 @@ mod region;
 mod scene_view;
 mod seeing;
 mod shapes;
+mod shared_tally;
 
 pub use inputs::{CAMERAS, DETECTOR_DEFAULT};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};

@@ -6,21 +6,21 @@ use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 /// Sums over the contours that stay, of the comparator that counted them last. Likelihoods
 /// of one node of a trace share them, as their views share a canvas.
-pub(super) struct Kept<C, T>(Mutex<(Option<Arc<C>>, T)>);
+pub(super) struct SharedTally<C, T>(Mutex<(Option<Arc<C>>, T)>);
 
-impl<C, T> fmt::Debug for Kept<C, T> {
+impl<C, T> fmt::Debug for SharedTally<C, T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Kept")
+        f.write_str("SharedTally")
     }
 }
 
-impl<C: Send + Sync + 'static, T: Default + Send + 'static> Kept<C, T> {
+impl<C: Send + Sync + 'static, T: Default + Send + 'static> SharedTally<C, T> {
     /// What the previous evaluation kept. While another thread counts, nothing: forks that
     /// run side by side would disturb each other.
-    pub fn after(previous: Option<&PreviousEvaluation>) -> Arc<Kept<C, T>> {
-        let kept = previous.and_then(|p| Arc::clone(&p.state).downcast::<Kept<C, T>>().ok());
+    pub fn after(previous: Option<&PreviousEvaluation>) -> Arc<SharedTally<C, T>> {
+        let kept = previous.and_then(|p| Arc::clone(&p.state).downcast::<SharedTally<C, T>>().ok());
         kept.filter(|kept| !matches!(kept.0.try_lock(), Err(TryLockError::WouldBlock)))
-            .unwrap_or_else(|| Arc::new(Kept(Mutex::default())))
+            .unwrap_or_else(|| Arc::new(SharedTally(Mutex::default())))
     }
 
     /// Calls a function with the sums of a comparator, empty ones if they were of another
