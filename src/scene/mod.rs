@@ -34,7 +34,7 @@ pub use scene_view::SceneView;
 
 use crate::geom::GeomError;
 use crate::host::{Entry, Host};
-use crate::lang::builtins::{Arg, Args, PreviousEvaluation, Row, State, Type, function};
+use crate::lang::builtins::{Arg, Args, Resume, Row, Type, function};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use std::sync::Arc;
@@ -66,7 +66,7 @@ const fn incremental(
     args: &'static [Arg],
     returns: Type,
     doc: &'static str,
-    f: fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault>,
+    f: Resume,
 ) -> Row {
     Row { module: "scene", ..Row::incremental(name, section, args, returns, doc, f) }
 }

@@ -38,6 +38,10 @@ impl Arg {
     }
 }
 
+/// A function that may start from its previous evaluation, and returns the state that it
+/// keeps beside its value.
+pub type Resume = fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault>;
+
 /// One built-in; see [`Builtin`].
 #[derive(Clone, Copy)]
 pub struct Row {
@@ -52,8 +56,7 @@ pub struct Row {
     pub scalar: Option<Scalar>,
     pub derivative: Derivative,
     /// How it starts from its previous evaluation, for an incremental function.
-    pub incremental:
-        Option<fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault>>,
+    pub incremental: Option<Resume>,
     /// How files are read, for a kind of data.
     pub format: Option<fn() -> Arc<dyn DataFormat>>,
 }
@@ -105,7 +108,7 @@ impl Row {
         args: &'static [Arg],
         returns: Type,
         doc: &'static str,
-        f: fn(&Args, Option<&PreviousEvaluation>) -> Result<(Value, State), Fault>,
+        f: Resume,
     ) -> Row {
         let kind = Kind::Function(call_host);
         Row { incremental: Some(f), ..Row::new(kind, name, section, args, returns, doc) }
