@@ -36,7 +36,9 @@ pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
 pub use finding::{doc, search};
 pub(crate) use reduce::dot;
-pub(crate) use row::{Arg, Resume, Row, arg, function, opt};
+#[cfg(feature = "scene")]
+pub(crate) use row::Resume;
+pub(crate) use row::{Arg, Row, arg, function, opt};
 pub use table::{Constant, Defaults, InputHook, Table};
 
 #[cfg(test)]
