@@ -25,7 +25,8 @@ impl Table {
         }
     }
 
-    /// Reads data of a kind from the bytes of a file: see [`DataFormat::load`].
+    /// Reads data of a kind from the bytes of a file: see
+    /// [`DataFormat::load`](super::DataFormat::load).
     ///
     /// # Errors
     /// An unknown kind, or bytes that are not of that kind.
