@@ -19,9 +19,8 @@ impl<'a> Runner<'a> {
     /// The checkpoint of a chain now, inside a statement that has got as far as `doing`;
     /// `None` if any of its variables is not plain data.
     pub fn checkpoint(&self, doing: Option<Doing>) -> Option<Checkpoint> {
-        let r = self;
-        let variables = r.variables.iter().map(Plain::of).collect::<Option<_>>()?;
-        let mut path = r.path.clone();
+        let variables = self.variables.iter().map(Plain::of).collect::<Option<_>>()?;
+        let mut path = self.path.clone();
         if let (Some(last), Some(doing)) = (path.last_mut(), doing) {
             last.doing = doing;
         }
@@ -30,33 +29,38 @@ impl<'a> Runner<'a> {
         }
         let kernel = |i: &Instance| {
             let (state, log_evidence, step_size) = match &i.kernel {
-                Some(k) => (k.save(&r.trace), k.log_evidence(), k.step_size()),
+                Some(k) => (k.save(&self.trace), k.log_evidence(), k.step_size()),
                 None => (i.saved.clone(), i.stats.log_evidence, i.stats.step_size),
             };
             let stats = KernelStats { log_evidence, step_size, ..i.stats.clone() };
             SavedKernel { signature: i.signature.clone(), state, stats }
         };
         Some(Checkpoint {
-            seed: r.options.seed,
-            chain: r.chain,
-            step: r.step,
-            warmup_steps: r.warmup_steps,
-            draws: r.draws,
-            counted: r.counted,
-            seconds: r.started.elapsed().as_secs_f64(),
-            finished: r.finished,
-            power: r.power,
-            state: r.trace.constraints(),
-            best: r.best.clone(),
-            population: r.population.clone(),
+            seed: self.options.seed,
+            chain: self.chain,
+            step: self.step,
+            warmup_steps: self.warmup_steps,
+            draws: self.draws,
+            counted: self.counted,
+            seconds: self.started.elapsed().as_secs_f64(),
+            finished: self.finished,
+            power: self.power,
+            state: self.trace.constraints(),
+            best: self.best.clone(),
+            population: self.population.clone(),
             variables,
             path,
-            kernels: r.instances.iter().map(kernel).collect(),
-            sites: r.sites.list(),
-            columns: r.recorder.columns().to_vec(),
-            observed: r.recorder.observed().clone(),
-            frozen: r.frozen.clone(),
-            callback: r.options.callback.as_ref().map(|w| w.save(r.chain)).unwrap_or_default(),
+            kernels: self.instances.iter().map(kernel).collect(),
+            sites: self.sites.list(),
+            columns: self.recorder.columns().to_vec(),
+            observed: self.recorder.observed().clone(),
+            frozen: self.frozen.clone(),
+            callback: self
+                .options
+                .callback
+                .as_ref()
+                .map(|w| w.save(self.chain))
+                .unwrap_or_default(),
         })
     }
 

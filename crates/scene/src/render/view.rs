@@ -12,7 +12,7 @@ use glam::DVec3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Values by image size; few sizes are ever requested, so a list is enough.
-type BySize<T> = Mutex<Vec<(u32, Arc<T>)>>;
+type BySize<T> = Mutex<Vec<(u32, T)>>;
 
 /// A solid and the camera that sees it. `Send` and `Sync`; share it in an `Arc`.
 pub struct View {
@@ -22,11 +22,11 @@ pub struct View {
     detail: f64,
     /// What it shares with the views before and after it.
     canvas: Canvas,
-    frames: BySize<Frame>,
-    depths: BySize<Frame>,
-    contours: BySize<Contours>,
+    frames: BySize<Arc<Frame>>,
+    depths: BySize<Arc<Frame>>,
+    contours: BySize<Arc<Contours>>,
     /// `None` where the picture is better drawn in full.
-    changes: Mutex<Vec<(u32, Option<Arc<ContourChange>>)>>,
+    changes: BySize<Option<Arc<ContourChange>>>,
 }
 
 impl View {
@@ -84,7 +84,7 @@ impl View {
     /// with the full meshes.
     pub fn frame(&self, size: u32) -> Arc<Frame> {
         once(&self.frames, size, || {
-            Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All)
+            Arc::new(Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All))
         })
     }
 
@@ -97,29 +97,27 @@ impl View {
             once(&self.depths, size, || {
                 let Scene { solid, camera } = self.scene(size);
                 let depth = on_canvas.then(|| self.canvas.depth(&solid, &camera)).flatten();
-                match depth {
+                Arc::new(match depth {
                     Some(depth) => Frame::of_depth(&camera, depth),
                     None => Frame::render(&solid, &camera, Channels::Depth),
-                }
+                })
             })
         })
     }
 
     /// The contours in the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn contours(&self, size: u32) -> Arc<Contours> {
-        let found = find(&lock(&self.contours), size);
-        found.unwrap_or_else(|| match self.change_on_canvas(size) {
-            Some(change) if change.moving.len() == change.count => {
-                once_shared(&self.contours, size, || Arc::clone(&change.moving))
+        once(&self.contours, size, || {
+            let change = self.change_on_canvas(size);
+            if let Some(change) = change.as_ref().filter(|c| c.moving.len() == c.count) {
+                return Arc::clone(&change.moving);
             }
-            change => once(&self.contours, size, || {
-                let Scene { solid, camera } = self.scene(size);
-                match self.depth_drawn(size).filter(|_| change.is_none()) {
-                    Some(frame) => Contours::with_depth(&solid, &camera, &frame.depth),
-                    None if change.is_some() => self.canvas.contours(&solid, &camera),
-                    None => Contours::of(&solid, &camera),
-                }
-            }),
+            let Scene { solid, camera } = self.scene(size);
+            Arc::new(match (change, self.depth_drawn(size)) {
+                (Some(_), _) => self.canvas.contours(&solid, &camera),
+                (None, Some(frame)) => Contours::with_depth(&solid, &camera, &frame.depth),
+                (None, None) => Contours::of(&solid, &camera),
+            })
         })
     }
 
@@ -132,17 +130,13 @@ impl View {
 
     /// The change, unless the picture is better drawn in full, or its depth is known.
     fn change_on_canvas(&self, size: u32) -> Option<Arc<ContourChange>> {
-        let mut entries = self.changes.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, change)) = entries.iter().find(|(at, _)| *at == size) {
-            return change.clone();
-        }
-        let draw = || {
+        once(&self.changes, size, || {
+            if self.depth_drawn(size).is_some() {
+                return None;
+            }
             let Scene { solid, camera } = self.scene(size);
             self.canvas.change(&solid, &camera).map(Arc::new)
-        };
-        let change = if self.depth_drawn(size).is_some() { None } else { draw() };
-        entries.push((size, change.clone()));
-        change
+        })
     }
 
     /// The vector-Jacobian product of [`View::contours`] with respect to the solid's
@@ -168,12 +162,12 @@ impl View {
     /// The frame of all channels, if it was drawn and can replace the depth frame: it
     /// shows the full meshes, so only if depth does too.
     fn frame_drawn(&self, size: u32) -> Option<Arc<Frame>> {
-        if self.detail > 0.0 { None } else { find(&lock(&self.frames), size) }
+        if self.detail > 0.0 { None } else { find(&self.frames, size) }
     }
 
     /// A frame with depth at least, if one was drawn.
     fn depth_drawn(&self, size: u32) -> Option<Arc<Frame>> {
-        self.frame_drawn(size).or_else(|| find(&lock(&self.depths), size))
+        self.frame_drawn(size).or_else(|| find(&self.depths, size))
     }
 }
 
@@ -183,28 +177,24 @@ impl std::fmt::Debug for View {
     }
 }
 
-fn lock<T>(cache: &BySize<T>) -> MutexGuard<'_, Vec<(u32, Arc<T>)>> {
+fn lock<T>(cache: &BySize<T>) -> MutexGuard<'_, Vec<(u32, T)>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn find<T>(entries: &[(u32, Arc<T>)], size: u32) -> Option<Arc<T>> {
-    entries.iter().find(|(at, _)| *at == size).map(|(_, value)| value.clone())
+fn find<T: Clone>(cache: &BySize<T>, size: u32) -> Option<T> {
+    lock(cache).iter().find(|(at, _)| *at == size).map(|(_, value)| value.clone())
 }
 
 /// The entry of a size, computed under the lock if missing: a second thread waits rather
 /// than computing it again.
-fn once<T>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> T) -> Arc<T> {
-    once_shared(cache, size, || Arc::new(make()))
-}
-
-/// As [`once`], for a value that is already shared.
-fn once_shared<T>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> Arc<T>) -> Arc<T> {
+fn once<T: Clone>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> T) -> T {
     let mut entries = lock(cache);
-    find(&entries, size).unwrap_or_else(|| {
-        let value = make();
-        entries.push((size, Arc::clone(&value)));
-        value
-    })
+    if let Some((_, value)) = entries.iter().find(|(at, _)| *at == size) {
+        return value.clone();
+    }
+    let value = make();
+    entries.push((size, value.clone()));
+    value
 }
 
 #[cfg(test)]

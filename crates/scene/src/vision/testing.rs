@@ -5,29 +5,9 @@
 use super::pictures::contour_map::ContourMap;
 use crate::contours::{ContourChange, ContourSlice, Contours};
 
-/// Elements that own their lists.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Pieces {
-    pub x: Vec<f32>,
-    pub y: Vec<f32>,
-    pub tx: Vec<f32>,
-    pub ty: Vec<f32>,
-    pub length: Vec<f32>,
-    pub width: u32,
-    pub height: u32,
-}
-
-impl Pieces {
-    fn into_contours(self) -> Contours {
-        let Pieces { x, y, tx, ty, length, width, height } = self;
-        Contours { x, y, tx, ty, length, width, height }
-    }
-
-    pub fn new(width: u32, height: u32) -> Self {
-        Pieces { width, height, ..Pieces::default() }
-    }
-
-    pub fn push(&mut self, x: f32, y: f32, angle: f32, length: f32) {
+impl Contours {
+    /// Adds a piece in the direction of an angle.
+    pub(in crate::vision) fn stroke(&mut self, x: f32, y: f32, angle: f32, length: f32) {
         self.x.push(x);
         self.y.push(y);
         self.tx.push(libm::cosf(angle));
@@ -37,32 +17,20 @@ impl Pieces {
 
     /// A circle of pieces about a pixel long; the centre and radius are fractions of the
     /// width.
-    pub fn circle(mut self, cx: f32, cy: f32, r: f32) -> Self {
+    pub(in crate::vision) fn circle(mut self, cx: f32, cy: f32, r: f32) -> Self {
         let w = self.width as f32;
         let n = (std::f32::consts::TAU * r * w).ceil().max(8.0);
         let step = std::f32::consts::TAU / n;
         for i in 0..n as usize {
             let a = (i as f32 + 0.5) * step;
             let (x, y) = (cx + r * libm::cosf(a), cy + r * libm::sinf(a));
-            self.push(x * w, y * w, a + std::f32::consts::FRAC_PI_2, step * r * w);
+            self.stroke(x * w, y * w, a + std::f32::consts::FRAC_PI_2, step * r * w);
         }
         self
     }
 
-    pub fn elements(&self) -> ContourSlice<'_> {
-        ContourSlice {
-            x: &self.x,
-            y: &self.y,
-            tx: &self.tx,
-            ty: &self.ty,
-            length: &self.length,
-            width: self.width,
-            height: self.height,
-        }
-    }
-
     /// Returns an observed map of the same size.
-    pub fn map(&self) -> ContourMap {
+    pub(in crate::vision) fn map(&self) -> ContourMap {
         ContourMap {
             width: self.width,
             height: self.height,
@@ -75,7 +43,7 @@ impl Pieces {
     }
 
     /// Returns the pieces in the opposite order.
-    pub fn reversed(&self) -> Self {
+    pub(in crate::vision) fn reversed(&self) -> Self {
         let mut r = self.clone();
         for list in [&mut r.x, &mut r.y, &mut r.tx, &mut r.ty, &mut r.length] {
             list.reverse();
@@ -85,7 +53,7 @@ impl Pieces {
 
     /// Returns a copy with the x, y, length or angle (`k` = 0 to 3) of piece `i` changed
     /// by `by`.
-    pub fn nudged(&self, i: usize, k: usize, by: f32) -> Self {
+    pub(in crate::vision) fn nudged(&self, i: usize, k: usize, by: f32) -> Self {
         let mut r = self.clone();
         match k {
             0 => r.x[i] += by,
@@ -103,10 +71,14 @@ impl Pieces {
     /// Counts the derivatives with respect to x, y, length and angle that differ from
     /// central differences of a score. Some may differ where a difference straddles a
     /// kink.
-    pub fn differing(&self, found: &[[f64; 4]], score: impl Fn(&ContourSlice<'_>) -> f64) -> usize {
+    pub(in crate::vision) fn differing(
+        &self,
+        found: &[[f64; 4]],
+        score: impl Fn(&ContourSlice<'_>) -> f64,
+    ) -> usize {
         let h = 1.0f32 / 128.0;
         let differs = |i: usize, k: usize| {
-            let at = |by: f32| score(&self.nudged(i, k, by).elements());
+            let at = |by: f32| score(&self.nudged(i, k, by).slice());
             let numeric = (at(h) - at(-h)) / f64::from(2.0 * h);
             (numeric - found[i][k]).abs() > 2e-3 * (numeric.abs() + 1e-2)
         };
@@ -117,7 +89,7 @@ impl Pieces {
     }
 
     /// Returns a copy moved by some pixels.
-    pub fn moved(&self, dx: f32, dy: f32) -> Self {
+    pub(in crate::vision) fn moved(&self, dx: f32, dy: f32) -> Self {
         let mut r = self.clone();
         r.x.iter_mut().for_each(|x| *x += dx);
         r.y.iter_mut().for_each(|y| *y += dy);
@@ -134,13 +106,13 @@ pub(super) fn numbers(mut seed: u64) -> impl FnMut() -> f32 {
 }
 
 /// An observed map of `n` random strokes.
-pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
+pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Contours {
     let mut next = numbers(seed);
-    let mut pieces = Pieces::new(width, height);
+    let mut pieces = Contours::new(width, height);
     for _ in 0..n {
         let (x, y, angle) = (next() * width as f32, next() * height as f32, next() * 3.1);
         for i in 0..12 {
-            pieces.push(
+            pieces.stroke(
                 x + i as f32 * libm::cosf(angle),
                 y + i as f32 * libm::sinf(angle),
                 angle,
@@ -153,11 +125,11 @@ pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
 
 /// Calls `each` with steps in which some of the pieces appear, disappear or move, and
 /// with all pieces that are there after the step.
-pub(super) fn comings_and_goings(all: &Pieces, mut each: impl FnMut(&ContourChange, &Pieces)) {
+pub(super) fn comings_and_goings(all: &Contours, mut each: impl FnMut(&ContourChange, &Contours)) {
     let only = |keep: &dyn Fn(usize) -> bool| {
-        let mut some = Pieces::new(all.width, all.height);
+        let mut some = Contours::new(all.width, all.height);
         for i in (0..all.x.len()).filter(|i| keep(*i)) {
-            some.push(all.x[i], all.y[i], libm::atan2f(all.ty[i], all.tx[i]), all.length[i]);
+            some.stroke(all.x[i], all.y[i], libm::atan2f(all.ty[i], all.tx[i]), all.length[i]);
         }
         some
     };
@@ -172,8 +144,7 @@ pub(super) fn comings_and_goings(all: &Pieces, mut each: impl FnMut(&ContourChan
         let added = only(&|i| !moves(i) && !there(step - 1, i) && there(step, i));
         let moving = only(&|i| moves(i) && there(step, i));
         let to = std::sync::Arc::new(());
-        let ([removed, added, moving], count) =
-            ([removed, added, moving].map(Pieces::into_contours), whole.x.len());
+        let ([removed, added, moving], count) = ([removed, added, moving], whole.x.len());
         let moving = std::sync::Arc::new(moving);
         each(&ContourChange { from, to: to.clone(), removed, added, moving, count }, &whole);
         from = to;

@@ -52,8 +52,8 @@ impl Posed {
         transforms: Vec<Affine3A>,
         before: Option<&Posed>,
     ) -> (Posed, impl FnOnce() -> Vec<Instance> + Send + 'static) {
-        let before = before.filter(|b| Arc::ptr_eq(&b.0.body, body) && b.0.parts.get().is_some());
-        let before = before.map(|b| Arc::clone(&b.0));
+        let is_made = |b: &&Posed| Arc::ptr_eq(&b.0.body, body) && b.0.parts.get().is_some();
+        let before = before.filter(is_made).map(|b| Arc::clone(&b.0));
         let pose = Arc::new(Pose { body: Arc::clone(body), transforms, parts: OnceLock::new() });
         let own = Arc::clone(&pose);
         (Posed(pose), move || own.parts(before.as_deref()).to_vec())
@@ -62,8 +62,7 @@ impl Posed {
 
 impl Armature {
     /// Returns the body in a pose: one instance per part, numbered by joint, and the
-    /// keypoints as landmarks. Parts that one of this thread's last poses moved in the
-    /// same way share its meshes.
+    /// keypoints as landmarks.
     ///
     /// # Errors
     /// A pose that is not finite, or that moves vertices beyond the range of single

@@ -32,7 +32,7 @@ pub(super) struct Picture {
     camera: [u64; 17],
     /// The meshes shown.
     shown: Meshes,
-    /// The meshes of the solid that was last drawn in full.
+    /// The meshes of the last solid most of which was not shown.
     last: Meshes,
     dynamic: Vec<DynamicMesh>,
     static_layer: Option<StaticLayer>,
@@ -103,8 +103,11 @@ impl Picture {
     ) -> Option<ContourChange> {
         self.clock += 1;
         let count = solid.mesh_count();
+        if self.refused == Some(count) {
+            return None;
+        }
         let most = |some: &[(usize, &Instance)]| 2 * some.len() > count;
-        let mut changed = self.shown.changed(solid);
+        let changed = self.shown.changed(solid);
         if most(&changed) {
             // The picture shows something else. Whether it is worth showing this solid
             // depends on how much it differs from the last one.
@@ -125,9 +128,7 @@ impl Picture {
         if 2 * self.dynamic.len() > count {
             self.sweep(count);
         }
-        if self.dynamic.len().saturating_mul(camera.pixels()) > MOST_PIXELS
-            || self.refused == Some(count)
-        {
+        if self.dynamic.len().saturating_mul(camera.pixels()) > MOST_PIXELS {
             self.forget();
             return None;
         }
@@ -163,7 +164,6 @@ impl Picture {
             // What was skipped as hidden may be visible at another depth range.
             self.move_all(solid, camera, tools);
         }
-        changed.clear();
         self.begin(camera)
     }
 
@@ -326,9 +326,8 @@ impl Picture {
                 rows.extend_from_slice(there);
                 there.copy_from_slice(static_layer);
             }
-            let compose = || dynamic.iter().for_each(|m| m.now.layer.show(depth, width, area));
+            vectorised(|| dynamic.iter().for_each(|m| m.now.layer.show(depth, width, area)));
             if !anything_still {
-                vectorised(compose);
                 continue;
             }
             again.clear();
@@ -336,7 +335,6 @@ impl Picture {
             vectorised(
                 #[inline(always)]
                 || {
-                    dynamic.iter().for_each(|m| m.now.layer.show(depth, width, area));
                     let lists = rows.chunks_exact(columns).zip(again.chunks_exact_mut(columns));
                     for (row, (before, again)) in (area.top..area.bottom).zip(lists) {
                         let lists = (
@@ -391,7 +389,11 @@ impl Picture {
             }
         }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
-        let [mut removed, mut added] = [0; 2].map(|_| Contours::with_room(camera, 256));
+        let room = || match anything_still {
+            true => Contours::with_room(camera, 256),
+            false => Contours::new(camera.width, camera.height),
+        };
+        let [mut removed, mut added] = [room(), room()];
         static_layer.retest(&depths, pixels, extents, |piece, shown| {
             if shown { &mut added } else { &mut removed }.push(piece);
         });

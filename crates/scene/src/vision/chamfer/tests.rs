@@ -1,7 +1,8 @@
 //! Tests of the chamfer comparator against a brute-force reference.
 
-use super::super::testing::{Pieces, clutter, comings_and_goings, numbers};
+use super::super::testing::{clutter, comings_and_goings, numbers};
 use super::*;
+use crate::contours::Contours;
 
 fn options() -> ChamferOptions {
     ChamferOptions::default()
@@ -20,20 +21,20 @@ fn variants() -> Vec<ChamferOptions> {
 }
 
 /// Distance from a point to a piece, in pixels.
-fn to_piece(x: f32, y: f32, p: &Pieces, i: usize, half: f32) -> f64 {
+fn to_piece(x: f32, y: f32, p: &Contours, i: usize, half: f32) -> f64 {
     let (dx, dy) = (x - p.x[i], y - p.y[i]);
     let s = (dx * p.tx[i] + dy * p.ty[i]).clamp(-half, half);
     f64::from(dx - s * p.tx[i]).hypot(f64::from(dy - s * p.ty[i]))
 }
 
-fn turn(a: &Pieces, i: usize, b: &Pieces, j: usize) -> f64 {
+fn turn(a: &Contours, i: usize, b: &Contours, j: usize) -> f64 {
     let cos = f64::from(a.tx[i] * b.tx[j] + a.ty[i] * b.ty[j]).abs().min(1.0);
     cos.acos()
 }
 
 /// Mean distance in percent from the pieces of `a` to those of `b`.
-fn slow(a: &Pieces, b: &Pieces, half: impl Fn(usize) -> f32, per_radian: f64) -> f64 {
-    let percent = 100.0 / a.elements().diagonal();
+fn slow(a: &Contours, b: &Contours, half: impl Fn(usize) -> f32, per_radian: f64) -> f64 {
+    let percent = 100.0 / a.slice().diagonal();
     let (mut sum, mut length) = (0.0, 0.0);
     for i in 0..a.x.len() {
         let near = (0..b.x.len())
@@ -48,7 +49,7 @@ fn slow(a: &Pieces, b: &Pieces, half: impl Fn(usize) -> f32, per_radian: f64) ->
 }
 
 /// Half lengths of the observed pieces: half the chord of a pixel.
-fn chord(p: &Pieces) -> impl Fn(usize) -> f32 {
+fn chord(p: &Contours) -> impl Fn(usize) -> f32 {
     |j| 0.5 / p.tx[j].abs().max(p.ty[j].abs())
 }
 
@@ -56,10 +57,9 @@ fn chord(p: &Pieces) -> impl Fn(usize) -> f32 {
 fn one_sided_distance_is_the_plain_one() {
     for size in [128, 256] {
         let seen = clutter(size, size, 12, 3);
-        let drawn = Pieces::new(size, size).circle(0.5, 0.45, 0.3);
-        let fast = Chamfer::prepare(&seen.map(), size, size, &options())
-            .unwrap()
-            .distance(&drawn.elements());
+        let drawn = Contours::new(size, size).circle(0.5, 0.45, 0.3);
+        let fast =
+            Chamfer::prepare(&seen.map(), size, size, &options()).unwrap().distance(&drawn.slice());
         let plain = slow(&drawn, &seen, chord(&seen), 0.0);
         assert!((fast - plain).abs() < 0.02 * plain, "{size}: {fast} {plain}");
     }
@@ -67,11 +67,10 @@ fn one_sided_distance_is_the_plain_one() {
 
 #[test]
 fn orientation_costs_as_the_plain_one() {
-    let seen = Pieces::new(128, 128).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.12);
-    let drawn = Pieces::new(128, 128).circle(0.55, 0.5, 0.25);
+    let seen = Contours::new(128, 128).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.12);
+    let drawn = Contours::new(128, 128).circle(0.55, 0.5, 0.25);
     let turned = ChamferOptions { oriented: Some(3.0), ..options() };
-    let fast =
-        Chamfer::prepare(&seen.map(), 128, 128, &turned).unwrap().distance(&drawn.elements());
+    let fast = Chamfer::prepare(&seen.map(), 128, 128, &turned).unwrap().distance(&drawn.slice());
     let plain = slow(&drawn, &seen, chord(&seen), 3.0);
     // Orientations are quantised to eight channels.
     assert!((fast - plain).abs() < 0.12 * plain, "{fast} {plain}");
@@ -80,7 +79,7 @@ fn orientation_costs_as_the_plain_one() {
 #[test]
 fn symmetric_distance_is_the_plain_one() {
     let seen = clutter(128, 96, 9, 5).circle(0.4, 0.4, 0.2);
-    let mut seen = Pieces { length: vec![0.0; seen.x.len()], ..seen };
+    let mut seen = Contours { length: vec![0.0; seen.x.len()], ..seen };
     for j in 0..seen.x.len() {
         let length = 2.0 * chord(&seen)(j);
         seen.length[j] = length;
@@ -91,7 +90,7 @@ fn symmetric_distance_is_the_plain_one() {
         })
         .collect();
     let pick = |v: &[f32]| keep.iter().map(|&i| v[i]).collect();
-    let seen = Pieces {
+    let seen = Contours {
         x: pick(&seen.x),
         y: pick(&seen.y),
         tx: pick(&seen.tx),
@@ -101,7 +100,7 @@ fn symmetric_distance_is_the_plain_one() {
     };
     for radius in [0.02, 0.1, 0.3] {
         for per_radian in [0.0, 2.0] {
-            let drawn = Pieces::new(128, 96).circle(0.5, 0.35, radius);
+            let drawn = Contours::new(128, 96).circle(0.5, 0.35, radius);
             let both = ChamferOptions {
                 symmetric: true,
                 oriented: (per_radian > 0.0).then_some(per_radian),
@@ -109,9 +108,9 @@ fn symmetric_distance_is_the_plain_one() {
             };
             let one = ChamferOptions { symmetric: false, ..both.clone() };
             let both =
-                Chamfer::prepare(&seen.map(), 128, 96, &both).unwrap().distance(&drawn.elements());
+                Chamfer::prepare(&seen.map(), 128, 96, &both).unwrap().distance(&drawn.slice());
             let one =
-                Chamfer::prepare(&seen.map(), 128, 96, &one).unwrap().distance(&drawn.elements());
+                Chamfer::prepare(&seen.map(), 128, 96, &one).unwrap().distance(&drawn.slice());
             let back = slow(&seen, &drawn, |j| 0.5 * drawn.length[j], per_radian);
             assert!((2.0 * both - one - back).abs() < 1e-3 * back, "{radius}: {both} {one} {back}");
         }
@@ -120,20 +119,19 @@ fn symmetric_distance_is_the_plain_one() {
 
 #[test]
 fn log_normal_of_the_distance() {
-    let seen = Pieces::new(64, 64).circle(0.5, 0.5, 0.3);
-    let drawn = Pieces::new(64, 64).circle(0.5, 0.5, 0.32);
+    let seen = Contours::new(64, 64).circle(0.5, 0.5, 0.3);
+    let drawn = Contours::new(64, 64).circle(0.5, 0.5, 0.32);
     let c =
         Chamfer::prepare(&seen.map(), 64, 64, &ChamferOptions { sigma: 0.7, ..options() }).unwrap();
-    let rho = c.distance(&drawn.elements());
+    let rho = c.distance(&drawn.slice());
     let exact = -0.5 * (rho / 0.7).powi(2) - 0.7f64.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln();
-    assert!((c.log_likelihood(&drawn.elements()) - exact).abs() < 1e-12);
+    assert!((c.log_likelihood(&drawn.slice()) - exact).abs() < 1e-12);
     // The radius is off by 0.02 of the width: 2 / sqrt 2 percent of the diagonal.
     assert!((rho - std::f64::consts::SQRT_2).abs() < 0.05, "{rho}");
     // With all pieces equally far, the sum is the length in percent times one log
     // density.
     let sum = ChamferOptions { sigma: 0.7, mode: Mode::Sum, ..options() };
-    let sum =
-        Chamfer::prepare(&seen.map(), 64, 64, &sum).unwrap().log_likelihood(&drawn.elements());
+    let sum = Chamfer::prepare(&seen.map(), 64, 64, &sum).unwrap().log_likelihood(&drawn.slice());
     let length = 100.0 * 2.0 * std::f64::consts::PI * 0.32 / std::f64::consts::SQRT_2;
     assert!((sum / (length * exact) - 1.0).abs() < 0.03, "{sum} {}", length * exact);
 }
@@ -142,9 +140,9 @@ fn log_normal_of_the_distance() {
 fn resolution_does_not_matter() {
     for o in variants() {
         let scores = [64u32, 128, 256].map(|size| {
-            let seen = Pieces::new(256, 256).circle(0.5, 0.5, 0.3).circle(0.75, 0.7, 0.1);
-            let drawn = Pieces::new(size, size).circle(0.52, 0.5, 0.31);
-            Chamfer::prepare(&seen.map(), size, size, &o).unwrap().log_likelihood(&drawn.elements())
+            let seen = Contours::new(256, 256).circle(0.5, 0.5, 0.3).circle(0.75, 0.7, 0.1);
+            let drawn = Contours::new(size, size).circle(0.52, 0.5, 0.31);
+            Chamfer::prepare(&seen.map(), size, size, &o).unwrap().log_likelihood(&drawn.slice())
         });
         let spread = scores.iter().fold(0.0f64, |m, s| m.max((s - scores[2]).abs()));
         assert!(spread < 0.03 * scores[2].abs() + 0.02, "{o:?} {scores:?}");
@@ -154,11 +152,11 @@ fn resolution_does_not_matter() {
 #[test]
 fn order_does_not_matter() {
     let seen = clutter(128, 128, 20, 9);
-    let drawn = Pieces::new(128, 128).circle(0.5, 0.5, 0.35);
+    let drawn = Contours::new(128, 128).circle(0.5, 0.5, 0.35);
     for o in variants() {
         let c = Chamfer::prepare(&seen.map(), 128, 128, &o).unwrap();
         let (a, b) =
-            (c.log_likelihood(&drawn.elements()), c.log_likelihood(&drawn.reversed().elements()));
+            (c.log_likelihood(&drawn.slice()), c.log_likelihood(&drawn.reversed().slice()));
         assert!((a - b).abs() <= 1e-10 * a.abs(), "{o:?} {a} {b}");
     }
 }
@@ -166,14 +164,14 @@ fn order_does_not_matter() {
 #[test]
 fn small_moves_change_little() {
     let seen = clutter(128, 128, 20, 11);
-    let drawn = Pieces::new(128, 128).circle(0.5, 0.5, 0.35).circle(1.0, 0.5, 0.2);
+    let drawn = Contours::new(128, 128).circle(0.5, 0.5, 0.35).circle(1.0, 0.5, 0.2);
     for o in variants() {
         let c = Chamfer::prepare(&seen.map(), 128, 128, &o).unwrap();
         let mut scratch = Scratch::default();
-        let mut last = c.distance_with(&drawn.elements(), &mut scratch);
+        let mut last = c.distance_with(&drawn.slice(), &mut scratch);
         for i in 1..2000 {
             let now = c.distance_with(
-                &drawn.moved(0.001 * i as f32, 0.0007 * i as f32).elements(),
+                &drawn.moved(0.001 * i as f32, 0.0007 * i as f32).slice(),
                 &mut scratch,
             );
             // 0.0012 pixels are 0.0007 percent; a piece that enters or leaves at the
@@ -188,12 +186,12 @@ fn small_moves_change_little() {
 fn gradient_is_that_of_differences() {
     let seen = clutter(128, 128, 15, 21).map();
     let mut next = numbers(4);
-    let mut drawn = Pieces::new(128, 128);
+    let mut drawn = Contours::new(128, 128);
     for _ in 0..60 {
-        drawn.push(next() * 129.0 - 0.5, next() * 129.0 - 0.5, next() * 3.0, 0.5 + next());
+        drawn.stroke(next() * 129.0 - 0.5, next() * 129.0 - 0.5, next() * 3.0, 0.5 + next());
     }
-    drawn.push(-0.2, 50.3, 1.0, 1.0);
-    drawn.push(70.3, 128.3, 1.0, 1.0);
+    drawn.stroke(-0.2, 50.3, 1.0, 1.0);
+    drawn.stroke(70.3, 128.3, 1.0, 1.0);
     for o in [
         options(),
         ChamferOptions { truncate: Some(6.0), ..options() },
@@ -213,8 +211,8 @@ fn gradient_is_that_of_differences() {
         };
         let c = prepared(5.0);
         let mut out = Vec::new();
-        let by_sigma = c.gradient(&drawn.elements(), &mut Scratch::default(), &mut out);
-        let scored = |sigma| prepared(sigma).log_likelihood(&drawn.elements());
+        let by_sigma = c.gradient(&drawn.slice(), &mut Scratch::default(), &mut out);
+        let scored = |sigma| prepared(sigma).log_likelihood(&drawn.slice());
         let numeric = (scored(5.001) - scored(4.999)) / 0.002;
         assert!((numeric - by_sigma).abs() < 1e-5 * numeric.abs(), "{o:?}: {numeric} {by_sigma}");
         let bad = drawn.differing(&out, |e| c.log_likelihood(e));
@@ -227,19 +225,19 @@ fn gradient_is_that_of_differences() {
 #[test]
 fn nothing_in_view_is_a_diagonal_away() {
     let seen = clutter(64, 48, 8, 2).map();
-    let out = Pieces::new(64, 48).circle(3.0, 3.0, 0.2);
-    let drawn = Pieces::new(64, 48).circle(0.5, 0.4, 0.3);
+    let out = Contours::new(64, 48).circle(3.0, 3.0, 0.2);
+    let drawn = Contours::new(64, 48).circle(0.5, 0.4, 0.3);
     for o in variants() {
         let c = Chamfer::prepare(&seen, 64, 48, &o).unwrap();
-        for nothing in [&out, &Pieces::new(64, 48)] {
+        for nothing in [&out, &Contours::new(64, 48)] {
             let expected =
                 if o.symmetric { 0.5 * (100.0 + o.truncate.unwrap_or(100.0)) } else { 100.0 };
-            assert!((c.distance(&nothing.elements()) - expected).abs() < 1e-4, "{o:?}");
-            assert!(c.log_likelihood(&nothing.elements()) < c.log_likelihood(&drawn.elements()));
+            assert!((c.distance(&nothing.slice()) - expected).abs() < 1e-4, "{o:?}");
+            assert!(c.log_likelihood(&nothing.slice()) < c.log_likelihood(&drawn.slice()));
         }
-        let blank = Chamfer::prepare(&Pieces::new(64, 48).map(), 64, 48, &o).unwrap();
-        assert!(blank.log_likelihood(&drawn.elements()).is_finite());
-        assert!(blank.log_likelihood(&out.elements()).is_finite());
+        let blank = Chamfer::prepare(&Contours::new(64, 48).map(), 64, 48, &o).unwrap();
+        assert!(blank.log_likelihood(&drawn.slice()).is_finite());
+        assert!(blank.log_likelihood(&out.slice()).is_finite());
     }
 }
 
@@ -263,27 +261,27 @@ fn extremes_give_numbers_or_errors() {
     odd.x[0] = f32::NAN;
     odd.tx[1] = f32::NAN;
     odd.y[2] = f32::INFINITY;
-    let mut drawn = Pieces::new(64, 64).circle(0.5, 0.5, 0.3);
+    let mut drawn = Contours::new(64, 64).circle(0.5, 0.5, 0.3);
     drawn.x[0] = f32::NAN;
     drawn.length[1] = f32::MAX;
     for mut o in variants() {
         for sigma in [1e-200, 1e-6, 1e6] {
             o.sigma = sigma;
             let c = Chamfer::prepare(&odd, 64, 64, &o).unwrap();
-            assert!(c.log_likelihood(&drawn.elements()).is_finite(), "{o:?}");
+            assert!(c.log_likelihood(&drawn.slice()).is_finite(), "{o:?}");
         }
     }
     // One pixel.
-    let c =
-        Chamfer::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options()).unwrap();
-    assert!(c.distance(&Pieces::new(1, 1).circle(0.5, 0.5, 0.4).elements()).is_finite());
+    let c = Chamfer::prepare(&Contours::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options())
+        .unwrap();
+    assert!(c.distance(&Contours::new(1, 1).circle(0.5, 0.5, 0.4).slice()).is_finite());
 }
 
 #[test]
 fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
-    let seen = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
+    let seen = Contours::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
     let all =
-        Pieces::new(96, 96).circle(0.52, 0.5, 0.3).circle(0.4, 0.4, 0.35).circle(0.99, 0.5, 0.1);
+        Contours::new(96, 96).circle(0.52, 0.5, 0.3).circle(0.4, 0.4, 0.35).circle(0.99, 0.5, 0.1);
     for options in variants() {
         let chamfer = Chamfer::prepare(&seen.map(), 96, 96, &options).unwrap();
         let (mut tally, mut asked) = (Tally::default(), 0);
@@ -291,11 +289,11 @@ fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
             let count = std::cell::Cell::new(0);
             let elements = || {
                 count.set(count.get() + 1);
-                whole.elements()
+                whole.slice()
             };
             let score =
                 chamfer.log_likelihood_after(step, elements, &mut tally, &mut Scratch::default());
-            assert_eq!(score.to_bits(), chamfer.log_likelihood(&whole.elements()).to_bits());
+            assert_eq!(score.to_bits(), chamfer.log_likelihood(&whole.slice()).to_bits());
             asked += usize::from(count.get() > 0);
         });
         assert!(options.symmetric || asked < 39, "{asked}");

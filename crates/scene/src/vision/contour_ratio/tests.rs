@@ -1,13 +1,14 @@
 //! Tests of the contour ratio: a closed-form reference for one element, and properties.
 
-use super::super::testing::{Pieces, clutter, comings_and_goings};
+use super::super::testing::{clutter, comings_and_goings};
 use super::*;
+use crate::contours::Contours;
 
 fn options() -> ContourRatioOptions {
     ContourRatioOptions::default()
 }
 
-fn prepare(seen: &Pieces, size: u32) -> ContourRatio {
+fn prepare(seen: &Contours, size: u32) -> ContourRatio {
     ContourRatio::prepare(&seen.map(), size, size, &options()).unwrap()
 }
 
@@ -15,17 +16,17 @@ fn prepare(seen: &Pieces, size: u32) -> ContourRatio {
 /// in the window, which are simple sums.
 #[test]
 fn scores_follow_the_formula() {
-    let mut seen = Pieces::new(256, 256);
+    let mut seen = Contours::new(256, 256);
     for i in 0..256 {
-        seen.push(128.0, i as f32 + 0.5, std::f32::consts::FRAC_PI_2, 1.0);
+        seen.stroke(128.0, i as f32 + 0.5, std::f32::consts::FRAC_PI_2, 1.0);
     }
     let o = ContourRatioOptions { least: 1e-9, ..options() };
     let c = ContourRatio::prepare(&seen.map(), 256, 256, &o).unwrap();
     let percent = 100.0 / (256.0 * std::f64::consts::SQRT_2);
     for offset in [0.5, 1.0, 2.0, 3.0, 5.5, 9.0, 20.0] {
-        let mut one = Pieces::new(256, 256);
-        one.push(128.0 + offset, 128.0, std::f32::consts::FRAC_PI_2, 1.0);
-        let got = c.log_likelihood(&one.elements()) / (o.weight / o.unit) / percent;
+        let mut one = Contours::new(256, 256);
+        one.stroke(128.0 + offset, 128.0, std::f32::consts::FRAC_PI_2, 1.0);
+        let got = c.log_likelihood(&one.slice()) / (o.weight / o.unit) / percent;
         // A window of 64 pixels in the middle, in which the distance changes by a pixel
         // per pixel on both sides; 5 % of the density comes from the whole picture.
         let d = f64::from(offset) * percent;
@@ -43,14 +44,14 @@ fn scores_follow_the_formula() {
 
 #[test]
 fn edges_pay_no_more_than_their_credit() {
-    let seen = Pieces::new(128, 128).circle(0.5, 0.5, 0.3);
+    let seen = Contours::new(128, 128).circle(0.5, 0.5, 0.3);
     let c = prepare(&seen, 128);
     let times = |n: usize| {
-        let mut drawn = Pieces::new(128, 128);
+        let mut drawn = Contours::new(128, 128);
         for _ in 0..n {
             drawn = drawn.circle(0.5, 0.5, 0.3);
         }
-        c.log_likelihood(&drawn.elements())
+        c.log_likelihood(&drawn.slice())
     };
     let scores = [1, 2, 3, 8].map(times);
     assert!(scores[1] > 1.7 * scores[0], "{scores:?}");
@@ -61,7 +62,7 @@ fn edges_pay_no_more_than_their_credit() {
 fn the_true_circle_wins() {
     let seen = clutter(128, 128, 30, 8).circle(0.5, 0.5, 0.3);
     let c = prepare(&seen, 128);
-    let score = |x, y, r| c.log_likelihood(&Pieces::new(128, 128).circle(x, y, r).elements());
+    let score = |x, y, r| c.log_likelihood(&Contours::new(128, 128).circle(x, y, r).slice());
     let truth = score(0.5, 0.5, 0.3);
     assert!(truth > 0.0);
     for (x, y, r) in
@@ -77,7 +78,7 @@ fn resolution_does_not_matter() {
     for (x, r) in [(0.5, 0.3), (0.51, 0.3), (0.55, 0.2)] {
         let scores = [64u32, 128, 256].map(|size| {
             prepare(&seen, size)
-                .log_likelihood(&Pieces::new(size, size).circle(x, 0.5, r).elements())
+                .log_likelihood(&Contours::new(size, size).circle(x, 0.5, r).slice())
         });
         let spread = scores.iter().fold(0.0f64, |m, s| m.max((s - scores[2]).abs()));
         assert!(spread < 0.04 * scores[2].abs() + 1.0, "{scores:?}");
@@ -88,28 +89,30 @@ fn resolution_does_not_matter() {
 fn order_does_not_matter_to_the_last_bit() {
     let seen = clutter(128, 128, 40, 9);
     let c = prepare(&seen, 128);
-    let drawn = Pieces::new(128, 128)
+    let drawn = Contours::new(128, 128)
         .circle(0.5, 0.5, 0.35)
         .circle(0.5, 0.5, 0.352)
         .circle(0.51, 0.5, 0.35);
     let mut scratch = Scratch::default();
-    let a = c.log_likelihood_with(&drawn.elements(), &mut scratch);
-    let b = c.log_likelihood_with(&drawn.reversed().elements(), &mut scratch);
+    let a = c.log_likelihood_with(&drawn.slice(), &mut scratch);
+    let b = c.log_likelihood_with(&drawn.reversed().slice(), &mut scratch);
     assert_eq!(a, b);
-    assert_eq!(a, c.log_likelihood(&drawn.elements()));
+    assert_eq!(a, c.log_likelihood(&drawn.slice()));
 }
 
 #[test]
 fn small_moves_change_little() {
     let seen = clutter(128, 128, 40, 11).circle(0.5, 0.5, 0.35);
     let c = prepare(&seen, 128);
-    let drawn =
-        Pieces::new(128, 128).circle(0.5, 0.5, 0.35).circle(0.5, 0.5, 0.353).circle(1.0, 0.4, 0.2);
+    let drawn = Contours::new(128, 128)
+        .circle(0.5, 0.5, 0.35)
+        .circle(0.5, 0.5, 0.353)
+        .circle(1.0, 0.4, 0.2);
     let mut scratch = Scratch::default();
-    let mut last = c.log_likelihood_with(&drawn.elements(), &mut scratch);
+    let mut last = c.log_likelihood_with(&drawn.slice(), &mut scratch);
     for i in 1..3000 {
         let now = c.log_likelihood_with(
-            &drawn.moved(0.001 * i as f32, 0.0007 * i as f32).elements(),
+            &drawn.moved(0.001 * i as f32, 0.0007 * i as f32).slice(),
             &mut scratch,
         );
         // There are about 700 pieces, each of which can change by a few hundredths per
@@ -128,9 +131,9 @@ fn small_moves_change_little() {
         }
         p
     };
-    let mut last = c.log_likelihood(&drawn.elements());
+    let mut last = c.log_likelihood(&drawn.slice());
     for i in 1..400 {
-        let now = c.log_likelihood_with(&turned(i).elements(), &mut scratch);
+        let now = c.log_likelihood_with(&turned(i).slice(), &mut scratch);
         assert!((now - last).abs() < 5.0, "turn {i}: {last} {now}");
         last = now;
     }
@@ -140,16 +143,16 @@ fn small_moves_change_little() {
 fn nothing_in_view_is_worse_than_a_bad_match() {
     let seen = clutter(128, 128, 10, 11);
     let c = prepare(&seen, 128);
-    let nothing = c.log_likelihood(&Pieces::new(128, 128).elements());
+    let nothing = c.log_likelihood(&Contours::new(128, 128).slice());
     let exact = 1000.0 * 0.25f64.ln() * 0.5 * 256.0 * std::f64::consts::SQRT_2 / 200.0;
     assert!((nothing - exact).abs() < 1e-6, "{nothing} {exact}");
-    assert_eq!(nothing, c.log_likelihood(&Pieces::new(128, 128).circle(5.0, 5.0, 0.3).elements()));
-    let bad = c.log_likelihood(&Pieces::new(128, 128).circle(0.5, 0.5, 0.49).elements());
+    assert_eq!(nothing, c.log_likelihood(&Contours::new(128, 128).circle(5.0, 5.0, 0.3).slice()));
+    let bad = c.log_likelihood(&Contours::new(128, 128).circle(0.5, 0.5, 0.49).slice());
     assert!(nothing < bad);
     // Shrinking the contour does not escape the penalty.
     let mut last = f64::INFINITY;
     for r in [0.02, 0.01, 0.005, 0.002] {
-        let now = c.log_likelihood(&Pieces::new(128, 128).circle(0.5, 0.5, r).elements());
+        let now = c.log_likelihood(&Contours::new(128, 128).circle(0.5, 0.5, r).slice());
         assert!(now < last, "{r}: {now}");
         last = now;
     }
@@ -157,19 +160,19 @@ fn nothing_in_view_is_worse_than_a_bad_match() {
 
 #[test]
 fn dense_texture_pays_little() {
-    let mut seen = Pieces::new(128, 128);
+    let mut seen = Contours::new(128, 128);
     for row in 0..64 {
         for x in 0..128 {
-            seen.push(x as f32 + 0.5, row as f32 * 2.0 + 0.5, 0.0, 1.0);
+            seen.stroke(x as f32 + 0.5, row as f32 * 2.0 + 0.5, 0.0, 1.0);
         }
     }
     let texture = prepare(&seen, 128);
-    let mut line = Pieces::new(128, 128);
+    let mut line = Contours::new(128, 128);
     for x in 0..128 {
-        line.push(x as f32 + 0.5, 64.5, 0.0, 1.0);
+        line.stroke(x as f32 + 0.5, 64.5, 0.0, 1.0);
     }
     let alone = prepare(&line, 128);
-    let (t, a) = (texture.log_likelihood(&line.elements()), alone.log_likelihood(&line.elements()));
+    let (t, a) = (texture.log_likelihood(&line.slice()), alone.log_likelihood(&line.slice()));
     assert!(t < 0.35 * a, "{t} {a}");
 }
 
@@ -192,30 +195,30 @@ fn extremes_give_numbers_or_errors() {
             assert!(ContourRatio::prepare(&seen, 64, 64, &o).is_err(), "{o:?}");
         }
     }
-    let blank = ContourRatio::prepare(&Pieces::new(64, 64).map(), 64, 64, &options()).unwrap();
-    let mut drawn = Pieces::new(64, 64).circle(0.5, 0.5, 0.3);
+    let blank = ContourRatio::prepare(&Contours::new(64, 64).map(), 64, 64, &options()).unwrap();
+    let mut drawn = Contours::new(64, 64).circle(0.5, 0.5, 0.3);
     let length = 100.0 * 2.0 * std::f64::consts::PI * 0.3 / std::f64::consts::SQRT_2;
     let expected = length * 0.25f64.ln() * 0.5 / options().unit;
-    assert!((blank.log_likelihood(&drawn.elements()) / expected - 1.0).abs() < 1e-4);
+    assert!((blank.log_likelihood(&drawn.slice()) / expected - 1.0).abs() < 1e-4);
     drawn.x[0] = f32::NAN;
     drawn.length[1] = f32::MAX;
     for (sd, truncate) in [(1e-12, 3.3), (1e6, 3.3), (0.4, 1e-9), (0.4, 1e9)] {
         let o = ContourRatioOptions { sd, truncate, ..options() };
         let c = ContourRatio::prepare(&seen, 64, 64, &o).unwrap();
-        assert!(c.log_likelihood(&drawn.elements()).is_finite(), "{o:?}");
+        assert!(c.log_likelihood(&drawn.slice()).is_finite(), "{o:?}");
     }
     let one =
-        ContourRatio::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options())
+        ContourRatio::prepare(&Contours::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options())
             .unwrap();
-    assert!(one.log_likelihood(&Pieces::new(1, 1).circle(0.5, 0.5, 0.4).elements()).is_finite());
+    assert!(one.log_likelihood(&Contours::new(1, 1).circle(0.5, 0.5, 0.4).slice()).is_finite());
 }
 
 #[test]
 fn gradient_is_that_of_differences() {
     let seen = clutter(128, 128, 12, 21).circle(0.5, 0.5, 0.3).map();
-    let mut drawn = Pieces::new(128, 128).circle(0.52, 0.49, 0.29);
-    drawn.push(-0.2, 50.3, 1.0, 1.0);
-    drawn.push(70.3, 128.3, 1.0, 1.0);
+    let mut drawn = Contours::new(128, 128).circle(0.52, 0.49, 0.29);
+    drawn.stroke(-0.2, 50.3, 1.0, 1.0);
+    drawn.stroke(70.3, 128.3, 1.0, 1.0);
     // Smooth scores, so that finite differences approximate derivatives; then too little
     // contour in view, and groups beyond their match capacity.
     let smooth =
@@ -227,7 +230,7 @@ fn gradient_is_that_of_differences() {
     ] {
         let c = ContourRatio::prepare(&seen, 128, 128, &o).unwrap();
         let mut out = Vec::new();
-        c.gradient(&drawn.elements(), &mut Scratch::default(), &mut out);
+        c.gradient(&drawn.slice(), &mut Scratch::default(), &mut out);
         let bad = drawn.differing(&out, |e| c.log_likelihood(e));
         assert!(bad <= out.len() / 5, "{o:?}: {bad} of {} differ", 4 * out.len());
     }
@@ -235,9 +238,9 @@ fn gradient_is_that_of_differences() {
 
 #[test]
 fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
-    let seen = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
+    let seen = Contours::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
     let all =
-        Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.5, 0.5, 0.305).circle(0.4, 0.4, 0.35);
+        Contours::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.5, 0.5, 0.305).circle(0.4, 0.4, 0.35);
     // A small match capacity, so that groups are assigned more than they can match.
     let ratio = ContourRatio::prepare(
         &seen.map(),
@@ -251,10 +254,10 @@ fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
         let mut count = 0;
         let elements = || {
             count += 1;
-            whole.elements()
+            whole.slice()
         };
         let score = ratio.log_likelihood_after(step, elements, &mut scratch);
-        assert_eq!(score.to_bits(), ratio.log_likelihood(&whole.elements()).to_bits());
+        assert_eq!(score.to_bits(), ratio.log_likelihood(&whole.slice()).to_bits());
         // Repeating the same contours does not ask for all of them.
         let again = ratio.log_likelihood_after(step, || panic!("they are known"), &mut scratch);
         assert_eq!(again.to_bits(), score.to_bits());
