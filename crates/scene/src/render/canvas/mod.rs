@@ -55,26 +55,41 @@ impl Canvas {
 
     /// The contours of a solid in a camera's picture, as [`Contours::of`].
     pub fn contours(&self, solid: &Solid, camera: &Camera) -> Contours {
-        self.draw(solid, camera, |picture, _| picture.contours(camera))
+        self.shown(solid, camera, |picture| picture.contours(camera))
             .unwrap_or_else(|| Contours::of(solid, camera))
+    }
+
+    /// The depth of a solid, row by row; `None` if it is better drawn in full.
+    pub(super) fn depth(&self, solid: &Solid, camera: &Camera) -> Option<Vec<f32>> {
+        self.shown(solid, camera, |picture| picture.depth().to_vec())
     }
 
     /// The change from the previous contours in this picture; `None` if the solid is
     /// better drawn in full.
     pub(super) fn change(&self, solid: &Solid, camera: &Camera) -> Option<ContourChange> {
-        self.draw(solid, camera, |_, change| change)
+        self.with_picture(camera, |picture, tools| picture.draw(solid, camera, tools))
     }
 
-    /// The depth of a solid, row by row; `None` if it is better drawn in full.
-    pub(super) fn depth(&self, solid: &Solid, camera: &Camera) -> Option<Vec<f32>> {
-        self.draw(solid, camera, |picture, _| picture.depth().to_vec())
-    }
-
-    fn draw<T>(
+    /// Takes something from the picture that shows a solid, which is drawn only if it is
+    /// not there yet.
+    fn shown<T>(
         &self,
         solid: &Solid,
         camera: &Camera,
-        take: impl FnOnce(&Picture, ContourChange) -> T,
+        take: impl FnOnce(&Picture) -> T,
+    ) -> Option<T> {
+        self.with_picture(camera, |picture, tools| {
+            if !picture.shows(solid) {
+                picture.draw(solid, camera, tools)?;
+            }
+            Some(take(picture))
+        })
+    }
+
+    fn with_picture<T>(
+        &self,
+        camera: &Camera,
+        work: impl FnOnce(&mut Picture, &mut Tools) -> Option<T>,
     ) -> Option<T> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Pictures { pictures, tools } = &mut *all;
@@ -86,8 +101,6 @@ impl Canvas {
                 pictures.insert(0, Picture::new(eye));
             }
         }
-        let picture = pictures.first_mut()?;
-        let change = picture.draw(solid, camera, tools)?;
-        Some(take(picture, change))
+        work(pictures.first_mut()?, tools)
     }
 }

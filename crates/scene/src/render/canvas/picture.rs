@@ -88,6 +88,13 @@ impl Picture {
         self.camera == *camera
     }
 
+    /// Whether it shows just this solid.
+    pub fn shows(&self, solid: &Solid) -> bool {
+        self.static_layer.is_some()
+            && self.shown.len() == solid.mesh_count()
+            && self.shown.changed(solid).is_empty()
+    }
+
     /// Depth, row by row.
     pub fn depth(&self) -> &[f32] {
         &self.depth
@@ -389,7 +396,7 @@ impl Picture {
             }
         }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
-        let room = || match anything_still {
+        let room = || match anything && anything_still {
             true => Contours::with_room(camera, 256),
             false => Contours::new(camera.width, camera.height),
         };
