@@ -12,6 +12,7 @@
 //! [`host`], as any embedding program would. Without the feature `scene` the engine is
 //! built alone.
 #![doc = include_str!("guide.md")]
+#![doc = include_str!("pictures.md")]
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 

@@ -3,13 +3,15 @@
 //!
 //! Most choices are single numbers that feed a little arithmetic and a few scores of the
 //! same block. For those, the scores under another value can be computed without touching
-//! the trace, by this code, which is compiled once per slot. It covers operations with a
-//! form on single numbers (see [`Scalar`]) and gives up on everything else, at run time
-//! as well. An update then decides, so a local density must be correct only where it
-//! returns a result.
+//! the trace, by this code, which is compiled once per slot. Operations with a form on
+//! single numbers (see [`Scalar`]) have instructions of their own; arrays, records and
+//! calls of other built-ins are computed as in an update. It gives up on operations with
+//! structure, at run time as well. An update then decides, so a local density must be
+//! correct only where it returns a result.
 
 use super::builtins::{Scalar, Table};
 use super::code::{DistSpec, Op, Operand, Slot};
+use smallvec::SmallVec;
 
 /// The number of registers of a local density.
 pub const REGISTERS: usize = 16;
@@ -19,6 +21,9 @@ pub const PARAMETERS: usize = 4;
 
 /// The maximum number of instructions.
 const LONGEST: usize = 96;
+
+/// The maximum number of operands of `Compute`.
+const MOST_SOURCES: usize = 256;
 
 /// Where an instruction finds an input.
 #[derive(Clone, Copy, Debug)]
@@ -37,16 +42,19 @@ pub enum Instruction {
     SkipUnevaluated { slot: Slot, to: u16 },
     /// If the slot is evaluated, takes its value and jumps to `to`.
     Recall { slot: Slot, into: u8, to: u16 },
-    /// A function of single numbers.
-    Unary { f: fn(f64) -> f64, x: Source, into: u8 },
+    /// A function of single numbers; of arrays, it is the operation in the slot.
+    Unary { slot: Slot, f: fn(f64) -> f64, x: Source, into: u8 },
     /// See `Unary`.
-    Binary { f: fn(f64, f64) -> f64, x: Source, y: Source, into: u8 },
+    Binary { slot: Slot, f: fn(f64, f64) -> f64, x: Source, y: Source, into: u8 },
     /// See `Unary`.
     Test { f: fn(f64, f64) -> bool, x: Source, y: Source, into: u8 },
     /// See `Unary`.
     Logic { f: fn(bool) -> bool, x: Source, into: u8 },
-    /// An element of an array.
+    /// An element of an array or record.
     Index { base: Source, key: Source, into: u8 },
+    /// The operation in the slot, whose operands are `count` of the density's sources from
+    /// `first` on.
+    Compute { slot: Slot, first: u16, count: u16, into: u8 },
     /// Jumps to `otherwise` if the condition of the selection in the slot does not hold.
     Branch { slot: Slot, cond: Source, otherwise: u16 },
     /// Jumps.
@@ -57,6 +65,8 @@ pub enum Instruction {
     Draw { slot: Slot, builtin: u32, parameters: [Source; PARAMETERS] },
     /// Scores the observation in the slot.
     Observe { slot: Slot, builtin: u32, parameters: [Source; PARAMETERS], value: Source },
+    /// Scores the observation in the slot under a distribution or likelihood.
+    ObserveUnder { slot: Slot, dist: Source, value: Source },
     /// Scores the factor in the slot.
     Factor { slot: Slot, weight: Source },
 }
@@ -79,6 +89,8 @@ pub struct KeptAlternative {
 pub struct LocalDensity {
     /// The instructions.
     pub instructions: Box<[Instruction]>,
+    /// The operands of `Compute`.
+    pub sources: Box<[Source]>,
     /// The computations that depend on the value; other blocks must not read them.
     pub computations: Box<[Slot]>,
     /// The registers that contain the results of computations, once computed: of
@@ -107,6 +119,7 @@ impl LocalDensity {
             from,
             dependent: vec![false; ops.len()],
             instructions: Vec::new(),
+            sources: Vec::new(),
             known: vec![None; ops.len()],
             registers: 1,
             inside: false,
@@ -121,12 +134,13 @@ impl LocalDensity {
         let (scores, computations): (Vec<Slot>, Vec<Slot>) =
             dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
-        let Compiler { instructions, results, mut held, computed, .. } = compiler;
+        let Compiler { instructions, sources, results, mut held, computed, .. } = compiler;
         let operands: Vec<Operand> = held.iter().map(|h| h.operand).collect();
         held.iter_mut()
             .for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
         Some(LocalDensity {
             instructions: instructions.into(),
+            sources: sources.into(),
             computations: computations.into(),
             results: results.into(),
             held: held.into(),
@@ -142,6 +156,7 @@ struct Compiler<'a> {
     /// By slot: whether it depends on the value.
     dependent: Vec<bool>,
     instructions: Vec<Instruction>,
+    sources: Vec<Source>,
     /// By slot: the register that contains its value whenever the next instruction runs.
     known: Vec<Option<u8>>,
     registers: usize,
@@ -168,6 +183,10 @@ impl Compiler<'_> {
             Op::Observe { dist: DistSpec::Family { builtin, args }, value, .. } => {
                 let (parameters, value) = (self.parameters(args)?, self.source(*value)?);
                 Instruction::Observe { slot, builtin: *builtin, parameters, value }
+            }
+            Op::Observe { dist: DistSpec::Value(dist), value, .. } => {
+                let (dist, value) = (self.source(*dist)?, self.source(*value)?);
+                Instruction::ObserveUnder { slot, dist, value }
             }
             Op::Factor { weight, .. } => {
                 Instruction::Factor { slot, weight: self.source(*weight)? }
@@ -228,9 +247,9 @@ impl Compiler<'_> {
 
     fn is_computed(&self, slot: Slot) -> bool {
         match &self.ops[slot as usize] {
-            Op::Prim { builtin, .. } => self.builtins.get(*builtin).scalar.is_some(),
-            Op::Index { keys, .. } => keys.len() == 1,
-            Op::Select { .. } => true,
+            // A host's functions may be costly, or keep a state in the node.
+            Op::Prim { builtin, .. } => self.builtins.get(*builtin).host.is_none(),
+            Op::Index { .. } | Op::Select { .. } | Op::Array(_) | Op::Record { .. } => true,
             _ => false,
         }
     }
@@ -238,14 +257,14 @@ impl Compiler<'_> {
     /// Emits the instructions that compute a slot; returns the register of its value.
     fn compute(&mut self, slot: Slot) -> Option<u8> {
         match &self.ops[slot as usize] {
-            Op::Prim { builtin, args } => {
+            Op::Prim { builtin, args } if self.is_on_numbers(*builtin) => {
                 let mut arg = |i: usize| self.source(*args.get(i)?);
                 let (x, y) = (arg(0)?, arg(1));
                 let into = self.register()?;
                 let instruction = match (self.builtins.get(*builtin).scalar?, y) {
-                    (Scalar::Unary(f), _) => Instruction::Unary { f, x, into },
+                    (Scalar::Unary(f), _) => Instruction::Unary { slot, f, x, into },
                     (Scalar::Logic(f), _) => Instruction::Logic { f, x, into },
-                    (Scalar::Binary(f), Some(y)) => Instruction::Binary { f, x, y, into },
+                    (Scalar::Binary(f), Some(y)) => Instruction::Binary { slot, f, x, y, into },
                     (Scalar::Test(f), Some(y)) => Instruction::Test { f, x, y, into },
                     _ => return None,
                 };
@@ -275,8 +294,28 @@ impl Compiler<'_> {
                 }
                 Some(into)
             }
+            op if self.is_computed(slot) => {
+                let mut operands: SmallVec<[Operand; 8]> = SmallVec::new();
+                op.operands(|o| operands.push(o));
+                let found = operands.iter().map(|o| self.source(*o));
+                let found: SmallVec<[Source; 8]> = found.collect::<Option<_>>()?;
+                let (first, count) = (self.sources.len() as u16, found.len() as u16);
+                self.sources.extend(found);
+                let into = self.register()?;
+                self.push(Instruction::Compute { slot, first, count, into })?;
+                (self.sources.len() <= MOST_SOURCES).then_some(into)
+            }
             _ => None,
         }
+    }
+
+    /// Whether a built-in is a function of single numbers.
+    fn is_on_numbers(&self, builtin: u32) -> bool {
+        let scalar = &self.builtins.get(builtin).scalar;
+        matches!(
+            scalar,
+            Some(Scalar::Unary(_) | Scalar::Binary(_) | Scalar::Test(_) | Scalar::Logic(_))
+        )
     }
 
     fn alternative(&mut self, o: Operand, into: u8) -> Option<()> {

@@ -48,7 +48,6 @@ use graph::Graph;
 use journal::Before;
 pub(crate) use marginal::{Elimination, Explored, Marginal};
 use node::NONE;
-pub(crate) use shortcuts::enumeration::Enumeration;
 use std::sync::Arc;
 
 /// One execution of a program: the values of its choices and everything computed from

@@ -12,7 +12,7 @@ use crate::infer::kernel::{
 };
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Change, Enumeration, Target, Trace, TraceResult};
+use crate::trace::{Change, Target, Trace, TraceResult};
 
 /// `gibbs(sel)`: draws one choice from its distribution given all others.
 #[derive(Clone, Debug)]
@@ -23,7 +23,6 @@ pub struct Gibbs {
     values: Vec<Datum>,
     log: Vec<f64>,
     weights: Vec<f64>,
-    enumeration: Enumeration,
 }
 
 /// Properties of the weighed values of a choice.
@@ -40,13 +39,7 @@ impl Gibbs {
     /// A kernel for one of these choices at a time.
     pub fn new(scope: SiteSelection) -> Self {
         let scope = Registered::new(scope.single());
-        Gibbs {
-            scope,
-            values: Vec::new(),
-            log: Vec::new(),
-            weights: Vec::new(),
-            enumeration: Enumeration::default(),
-        }
+        Gibbs { scope, values: Vec::new(), log: Vec::new(), weights: Vec::new() }
     }
 
     /// Computes the log weights of all values, relative to the state with value `old`,
@@ -58,22 +51,13 @@ impl Gibbs {
         target: Target,
         dist: &Dist,
         old: usize,
-    ) -> TraceResult<Option<Weighed>> {
-        let mut weighed = Weighed::default();
+    ) -> Option<Weighed> {
         let log = &mut self.log;
         log.clear();
-        let told = trace.enumerate_conditional(
-            target,
-            dist,
-            (&self.values, old),
-            &mut self.enumeration,
-            at.power,
-            |w| {
-                weighed.failed += u32::from(w.is_none());
-                log.push(w.filter(|w| !w.is_nan()).unwrap_or(f64::NEG_INFINITY));
-            },
-        )?;
-        Ok(told.then_some(weighed))
+        let number = |w: f64| log.push(if w.is_nan() { f64::NEG_INFINITY } else { w });
+        trace
+            .weigh_values(target, dist, (&self.values, old), at.power, number)
+            .then(Weighed::default)
     }
 
     /// As [`Gibbs::weigh_beside`], by updates. `ways` is minus the log probability of
@@ -135,7 +119,7 @@ impl Kernel for Gibbs {
         let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
             return Ok(Outcome::default());
         };
-        let forward = match self.weigh_beside(trace, at, target, &dist, old)? {
+        let forward = match self.weigh_beside(trace, at, target, &dist, old) {
             Some(forward) => forward,
             None => self.weigh(trace, at, target, old, (libm::log(n as f64), 0))?,
         };

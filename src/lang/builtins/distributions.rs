@@ -18,8 +18,6 @@ use crate::dist::{self, Dist, FAMILIES, Family, ParamDoc, ParamError, ParamKind}
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use smallvec::{SmallVec, smallvec};
-use std::cell::RefCell;
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// The built-ins of all families.
@@ -161,45 +159,8 @@ fn product(
     made(dist::Product::new(elements))
 }
 
-/// The maximum number of multivariate normals cached per thread.
-const REMEMBERED: usize = 64;
-
-thread_local! {
-    /// Recent multivariate normals, by the identity of the arrays for mean and matrix: a
-    /// factorisation is expensive, and a trace requests the same ones repeatedly.
-    static NORMALS: RefCell<VecDeque<([Value; 3], bool, Dist)>> = const { RefCell::new(VecDeque::new()) };
-}
-
-/// Whether two values are the same array in memory, not merely equal.
-fn is_same_array(a: &Value, b: &Value) -> bool {
-    match (a, b) {
-        (Value::Array(a), Value::Array(b)) => Arc::ptr_eq(a, b),
-        (Value::List(a), Value::List(b)) => Arc::ptr_eq(a, b),
-        (Value::Unit, Value::Unit) => true,
-        _ => false,
-    }
-}
-
 fn mv_normal(a: &Args) -> Result<Dist, Fault> {
     let whitened = a.bool_or(3, false)?;
-    let given = [0, 1, 2].map(|i| a.get(i));
-    NORMALS.with_borrow_mut(|known| {
-        let same = |(of, white, _): &([Value; 3], bool, Dist)| {
-            *white == whitened && of.iter().zip(given).all(|(a, b)| is_same_array(a, b))
-        };
-        if let Some(at) = known.iter().position(same) {
-            return Ok(known[at].2.clone());
-        }
-        let made = new_mv_normal(a, whitened)?;
-        if known.len() == REMEMBERED {
-            known.pop_front();
-        }
-        known.push_back((given.map(Value::clone), whitened, made.clone()));
-        Ok(made)
-    })
-}
-
-fn new_mv_normal(a: &Args, whitened: bool) -> Result<Dist, Fault> {
     let mean = a.array(0)?;
     let d = match (a.given(1), a.given(2)) {
         (true, false) => dist::MvNormal::from_cov(&mean, &square(a, 1, mean.len())?),

@@ -30,15 +30,30 @@ impl Lowerer<'_> {
             }
             DistSpec::Family { builtin, args } => match &*self.code.builtins.get(*builtin).name {
                 "flip" => Type::Any,
-                "dirichlet" | "mv_normal" | "gp" | "multinomial" | "lkj" | "wishart"
-                | "ordered" => Type::Array,
+                "dirichlet" | "multinomial" | "lkj" | "wishart" | "ordered" => Type::Array,
                 "iid" | "mixture" => Type::Any,
                 _ if args.iter().all(|a| self.is_number(*a)) => Type::Num,
                 // A parameter that is an array makes the choice an array.
                 _ => Type::Nums,
             },
+            DistSpec::Value(o) if self.makes_arrays(*o) => Type::Array,
             DistSpec::Value(_) => Type::Any,
         }
+    }
+
+    /// Whether a distribution is a multivariate normal that this block makes.
+    fn makes_arrays(&self, dist: Operand) -> bool {
+        let Operand::Local(slot) = dist else { return false };
+        match self.code.blocks[self.block() as usize].ops.get(slot as usize) {
+            Some(Op::Prim { builtin, .. }) => self.has_covariance(*builtin),
+            _ => false,
+        }
+    }
+
+    /// Whether a built-in is a family with a covariance matrix.
+    pub fn has_covariance(&self, builtin: u32) -> bool {
+        let family = self.code.builtins.get(builtin);
+        family.host.is_none() && matches!(&*family.name, "mv_normal" | "gp")
     }
 
     fn is_number(&self, o: Operand) -> bool {

@@ -184,6 +184,11 @@ impl Lowerer<'_> {
     /// Lowers a distribution: a direct call of a family, or a value.
     pub fn dist_spec(&mut self, e: &Expr, observed: bool) -> DistSpec {
         if let Some((builtin, args)) = self.family_call(e) {
+            // A node of its own keeps the factor of the matrix.
+            if self.has_covariance(builtin) {
+                let made = self.push(Op::Prim { builtin, args }, e.span);
+                return DistSpec::Value(Operand::Local(made));
+            }
             return DistSpec::Family { builtin, args };
         }
         let value = self.expr(e);

@@ -235,13 +235,3 @@ pub(super) enum Made {
     /// With the data from which the next evaluation starts.
     Kept(PreviousEvaluation),
 }
-
-impl Made {
-    /// Returns the value alone.
-    pub fn into_value(self) -> Value {
-        match self {
-            Made::Value(value) => value,
-            Made::Kept(before) => before.value,
-        }
-    }
-}

@@ -3,21 +3,24 @@
 //!
 //! The scores are computed by the same functions as in an update and quantised in the
 //! same way, so the weights agree to the last bit. A case that a local density does not
-//! cover is left to [`crate::trace::shortcuts::enumeration`] or an update.
+//! cover is left to an update.
 
 use crate::dist::{Datum, Dist};
 use crate::lang::builtins::{Args, Argument, Builtin, Kind, Scalar};
 use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
-use crate::lang::index::place;
+use crate::lang::index::{index_value, place};
 use crate::lang::local_density::{
     Instruction, KeptAlternative, LocalDensity, PARAMETERS, REGISTERS, Source,
 };
-use crate::lang::value::Value;
+use crate::lang::value::{Extent, Value};
 use crate::num::ExactSum;
+use crate::trace::eval::Score;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use crate::trace::propose::Weight;
+use crate::trace::{Target, Trace};
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// The local densities that together give the effect of another value of a choice.
 pub(crate) type LocalDensities<'c> = SmallVec<[Placed<'c>; 4]>;
@@ -36,12 +39,17 @@ pub(crate) struct Placed<'c> {
 /// The maximum number of other frames that may read the choice.
 const READERS: usize = 4;
 
+/// The maximum length of a value that is computed here.
+const LARGEST: usize = 1024;
+
 /// A value in a local density.
 #[derive(Clone, Copy)]
 pub(crate) enum Register<'a> {
     Num(f64),
     Bool(bool),
     Other(&'a Value),
+    /// A value that the evaluation has made, by its index there.
+    Made(u8),
 }
 
 /// The evaluation of a local density on the nodes of one frame.
@@ -52,6 +60,10 @@ pub(crate) struct Evaluation<'a, const N: usize> {
     registers: [Register<'a>; N],
     /// A bit for each filled register.
     filled: u32,
+    /// The values that are neither numbers nor part of the trace.
+    made: SmallVec<[Value; 4]>,
+    /// Whether an observation's score is a sum over elements.
+    pub summed: bool,
     /// The selections that take their other alternative.
     pub turned: SmallVec<[NodeId; 4]>,
     /// The scores, by node.
@@ -60,7 +72,48 @@ pub(crate) struct Evaluation<'a, const N: usize> {
     pub likelihood: ExactSum,
 }
 
+impl Trace {
+    /// Passes to `weight` the log weights that the values of a choice with this
+    /// distribution would have in an update, relative to the current state (that of the
+    /// `current` value is 0), with the likelihood raised to a power. Returns false if
+    /// updates are needed instead.
+    pub(crate) fn weigh_values(
+        &self,
+        target: Target,
+        dist: &Dist,
+        (values, current): (&[Datum], usize),
+        power: f64,
+        mut weight: impl FnMut(f64),
+    ) -> bool {
+        if self.update.is_some() || target.element != NONE {
+            return false;
+        }
+        let Some(local_densities) = self.graph.local_densities(&self.code, target.node) else {
+            return false;
+        };
+        let mut evaluation = self.graph.evaluation(&self.code);
+        values.iter().enumerate().all(|(i, value)| {
+            let found = match i == current {
+                true => Some(0.0),
+                false => evaluation.weigh(target.node, &local_densities, dist, value, power),
+            };
+            found.map(&mut weight).is_some()
+        })
+    }
+}
+
 impl Graph {
+    /// Whether a choice is a single number or boolean, stored as the program sees it.
+    pub fn is_plain_choice(&self, n: NodeId) -> bool {
+        let node = &self.nodes[n as usize];
+        let whole = match node.side.as_deref() {
+            None => true,
+            Some(Side::Choice(c)) => c.stored.is_none() && c.elements == NONE && c.deps.is_empty(),
+            _ => false,
+        };
+        whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
+    }
+
     /// Returns the local densities that together give the effect of another value of a
     /// choice; `None` if there are none in this state.
     pub fn local_densities<'c>(
@@ -174,6 +227,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
     /// Starts with a value of the choice.
     pub fn begin(&mut self, value: Register<'a>) {
         self.registers[0] = value;
+        self.made.clear();
+        self.summed = false;
         self.turned.clear();
         self.scores.clear();
         self.prior = ExactSum::default();
@@ -201,11 +256,15 @@ impl<'a> Evaluation<'a, REGISTERS> {
                         next = to as usize;
                     }
                 }
-                Instruction::Unary { f, x, into } => {
-                    self.fill(into, Register::Num(f(self.number(x)?)))
-                }
-                Instruction::Binary { f, x, y, into } => {
-                    self.fill(into, Register::Num(f(self.number(x)?, self.number(y)?)));
+                Instruction::Unary { slot, f, x, into } => match self.number(x) {
+                    Some(x) => self.fill(into, Register::Num(f(x))),
+                    None => self.compute(slot, &[x], into)?,
+                },
+                Instruction::Binary { slot, f, x, y, into } => {
+                    match (self.number(x), self.number(y)) {
+                        (Some(x), Some(y)) => self.fill(into, Register::Num(f(x, y))),
+                        _ => self.compute(slot, &[x, y], into)?,
+                    }
                 }
                 Instruction::Test { f, x, y, into } => {
                     self.fill(into, Register::Bool(f(self.number(x)?, self.number(y)?)));
@@ -214,7 +273,16 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     self.fill(into, Register::Bool(f(self.truth(x)?)))
                 }
                 Instruction::Index { base, key, into } => {
-                    self.fill(into, element(self.read(base)?, self.number(key)?)?);
+                    let found = match (self.read(base)?, self.read(key)?) {
+                        (Register::Other(base), Register::Num(key)) => element(base, key)?,
+                        _ => self.make(index_value(&self.value(base)?, &self.value(key)?).ok()?)?,
+                    };
+                    self.fill(into, found);
+                }
+                Instruction::Compute { slot, first, count, into } => {
+                    let from = first as usize;
+                    let operands = &local_density.sources[from..from + count as usize];
+                    self.compute(slot, operands, into)?;
                 }
                 Instruction::Branch { slot, cond, otherwise } => {
                     let holds = self.truth(cond)?;
@@ -250,11 +318,21 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 Instruction::Observe { slot, builtin, ref parameters, value } => {
                     let n = self.base + slot;
                     let replaced = self.graph.replaced(self.code, n).map(Register::of);
-                    let value = replaced.map_or_else(|| self.read(value), Some)?;
-                    let score = self.log_density(builtin, parameters, value)?;
-                    self.graph.take_score(n, &mut self.likelihood);
-                    self.likelihood.add(score);
-                    self.scores.push((n, score));
+                    let observed = replaced.map_or_else(|| self.read(value), Some)?;
+                    match self.log_density(builtin, parameters, observed) {
+                        Some(score) => {
+                            self.graph.take_score(n, &mut self.likelihood);
+                            self.likelihood.add(score);
+                            self.scores.push((n, score));
+                        }
+                        None => {
+                            let count = self.code.builtins.get(builtin).args.len();
+                            self.observe(slot, parameters.get(..count)?, value)?;
+                        }
+                    }
+                }
+                Instruction::ObserveUnder { slot, dist, value } => {
+                    self.observe(slot, &[dist], value)?;
                 }
                 Instruction::Factor { slot, weight } => {
                     let weight = self.number(weight).filter(|w| !w.is_nan())?;
@@ -272,15 +350,84 @@ impl<'a> Evaluation<'a, REGISTERS> {
         self.filled & (1 << r) != 0
     }
 
-    /// Returns the contents of a register.
-    pub fn register(&self, r: u8) -> Register<'a> {
-        self.registers[r as usize]
+    /// Returns the value in a register.
+    pub fn value_in(&self, r: u8) -> Value {
+        self.to_value(self.registers[r as usize])
     }
 
     #[inline(always)]
     fn fill(&mut self, into: u8, value: Register<'a>) {
         self.registers[into as usize] = value;
         self.filled |= 1 << into;
+    }
+
+    /// Runs the operation in a slot on these operands, as an update would.
+    fn compute(&mut self, slot: Slot, operands: &[Source], into: u8) -> Option<()> {
+        // Containers that it reads are held by its node.
+        if self.node(slot).side.is_some() {
+            return None;
+        }
+        let values = self.values(operands)?;
+        let value = match self.graph.op(self.code, self.base + slot) {
+            Op::Prim { builtin, .. } => {
+                let values: SmallVec<[&Value; 4]> = values.iter().collect();
+                self.code.builtins.get(*builtin).apply(&values).ok()?
+            }
+            Op::Array(_) => Value::from_elements(values.into_vec()),
+            Op::Record { names, .. } => {
+                Value::Record(Arc::new(names.iter().cloned().zip(values).collect()))
+            }
+            Op::Index { .. } => {
+                let (base, keys) = values.split_first()?;
+                keys.iter().try_fold(base.clone(), |v, key| index_value(&v, key)).ok()?
+            }
+            _ => return None,
+        };
+        let made = self.make(value)?;
+        self.fill(into, made);
+        Some(())
+    }
+
+    /// Returns the contents of a register for a value; `None` for one that limits may
+    /// apply to.
+    fn make(&mut self, value: Value) -> Option<Register<'a>> {
+        let is_small = match &value {
+            Value::Num(x) => return Some(Register::Num(*x)),
+            Value::Bool(b) => return Some(Register::Bool(*b)),
+            Value::Array(xs) => xs.len() <= LARGEST,
+            Value::List(_) | Value::Record(_) => {
+                value.len() <= Some(LARGEST) && value.extent() == Extent::Fits
+            }
+            Value::Dist(_) | Value::Likelihood(_) => true,
+            _ => false,
+        };
+        self.made.push(value);
+        is_small.then_some(Register::Made((self.made.len() - 1).try_into().ok()?))
+    }
+
+    /// Scores an observation of any kind, as an update would.
+    fn observe(&mut self, slot: Slot, parameters: &[Source], observed: Source) -> Option<()> {
+        let n = self.base + slot;
+        let Op::Observe { dist, .. } = self.graph.op(self.code, n) else { return None };
+        let values = self.values(parameters)?;
+        let values: SmallVec<[&Value; 4]> = values.iter().collect();
+        let observed = match self.graph.replaced(self.code, n) {
+            Some(value) => value.clone(),
+            None => self.value(observed)?,
+        };
+        let score = self.graph.score_of_values(self.code, n, dist, &values, &observed).ok()?;
+        self.graph.take_score(n, &mut self.likelihood);
+        match score {
+            Score::One(score) => {
+                self.likelihood.add(score);
+                self.scores.push((n, score));
+            }
+            Score::Sum(sum) => {
+                self.likelihood.merge(&sum);
+                self.summed = true;
+            }
+        }
+        Some(())
     }
 
     /// Whether its selections can take their other alternatives without releasing
@@ -347,7 +494,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     _ if !dist.is_scalar() => None,
                     Register::Num(x) => Some(dist.log_density_num(x)),
                     Register::Bool(b) => Some(dist.log_density_bool(b)),
-                    Register::Other(_) => None,
+                    _ => None,
                 }
             }
         }
@@ -362,6 +509,8 @@ impl<'a, const N: usize> Evaluation<'a, N> {
             base: 0,
             registers,
             filled: 0,
+            made: SmallVec::new(),
+            summed: false,
             turned: SmallVec::new(),
             scores: SmallVec::new(),
             prior: ExactSum::default(),
@@ -405,6 +554,27 @@ impl<'a, const N: usize> Evaluation<'a, N> {
             _ => None,
         }
     }
+
+    fn to_value(&self, r: Register) -> Value {
+        match r {
+            Register::Num(x) => Value::Num(x),
+            Register::Bool(b) => Value::Bool(b),
+            Register::Other(v) => v.clone(),
+            Register::Made(i) => self.made[i as usize].clone(),
+        }
+    }
+
+    /// Returns a value as an operation reads it.
+    fn value(&self, s: Source) -> Option<Value> {
+        match self.read(s)? {
+            Register::Other(Value::Container(_)) => None,
+            r => Some(self.to_value(r)),
+        }
+    }
+
+    fn values(&self, all: &[Source]) -> Option<SmallVec<[Value; 4]>> {
+        all.iter().map(|s| self.value(*s)).collect()
+    }
 }
 
 impl<'a> Register<'a> {
@@ -413,14 +583,6 @@ impl<'a> Register<'a> {
             Datum::Num(x) => Some(Register::Num(*x)),
             Datum::Bool(b) => Some(Register::Bool(*b)),
             _ => None,
-        }
-    }
-
-    pub fn to_value(self) -> Value {
-        match self {
-            Register::Num(x) => Value::Num(x),
-            Register::Bool(b) => Value::Bool(b),
-            Register::Other(v) => v.clone(),
         }
     }
 
@@ -456,14 +618,19 @@ fn family(builtin: &Builtin, parameters: &[Register]) -> Option<Dist> {
         return make(w);
     }
     let Kind::Distribution(make) = builtin.kind else { return None };
-    let owned: SmallVec<[Value; PARAMETERS]> = parameters.iter().map(|r| r.to_value()).collect();
+    let owned = parameters.iter().map(|r| match r {
+        Register::Num(x) => Some(Value::Num(*x)),
+        Register::Bool(b) => Some(Value::Bool(*b)),
+        Register::Other(v) => Some(Value::clone(v)),
+        Register::Made(_) => None,
+    });
+    let owned: SmallVec<[Value; PARAMETERS]> = owned.collect::<Option<_>>()?;
     let values: SmallVec<[&Value; PARAMETERS]> = owned.iter().collect();
     make(&Args { builtin, values: &values }).ok()
 }
 
 /// Returns an element of an array, if the index is in range.
-fn element(base: Register, key: f64) -> Option<Register> {
-    let Register::Other(base) = base else { return None };
+fn element(base: &Value, key: f64) -> Option<Register<'_>> {
     match base {
         Value::Array(xs) => place(xs.len(), key).map(|i| Register::Num(xs[i])),
         Value::List(xs) => place(xs.len(), key).map(|i| Register::of(&xs[i])),

@@ -47,14 +47,14 @@ impl Graph {
             if e.run(placed, local_densities.len() == 1).is_none() {
                 return false;
             }
-            following.values.push((placed.entry, at.to_value()));
+            following.values.push((placed.entry, e.value_in(0)));
             if !e.turned.is_empty() {
                 for (slot, r) in
                     placed.local_density.results.iter().filter(|(_, r)| e.is_filled(*r))
                 {
                     let n = placed.base + slot;
                     if self.nodes[n as usize].state == State::Empty {
-                        following.fresh.push((n, e.register(*r).to_value()));
+                        following.fresh.push((n, e.value_in(*r)));
                     }
                 }
             }
@@ -63,11 +63,14 @@ impl Graph {
                 if self.nodes[n as usize].state == State::Clean {
                     let mut results = placed.local_density.results.iter();
                     match results.find(|(s, r)| s == slot && e.is_filled(*r)) {
-                        Some((_, r)) => following.values.push((n, e.register(*r).to_value())),
+                        Some((_, r)) => following.values.push((n, e.value_in(*r))),
                         None => following.unasked.push(n),
                     }
                 }
             }
+        }
+        if e.summed {
+            return false;
         }
         following.turned = e.turned;
         let (scores, prior, likelihood) = (e.scores, e.prior, e.likelihood);
