@@ -4,7 +4,7 @@
 use super::graph::Graph;
 use super::node::*;
 use crate::lang::address::{Address, AddressSegment};
-use crate::lang::code::{BlockKind, Code, Op, Operand, Site};
+use crate::lang::code::{BlockKind, Code, DistSpec, Op, Operand, Site};
 use crate::lang::key::{Key, mix};
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -175,6 +175,7 @@ impl Graph {
     /// Returns the address for which a node is executed: its own, or that of the choice
     /// or call around it.
     pub fn address_near(&self, code: &Code, n: NodeId) -> Address {
+        let n = self.drawn_from(code, n).unwrap_or(n);
         let mut address = self.address(code, n);
         if address.segments.is_empty()
             && let Some(name) = self.name_of(code, n)
@@ -182,6 +183,18 @@ impl Graph {
             address.segments.push(AddressSegment { name, occurrence: 1, keys: Vec::new() });
         }
         address
+    }
+
+    /// Returns the choice or observation for which alone a nameless distribution is made.
+    fn drawn_from(&self, code: &Code, n: NodeId) -> Option<NodeId> {
+        let facts = self.slot_facts(code, n);
+        let [user] = facts.users[..] else { return None };
+        let user = n - facts.slot + user;
+        let (Op::Draw { dist, .. } | Op::Observe { dist, .. }) = self.op(code, user) else {
+            return None;
+        };
+        let made_for = matches!(dist, DistSpec::Value(Operand::Local(s)) if *s == facts.slot);
+        (made_for && self.name_of(code, n).is_none()).then_some(user)
     }
 
     /// Returns the top-level name of a node.
