@@ -19,6 +19,7 @@
 #[cfg(feature = "scene")]
 pub mod bank;
 pub mod diag;
+pub mod editor;
 pub mod host;
 pub mod infer;
 pub mod lang;

@@ -59,6 +59,8 @@ pub enum Command {
     Repl(Repl),
     /// Format programs: spacing and line breaks; comments are kept
     Fmt(Fmt),
+    /// Serve an editor: the Language Server Protocol over standard input and output
+    Lsp,
     /// Print a shell completion script
     Completions(Completions),
     /// Show a kept state of a finished run: a picture, a mesh, or its choices

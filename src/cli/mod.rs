@@ -10,6 +10,7 @@ mod edges;
 mod evaluate;
 mod failure;
 mod learn;
+mod lsp;
 mod manual;
 mod people;
 mod programs;
@@ -45,6 +46,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Doc(a) => doc::doc(&a),
         Command::Repl(a) => repl::repl(&a),
         Command::Fmt(a) => fmt::fmt(&a),
+        Command::Lsp => lsp::lsp(),
         Command::Completions(a) => manual::completions(&a, Cli::command()),
         Command::Man(a) => manual::man(&a, Cli::command()),
         Command::Show(a) => show::show(&a),

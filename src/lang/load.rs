@@ -162,10 +162,23 @@ pub fn load_text(
     loader: &dyn Loader,
     map: &mut SourceMap,
 ) -> Result<Loaded, Vec<Diagnostic>> {
+    match load_partly(name, text, loader, map) {
+        (loaded, errors) if errors.is_empty() => Ok(loaded),
+        (_, errors) => Err(errors),
+    }
+}
+
+/// Loads what can be loaded of a program given as text, with the errors of the rest.
+pub fn load_partly(
+    name: &str,
+    text: &str,
+    loader: &dyn Loader,
+    map: &mut SourceMap,
+) -> (Loaded, Vec<Diagnostic>) {
     let mut loading =
         Loading { loader, map, loaded: Loaded::default(), errors: Vec::new(), stack: Vec::new() };
     loading.unit(tidy(name), text.as_bytes(), false);
-    loading.finish()
+    (loading.loaded, loading.errors)
 }
 
 /// Returns the names of the programs that come with the binary.

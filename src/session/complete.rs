@@ -2,9 +2,12 @@
 
 use super::command::COMMANDS;
 use super::state::Session;
+use crate::editor::words::{
+    KEYWORDS, KINDS, enclosing_call, files, files_wanted, open_string, start_of,
+};
 use crate::lang::builtins::{Kind, Type};
 use crate::lang::code::BlockKind;
-use crate::syntax::{Class, STATEMENTS, classes};
+use crate::syntax::STATEMENTS;
 use std::path::Path;
 
 /// The candidates for a piece of a line.
@@ -15,24 +18,6 @@ pub struct Completion {
     /// The candidates, in order.
     pub words: Vec<String>,
 }
-
-/// Keywords that do not begin a statement.
-const KEYWORDS: &[&str] = &["else", "and", "or", "not", "true", "false"];
-/// Tags that choices get from their distributions.
-const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
-/// Built-ins that read files.
-const READERS: &[&str] = &[
-    "image",
-    "csv",
-    "json",
-    "mesh",
-    "armature",
-    "keypoints",
-    "mask",
-    "depth",
-    "contours",
-    "detector",
-];
 
 impl Session {
     /// Completes the word that ends at byte `at` of a line.
@@ -55,8 +40,8 @@ impl Session {
         let params = || self.program.interface().params.into_iter().map(|p| p.name);
         let is_first = before[..start].split_whitespace().count() == 1;
         match command {
-            "save" | "save!" | "load" => found(start, word, files(word, &[".pcad"])),
-            "render" => found(start, word, globals().chain(files(word, &[".png"]))),
+            "save" | "save!" | "load" => found(start, word, files(Path::new(""), word, &[".pcad"])),
+            "render" => found(start, word, globals().chain(files(Path::new(""), word, &[".png"]))),
             "plot" => found(start, word, self.quantity_names().into_iter()),
             "doc" | "help" if is_first => found(start, word, self.topics()),
             "why" if is_first => self.complete_choice(before, std::iter::empty()),
@@ -110,30 +95,22 @@ impl Session {
     /// Completes a word of an expression or directive.
     fn complete_text(&self, before: &str) -> Completion {
         if let Some(start) = open_string(before) {
-            let is_program = before[..start - 1].trim_end().ends_with("include");
-            let reads =
-                |name: &&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(*name);
-            return match is_program || READERS.iter().any(reads) {
-                true => found(
-                    start,
-                    &before[start..],
-                    files(&before[start..], if is_program { &[".pcad"] } else { &[] }),
-                ),
-                false => Completion::default(),
+            return match files_wanted(&before[..start - 1]) {
+                Some(endings) => {
+                    let word = &before[start..];
+                    found(start, word, files(Path::new(""), word, endings))
+                }
+                None => Completion::default(),
             };
         }
         let part_of_address = |c: char| c.is_alphanumeric() || "@_/[]#*\".-".contains(c);
-        let start = before
-            .rfind(|c: char| !part_of_address(c))
-            .map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
+        let start = start_of(before, part_of_address);
         if before[start..].contains('@') {
             let start = start + before[start..].rfind('@').unwrap_or(0);
             return found(start, &before[start..], self.addresses());
         }
         let part_of_name = |c: char| c.is_alphanumeric() || c == '_' || c == '.' || c == '$';
-        let start = before
-            .rfind(|c: char| !part_of_name(c))
-            .map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
+        let start = start_of(before, part_of_name);
         let word = &before[start..];
         if word.starts_with('$') {
             let tags = self.model.code().tags.iter().map(|t| format!("${t}"));
@@ -196,68 +173,4 @@ fn found(start: usize, word: &str, all: impl Iterator<Item = String>) -> Complet
     words.sort();
     words.dedup();
     Completion { start, words }
-}
-
-/// Returns where the text of an unclosed string begins.
-fn open_string(before: &str) -> Option<usize> {
-    let mut open = None;
-    let mut chars = before.char_indices();
-    while let Some((i, c)) = chars.next() {
-        match c {
-            '\\' if open.is_some() => {
-                chars.next();
-            }
-            '"' => open = if open.is_some() { None } else { Some(i + 1) },
-            _ => {}
-        }
-    }
-    open
-}
-
-/// Returns the name of the call whose arguments are open at the end of a text.
-fn enclosing_call(before: &str) -> Option<String> {
-    let hidden: Vec<_> = classes(before)
-        .into_iter()
-        .filter(|(_, c)| matches!(c, Class::String | Class::Comment | Class::Address))
-        .collect();
-    let mut depth = 0;
-    for (i, c) in before.char_indices().rev() {
-        if hidden.iter().any(|(r, _)| r.contains(&i)) {
-            continue;
-        }
-        match c {
-            ')' | ']' | '}' => depth += 1,
-            '(' if depth == 0 => {
-                let head = before[..i].trim_end();
-                let start = head
-                    .rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
-                    .map_or(0, |j| j + head[j..].chars().next().map_or(1, char::len_utf8));
-                return Some(head[start..].to_owned()).filter(|n| !n.is_empty());
-            }
-            '(' | '[' | '{' => depth -= 1,
-            ';' if depth == 0 => return None,
-            _ => {}
-        }
-        if depth < 0 {
-            // Inside an array or record among the arguments.
-            depth = 0;
-        }
-    }
-    None
-}
-
-/// Lists the files and subfolders in the folder of a path; files only with one of the
-/// endings, if any are given. Hidden names are left out.
-fn files(word: &str, endings: &[&str]) -> impl Iterator<Item = String> + use<> {
-    let folder = word.rfind('/').map_or("", |i| &word[..=i]).to_owned();
-    let endings: Vec<String> = endings.iter().map(|e| (*e).to_owned()).collect();
-    let listed =
-        std::fs::read_dir(if folder.is_empty() { Path::new(".") } else { Path::new(&folder) });
-    listed.into_iter().flatten().flatten().filter_map(move |e| {
-        let name = e.file_name().into_string().ok().filter(|n| !n.starts_with('.'))?;
-        let is_folder = e.path().is_dir();
-        let fits =
-            is_folder || endings.is_empty() || endings.iter().any(|x| name.ends_with(x.as_str()));
-        fits.then(|| format!("{folder}{name}{}", if is_folder { "/" } else { "" }))
-    })
 }
