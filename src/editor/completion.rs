@@ -4,7 +4,6 @@ use super::Analysis;
 use super::names::BindingKind;
 use super::words::{self, KEYWORDS, KINDS};
 use crate::lang::builtins::Kind;
-use crate::syntax::span::FileId;
 use crate::syntax::{Class, STATEMENTS, classes};
 use std::path::Path;
 
@@ -151,11 +150,6 @@ impl Analysis {
         let inner = self.hints().into_iter().map(|h| h.address).filter(|a| !a.contains('…'));
         let all = top.into_iter().chain(inner);
         all.map(|word| plain(word, CandidateKind::Address))
-    }
-
-    /// Whether a file of the program is the text itself.
-    pub fn is_own(&self, file: FileId) -> bool {
-        file == FileId(0)
     }
 }
 

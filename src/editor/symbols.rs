@@ -33,7 +33,9 @@ impl Analysis {
     /// Returns the bindings at the top level, in the order of the text.
     pub fn outline(&self) -> Vec<&Binding> {
         let top = |b: &&Binding| b.span.file == FileId(0) && b.scope.is_none();
-        self.names.bindings.iter().filter(top).collect()
+        let mut all: Vec<&Binding> = self.names.bindings.iter().filter(top).collect();
+        all.sort_by_key(|b| b.span.start);
+        all
     }
 
     /// Returns the pieces of the text that have a class, in order.

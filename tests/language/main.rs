@@ -8,6 +8,7 @@ mod common;
 mod forests;
 
 mod docs;
+mod editor;
 mod errors;
 mod examples;
 mod limits;
