@@ -11,7 +11,6 @@ use std::sync::Arc;
 
 /// What is known of a program's text, as if it were a file with that name. The text is
 /// file 0; the files it includes follow.
-#[derive(Debug)]
 pub struct Analysis {
     /// The text and the files that it includes.
     pub sources: SourceMap,
@@ -21,6 +20,8 @@ pub struct Analysis {
     pub names: Names,
     /// The program, if it has no mistakes.
     pub(super) model: Option<Model>,
+    /// The last version that could be parsed, with the data files that were read for it.
+    program: Option<Program>,
     pub(super) builtins: Arc<Table>,
 }
 
@@ -47,19 +48,34 @@ pub enum CannotRename {
 impl Analysis {
     /// Analyses a text.
     pub fn of(name: &str, text: &str) -> Analysis {
+        Analysis::from_program(name, text, None)
+    }
+
+    /// Analyses another version of the text. Data files that have been read are not read
+    /// again.
+    #[must_use]
+    pub fn edited(self, text: &str) -> Analysis {
+        let name = self.sources.get(FileId(0)).map_or("", |f| f.name()).to_owned();
+        Analysis::from_program(&name, text, self.program)
+    }
+
+    fn from_program(name: &str, text: &str, mut program: Option<Program>) -> Analysis {
         let mut sources = SourceMap::new();
         let reach = Reach::default().of(name);
         let (loaded, mut diagnostics) = load_partly(name, text, &reach, &mut sources);
         let mut model = None;
         if diagnostics.is_empty() {
-            let compiled = Program::named(name, text).and_then(|p| p.without_data().compile());
-            match compiled {
+            let parsed = match &program {
+                Some(before) => before.edited(text),
+                None => Program::named(name, text).map(Program::without_data),
+            };
+            match parsed.and_then(|p| program.insert(p).clone().compile()) {
                 Ok(compiled) => model = Some(compiled),
                 Err(e) => diagnostics = e.diagnostics,
             }
         }
         let names = Names::of(&loaded);
-        Analysis { sources, diagnostics, names, model, builtins: standard::table() }
+        Analysis { sources, diagnostics, names, model, program, builtins: standard::table() }
     }
 
     /// Returns the text.

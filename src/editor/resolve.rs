@@ -301,9 +301,16 @@ impl Resolver<'_> {
                 self.block(s.span, names, true, |r| r.stmts(body));
             }
         }
-        let keyed_draw = matches!(&s.kind,
-            StmtKind::Draw { target, .. } if matches!(target.kind, ExprKind::Index { .. }));
-        if !declared && !(keyed_draw && self.in_loop()) && !matches!(s.kind, StmtKind::For { .. }) {
+        let is_declared = declared
+            || match &s.kind {
+                // Its container belongs to a block further out.
+                StmtKind::Draw { target, .. } => {
+                    matches!(target.kind, ExprKind::Index { .. }) && self.in_loop()
+                }
+                StmtKind::For { .. } => true,
+                _ => false,
+            };
+        if !is_declared {
             self.declare(s);
         }
     }

@@ -131,7 +131,7 @@ fn lines(places: &Value) -> Vec<u64> {
 fn a_client_plays_requests() {
     let mut c = Client::new();
     assert_eq!(c.open(TEXT)["diagnostics"].as_array().unwrap().len(), 1, "é is no letter of names");
-    let text = TEXT.replace("\u{e9}t", "et");
+    let text = TEXT.replace("\u{e9}t", "et").replace("slope * x", "slope*x");
     assert_eq!(c.change(2, &text)["diagnostics"], json!([]));
 
     let hover = |c: &mut Client, line, column| {
@@ -180,7 +180,7 @@ fn a_client_plays_requests() {
 
     let tokens = c.ask("textDocument/semanticTokens/full", json!({}));
     let data = tokens["data"].as_array().unwrap();
-    assert!(data.len() > 100 && data.len() % 5 == 0);
+    assert!(data.len() > 100 && data.len().is_multiple_of(5));
     assert_eq!(data[..5], [0, 0, 5, 0, 0].map(Value::from), "the keyword `param`");
 
     let options = json!({ "options": { "tabSize": 2, "insertSpaces": true } });
@@ -192,7 +192,7 @@ fn a_client_plays_requests() {
     // Mistakes have hints, in the units of the editor.
     let wrong = "/* 𝄞 */ assume x ~ norml(0, 1);";
     let found = c.change(4, wrong)["diagnostics"][0].clone();
-    assert_eq!(found["range"]["start"], json!({ "line": 0, "character": 19 }));
+    assert_eq!(found["range"]["start"], json!({ "line": 0, "character": 20 }));
     assert!(found["message"].as_str().unwrap().contains("did you mean `normal`?"));
     assert_eq!(c.change(5, "let x = 1;")["diagnostics"], json!([]));
 
@@ -242,6 +242,19 @@ fn included_files_have_their_own_mistakes() {
         found["diagnostics"].as_array().unwrap().len()
     };
     assert_eq!((of(&part), of(&main)), (1, 0));
+    folder.write("part.pcad", "let a = 1;\n");
+    c.send(json!({
+        "method": "textDocument/didSave", "params": { "textDocument": { "uri": part } },
+    }));
+    for note in [c.mistakes(), c.mistakes()] {
+        assert_eq!(note["diagnostics"], json!([]), "mended on the disk");
+    }
+    folder.write("part.pcad", "let a = nothing_here;\n");
+    c.send(json!({
+        "method": "textDocument/didSave", "params": { "textDocument": { "uri": part } },
+    }));
+    let notes = [c.mistakes(), c.mistakes()];
+    assert_eq!(notes.iter().filter(|n| n["diagnostics"] != json!([])).count(), 1);
     c.send(json!({
         "method": "textDocument/didClose", "params": { "textDocument": { "uri": main } },
     }));

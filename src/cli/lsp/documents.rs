@@ -10,7 +10,6 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// One open document.
-#[derive(Debug)]
 pub struct Document {
     /// Its address.
     pub uri: Uri,
@@ -20,13 +19,19 @@ pub struct Document {
     pub version: i32,
     text: String,
     analysis: Option<Analysis>,
+    /// The analysis of an earlier version.
+    before: Option<Analysis>,
     is_published: bool,
 }
 
 impl Document {
     /// Returns the analysis of the present text.
     pub fn analysis(&mut self) -> &Analysis {
-        self.analysis.get_or_insert_with(|| Analysis::of(&self.path, &self.text))
+        let Document { path, text, before, .. } = self;
+        self.analysis.get_or_insert_with(|| match before.take() {
+            Some(before) => before.edited(text),
+            None => Analysis::of(path, text),
+        })
     }
 
     /// Returns the folder to which paths in the document are relative.
@@ -41,7 +46,6 @@ pub fn source(analysis: &Analysis) -> Option<&SourceFile> {
 }
 
 /// The open documents.
-#[derive(Debug)]
 pub struct Documents {
     /// The units of columns.
     pub encoding: Encoding,
@@ -57,17 +61,19 @@ impl Documents {
 
     /// Opens a document, or gives it a new text.
     pub fn set(&mut self, uri: &Uri, text: String, version: i32) {
-        let path = path_of(uri);
-        let (uri, analysis, is_published) = (uri.clone(), None, false);
-        let key = uri.as_str().to_owned();
-        self.open.insert(key, Document { uri, path, version, text, analysis, is_published });
-        // Others may include it. They read it as it was saved.
-        for other in self.open.values_mut().filter(|d| d.analysis.is_some()) {
-            let names_it =
-                other.analysis.as_ref().is_some_and(|a| a.sources.get(FileId(1)).is_some());
-            if names_it {
-                (other.analysis, other.is_published) = (None, false);
-            }
+        let known = self.open.remove(uri.as_str());
+        let before = known.and_then(|d| d.analysis.or(d.before));
+        let (path, key, uri) = (path_of(uri), uri.as_str().to_owned(), uri.clone());
+        let (analysis, is_published) = (None, false);
+        let document = Document { uri, path, version, text, analysis, before, is_published };
+        self.open.insert(key, document);
+    }
+
+    /// A document was saved: what is read from the disk may have changed, for others too.
+    pub fn saved(&mut self) {
+        for document in self.open.values_mut() {
+            (document.analysis, document.before) = (None, None);
+            document.is_published = false;
         }
     }
 

@@ -9,7 +9,7 @@ use crate::trace::Trace;
 use crate::trace::choices::Target;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
-use crate::trace::shortcuts::local_density::Register;
+use crate::trace::shortcuts::register::Register;
 use smallvec::SmallVec;
 
 /// Changes to the nodes that depend on a choice.
