@@ -30,6 +30,18 @@ pub fn quantile_sorted(sorted: &[f64], p: f64) -> f64 {
     }
 }
 
+/// The median, for an even number of draws half the sum of the two in the middle, rounded
+/// as numpy does. NaN as for [`quantile`].
+pub fn median(x: &[f64]) -> f64 {
+    if x.is_empty() || x.iter().any(|v| v.is_nan()) {
+        return f64::NAN;
+    }
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let half = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
+    if half.is_finite() { half } else { quantile_sorted(&sorted, 0.5) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,6 +54,21 @@ mod tests {
         assert_eq!(quantile(&x, 0.5), 2.5);
         assert_eq!(quantile(&x, 0.25), 1.75);
         assert_eq!(quantile(&[7.0], 0.3), 7.0);
+    }
+
+    #[test]
+    fn medians_are_rounded_as_half_a_sum() {
+        assert_eq!([median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])], [2.0, 2.5]);
+        // Where lo + (hi - lo) / 2 rounds otherwise.
+        let mut differ = 0;
+        for i in 1..200 {
+            let (lo, hi) = (-0.1 / f64::from(i), 0.37 / f64::from(i * i));
+            assert_eq!(median(&[hi, lo]), 0.5 * (lo + hi));
+            differ += u32::from(median(&[hi, lo]) != quantile(&[hi, lo], 0.5));
+        }
+        assert!(differ > 0);
+        assert_eq!(median(&[f64::MAX, f64::MAX]), f64::MAX);
+        assert!(median(&[]).is_nan() && median(&[1.0, f64::NAN]).is_nan());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::chains::{Chains, mean, variance};
 use super::normal_scores::normal_scores;
-use super::quantile::quantile;
+use super::quantile::median;
 
 /// Rank-normalised split R-hat: the larger of bulk and folded R-hat (Vehtari et al. 2021,
 /// section 4.1). Near 1 if the chains agree; above 1.01 they have not converged. NaN for
@@ -15,7 +15,8 @@ pub(super) fn rank_normalised(chains: &Chains) -> f64 {
     if chains.count() < 2 {
         return f64::NAN;
     }
-    let median = quantile(chains.values(), 0.5);
+    // Of two draws in the middle, rounding decides which is nearer, as in ArviZ.
+    let median = median(chains.values());
     let bulk = plain(&normal_scores(&chains.split()));
     let folded = plain(&normal_scores(&chains.map(|x| (x - median).abs()).split()));
     // If the folded draws do not vary, their R-hat is NaN and the bulk's is used.
