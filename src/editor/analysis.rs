@@ -60,21 +60,27 @@ impl Analysis {
     }
 
     fn from_program(name: &str, text: &str, mut program: Option<Program>) -> Analysis {
-        let mut sources = SourceMap::new();
-        let reach = Reach::default().of(name);
-        let (loaded, mut diagnostics) = load_partly(name, text, &reach, &mut sources);
-        let mut model = None;
-        if diagnostics.is_empty() {
-            let parsed = match &program {
-                Some(before) => before.edited(text),
-                None => Program::named(name, text).map(Program::without_data),
-            };
-            match parsed.and_then(|p| program.insert(p).clone().compile()) {
-                Ok(compiled) => model = Some(compiled),
-                Err(e) => diagnostics = e.diagnostics,
+        let parsed = match &program {
+            Some(before) => before.edited(text),
+            None => Program::named(name, text).map(Program::without_data),
+        };
+        let (names, sources, compiled) = match parsed {
+            Ok(parsed) => {
+                let (loaded, sources) = parsed.loaded();
+                let (names, sources) = (Names::of(loaded), sources.clone());
+                (names, sources, program.insert(parsed).clone().compile())
             }
-        }
-        let names = Names::of(&loaded);
+            Err(e) => {
+                let mut sources = SourceMap::new();
+                let reach = Reach::default().of(name);
+                let (loaded, _) = load_partly(name, text, &reach, &mut sources);
+                (Names::of(&loaded), sources, Err(e))
+            }
+        };
+        let (model, diagnostics) = match compiled {
+            Ok(model) => (Some(model), Vec::new()),
+            Err(e) => (None, e.diagnostics),
+        };
         Analysis { sources, diagnostics, names, model, program, builtins: standard::table() }
     }
 

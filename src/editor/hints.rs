@@ -2,8 +2,10 @@
 
 use super::Analysis;
 use crate::dist::FAMILIES;
+use crate::lang::address::AddressSegment;
 use crate::lang::code::{BlockKind, Code, DistSpec, Op, Operand};
 use crate::syntax::span::FileId;
+use std::sync::Arc;
 
 /// A hint at a place in the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,10 +57,12 @@ fn address(code: &Code, block: usize, site: u32) -> String {
     let segments: Vec<String> = code.sites[site as usize]
         .segments
         .iter()
-        .map(|s| match s.occurrence {
-            0 | 1 => s.name.to_string(),
-            n => format!("{}#{n}", s.name),
+        .map(|s| AddressSegment {
+            name: Arc::clone(&s.name),
+            occurrence: s.occurrence,
+            keys: Vec::new(),
         })
+        .map(|s| s.to_string())
         .collect();
     let (before, keys) = (if inside { "…/" } else { "" }, if looped { "[…]" } else { "" });
     format!("@{before}{}{keys}", segments.join("/"))

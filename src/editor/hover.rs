@@ -2,6 +2,7 @@
 
 use super::Analysis;
 use super::names::Binding;
+use super::words::start_of;
 use crate::lang::builtins::doc::doc;
 use crate::syntax::span::{FileId, Span};
 
@@ -38,9 +39,7 @@ impl Analysis {
         let text = self.text();
         let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let (before, after) = text.split_at_checked(byte)?;
-        let start = before
-            .rfind(|c| !part(c))
-            .map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
+        let start = start_of(before, part);
         let end = byte + after.find(|c| !part(c)).unwrap_or(after.len());
         let word = text.get(start..end).filter(|w| !w.is_empty())?;
         Some((Span::new(FileId(0), start, end), word.to_owned()))

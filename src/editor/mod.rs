@@ -11,7 +11,7 @@ mod resolve;
 mod symbols;
 pub mod words;
 
-pub use analysis::Analysis;
+pub use analysis::{Analysis, CannotRename};
 pub use completion::{Candidate, CandidateKind};
 pub use hints::Hint;
 pub use names::{Binding, BindingId, BindingKind, Names, Occurrence};

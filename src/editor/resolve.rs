@@ -260,7 +260,7 @@ impl Resolver<'_> {
 
     fn stmts(&mut self, stmts: &[Stmt]) {
         // Containers can be read before the loop that draws into them.
-        if !self.scopes.last().is_some_and(|s| s.is_loop) {
+        if !self.in_loop() {
             stmts.iter().for_each(|s| self.declare_keyed(s));
         }
         stmts.iter().for_each(|s| self.stmt(s, false));
@@ -295,10 +295,7 @@ impl Resolver<'_> {
                 self.expr(e);
             }
             StmtKind::For { var, iter, body } => {
-                self.expr(iter);
-                let id = self.add(var, BindingKind::Loop, var.span, Some(s.span));
-                let names = Scope::from_iter([(Arc::clone(&var.node), id)]);
-                self.block(s.span, names, true, |r| r.stmts(body));
+                self.loop_over(var, iter, s.span, |r| r.stmts(body));
             }
         }
         let is_declared = declared
@@ -313,6 +310,14 @@ impl Resolver<'_> {
         if !is_declared {
             self.declare(s);
         }
+    }
+
+    /// Resolves a loop of the model or of a plan.
+    fn loop_over(&mut self, var: &Name, iter: &Expr, span: Span, body: impl FnOnce(&mut Self)) {
+        self.expr(iter);
+        let id = self.add(var, BindingKind::Loop, var.span, Some(span));
+        let names = Scope::from_iter([(Arc::clone(&var.node), id)]);
+        self.block(span, names, true, body);
     }
 
     fn in_loop(&self) -> bool {
@@ -349,10 +354,7 @@ impl Resolver<'_> {
                     }
                 }
                 KStmtKind::For { var, iter, body } => {
-                    self.expr(iter);
-                    let id = self.add(var, BindingKind::Loop, var.span, Some(s.span));
-                    let names = Scope::from_iter([(Arc::clone(&var.node), id)]);
-                    self.block(s.span, names, true, |r| r.steps(body));
+                    self.loop_over(var, iter, s.span, |r| r.steps(body));
                 }
                 KStmtKind::StopWhen(e) | KStmtKind::Expr(e) => self.expr(e),
                 KStmtKind::Collect(all) => all.iter().for_each(|e| self.expr(e)),

@@ -122,6 +122,11 @@ impl Program {
         }
     }
 
+    /// Returns its syntax trees, and the texts that they are from.
+    pub(crate) fn loaded(&self) -> (&Loaded, &SourceMap) {
+        (&self.loaded, &self.sources)
+    }
+
     /// Returns its parameters and data.
     pub fn interface(&self) -> Interface {
         inspect(&self.loaded, &self.builtins)

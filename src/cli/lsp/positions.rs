@@ -2,7 +2,8 @@
 //! two sides agree on; paths and addresses of files.
 
 use lsp_types::{Position, Range, Uri};
-use pcadlang::diag::{SourceFile, Span};
+use pcadlang::diag::{FileId, SourceFile, Span};
+use pcadlang::editor::Analysis;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -81,7 +82,7 @@ pub fn path_of(uri: &Uri) -> String {
 }
 
 /// Returns the address of a file.
-pub fn uri_of(path: &Path) -> Option<Uri> {
+fn uri_of(path: &Path) -> Option<Uri> {
     let path: PathBuf = std::path::absolute(path).ok()?;
     let mut text = String::from("file://");
     let path = path.to_str()?.replace('\\', "/");
@@ -96,6 +97,16 @@ pub fn uri_of(path: &Path) -> Option<Uri> {
         }
     }
     Uri::from_str(&text).ok()
+}
+
+/// Returns the address of a file of a program whose text has this one; `None` for a
+/// shipped file, which is not on the disk.
+pub fn address(analysis: &Analysis, own: &Uri, file: FileId) -> Option<Uri> {
+    if file == FileId(0) {
+        return Some(own.clone());
+    }
+    let path = Path::new(analysis.sources.get(file)?.name());
+    path.exists().then(|| uri_of(path)).flatten()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The mistakes that the editor shows: those of each document, also in the files that it
 //! includes.
 
-use super::positions::{Encoding, uri_of};
+use super::positions::{Encoding, address};
 use lsp_server::Notification;
 use lsp_types::notification::{Notification as _, PublishDiagnostics};
 use lsp_types::{
@@ -11,7 +11,6 @@ use lsp_types::{
 use pcadlang::diag::{self, FileId, Severity, SourceMap};
 use pcadlang::editor::Analysis;
 use std::collections::{BTreeMap, HashMap};
-use std::path::Path;
 use std::str::FromStr;
 
 /// By document, the files for which mistakes are shown on its account.
@@ -47,19 +46,12 @@ impl Published {
         for before in self.by_document.remove(&own).unwrap_or_default() {
             by_file.entry(before).or_default();
         }
-        let address = |file: FileId| match file {
-            FileId(0) => Some(uri.clone()),
-            file => {
-                let path = Path::new(analysis.sources.get(file)?.name());
-                // Shipped files are not on the disk.
-                path.exists().then(|| uri_of(path)).flatten()
-            }
-        };
+        let address = |file: FileId| address(analysis, uri, file);
         for d in &analysis.diagnostics {
             let at = d.labels.iter().find(|l| l.primary).or(d.labels.first());
             let file = at.and_then(|l| address(l.span.file));
             let place = file.as_ref().map_or(own.clone(), |u| u.as_str().to_owned());
-            let shown = shown(d, file.is_some(), &analysis.sources, encoding, &address);
+            let shown = shown(d, at, file.is_some(), &analysis.sources, encoding, &address);
             by_file.entry(place).or_default().push(shown);
         }
         let files: Vec<String> =
@@ -81,6 +73,7 @@ fn message(uri: &str, diagnostics: Vec<Diagnostic>, version: Option<i32>) -> Opt
 
 fn shown(
     d: &diag::Diagnostic,
+    at: Option<&diag::Label>,
     is_placed: bool,
     sources: &SourceMap,
     encoding: Encoding,
@@ -89,19 +82,18 @@ fn shown(
     let range = |label: &diag::Label| {
         sources.get(label.span.file).map_or(Range::default(), |f| encoding.range(f, label.span))
     };
-    let first = d.labels.iter().find(|l| l.primary).or(d.labels.first());
     let mut text = d.message.clone();
-    if let Some(label) = first.filter(|l| !l.text.is_empty()) {
+    if let Some(label) = at.filter(|l| !l.text.is_empty()) {
         text.push_str(&format!("\n{}", label.text));
     }
     d.notes.iter().for_each(|n| text.push_str(&format!("\n{n}")));
     d.hints.iter().for_each(|h| text.push_str(&format!("\nhint: {h}")));
-    let related = d.labels.iter().filter(|l| Some(*l) != first).filter_map(|l| {
+    let related = d.labels.iter().filter(|l| Some(*l) != at).filter_map(|l| {
         let location = Location { uri: address(l.span.file)?, range: range(l) };
         Some(DiagnosticRelatedInformation { location, message: l.text.clone() })
     });
     Diagnostic {
-        range: first.filter(|_| is_placed).map_or(Range::default(), range),
+        range: at.filter(|_| is_placed).map_or(Range::default(), range),
         severity: Some(match d.severity {
             Severity::Error => DiagnosticSeverity::ERROR,
             Severity::Warning => DiagnosticSeverity::WARNING,

@@ -2,7 +2,7 @@
 
 use super::documents::{Documents, source};
 use super::edits;
-use super::positions::uri_of;
+use super::positions::address;
 use super::tokens::tokens;
 use lsp_types::request::*;
 use lsp_types::{
@@ -17,7 +17,6 @@ use pcadlang::editor::{Analysis, BindingKind, Candidate, CandidateKind};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::path::Path;
 
 type Answer<T> = Result<T, String>;
 
@@ -125,11 +124,7 @@ fn location(
 ) -> Option<Location> {
     let (own, encoding) = documents;
     let file = analysis.sources.get(span.file)?;
-    let uri = match span.file {
-        FileId(0) => own.clone(),
-        _ => Some(Path::new(file.name())).filter(|p| p.exists()).and_then(uri_of)?,
-    };
-    Some(Location { uri, range: encoding.range(file, span) })
+    Some(Location { uri: address(analysis, own, span.file)?, range: encoding.range(file, span) })
 }
 
 fn definition(documents: &mut Documents, p: GotoDefinitionParams) -> Answer<Option<Location>> {

@@ -3,12 +3,14 @@
 /// The quantile at `p` in [0, 1] by linear interpolation between order statistics (R's
 /// type 7, numpy's default); NaN for an empty slice, or if a draw is NaN.
 pub fn quantile(x: &[f64], p: f64) -> f64 {
-    if x.iter().any(|v| v.is_nan()) {
-        return f64::NAN;
-    }
+    in_order(x).map_or(f64::NAN, |sorted| quantile_sorted(&sorted, p))
+}
+
+/// Returns draws in ascending order; `None` if one is NaN.
+fn in_order(x: &[f64]) -> Option<Vec<f64>> {
     let mut sorted = x.to_vec();
     sorted.sort_by(f64::total_cmp);
-    quantile_sorted(&sorted, p)
+    (!x.iter().any(|v| v.is_nan())).then_some(sorted)
 }
 
 /// As [`quantile`], for draws already in ascending order.
@@ -33,11 +35,7 @@ pub fn quantile_sorted(sorted: &[f64], p: f64) -> f64 {
 /// The median, for an even number of draws half the sum of the two in the middle, rounded
 /// as numpy does. NaN as for [`quantile`].
 pub fn median(x: &[f64]) -> f64 {
-    if x.is_empty() || x.iter().any(|v| v.is_nan()) {
-        return f64::NAN;
-    }
-    let mut sorted = x.to_vec();
-    sorted.sort_by(f64::total_cmp);
+    let Some(sorted) = in_order(x).filter(|s| !s.is_empty()) else { return f64::NAN };
     let half = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
     if half.is_finite() { half } else { quantile_sorted(&sorted, 0.5) }
 }
