@@ -1,9 +1,13 @@
 //! The command line.
 
 mod reopening;
+#[cfg(feature = "studio")]
+mod studio;
 mod values;
 
 pub use reopening::{Compare, Report, Show};
+#[cfg(feature = "studio")]
+pub use studio::Studio;
 
 use super::detect::Detect;
 use super::manual::{Completions, Man};
@@ -57,6 +61,10 @@ pub enum Command {
     Doc(Doc),
     /// Explore a program interactively; `:help` at the prompt lists the commands
     Repl(Repl),
+    /// Serve a web application on this machine: write programs, run them over photographs,
+    /// look at what they find
+    #[cfg(feature = "studio")]
+    Studio(Studio),
     /// Format programs: spacing and line breaks; comments are kept
     Fmt(Fmt),
     /// Serve an editor: the Language Server Protocol over standard input and output

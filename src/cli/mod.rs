@@ -19,6 +19,8 @@ mod repl;
 mod running;
 mod sample;
 mod scene;
+#[cfg(feature = "studio")]
+mod studio;
 mod term;
 mod tradeoff;
 
@@ -47,6 +49,8 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Repl(a) => repl::repl(&a),
         Command::Fmt(a) => fmt::fmt(&a),
         Command::Lsp => lsp::lsp(),
+        #[cfg(feature = "studio")]
+        Command::Studio(a) => studio::studio(&a),
         Command::Completions(a) => manual::completions(&a, Cli::command()),
         Command::Man(a) => manual::man(&a, Cli::command()),
         Command::Show(a) => show::show(&a),

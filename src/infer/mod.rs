@@ -17,6 +17,7 @@ mod init;
 mod kernel;
 mod kernels;
 mod neighbours;
+mod pause;
 mod plain;
 mod plan;
 mod population;
@@ -49,6 +50,8 @@ pub use gather::best::{BestSoFar, BestState};
 pub use gather::evidence::{Evidence, Weighed};
 #[doc(hidden)]
 pub use gather::kept::{KeptTrace, KeptTraces};
+#[doc(hidden)]
+pub use gather::trajectory::{Trajectory, TrajectoryState};
 pub(crate) use init::attempts;
 #[doc(hidden)]
 pub use init::{Start, StartError, starts};
@@ -62,6 +65,7 @@ pub use kernels::{
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
 #[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
+pub use pause::Pause;
 pub use plan::checkpoint::Checkpoint;
 #[doc(hidden)]
 pub use plan::run_from;

@@ -3,6 +3,7 @@
 use super::callback::Callback;
 use super::init::StartError;
 use super::neighbours::Banks;
+use super::pause::Pause;
 use super::state::StateError;
 use super::stats::{KernelStats, SiteStats};
 use crate::lang::error::RunError;
@@ -80,6 +81,8 @@ pub struct Progress {
     pub pass: AtomicU64,
     /// See `pass`.
     pub passes: AtomicU64,
+    /// Holds the chains between two kernel applications.
+    pub pause: Pause,
 }
 
 /// The result of a chain.

@@ -29,6 +29,12 @@ impl Memory {
         self.draws.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Returns the number of draws so far, up to the interval at which they are kept.
+    pub fn count(&self) -> u64 {
+        let kept = self.lock();
+        kept.rows.len() as u64 * kept.every
+    }
+
     /// Returns the draws so far.
     pub fn draws(&self) -> ChainDraws {
         self.lock().clone()

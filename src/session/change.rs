@@ -2,23 +2,28 @@
 
 use super::look::{ROWS, addressed, more};
 use super::reply::{Reply, Trouble};
-use super::shown;
+use super::shown::{self, short};
 use super::state::Session;
 use crate::infer::{StepContext, accepts};
+use crate::lang::value::Value;
 use crate::report::number;
 use crate::rng::{Purpose, StreamKey};
-use crate::trace::{Draws, Given, Trace};
+use crate::trace::{Address, Draws, Given, Trace};
 
 /// The log joint density and its parts.
-#[derive(Clone, Copy)]
-struct Scores {
-    joint: f64,
-    prior: f64,
-    likelihood: f64,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scores {
+    /// Their sum.
+    pub joint: f64,
+    /// That of the choices.
+    pub prior: f64,
+    /// That of observations and factors.
+    pub likelihood: f64,
 }
 
 impl Scores {
-    fn of(t: &Trace) -> Scores {
+    /// Those of a state.
+    pub fn of(t: &Trace) -> Scores {
         Scores { joint: t.log_joint(), prior: t.log_prior(), likelihood: t.log_likelihood() }
     }
 
@@ -100,8 +105,36 @@ impl Session {
         }
         let value = self.value_of(value)?;
         let address = addressed(name).parse().map_err(|e| Trouble::plain(format!("{e}")))?;
-        let before = Scores::of(&self.trace);
         let past = self.remember(&format!(":set {text}"));
+        let (before, after) = self.give(address, value)?;
+        self.keep(past);
+        Ok(Reply::text(before.to(after)))
+    }
+
+    /// Gives a value to a choice or an observation, as `:set` does. With `joins`, the
+    /// change joins the one before it for `:undo`, if that was of the same address: those
+    /// of one drag are undone together.
+    ///
+    /// # Errors
+    /// If there is no such address, the value does not fit it, or the state would have
+    /// probability zero; nothing has changed then.
+    pub fn assign(&mut self, address: &str, value: Value, joins: bool) -> Result<Scores, Trouble> {
+        let at: Address = addressed(address).parse().map_err(|e| Trouble::plain(format!("{e}")))?;
+        let is_same = joins && self.dragged.as_ref() == Some(&at);
+        let past = (!is_same).then(|| self.remember(&format!(":set {address} {}", short(&value))));
+        self.clock += 1;
+        let (_, after) = self.give(at.clone(), value)?;
+        if let Some(past) = past {
+            self.keep(past);
+        }
+        self.dragged = joins.then_some(at);
+        Ok(after)
+    }
+
+    /// Gives a value to a choice or an observation. Returns the log densities before and
+    /// after.
+    fn give(&mut self, address: Address, value: Value) -> Result<(Scores, Scores), Trouble> {
+        let before = Scores::of(&self.trace);
         let given = [(address, Given::Value(value))];
         self.trace.update(&given, self.values()).map_err(|e| Trouble::run(&self.model, *e))?;
         let after = Scores::of(&self.trace);
@@ -115,8 +148,7 @@ impl Session {
             )));
         }
         self.trace.commit();
-        self.keep(past);
-        Ok(Reply::text(before.to(after)))
+        Ok((before, after))
     }
 
     /// `:draw`.

@@ -197,6 +197,7 @@ impl Session {
             return Ok(Reply::text("the program is unchanged\n"));
         }
         self.clock += 1;
+        self.dragged = None;
         let past = self.remember(":edit");
         let said = self.rewrite(self.program.edited(text)?)?;
         self.keep(past);
@@ -307,6 +308,7 @@ impl Session {
         let model = Arc::clone(&self.model);
         for x in model.exports().iter().skip(known) {
             let Some(operand) = exported_operand(model.code(), x) else { continue };
+            self.permit(&x.file)?;
             let bytes = exported(&self.asked(operand)?, &x.file).map_err(Trouble::plain)?;
             write_file(Path::new(&*x.file), &bytes)
                 .map_err(|e| Trouble::plain(format!("cannot write {}: {}", x.file, reason(&e))))?;

@@ -24,6 +24,7 @@ impl Session {
     /// this session neither wrote nor loaded.
     pub(super) fn save(&mut self, name: &str, overwrites: bool) -> Result<Reply, Trouble> {
         let name = bare(name);
+        self.permit(name)?;
         let (program, trace) = (format!("{name}.pcad"), format!("{name}.trace.json"));
         let there = [&program, &trace]
             .into_iter()
@@ -55,6 +56,7 @@ impl Session {
 
     /// `:load NAME`.
     pub(super) fn load(&mut self, name: &str) -> Result<Reply, Trouble> {
+        self.permit(name.trim_matches('"'))?;
         let folder = Path::new(name.trim_matches('"'));
         if folder.join("run.json").is_file() {
             return Ok(Reply::request(Request::Open(folder.to_owned())));

@@ -9,12 +9,14 @@
 
 mod background;
 mod change;
+mod choices;
 mod command;
 mod complete;
 mod draws;
 mod edit;
 mod export;
 mod files;
+mod layers;
 mod look;
 mod picture;
 mod plot;
@@ -27,10 +29,14 @@ mod state;
 mod why;
 
 pub use background::Status;
+pub use change::Scores;
+pub use choices::{ChoiceRow, from_json, to_json};
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use export::{exported, exported_operand};
+pub use layers::Layer;
 pub use picture::{Picture, detected, over};
+pub use render::observed_image;
 pub use reply::{Reply, Request, Trouble};
 pub use shown::short;
 pub use state::Session;
@@ -42,6 +48,7 @@ impl Session {
     /// If the entry has errors or was stopped; nothing has changed then.
     pub fn enter(&mut self, text: &str) -> Result<Reply, Trouble> {
         self.clock += 1;
+        self.dragged = None;
         let text = text.trim();
         let done = match text.strip_prefix(':') {
             Some(command) => self.command(command),

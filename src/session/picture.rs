@@ -1,9 +1,10 @@
 //! A picture of the scene, which is rendered only when a front end asks for its pixels.
 
-use crate::lang::value::Located;
+use crate::lang::value::{Located, Value};
 use crate::render::View;
 use crate::report::pictures;
-use crate::scene::ViewValue;
+use crate::scene::{ImageValue, ViewValue};
+use crate::vision::Photo;
 use image::RgbImage;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +13,8 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(super) view: Arc<View>,
-    pub(super) photo: Option<Arc<RgbImage>>,
+    /// What was observed, an [`ImageValue`], if anything was.
+    pub(super) image: Option<Value>,
     /// The file that the user named, if any.
     pub file: Option<PathBuf>,
 }
@@ -25,12 +27,13 @@ impl Picture {
     /// 1024 pixels.
     pub fn pixels(&self) -> RgbImage {
         let camera = self.view.camera();
-        let (width, height) =
-            self.photo.as_ref().map_or((camera.width, camera.height), |p| p.dimensions());
+        let image = self.image.as_ref().and_then(|i| i.downcast::<ImageValue>());
+        let photo = image.and_then(ImageValue::as_photo).map(Photo::rgb);
+        let (width, height) = photo.map_or((camera.width, camera.height), RgbImage::dimensions);
         let longer = width.max(height).max(1);
         let scaled = |x: u32| (u64::from(x) * u64::from(LARGEST) / u64::from(longer)).max(1) as u32;
         let fit = |x| if longer > LARGEST { scaled(x) } else { x };
-        over(&self.view, self.photo.as_deref(), (fit(width), fit(height)))
+        over(&self.view, photo, (fit(width), fit(height)))
     }
 }
 

@@ -6,10 +6,9 @@ use super::state::Session;
 use crate::bank;
 use crate::diag::nearest;
 use crate::lang::code::{Code, Operand};
+use crate::lang::value::Value;
 use crate::scene::ImageValue;
-use image::RgbImage;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 impl Session {
     /// `:render [name] [file]`.
@@ -18,6 +17,7 @@ impl Session {
         let is_file = |w: &&str| [".png", ".PNG"].iter().any(|e| w.ends_with(e));
         let file = words.last().copied().filter(is_file).map(|f| f.trim_matches('"'));
         words.truncate(words.len() - usize::from(file.is_some()));
+        file.map_or(Ok(()), |f| self.permit(f))?;
         let draws = self.looks();
         let operand = match words[..] {
             [] => bank::picture(&mut self.trace, draws).ok_or_else(|| {
@@ -35,8 +35,11 @@ impl Session {
                 "`{text}` is {what}: only views and solids can be seen"
             )));
         };
-        let picture =
-            Picture { view, photo: photo(self.model.code()), file: file.map(PathBuf::from) };
+        let picture = Picture {
+            view,
+            image: observed_image(self.model.code()),
+            file: file.map(PathBuf::from),
+        };
         Ok(Reply { picture: Some(picture), ..Reply::default() })
     }
 
@@ -52,15 +55,13 @@ impl Session {
     }
 }
 
-/// Returns the first photograph among a program's data.
-fn photo(code: &Code) -> Option<Arc<RgbImage>> {
+/// Returns the first photograph, or contour map, among a program's data: an
+/// [`ImageValue`].
+pub fn observed_image(code: &Code) -> Option<Value> {
     let of = |o: &Operand| match o {
-        Operand::Const(i) => code
-            .const_value(*i)
-            .downcast::<ImageValue>()?
-            .as_photo()
-            .map(|p| Arc::new(p.rgb().clone())),
+        Operand::Const(i) => Some(code.const_value(*i).clone()),
         _ => None,
     };
-    code.globals.values().find_map(of)
+    let is_image = |v: &Value| v.downcast::<ImageValue>().is_some();
+    code.globals.values().filter_map(of).find(is_image)
 }

@@ -2,11 +2,14 @@
 
 use super::background::{Background, Finished, Status};
 use super::reply::{Reply, Trouble};
+use crate::bank;
 use crate::lang::code::{Eager, Observed};
 use crate::model::{Model, Program};
+use crate::render::{Camera, View};
 use crate::rng::{Purpose, StreamKey};
-use crate::trace::{Constraint, Draws, Limits, Stop, Trace};
+use crate::trace::{Address, Constraint, Draws, Limits, Stop, Trace};
 use std::collections::{BTreeSet, VecDeque};
+use std::path::{Component, Path};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,6 +48,11 @@ pub struct Session {
     pub(super) background: Option<Background>,
     pub(super) last: Option<Finished>,
     pub(super) watch: Option<Watcher>,
+    /// The address that [`Session::assign`] changed last, if the next change of it joins
+    /// that one.
+    pub(super) dragged: Option<Address>,
+    /// Whether entries may use only files below the current folder.
+    is_confined: bool,
 }
 
 /// A state for `:undo`. Its choices are enough to rebuild the trace, to the last bit.
@@ -103,6 +111,8 @@ impl Session {
             background: None,
             last: None,
             watch: None,
+            dragged: None,
+            is_confined: false,
         };
         let model = Arc::clone(&session.model);
         let (mut trace, said) = session.restart(&model, &[], &Arc::default())?;
@@ -117,6 +127,23 @@ impl Session {
         self.watch = Some(Box::new(watch));
     }
 
+    /// From now on, entries read and write only files below the current folder.
+    pub fn confine(&mut self) {
+        self.is_confined = true;
+    }
+
+    /// Checks a file that an entry names.
+    pub(super) fn permit(&self, path: &str) -> Result<(), Trouble> {
+        let is_below = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
+        match self.is_confined && !Path::new(path).components().all(is_below) {
+            true => {
+                let trouble = Trouble::plain(format!("{path}: not a file of this folder"));
+                Err(trouble.hint("only files below the current folder can be used here"))
+            }
+            false => Ok(()),
+        }
+    }
+
     /// Returns the text of the program.
     pub fn text(&self) -> &str {
         self.program.text()
@@ -125,6 +152,35 @@ impl Session {
     /// Returns the trace.
     pub fn trace(&self) -> &Trace {
         &self.trace
+    }
+
+    /// Returns the program.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// Returns the compiled program.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Returns a number that grows with every entry and change.
+    pub fn revision(&self) -> u64 {
+        self.clock
+    }
+
+    /// Returns what `:undo` would undo, and what `:redo` would redo.
+    pub fn history(&self) -> [Option<&str>; 2] {
+        [self.past.back(), self.undone.last()].map(|s| s.map(|s| s.what.as_str()))
+    }
+
+    /// Returns the view of the scene in the present state, from another camera if one is
+    /// given; `None` if the program has no view and no solid.
+    pub fn view(&mut self, camera: Option<Camera>) -> Option<Arc<View>> {
+        let draws = self.looks();
+        let at = bank::picture(&mut self.trace, draws)?;
+        let values = self.trace.query(&[at], draws).ok()?;
+        bank::as_view(values.first()?, camera)
     }
 
     /// Returns the random stream for values that are only inspected.

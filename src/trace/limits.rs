@@ -106,6 +106,13 @@ impl Stop {
         Stop { time, ..self }
     }
 
+    /// Moves the start of the available time, after a pause.
+    #[must_use]
+    pub(crate) fn later(self, by: Duration) -> Stop {
+        let time = self.time.map(|(from, t)| (from.checked_add(by).unwrap_or(from), t));
+        Stop { time, ..self }
+    }
+
     /// Replaces the two seconds in which an update may finish by itself.
     #[must_use]
     pub fn after(self, patience: Duration) -> Stop {

@@ -339,6 +339,11 @@ impl Trace {
         self.graph.limits = limits;
     }
 
+    /// Returns the limits on what updates may build.
+    pub(crate) fn limits(&self) -> &Limits {
+        &self.graph.limits
+    }
+
     /// Returns the condition that interrupts updates, and searches that consist of many
     /// updates.
     pub(crate) fn stop(&self) -> &Stop {

@@ -34,7 +34,8 @@ pub fn lsp() -> Result<(), Failure> {
     served
 }
 
-fn serve(connection: &Connection) -> Result<(), Failure> {
+/// Serves a client over a connection until it says goodbye or leaves.
+pub fn serve(connection: &Connection) -> Result<(), Failure> {
     let failed = |e: &dyn std::fmt::Display| plain(format!("the language server stopped: {e}"));
     let (id, params) = connection.initialize_start().map_err(|e| failed(&e))?;
     let client: InitializeParams = serde_json::from_value(params).unwrap_or_default();

@@ -57,27 +57,74 @@ impl RunSummary {
     }
 }
 
+/// Two runs side by side.
+pub struct Comparison {
+    runs: [RunSummary; 2],
+}
+
+/// A quantity of both runs.
+pub struct Apart {
+    /// Its name.
+    pub name: String,
+    /// Its summary in the first run.
+    pub a: Value,
+    /// Its summary in the second run.
+    pub b: Value,
+    /// The difference of its means in units of its standard deviations.
+    pub apart: f64,
+}
+
+impl Comparison {
+    /// Reads both folders.
+    pub fn of(a: &Path, b: &Path) -> Result<Comparison, Failure> {
+        Ok(Comparison { runs: [RunSummary::of(a)?, RunSummary::of(b)?] })
+    }
+
+    /// Returns what only one of the commands has.
+    pub fn settings(&self) -> [Vec<String>; 2] {
+        let [left, right] = self.runs.each_ref().map(RunSummary::settings);
+        let only = |mine: &[String], other: &[String]| -> Vec<String> {
+            mine.iter().filter(|s| !other.contains(s)).cloned().collect()
+        };
+        [only(&left, &right), only(&right, &left)]
+    }
+
+    /// Whether both runs have the same value in a field of `run.json`.
+    pub fn has_same(&self, field: &str) -> bool {
+        self.runs[0].run[field] == self.runs[1].run[field]
+    }
+
+    /// Returns the quantities of both runs, in decreasing order of their difference.
+    pub fn quantities(&self) -> Vec<Apart> {
+        let [one, two] = &self.runs;
+        let apart = |name: &str| {
+            let [a, b] = [one, two].map(|t| (t.number(name, "mean"), t.number(name, "sd")));
+            (a.0 - b.0).abs() / (0.5 * (a.1 * a.1 + b.1 * b.1)).sqrt()
+        };
+        let names = one.summary["quantities"].as_object().into_iter().flatten();
+        let both = |(name, a): (&String, &Value)| {
+            let b = two.summary["quantities"].get(name)?.clone();
+            Some(Apart { name: name.clone(), a: a.clone(), b, apart: apart(name) })
+        };
+        let mut all: Vec<Apart> = names.filter_map(both).collect();
+        all.sort_by(|a, b| b.apart.total_cmp(&a.apart));
+        all
+    }
+}
+
 /// Compares two runs.
 pub fn compare(a: &Compare) -> Result<(), Failure> {
-    let (one, two) = (RunSummary::of(&a.a)?, RunSummary::of(&a.b)?);
-    for (name, told) in [("A", &one), ("B", &two)] {
+    let both = Comparison::of(&a.a, &a.b)?;
+    for (name, told) in ["A", "B"].iter().zip(&both.runs) {
         print_line!("{name}: pcadlang run {}", quoted(&told.arguments()));
     }
-    let (left, right) = (one.settings(), two.settings());
-    let only = |mine: &[String], other: &[String]| {
-        let own: Vec<&str> =
-            mine.iter().filter(|s| !other.contains(s)).map(String::as_str).collect();
-        if own.is_empty() { "-".to_owned() } else { own.join(" ") }
-    };
-    let same = left == right;
-    match (
-        same,
-        one.run["program_hash"] == two.run["program_hash"],
-        one.run["inputs_hash"] == two.run["inputs_hash"],
-    ) {
+    let said = |only: &[String]| if only.is_empty() { "-".to_owned() } else { only.join(" ") };
+    let [left, right] = both.settings();
+    let same = both.runs[0].settings() == both.runs[1].settings();
+    match (same, both.has_same("program_hash"), both.has_same("inputs_hash")) {
         (true, true, true) => print_line!("\nThe commands, programs and data are the same."),
         (_, program, data) => {
-            print_line!("\nonly A: {}\nonly B: {}", only(&left, &right), only(&right, &left));
+            print_line!("\nonly A: {}\nonly B: {}", said(&left), said(&right));
             if !program {
                 print_line!("the programs differ");
             }
@@ -86,37 +133,20 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
             }
         }
     }
-    print_line!("\n{}", quantities(&one, &two));
+    print_line!("\n{}", quantities(&both));
     a.out.as_ref().map_or(Ok(()), |out| pictures(a, out))
 }
 
-/// Formats a table of the quantities of both runs, in decreasing order of the difference
-/// of means in units of their standard deviation.
-fn quantities(one: &RunSummary, two: &RunSummary) -> String {
-    let names = one.summary["quantities"].as_object();
-    let both = names.into_iter().flatten().map(|(name, _)| name);
-    let apart = |name: &str| {
-        let [a, b] = [one, two].map(|t| (t.number(name, "mean"), t.number(name, "sd")));
-        (a.0 - b.0).abs() / (0.5 * (a.1 * a.1 + b.1 * b.1)).sqrt()
-    };
-    let mut both: Vec<(&str, f64)> = both
-        .map(String::as_str)
-        .filter(|name| two.summary["quantities"].get(name).is_some())
-        .map(|name| (name, apart(name)))
-        .collect();
-    both.sort_by(|a, b| b.1.total_cmp(&a.1));
+/// Formats a table of the quantities of both runs.
+fn quantities(compared: &Comparison) -> String {
+    let ([one, two], both) = (&compared.runs, compared.quantities());
     let head =
         ["quantity", "mean A", "sd A", "mean B", "sd B", "difference/sd", "r_hat A", "r_hat B"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for (name, apart) in both.iter().take(LISTED) {
+    for Apart { name, apart, .. } in both.iter().take(LISTED) {
         let of = |t: &RunSummary, what: &str| number(t.number(name, what));
-        let mut row = vec![
-            (*name).to_owned(),
-            of(one, "mean"),
-            of(one, "sd"),
-            of(two, "mean"),
-            of(two, "sd"),
-        ];
+        let mut row =
+            vec![name.clone(), of(one, "mean"), of(one, "sd"), of(two, "mean"), of(two, "sd")];
         row.extend([number(*apart), of(one, "r_hat"), of(two, "r_hat")]);
         rows.push(row);
     }

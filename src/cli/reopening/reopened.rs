@@ -3,15 +3,20 @@
 
 use crate::cli::args::{Cli, Command, Job};
 use crate::cli::failure::{Failure, plain};
+use crate::cli::reopening::page::PROGRAM;
+use crate::cli::running::inputs;
 use clap::Parser;
-use pcadlang::Model;
-use pcadlang::infer::KeptTrace;
+use pcadlang::infer::{KeptTrace, TrajectoryState};
 use pcadlang::trace::{SavedTrace, Trace};
+use pcadlang::{Model, Program};
+use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The file of the kept states: JSON, one per line.
 pub const TRACES: &str = "traces.jsonl";
+/// The file of the states on the way from the prior: JSON, one per line.
+pub const TRAJECTORY: &str = "trajectory.jsonl";
 
 /// The folder of a run.
 pub struct Reopened {
@@ -92,12 +97,36 @@ impl Reopened {
         }
     }
 
+    /// Reads the program, as it was run: its file may have changed since.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn program(&self) -> Result<Program, Failure> {
+        let now = inputs::program(&self.job.inputs, true)?;
+        match std::fs::read_to_string(self.folder.join(PROGRAM)) {
+            Ok(text) if text != now.text() => Ok(now.edited(&text)?),
+            _ => Ok(now),
+        }
+    }
+
     /// Reads the kept states.
     ///
     /// # Errors
     /// If their file cannot be read.
     pub fn traces(&self) -> Result<Vec<KeptTrace>, Failure> {
-        let path = self.folder.join(TRACES);
+        self.states(TRACES)
+    }
+
+    /// Reads the states on the way from the prior.
+    ///
+    /// # Errors
+    /// If their file cannot be read.
+    pub fn trajectory(&self) -> Result<Vec<TrajectoryState>, Failure> {
+        self.states(TRAJECTORY)
+    }
+
+    fn states<S: DeserializeOwned>(&self, name: &str) -> Result<Vec<S>, Failure> {
+        let path = self.folder.join(name);
         let text = std::fs::read_to_string(&path)
             .map_err(|e| plain(format!("cannot read {}: {e}", path.display())))?;
         let one = |(i, line): (usize, &str)| {

@@ -6,9 +6,17 @@ use crate::cli::reopening::page::{PAGE, write_page};
 use crate::cli::running::{files, job, resume};
 use pcadlang::report::{Quantity, RunDir, modes, quantities, rename, reread, warnings};
 use serde_json::{Value, json};
+use std::path::PathBuf;
 
 /// Rebuilds the page of a run.
 pub fn report(a: &Report) -> Result<(), Failure> {
+    let page = written(a)?;
+    print_line!("{}", page.display());
+    Ok(())
+}
+
+/// Writes the page of a run, and returns its path.
+pub fn written(a: &Report) -> Result<PathBuf, Failure> {
     let run = resume::run(&a.run)?;
     let dir = RunDir::open(&a.run).map_err(|e| plain(e.to_string()))?;
     let draws = reread(&dir, job::ROOM).map_err(|e| plain(e.to_string()))?;
@@ -29,8 +37,7 @@ pub fn report(a: &Report) -> Result<(), Failure> {
         summary["quantities"].as_object().into_iter().flat_map(|q| q.keys()).collect();
     rename(&mut quantities, names.into_iter().map(String::as_str));
     write_page(&dir, &run, &summary, &quantities)?;
-    print_line!("{}", dir.file(PAGE).display());
-    Ok(())
+    Ok(dir.file(PAGE))
 }
 
 /// Makes a summary from the draws alone.

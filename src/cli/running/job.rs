@@ -7,20 +7,20 @@
 use crate::cli::args::Job;
 use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::{PROGRAM, write_page};
-use crate::cli::reopening::reopened::{TRACES, arguments};
+use crate::cli::reopening::reopened::{TRACES, TRAJECTORY, arguments};
 use crate::cli::reopening::{date, seen};
 use crate::cli::running::best::{disagreement, keep_best, outside, show_best};
 use crate::cli::running::files::write_in;
 use crate::cli::running::keypoints::Joints;
 use crate::cli::running::places::{best_of_each, show_places};
 use crate::cli::running::progress::{self, Ending};
+use crate::cli::running::watched::Watched;
 use crate::cli::running::{files, inputs};
 use crate::cli::{edges, people};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
-    BestSoFar, BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress,
-    stuck_structure,
+    BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, stuck_structure,
 };
 use pcadlang::lang;
 use pcadlang::report::{
@@ -29,7 +29,8 @@ use pcadlang::report::{
 };
 use pcadlang::scene::ImageValue;
 use pcadlang::vision::Photo;
-use pcadlang::{Model, RunOptions};
+use pcadlang::{Model, Program, RunOptions};
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -89,7 +90,7 @@ impl Ready {
 
     /// Returns the photograph with its detections, or a contour map without a photograph,
     /// if there is one.
-    fn image(&self) -> Option<&ImageValue> {
+    pub fn image(&self) -> Option<&ImageValue> {
         self.image.as_ref()?.1.downcast::<ImageValue>()
     }
 }
@@ -122,7 +123,12 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
 /// Reads and compiles a program; the time of a run begins here.
 pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     let begun = Instant::now();
-    let (program, image) = inputs::observe(inputs::program(&job.inputs, quiet)?, job)?;
+    prepare_program(inputs::program(&job.inputs, quiet)?, job, begun)
+}
+
+/// Compiles a program that was read for a job; the time of a run began at `begun`.
+pub fn prepare_program(program: Program, job: &Job, begun: Instant) -> Result<Ready, Failure> {
+    let (program, image) = inputs::observe(program, job)?;
     let chooses = program.interface().params.iter().any(|p| p.name == "person");
     Ok(Ready { model: program.compile()?, image, chooses, begun })
 }
@@ -305,9 +311,23 @@ pub fn perform(
     interrupt: &Interrupt,
     manner: RunMode,
 ) -> Result<Outcome, Failure> {
+    let watched = Watched::new(job, &ready.model, manner.keep);
+    perform_watched(job, ready, dir, record, interrupt, manner, &watched)
+}
+
+/// [`perform`] with something to look at meanwhile, made for the same job.
+pub fn perform_watched(
+    job: &Job,
+    ready: &Ready,
+    dir: &RunDir,
+    record: &Map<String, Value>,
+    interrupt: &Interrupt,
+    manner: RunMode,
+    watched: &Watched,
+) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
     write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
-    fill(job, ready, dir, record, interrupt, manner).inspect_err(|failure| {
+    fill(job, ready, dir, record, interrupt, manner, watched).inspect_err(|failure| {
         // An error in writing the record must not hide the first error.
         let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
     })
@@ -342,38 +362,41 @@ fn fill(
     record: &Map<String, Value>,
     interrupt: &Interrupt,
     manner: RunMode,
+    watched: &Watched,
 ) -> Result<Outcome, Failure> {
     let Ready { model, image, begun, chooses } = ready;
     let s = &job.sampling;
     let joints = Joints::new(s.chains(), ready.size());
-    let progress = Arc::new(Progress::default());
-    let best = Arc::new(BestSoFar::new(s.chains(), &progress));
+    let Watched { progress, best, kept, trajectory, memories } = watched;
     // A single chain has one mode, which needs no evidence.
     let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
-    let kept = Arc::new(KeptTraces::new(s.chains(), manner.keep as usize, model.hash()));
-    let callbacks: Vec<Arc<dyn Callback>> =
-        vec![Arc::new(joints.clone()), best.clone(), evidence.clone(), kept.clone()];
+    let callbacks: Vec<Arc<dyn Callback>> = vec![
+        Arc::new(joints.clone()),
+        best.clone(),
+        evidence.clone(),
+        kept.clone(),
+        trajectory.clone(),
+    ];
     let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
-    let memories: Vec<Memory> =
-        (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
-    let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
+    let sinks = sinks(dir, job, model, memories, record, manner.resume)?;
     let ending = Ending::default();
-    interrupt.ends(&progress);
+    interrupt.ends(progress);
     let results = std::thread::scope(|scope| {
         scope.spawn(|| {
-            progress::watch(&progress, (s.chains(), "chains"), &ending, options.time, !manner.live)
+            progress::watch(progress, (s.chains(), "chains"), &ending, options.time, !manner.live)
         });
-        scope.spawn(|| progress::ask_for_checkpoints(&progress, &ending, manner.checkpoint));
-        scope.spawn(|| keep_best(dir, model, &best, &ending, manner.checkpoint));
-        scope.spawn(|| keep_traces(dir, &kept, &ending, manner.checkpoint));
-        ending.of(|| model.run_into(&options, threads(job), &progress, sinks))
+        scope.spawn(|| progress::ask_for_checkpoints(progress, &ending, manner.checkpoint));
+        scope.spawn(|| keep_best(dir, model, best, &ending, manner.checkpoint));
+        scope.spawn(|| keep_traces(dir, kept, &ending, manner.checkpoint));
+        ending.of(|| model.run_into(&options, threads(job), progress, sinks))
     })?;
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
     let sampled = begun.elapsed().as_secs_f64();
 
     let chains =
         results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
-    write_traces(dir, &kept)?;
+    write_traces(dir, kept)?;
+    write_lines(dir, TRAJECTORY, &trajectory.all())?;
     let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
     // A run that may be resumed keeps all its draws.
     let even = align(dir.path(), s.chains(), !interrupted);
@@ -406,7 +429,7 @@ fn fill(
     let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
     let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
     warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
-    let places = best_of_each(&modes, &best);
+    let places = best_of_each(&modes, best);
     let best = best.state();
     let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;
     show_places(dir, s.seed, model, &places, ready.photo())?;
@@ -465,12 +488,16 @@ fn keep_traces(dir: &RunDir, kept: &KeptTraces, ending: &Ending, every: Duration
 }
 
 fn write_traces(dir: &RunDir, kept: &KeptTraces) -> Result<(), Failure> {
-    let lines = kept
-        .all()
+    write_lines(dir, TRACES, &kept.all())
+}
+
+/// Writes states as JSON, one per line.
+fn write_lines(dir: &RunDir, name: &str, states: &[impl Serialize]) -> Result<(), Failure> {
+    let lines = states
         .iter()
         .filter_map(|k| serde_json::to_string(k).ok())
         .fold(String::new(), |s, k| s + &k + "\n");
-    if lines.is_empty() { Ok(()) } else { write_in(dir, TRACES, lines.as_bytes()) }
+    if lines.is_empty() { Ok(()) } else { write_in(dir, name, lines.as_bytes()) }
 }
 
 /// Lists the approximations of a run, in its likelihoods and by its time limit.

@@ -10,3 +10,4 @@ pub(in crate::cli) mod progress;
 pub(in crate::cli) mod quality;
 pub(in crate::cli) mod resume;
 pub(in crate::cli) mod run;
+pub(in crate::cli) mod watched;

@@ -3,3 +3,4 @@
 pub(in crate::infer) mod best;
 pub(in crate::infer) mod evidence;
 pub(in crate::infer) mod kept;
+pub(in crate::infer) mod trajectory;

@@ -59,6 +59,9 @@ impl<'a> Runner<'a> {
             }
             _ => self.instance(call)?,
         };
+        if self.progress.pause.is_on() {
+            self.pause();
+        }
         let begun = Instant::now();
         let (mut steps, mut done) = match doing {
             Doing::Kernel { steps, done, .. } => (steps, done),

@@ -427,6 +427,15 @@ impl<'a> Runner<'a> {
             || self.options.callback.as_ref().is_some_and(|w| w.is_over())
     }
 
+    /// Waits while the run is paused. The chain's clock stands still meanwhile.
+    pub fn pause(&mut self) {
+        let waited = self.progress.pause.wait(|| self.is_cancelled());
+        self.started = self.started.checked_add(waited).unwrap_or(self.started);
+        let limits = self.trace.limits().clone();
+        let stop = limits.stop.clone().later(waited);
+        self.trace.set_limits(Limits { stop, ..limits });
+    }
+
     /// Whether the run, or its warm-up, has used up its steps or time.
     pub fn is_over(&self) -> bool {
         if self.is_cancelled() {

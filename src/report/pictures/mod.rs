@@ -7,16 +7,18 @@
 
 mod dots;
 mod font;
+mod layers;
 mod limbs;
 mod sheet;
 mod strokes;
 mod surface;
 
 pub use dots::{DETECTED, OF_SCENE, dots};
+pub use layers::{depth, normals, parts, residuals};
 pub use limbs::limbs;
 pub use sheet::{captioned_sheet, contact_sheet};
 pub use strokes::contours;
-pub use surface::{frequency, mask, overlay, shaded};
+pub use surface::{frequency, mask, overlaid, overlay, shaded};
 
 /// Pictures are enlarged until their longer side has this many pixels.
 pub const LONGER_SIDE: u32 = 768;

@@ -15,7 +15,17 @@ pub fn contours(width: u32, height: u32, strokes: &ContourSlice) -> RgbImage {
 /// Coverage falls linearly from 1 to 0 over one pixel across the edge of a stroke; where
 /// strokes meet, the larger coverage counts, so joints are not visible.
 pub(super) fn draw_strokes(out: &mut RgbImage, s: &ContourSlice, color: [f32; 3]) {
-    let (width, height) = (out.width() as usize, out.height() as usize);
+    let cover = coverage(out.width(), out.height(), s);
+    for (p, c) in out.pixels_mut().zip(cover) {
+        if c > 0.0 {
+            p.0 = mix(p.0, color, c);
+        }
+    }
+}
+
+/// Returns how far strokes cover each pixel, from 0 to 1, row by row.
+pub(super) fn coverage(width: u32, height: u32, s: &ContourSlice) -> Vec<f32> {
+    let (width, height) = (width as usize, height as usize);
     let (w, h) = (width as f32, height as f32);
     let (sx, sy) = (w / s.width.max(1) as f32, h / s.height.max(1) as f32);
     let half_width = (w.max(h) / LONGER_SIDE as f32).max(0.7);
@@ -48,11 +58,7 @@ pub(super) fn draw_strokes(out: &mut RgbImage, s: &ContourSlice, color: [f32; 3]
             }
         }
     }
-    for (p, c) in out.pixels_mut().zip(cover) {
-        if c > 0.0 {
-            p.0 = mix(p.0, color, c);
-        }
-    }
+    cover
 }
 
 #[cfg(test)]

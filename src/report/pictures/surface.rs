@@ -23,7 +23,7 @@ const PALETTE: [[[f32; 3]; 2]; 4] = [
 
 /// Returns the brightness of a pixel, from 0 to 1: a light at the upper left of the
 /// camera, a weaker one at the camera, and ambient light (Lambert's law).
-fn light([x, y, z]: [f32; 3]) -> f32 {
+pub(super) fn light([x, y, z]: [f32; 3]) -> f32 {
     let key = (0.7 * z - 0.45 * x + 0.55 * y).max(0.0);
     let light = 0.72 * key + 0.22 * z.max(0.0) + 0.06;
     if light.is_finite() { light.clamp(0.0, 1.0) } else { 0.0 }
@@ -51,6 +51,24 @@ fn vivid(c: [f32; 3]) -> [f32; 3] {
 /// result has the drawing's size, but a small picture is enlarged to [`LONGER_SIDE`] so
 /// that details are visible.
 pub fn overlay(photo: Option<&RgbImage>, drawn: &Frame, strokes: &ContourSlice) -> RgbImage {
+    let mut out = blended(photo, drawn);
+    let size = super::picture_size(drawn.width, drawn.height);
+    if drawn.width > 0 && drawn.height > 0 && drawn.width.max(drawn.height) < LONGER_SIDE {
+        out = resize(&out, size.0, size.1, FilterType::Triangle);
+    }
+    draw_strokes(&mut out, strokes, STROKE);
+    out
+}
+
+/// Draws an [`overlay`] of exactly the drawing's size.
+pub fn overlaid(photo: Option<&RgbImage>, drawn: &Frame, strokes: &ContourSlice) -> RgbImage {
+    let mut out = blended(photo, drawn);
+    draw_strokes(&mut out, strokes, STROKE);
+    out
+}
+
+/// Draws the surface over the photograph, half transparent.
+fn blended(photo: Option<&RgbImage>, drawn: &Frame) -> RgbImage {
     let mut out = match photo.filter(|p| p.width() > 0 && p.height() > 0) {
         Some(p) if p.dimensions() == (drawn.width, drawn.height) => p.clone(),
         Some(p) => resize(p, drawn.width, drawn.height, FilterType::CatmullRom),
@@ -61,11 +79,6 @@ pub fn overlay(photo: Option<&RgbImage>, drawn: &Frame, strokes: &ContourSlice) 
             p.0 = mix(p.0, vivid(s), OVER);
         }
     }
-    let size = super::picture_size(drawn.width, drawn.height);
-    if drawn.width > 0 && drawn.height > 0 && drawn.width.max(drawn.height) < LONGER_SIDE {
-        out = resize(&out, size.0, size.1, FilterType::Triangle);
-    }
-    draw_strokes(&mut out, strokes, STROKE);
     out
 }
 

@@ -1,0 +1,277 @@
+//! States of runs: which trace a name stands for, and pictures of it that neither slow the
+//! chains down nor are drawn twice.
+
+use super::answer::Problem;
+use super::protocol::{StateName, Viewpoint};
+use super::run::{Run, revision};
+use crate::cli::reopening::reopened::Reopened;
+use crate::cli::running::job::Ready;
+use crate::cli::scene;
+use pcadlang::infer::{KeptTrace, TrajectoryState};
+use pcadlang::lang::value::Located;
+use pcadlang::render::{Camera, Projection, View};
+use pcadlang::report::Mode;
+use pcadlang::scene::ImageValue;
+use pcadlang::session::Layer;
+use pcadlang::trace::{SavedTrace, Trace};
+use serde_json::{Map, Value, json};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// The least time between two pictures of a run whose chains are at work.
+const BETWEEN: Duration = Duration::from_millis(200);
+/// The part of the machine that may go to such pictures.
+const SHARE: f64 = 0.02;
+/// The most pictures of a run that are kept.
+const KEPT: usize = 24;
+/// The longer side of pictures, in pixels.
+const SIDES: std::ops::RangeInclusive<u32> = 16..=2048;
+
+/// A picture file with its header.
+pub type Encoded = (Map<String, Value>, Arc<Vec<u8>>);
+
+/// The pictures of a run that were drawn last, and when the next one may be drawn.
+#[derive(Default)]
+pub struct Pictures {
+    kept: Mutex<VecDeque<(String, Encoded)>>,
+    next: Mutex<Option<Instant>>,
+    /// Held while one is drawn, so that many tabs do not draw the same one.
+    drawing: Mutex<()>,
+}
+
+impl Pictures {
+    fn get(&self, key: &str) -> Option<Encoded> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.iter().find(|(k, _)| k == key).map(|(_, e)| e.clone())
+    }
+
+    fn keep(&self, key: String, picture: &Encoded) {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.push_back((key, picture.clone()));
+        while kept.len() > KEPT {
+            kept.pop_front();
+        }
+    }
+
+    /// Gives up the memory of all pictures.
+    pub fn forget(&self) {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
+    /// Waits until a picture may be drawn beside the chains, draws it, and keeps account
+    /// of what that cost.
+    fn in_turn<T>(&self, is_working: bool, draw: impl FnOnce() -> T) -> T {
+        let next = *self.next.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(wait) =
+            next.filter(|_| is_working).and_then(|n| n.checked_duration_since(Instant::now()))
+        {
+            std::thread::sleep(wait);
+        }
+        let begun = Instant::now();
+        let drawn = draw();
+        let threads = crate::cli::running::job::machine_threads() as f64;
+        let rest = begun.elapsed().as_secs_f64() / (SHARE * threads);
+        let rest = BETWEEN.max(Duration::from_secs_f64(rest.min(10.0)));
+        *self.next.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now() + rest);
+        drawn
+    }
+}
+
+/// A trace of a run, with the program it belongs to.
+pub struct RunState {
+    /// The compiled program.
+    pub ready: Arc<Ready>,
+    /// The trace.
+    pub trace: Trace,
+}
+
+impl Run {
+    /// Returns the kept draws, chain by chain.
+    pub fn kept(&self) -> Result<Vec<KeptTrace>, Problem> {
+        match self.watched() {
+            Some(w) => Ok(w.kept.all()),
+            None => Ok(Reopened::open(&self.folder)?.traces().unwrap_or_default()),
+        }
+    }
+
+    /// Returns the states on the way of the chain that ended best.
+    pub fn film(&self) -> Result<Vec<TrajectoryState>, Problem> {
+        let all = match self.watched() {
+            Some(w) => w.trajectory.all(),
+            None => Reopened::open(&self.folder)?.trajectory().unwrap_or_default(),
+        };
+        let mut last: Vec<&TrajectoryState> = Vec::new();
+        for s in &all {
+            match last.last_mut().filter(|l| l.chain == s.chain) {
+                Some(l) => *l = s,
+                None => last.push(s),
+            }
+        }
+        let best = last.iter().max_by(|a, b| a.log_joint.total_cmp(&b.log_joint)).map(|s| s.chain);
+        Ok(all.into_iter().filter(|s| Some(s.chain) == best).collect())
+    }
+
+    /// Returns the modes, once the run has ended.
+    pub fn modes(&self) -> Vec<Mode> {
+        let summary = std::fs::read(self.folder.join("summary.json")).ok();
+        let summary: Option<Value> = summary.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let modes = summary.map(|s| s["modes"].clone()).unwrap_or_default();
+        serde_json::from_value(modes).unwrap_or_default()
+    }
+
+    /// Builds the trace of a state.
+    pub fn state(&self, name: &StateName) -> Result<RunState, Problem> {
+        let ready = self.ready()?;
+        let missing =
+            |what: &str, n: usize| Problem::plain(format!("{} has no {what} {n}", self.name));
+        let saved: SavedTrace = match *name {
+            StateName { draw: Some(n), .. } => {
+                self.kept()?.into_iter().nth(n).ok_or_else(|| missing("kept draw", n))?.trace
+            }
+            StateName { film: Some(n), .. } => {
+                self.film()?.into_iter().nth(n).ok_or_else(|| missing("film state", n))?.trace
+            }
+            StateName { mode: Some(n), .. } => {
+                let modes = self.modes();
+                let mode = modes.get(n).ok_or_else(|| missing("mode", n))?;
+                let of = |k: &KeptTrace| mode.chains.contains(&(k.chain as usize));
+                let best = self.kept()?.into_iter().filter(of);
+                let best = best.max_by(|a, b| a.log_joint.total_cmp(&b.log_joint));
+                best.ok_or_else(|| missing("kept draw of mode", n))?.trace
+            }
+            _ => match self.watched() {
+                Some(w) => {
+                    let state =
+                        w.best.state().ok_or_else(|| Problem::plain("the run has no state yet"))?;
+                    let draws = scene::predictive(0, 0);
+                    let trace = scene::rebuilt(&ready.model, &state.choices, draws)?;
+                    return Ok(RunState { ready, trace });
+                }
+                None => Reopened::open(&self.folder)?.best()?,
+            },
+        };
+        let model = &ready.model;
+        let loaded =
+            Trace::load(Arc::clone(model.code()), model.hash(), &saved, model.limits().clone());
+        let trace = loaded.map_err(|e| Problem::plain(e.to_string()))?;
+        Ok(RunState { ready, trace })
+    }
+
+    /// Draws a picture of a state, or returns the one that was drawn before.
+    pub fn picture(
+        &self,
+        name: &StateName,
+        layer: Layer,
+        size: u32,
+        camera: Option<Viewpoint>,
+    ) -> Result<Encoded, Problem> {
+        let is_best = name.draw.or(name.film).or(name.mode).is_none();
+        let watched = self.watched().filter(|_| is_best);
+        let (best, is_working) = match &watched {
+            Some(w) => (w.best.state().map(|b| b.log_joint), !w.progress.pause.is_on()),
+            None => (None, false),
+        };
+        let key = format!("{name:?} {layer:?} {size} {camera:?} {best:?}");
+        let alone = || self.pictures.drawing.lock().unwrap_or_else(PoisonError::into_inner);
+        let _drawing = watched.as_ref().map(|_| alone());
+        if let Some(picture) = self.pictures.get(&key) {
+            return Ok(picture);
+        }
+        let picture = self.pictures.in_turn(is_working, || {
+            let mut state = self.state(name)?;
+            let log_joint = state.trace.log_joint();
+            let draws = scene::predictive(0, 0);
+            let view = scene::view(&mut state.trace, draws, None).ok_or_else(no_view)?;
+            let located = state.trace.located();
+            let (mut header, data) =
+                picture(&view, state.ready.image(), &located, layer, size, camera)?;
+            header.insert("log_joint".into(), super::layout::finite(log_joint));
+            header.insert("revision".into(), json!(revision(log_joint)));
+            Ok::<_, Problem>((header, Arc::new(data)))
+        })?;
+        self.pictures.keep(key, &picture);
+        Ok(picture)
+    }
+}
+
+/// The message where nothing can be drawn.
+pub fn no_view() -> Problem {
+    Problem::plain("the program has no view and no solid").hint("let view = scene.render(solid);")
+}
+
+/// Draws a picture of a scene as a file, with its header.
+pub fn picture(
+    view: &Arc<View>,
+    image: Option<&ImageValue>,
+    located: &[Located],
+    layer: Layer,
+    size: u32,
+    camera: Option<Viewpoint>,
+) -> Result<(Map<String, Value>, Vec<u8>), Problem> {
+    if !SIDES.contains(&size) {
+        return Err(Problem::plain(format!(
+            "`size` must be from {} to {}",
+            SIDES.start(),
+            SIDES.end()
+        )));
+    }
+    // From elsewhere the photograph does not lie behind the scene.
+    let drawn = match camera {
+        Some(viewpoint) => {
+            let camera = seen_from(viewpoint, view.camera())?;
+            let view = Arc::new(View::new(view.solid().clone(), camera));
+            layer.draw(&view, None, &[], size)
+        }
+        None => layer.draw(view, image, located, size),
+    };
+    let drawn = drawn.map_err(Problem::plain)?;
+    let (kind, bytes) = encoded(&drawn, layer)?;
+    let mut header = Map::new();
+    header.insert("type".into(), json!(kind));
+    header.insert("width".into(), json!(drawn.width()));
+    header.insert("height".into(), json!(drawn.height()));
+    Ok((header, bytes))
+}
+
+/// Photographs are encoded as JPEG, which is several times faster; exact values as PNG.
+fn encoded(picture: &image::RgbImage, layer: Layer) -> Result<(&'static str, Vec<u8>), Problem> {
+    let mut bytes = Vec::new();
+    let done = match layer {
+        Layer::Overlay | Layer::Photo | Layer::Joints => {
+            let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 88);
+            picture.write_with_encoder(encoder).map(|()| "image/jpeg")
+        }
+        _ => {
+            use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+            let encoder = PngEncoder::new_with_quality(
+                &mut bytes,
+                CompressionType::Fast,
+                FilterType::Adaptive,
+            );
+            picture.write_with_encoder(encoder).map(|()| "image/png")
+        }
+    };
+    let kind = done.map_err(|e| Problem::plain(e.to_string()))?;
+    Ok((kind, bytes))
+}
+
+/// Returns a camera at a viewpoint, with the size of another one's pictures.
+fn seen_from(v: Viewpoint, other: &Camera) -> Result<Camera, Problem> {
+    use glam::DVec3;
+    let wrong = || {
+        Problem::plain(
+            "`camera` needs an eye, another target, and an up that is not the direction between them",
+        )
+    };
+    let [eye, target, up] = [v.eye, v.target, v.up].map(DVec3::from_array);
+    let forward = (target - eye).try_normalize().ok_or_else(wrong)?;
+    let right = forward.cross(up).try_normalize().ok_or_else(wrong)?;
+    if !eye.is_finite() || !(1.0..=170.0).contains(&v.fov_y) {
+        return Err(wrong());
+    }
+    let (width, height) = (f64::from(other.width), f64::from(other.height));
+    let focal_px = 0.5 * height / (0.5 * v.fov_y.to_radians()).tan();
+    let projection = Projection::Pinhole { focal_px, cx: 0.5 * width, cy: 0.5 * height };
+    Ok(Camera { eye, right, up: right.cross(forward), forward, projection, ..*other })
+}
