@@ -5,7 +5,7 @@ mod reopening;
 mod studio;
 mod values;
 
-pub use reopening::{Compare, Report, Show};
+pub use reopening::{Compare, Film, Report, Show};
 #[cfg(feature = "studio")]
 pub use studio::Studio;
 
@@ -75,6 +75,8 @@ pub enum Command {
     Show(Show),
     /// Compare two runs: their settings, quantities and pictures
     Compare(Compare),
+    /// Make a film of a run: from the prior to the posterior, and around the best state
+    Film(Film),
     /// Make the page of a run anew, `report.html`, from what its folder holds
     Report(Report),
     /// Print the manual page, or write one for every command

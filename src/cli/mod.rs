@@ -27,7 +27,7 @@ mod tradeoff;
 use args::{Cli, Command};
 use clap::CommandFactory;
 use programs::{calibrate, check, doc, fmt, predict, watch};
-use reopening::{compare, report, show};
+use reopening::{compare, film, report, show};
 use running::run;
 use std::process::ExitCode;
 
@@ -55,6 +55,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Man(a) => manual::man(&a, Cli::command()),
         Command::Show(a) => show::show(&a),
         Command::Compare(a) => compare::compare(&a),
+        Command::Film(a) => film::film(&a),
         Command::Report(a) => report::report(&a),
     };
     match done {

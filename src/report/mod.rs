@@ -14,6 +14,8 @@ pub mod checkpoint;
 pub mod csv;
 mod draws;
 pub mod evaluation;
+#[cfg(feature = "codecs")]
+pub mod film;
 mod hash;
 pub mod html;
 mod modes;

@@ -14,9 +14,12 @@ pub const MARK: &str = "run.json";
 const CLEARED: &[u8] = b"{}";
 /// The files that a run writes besides `run.json`, numbered files, and the exports of its
 /// program.
-const WRITTEN: [&str; 19] = [
+const WRITTEN: [&str; 22] = [
     "program.pcad",
     "traces.jsonl",
+    "trajectory.jsonl",
+    "film.png",
+    "film.glb",
     super::zarr::ZARR,
     "summary.json",
     "best.trace.json",

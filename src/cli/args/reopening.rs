@@ -33,6 +33,28 @@ pub struct Compare {
     pub out: Option<PathBuf>,
 }
 
+/// `film`.
+#[derive(Args, Debug)]
+pub struct Film {
+    /// The folder of the run
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// The file to write: an animated picture (.png), or meshes with their animation (.glb;
+    /// a body keeps its skin). A name without an ending is a folder for one PNG file per
+    /// picture
+    #[arg(short, value_name = "FILE|DIR", default_value = "film.png")]
+    pub out: PathBuf,
+    /// The longer side of the pictures in pixels
+    #[arg(long, default_value_t = 480, value_parser = clap::value_parser!(u32).range(16..=2048))]
+    pub size: u32,
+    /// The most states on the way from the prior
+    #[arg(long, default_value_t = 60, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub states: u32,
+    /// End with the best state over the photograph, without a turn around it
+    #[arg(long)]
+    pub no_turn: bool,
+}
+
 /// `report`.
 #[derive(Args, Debug)]
 pub struct Report {

@@ -2,6 +2,7 @@
 
 pub(in crate::cli) mod compare;
 pub(in crate::cli) mod date;
+pub(in crate::cli) mod film;
 pub(in crate::cli) mod page;
 pub(in crate::cli) mod reopened;
 pub(in crate::cli) mod report;

@@ -2,9 +2,9 @@
 
 use super::answer::Problem;
 use super::run::Run;
-use crate::cli::args::Report;
+use crate::cli::args::{Film, Report};
 use crate::cli::reopening::page::PAGE;
-use crate::cli::reopening::report;
+use crate::cli::reopening::{film, report};
 
 /// Writes a file of a kind, and returns its name.
 pub fn export(run: &Run, kind: &str) -> Result<String, Problem> {
@@ -17,6 +17,12 @@ pub fn export(run: &Run, kind: &str) -> Result<String, Problem> {
         PAGE => {
             report::written(&Report { run: run.folder.clone() })?;
             Ok(PAGE.to_owned())
+        }
+        "film.png" | "film.glb" => {
+            let out = run.folder.join(kind);
+            let (size, states, no_turn) = (480, 60, false);
+            film::write(&Film { run: run.folder.clone(), out, size, states, no_turn })?;
+            Ok(kind.to_owned())
         }
         _ => {
             let problem = Problem::plain(format!("a run cannot be exported as `{kind}`"));

@@ -4,6 +4,7 @@
 use super::answer::Problem;
 use super::protocol::{StateName, Viewpoint};
 use super::run::{Run, revision};
+use crate::cli::reopening::film::best_chain;
 use crate::cli::reopening::reopened::Reopened;
 use crate::cli::running::job::Ready;
 use crate::cli::scene;
@@ -101,15 +102,7 @@ impl Run {
             Some(w) => w.trajectory.all(),
             None => Reopened::open(&self.folder)?.trajectory().unwrap_or_default(),
         };
-        let mut last: Vec<&TrajectoryState> = Vec::new();
-        for s in &all {
-            match last.last_mut().filter(|l| l.chain == s.chain) {
-                Some(l) => *l = s,
-                None => last.push(s),
-            }
-        }
-        let best = last.iter().max_by(|a, b| a.log_joint.total_cmp(&b.log_joint)).map(|s| s.chain);
-        Ok(all.into_iter().filter(|s| Some(s.chain) == best).collect())
+        Ok(best_chain(&all).into_iter().cloned().collect())
     }
 
     /// Returns the modes, once the run has ended.

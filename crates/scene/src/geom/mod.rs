@@ -37,7 +37,7 @@ pub use patches::Patches;
 pub(crate) use patches::Run;
 pub use profile_path::{Profile, Wall};
 pub(crate) use solid::MeshesMark;
-pub use solid::{Instance, PlacedGradient, Solid};
+pub use solid::{Instance, PlacedGradient, PosedSkin, Solid};
 pub use sphere::{sphere, vjp_sphere};
 
 /// Returns the matrix a b'.

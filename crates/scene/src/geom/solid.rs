@@ -5,11 +5,12 @@
 //! Invariants: a member's parts are numbered after those of the members before it
 //! (numbers beyond 65534 are all drawn as that one); all landmarks have different names.
 
+use super::armature::Armature;
 use super::detail::{Coarse, Detail};
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
-use glam::{DMat3, DVec3};
+use glam::{Affine3A, DMat3, DVec3};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::{Arc, LazyLock, Weak};
@@ -25,6 +26,20 @@ pub struct Instance {
     pub first_part: u16,
     /// Coarser versions of the mesh, if it has any.
     pub detail: Option<Arc<Detail>>,
+    /// The body it is a part of, if it is the part of a posed one.
+    pub skin: Option<PosedSkin>,
+}
+
+/// The body that a mesh is a part of, and the transforms that pose it.
+#[derive(Clone, Debug)]
+pub struct PosedSkin {
+    /// The body at rest.
+    pub body: Arc<Armature>,
+    /// The transform of each joint. Those of joints that do not move this part may be of
+    /// an earlier pose.
+    pub transforms: Arc<[Affine3A]>,
+    /// The part, by its place among those of the body.
+    pub part: usize,
 }
 
 impl Instance {
@@ -142,6 +157,7 @@ impl Solid {
             affine: Affine::IDENTITY,
             first_part: 0,
             detail: None,
+            skin: None,
         }]))
     }
 
@@ -155,7 +171,8 @@ impl Solid {
     /// A solid of one mesh with coarser versions.
     pub(super) fn detailed(mesh: Mesh, detail: Detail) -> Solid {
         let (mesh, detail) = (Arc::new(mesh), Some(Arc::new(detail)));
-        Solid::of(Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0, detail }]))
+        let (affine, first_part, skin) = (Affine::IDENTITY, 0, None);
+        Solid::of(Arc::new([Instance { mesh, affine, first_part, detail, skin }]))
     }
 
     /// A solid of placed meshes, without landmarks.

@@ -29,7 +29,9 @@ impl Drawn {
             return Drawn { solid: solid.clone(), coarse: Vec::new() };
         }
         let one = |(instance, coarse): (&Instance, &Option<Arc<Coarse>>)| match coarse {
-            Some(coarse) => Instance { mesh: Arc::clone(&coarse.mesh), detail: None, ..*instance },
+            Some(coarse) => {
+                Instance { mesh: Arc::clone(&coarse.mesh), detail: None, skin: None, ..*instance }
+            }
             None => instance.clone(),
         };
         Drawn { solid: Solid::of(solid.instances().iter().zip(&coarse).map(one).collect()), coarse }

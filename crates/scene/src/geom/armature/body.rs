@@ -337,6 +337,21 @@ impl Armature {
         &self.skin.parts
     }
 
+    /// Whether another body is the same but for its shape: vertices and joints correspond.
+    pub(in crate::geom) fn shares_skin(&self, other: &Armature) -> bool {
+        Arc::ptr_eq(&self.skin, &other.skin)
+    }
+
+    /// The joints that move a part, by its place.
+    pub(in crate::geom) fn joints_of_part(&self, part: usize) -> &[u16] {
+        self.skin.parts.get(part).map_or(&[], |p| &p.joints)
+    }
+
+    /// The normals of the vertices at rest.
+    pub(in crate::geom) fn normals(&self) -> &[Vec3] {
+        &self.surface.normals
+    }
+
     /// Returns a part deformed by the transforms of all joints.
     pub(super) fn skinned(&self, number: usize, transforms: &[Affine3A]) -> Instance {
         let (rest, part): (&Surface, &Part) = (&self.surface, &self.skin.parts[number]);
@@ -362,6 +377,7 @@ impl Armature {
             affine: Affine::IDENTITY,
             first_part: part.joint,
             detail: Some(Arc::new(detail)),
+            skin: None,
         }
     }
 

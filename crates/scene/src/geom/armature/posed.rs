@@ -3,7 +3,7 @@
 
 use super::body::{Armature, Part};
 use super::{JointPose, Keypoint, Rules};
-use crate::geom::{GeomError, Instance, Landmark, Solid};
+use crate::geom::{GeomError, Instance, Landmark, PosedSkin, Solid};
 use glam::{Affine3A, DAffine3};
 use std::sync::{Arc, OnceLock};
 
@@ -15,7 +15,7 @@ pub struct Posed(Arc<Pose>);
 #[derive(Debug)]
 struct Pose {
     body: Arc<Armature>,
-    transforms: Vec<Affine3A>,
+    transforms: Arc<[Affine3A]>,
     parts: OnceLock<Vec<Instance>>,
 }
 
@@ -37,7 +37,14 @@ impl Pose {
                     let same = joints.all(|j| moved(transforms, j) == moved(&self.transforms, j));
                     parts.get(i).filter(|_| same).cloned()
                 });
-                same.unwrap_or_else(|| self.body.skinned(i, &self.transforms))
+                same.unwrap_or_else(|| {
+                    let skin = PosedSkin {
+                        body: Arc::clone(&self.body),
+                        transforms: Arc::clone(&self.transforms),
+                        part: i,
+                    };
+                    Instance { skin: Some(skin), ..self.body.skinned(i, &self.transforms) }
+                })
             };
             self.body.parts().iter().enumerate().map(make).collect()
         })
@@ -54,7 +61,8 @@ impl Posed {
     ) -> (Posed, impl FnOnce() -> Vec<Instance> + Send + 'static) {
         let is_made = |b: &&Posed| Arc::ptr_eq(&b.0.body, body) && b.0.parts.get().is_some();
         let before = before.filter(is_made).map(|b| Arc::clone(&b.0));
-        let pose = Arc::new(Pose { body: Arc::clone(body), transforms, parts: OnceLock::new() });
+        let (body, transforms) = (Arc::clone(body), transforms.into());
+        let pose = Arc::new(Pose { body, transforms, parts: OnceLock::new() });
         let own = Arc::clone(&pose);
         (Posed(pose), move || own.parts(before.as_deref()).to_vec())
     }

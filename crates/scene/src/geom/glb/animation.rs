@@ -1,0 +1,107 @@
+//! Several states of a scene as one animation: by the joints of its bodies where it has
+//! any, otherwise by moving vertices.
+
+use super::document::Document;
+use super::{morphs, skins};
+use crate::geom::{GeomError, Solid};
+use serde_json::{Value, json};
+
+/// The channels and samplers of an animation under way.
+pub struct Animation {
+    /// The accessor of the times.
+    times: usize,
+    channels: Vec<Value>,
+    samplers: Vec<Value>,
+}
+
+impl Animation {
+    /// Animates a property of a node. `how` is `LINEAR` or `STEP`.
+    pub fn channel(&mut self, node: usize, path: &str, output: usize, how: &str) {
+        let sampler = json!({ "input": self.times, "output": output, "interpolation": how });
+        let target = json!({ "node": node, "path": path });
+        self.channels.push(json!({ "sampler": self.samplers.len(), "target": target }));
+        self.samplers.push(sampler);
+    }
+}
+
+/// Returns the bytes of a `.glb` file that plays states one after another, `seconds`
+/// apart. A body keeps its skin: its joints move. Anything else moves by morph targets;
+/// where the triangles change between two states, one mesh is replaced by another.
+///
+/// # Errors
+/// If there are no states, or one has no mesh.
+pub fn write_animation(states: &[Solid], seconds: f64) -> Result<Vec<u8>, GeomError> {
+    if states.is_empty() {
+        return Err(GeomError::domain("there are no states to animate"));
+    }
+    let mut d = Document::default();
+    let times: Vec<f32> = (0..states.len()).map(|i| (i as f64 * seconds) as f32).collect();
+    let mut animation =
+        Animation { times: d.numbers(&times), channels: Vec::new(), samplers: Vec::new() };
+    if !skins::add(&mut d, &mut animation, states) {
+        morphs::add(&mut d, &mut animation, states)?;
+    }
+    d.animation(json!({
+        "name": "states", "channels": animation.channels, "samplers": animation.samplers,
+    }));
+    Ok(d.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Affine, cuboid, sphere};
+    use glam::{DVec3, Vec3};
+    use std::sync::Arc;
+
+    fn json_of(glb: &[u8]) -> Value {
+        let length = u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
+        serde_json::from_slice(&glb[20..20 + length]).unwrap()
+    }
+
+    /// The numbers of an accessor.
+    fn floats(glb: &[u8], document: &Value, accessor: &Value, per: usize) -> Vec<f32> {
+        let a = &document["accessors"][accessor.as_u64().unwrap() as usize];
+        let view = &document["bufferViews"][a["bufferView"].as_u64().unwrap() as usize];
+        let json = u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
+        let at = 28 + json + view["byteOffset"].as_u64().unwrap() as usize;
+        let count = a["count"].as_u64().unwrap() as usize * per;
+        glb[at..at + 4 * count]
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect()
+    }
+
+    #[test]
+    fn moving_vertices_are_morph_targets() {
+        let ball = Solid::new(Arc::new(sphere(1.0, 8).unwrap()));
+        let by = |x: f64| ball.placed(Affine::new(DVec3::X * x, DVec3::ZERO, DVec3::ONE));
+        let glb = write_animation(&[by(0.0), by(1.0), by(3.0)], 0.5).unwrap();
+        let d = json_of(&glb);
+        let targets = d["meshes"][0]["primitives"][0]["targets"].as_array().unwrap();
+        assert_eq!((targets.len(), d["nodes"].as_array().unwrap().len()), (2, 1));
+        let moved = floats(&glb, &d, &targets[1]["POSITION"], 3);
+        assert!(moved.chunks_exact(3).all(|v| Vec3::from_slice(v).distance(3.0 * Vec3::X) < 1e-5));
+        let sampler = &d["animations"][0]["samplers"][0];
+        assert_eq!(floats(&glb, &d, &sampler["input"], 1), [0.0, 0.5, 1.0]);
+        assert_eq!(floats(&glb, &d, &sampler["output"], 1), [0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn other_triangles_are_another_mesh() {
+        let ball = Solid::new(Arc::new(sphere(1.0, 8).unwrap()));
+        let cube = Solid::new(Arc::new(cuboid(DVec3::ONE).unwrap()));
+        let glb = write_animation(&[ball.clone(), cube, ball], 1.0).unwrap();
+        let d = json_of(&glb);
+        assert_eq!(d["meshes"].as_array().unwrap().len(), 2);
+        let shown = |node: u64| {
+            let all = d["animations"][0]["channels"].as_array().unwrap();
+            let of = |c: &&Value| c["target"]["node"] == node && c["target"]["path"] == "scale";
+            let at = all.iter().find(of).unwrap()["sampler"].as_u64().unwrap() as usize;
+            let output = &d["animations"][0]["samplers"][at]["output"];
+            floats(&glb, &d, output, 3).iter().step_by(3).copied().collect::<Vec<_>>()
+        };
+        assert_eq!((shown(0), shown(1)), (vec![1.0, 0.0, 1.0], vec![0.0, 1.0, 0.0]));
+        assert!(write_animation(&[], 1.0).is_err());
+    }
+}
