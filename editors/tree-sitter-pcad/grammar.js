@@ -169,7 +169,7 @@ export default grammar({
 
     _for: $ => seq("for", field("variable", $.name), "in", field("values", $.expression)),
 
-    _bind: _ => choice("~", "="),
+    _bind: _ => field("bind", choice("~", "=")),
 
     _as: $ => seq("as", field("name", $.name)),
 
@@ -177,7 +177,7 @@ export default grammar({
       "#", field("name", $._any_name), optional(seq(":", field("value", $._tag_value))),
     ),
 
-    _tag_value: $ => choice($._literal, $.name),
+    _tag_value: $ => choice($._literal, variable($)),
 
     // ------------------------------------------------------------------------------------
     // inference statements
@@ -274,7 +274,7 @@ export default grammar({
 
     _atom: $ => choice(
       $._literal,
-      $.name,
+      variable($),
       $.address,
       $.tag_selection,
       $.parenthesized,
@@ -316,21 +316,23 @@ export default grammar({
 
     /** A segment's name, and in any order its keys and at most one occurrence `#n`. */
     segment: $ => seq(
-      field("name", choice(immediate_name($), $.any_segment, $.any_segments)),
+      field("name", choice(immediate_name($), $.any, $.deep)),
       repeat($._key),
       optional(seq(field("occurrence", $.occurrence), repeat($._key))),
     ),
 
-    any_segment: _ => token.immediate("*"),
+    /** Any one segment, or any key. */
+    any: _ => token.immediate("*"),
 
-    any_segments: _ => token.immediate("**"),
+    /** Any number of segments. */
+    deep: _ => token.immediate("**"),
 
     occurrence: _ => token.immediate(/#0*[1-9][0-9]*/),
 
     _key: $ => seq(
       token.immediate("["),
       field("key", choice(
-        $.any_key,
+        $.any,
         immediate_name($),
         alias(token.immediate(/-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?/), $.number),
         alias($._immediate_string, $.string),
@@ -338,8 +340,6 @@ export default grammar({
       )),
       token.immediate("]"),
     ),
-
-    any_key: _ => token.immediate("*"),
 
     computed_key: $ => seq(token.immediate("{"), $.expression, "}"),
 
@@ -386,6 +386,11 @@ function binary(rule, $) {
 
 function unary(rule, $) {
   return alias(rule, $.unary);
+}
+
+/** A name that stands for a value. */
+function variable($) {
+  return alias($.name, $.variable);
 }
 
 /** A name, keyword or not, that touches the token before it. */
