@@ -12,5 +12,7 @@ vim.api.nvim_create_autocmd("FileType", {
   pattern = "pcad",
   callback = function()
     vim.bo.commentstring = "// %s"
+    -- Colours from the tree, if ~/.config/nvim has parser/pcad.so and queries/pcad/.
+    pcall(vim.treesitter.start)
   end,
 })
