@@ -13,6 +13,8 @@ mod chain_file;
 pub mod checkpoint;
 pub mod csv;
 mod draws;
+#[cfg(feature = "codecs")]
+pub mod embedded;
 pub mod evaluation;
 #[cfg(feature = "codecs")]
 pub mod film;

@@ -14,10 +14,11 @@ pub const MARK: &str = "run.json";
 const CLEARED: &[u8] = b"{}";
 /// The files that a run writes besides `run.json`, numbered files, and the exports of its
 /// program.
-const WRITTEN: [&str; 22] = [
+const WRITTEN: [&str; 23] = [
     "program.pcad",
     "traces.jsonl",
     "trajectory.jsonl",
+    "scene.json",
     "film.png",
     "film.glb",
     super::zarr::ZARR,

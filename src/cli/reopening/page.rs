@@ -6,12 +6,13 @@
 use crate::cli::failure::Failure;
 use crate::cli::reopening::date::readable;
 use crate::cli::reopening::reopened::quoted;
+use crate::cli::running::embedded::SCENE;
 use crate::cli::running::files::write_in;
 use crate::cli::running::places;
 use image::RgbImage;
-use pcadlang::geom::obj;
+use image::codecs::jpeg::JpegEncoder;
 use pcadlang::infer::draws::KernelStats;
-use pcadlang::report::html::{MeshData, Page, Picture, page};
+use pcadlang::report::html::{Page, Picture, page};
 use pcadlang::report::pictures::png;
 use pcadlang::report::{Mode, Quantity, RunDir, seconds};
 use serde::de::DeserializeOwned;
@@ -23,6 +24,8 @@ pub const PAGE: &str = "report.html";
 pub const PROGRAM: &str = "program.pcad";
 /// The maximum longer side of a picture on the page, in pixels.
 const LARGEST: u32 = 1024;
+/// The quality of JPEG files on the page.
+const QUALITY: u8 = 88;
 
 /// The pictures of a folder: file name, caption, and whether it has bright lines on
 /// black.
@@ -54,13 +57,11 @@ pub fn write_page(
 ) -> Result<(), Failure> {
     let modes: Vec<Mode> = list(&summary["modes"]);
     let mode_pictures: Vec<_> =
-        (1..=modes.len()).map(|n| std::fs::read(dir.file(&places::name(n))).ok()).collect();
+        (1..=modes.len()).map(|n| sized(std::fs::read(dir.file(&places::name(n))).ok()?)).collect();
     let kernels: Vec<KernelStats> = list(&summary["kernels"]);
     let mut warnings: Vec<String> = state(run).into_iter().collect();
     warnings.extend(list::<String>(&summary["warnings"]));
-    let mesh = std::fs::read(dir.file("best.obj")).ok().and_then(|bytes| obj::indexed(&bytes).ok());
-    let positions: Vec<[f32; 3]> =
-        mesh.iter().flat_map(|m| &m.positions).map(|p| p.to_array()).collect();
+    let scene = std::fs::read_to_string(dir.file(SCENE)).ok();
     let program = std::fs::read(dir.file(PROGRAM)).unwrap_or_default();
     let html = page(&Page {
         title: text(&run["program"]),
@@ -74,7 +75,7 @@ pub fn write_page(
         kernels: &kernels,
         warnings: &warnings,
         approximate: &list::<String>(&summary["approximate"]),
-        mesh: mesh.as_ref().map(|m| MeshData { positions: &positions, triangles: &m.triangles }),
+        scene: scene.as_deref(),
         program: &String::from_utf8_lossy(&program),
     });
     write_in(dir, PAGE, html.as_bytes())
@@ -158,7 +159,9 @@ fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
         vec![vec![PHOTO], vec![OVER], vec![JOINTS], vec![COVERED], vec![EDGES, CONTOURS]];
     groups.extend(modes.then(|| vec![MODES]));
     let of = |(name, caption, lines): (&str, &'static str, bool)| {
-        let file = sized(std::fs::read(dir.file(name)).ok()?)?;
+        let file = std::fs::read(dir.file(name)).ok()?;
+        // Lines stay sharp, everything else is a photograph or lies over one.
+        let file = if lines { fitted(file)? } else { sized(file)? };
         Some(Picture { caption, file, lines })
     };
     let found =
@@ -168,7 +171,7 @@ fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
 
 /// Scales a picture down to the maximum size of a page; `None` if the file is not a
 /// picture.
-fn sized(file: Vec<u8>) -> Option<Vec<u8>> {
+fn fitted(file: Vec<u8>) -> Option<Vec<u8>> {
     let reader = image::ImageReader::new(std::io::Cursor::new(&file)).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
     if width.max(height) <= LARGEST {
@@ -176,4 +179,14 @@ fn sized(file: Vec<u8>) -> Option<Vec<u8>> {
     }
     let large: RgbImage = image::load_from_memory(&file).ok()?.to_rgb8();
     png(&places::sized(&large, LARGEST)).ok()
+}
+
+/// As [`fitted`], as a JPEG file if that is smaller: pictures over a photograph then take a
+/// fifth of the space.
+fn sized(file: Vec<u8>) -> Option<Vec<u8>> {
+    let file = fitted(file)?;
+    let picture = image::load_from_memory(&file).ok()?.to_rgb8();
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&picture).ok()?;
+    Some(if bytes.len() < file.len() { bytes } else { file })
 }

@@ -10,6 +10,7 @@ use crate::cli::reopening::page::{PROGRAM, write_page};
 use crate::cli::reopening::reopened::{TRACES, TRAJECTORY, arguments};
 use crate::cli::reopening::{date, seen};
 use crate::cli::running::best::{disagreement, keep_best, outside, show_best};
+use crate::cli::running::embedded::write_scene;
 use crate::cli::running::files::write_in;
 use crate::cli::running::keypoints::Joints;
 use crate::cli::running::places::{best_of_each, show_places};
@@ -433,6 +434,7 @@ fn fill(
     let best = best.state();
     let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;
     show_places(dir, s.seed, model, &places, ready.photo())?;
+    write_scene(dir, s.seed, ready, best.as_deref(), &kept.all())?;
     warnings.extend(disagreement(&drawn));
     warnings.extend(outside(&drawn));
     let summary = json!({

@@ -1,6 +1,7 @@
 //! Runs: their inputs, chains, progress and results.
 
 pub(in crate::cli) mod best;
+pub(in crate::cli) mod embedded;
 pub(in crate::cli) mod files;
 pub(in crate::cli) mod inputs;
 pub(in crate::cli) mod job;

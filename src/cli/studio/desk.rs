@@ -14,6 +14,7 @@ use crate::cli::reopening::reopened::Reopened;
 use crate::cli::running::files;
 use crate::cli::scene;
 use pcadlang::render::View;
+use pcadlang::report::embedded;
 use pcadlang::report::pictures::png;
 use pcadlang::scene::ImageValue;
 use pcadlang::session::{ChoiceRow, Layer, Request, Scores, from_json, observed_image, to_json};
@@ -115,7 +116,7 @@ impl Desk {
             Call::Picture(p) => return self.picture(p),
             Call::Mesh(m) => return self.mesh(&m),
             Call::CameraOf(c) => {
-                self.with_view(&c.state, |view, _, _| Ok(layout::camera(view.camera())))?
+                self.with_view(&c.state, |view, _, _| Ok(embedded::camera(view.camera())))?
             }
         };
         Ok(json.into())

@@ -1,38 +1,12 @@
-//! JSON and binary forms that several answers share.
+//! Numbers and meshes as answers carry them.
 
-use pcadlang::geom::{GeomError, Mesh, Solid};
-use pcadlang::render::{Camera, Projection};
+use pcadlang::geom::{GeomError, Solid};
+use pcadlang::report::embedded::topology;
 use serde_json::{Map, Value, json};
-use std::collections::hash_map::DefaultHasher;
-use std::hash::{Hash, Hasher};
 
 /// Returns a number as JSON: null if it is not finite.
 pub fn finite(x: f64) -> Value {
     if x.is_finite() { json!(x) } else { Value::Null }
-}
-
-/// Returns a camera as JSON, with the angle of its picture's height in degrees, or, for a
-/// parallel projection, the height in scene units.
-pub fn camera(c: &Camera) -> Value {
-    let target = c.eye + c.forward;
-    let mut out = json!({
-        "eye": c.eye.to_array(), "target": target.to_array(), "up": c.up.to_array(),
-        "width_px": c.width, "height_px": c.height, "near": Camera::NEAR,
-    });
-    let height = f64::from(c.height);
-    let centre = match c.projection {
-        Projection::Pinhole { focal_px, cx, cy } => {
-            out["fov_y"] = json!(2.0 * (0.5 * height / focal_px).atan().to_degrees());
-            [cx, cy]
-        }
-        Projection::Orthographic { units_per_pixel, cx, cy } => {
-            out["height"] = json!(height * units_per_pixel);
-            [cx, cy]
-        }
-    };
-    // The principal point as a shift of the picture's centre, in parts of its sides.
-    out["shift"] = json!([centre[0] / f64::from(c.width) - 0.5, centre[1] / height - 0.5]);
-    out
 }
 
 /// Returns the header and the data of a mesh: positions, normals, corners, parts.
@@ -60,12 +34,4 @@ pub fn mesh(solid: &Solid, limit: Option<usize>) -> Result<(Map<String, Value>, 
         return Err("no header".to_owned());
     };
     Ok((header, data))
-}
-
-/// Returns a name that meshes with the same triangles share.
-pub fn topology(mesh: &Mesh) -> String {
-    let mut hasher = DefaultHasher::new();
-    mesh.positions.len().hash(&mut hasher);
-    mesh.topology.triangles.hash(&mut hasher);
-    format!("{:016x}", hasher.finish())
 }

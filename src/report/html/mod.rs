@@ -1,5 +1,5 @@
-//! `report.html`: a single file that contains the pictures, plots, tables, a mesh that
-//! can be rotated, and the program.
+//! `report.html`: a single file that contains the pictures, plots, tables, draws to look at
+//! from all sides, and the program.
 //!
 //! Invariant: the page loads nothing from the network, and all quoted text is escaped.
 
@@ -38,8 +38,8 @@ pub struct Page<'a> {
     pub warnings: &'a [String],
     /// The approximations that were made.
     pub approximate: &'a [String],
-    /// The mesh of the best state.
-    pub mesh: Option<MeshData<'a>>,
+    /// What the viewer shows ([`super::embedded`]), as JSON.
+    pub scene: Option<&'a str>,
     /// The program's text.
     pub program: &'a str,
 }
@@ -54,15 +54,6 @@ pub struct Picture<'a> {
     /// Whether it shows bright lines on black; on a bright page they are shown dark on
     /// white.
     pub lines: bool,
-}
-
-/// A mesh that the reader can rotate.
-#[derive(Clone, Copy, Debug)]
-pub struct MeshData<'a> {
-    /// The positions of the vertices.
-    pub positions: &'a [[f32; 3]],
-    /// The vertices of each triangle; a triangle with an invalid vertex is left out.
-    pub triangles: &'a [[u32; 3]],
 }
 
 /// The maximum number of quantities with plots.
@@ -114,6 +105,7 @@ pub fn page(p: &Page) -> String {
 /// contents.
 fn parts(p: &Page) -> Vec<(&'static str, &'static str, String)> {
     let mut all = vec![
+        ("states", "Scene", pictures::viewer(p)),
         ("pictures", "Pictures", pictures::pictures(p)),
         ("quantities", "Quantities", tables::quantities(p.quantities)),
         ("modes", "Modes", tables::modes(p)),

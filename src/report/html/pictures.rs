@@ -1,11 +1,12 @@
-//! The pictures of a page and its mesh.
+//! The pictures of a page, and the viewer of its draws.
 
-use super::encode::{coordinates, escaped};
-use super::{MeshData, Page, Picture};
+use super::encode::escaped;
+use super::{Page, Picture};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use std::fmt::Write;
 
-const VIEWER: &str = include_str!("viewer.js");
+/// The viewer, which is bundled ahead from `web/`.
+const VIEWER: &str = include_str!("../../../web/dist/report.js");
 
 /// Returns the file of a picture as a `data:` URL.
 pub(super) fn source(file: &[u8]) -> String {
@@ -15,7 +16,7 @@ pub(super) fn source(file: &[u8]) -> String {
 
 pub(super) fn pictures(p: &Page) -> String {
     let mut s = String::new();
-    if p.pictures.is_empty() && p.mesh.is_none() {
+    if p.pictures.is_empty() {
         return s;
     }
     s.push_str("<div class=\"pictures\">\n");
@@ -28,9 +29,6 @@ pub(super) fn pictures(p: &Page) -> String {
                 s.push_str("</div>\n");
             }
         }
-    }
-    if let Some(mesh) = &p.mesh {
-        mesh_viewer(&mut s, mesh);
     }
     s.push_str("</div>\n");
     s
@@ -45,19 +43,16 @@ fn figure(s: &mut String, picture: &Picture) {
     );
 }
 
-fn mesh_viewer(s: &mut String, m: &MeshData) {
-    let known = |t: &&[u32; 3]| t.iter().all(|i| (*i as usize) < m.positions.len());
-    let triangles: Vec<String> =
-        m.triangles.iter().filter(known).flatten().map(u32::to_string).collect();
-    let _ = writeln!(
-        s,
-        "<figure><canvas id=\"mesh\" width=\"384\" height=\"384\" tabindex=\"0\"></canvas>\
-         <figcaption>the best state; drag to rotate, scroll to zoom, double-click to reset</figcaption></figure>\n\
-         <script type=\"application/json\" id=\"mesh-data\">{{\"positions\":[{}],\"triangles\":[{}]}}</script>\n\
-         <script>\n{VIEWER}</script>",
-        coordinates(m.positions),
-        triangles.join(",")
-    );
+/// Returns the place of the viewer, its data and its program.
+pub(super) fn viewer(p: &Page) -> String {
+    let Some(scene) = p.scene else { return String::new() };
+    // Within a script, `</` could end it.
+    let (scene, program) = (scene.replace("</", "<\\/"), VIEWER.replace("</script", "<\\/script"));
+    format!(
+        "<div id=\"viewer\"><noscript>The scene can be turned only with JavaScript.</noscript></div>\n\
+         <script type=\"application/json\" id=\"scene\">{scene}</script>\n\
+         <script>\n{program}</script>\n"
+    )
 }
 
 #[cfg(test)]

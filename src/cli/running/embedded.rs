@@ -1,0 +1,82 @@
+//! `scene.json`: some draws of a run as meshes, and pictures of the best one, for the viewer
+//! of its page.
+
+use crate::cli::failure::Failure;
+use crate::cli::running::files::write_in;
+use crate::cli::running::job::Ready;
+use crate::cli::scene;
+use base64::prelude::{BASE64_STANDARD, Engine as _};
+use image::RgbImage;
+use image::codecs::jpeg::JpegEncoder;
+use pcadlang::infer::{BestState, KeptTrace};
+use pcadlang::lang::value::Located;
+use pcadlang::render::View;
+use pcadlang::report::RunDir;
+use pcadlang::report::embedded::{EmbeddedDraw, embedded};
+use pcadlang::session::Layer;
+use pcadlang::trace::Trace;
+use serde_json::{Map, Value, json};
+use std::sync::Arc;
+
+/// The file.
+pub const SCENE: &str = "scene.json";
+/// The most draws, beside the best state.
+const DRAWS: usize = 40;
+/// The longer side of the pictures, in pixels, and their quality.
+const SIDE: u32 = 512;
+const QUALITY: u8 = 85;
+
+/// Writes the file, if the program has a view.
+pub fn write_scene(
+    dir: &RunDir,
+    seed: u64,
+    ready: &Ready,
+    best: Option<&BestState>,
+    kept: &[KeptTrace],
+) -> Result<(), Failure> {
+    let Some(best) = best else { return Ok(()) };
+    let (model, draws) = (&ready.model, scene::predictive(seed, 0));
+    let mut trace = scene::rebuilt(model, &best.choices, draws)?;
+    let Some(view) = scene::view(&mut trace, draws, None) else { return Ok(()) };
+    let mut all = vec![EmbeddedDraw {
+        chain: None,
+        draw: None,
+        log_joint: best.log_joint,
+        label: Some("the best state".to_owned()),
+        solid: view.solid().clone(),
+    }];
+    let every = kept.len().div_ceil(DRAWS).max(1);
+    for k in kept.iter().step_by(every) {
+        let code = Arc::clone(model.code());
+        let loaded = Trace::load(code, model.hash(), &k.trace, model.limits().clone());
+        // A state that cannot be rebuilt is one fewer to look at.
+        let Some(view) = loaded.ok().and_then(|mut t| scene::view(&mut t, draws, None)) else {
+            continue;
+        };
+        all.push(EmbeddedDraw {
+            chain: Some(k.chain),
+            draw: Some(k.draw),
+            log_joint: k.log_joint,
+            label: None,
+            solid: view.solid().clone(),
+        });
+    }
+    let Some(mut shown) = embedded(view.camera(), &all) else { return Ok(()) };
+    let located = trace.located();
+    shown["photo"] = json!(layer(Layer::Photo, &view, ready, &located));
+    shown["layers"] = Value::Object(layers(&view, ready, &located));
+    write_in(dir, SCENE, shown.to_string().as_bytes())
+}
+
+/// Draws the layers that apply, as `data:` addresses.
+fn layers(view: &Arc<View>, ready: &Ready, located: &[Located]) -> Map<String, Value> {
+    let of = |l: Layer| Some((l.name().to_owned(), json!(layer(l, view, ready, located)?)));
+    Layer::ALL.into_iter().filter(|l| *l != Layer::Photo).filter_map(of).collect()
+}
+
+fn layer(layer: Layer, view: &Arc<View>, ready: &Ready, located: &[Located]) -> Option<String> {
+    let picture: RgbImage = layer.draw(view, ready.image(), located, SIDE).ok()?;
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&picture).ok()?;
+    Some(format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes)))
+}
