@@ -16,4 +16,6 @@ mod readme;
 mod repl;
 mod report;
 mod runs;
+#[cfg(feature = "studio")]
+mod studio;
 mod tradeoff;

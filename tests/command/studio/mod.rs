@@ -1,0 +1,6 @@
+//! `pcadlang studio`, used over its protocol as the page uses it.
+
+mod client;
+mod refused;
+mod runs;
+mod sessions;
