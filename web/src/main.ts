@@ -1,0 +1,97 @@
+// The page: connects, puts the panels together, and keeps the address up to date.
+
+import "./style.css";
+import "uplot/dist/uPlot.min.css";
+import { Actions } from "./actions";
+import { Connection } from "./connection";
+import { h } from "./dom";
+import { acceptDrops } from "./drop";
+import { ErrorBox } from "./errors";
+import { readPlace, writePlace } from "./fragment";
+import { ProgramPanel } from "./program_panel";
+import { ScenePanel } from "./scene_panel";
+import { splitter } from "./splitter";
+import { Store } from "./store";
+import { Tabs } from "./tabs";
+import { TopBar } from "./top_bar";
+import { TracePanel } from "./trace_panel";
+
+const place = readPlace(location.hash);
+const store = new Store();
+const connection = new Connection(place.token);
+const actions = new Actions(connection, store);
+// Until everything is read, the address says what shall be opened.
+let loaded = false;
+
+const banner = h("div", { class: "banner", role: "status", hidden: true });
+const errors = new ErrorBox();
+actions.onError = (error) => errors.show(error);
+
+const bar = new TopBar(actions);
+const program = new ProgramPanel(actions);
+const scene = new ScenePanel(actions);
+const trace = new TracePanel(actions);
+trace.onMoved = (coarse) => scene.follow(coarse);
+
+const programTab = h("div", { class: "panel program-tab" });
+const tabs = new Tabs(
+  [
+    { key: "program", name: "Program", panel: programTab },
+    { key: "trace", name: "Trace", panel: trace.element, setVisible: (v) => trace.setVisible(v) },
+  ],
+  (tab) => store.set({ tab }),
+);
+
+const left = h("aside", { class: "left", "aria-label": "Program" });
+const root = document.getElementById("studio")!;
+root.append(
+  banner,
+  bar.element,
+  bar.error.element,
+  errors.element,
+  h(
+    "main",
+    {},
+    left,
+    splitter("--left", "Width of the program", 400, 1),
+    h("section", { class: "middle", "aria-label": "Scene" }, scene.element),
+    splitter("--right", "Width of the tabs", 440, -1),
+    h("aside", { class: "right", "aria-label": "Panels" }, tabs.element),
+  ),
+);
+
+// On a narrow page the program is one of the tabs.
+const narrow = matchMedia("(max-width: 1100px)");
+const arrange = () => {
+  (narrow.matches ? programTab : left).append(program.element);
+  tabs.hide("program", !narrow.matches);
+};
+narrow.addEventListener("change", arrange);
+
+store.on(["session", "run", "view", "at", "tab"], () => {
+  const { session, run, view, at, tab } = store.now;
+  if (!loaded) return;
+  const now = { token: place.token, session: session?.session ?? null, run, view, at, tab };
+  history.replaceState(null, "", writePlace(now));
+});
+store.on(["tab"], () => tabs.choose(store.now.tab));
+tabs.choose(place.tab ?? "trace");
+store.set({ tab: place.tab ?? "trace" });
+arrange();
+acceptDrops(root, (file) => void bar.error.guard(() => bar.take(file)));
+
+connection.onChange = (connected) => {
+  store.set({ connected, wasConnected: store.now.wasConnected || connected });
+  if (connected) {
+    banner.hidden = true;
+    errors
+      .guard(() => actions.load(place))
+      .then(() => (loaded = true), (error) => errors.show(error));
+  } else {
+    banner.hidden = false;
+    banner.textContent = place.token
+      ? "The connection to pcadlang is lost; trying to reach it again …"
+      : "Open the address that `pcadlang studio` printed: this one has no token.";
+  }
+};
+connection.connect();

@@ -1,0 +1,104 @@
+// The middle of the page: the viewer, and which states it shows.
+
+import type { Actions } from "./actions";
+import { button, h, Segments } from "./dom";
+import { ErrorBox } from "./errors";
+import { SocketSource } from "./socket_source";
+import type { View } from "./store";
+import { Viewer } from "./viewer";
+
+const VIEWS: [View, string][] = [
+  ["session", "Session"],
+  ["best", "Best"],
+  ["draws", "Draws"],
+  ["film", "Film"],
+  ["modes", "Modes"],
+];
+
+const TITLES: Record<View, string> = {
+  session: "The session's state, which you can change",
+  best: "The best state of the run so far",
+  draws: "The kept draws of the run",
+  film: "From the prior to the posterior",
+  modes: "The best state of each mode, after the run",
+};
+
+/** Feeds the viewer with the states that the user chose. */
+export class ScenePanel {
+  readonly element: HTMLElement;
+  private readonly views: Segments;
+  private readonly viewer: Viewer;
+  private readonly error = new ErrorBox();
+  private readonly exports: HTMLElement;
+  private shown = "";
+
+  constructor(private readonly actions: Actions) {
+    const { store } = actions;
+    const choose = (view: string) => store.set({ view: view as View, at: null });
+    this.views = new Segments("States", VIEWS, "session", choose);
+    for (const child of this.views.element.children) {
+      const view = (child as HTMLElement).dataset.value as View;
+      (child as HTMLElement).title = TITLES[view];
+    }
+    const edit = button("Edit", () => this.edit(), {
+      title: "Open a session at the run's best state",
+    });
+    const kinds = ["film.png", "film.glb", "report.html"].map((kind) =>
+      button(kind, () => this.download(kind), { title: `Make and download ${kind}` }),
+    );
+    this.exports = h("div", { class: "exports" }, edit, ...kinds);
+    this.viewer = new Viewer(this.views.element);
+    this.viewer.onFrame = (at) => store.set({ at });
+    this.element = h("div", { class: "scene" }, this.viewer.element, this.error.element);
+    this.viewer.element.querySelector(".viewer-head")!.append(this.exports);
+    store.on(["session", "runs", "run", "draws", "modes", "view", "connected"], () => this.show());
+    this.show();
+  }
+
+  /** A dragged choice was changed: coarse pictures follow it. */
+  follow(coarse: boolean): void {
+    if (this.actions.store.now.view === "session") this.viewer.refresh(coarse);
+  }
+
+  private show(): void {
+    const { store, connection } = this.actions;
+    const known = store.now;
+    const run = store.currentRun;
+    this.views.value = known.view;
+    this.views.enable("session", known.session !== null);
+    this.views.enable("best", run !== null && run.revision > 0);
+    this.views.enable("draws", (run?.draws ?? 0) > 0);
+    this.views.enable("film", (run?.film ?? 0) > 0);
+    this.views.enable("modes", known.modes > 0);
+    this.exports.hidden = run === null;
+    for (const child of this.exports.children) {
+      (child as HTMLButtonElement).disabled = run === null || run.revision === 0;
+    }
+    if (!known.connected) return;
+    const source = new SocketSource(connection, known);
+    // What is shown is asked for again only when it changed, not whenever anything is known.
+    const revision = known.view === "session" ? known.session?.revision : run?.revision;
+    const moving = known.view === "session" || known.view === "best";
+    const shown = JSON.stringify([
+      source.key,
+      moving ? revision : source.frames.length,
+      source.frames.length,
+    ]);
+    if (shown === this.shown) return;
+    const same = this.shown.startsWith(`["${source.key.replace(/"/g, '\\"')}"`);
+    this.shown = shown;
+    // While a choice is dragged its own answers bring the pictures.
+    if (known.dragging && moving && same) return;
+    this.viewer.setSource(source, same ? this.viewer.current : (known.at ?? 0));
+  }
+
+  private edit(): void {
+    const run = this.actions.store.now.run;
+    if (run !== null) void this.error.guard(() => this.actions.openRun(run));
+  }
+
+  private download(kind: string): void {
+    const run = this.actions.store.now.run;
+    if (run !== null) void this.error.guard(() => this.actions.download(run, kind));
+  }
+}

@@ -1,0 +1,115 @@
+// What the studio's viewer shows: states of the session or of the run that is looked at.
+
+import type { Connection } from "./connection";
+import type { Camera, Mesh, State } from "./protocol";
+import { readMesh } from "./protocol";
+import type { Frame, Picture, Source } from "./source";
+import type { Known } from "./store";
+
+const LAYERS = [
+  "overlay",
+  "photo",
+  "scene",
+  "depth",
+  "normals",
+  "regions",
+  "contours",
+  "photo_contours",
+  "residuals",
+  "joints",
+  "mask",
+];
+
+/** The states of the chosen view, as frames of the viewer. */
+export class SocketSource implements Source {
+  readonly layers = LAYERS;
+  readonly viewpoints = true;
+  readonly key: string;
+  readonly frames: Frame[];
+  readonly drawCount: number;
+  private readonly states: State[];
+
+  constructor(
+    private readonly connection: Connection,
+    known: Readonly<Known>,
+  ) {
+    const { view, run, session, draws } = known;
+    const listed = framesOf(known);
+    this.frames = listed.map(([frame]) => frame);
+    this.states = listed.map(([, state]) => state);
+    // Another photograph changes the pictures of a session's states, whatever its number.
+    const data = view === "session" ? JSON.stringify(session?.observe) : "";
+    this.key = `${view} ${view === "session" ? session?.session : run} ${data}`;
+    this.drawCount = run === null ? 0 : (draws?.draws.length ?? 0);
+    this.run = run;
+  }
+
+  private readonly run: string | null;
+
+  async mesh(frame: number): Promise<Mesh> {
+    return this.meshOf(this.states[frame]!);
+  }
+
+  async drawMesh(draw: number): Promise<Mesh> {
+    return this.meshOf({ run: this.run!, draw });
+  }
+
+  async camera(frame: number): Promise<Camera | null> {
+    return this.connection.ask<Camera>("camera", { state: this.states[frame]! });
+  }
+
+  async photo(): Promise<Picture | null> {
+    try {
+      return await this.picture(0, "photo", 1024);
+    } catch {
+      // A program without a photograph has no such layer, and the 3D view does without.
+      return null;
+    }
+  }
+
+  async picture(frame: number, layer: string, size: number, camera?: Camera): Promise<Picture> {
+    return askPicture(this.connection, this.states[frame]!, layer, size, camera);
+  }
+
+  private async meshOf(state: State): Promise<Mesh> {
+    return readMesh(await this.connection.askBinary("mesh", { state }));
+  }
+}
+
+/** Asks for the picture of a state. */
+export async function askPicture(
+  connection: Connection,
+  state: State,
+  layer: string,
+  size: number,
+  camera?: Camera,
+): Promise<Picture> {
+  const params = { state, layer, size, ...(camera ? { camera } : {}) };
+  const { header, data } = await connection.askBinary("picture", params);
+  const url = URL.createObjectURL(new Blob([data.slice()], { type: header.type }));
+  return { url, owned: true, logJoint: header.log_joint ?? null };
+}
+
+function framesOf(known: Readonly<Known>): [Frame, State][] {
+  const { view, run, session, draws, modes } = known;
+  const plain = (label: string, logJoint: number | null = null): Frame => {
+    return { label, chain: null, logJoint };
+  };
+  if (view === "session") {
+    if (!session?.has_view) return [];
+    return [[plain("The session's state", session.log_joint), { session: session.session }]];
+  }
+  if (run === null) return [];
+  if (view === "best") return [[plain("The best state so far"), { run }]];
+  if (view === "modes") {
+    return Array.from({ length: modes }, (_, mode) => [plain(`Mode ${mode + 1}`), { run, mode }]);
+  }
+  if (view === "film") {
+    const n = draws?.film ?? 0;
+    return Array.from({ length: n }, (_, film) => [plain("From prior to posterior"), { run, film }]);
+  }
+  return (draws?.draws ?? []).map((d, draw) => [
+    { label: `Chain ${d.chain + 1}, draw ${d.draw}`, chain: d.chain, logJoint: d.log_joint },
+    { run, draw },
+  ]);
+}
