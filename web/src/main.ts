@@ -4,15 +4,21 @@ import "./style.css";
 import "uplot/dist/uPlot.min.css";
 import { Actions } from "./actions";
 import { Connection } from "./connection";
-import { h } from "./dom";
+import { button, h } from "./dom";
 import { acceptDrops } from "./drop";
+import { ComparePanel } from "./compare_panel";
 import { ErrorBox } from "./errors";
 import { readPlace, writePlace } from "./fragment";
+import { GalleryPanel } from "./gallery_panel";
+import { ModesPanel } from "./modes_panel";
+import { PlotsPanel } from "./plots_panel";
 import { ProgramPanel } from "./program_panel";
+import { PromptPanel } from "./prompt_panel";
+import { RunsPanel } from "./runs_panel";
 import { ScenePanel } from "./scene_panel";
 import { splitter } from "./splitter";
 import { Store } from "./store";
-import { Tabs } from "./tabs";
+import { Tabs, type Tab } from "./tabs";
 import { TopBar } from "./top_bar";
 import { TracePanel } from "./trace_panel";
 
@@ -34,13 +40,33 @@ const trace = new TracePanel(actions);
 trace.onMoved = (coarse) => scene.follow(coarse);
 
 const programTab = h("div", { class: "panel program-tab" });
+interface Panel {
+  element: HTMLElement;
+  setVisible(visible: boolean): void;
+}
+const tabOf = (key: string, name: string, panel: Panel): Tab => {
+  return { key, name, panel: panel.element, setVisible: (v) => panel.setVisible(v) };
+};
 const tabs = new Tabs(
   [
     { key: "program", name: "Program", panel: programTab },
-    { key: "trace", name: "Trace", panel: trace.element, setVisible: (v) => trace.setVisible(v) },
+    tabOf("trace", "Trace", trace),
+    tabOf("plots", "Plots", new PlotsPanel(actions)),
+    tabOf("modes", "Modes", new ModesPanel(actions)),
+    tabOf("prompt", "Prompt", new PromptPanel(actions)),
+    tabOf("compare", "Compare", new ComparePanel(actions)),
+    tabOf("gallery", "Gallery", new GalleryPanel(actions)),
+    tabOf("runs", "Runs", new RunsPanel(actions)),
   ],
   (tab) => store.set({ tab }),
 );
+
+const wide = button("⤢", () => {
+  const on = document.querySelector("main")!.classList.toggle("wide");
+  wide.setAttribute("aria-pressed", String(on));
+}, { class: "quiet widen", title: "Give these tabs more room", "aria-pressed": "false" });
+wide.setAttribute("aria-label", "Give these tabs more room");
+tabs.element.querySelector(".tab-row")!.append(wide);
 
 const left = h("aside", { class: "left", "aria-label": "Program" });
 const root = document.getElementById("studio")!;

@@ -91,7 +91,7 @@ export class Scene3D {
     this.given = camera;
     if (same) return;
     this.placePhoto();
-    if (camera && (this.atCamera || !this.framed)) this.fromCamera();
+    if (camera && this.atCamera) this.fromCamera();
   }
 
   /** The photograph behind the scene. */
@@ -159,20 +159,25 @@ export class Scene3D {
     this.render();
   }
 
-  /** Looks at the whole mesh from the front and a little above. */
+  /** Looks at the whole mesh from a little beside the photograph's camera, and above. */
   reset(): void {
     if (!this.mesh) return;
-    if (this.given) {
-      this.fromCamera();
-      return;
-    }
     const { center, radius } = this.bounds();
+    const { given } = this;
+    const toEye = given
+      ? new THREE.Vector3(...given.eye).sub(center).normalize()
+      : new THREE.Vector3(0, 0, 1);
+    const polar = new THREE.Spherical().setFromVector3(toEye);
+    polar.theta += 0.5;
+    polar.phi = Math.max(0.3, polar.phi - 0.22);
+    polar.radius = (1.5 * radius) / Math.sin((17.5 * Math.PI) / 180);
+    const eye = new THREE.Vector3().setFromSpherical(polar).add(center);
     this.use(this.perspective);
     this.perspective.fov = 35;
-    const distance = (1.25 * radius) / Math.sin((17.5 * Math.PI) / 180);
-    const eye = center.clone().add(new THREE.Vector3(0.45, 0.35, 0.82).multiplyScalar(distance));
     this.place({ eye: eye.toArray() as Vec3, target: center.toArray() as Vec3, up: [0, 1, 0] });
+    this.atCamera = false;
     this.framed = true;
+    this.onViewpoint(false);
     this.resize();
   }
 

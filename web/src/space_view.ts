@@ -66,6 +66,7 @@ export class SpaceView {
       "div",
       { class: "tools" },
       this.home,
+      button("Whole", () => this.scene?.reset(), { title: "Look at the whole scene" }),
       paint,
       this.ghostToggle,
       this.toggle("Wireframe", "The triangles", (on) => this.look({ wireframe: on })),
@@ -142,8 +143,8 @@ export class SpaceView {
     this.error.clear();
     this.mesh = mesh;
     await this.loadPhoto(source, scene);
-    scene.setMesh(mesh);
     scene.setCamera(camera);
+    scene.setMesh(mesh);
     if (scene.look.paint === "parts") this.showParts();
     if (scene.look.paint === "uncertainty" && this.spread?.topology !== mesh.topology) {
       this.spreads.call();
