@@ -61,6 +61,7 @@ export class EmbeddedSource implements Source {
   readonly frames: Frame[];
   readonly layers: string[];
   readonly viewpoints = false;
+  readonly pictureNote = "the best state";
   readonly drawCount: number;
   private readonly corners = new Map<string, Promise<Uint32Array>>();
   private readonly meshes = new Map<number, Promise<Mesh>>();

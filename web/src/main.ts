@@ -79,9 +79,9 @@ root.append(
     "main",
     {},
     left,
-    splitter("--left", "Width of the program", 400, 1),
+    splitter("--left", "Width of the program", 375, 1),
     h("section", { class: "middle", "aria-label": "Scene" }, scene.element),
-    splitter("--right", "Width of the tabs", 440, -1),
+    splitter("--right", "Width of the tabs", 450, -1),
     h("aside", { class: "right", "aria-label": "Panels" }, tabs.element),
   ),
 );

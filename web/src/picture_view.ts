@@ -53,6 +53,7 @@ export class PictureView {
   private shown: Picture | null = null;
   private readonly image = h("img", { alt: "", draggable: "false" });
   private readonly empty = h("div", { class: "empty" }, "No picture yet");
+  private readonly note = h("span", { class: "muted" });
   private readonly error = new ErrorBox();
   private readonly layers: HTMLSelectElement;
   private readonly viewpoints: HTMLSelectElement;
@@ -68,7 +69,7 @@ export class PictureView {
     this.viewpoints = select(VIEWPOINTS, "given", (value) => this.setViewpoint(value), {
       "aria-label": "Viewpoint",
     });
-    this.tools = h("div", { class: "tools" }, this.layers, this.viewpoints);
+    this.tools = h("div", { class: "tools" }, this.layers, this.viewpoints, this.note);
     this.element = h("div", { class: "picture" }, this.image, this.empty, this.error.element);
     this.image.hidden = true;
     // A picture asked for at another size is sharp again once the view's size is settled.
@@ -87,6 +88,7 @@ export class PictureView {
     );
     if (known.length > 0 && !known.includes(this.layer)) this.setLayer(known[0]!);
     this.viewpoints.hidden = !source?.viewpoints;
+    this.note.textContent = source?.pictureNote ?? "";
     if (!source) this.show(null);
     else if (other) this.error.clear();
   }

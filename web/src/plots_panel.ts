@@ -126,7 +126,9 @@ export class PlotsPanel {
       const more = quantities.length > MOST_PAIRS ? h("p", { class: "muted" }, note) : null;
       fill(this.plots, pairsPlot(quantities, width), more);
     } else {
-      const intervals = quantities
+      // Log densities are in the hundreds, and would squeeze the choices together.
+      const choices = quantities.filter(({ name }) => !/^(log_|lp__)/.test(name));
+      const intervals = (choices.length > 0 ? choices : quantities)
         .map(({ name }) => interval(name, this.statistics[name] ?? {}))
         .filter((i): i is Interval => i !== null);
       if (intervals.length > 0) fill(this.plots, forestPlot(intervals, width));

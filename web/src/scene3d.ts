@@ -113,7 +113,7 @@ export class Scene3D {
   setGhosts(meshes: Mesh[]): void {
     for (const child of this.ghosts.children) (child as THREE.Mesh).geometry.dispose();
     this.ghosts.clear();
-    this.ghostMaterial.opacity = Math.min(0.2, 1 / Math.max(1, meshes.length));
+    this.ghostMaterial.opacity = Math.min(0.15, 0.5 / Math.max(1, meshes.length));
     for (const mesh of meshes) {
       this.ghosts.add(new THREE.Mesh(ghostGeometry(mesh), this.ghostMaterial));
     }
@@ -170,7 +170,9 @@ export class Scene3D {
     const polar = new THREE.Spherical().setFromVector3(toEye);
     polar.theta += 0.5;
     polar.phi = Math.max(0.3, polar.phi - 0.22);
-    polar.radius = (1.5 * radius) / Math.sin((17.5 * Math.PI) / 180);
+    const { width, height } = this.size();
+    const room = Math.min(1, width / height);
+    polar.radius = (1.15 * radius) / Math.sin((17.5 * Math.PI) / 180) / room;
     const eye = new THREE.Vector3().setFromSpherical(polar).add(center);
     this.use(this.perspective);
     this.perspective.fov = 35;

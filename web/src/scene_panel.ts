@@ -1,7 +1,7 @@
 // The middle of the page: the viewer, and which states it shows.
 
 import type { Actions } from "./actions";
-import { button, h, Segments } from "./dom";
+import { button, h, Segments, select } from "./dom";
 import { ErrorBox } from "./errors";
 import { SocketSource } from "./socket_source";
 import type { View } from "./store";
@@ -13,6 +13,13 @@ const VIEWS: [View, string][] = [
   ["draws", "Draws"],
   ["film", "Film"],
   ["modes", "Modes"],
+];
+
+const KINDS: [string, string][] = [
+  ["", "Export …"],
+  ["film.png", "Film as PNG"],
+  ["film.glb", "Film as glTF"],
+  ["report.html", "Report"],
 ];
 
 const TITLES: Record<View, string> = {
@@ -43,10 +50,11 @@ export class ScenePanel {
     const edit = button("Edit", () => this.edit(), {
       title: "Open a session at the run's best state",
     });
-    const kinds = ["film.png", "film.glb", "report.html"].map((kind) =>
-      button(kind, () => this.download(kind), { title: `Make and download ${kind}` }),
-    );
-    this.exports = h("div", { class: "exports" }, edit, ...kinds);
+    const exports = select(KINDS, "", (kind) => {
+      exports.value = "";
+      this.download(kind);
+    }, { "aria-label": "Make and download", title: "Make and download a film or report" });
+    this.exports = h("div", { class: "exports" }, edit, exports);
     this.viewer = new Viewer(this.views.element);
     this.viewer.onFrame = (at) => store.set({ at });
     this.element = h("div", { class: "scene" }, this.viewer.element, this.error.element);
@@ -72,7 +80,7 @@ export class ScenePanel {
     this.views.enable("modes", known.modes > 0);
     this.exports.hidden = run === null;
     for (const child of this.exports.children) {
-      (child as HTMLButtonElement).disabled = run === null || run.revision === 0;
+      (child as HTMLButtonElement | HTMLSelectElement).disabled = run === null || run.revision === 0;
     }
     if (!known.connected) return;
     const source = new SocketSource(connection, known);

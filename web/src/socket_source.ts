@@ -24,6 +24,7 @@ const LAYERS = [
 export class SocketSource implements Source {
   readonly layers = LAYERS;
   readonly viewpoints = true;
+  readonly pictureNote = null;
   readonly key: string;
   readonly frames: Frame[];
   readonly drawCount: number;

@@ -27,6 +27,8 @@ export interface Source {
   readonly layers: string[];
   /** Whether any frame can be rendered from another viewpoint. */
   readonly viewpoints: boolean;
+  /** What the pictures show where they do not follow the frames; otherwise null. */
+  readonly pictureNote: string | null;
   /** How many posterior draws there are, for ghosts and uncertainty. */
   readonly drawCount: number;
   mesh(frame: number): Promise<Mesh>;

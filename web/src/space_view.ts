@@ -45,7 +45,7 @@ export class SpaceView {
     });
     const paints: [Paint, string][] = [
       ["plain", "Plain"],
-      ["parts", "Parts in colours"],
+      ["parts", "Parts"],
       ["uncertainty", "Uncertainty"],
     ];
     const paint = select(paints, "plain", (value) => this.setPaint(value as Paint), {
@@ -69,7 +69,7 @@ export class SpaceView {
       button("Whole", () => this.scene?.reset(), { title: "Look at the whole scene" }),
       paint,
       this.ghostToggle,
-      this.toggle("Wireframe", "The triangles", (on) => this.look({ wireframe: on })),
+      this.toggle("Wire", "The triangles' edges only", (on) => this.look({ wireframe: on })),
       this.toggle("Photo", "The photograph behind the scene", (on) => this.look({ photo: on }), true),
       opacity,
     );

@@ -25,6 +25,7 @@ export class TracePanel {
   private words: string[] = [];
   private readonly error = new ErrorBox();
   private readonly joint = h("div", { class: "joint" });
+  private readonly observed = h("details", { class: "observed", hidden: true });
   private readonly list: VirtualList;
   private readonly selection: SelectedChoice;
   private readonly undo = button("Undo", () => this.enter(":undo"));
@@ -71,6 +72,7 @@ export class TracePanel {
         h("span", { class: "acceptance" }, "Acc."),
       ),
       this.list.element,
+      this.observed,
       this.selection.element,
     );
     this.assigns = new Latest((wish) => this.send(wish), (e) => this.failAssign(e));
@@ -115,6 +117,7 @@ export class TracePanel {
     // A small trace is shown open; of a large one the branches are opened by hand.
     if (first && data.choices.length <= 40) this.openAll();
     this.showJoint(data);
+    this.showObserved(data);
     this.rebuild();
   }
 
@@ -134,6 +137,16 @@ export class TracePanel {
         ` = ${number(d.log_prior)} (choices) + ${number(d.log_likelihood)} (observed)`,
       ),
     );
+  }
+
+  private showObserved({ observed }: Choices): void {
+    this.observed.hidden = observed.length === 0;
+    const most = 500;
+    const lines = observed.slice(0, most).map(({ address, log_density }) => {
+      return h("div", {}, h("code", {}, address), h("span", {}, number(log_density)));
+    });
+    if (observed.length > most) lines.push(h("div", {}, `and ${observed.length - most} more`));
+    fill(this.observed, h("summary", {}, `Observed (${observed.length})`), ...lines);
   }
 
   private rebuild(): void {
