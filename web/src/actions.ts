@@ -126,7 +126,7 @@ export class Actions {
     const { file } = await this.connection.ask<{ file: string }>("export", { run, kind });
     const link = document.createElement("a");
     link.href = this.connection.fileAddress(file);
-    link.download = `${run}-${kind}`;
+    link.download = `${run.split("/").pop()}-${kind}`;
     link.click();
   }
 

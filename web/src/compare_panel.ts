@@ -5,7 +5,7 @@ import { fill, h, number, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
 import { figure, PictureView } from "./picture_view";
-import type { Comparison, Statistics } from "./protocol";
+import { hasBest, type Comparison, type Statistics } from "./protocol";
 import { SocketSource } from "./socket_source";
 
 /** Two runs: pictures in the same layer, settings, quantities. */
@@ -51,7 +51,7 @@ export class ComparePanel {
   private show(): void {
     if (!this.visible) return;
     const { runs, run } = this.actions.store.now;
-    const usable = runs.filter((r) => r.revision > 0 || r.draws > 0).map((r) => r.run);
+    const usable = runs.filter(hasBest).map((r) => r.run);
     if (usable.length < 2) {
       fill(this.tables, h("div", { class: "empty" }, "Two runs with results can be compared."));
       fill(this.figures);

@@ -5,7 +5,12 @@ import { h } from "./dom";
 
 /** The lines that explain an error. */
 export function explain(error: unknown): { message: string; hint: string | null } {
-  if (error instanceof Refusal) return { message: error.message, hint: error.hint };
+  if (error instanceof Refusal) {
+    // A diagnostic says more than its message, whose first part it repeats.
+    const first = error.diagnostics[0];
+    const whole = first?.message.startsWith(error.message) ? first.message : error.message;
+    return { message: whole, hint: error.hint ?? first?.hint ?? null };
+  }
   if (error instanceof Error) return { message: error.message, hint: null };
   return { message: String(error), hint: null };
 }

@@ -94,12 +94,13 @@ const arrange = () => {
 };
 narrow.addEventListener("change", arrange);
 
-store.on(["session", "run", "view", "at", "tab"], () => {
+const remember = () => {
   const { session, run, view, at, tab } = store.now;
   if (!loaded) return;
   const now = { token: place.token, session: session?.session ?? null, run, view, at, tab };
   history.replaceState(null, "", writePlace(now));
-});
+};
+store.on(["session", "run", "view", "at", "tab"], remember);
 store.on(["tab"], () => tabs.choose(store.now.tab));
 tabs.choose(place.tab ?? "trace");
 store.set({ tab: place.tab ?? "trace" });
@@ -110,9 +111,11 @@ connection.onChange = (connected) => {
   store.set({ connected, wasConnected: store.now.wasConnected || connected });
   if (connected) {
     banner.hidden = true;
-    errors
-      .guard(() => actions.load(place))
-      .then(() => (loaded = true), (error) => errors.show(error));
+    void errors.guard(async () => {
+      await actions.load(place);
+      loaded = true;
+      remember();
+    });
   } else {
     banner.hidden = false;
     banner.textContent = place.token

@@ -74,7 +74,8 @@ export class ModesPanel {
     const facts: [string, string][] = [
       ["probability", number(mode.probability, 3)],
       ["chains", chainsOf(mode)],
-      ["log evidence", number(mode.log_evidence, 4)],
+      ["log joint", number(mode.log_joint)],
+      ["log evidence", evidence(mode)],
     ];
     const list = h("dl", {});
     for (const [name, value] of facts) {
@@ -99,7 +100,11 @@ export class ModesPanel {
   }
 }
 
-function chainsOf({ chains, fraction }: Mode): string {
-  if (Array.isArray(chains)) return String(chains.length);
-  return typeof chains === "number" ? String(chains) : number(fraction, 3);
+function chainsOf({ chains, share }: Mode): string {
+  const list = chains?.join(", ");
+  return list ? `${list} (${Math.round(100 * (share ?? 0))}%)` : number(share, 3);
+}
+
+function evidence({ log_evidence }: Mode): string {
+  return log_evidence ? `${number(log_evidence[0])} ± ${number(log_evidence[1], 2)}` : "–";
 }

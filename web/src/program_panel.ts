@@ -29,7 +29,7 @@ export class ProgramPanel {
   private readonly row = h("div", { class: "file-row" });
   private readonly note = h("span", { class: "muted note", "aria-live": "polite" });
   private readonly apply = button("Apply", () => this.applyText(), { class: "primary" });
-  private readonly open = select([], "", (file) => this.openFile(file), {
+  private readonly open = select([["", "Open …"]], "", (file) => this.openFile(file), {
     "aria-label": "Open a program beside this one",
   });
   private readonly server: LanguageServer;
@@ -49,6 +49,7 @@ export class ProgramPanel {
       h("div", { class: "editor" }, this.view.dom),
       this.error.element,
     );
+    this.describe();
     actions.onOpened = (session) => this.showSession(session);
     store.on(["folder"], () => this.showFolder());
     store.on(["session"], () => this.follow());
@@ -121,9 +122,9 @@ export class ProgramPanel {
 
   private describe(): void {
     const { current } = this;
-    const ofSession = current?.file === this.sessionFile;
+    const ofSession = current === null || current.file === this.sessionFile;
     const edited = current !== null && current.text !== current.base;
-    this.apply.textContent = ofSession ? "Apply" : "Use this program";
+    this.apply.textContent = ofSession ? "Apply" : "Use";
     this.apply.title = ofSession
       ? "Replace the session's program; shared choices keep their values (Ctrl-Enter)"
       : "Open a session of this program (Ctrl-Enter)";

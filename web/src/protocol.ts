@@ -44,7 +44,7 @@ export interface Session {
   observe: string[];
   photo: { name: string; width: number; height: number } | null;
   data: { name: string; kind: string; given: boolean }[];
-  params: { name: string; value: unknown }[];
+  params: { name: string; value: unknown; about?: string | null }[];
   revision: number;
   log_joint: number | null;
   undo: string | null;
@@ -112,7 +112,7 @@ export interface Run {
   best: number | null;
   revision: number;
   draws: number;
-  film: number;
+  film: number | null;
   error: string | null;
   begun: string | null;
   r_hat: number | null;
@@ -146,9 +146,11 @@ export type Statistics = Record<string, number | null>;
 
 export interface Mode {
   chains?: number[];
-  fraction?: number;
+  share?: number;
   probability?: number | null;
-  log_evidence?: number | null;
+  log_joint?: number | null;
+  /** With its standard error. */
+  log_evidence?: [number, number] | null;
   [more: string]: unknown;
 }
 
@@ -207,6 +209,8 @@ export interface Camera {
   height_px?: number;
   near?: number;
   far?: number;
+  /** Where the camera's axis meets the picture: from its centre, in parts of its sides. */
+  shift?: [number, number];
 }
 
 export type Event =
@@ -270,6 +274,29 @@ export function readMesh({ header, data }: BinaryAnswer): Mesh {
     corners: new Uint32Array(buffer, 24 * n, 3 * m),
     partOf: new Uint16Array(buffer, 24 * n + 12 * m, m),
   };
+}
+
+/** A choice with what the program leaves out where there is nothing to say. */
+export function wholeChoice(choice: Partial<Choice> & Pick<Choice, "address" | "value">): Choice {
+  return {
+    text: String(choice.value),
+    family: "",
+    log_density: null,
+    support: null,
+    low: null,
+    high: null,
+    scale: null,
+    tags: [],
+    forced: false,
+    frozen: false,
+    acceptance: null,
+    ...choice,
+  };
+}
+
+/** Whether a run has a best state, whose picture can be asked for. */
+export function hasBest(run: Run | null): boolean {
+  return run !== null && (run.revision > 0 || run.draws > 0);
 }
 
 /** Whether a run still works or waits, so that it can be stopped. */

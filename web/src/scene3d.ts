@@ -152,6 +152,7 @@ export class Scene3D {
       this.perspective.fov = (2 * angle * 180) / Math.PI;
       this.perspective.aspect = aspect;
     }
+    this.shiftView(given, width, height, shape);
     this.place(given);
     this.atCamera = true;
     this.framed = true;
@@ -175,6 +176,7 @@ export class Scene3D {
     polar.radius = (1.15 * radius) / Math.sin((17.5 * Math.PI) / 180) / room;
     const eye = new THREE.Vector3().setFromSpherical(polar).add(center);
     this.use(this.perspective);
+    this.perspective.clearViewOffset();
     this.perspective.fov = 35;
     this.place({ eye: eye.toArray() as Vec3, target: center.toArray() as Vec3, up: [0, 1, 0] });
     this.atCamera = false;
@@ -192,6 +194,17 @@ export class Scene3D {
       up: up.toArray() as Vec3,
       fov_y: this.camera instanceof THREE.PerspectiveCamera ? this.camera.fov : 35,
     };
+  }
+
+  /** Moves the view's window so that a photograph off the camera's axis is in its middle. */
+  private shiftView(given: Camera, width: number, height: number, shape: number): void {
+    const [x, y] = given.shift ?? [0, 0];
+    if (x === 0 && y === 0) {
+      this.camera.clearViewOffset();
+      return;
+    }
+    const tall = Math.min(height, width / shape);
+    this.camera.setViewOffset(width, height, -x * tall * shape, -y * tall, width, height);
   }
 
   private place(camera: Camera): void {
@@ -302,6 +315,10 @@ export class Scene3D {
       // A plane faces +z, and lookAt turns +z of a thing that is no camera to the target.
       this.photo.lookAt(eye);
       this.photo.scale.set(tall * this.aspectOf(given), tall, 1);
+      const [right, down] = given.shift ?? [0, 0];
+      // Pictures count downwards, and a plane that faces the camera has its x to the right.
+      this.photo.translateX(-right * tall * this.aspectOf(given));
+      this.photo.translateY(down * tall);
       this.photo.updateMatrixWorld();
       this.drawFrustum(eye, given.height ? null : eye);
     }

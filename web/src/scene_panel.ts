@@ -3,6 +3,7 @@
 import type { Actions } from "./actions";
 import { button, h, Segments, select } from "./dom";
 import { ErrorBox } from "./errors";
+import { hasBest } from "./protocol";
 import { SocketSource } from "./socket_source";
 import type { View } from "./store";
 import { Viewer } from "./viewer";
@@ -74,13 +75,13 @@ export class ScenePanel {
     const run = store.currentRun;
     this.views.value = known.view;
     this.views.enable("session", known.session !== null);
-    this.views.enable("best", run !== null && run.revision > 0);
-    this.views.enable("draws", (run?.draws ?? 0) > 0);
-    this.views.enable("film", (run?.film ?? 0) > 0);
+    this.views.enable("best", hasBest(run));
+    this.views.enable("draws", (known.draws?.draws.length ?? run?.draws ?? 0) > 0);
+    this.views.enable("film", (known.draws?.film ?? run?.film ?? 0) > 0);
     this.views.enable("modes", known.modes > 0);
     this.exports.hidden = run === null;
     for (const child of this.exports.children) {
-      (child as HTMLButtonElement | HTMLSelectElement).disabled = run === null || run.revision === 0;
+      (child as HTMLButtonElement | HTMLSelectElement).disabled = !hasBest(run);
     }
     if (!known.connected) return;
     const source = new SocketSource(connection, known);

@@ -10,9 +10,9 @@ export class SettingsForm {
   private readonly about = h("p", { class: "muted" });
   private readonly time = field("time", "as preset");
   private readonly chains = field("chains", "as preset");
-  private readonly seed = field("seed", "0");
+  private readonly seed = field("seed", "as preset");
   private readonly params = h("div", { class: "params" });
-  private presets: Session["presets"] = [];
+  private presets: Session["presets"] | null = null;
 
   constructor(private readonly toggle: HTMLElement) {
     const row = (text: string, control: HTMLElement) => h("label", {}, h("span", {}, text), control);
@@ -58,10 +58,10 @@ export class SettingsForm {
     const old = new Map([...this.fields()].map((f) => [f.name, f.value]));
     fill(
       this.params,
-      ...(session?.params ?? []).map(({ name, value }) => {
+      ...(session?.params ?? []).map(({ name, value, about }) => {
         const input = field(name, String(value ?? ""));
         input.value = old.get(name) ?? "";
-        return h("label", {}, h("code", {}, name), input);
+        return h("label", { title: about ?? null }, h("code", {}, name), input);
       }),
     );
     if ((session?.params ?? []).length === 0) this.params.append("It has none.");
@@ -90,7 +90,7 @@ export class SettingsForm {
   }
 
   private explain(): void {
-    const preset = this.presets.find(({ name }) => name === this.quality.value);
+    const preset = (this.presets ?? []).find(({ name }) => name === this.quality.value);
     this.about.textContent = preset?.about ?? "";
     this.about.hidden = !preset?.about;
   }

@@ -110,7 +110,7 @@ function framesOf(known: Readonly<Known>): [Frame, State][] {
     return Array.from({ length: n }, (_, film) => [plain("From prior to posterior"), { run, film }]);
   }
   return (draws?.draws ?? []).map((d, draw) => [
-    { label: `Chain ${d.chain + 1}, draw ${d.draw}`, chain: d.chain, logJoint: d.log_joint },
+    { label: `Chain ${d.chain}, draw ${d.draw}`, chain: d.chain, logJoint: d.log_joint },
     { run, draw },
   ]);
 }

@@ -5,7 +5,7 @@ import { buildTree, passes, visibleRows, type Node, type Row } from "./address_t
 import { button, fill, h, number } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
-import type { Choices, Densities, Value } from "./protocol";
+import { wholeChoice, type Choices, type Densities, type Value } from "./protocol";
 import { SelectedChoice } from "./selected_choice";
 import { stateOf } from "./states";
 import { VirtualList } from "./virtual_list";
@@ -109,7 +109,8 @@ export class TracePanel {
       this.rebuild();
       return;
     }
-    const data = await this.actions.connection.ask<Choices>("choices", { state });
+    const answer = await this.actions.connection.ask<Choices>("choices", { state });
+    const data = { ...answer, choices: answer.choices.map(wholeChoice) };
     if (this.actions.store.now.dragging) return;
     const first = this.data === null;
     this.data = data;

@@ -69,7 +69,7 @@ export class Viewer {
     this.space.onTurn = () => this.pictures.turned();
     new ResizeObserver(() => this.arrange()).observe(this.panes);
     document.addEventListener("visibilitychange", () => this.refresh());
-    this.arrange();
+    this.setSource(null);
   }
 
   /** Shows a source, from the given frame. */
@@ -81,7 +81,7 @@ export class Viewer {
     const chains = [...new Set((source?.frames ?? []).map((f) => f.chain))]
       .filter((c): c is number => c !== null)
       .sort((a, b) => a - b);
-    const options = chains.map((c) => [String(c), `Chain ${c + 1}`] as [string, string]);
+    const options = chains.map((c) => [String(c), `Chain ${c}`] as [string, string]);
     setOptions(this.chains, [["all", "All chains"], ...options], this.chains.value || "all");
     if (this.chains.selectedIndex < 0) this.chains.value = "all";
     this.chains.hidden = chains.length < 2;
