@@ -50,12 +50,19 @@ export class Actions {
 
   /** Opens a session of a program file. */
   async openProgram(program: string, observe: string[] = []): Promise<void> {
-    await this.opened(await this.connection.ask("open", { program, observe }));
+    const session = await this.connection.ask<P.Session>("open", { program, observe });
+    this.store.set({ session, view: "session", run: null, draws: null, modes: 0, at: null });
+    this.onOpened(session);
+    await this.readFolder();
   }
 
   /** Opens a session at the best state of a run. */
   async openRun(run: string): Promise<void> {
-    await this.opened(await this.connection.ask("open", { run }));
+    // The run stays in view: its draws are the ghosts behind what is edited.
+    const session = await this.connection.ask<P.Session>("open", { run });
+    this.store.set({ session, view: "session" });
+    this.onOpened(session);
+    await this.readFolder();
   }
 
   /** Gives the session other data; without a session nothing can take them. */
@@ -135,12 +142,6 @@ export class Actions {
     this.session.call();
   }
 
-  private async opened(session: P.Session): Promise<void> {
-    this.store.set({ session, view: "session", run: null, draws: null, modes: 0, at: null });
-    this.onOpened(session);
-    await this.readFolder();
-  }
-
   private take(event: P.Event): void {
     if (event.event === "folder") this.folder.call();
     else if (event.event === "run") this.keep(event.run);
@@ -186,8 +187,11 @@ export class Actions {
   }
 
   private async readDraws(): Promise<void> {
-    const run = this.store.now.run;
-    if (run === null) return;
+    const { run } = this.store.now;
+    const current = this.store.currentRun;
+    if (run === null || !current) return;
+    // A run that just began has nothing to list yet.
+    if (isLive(current) && current.draws === 0 && !current.film) return;
     const draws = await this.connection.ask<P.Draws>("draws", { run });
     if (this.store.now.run === run) this.store.set({ draws });
   }

@@ -62,7 +62,17 @@ export function buildTree(choices: Choice[]): Node {
     }
     node.choice = choice;
   }
+  root.children = root.children.map(shortened);
   return root;
+}
+
+/** Branches with one child only are one line together with it. */
+function shortened(node: Node): Node {
+  const [only, ...others] = node.children;
+  if (only && others.length === 0 && node.choice === null) {
+    return shortened({ ...only, name: `${node.name}/${only.name}` });
+  }
+  return { ...node, children: node.children.map(shortened) };
 }
 
 /** Whether a choice passes the filter: parts of its address, its tags, or its family. */

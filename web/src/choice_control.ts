@@ -29,6 +29,12 @@ function isWhole(choice: Choice): boolean {
   return typeof choice.value === "number" && /integer|whole|natural/.test(choice.support ?? "");
 }
 
+/** What a moved control says: `last` when the user let go, `drag` if the changes before it
+ * belong to the same movement. */
+export type Change = (value: Value, move: { last: boolean; drag: boolean }) => void;
+
+type Apply = (x: number, move: { last: boolean; drag: boolean }, from: HTMLElement) => void;
+
 /** A control for one choice; it calls back while and after it is moved. */
 export class ChoiceControl {
   readonly element = h("div", { class: "control" });
@@ -36,8 +42,7 @@ export class ChoiceControl {
   private moving = false;
   private updates: ((value: Value) => void)[] = [];
 
-  /** `change` is called with `last` true when the user let go. */
-  constructor(private readonly change: (value: Value, last: boolean) => void) {}
+  constructor(private readonly change: Change) {}
 
   /** Shows a choice; while it is dragged its controls stay as they are. */
   show(choice: Choice | null): void {
@@ -71,7 +76,7 @@ export class ChoiceControl {
   private buttonsFor(values: Value[]): HTMLElement {
     const group = h("div", { class: "segments", role: "group", "aria-label": "Value" });
     const buttons = values.map((value) => {
-      return button(String(value), () => this.change(value, true));
+      return button(String(value), () => this.change(value, { last: true, drag: false }));
     });
     group.append(...buttons);
     const update = (now: Value) => {
@@ -126,23 +131,25 @@ export class ChoiceControl {
       title: "Type a value, or drag sideways",
     });
     field.value = number(value, 5);
-    const apply = (x: number, last: boolean, from: HTMLElement) => {
+    const apply: Apply = (x, move, from) => {
       if (!Number.isFinite(x)) return;
+      const { last } = move;
       const y = whole ? Math.round(x) : x;
       this.moving = !last;
       if (from !== slider) slider.value = String(y);
-      if (from !== field || last) field.value = number(y, 5);
+      if (from !== field || last || move.drag) field.value = number(y, 5);
       const next = put(y);
       if (this.choice) this.choice = { ...this.choice, value: next };
-      this.change(next, last);
+      this.change(next, move);
     };
-    slider.addEventListener("input", () => apply(Number(slider.value), false, slider));
-    slider.addEventListener("change", () => apply(Number(slider.value), true, slider));
+    const slide = (last: boolean) => apply(Number(slider.value), { last, drag: true }, slider);
+    slider.addEventListener("input", () => slide(false));
+    slider.addEventListener("change", () => slide(true));
     slider.addEventListener("keydown", (event) => arrow(event, slider, step, apply));
     field.addEventListener("change", () => {
-      apply(Number(field.value.replace("\u2212", "-")), true, field);
+      apply(Number(field.value.replace("\u2212", "-")), { last: true, drag: false }, field);
     });
-    scrub(field, step, () => Number(get()), (x, last) => apply(x, last, slider));
+    scrub(field, step, () => Number(get()), (x, last) => apply(x, { last, drag: true }, field));
     this.updates.push((now) => {
       const all = this.choice;
       this.choice = all ? { ...all, value: now } : all;
@@ -161,14 +168,14 @@ function arrow(
   event: KeyboardEvent,
   slider: HTMLInputElement,
   step: number,
-  apply: (x: number, last: boolean, from: HTMLElement) => void,
+  apply: Apply,
 ): void {
   const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
   if (!by) return;
   event.preventDefault();
   const x = Number(slider.value) + by * step * (event.shiftKey ? 50 : 5);
   slider.value = String(Math.min(Number(slider.max), Math.max(Number(slider.min), x)));
-  apply(Number(slider.value), true, slider);
+  apply(Number(slider.value), { last: true, drag: true }, slider);
 }
 
 /** Dragging sideways over a field changes its number, as in Blender. */

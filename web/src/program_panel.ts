@@ -76,6 +76,7 @@ export class ProgramPanel {
     const opened = this.add(file, session.text, draft ?? session.text);
     this.files = [opened, ...this.files.filter((f) => f !== opened && f.text !== f.base)];
     this.show(opened);
+    this.view.scrollDOM.scrollTo(0, 0);
     this.error.clear();
   }
 

@@ -49,6 +49,8 @@ export class Scene3D {
   private atCamera = false;
   private pending = false;
   private framed = false;
+  /** The user chose the view: it stays as it is. */
+  private touched = false;
 
   constructor(private readonly container: HTMLElement) {
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
@@ -79,9 +81,10 @@ export class Scene3D {
 
   /** Shows a mesh. */
   setMesh(mesh: Mesh | null): void {
+    const before = this.bounds().clone();
     this.mesh = mesh;
     this.rebuild();
-    if (mesh && !this.framed) this.reset();
+    if (mesh && (!this.framed || (!this.touched && this.isElsewhere(before)))) this.reset();
     this.placePhoto();
   }
 
@@ -155,6 +158,7 @@ export class Scene3D {
     this.shiftView(given, width, height, shape);
     this.place(given);
     this.atCamera = true;
+    this.touched = true;
     this.framed = true;
     this.onViewpoint(true);
     this.render();
@@ -180,6 +184,7 @@ export class Scene3D {
     this.perspective.fov = 35;
     this.place({ eye: eye.toArray() as Vec3, target: center.toArray() as Vec3, up: [0, 1, 0] });
     this.atCamera = false;
+    this.touched = false;
     this.framed = true;
     this.onViewpoint(false);
     this.resize();
@@ -228,6 +233,7 @@ export class Scene3D {
     controls.enableDamping = false;
     controls.addEventListener("start", () => {
       this.atCamera = false;
+      this.touched = true;
       this.onViewpoint(false);
     });
     controls.addEventListener("change", () => {
@@ -263,10 +269,18 @@ export class Scene3D {
     this.camera.position.setFromSpherical(polar).add(this.controls.target);
     this.camera.updateProjectionMatrix();
     this.atCamera = false;
+    this.touched = true;
     this.onViewpoint(false);
     this.controls.update();
     this.clip();
     this.render();
+  }
+
+  /** Whether the mesh has left the view that was framed for another. */
+  private isElsewhere(before: THREE.Sphere): boolean {
+    const { center, radius } = this.bounds();
+    const far = center.distanceTo(before.center) > 0.5 * before.radius;
+    return far || radius > 1.4 * before.radius || radius < 0.6 * before.radius;
   }
 
   private bounds(): THREE.Sphere {

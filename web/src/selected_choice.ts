@@ -1,6 +1,6 @@
 // What is known of the selected choice, its control, and what can be done with it.
 
-import { ChoiceControl } from "./choice_control";
+import { ChoiceControl, type Change } from "./choice_control";
 import { button, fill, h, number } from "./dom";
 import type { Choice, Value } from "./protocol";
 
@@ -17,7 +17,7 @@ export class SelectedChoice {
   private readonly freeze = button("Freeze", () => this.sayOf(`freeze ${this.choice?.address};`));
 
   constructor(
-    change: (value: Value, last: boolean) => void,
+    change: Change,
     private readonly enter: (text: string) => void,
     why: (address: string) => void,
   ) {

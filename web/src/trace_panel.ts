@@ -12,6 +12,14 @@ import { VirtualList } from "./virtual_list";
 
 const ROW = 26;
 
+/** A value that a choice shall have. */
+interface Wish {
+  address: string;
+  value: Value;
+  last: boolean;
+  drag: boolean;
+}
+
 /** The tree of choices. */
 export class TracePanel {
   readonly element: HTMLElement;
@@ -31,8 +39,7 @@ export class TracePanel {
   private readonly undo = button("Undo", () => this.enter(":undo"));
   private readonly redo = button("Redo", () => this.enter(":redo"));
   private readonly reads = new Latest<void>(() => this.read(), (e) => this.error.show(e));
-  private readonly assigns: Latest<{ address: string; value: Value; last: boolean }>;
-  private dragAddress: string | null = null;
+  private readonly assigns: Latest<Wish>;
   private visible = false;
 
   constructor(private readonly actions: Actions) {
@@ -52,7 +59,7 @@ export class TracePanel {
     this.list.element.setAttribute("aria-label", "Choices");
     this.list.element.addEventListener("keydown", (event) => this.key(event));
     this.selection = new SelectedChoice(
-      (value, last) => this.assign(value, last),
+      (value, move) => this.assign(value, move),
       (text) => this.enter(text),
       (address) => this.why(address),
     );
@@ -193,7 +200,7 @@ export class TracePanel {
         h("span", { class: "acceptance" }, percent(choice.acceptance)),
       );
     } else {
-      line.append(h("span", { class: "value muted" }, `${node.count} choices`));
+      line.append(h("span", { class: "value muted" }, `${node.count} ${node.count === 1 ? "choice" : "choices"}`));
     }
     line.addEventListener("click", () => {
       this.list.element.focus({ preventScroll: true });
@@ -246,29 +253,26 @@ export class TracePanel {
     }
   }
 
-  private assign(value: Value, last: boolean): void {
+  private assign(value: Value, move: { last: boolean; drag: boolean }): void {
     if (this.selected === null) return;
     this.actions.store.set({ dragging: true });
-    this.assigns.call({ address: this.selected, value, last });
+    this.assigns.call({ address: this.selected, value, ...move });
   }
 
-  private async send(wish: { address: string; value: Value; last: boolean }): Promise<void> {
+  private async send({ address, value, drag, last }: Wish): Promise<void> {
     const { store, connection } = this.actions;
     const session = store.now.session;
     if (!session) return;
-    // The first change of a drag is an entry of the history of its own, the others join it.
-    const drag = this.dragAddress === wish.address;
-    this.dragAddress = wish.last ? null : wish.address;
-    const params = { session: session.session, address: wish.address, value: wish.value, drag };
+    const params = { session: session.session, address, value, drag };
     const answer = await connection.ask<Densities & { revision: number }>("assign", params);
     this.error.clear();
     const now = store.now.session;
     if (now && answer.revision > now.revision) {
       store.set({ session: { ...now, revision: answer.revision, log_joint: answer.log_joint } });
     }
-    this.showMoved(wish.address, wish.value, answer);
-    this.onMoved(!wish.last);
-    if (wish.last) this.endDrag();
+    this.showMoved(address, value, answer);
+    this.onMoved(!last);
+    if (last) this.endDrag();
   }
 
   private showMoved(address: string, value: Value, densities: Densities): void {
@@ -282,7 +286,6 @@ export class TracePanel {
 
   private failAssign(error: unknown): void {
     this.error.show(error);
-    this.dragAddress = null;
     this.endDrag();
   }
 

@@ -41,6 +41,11 @@ test("the tree has each branch once, and closed branches hide their choices", ()
   assert.deepEqual(visibleRows(tree, () => true).map((r) => r.depth), [0, 0, 1, 1]);
 });
 
+test("a branch with one child is one line with it", () => {
+  const tree = buildTree(["@a/b/x", "@a/b/y", "@c/d"].map((a) => choice(a)));
+  assert.deepEqual(tree.children.map((n) => [n.name, n.path]), [["a/b", "@a/b"], ["c/d", "@c/d"]]);
+});
+
 test("the filter looks at addresses, tags and families", () => {
   const c = choice("@body/arm", { tags: ["pose"] });
   assert.ok(passes(c, ["arm", "$pose"]) && passes(c, ["norm"]));
