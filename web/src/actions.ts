@@ -19,6 +19,8 @@ export class Actions {
   private readonly folder = new Latest<void>(() => this.readFolder(), (e) => this.onError(e));
   private readonly session = new Latest<void>(() => this.readSession(), (e) => this.onError(e));
   private readonly draws = new Latest<void>(() => this.readDraws(), (e) => this.onError(e));
+  /** The last session that this page opened. */
+  private opened: number | null = null;
   private drawsTimer: ReturnType<typeof setTimeout> | null = null;
 
   constructor(
@@ -51,6 +53,7 @@ export class Actions {
   /** Opens a session of a program file. */
   async openProgram(program: string, observe: string[] = []): Promise<void> {
     const session = await this.connection.ask<P.Session>("open", { program, observe });
+    await this.closeLast(session.session);
     this.store.set({ session, view: "session", run: null, draws: null, modes: 0, at: null });
     this.onOpened(session);
     await this.readFolder();
@@ -60,6 +63,7 @@ export class Actions {
   async openRun(run: string): Promise<void> {
     // The run stays in view: its draws are the ghosts behind what is edited.
     const session = await this.connection.ask<P.Session>("open", { run });
+    await this.closeLast(session.session);
     this.store.set({ session, view: "session" });
     this.onOpened(session);
     await this.readFolder();
@@ -68,7 +72,7 @@ export class Actions {
   /** Gives the session other data; without a session nothing can take them. */
   async observe(observe: string[]): Promise<void> {
     const session = this.store.now.session;
-    if (!session) return;
+    if (!session) throw new Error("open a program first: a photograph is observed by one");
     const params = { session: session.session, observe };
     this.store.set({ session: await this.connection.ask("observe", params), view: "session" });
   }
@@ -140,6 +144,16 @@ export class Actions {
   /** Reads the session again: its text and history, after a change. */
   refreshSession(): void {
     this.session.call();
+  }
+
+  /** Closes the session that this page opened before: their number is limited. Those that
+   * other pages opened, or that runs still work for, stay. */
+  private async closeLast(next: number): Promise<void> {
+    const last = this.opened;
+    this.opened = next;
+    const works = this.store.now.runs.some((run) => run.session === last && isLive(run));
+    if (last === null || works) return;
+    await this.connection.ask("close", { session: last });
   }
 
   private take(event: P.Event): void {

@@ -5,7 +5,7 @@ import { fill, h, number, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
 import { figure, PictureView } from "./picture_view";
-import { hasBest, type Comparison, type Statistics } from "./protocol";
+import { hasBest, runName, type Comparison, type Statistics } from "./protocol";
 import { SocketSource } from "./socket_source";
 
 /** Two runs: pictures in the same layer, settings, quantities. */
@@ -63,15 +63,16 @@ export class ComparePanel {
     if (!this.b || !usable.includes(this.b) || this.b === this.a) {
       this.b = [...usable].reverse().find((r) => r !== this.a)!;
     }
-    setOptions(this.selects[0], usable, this.a);
-    setOptions(this.selects[1], usable, this.b);
+    const options = usable.map((r): [string, string] => [r, runName(r)]);
+    setOptions(this.selects[0], options, this.a);
+    setOptions(this.selects[1], options, this.b);
     const revision = (name: string) => runs.find((r) => r.run === name)?.revision;
     const key = `${this.a} ${revision(this.a)} ${this.b} ${revision(this.b)}`;
     if (key === this.shown) return;
     this.shown = key;
     this.showPicture(this.left, this.a);
     this.showPicture(this.right, this.b);
-    fill(this.figures, figure(this.left, this.a), figure(this.right, this.b));
+    fill(this.figures, figure(this.left, runName(this.a)), figure(this.right, runName(this.b)));
     this.left.ask(0);
     this.right.ask(0);
     this.reads.call();
@@ -102,8 +103,8 @@ export class ComparePanel {
         `${data.same_program ? "The same program" : "Different programs"}, `,
         data.same_data ? "the same data." : "different data.",
       ),
-      settingsTable(a, b, data),
-      quantitiesTable(a, b, data),
+      settingsTable(runName(a), runName(b), data),
+      quantitiesTable(runName(a), runName(b), data),
     );
   }
 }

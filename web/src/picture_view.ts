@@ -1,5 +1,6 @@
 // The picture of a frame in one of its layers, with the viewpoint it is rendered from.
 
+import { Disconnected } from "./connection";
 import { append, h, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
@@ -48,6 +49,8 @@ export class PictureView {
 
   private source: Source | null = null;
   private frame = 0;
+  /** The layer that the user chose, and the one shown: not every source has every layer. */
+  private wanted: string;
   private layer: string;
   private viewpoint = "given";
   private shown: Picture | null = null;
@@ -64,7 +67,7 @@ export class PictureView {
     layer = "overlay",
     private readonly onLayer: (layer: string) => void = () => {},
   ) {
-    this.layer = layer;
+    this.wanted = this.layer = layer;
     this.layers = select([], layer, (value) => this.setLayer(value), { "aria-label": "Layer" });
     this.viewpoints = select(VIEWPOINTS, "given", (value) => this.setViewpoint(value), {
       "aria-label": "Viewpoint",
@@ -81,16 +84,19 @@ export class PictureView {
     const other = source?.key !== this.source?.key;
     this.source = source;
     const known = source?.layers ?? [];
-    setOptions(
-      this.layers,
-      LAYERS.filter(([key]) => known.includes(key)),
-      this.layer,
-    );
-    if (known.length > 0 && !known.includes(this.layer)) this.setLayer(known[0]!);
+    if (known.length > 0) this.layer = known.includes(this.wanted) ? this.wanted : known[0]!;
+    const options = LAYERS.filter(([key]) => known.includes(key));
+    setOptions(this.layers, options, this.layer);
+    this.layers.hidden = options.length === 0;
     this.viewpoints.hidden = !source?.viewpoints;
     this.note.textContent = source?.pictureNote ?? "";
-    if (!source) this.show(null);
+    if (!source || source.frames.length === 0) void this.show(null);
     else if (other) this.error.clear();
+  }
+
+  /** Says why there is no picture. */
+  setEmpty(text: string): void {
+    this.empty.textContent = text;
   }
 
   /** Asks for a frame's picture; a coarse one is followed by a full one when things rest. */
@@ -108,7 +114,7 @@ export class PictureView {
 
   /** Chooses the layer. */
   setLayer(layer: string): void {
-    this.layer = layer;
+    this.wanted = this.layer = layer;
     if (this.layers.value !== layer) this.layers.value = layer;
     this.onLayer(layer);
     this.ask(this.frame);
@@ -174,6 +180,8 @@ export class PictureView {
   }
 
   private fail(error: unknown): void {
+    // While the connection is lost the last picture stays: the banner says what is wrong.
+    if (error instanceof Disconnected) return;
     void this.show(null);
     this.error.show(error);
   }

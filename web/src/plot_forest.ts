@@ -6,13 +6,20 @@ import type { Interval } from "./plot_data";
 
 const ROW = 20;
 
-/** The intervals of quantities, on one axis. */
+// Intervals that differ more in length than this would be points on a common axis.
+const MOST_RATIO = 20;
+
+/** The intervals of quantities, on one axis, or on one each where their scales differ. */
 export function forestPlot(intervals: Interval[], width: number): HTMLElement {
   const low = Math.min(...intervals.map((i) => i.outer[0]));
   const high = Math.max(...intervals.map((i) => i.outer[1]));
+  const lengths = intervals.map((i) => i.outer[1] - i.outer[0]).filter((l) => l > 0);
+  const common = (high - low) / Math.min(...lengths) < MOST_RATIO;
   const left = Math.min(150, 0.3 * width);
   const right = width - 130;
-  const x = (v: number) => left + ((v - low) / (high - low || 1)) * (right - left);
+  const along = (v: number, from: number, to: number) => {
+    return left + ((v - from) / (to - from || 1)) * (right - left);
+  };
   const height = intervals.length * ROW + 26;
   const label = `Intervals of ${intervals.length} quantities`;
   const picture = canvas(width, height, label, (context) => {
@@ -26,17 +33,19 @@ export function forestPlot(intervals: Interval[], width: number): HTMLElement {
     context.textBaseline = "middle";
     context.fillStyle = themeColour("muted");
     context.textAlign = "center";
-    for (const tick of ticks(low, high, 4)) {
+    for (const tick of common ? ticks(low, high, 4) : []) {
+      const x = along(tick, low, high);
       context.strokeStyle = themeColour("line");
       context.lineWidth = 1;
       context.beginPath();
-      context.moveTo(x(tick), 0);
-      context.lineTo(x(tick), height - 20);
+      context.moveTo(x, 0);
+      context.lineTo(x, height - 20);
       context.stroke();
-      context.fillText(number(tick, 3), x(tick), height - 9);
+      context.fillText(number(tick, 3), x, height - 9);
     }
     intervals.forEach(({ name, outer, inner, middle }, i) => {
       const y = (i + 0.5) * ROW;
+      const x = (v: number) => (common ? along(v, low, high) : along(v, outer[0], outer[1]));
       context.fillStyle = themeColour("text");
       context.textAlign = "left";
       context.fillText(name, 2, y, left - 10);
@@ -51,9 +60,11 @@ export function forestPlot(intervals: Interval[], width: number): HTMLElement {
       context.stroke();
       context.fillStyle = themeColour("muted");
       const [from, to] = outer;
-      context.fillText(`${number(middle, 3)} [${number(from, 3)}, ${number(to, 3)}]`, right + 8, y, 120);
+      const text = `${number(middle, 3)} [${number(from, 3)}, ${number(to, 3)}]`;
+      context.fillText(text, right + 8, y, 120);
     });
   });
-  const caption = h("figcaption", {}, "Median, 50% and 90% intervals");
+  const axis = common ? "" : ", each on an axis of its own";
+  const caption = h("figcaption", {}, `Median, 50% and 90% intervals${axis}`);
   return h("figure", { class: "plot" }, caption, picture);
 }

@@ -14,7 +14,7 @@ export function pairsPlot(quantities: Quantity[], width: number): HTMLElement {
   const shown = quantities.slice(0, MOST_PAIRS);
   const n = shown.length;
   const left = 10;
-  const cell = Math.min(260, (width - left - 6) / n);
+  const cell = Math.min(200, (width - left - 6) / n);
   const ranges = shown.map((q) => range(finite(q)));
   const label = `Scatter plots of ${shown.map((q) => q.name).join(", ")}`;
   const height = n * cell + 22;

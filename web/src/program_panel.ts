@@ -72,7 +72,7 @@ export class ProgramPanel {
   private showSession(session: Session): void {
     const file = session.program || "untitled.pcad";
     this.files = this.files.filter((f) => f.file !== file);
-    const draft = sessionStorage.getItem(draftKey(session.session, file));
+    const draft = sessionStorage.getItem(this.draftKey(session.session, file));
     const opened = this.add(file, session.text, draft ?? session.text);
     this.files = [opened, ...this.files.filter((f) => f !== opened && f.text !== f.base)];
     this.show(opened);
@@ -114,7 +114,7 @@ export class ProgramPanel {
     opened.text = text;
     const session = this.actions.store.now.session;
     if (session && opened.file === this.sessionFile) {
-      const key = draftKey(session.session, opened.file);
+      const key = this.draftKey(session.session, opened.file);
       if (text === opened.base) sessionStorage.removeItem(key);
       else sessionStorage.setItem(key, text);
     }
@@ -206,6 +206,11 @@ export class ProgramPanel {
     });
   }
 
+  /** Where text that is not applied is kept; another start of the program has other sessions. */
+  private draftKey(session: number, file: string): string {
+    return `draft ${this.actions.connection.token.slice(0, 8)} ${session} ${file}`;
+  }
+
   private async write(opened: OpenFile): Promise<void> {
     const { text, file } = opened;
     await this.actions.connection.ask("write", { file, text });
@@ -213,8 +218,4 @@ export class ProgramPanel {
     if (file !== this.sessionFile) opened.base = text;
     this.describe();
   }
-}
-
-function draftKey(session: number, file: string): string {
-  return `draft ${session} ${file}`;
 }

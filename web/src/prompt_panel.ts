@@ -16,7 +16,11 @@ const KEPT = 200;
 /** A prompt like that of `pcadlang repl`, with history and completion. */
 export class PromptPanel {
   readonly element: HTMLElement;
-  private readonly output = h("div", { class: "output scroll", "aria-live": "polite", tabindex: 0 });
+  private readonly output = h("div", {
+    class: "output scroll",
+    "aria-live": "polite",
+    tabindex: 0,
+  });
   private readonly input = h("textarea", {
     rows: 1,
     "aria-label": "Prompt",
@@ -104,7 +108,8 @@ export class PromptPanel {
     } catch (error) {
       const { message, hint } = explain(error);
       // The message is whole already where it quotes the program.
-      const whole = hint !== null && !message.includes(hint) ? `${message}\n  = hint: ${hint}` : message;
+      const more = hint !== null && !message.includes(hint) ? `\n  = hint: ${hint}` : "";
+      const whole = `${message}${more}`;
       this.print(whole.startsWith("error") ? whole : `error: ${whole}`, "failed");
     }
     this.input.disabled = false;

@@ -294,6 +294,11 @@ export function wholeChoice(choice: Partial<Choice> & Pick<Choice, "address" | "
   };
 }
 
+/** The name of a run as the user reads it: where all runs lie goes without saying. */
+export function runName(run: string): string {
+  return run.replace(/^runs\//, "");
+}
+
 /** Whether a run has a best state, whose picture can be asked for. */
 export function hasBest(run: Run | null): boolean {
   return run !== null && (run.revision > 0 || run.draws > 0);

@@ -3,7 +3,7 @@
 import type { Actions } from "./actions";
 import { button, duration, fill, h, number } from "./dom";
 import { ErrorBox } from "./errors";
-import { canGoOn, isLive, type Run, type Summary } from "./protocol";
+import { canGoOn, isLive, runName, type Run, type Summary } from "./protocol";
 import { Latest } from "./latest";
 
 /** A table of runs; below it what the chosen one left. */
@@ -71,7 +71,7 @@ export class RunsPanel {
   private row(run: Run): HTMLElement {
     const { actions } = this;
     const guard = (task: () => Promise<unknown>) => () => void this.error.guard(task);
-    const name = button(run.run, () => actions.choose(run.run), { class: "link" });
+    const name = button(runName(run.run), () => actions.choose(run.run), { class: "link" });
     name.title = `${run.program}, ${run.observe.join(", ") || "no data"}\n${run.folder}`;
     const buttons: HTMLElement[] = [];
     if (run.state === "running") {
@@ -81,7 +81,9 @@ export class RunsPanel {
     if (isLive(run)) buttons.push(button("Stop", guard(() => actions.steer("stop", run.run))));
     else {
       const title = "Take it off this list; its folder stays";
-      buttons.push(button("Remove", guard(() => actions.remove(run.run)), { title }));
+      const label = `Remove ${runName(run.run)} from this list`;
+      const attributes = { title, class: "quiet", "aria-label": label };
+      buttons.push(button("×", guard(() => actions.remove(run.run)), attributes));
     }
     const current = run.run === actions.store.now.run;
     return h(
@@ -111,7 +113,7 @@ export class RunsPanel {
     const files = summary.files.map((file) => this.fileLink(run, file));
     fill(
       this.about,
-      h("h2", {}, run.run),
+      h("h2", {}, runName(run.run)),
       summary.command ? h("pre", { class: "answer" }, summary.command) : null,
       list("Warnings", summary.warnings, "warnings"),
       list("Approximations", summary.approximate),

@@ -88,6 +88,14 @@ export class Scene3D {
     this.placePhoto();
   }
 
+  /** Shows nothing. */
+  clear(): void {
+    this.setMesh(null);
+    this.setGhosts([]);
+    this.setCamera(null);
+    this.setPhoto(null);
+  }
+
   /** The camera of the photograph: the first one also becomes the view's. */
   setCamera(camera: Camera | null): void {
     const same = JSON.stringify(camera) === JSON.stringify(this.given);

@@ -17,7 +17,7 @@ const VIEWS: [View, string][] = [
 ];
 
 const KINDS: [string, string][] = [
-  ["", "Export …"],
+  ["", "Export"],
   ["film.png", "Film as PNG"],
   ["film.glb", "Film as glTF"],
   ["report.html", "Report"],
@@ -37,8 +37,10 @@ export class ScenePanel {
   private readonly views: Segments;
   private readonly viewer: Viewer;
   private readonly error = new ErrorBox();
+  private readonly note = h("div", { class: "note-bar", role: "note", hidden: true });
   private readonly exports: HTMLElement;
   private shown = "";
+  private key = "";
 
   constructor(private readonly actions: Actions) {
     const { store } = actions;
@@ -58,9 +60,10 @@ export class ScenePanel {
     this.exports = h("div", { class: "exports" }, edit, exports);
     this.viewer = new Viewer(this.views.element);
     this.viewer.onFrame = (at) => store.set({ at });
-    this.element = h("div", { class: "scene" }, this.viewer.element, this.error.element);
+    this.element = h("div", { class: "scene" }, this.note, this.viewer.element, this.error.element);
     this.viewer.element.querySelector(".viewer-head")!.append(this.exports);
-    store.on(["session", "runs", "run", "draws", "modes", "view", "connected"], () => this.show());
+    const keys = ["session", "runs", "run", "draws", "modes", "view", "at", "connected"] as const;
+    store.on([...keys], () => this.show());
     this.show();
   }
 
@@ -83,6 +86,7 @@ export class ScenePanel {
     for (const child of this.exports.children) {
       (child as HTMLButtonElement | HTMLSelectElement).disabled = !hasBest(run);
     }
+    this.showNote();
     if (!known.connected) return;
     const source = new SocketSource(connection, known);
     // What is shown is asked for again only when it changed, not whenever anything is known.
@@ -92,13 +96,29 @@ export class ScenePanel {
       source.key,
       moving ? revision : source.frames.length,
       source.frames.length,
+      // Ghosts are a sample of the draws: twice as many make another sample worth its price.
+      Math.floor(Math.log2(source.drawCount + 1)),
     ]);
-    if (shown === this.shown) return;
-    const same = this.shown.startsWith(`["${source.key.replace(/"/g, '\\"')}"`);
+    if (shown === this.shown) {
+      if (known.at !== null && known.at !== this.viewer.current) this.viewer.setFrame(known.at);
+      return;
+    }
+    const same = source.key === this.key;
+    this.key = source.key;
     this.shown = shown;
     // While a choice is dragged its own answers bring the pictures.
     if (known.dragging && moving && same) return;
-    this.viewer.setSource(source, same ? this.viewer.current : (known.at ?? 0));
+    this.viewer.setSource(source, known.at ?? 0);
+  }
+
+  private showNote(): void {
+    const { session, view } = this.actions.store.now;
+    const note = view === "session" ? (session?.note ?? "").trim().replace(/^note: /, "") : "";
+    this.note.textContent = note;
+    this.note.hidden = note === "";
+    const none = "This program draws no scene: its choices are under Trace, its draws under Plots.";
+    const start = "Open a program and a photograph above, or drop a photograph on the page.";
+    this.viewer.setEmpty(session === null ? start : session.has_view ? "No picture yet" : none);
   }
 
   private edit(): void {

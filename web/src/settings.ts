@@ -15,7 +15,9 @@ export class SettingsForm {
   private presets: Session["presets"] | null = null;
 
   constructor(private readonly toggle: HTMLElement) {
-    const row = (text: string, control: HTMLElement) => h("label", {}, h("span", {}, text), control);
+    const row = (text: string, control: HTMLElement) => {
+      return h("label", {}, h("span", {}, text), control);
+    };
     this.element.append(
       row("Quality", this.quality),
       this.about,

@@ -20,9 +20,11 @@ const LAYERS = [
   "mask",
 ];
 
+const OF_PHOTOGRAPHS = ["overlay", "photo", "photo_contours", "residuals"];
+
 /** The states of the chosen view, as frames of the viewer. */
 export class SocketSource implements Source {
-  readonly layers = LAYERS;
+  readonly layers: string[];
   readonly viewpoints = true;
   readonly pictureNote = null;
   readonly key: string;
@@ -43,6 +45,9 @@ export class SocketSource implements Source {
     this.key = `${view} ${view === "session" ? session?.session : run} ${data}`;
     this.drawCount = run === null ? 0 : (draws?.draws.length ?? 0);
     this.run = run;
+    const observed = known.runs.find((r) => r.run === run)?.observe ?? [];
+    const hasPhoto = view === "session" ? session?.photo !== null : observed.length > 0;
+    this.layers = hasPhoto ? LAYERS : LAYERS.filter((layer) => !OF_PHOTOGRAPHS.includes(layer));
   }
 
   private readonly run: string | null;
@@ -101,13 +106,17 @@ function framesOf(known: Readonly<Known>): [Frame, State][] {
     return [[plain("The session's state", session.log_joint), { session: session.session }]];
   }
   if (run === null) return [];
+  // Pictures of a program without a scene would be errors.
+  const ofSession = known.runs.find((r) => r.run === run)?.session === session?.session;
+  if (session && ofSession && !session.has_view) return [];
   if (view === "best") return [[plain("The best state so far"), { run }]];
   if (view === "modes") {
     return Array.from({ length: modes }, (_, mode) => [plain(`Mode ${mode + 1}`), { run, mode }]);
   }
   if (view === "film") {
     const n = draws?.film ?? 0;
-    return Array.from({ length: n }, (_, film) => [plain("From prior to posterior"), { run, film }]);
+    const label = "From prior to posterior";
+    return Array.from({ length: n }, (_, film) => [plain(label), { run, film }]);
   }
   return (draws?.draws ?? []).map((d, draw) => [
     { label: `Chain ${d.chain}, draw ${d.draw}`, chain: d.chain, logJoint: d.log_joint },

@@ -62,6 +62,8 @@ export class SpaceView {
       title: "Opacity of the surface",
     });
     opacity.addEventListener("input", () => this.look({ opacity: Number(opacity.value) }));
+    const showPhoto = (on: boolean) => this.look({ photo: on });
+    const photo = this.toggle("Photo", "The photograph behind the scene", showPhoto, true);
     this.tools = h(
       "div",
       { class: "tools" },
@@ -70,7 +72,7 @@ export class SpaceView {
       paint,
       this.ghostToggle,
       this.toggle("Wire", "The triangles' edges only", (on) => this.look({ wireframe: on })),
-      this.toggle("Photo", "The photograph behind the scene", (on) => this.look({ photo: on }), true),
+      photo,
       opacity,
     );
     this.element.append(this.legend, this.error.element);
@@ -99,7 +101,7 @@ export class SpaceView {
     this.legend.hidden = true;
     this.scene?.setDeviations(null);
     this.scene?.setGhosts([]);
-    if (!source) this.scene?.setMesh(null);
+    if (!source || source.frames.length === 0) this.scene?.clear();
   }
 
   /** Asks for a frame's mesh. */
@@ -212,7 +214,7 @@ export class SpaceView {
     const bar = h("div", { class: "bar" });
     bar.style.background = viridisGradient();
     this.showLegend(
-      h("div", {}, `Standard deviation over ${draws} draws, scene units`),
+      h("div", {}, `Standard deviation over ${draws} draws, in scene units`),
       bar,
       h(
         "div",

@@ -3,7 +3,7 @@
 import type { Actions } from "./actions";
 import { button, duration, fill, h, number, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
-import { canGoOn, isLive, type Run } from "./protocol";
+import { canGoOn, isLive, runName, type Run } from "./protocol";
 import { SettingsForm } from "./settings";
 
 const OTHER = "…";
@@ -137,7 +137,7 @@ export function statusOf(run: Run): (HTMLElement | string)[] {
   if (run.best !== null) rest.push(`best log joint ${number(run.best, 5)}`);
   if (run.r_hat !== null) rest.push(`R-hat ${number(run.r_hat, 3)}`);
   const parts: (HTMLElement | string)[] = [
-    h("b", {}, run.run),
+    h("b", { title: run.folder }, runName(run.run)),
     h("span", { class: `state ${run.state}` }, state),
     h("span", { class: "numbers" }, rest.join(" · ")),
   ];

@@ -5,7 +5,7 @@ import { buildTree, passes, visibleRows, type Node, type Row } from "./address_t
 import { button, fill, h, number } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
-import { wholeChoice, type Choices, type Densities, type Value } from "./protocol";
+import { wholeChoice, type Choices, type Densities, type State, type Value } from "./protocol";
 import { SelectedChoice } from "./selected_choice";
 import { stateOf } from "./states";
 import { VirtualList } from "./virtual_list";
@@ -116,8 +116,7 @@ export class TracePanel {
       this.rebuild();
       return;
     }
-    const answer = await this.actions.connection.ask<Choices>("choices", { state });
-    const data = { ...answer, choices: answer.choices.map(wholeChoice) };
+    const data = await this.readAll(state);
     if (this.actions.store.now.dragging) return;
     const first = this.data === null;
     this.data = data;
@@ -127,6 +126,20 @@ export class TracePanel {
     this.showJoint(data);
     this.showObserved(data);
     this.rebuild();
+  }
+
+  /** All choices of a state, in as many answers as the program gives them. */
+  private async readAll(state: State): Promise<Choices> {
+    const { connection } = this.actions;
+    const data = await connection.ask<Choices>("choices", { state });
+    const choices = [...data.choices];
+    while (choices.length < data.total) {
+      const params = { state, from: choices.length };
+      const more = await connection.ask<Choices>("choices", params);
+      if (more.choices.length === 0) break;
+      choices.push(...more.choices);
+    }
+    return { ...data, choices: choices.map(wholeChoice) };
   }
 
   private openAll(): void {
@@ -200,7 +213,8 @@ export class TracePanel {
         h("span", { class: "acceptance" }, percent(choice.acceptance)),
       );
     } else {
-      line.append(h("span", { class: "value muted" }, `${node.count} ${node.count === 1 ? "choice" : "choices"}`));
+      const count = `${node.count} ${node.count === 1 ? "choice" : "choices"}`;
+      line.append(h("span", { class: "value muted" }, count));
     }
     line.addEventListener("click", () => {
       this.list.element.focus({ preventScroll: true });
@@ -307,8 +321,9 @@ export class TracePanel {
 
   private why(address: string): void {
     void this.error.guard(async () => {
-      const session = this.actions.store.now.session?.session;
-      const answer = await this.actions.connection.ask<{ text: string }>("why", { session, address });
+      const { store, connection } = this.actions;
+      const params = { session: store.now.session?.session, address };
+      const answer = await connection.ask<{ text: string }>("why", params);
       this.selection.say(answer.text);
     });
   }

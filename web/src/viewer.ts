@@ -102,6 +102,11 @@ export class Viewer {
     this.space.ask(this.frame);
   }
 
+  /** Says why there is no picture. */
+  setEmpty(text: string): void {
+    this.pictures.setEmpty(text);
+  }
+
   /** The frame shown. */
   get current(): number {
     return this.frame;
@@ -179,9 +184,10 @@ export class Viewer {
   private arrange(): void {
     const [picture, space] = this.panes.children as unknown as [HTMLElement, HTMLElement];
     const layout = this.layout.value;
-    const changed = picture.hidden !== (layout === "space") || space.hidden !== (layout === "picture");
+    const before = `${picture.hidden} ${space.hidden}`;
     picture.hidden = layout === "space";
     space.hidden = layout === "picture";
+    const changed = before !== `${picture.hidden} ${space.hidden}`;
     const { clientWidth, clientHeight } = this.panes;
     this.panes.classList.toggle("side-by-side", clientWidth > 1.1 * clientHeight);
     if (changed) this.refresh();
