@@ -11,6 +11,7 @@ import { openPage, startBrowser } from "./browser.mjs";
 import { startProgram } from "./program.mjs";
 import { appearance } from "./appearance.mjs";
 import { keyboard } from "./keyboard.mjs";
+import { language } from "./language.mjs";
 import { scenario } from "./scenario.mjs";
 
 const { values, positionals } = parseArgs({
@@ -85,6 +86,7 @@ try {
   const tools = { open, step, out, update: values.update, program };
   await appearance(tools);
   await scenario(tools);
+  await language(tools);
   await keyboard(tools);
   await step("no page reported an error", async () => {
     const errors = opened.flatMap(({ errors }) => errors);

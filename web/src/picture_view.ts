@@ -4,7 +4,7 @@ import { Disconnected } from "./connection";
 import { append, h, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
-import type { Camera } from "./protocol";
+import type { Camera, Vec3 } from "./protocol";
 import type { Picture, Source } from "./source";
 
 const LAYERS: [string, string][] = [
@@ -161,8 +161,8 @@ export class PictureView {
   private async cameraFor(source: Source, frame: number): Promise<Camera | undefined> {
     if (this.viewpoint === "given") return undefined;
     if (this.viewpoint === "view") return this.viewOf3D() ?? undefined;
-    const camera = await source.camera(frame);
-    return camera ? turned(camera, this.viewpoint) : undefined;
+    const [camera, mesh] = await Promise.all([source.camera(frame), source.mesh(frame)]);
+    return camera ? turned(camera, this.viewpoint, middle(mesh.positions)) : undefined;
   }
 
   private async show(picture: Picture | null): Promise<void> {
@@ -183,24 +183,36 @@ export class PictureView {
     // While the connection is lost the last picture stays: the banner says what is wrong.
     if (error instanceof Disconnected) return;
     void this.show(null);
+    this.empty.hidden = true;
     this.error.show(error);
   }
 }
 
-/** A camera that looks at the same target from another side. */
-function turned(camera: Camera, side: string): Camera {
-  const away = camera.eye.map((x, i) => x - camera.target[i]!);
-  const [x, y, z] = away as [number, number, number];
+/** A camera that looks at the scene's middle from another side, as far away. */
+function turned(camera: Camera, side: string, target: Vec3): Camera {
+  const [x, y, z] = camera.eye.map((c, i) => c - target[i]!) as Vec3;
   const distance = Math.hypot(x, y, z);
-  const eyes: Record<string, number[]> = {
+  const eyes: Record<string, Vec3> = {
     left: [-z, y, x],
     right: [z, y, -x],
     behind: [-x, y, -z],
+    // Exactly from above there would be no upward direction.
     above: [0.05 * x, distance, 0.05 * z],
   };
-  const eye = (eyes[side] ?? away).map((c, i) => c + camera.target[i]!);
+  const eye = (eyes[side] ?? [x, y, z]).map((c, i) => c + target[i]!) as Vec3;
   const fov = camera.fov_y ?? fovOfHeight(camera.height ?? 1, distance);
-  return { eye: eye as Camera["eye"], target: camera.target, up: [0, 1, 0], fov_y: fov };
+  return { eye, target, up: [0, 1, 0], fov_y: fov };
+}
+
+/** The middle of the box around points. */
+function middle(positions: Float32Array): Vec3 {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  positions.forEach((x, i) => {
+    low[i % 3] = Math.min(low[i % 3]!, x);
+    high[i % 3] = Math.max(high[i % 3]!, x);
+  });
+  return low.map((l, k) => (positions.length > 0 ? (l + high[k]!) / 2 : 0)) as Vec3;
 }
 
 function fovOfHeight(height: number, distance: number): number {

@@ -28,7 +28,7 @@ export function tracePlot(quantity: Quantity, every: number, width: number): HTM
     scales: { x: { time: false } },
     axes: [
       { ...axis, size: 24 },
-      { ...axis, size: 56, values: (_, values) => values.map((v) => number(v)) },
+      { ...axis, size: 56, space: 24, values: (_, values) => values.map((v) => number(v)) },
     ],
     series: [
       {},

@@ -19,6 +19,10 @@ interface OpenFile {
   text: string;
 }
 
+// Not names of files: these have an ending.
+const NEW = "new";
+const SAVE_AS = "save as";
+
 /** Programs, and what is done with them. */
 export class ProgramPanel {
   readonly element: HTMLElement;
@@ -60,7 +64,12 @@ export class ProgramPanel {
     const options = programs.map(({ file, about }): [string, string] => {
       return [file, about ? `${file} – ${about}` : file];
     });
-    setOptions(this.open, [["", "Open …"], ...options], "");
+    const first: [string, string][] = [
+      ["", "Open …"],
+      [NEW, "New program …"],
+      [SAVE_AS, "Save as …"],
+    ];
+    setOptions(this.open, [...first, ...options], "");
   }
 
   private get sessionFile(): string | null {
@@ -157,6 +166,10 @@ export class ProgramPanel {
 
   private openFile(file: string): void {
     this.open.value = "";
+    if (file === NEW || file === SAVE_AS) {
+      this.create(file === NEW ? "" : this.view.state.doc.toString());
+      return;
+    }
     const opened = this.files.find((f) => f.file === file);
     if (opened) {
       this.show(opened);
@@ -164,6 +177,21 @@ export class ProgramPanel {
     }
     void this.error.guard(async () => {
       const { text } = await this.actions.connection.ask<{ text: string }>("read", { file });
+      this.show(this.add(file, text));
+    });
+  }
+
+  /** Makes a file with a text, under a name that the user chooses. */
+  private create(text: string): void {
+    const name = prompt("The new program's file", "new.pcad")?.trim();
+    if (!name) return;
+    const file = name.endsWith(".pcad") ? name : `${name}.pcad`;
+    void this.error.guard(async () => {
+      const opened = this.files.find((f) => f.file === file);
+      const programs = this.actions.store.now.folder?.programs ?? [];
+      const exists = opened || programs.some((p) => p.file === file && !p.shipped);
+      if (exists) throw new Error(`${file} exists: choose another name`);
+      await this.actions.connection.ask("write", { file, text });
       this.show(this.add(file, text));
     });
   }

@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Camera, Mesh, Vec3 } from "./protocol";
+import { PhotoPlane } from "./photo_plane";
 import { meshGeometry, ghostGeometry, type Paint } from "./scene_geometry";
 
 export interface Look {
@@ -40,12 +41,10 @@ export class Scene3D {
   });
   private readonly surface = new THREE.Mesh(new THREE.BufferGeometry(), this.material);
   private readonly ghosts = new THREE.Group();
-  private readonly photo: THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial>;
-  private readonly frustum: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly photo = new PhotoPlane();
   private mesh: Mesh | null = null;
   private deviations: { values: Float32Array; top: number } | null = null;
   private given: Camera | null = null;
-  private photoAspect = 1;
   private atCamera = false;
   private pending = false;
   private framed = false;
@@ -61,18 +60,9 @@ export class Scene3D {
     canvas.setAttribute("aria-label", "3D view; arrow keys turn it, plus and minus zoom");
     canvas.addEventListener("keydown", (event) => this.key(event));
     container.append(canvas);
-    this.photo = new THREE.Mesh(
-      new THREE.PlaneGeometry(1, 1),
-      new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, toneMapped: false }),
-    );
-    this.photo.visible = false;
-    this.frustum = new THREE.LineSegments(
-      new THREE.BufferGeometry(),
-      new THREE.LineBasicMaterial({ color: 0x8894a3, transparent: true, opacity: 0.6 }),
-    );
     this.light.position.set(1.5, 2.5, 3);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f98, 1.3), this.light);
-    this.scene.add(this.photo, this.frustum, this.ghosts, this.surface);
+    this.scene.add(this.photo.object, this.ghosts, this.surface);
     this.controls = this.makeControls();
     this.perspective.position.set(2, 1.5, 4);
     new ResizeObserver(() => this.resize()).observe(container);
@@ -107,15 +97,7 @@ export class Scene3D {
 
   /** The photograph behind the scene. */
   setPhoto(image: HTMLImageElement | null): void {
-    this.photo.material.map?.dispose();
-    const texture = image ? new THREE.Texture(image) : null;
-    if (texture && image) {
-      texture.colorSpace = THREE.SRGBColorSpace;
-      texture.needsUpdate = true;
-      this.photoAspect = image.naturalWidth / Math.max(1, image.naturalHeight);
-    }
-    this.photo.material.map = texture;
-    this.photo.material.needsUpdate = true;
+    this.photo.setImage(image);
     this.placePhoto();
     if (this.atCamera) this.fromCamera();
   }
@@ -149,7 +131,7 @@ export class Scene3D {
     if (!given) return;
     const { width, height } = this.size();
     const aspect = width / height;
-    const shape = this.aspectOf(given);
+    const shape = this.photo.aspect(given);
     if (given.height) {
       const half = (given.height / 2) * Math.max(1, shape / aspect);
       this.use(this.orthographic);
@@ -315,53 +297,10 @@ export class Scene3D {
     this.render();
   }
 
-  private aspectOf(camera: Camera): number {
-    if (camera.width_px && camera.height_px) return camera.width_px / camera.height_px;
-    return this.photoAspect;
-  }
-
   private placePhoto(): void {
-    const given = this.given;
-    const shown = given !== null && this.photo.material.map !== null && this.look.photo;
-    this.photo.visible = shown;
-    this.frustum.visible = shown && !this.atCamera;
-    if (given && shown) {
-      const eye = new THREE.Vector3(...given.eye);
-      const axis = new THREE.Vector3(...given.target).sub(eye).normalize();
-      const { center, radius } = this.bounds();
-      const depth = Math.max(center.clone().sub(eye).dot(axis), 0) + 1.3 * radius;
-      const half = Math.tan((((given.fov_y ?? 35) / 2) * Math.PI) / 180);
-      const tall = given.height ? given.height : 2 * depth * half;
-      this.photo.position.copy(eye).addScaledVector(axis, depth);
-      this.photo.up.set(...given.up);
-      // A plane faces +z, and lookAt turns +z of a thing that is no camera to the target.
-      this.photo.lookAt(eye);
-      this.photo.scale.set(tall * this.aspectOf(given), tall, 1);
-      const [right, down] = given.shift ?? [0, 0];
-      // Pictures count downwards, and a plane that faces the camera has its x to the right.
-      this.photo.translateX(-right * tall * this.aspectOf(given));
-      this.photo.translateY(down * tall);
-      this.photo.updateMatrixWorld();
-      this.drawFrustum(eye, given.height ? null : eye);
-    }
+    this.photo.show(this.given, this.bounds(), this.look.photo);
     this.clip();
     this.render();
-  }
-
-  private drawFrustum(eye: THREE.Vector3, apex: THREE.Vector3 | null): void {
-    const corners = [
-      [-0.5, -0.5],
-      [0.5, -0.5],
-      [0.5, 0.5],
-      [-0.5, 0.5],
-    ].map(([x, y]) => this.photo.localToWorld(new THREE.Vector3(x, y, 0)));
-    const lines: THREE.Vector3[] = [];
-    corners.forEach((corner, i) => {
-      lines.push(corner, corners[(i + 1) % 4]!);
-      if (apex) lines.push(eye, corner);
-    });
-    this.frustum.geometry.dispose();
-    this.frustum.geometry = new THREE.BufferGeometry().setFromPoints(lines);
   }
 
   private clip(): void {
@@ -397,7 +336,7 @@ export class Scene3D {
     this.pending = true;
     requestAnimationFrame(() => {
       this.pending = false;
-      this.frustum.visible = this.photo.visible && !this.atCamera;
+      this.photo.showFrustum(!this.atCamera);
       // A wide view would otherwise be lit from the side that the user does not see.
       this.light.position.copy(this.camera.position).add(new THREE.Vector3(1, 2, 0.5));
       this.renderer.render(this.scene, this.camera);

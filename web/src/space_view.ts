@@ -107,7 +107,8 @@ export class SpaceView {
   /** Asks for a frame's mesh. */
   ask(frame: number): void {
     this.frame = frame;
-    if (this.scene && this.source && this.element.offsetParent) this.meshes.call();
+    const visible = this.element.offsetParent && document.visibilityState === "visible";
+    if (this.scene && this.source && visible) this.meshes.call();
   }
 
   /** The present camera of the view. */

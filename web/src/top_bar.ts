@@ -3,6 +3,7 @@
 import type { Actions } from "./actions";
 import { button, duration, fill, h, number, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
+import { helpButton } from "./help";
 import { canGoOn, isLive, runName, type Run } from "./protocol";
 import { SettingsForm } from "./settings";
 
@@ -46,6 +47,7 @@ export class TopBar {
       h("div", { class: "group" }, this.program, this.photo, this.upload),
       h("div", { class: "group" }, this.start, this.pause, this.goOn, this.stop, wrap),
       h("div", { class: "progress" }, this.status, this.bar),
+      helpButton(),
     );
     document.addEventListener("keydown", (event) => {
       if (event.altKey && event.code === "KeyR") {

@@ -177,6 +177,9 @@ export class TracePanel {
     const isOpen = (node: Node) => this.words.length > 0 || this.opened.has(node.path);
     this.rows = visibleRows(root, isOpen);
     this.list.update(this.rows.length);
+    const at = this.rows.findIndex((row) => row.node.path === this.selected);
+    if (at < 0) this.list.element.removeAttribute("aria-activedescendant");
+    else this.list.element.setAttribute("aria-activedescendant", `choice-${at}`);
     const choice = all.find((c) => c.address === this.selected) ?? null;
     this.selection.show(choice, this.editable());
   }
@@ -192,6 +195,7 @@ export class TracePanel {
     const line = h("div", {
       class: "row",
       role: "treeitem",
+      id: `choice-${index}`,
       "aria-level": depth + 1,
       "aria-selected": String(node.path === this.selected),
       ...(branch ? { "aria-expanded": String(open) } : {}),
