@@ -204,8 +204,9 @@ export class Actions {
     const { run } = this.store.now;
     const current = this.store.currentRun;
     if (run === null || !current) return;
-    // A run that just began has nothing to list yet.
-    if (isLive(current) && current.draws === 0 && !current.film) return;
+    // A run that just began, or failed before it did, has nothing to list.
+    const begun = current.draws > 0 || Boolean(current.film);
+    if (!begun && (isLive(current) || current.state === "failed")) return;
     const draws = await this.connection.ask<P.Draws>("draws", { run });
     if (this.store.now.run === run) this.store.set({ draws });
   }

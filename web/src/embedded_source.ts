@@ -63,6 +63,7 @@ export class EmbeddedSource implements Source {
   readonly viewpoints = false;
   readonly pictureNote = "the best state";
   readonly drawCount: number;
+  readonly photoKey: string | null;
   private readonly corners = new Map<string, Promise<Uint32Array>>();
   private readonly meshes = new Map<number, Promise<Mesh>>();
 
@@ -74,6 +75,7 @@ export class EmbeddedSource implements Source {
     }));
     this.layers = Object.keys(scene.layers);
     this.drawCount = scene.draws.length;
+    this.photoKey = scene.photo ? "photo" : null;
   }
 
   mesh(frame: number): Promise<Mesh> {

@@ -74,6 +74,7 @@ root.append(
   banner,
   bar.element,
   bar.error.element,
+  bar.runError.element,
   errors.element,
   h(
     "main",

@@ -98,7 +98,11 @@ export class ProgramPanel {
     opened.base = session.text;
     if (!edited) {
       if (opened === this.current) replaceText(this.view, session.text);
-      else this.files[this.files.indexOf(opened)] = this.add(opened.file, session.text);
+      else {
+        const changes = { from: 0, to: opened.state.doc.length, insert: session.text };
+        opened.state = opened.state.update({ changes }).state;
+        opened.text = session.text;
+      }
     }
     this.describe();
   }

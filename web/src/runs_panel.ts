@@ -3,7 +3,7 @@
 import type { Actions } from "./actions";
 import { button, duration, fill, h, number } from "./dom";
 import { ErrorBox } from "./errors";
-import { canGoOn, isLive, runName, type Run, type Summary } from "./protocol";
+import { canGoOn, hasBest, isLive, runName, type Run, type Summary } from "./protocol";
 import { Latest } from "./latest";
 
 /** A table of runs; below it what the chosen one left. */
@@ -60,7 +60,7 @@ export class RunsPanel {
     });
     if (!same) fill(this.body, ...rows);
     const run = this.actions.store.currentRun;
-    const key = run ? `${run.run} ${run.state}` : "";
+    const key = run ? `${run.run} ${run.state} ${hasBest(run)}` : "";
     if (key !== this.askedFor) {
       this.askedFor = key;
       fill(this.about);
@@ -89,7 +89,7 @@ export class RunsPanel {
     return h(
       "tr",
       { "aria-current": current ? "true" : null },
-      h("td", {}, name, run.error ? h("div", { class: "failed" }, run.error) : null),
+      h("td", {}, name, run.error ? h("pre", { class: "failed" }, run.error) : null),
       h("td", {}, h("span", { class: `state ${run.state}` }, run.state)),
       h("td", { class: "number" }, number(run.best)),
       h("td", { class: "number" }, number(run.r_hat, 3)),
@@ -102,7 +102,7 @@ export class RunsPanel {
   private async read(): Promise<void> {
     const { connection, store } = this.actions;
     const run = store.currentRun;
-    if (!run || run.state === "waiting") return;
+    if (!run || run.state === "waiting" || !hasBest(run)) return;
     const summary = await connection.ask<Summary>("summary", { run: run.run });
     if (store.now.run !== run.run) return;
     this.error.clear();

@@ -113,12 +113,18 @@ export class ScenePanel {
 
   private showNote(): void {
     const { session, view } = this.actions.store.now;
-    const note = view === "session" ? (session?.note ?? "").trim().replace(/^note: /, "") : "";
+    // What a session says when it is opened; its log joint is shown elsewhere.
+    const lines = (session?.note ?? "").split("\n").filter((line) => !/^log joint/.test(line));
+    const note = view === "session" ? lines.join("\n").trim().replace(/^note: /, "") : "";
     this.note.textContent = note;
     this.note.hidden = note === "";
     const none = "This program draws no scene: its choices are under Trace, its draws under Plots.";
+    const run = this.actions.store.currentRun;
+    const early = run?.state === "failed" ? "The run failed." : "The run has no state yet.";
     const start = "Open a program and a photograph above, or drop a photograph on the page.";
-    this.viewer.setEmpty(session === null ? start : session.has_view ? "No picture yet" : none);
+    if (session === null && run === null) this.viewer.setEmpty(start);
+    else if (view === "best" && !hasBest(run)) this.viewer.setEmpty(early);
+    else this.viewer.setEmpty(session && !session.has_view ? none : "No picture yet");
   }
 
   private edit(): void {

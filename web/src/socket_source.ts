@@ -2,7 +2,7 @@
 
 import type { Connection } from "./connection";
 import type { Camera, Mesh, State } from "./protocol";
-import { readMesh } from "./protocol";
+import { hasBest, readMesh } from "./protocol";
 import type { Frame, Picture, Source } from "./source";
 import type { Known } from "./store";
 
@@ -25,12 +25,14 @@ const OF_PHOTOGRAPHS = ["overlay", "photo", "photo_contours", "residuals"];
 /** The states of the chosen view, as frames of the viewer. */
 export class SocketSource implements Source {
   readonly layers: string[];
+  readonly photoKey: string | null;
   readonly viewpoints = true;
   readonly pictureNote = null;
   readonly key: string;
   readonly frames: Frame[];
   readonly drawCount: number;
   private readonly states: State[];
+  private readonly photoState: State | null;
 
   constructor(
     private readonly connection: Connection,
@@ -45,8 +47,13 @@ export class SocketSource implements Source {
     this.key = `${view} ${view === "session" ? session?.session : run} ${data}`;
     this.drawCount = run === null ? 0 : (draws?.draws.length ?? 0);
     this.run = run;
-    const observed = known.runs.find((r) => r.run === run)?.observe ?? [];
-    const hasPhoto = view === "session" ? session?.photo !== null : observed.length > 0;
+    const ofRun = known.runs.find((r) => r.run === run)?.observe ?? [];
+    const observed = view === "session" ? (session?.observe ?? []) : ofRun;
+    const hasPhoto = view === "session" ? Boolean(session?.photo) : ofRun.length > 0;
+    this.photoKey = hasPhoto ? JSON.stringify(observed) : null;
+    // A session answers sooner than a run that is at work.
+    const same = session?.photo && JSON.stringify(session.observe) === this.photoKey;
+    this.photoState = same ? { session: session.session } : null;
     this.layers = hasPhoto ? LAYERS : LAYERS.filter((layer) => !OF_PHOTOGRAPHS.includes(layer));
   }
 
@@ -65,8 +72,10 @@ export class SocketSource implements Source {
   }
 
   async photo(): Promise<Picture | null> {
+    const state = this.photoState ?? this.states[0];
+    if (!state) return null;
     try {
-      return await this.picture(0, "photo", 1024);
+      return await askPicture(this.connection, state, "photo", 1024);
     } catch {
       // A program without a photograph has no such layer, and the 3D view does without.
       return null;
@@ -106,10 +115,13 @@ function framesOf(known: Readonly<Known>): [Frame, State][] {
     return [[plain("The session's state", session.log_joint), { session: session.session }]];
   }
   if (run === null) return [];
+  const current = known.runs.find((r) => r.run === run) ?? null;
   // Pictures of a program without a scene would be errors.
-  const ofSession = known.runs.find((r) => r.run === run)?.session === session?.session;
-  if (session && ofSession && !session.has_view) return [];
-  if (view === "best") return [[plain("The best state so far"), { run }]];
+  if (session && current?.session === session.session && !session.has_view) return [];
+  if (view === "best") {
+    // A run that just began, or failed, has no state yet.
+    return hasBest(current) ? [[plain("The best state so far"), { run }]] : [];
+  }
   if (view === "modes") {
     return Array.from({ length: modes }, (_, mode) => [plain(`Mode ${mode + 1}`), { run, mode }]);
   }

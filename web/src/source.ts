@@ -31,6 +31,8 @@ export interface Source {
   readonly pictureNote: string | null;
   /** How many posterior draws there are, for ghosts and uncertainty. */
   readonly drawCount: number;
+  /** Which photograph is behind the scenes; null: none. */
+  readonly photoKey: string | null;
   mesh(frame: number): Promise<Mesh>;
   drawMesh(draw: number): Promise<Mesh>;
   camera(frame: number): Promise<Camera | null>;

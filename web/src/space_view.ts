@@ -31,6 +31,7 @@ export class SpaceView {
   private readonly home: HTMLButtonElement;
   private readonly ghostToggle: HTMLButtonElement;
   private readonly meshes = new Latest<void>(() => this.loadMesh(), (e) => this.fail(e));
+  private readonly photos = new Latest<void>(() => this.loadPhoto(), (e) => this.fail(e));
   private readonly ghosts = new Latest<void>(() => this.loadGhosts(), (e) => this.fail(e));
   private readonly spreads = new Latest<void>(() => this.loadSpread(), (e) => this.fail(e));
 
@@ -97,11 +98,13 @@ export class SpaceView {
     this.ghostToggle.disabled = !source || source.drawCount === 0;
     if (!other) return;
     this.spread = null;
-    this.photoOf = null;
     this.legend.hidden = true;
     this.scene?.setDeviations(null);
     this.scene?.setGhosts([]);
-    if (!source || source.frames.length === 0) this.scene?.clear();
+    this.ghostsOf = "";
+    if (source && source.frames.length > 0) return;
+    this.scene?.clear();
+    this.photoOf = null;
   }
 
   /** Asks for a frame's mesh. */
@@ -145,20 +148,24 @@ export class SpaceView {
     if (source.key !== this.source?.key) return;
     this.error.clear();
     this.mesh = mesh;
-    await this.loadPhoto(source, scene);
+    this.photos.call();
     scene.setCamera(camera);
     scene.setMesh(mesh);
     if (scene.look.paint === "parts") this.showParts();
     if (scene.look.paint === "uncertainty" && this.spread?.topology !== mesh.topology) {
       this.spreads.call();
     }
-    if (scene.look.ghosts && this.photoOf === source.key) this.ghosts.call();
+    if (scene.look.ghosts) this.ghosts.call();
   }
 
-  private async loadPhoto(source: Source, scene: Scene3D): Promise<void> {
-    if (this.photoOf === source.key) return;
-    this.photoOf = source.key;
-    const picture = await source.photo();
+  /** Loads the photograph beside the meshes, which do not wait for it. */
+  private async loadPhoto(): Promise<void> {
+    const { source, scene } = this;
+    if (!source || !scene || this.photoOf === source.photoKey) return;
+    const key = source.photoKey;
+    const picture = key === null ? null : await source.photo();
+    if (key !== this.source?.photoKey) return;
+    this.photoOf = key;
     if (!picture) {
       scene.setPhoto(null);
       return;
@@ -166,6 +173,7 @@ export class SpaceView {
     const image = new Image();
     image.src = picture.url;
     await image.decode();
+    if (picture.owned) URL.revokeObjectURL(picture.url);
     scene.setPhoto(image);
   }
 

@@ -1,10 +1,11 @@
 // Which state is shown, of the session or of the run that is looked at.
 
-import type { State } from "./protocol";
+import { hasBest, type State } from "./protocol";
 import type { Known } from "./store";
 
 /** The state that the viewer shows at present. */
-export function stateOf({ view, at, run, session, draws, modes }: Readonly<Known>): State | null {
+export function stateOf(known: Readonly<Known>): State | null {
+  const { view, at, run, session, draws, modes } = known;
   if (view === "session") return session ? { session: session.session } : null;
   if (run === null) return null;
   const within = (total: number) => (total > 0 ? Math.min(at ?? 0, total - 1) : null);
@@ -20,5 +21,5 @@ export function stateOf({ view, at, run, session, draws, modes }: Readonly<Known
     const mode = within(modes);
     return mode === null ? null : { run, mode };
   }
-  return { run };
+  return hasBest(known.runs.find((r) => r.run === run) ?? null) ? { run } : null;
 }

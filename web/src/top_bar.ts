@@ -13,6 +13,9 @@ const OTHER = "…";
 export class TopBar {
   readonly element: HTMLElement;
   readonly error = new ErrorBox();
+  /** Why the run that is looked at failed. */
+  readonly runError = new ErrorBox();
+  private failed = "";
   private readonly program = select([], "", (file) => this.openProgram(file), {
     "aria-label": "Program",
     class: "strong",
@@ -127,6 +130,11 @@ export class TopBar {
     if (run && run.done !== null && run.done !== undefined) this.bar.value = run.done;
     else this.bar.removeAttribute("value");
     fill(this.status, ...(run ? statusOf(run) : ["No run yet"]));
+    const failed = run?.error ? `${run.run} ${run.error}` : "";
+    if (failed === this.failed) return;
+    this.failed = failed;
+    if (run?.error) this.runError.show(new Error(run.error));
+    else this.runError.clear();
   }
 }
 
@@ -138,11 +146,9 @@ export function statusOf(run: Run): (HTMLElement | string)[] {
   const rest = [times.join(", ")];
   if (run.best !== null) rest.push(`best log joint ${number(run.best, 5)}`);
   if (run.r_hat !== null) rest.push(`R-hat ${number(run.r_hat, 3)}`);
-  const parts: (HTMLElement | string)[] = [
+  return [
     h("b", { title: run.folder }, runName(run.run)),
     h("span", { class: `state ${run.state}` }, state),
     h("span", { class: "numbers" }, rest.join(" · ")),
   ];
-  if (run.error) parts.push(h("span", { class: "failed", title: run.error }, run.error));
-  return parts;
 }

@@ -113,6 +113,8 @@ export class TracePanel {
     const state = stateOf(this.actions.store.now);
     if (!state) {
       this.data = null;
+      this.joint.replaceChildren();
+      this.observed.hidden = true;
       this.rebuild();
       return;
     }
@@ -318,7 +320,8 @@ export class TracePanel {
   private enter(text: string): void {
     void this.error.guard(async () => {
       const reply = await this.actions.enter(text);
-      this.selection.say(reply.text);
+      // Directives such as `freeze` answer nothing: they are part of the program now.
+      this.selection.say(reply.text || `${text} is part of the program now`);
       this.actions.refreshSession();
     });
   }
