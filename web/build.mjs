@@ -1,0 +1,71 @@
+// Bundles the studio's page and the viewer of reports into dist/, which is checked in so that
+// the binary can be built without Node. The same input gives the same bytes: CI compares.
+
+import { build } from "esbuild";
+import { mkdir, readFile, readdir, rm, writeFile, copyFile } from "node:fs/promises";
+import { dirname, join } from "node:path";
+
+const dist = "dist";
+
+const common = {
+  bundle: true,
+  minify: true,
+  sourcemap: false,
+  target: "es2022",
+  charset: "utf8",
+  legalComments: "none",
+  metafile: true,
+  logLevel: "warning",
+};
+
+/** The folder in node_modules that holds a bundled file, or null for our own files. */
+function packageFolder(input) {
+  const match = input.match(/^(.*node_modules\/(?:@[^/]+\/)?[^/]+)\//);
+  return match ? match[1] : null;
+}
+
+/** The licence texts of all packages from which the bundles took a file. */
+async function licences(metafiles) {
+  const folders = new Set();
+  for (const metafile of metafiles) {
+    for (const output of Object.values(metafile.outputs)) {
+      for (const [input, { bytesInOutput }] of Object.entries(output.inputs)) {
+        const folder = packageFolder(input);
+        if (folder && bytesInOutput > 0) folders.add(folder);
+      }
+    }
+  }
+  const parts = [];
+  for (const folder of [...folders].sort()) {
+    const about = JSON.parse(await readFile(join(folder, "package.json"), "utf8"));
+    const names = (await readdir(folder)).filter((n) => /^(licen[cs]e|copying)/i.test(n)).sort();
+    if (names.length === 0) throw new Error(`${folder} has no licence text`);
+    const texts = await Promise.all(names.map((n) => readFile(join(folder, n), "utf8")));
+    const title = `${about.name} ${about.version} (${about.license})`;
+    parts.push(`${title}\n${"=".repeat(title.length)}\n\n${texts.join("\n\n").trim()}\n`);
+  }
+  return parts.join("\n\n").replace(/\r\n/g, "\n");
+}
+
+await rm(dist, { recursive: true, force: true });
+await mkdir(dist, { recursive: true });
+const studio = await build({
+  ...common,
+  format: "esm",
+  entryPoints: { studio: "src/main.ts" },
+  outdir: dist,
+});
+const report = await build({
+  ...common,
+  format: "iife",
+  // A report is one file: its viewer brings its style along as text.
+  loader: { ".css": "text" },
+  entryPoints: { report: "src/report.ts" },
+  outdir: dist,
+});
+await copyFile(join("src", "index.html"), join(dist, "index.html"));
+await writeFile(join(dist, "licences.txt"), await licences([studio.metafile, report.metafile]));
+for (const name of (await readdir(dist)).sort()) {
+  const { length } = await readFile(join(dist, name));
+  console.log(`${join(dirname(join(dist, name)), name)}: ${(length / 1024).toFixed(0)} KiB`);
+}

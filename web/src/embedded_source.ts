@@ -1,0 +1,125 @@
+// What a report's viewer shows: draws and pictures that lie in the page as JSON.
+
+import type { Camera, Mesh } from "./protocol";
+import type { Frame, Picture, Source } from "./source";
+
+/** A draw as the report holds it. */
+export interface EmbeddedDraw {
+  chain: number | null;
+  draw: number | null;
+  log_joint: number | null;
+  label: string | null;
+  topology: string;
+  positions: string;
+}
+
+/** The JSON of a report. */
+export interface EmbeddedScene {
+  camera: Camera | null;
+  photo: string | null;
+  topologies: Record<string, string>;
+  low: number[];
+  high: number[];
+  draws: EmbeddedDraw[];
+  layers: Record<string, string>;
+}
+
+/** The bytes behind base64 text of a zlib stream. */
+export async function inflate(text: string): Promise<Uint8Array> {
+  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Positions from their differences: all x, then all y, then all z, of 16 bits each. */
+export function readPositions(bytes: Uint8Array, low: number[], high: number[]): Float32Array {
+  const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const n = Math.floor(bytes.byteLength / 6);
+  const positions = new Float32Array(3 * n);
+  for (let axis = 0; axis < 3; axis++) {
+    const from = low[axis]!;
+    const step = (high[axis]! - from) / 65535;
+    let q = 0;
+    for (let i = 0; i < n; i++) {
+      q = (q + data.getUint16(2 * (axis * n + i), true)) & 0xffff;
+      positions[3 * i + axis] = from + q * step;
+    }
+  }
+  return positions;
+}
+
+/** The corners of triangles, of 32 bits each. */
+export function readCorners(bytes: Uint8Array): Uint32Array {
+  const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const count = Math.floor(bytes.byteLength / 4);
+  return Uint32Array.from({ length: count }, (_, i) => data.getUint32(4 * i, true));
+}
+
+/** The draws and pictures of a report. */
+export class EmbeddedSource implements Source {
+  readonly key = "report";
+  readonly frames: Frame[];
+  readonly layers: string[];
+  readonly viewpoints = false;
+  readonly pictureNote = "the best state";
+  readonly drawCount: number;
+  readonly photoKey: string | null;
+  private readonly corners = new Map<string, Promise<Uint32Array>>();
+  private readonly meshes = new Map<number, Promise<Mesh>>();
+
+  constructor(private readonly scene: EmbeddedScene) {
+    this.frames = scene.draws.map((draw, i) => ({
+      label: draw.label ?? `Draw ${draw.draw ?? i}`,
+      chain: draw.chain,
+      logJoint: draw.log_joint,
+    }));
+    this.layers = Object.keys(scene.layers);
+    this.drawCount = scene.draws.length;
+    this.photoKey = scene.photo ? "photo" : null;
+  }
+
+  mesh(frame: number): Promise<Mesh> {
+    let mesh = this.meshes.get(frame);
+    if (!mesh) this.meshes.set(frame, (mesh = this.readMesh(frame)));
+    return mesh;
+  }
+
+  drawMesh(draw: number): Promise<Mesh> {
+    return this.mesh(draw);
+  }
+
+  async camera(): Promise<Camera | null> {
+    return this.scene.camera;
+  }
+
+  async photo(): Promise<Picture | null> {
+    const url = this.scene.photo;
+    return url ? { url, owned: false, logJoint: null } : null;
+  }
+
+  async picture(_frame: number, layer: string): Promise<Picture> {
+    const url = this.scene.layers[layer];
+    if (!url) throw new Error(`the report has no picture \`${layer}\``);
+    return { url, owned: false, logJoint: null };
+  }
+
+  private async readMesh(frame: number): Promise<Mesh> {
+    const { scene } = this;
+    const draw = scene.draws[frame]!;
+    let corners = this.corners.get(draw.topology);
+    if (!corners) {
+      const packed = scene.topologies[draw.topology];
+      if (packed === undefined) throw new Error(`the report lacks the triangles of draw ${frame}`);
+      corners = inflate(packed).then(readCorners);
+      this.corners.set(draw.topology, corners);
+    }
+    return {
+      topology: draw.topology,
+      parts: [],
+      positions: readPositions(await inflate(draw.positions), scene.low, scene.high),
+      normals: null,
+      corners: await corners,
+      partOf: null,
+    };
+  }
+}

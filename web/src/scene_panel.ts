@@ -1,0 +1,139 @@
+// The middle of the page: the viewer, and which states it shows.
+
+import type { Actions } from "./actions";
+import { button, h, Segments, select } from "./dom";
+import { ErrorBox } from "./errors";
+import { hasBest } from "./protocol";
+import { SocketSource } from "./socket_source";
+import type { View } from "./store";
+import { Viewer } from "./viewer";
+
+const VIEWS: [View, string][] = [
+  ["session", "Session"],
+  ["best", "Best"],
+  ["draws", "Draws"],
+  ["film", "Film"],
+  ["modes", "Modes"],
+];
+
+const KINDS: [string, string][] = [
+  ["", "Export"],
+  ["film.png", "Film as PNG"],
+  ["film.glb", "Film as glTF"],
+  ["report.html", "Report"],
+];
+
+const TITLES: Record<View, string> = {
+  session: "The session's state, which you can change",
+  best: "The best state of the run so far",
+  draws: "The kept draws of the run",
+  film: "From the prior to the posterior",
+  modes: "The best state of each mode, after the run",
+};
+
+/** Feeds the viewer with the states that the user chose. */
+export class ScenePanel {
+  readonly element: HTMLElement;
+  private readonly views: Segments;
+  private readonly viewer: Viewer;
+  private readonly error = new ErrorBox();
+  private readonly note = h("div", { class: "note-bar", role: "note", hidden: true });
+  private readonly exports: HTMLElement;
+  private shown = "";
+  private key = "";
+
+  constructor(private readonly actions: Actions) {
+    const { store } = actions;
+    const choose = (view: string) => store.set({ view: view as View, at: null });
+    this.views = new Segments("States", VIEWS, "session", choose);
+    for (const child of this.views.element.children) {
+      const view = (child as HTMLElement).dataset.value as View;
+      (child as HTMLElement).title = TITLES[view];
+    }
+    const edit = button("Edit", () => this.edit(), {
+      title: "Open a session at the run's best state",
+    });
+    const exports = select(KINDS, "", (kind) => {
+      exports.value = "";
+      this.download(kind);
+    }, { "aria-label": "Make and download", title: "Make and download a film or report" });
+    this.exports = h("div", { class: "exports" }, edit, exports);
+    this.viewer = new Viewer(this.views.element);
+    this.viewer.onFrame = (at) => store.set({ at });
+    this.element = h("div", { class: "scene" }, this.note, this.viewer.element, this.error.element);
+    this.viewer.element.querySelector(".viewer-head")!.append(this.exports);
+    const keys = ["session", "runs", "run", "draws", "modes", "view", "at", "connected"] as const;
+    store.on([...keys], () => this.show());
+    this.show();
+  }
+
+  /** A dragged choice was changed: coarse pictures follow it. */
+  follow(coarse: boolean): void {
+    if (this.actions.store.now.view === "session") this.viewer.refresh(coarse);
+  }
+
+  private show(): void {
+    const { store, connection } = this.actions;
+    const known = store.now;
+    const run = store.currentRun;
+    this.views.value = known.view;
+    this.views.enable("session", known.session !== null);
+    this.views.enable("best", hasBest(run));
+    this.views.enable("draws", (known.draws?.draws.length ?? run?.draws ?? 0) > 0);
+    this.views.enable("film", (known.draws?.film ?? run?.film ?? 0) > 0);
+    this.views.enable("modes", known.modes > 0);
+    this.exports.hidden = run === null;
+    for (const child of this.exports.children) {
+      (child as HTMLButtonElement | HTMLSelectElement).disabled = !hasBest(run);
+    }
+    this.showNote();
+    if (!known.connected) return;
+    const source = new SocketSource(connection, known);
+    // What is shown is asked for again only when it changed, not whenever anything is known.
+    const revision = known.view === "session" ? known.session?.revision : run?.revision;
+    const moving = known.view === "session" || known.view === "best";
+    const shown = JSON.stringify([
+      source.key,
+      moving ? revision : source.frames.length,
+      source.frames.length,
+      // Ghosts are a sample of the draws: twice as many make another sample worth its price.
+      Math.floor(Math.log2(source.drawCount + 1)),
+    ]);
+    if (shown === this.shown) {
+      if (known.at !== null && known.at !== this.viewer.current) this.viewer.setFrame(known.at);
+      return;
+    }
+    const same = source.key === this.key;
+    this.key = source.key;
+    this.shown = shown;
+    // While a choice is dragged its own answers bring the pictures.
+    if (known.dragging && moving && same) return;
+    this.viewer.setSource(source, known.at ?? 0);
+  }
+
+  private showNote(): void {
+    const { session, view } = this.actions.store.now;
+    // What a session says when it is opened; its log joint is shown elsewhere.
+    const lines = (session?.note ?? "").split("\n").filter((line) => !/^log joint/.test(line));
+    const note = view === "session" ? lines.join("\n").trim().replace(/^note: /, "") : "";
+    this.note.textContent = note;
+    this.note.hidden = note === "";
+    const none = "This program draws no scene: its choices are under Trace, its draws under Plots.";
+    const run = this.actions.store.currentRun;
+    const early = run?.state === "failed" ? "The run failed." : "The run has no state yet.";
+    const start = "Open a program and a photograph above, or drop a photograph on the page.";
+    if (session === null && run === null) this.viewer.setEmpty(start);
+    else if (view === "best" && !hasBest(run)) this.viewer.setEmpty(early);
+    else this.viewer.setEmpty(session && !session.has_view ? none : "No picture yet");
+  }
+
+  private edit(): void {
+    const run = this.actions.store.now.run;
+    if (run !== null) void this.error.guard(() => this.actions.openRun(run));
+  }
+
+  private download(kind: string): void {
+    const run = this.actions.store.now.run;
+    if (run !== null) void this.error.guard(() => this.actions.download(run, kind));
+  }
+}

@@ -1,0 +1,252 @@
+// The 3D view with its controls: paint, ghosts, the photograph, the camera.
+
+import { viridisGradient } from "./colour_map";
+import { button, fill, h, number, select } from "./dom";
+import { ErrorBox } from "./errors";
+import { Latest } from "./latest";
+import type { Mesh } from "./protocol";
+import { Scene3D } from "./scene3d";
+import type { Paint } from "./scene_geometry";
+import type { Source } from "./source";
+import { evenly, Spread } from "./uncertainty";
+
+const GHOSTS = 12;
+const DRAWS_FOR_SPREAD = 48;
+
+/** Shows one frame's mesh, and what the posterior's draws say about it. */
+export class SpaceView {
+  readonly element = h("div", { class: "space" });
+  readonly tools: HTMLElement;
+  /** Called when the view was turned. */
+  onTurn: () => void = () => {};
+
+  private scene: Scene3D | null = null;
+  private source: Source | null = null;
+  private frame = 0;
+  private mesh: Mesh | null = null;
+  private photoOf: string | null = null;
+  private spread: Spread | null = null;
+  private readonly error = new ErrorBox();
+  private readonly legend = h("div", { class: "legend", hidden: true });
+  private readonly home: HTMLButtonElement;
+  private readonly ghostToggle: HTMLButtonElement;
+  private readonly meshes = new Latest<void>(() => this.loadMesh(), (e) => this.fail(e));
+  private readonly photos = new Latest<void>(() => this.loadPhoto(), (e) => this.fail(e));
+  private readonly ghosts = new Latest<void>(() => this.loadGhosts(), (e) => this.fail(e));
+  private readonly spreads = new Latest<void>(() => this.loadSpread(), (e) => this.fail(e));
+
+  constructor() {
+    this.home = button("From the camera", () => this.scene?.fromCamera(), {
+      title: "Look exactly from where the photograph was taken",
+      "aria-pressed": "false",
+    });
+    this.ghostToggle = this.toggle("Ghosts", "Draws of the posterior, translucent", (on) => {
+      this.look({ ghosts: on });
+      if (on) this.ghosts.call();
+    });
+    const paints: [Paint, string][] = [
+      ["plain", "Plain"],
+      ["parts", "Parts"],
+      ["uncertainty", "Uncertainty"],
+    ];
+    const paint = select(paints, "plain", (value) => this.setPaint(value as Paint), {
+      "aria-label": "Colours of the surface",
+    });
+    const opacity = h("input", {
+      type: "range",
+      class: "small",
+      min: "0.1",
+      max: "1",
+      step: "0.05",
+      value: "1",
+      "aria-label": "Opacity of the surface",
+      title: "Opacity of the surface",
+    });
+    opacity.addEventListener("input", () => this.look({ opacity: Number(opacity.value) }));
+    const showPhoto = (on: boolean) => this.look({ photo: on });
+    const photo = this.toggle("Photo", "The photograph behind the scene", showPhoto, true);
+    this.tools = h(
+      "div",
+      { class: "tools" },
+      this.home,
+      button("Whole", () => this.scene?.reset(), { title: "Look at the whole scene" }),
+      paint,
+      this.ghostToggle,
+      this.toggle("Wire", "The triangles' edges only", (on) => this.look({ wireframe: on })),
+      photo,
+      opacity,
+    );
+    this.element.append(this.legend, this.error.element);
+    try {
+      this.scene = new Scene3D(this.element);
+      this.scene.onViewpoint = (at) => {
+        this.home.setAttribute("aria-pressed", String(at));
+        if (!at) this.onTurn();
+      };
+    } catch (error) {
+      this.element.append(
+        h("div", { class: "empty" }, "This browser offers no WebGL: there is no 3D view."),
+      );
+      console.warn(error);
+    }
+  }
+
+  /** Shows frames of another source. */
+  setSource(source: Source | null): void {
+    const other = source?.key !== this.source?.key;
+    this.source = source;
+    this.ghostToggle.disabled = !source || source.drawCount === 0;
+    if (!other) return;
+    this.spread = null;
+    this.legend.hidden = true;
+    this.scene?.setDeviations(null);
+    this.scene?.setGhosts([]);
+    this.ghostsOf = "";
+    if (source && source.frames.length > 0) return;
+    this.scene?.clear();
+    this.photoOf = null;
+  }
+
+  /** Asks for a frame's mesh. */
+  ask(frame: number): void {
+    this.frame = frame;
+    const visible = this.element.offsetParent && document.visibilityState === "visible";
+    if (this.scene && this.source && visible) this.meshes.call();
+  }
+
+  /** The present camera of the view. */
+  viewpoint() {
+    return this.scene?.viewpoint() ?? null;
+  }
+
+  private toggle(text: string, title: string, change: (on: boolean) => void, on = false) {
+    const element = button(text, () => {
+      const pressed = element.getAttribute("aria-pressed") !== "true";
+      element.setAttribute("aria-pressed", String(pressed));
+      change(pressed);
+    }, { title, "aria-pressed": String(on) });
+    return element;
+  }
+
+  private look(change: Partial<Scene3D["look"]>): void {
+    if (!this.scene) return;
+    Object.assign(this.scene.look, change);
+    this.scene.update();
+  }
+
+  private setPaint(paint: Paint): void {
+    this.look({ paint });
+    this.legend.hidden = true;
+    if (paint === "uncertainty") this.spreads.call();
+    if (paint === "parts") this.showParts();
+  }
+
+  private async loadMesh(): Promise<void> {
+    const { source, scene, frame } = this;
+    if (!source || !scene || frame >= source.frames.length) return;
+    const [mesh, camera] = await Promise.all([source.mesh(frame), source.camera(frame)]);
+    if (source.key !== this.source?.key) return;
+    this.error.clear();
+    this.mesh = mesh;
+    this.photos.call();
+    scene.setCamera(camera);
+    scene.setMesh(mesh);
+    if (scene.look.paint === "parts") this.showParts();
+    if (scene.look.paint === "uncertainty" && this.spread?.topology !== mesh.topology) {
+      this.spreads.call();
+    }
+    if (scene.look.ghosts) this.ghosts.call();
+  }
+
+  /** Loads the photograph beside the meshes, which do not wait for it. */
+  private async loadPhoto(): Promise<void> {
+    const { source, scene } = this;
+    if (!source || !scene || this.photoOf === source.photoKey) return;
+    const key = source.photoKey;
+    const picture = key === null ? null : await source.photo();
+    if (key !== this.source?.photoKey) return;
+    this.photoOf = key;
+    if (!picture) {
+      scene.setPhoto(null);
+      return;
+    }
+    const image = new Image();
+    image.src = picture.url;
+    await image.decode();
+    if (picture.owned) URL.revokeObjectURL(picture.url);
+    scene.setPhoto(image);
+  }
+
+  private ghostsOf = "";
+
+  private async loadGhosts(): Promise<void> {
+    const { source, scene } = this;
+    if (!source || !scene) return;
+    // Few draws more than before do not change the sample enough to load it again.
+    const key = `${source.key} ${Math.floor(Math.log2(source.drawCount + 1) * 2)}`;
+    if (key === this.ghostsOf && source.drawCount > 0) return;
+    const meshes: Mesh[] = [];
+    for (const draw of evenly(source.drawCount, GHOSTS)) {
+      meshes.push(await source.drawMesh(draw));
+      if (source.key !== this.source?.key) return;
+    }
+    this.ghostsOf = key;
+    scene.setGhosts(meshes);
+  }
+
+  private async loadSpread(): Promise<void> {
+    const { source, scene, mesh } = this;
+    if (!source || !scene || !mesh) return;
+    if (source.drawCount < 2) {
+      this.showLegend("The uncertainty needs draws: look at a run that has some.");
+      return;
+    }
+    const spread = new Spread(mesh.topology, mesh.positions.length);
+    const draws = evenly(source.drawCount, DRAWS_FOR_SPREAD);
+    for (const [i, draw] of draws.entries()) {
+      this.showLegend(`Loading draw ${i + 1} of ${draws.length} …`);
+      spread.add(await source.drawMesh(draw));
+      if (source.key !== this.source?.key || scene.look.paint !== "uncertainty") return;
+    }
+    this.spread = spread;
+    if (spread.draws < 2) {
+      this.showLegend("No two draws have the triangles of this one: nothing can be compared.");
+      return;
+    }
+    const values = spread.deviations();
+    const top = Float32Array.from(values).sort()[Math.floor(0.99 * (values.length - 1))] || 1e-9;
+    scene.setDeviations({ values, top });
+    this.showScale(top, spread.draws);
+  }
+
+  private showScale(top: number, draws: number): void {
+    const bar = h("div", { class: "bar" });
+    bar.style.background = viridisGradient();
+    this.showLegend(
+      h("div", {}, `Standard deviation over ${draws} draws, in scene units`),
+      bar,
+      h(
+        "div",
+        { class: "ticks" },
+        h("span", {}, "0"),
+        h("span", {}, number(top / 2, 2)),
+        h("span", {}, number(top, 2)),
+      ),
+    );
+  }
+
+  private showParts(): void {
+    const parts = this.mesh?.parts ?? [];
+    if (parts.length < 2) this.legend.hidden = true;
+    else this.showLegend(`${parts.length} parts: ${parts.slice(0, 24).join(", ")}`);
+  }
+
+  private showLegend(...content: (string | HTMLElement)[]): void {
+    fill(this.legend, ...content);
+    this.legend.hidden = false;
+  }
+
+  private fail(error: unknown): void {
+    this.error.show(error);
+  }
+}
