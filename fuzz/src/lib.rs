@@ -4,6 +4,10 @@
 //! `tests/fuzz/main.rs` also compiles these functions, and runs them on seeds and on
 //! every input that failed before.
 
+#[allow(dead_code)]
+#[path = "../../src/cli/studio/protocol.rs"]
+mod protocol;
+
 use pcadlang::bank::Bank;
 use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
 use pcadlang::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
@@ -397,4 +401,17 @@ pub fn forest(bytes: &[u8]) {
         }
         Err(e) => assert!(!e.to_string().is_empty()),
     }
+}
+
+/// Tests a text frame of the studio: it is read or answered, and the answer is JSON.
+pub fn studio(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let answer = match protocol::Request::read(text) {
+        Ok(request) => {
+            assert!(!format!("{:?}", request.call).is_empty());
+            protocol::result(request.id, &serde_json::json!({}))
+        }
+        Err(m) => protocol::error(m.id, &m.message, m.hint.as_deref(), serde_json::json!([])),
+    };
+    assert!(serde_json::from_str::<serde_json::Value>(&answer).is_ok());
 }

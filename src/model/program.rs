@@ -6,7 +6,7 @@ use crate::lang::builtins::data::Options;
 use crate::lang::builtins::{Defaults, Table};
 use crate::lang::code::Eager;
 use crate::lang::error::{Fault, FaultKind};
-use crate::lang::load::{Loaded, Loader, beside, load, load_text, read, reason};
+use crate::lang::load::{Loaded, Loader, beside, embedded, load, load_text, read, reason};
 use crate::lang::lower::{Inputs, Interface, compile, inspect};
 use crate::lang::reach::{Outside, Reach, folder_of, read_file};
 use crate::lang::value::Value;
@@ -278,11 +278,19 @@ impl Program {
                 return Ok(adapted(value.clone()));
             }
             let file = builtins.path_of(kind, &beside);
-            let (bytes, _) = read(reach, file).map_err(|e| {
-                let fault =
-                    Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)));
-                Outside::hint(&e).into_iter().fold(fault, Fault::with_hint)
-            })?;
+            // As for `include`, a shipped file is found from any folder.
+            let shipped = || embedded(builtins.path_of(kind, path)).map(|text| text.as_bytes());
+            let (bytes, beside) = match (read(reach, file), shipped()) {
+                (Ok((bytes, _)), _) => (bytes, beside),
+                (Err(e), Some(bytes)) if e.kind() == std::io::ErrorKind::NotFound => {
+                    (bytes.to_vec(), path.to_owned())
+                }
+                (Err(e), _) => {
+                    let said = format!("cannot read {file}: {}", reason(&e));
+                    let fault = Fault::new(FaultKind::Other, said);
+                    return Err(Outside::hint(&e).into_iter().fold(fault, Fault::with_hint));
+                }
+            };
             let value = builtins
                 .load(kind, &beside, &bytes, options, &|other| sibling(reach, &beside, other))?;
             let hash = bytes_hash(&bytes);

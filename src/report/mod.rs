@@ -2,8 +2,8 @@
 //! page that shows all of it.
 //!
 //! This module neither prints nor makes decisions; it turns results into text and files.
-//! It depends on draws, diagnostics and plain pixel buffers, but not on programs, traces
-//! or the renderer.
+//! It depends on draws, diagnostics, meshes and drawn pictures, but not on programs or
+//! traces.
 
 #![doc = include_str!("guide.md")]
 

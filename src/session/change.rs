@@ -112,8 +112,8 @@ impl Session {
     }
 
     /// Gives a value to a choice or an observation, as `:set` does. With `joins`, the
-    /// change joins the one before it for `:undo`, if that was of the same address: those
-    /// of one drag are undone together.
+    /// change joins the one before it for `:undo`, if that was such a change of the same
+    /// address: those of one drag, which begins without `joins`, are undone together.
     ///
     /// # Errors
     /// If there is no such address, the value does not fit it, or the state would have
@@ -127,7 +127,7 @@ impl Session {
         if let Some(past) = past {
             self.keep(past);
         }
-        self.dragged = joins.then_some(at);
+        self.dragged = Some(at);
         Ok(after)
     }
 

@@ -1,10 +1,16 @@
 //! The choices of a state as data, for front ends that show them in their own way.
 
 use super::shown;
+use super::state::Session;
+use crate::diag::SourceMap;
 use crate::dist::Support;
 use crate::lang::value::Value;
+use crate::syntax::ast::{ItemKind, StmtKind};
+use crate::syntax::{parse, print_expr};
 use crate::trace::{Target, Trace};
 use serde_json::{Number, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// The most elements of an array that are written out.
 const ELEMENTS: usize = 1000;
@@ -54,6 +60,49 @@ impl ChoiceRow {
     /// Formats the value briefly.
     pub fn text(&self) -> String {
         shown::short(&self.value)
+    }
+}
+
+/// What a program says of its choices beside their distributions.
+#[derive(Clone, Debug, Default)]
+pub struct Marks {
+    /// The choices that `force` statements set.
+    pub forced: BTreeSet<String>,
+    /// The choices that `freeze` statements take out of every proposal.
+    pub frozen: BTreeSet<String>,
+    /// The choices of each tag.
+    pub tags: BTreeMap<String, BTreeSet<String>>,
+}
+
+impl Session {
+    /// Returns what the program says of the choices of the present state.
+    pub fn marks(&mut self) -> Marks {
+        let (program, _) = parse(self.text(), SourceMap::new().add("", self.text()));
+        let mut marks = Marks::default();
+        for item in &program.items {
+            let ItemKind::Stmt(statement) = &item.kind else { continue };
+            match &statement.kind {
+                StmtKind::Force { target, .. } => {
+                    marks.forced.extend(self.selected(&print_expr(target)));
+                }
+                StmtKind::Freeze(selection) => {
+                    marks.frozen.extend(self.selected(&print_expr(selection)));
+                }
+                _ => {}
+            }
+        }
+        let tags: Vec<Arc<str>> = self.model().code().tags.clone();
+        for tag in tags {
+            let of = self.selected(&format!("${tag}")).collect();
+            marks.tags.insert(tag.to_string(), of);
+        }
+        marks
+    }
+
+    /// Returns the addresses of a selection; none if it selects nothing.
+    fn selected(&mut self, selection: &str) -> impl Iterator<Item = String> + use<> {
+        let found = self.select(selection).unwrap_or_default();
+        found.into_iter().map(|(address, _)| address.to_string())
     }
 }
 
@@ -138,6 +187,24 @@ mod tests {
         assert_eq!(of("@p").bounds, [Some(0.0), Some(1.0)]);
         assert!(matches!(of("@up").value, Value::Bool(_)));
         assert_eq!(of("@x").log_density, trace.choices()[4].2);
+    }
+
+    #[test]
+    fn forced_frozen_and_tagged_choices_are_known() {
+        let mut session = Session::new(1, crate::trace::Stop::default()).unwrap();
+        for text in [
+            "assume x ~ normal(0, 1) #place;",
+            "assume y ~ normal(0, 1) #place;",
+            "assume z ~ normal(0, 1);",
+            "force @z = 2;",
+            "freeze $place - @x;",
+        ] {
+            session.enter(text).unwrap();
+        }
+        let marks = session.marks();
+        let all = |s: &BTreeSet<String>| s.iter().cloned().collect::<Vec<_>>().join(" ");
+        assert_eq!((&*all(&marks.forced), &*all(&marks.frozen)), ("@z", "@y"));
+        assert_eq!(all(&marks.tags["place"]), "@x @y");
     }
 
     #[test]

@@ -25,9 +25,20 @@ use std::sync::atomic::AtomicU64;
 
 use serde_json::json;
 
+/// Requests of the studio's page.
+const REQUESTS: [&str; 6] = [
+    r#"{"id":1,"method":"folder"}"#,
+    r#"{"id":2,"method":"open","params":{"program":"lathe.pcad","observe":["a.png"],"set":{"size":"64"}}}"#,
+    r#"{"id":3,"method":"picture","params":{"state":{"run":"runs/a","draw":2},"layer":"depth","size":128,
+        "camera":{"eye":[0,0,8],"target":[0,0,0],"up":[0,1,0],"fov_y":30}}}"#,
+    r#"{"id":4,"method":"assign","params":{"session":1,"address":"@x[0]","value":[1,true,"a"],"drag":true}}"#,
+    r#"{"id":5,"method":"run","params":{"session":1,"settings":{"time":2.5,"chains":2,"set":{"a":"1"}}}}"#,
+    r#"{"id":6,"method":"quantity","params":{"run":"runs/a","names":["x","log_joint"]}}"#,
+];
+
 type Target = fn(&[u8]);
 
-const TARGETS: [(&str, Target); 15] = [
+const TARGETS: [(&str, Target); 16] = [
     ("program_text", targets::program_text),
     ("program", targets::program),
     ("obj", targets::obj),
@@ -43,6 +54,7 @@ const TARGETS: [(&str, Target); 15] = [
     ("table", targets::table),
     ("network", targets::network),
     ("forest", targets::forest),
+    ("studio", targets::studio),
 ];
 
 fn root() -> &'static Path {
@@ -211,6 +223,7 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             ]
         }
         "camera" => texts(&CAMERAS),
+        "studio" => texts(&REQUESTS),
         "trace" => {
             let model = targets::traced();
             (0..5)

@@ -49,7 +49,7 @@ fn modules_depend_one_way() {
         ("host", &[&["host", "infer"], &lang, &below]),
         ("scene", &[&["scene", "host"], &lang, &below, &scene]),
         ("standard", &[&["standard", "host", "scene"], &lang]),
-        ("report", &[&["report", "infer", "render"], &below]),
+        ("report", &[&["report", "infer", "geom", "render", "vision"], &below]),
         ("score", &[&["score"]]),
         ("tradeoff", &[&["tradeoff", "report"], &below]),
         (

@@ -10,7 +10,7 @@ mod observed;
 use super::args::{Evaluate, Inputs, Job};
 use super::failure::{Failure, plain};
 use super::running::job::{CHECKPOINT, Interrupt, RunMode};
-use super::running::{inputs, job, quality, resume};
+use super::running::{inputs, job, quality, ready, resume};
 use super::{edges, term};
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
@@ -224,7 +224,7 @@ impl<'a> Evaluation<'a> {
     fn fill(&self, t: &Task) -> Result<(), Failure> {
         let dir = RunDir::create(&self.dir.file(&t.case.name)).map_err(|e| plain(e.to_string()))?;
         let begun = Instant::now();
-        let ready = job::prepare(&t.job, true).inspect_err(|failure| {
+        let ready = ready::prepare(&t.job, true).inspect_err(|failure| {
             // An error in writing the record must not hide the first error.
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;

@@ -5,9 +5,10 @@
 use crate::cli::args::{Job, Predict};
 use crate::cli::failure::{Failure, plain};
 use crate::cli::running::files::write_in;
-use crate::cli::running::job::{self, Interrupt, Ready};
+use crate::cli::running::job::{self, Interrupt};
 use crate::cli::running::progress::{self, Ending};
 use crate::cli::running::quality;
+use crate::cli::running::ready::{self, Ready};
 use pcadlang::Model;
 use pcadlang::infer::draws::{Discard, Sink};
 use pcadlang::infer::predictive::{
@@ -30,7 +31,7 @@ const EXTREME: f64 = 0.01;
 pub fn predict(a: &Predict) -> Result<(), Failure> {
     let begun = Instant::now();
     let job = &quality::filled(&a.job, a.prior)?;
-    let ready = job::prepare(job, false)?;
+    let ready = ready::prepare(job, false)?;
     let model = &ready.model;
     let (what, draws) = match a.prior {
         true => ("prior", vec![from_prior(a, model)?]),

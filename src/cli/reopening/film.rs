@@ -4,7 +4,8 @@
 use crate::cli::args::Film;
 use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::reopened::Reopened;
-use crate::cli::running::{files, job};
+use crate::cli::running::files;
+use crate::cli::running::ready::{self, Ready};
 use crate::cli::scene;
 use glam::{DMat3, DVec3};
 use image::RgbImage;
@@ -36,7 +37,7 @@ pub fn film(a: &Film) -> Result<(), Failure> {
 /// Writes the film of a run.
 pub fn write(a: &Film) -> Result<(), Failure> {
     let run = Reopened::open(&a.run)?;
-    let ready = job::prepare_program(run.program()?, &run.job, Instant::now())?;
+    let ready = ready::prepare_program(run.program()?, &run.job, Instant::now())?;
     let states = way(&run, a.states as usize)?;
     match a.out.extension().and_then(|e| e.to_str()) {
         Some("glb") => files::write(&a.out, &animation(&run, &ready, &states)?)?,
@@ -85,18 +86,14 @@ pub fn best_chain(all: &[TrajectoryState]) -> Vec<&TrajectoryState> {
     all.iter().filter(|s| Some(s.chain) == best).collect()
 }
 
-fn view_of(run: &Reopened, ready: &job::Ready, saved: &SavedTrace) -> Result<Arc<View>, Failure> {
+fn view_of(run: &Reopened, ready: &Ready, saved: &SavedTrace) -> Result<Arc<View>, Failure> {
     let mut trace = run.trace(&ready.model, saved)?;
     let draws = scene::predictive(run.job.sampling.seed, 0);
     scene::view(&mut trace, draws, None).ok_or_else(|| plain("the program has no view"))
 }
 
 /// Returns the states as an animation of meshes.
-fn animation(
-    run: &Reopened,
-    ready: &job::Ready,
-    states: &[SavedTrace],
-) -> Result<Vec<u8>, Failure> {
+fn animation(run: &Reopened, ready: &Ready, states: &[SavedTrace]) -> Result<Vec<u8>, Failure> {
     let solids: Result<Vec<Solid>, Failure> =
         states.iter().map(|s| Ok(view_of(run, ready, s)?.solid().clone())).collect();
     glb::write_animation(&solids?, f64::from(STATE) / 1000.0)
@@ -105,7 +102,7 @@ fn animation(
 
 fn frames(
     run: &Reopened,
-    ready: &job::Ready,
+    ready: &Ready,
     states: &[SavedTrace],
     a: &Film,
 ) -> Result<Vec<FilmFrame>, Failure> {

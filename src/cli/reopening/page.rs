@@ -5,7 +5,7 @@
 
 use crate::cli::failure::Failure;
 use crate::cli::reopening::date::readable;
-use crate::cli::reopening::reopened::quoted;
+use crate::cli::reopening::reopened::{PROGRAM, quoted};
 use crate::cli::running::embedded::SCENE;
 use crate::cli::running::files::write_in;
 use crate::cli::running::places;
@@ -20,8 +20,6 @@ use serde_json::Value;
 
 /// The page's file.
 pub const PAGE: &str = "report.html";
-/// The program's text, as it was run.
-pub const PROGRAM: &str = "program.pcad";
 /// The maximum longer side of a picture on the page, in pixels.
 const LARGEST: u32 = 1024;
 /// The quality of JPEG files on the page.

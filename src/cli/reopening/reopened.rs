@@ -3,7 +3,6 @@
 
 use crate::cli::args::{Cli, Command, Job};
 use crate::cli::failure::{Failure, plain};
-use crate::cli::reopening::page::PROGRAM;
 use crate::cli::running::inputs;
 use clap::Parser;
 use pcadlang::infer::{KeptTrace, TrajectoryState};
@@ -13,6 +12,8 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// The program's text, as it was run.
+pub const PROGRAM: &str = "program.pcad";
 /// The file of the kept states: JSON, one per line.
 pub const TRACES: &str = "traces.jsonl";
 /// The file of the states on the way from the prior: JSON, one per line.

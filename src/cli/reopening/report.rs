@@ -3,7 +3,8 @@
 use crate::cli::args::Report;
 use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::{PAGE, write_page};
-use crate::cli::running::{files, job, resume};
+use crate::cli::running::watched::ROOM;
+use crate::cli::running::{files, resume};
 use pcadlang::report::{Quantity, RunDir, modes, quantities, rename, reread, warnings};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -19,7 +20,7 @@ pub fn report(a: &Report) -> Result<(), Failure> {
 pub fn written(a: &Report) -> Result<PathBuf, Failure> {
     let run = resume::run(&a.run)?;
     let dir = RunDir::open(&a.run).map_err(|e| plain(e.to_string()))?;
-    let draws = reread(&dir, job::ROOM).map_err(|e| plain(e.to_string()))?;
+    let draws = reread(&dir, ROOM).map_err(|e| plain(e.to_string()))?;
     if draws.iter().all(|d| d.rows.is_empty()) {
         let hint = run["error"].as_str().map(|e| format!("the run failed: {e}"));
         return Err(Failure::Plain(format!("{} holds no draws to report", a.run.display()), hint));

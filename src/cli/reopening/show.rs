@@ -3,7 +3,7 @@
 use crate::cli::args::Show;
 use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::reopened::{Reopened, quoted};
-use crate::cli::running::{files, job};
+use crate::cli::running::{files, ready};
 use crate::cli::scene;
 use pcadlang::geom::{glb, obj};
 use pcadlang::report::pictures::png;
@@ -11,6 +11,7 @@ use pcadlang::report::{number, table};
 use pcadlang::session::over;
 use pcadlang::vision::Photo;
 use std::path::Path;
+use std::time::Instant;
 
 /// The maximum number of choices listed.
 const LISTED: usize = 200;
@@ -31,7 +32,7 @@ pub fn show(a: &Show) -> Result<(), Failure> {
                 .clone()
         }
     };
-    let ready = job::prepare(&run.job, true)?;
+    let ready = ready::prepare_program(run.program()?, &run.job, Instant::now())?;
     let mut trace = run.trace(&ready.model, &saved)?;
     let Some(out) = &a.out else {
         print_line!("pcadlang run {}", quoted(&run.arguments));

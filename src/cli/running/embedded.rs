@@ -3,7 +3,7 @@
 
 use crate::cli::failure::Failure;
 use crate::cli::running::files::write_in;
-use crate::cli::running::job::Ready;
+use crate::cli::running::ready::Ready;
 use crate::cli::scene;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use image::RgbImage;

@@ -6,8 +6,8 @@
 
 use crate::cli::args::Job;
 use crate::cli::failure::{Failure, plain};
-use crate::cli::reopening::page::{PROGRAM, write_page};
-use crate::cli::reopening::reopened::{TRACES, TRAJECTORY, arguments};
+use crate::cli::reopening::page::write_page;
+use crate::cli::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
 use crate::cli::reopening::{date, seen};
 use crate::cli::running::best::{disagreement, keep_best, outside, show_best};
 use crate::cli::running::embedded::write_scene;
@@ -15,6 +15,7 @@ use crate::cli::running::files::write_in;
 use crate::cli::running::keypoints::Joints;
 use crate::cli::running::places::{best_of_each, show_places};
 use crate::cli::running::progress::{self, Ending};
+use crate::cli::running::ready::Ready;
 use crate::cli::running::watched::Watched;
 use crate::cli::running::{files, inputs};
 use crate::cli::{edges, people};
@@ -23,35 +24,17 @@ use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
     BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, stuck_structure,
 };
-use pcadlang::lang;
 use pcadlang::report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
     table, text_hash, widen, zarr,
 };
-use pcadlang::scene::ImageValue;
-use pcadlang::vision::Photo;
-use pcadlang::{Model, Program, RunOptions};
+use pcadlang::{Model, RunOptions};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::{Duration, Instant};
-
-/// How many numbers are kept in memory for the summary, over all chains: 32 MiB.
-pub const ROOM: usize = 4 << 20;
-
-/// A compiled program with its observed data.
-pub struct Ready {
-    /// The program with its data.
-    pub model: Model,
-    /// The name and value of the photograph.
-    image: Option<(String, lang::value::Value)>,
-    /// Whether the program has a param `person`, which selects a person in the
-    /// photograph.
-    chooses: bool,
-    begun: Instant,
-}
+use std::time::Duration;
 
 /// The results of a run.
 pub struct Outcome {
@@ -78,24 +61,6 @@ pub struct Outcome {
     pub interrupted: bool,
 }
 
-impl Ready {
-    /// Returns the width and height of the photograph, if there is one.
-    pub fn size(&self) -> Option<(u32, u32)> {
-        self.photo().map(|p| (p.width(), p.height()))
-    }
-
-    /// Returns the photograph, if there is one.
-    pub fn photo(&self) -> Option<&Photo> {
-        self.image()?.as_photo()
-    }
-
-    /// Returns the photograph with its detections, or a contour map without a photograph,
-    /// if there is one.
-    pub fn image(&self) -> Option<&ImageValue> {
-        self.image.as_ref()?.1.downcast::<ImageValue>()
-    }
-}
-
 impl Outcome {
     /// Returns the time of all kernels after warm-up, over all chains, in seconds.
     pub fn kernel_seconds(&self) -> f64 {
@@ -119,19 +84,6 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
         (q.name.clone(), s)
     };
     quantities.iter().map(one).collect()
-}
-
-/// Reads and compiles a program; the time of a run begins here.
-pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
-    let begun = Instant::now();
-    prepare_program(inputs::program(&job.inputs, quiet)?, job, begun)
-}
-
-/// Compiles a program that was read for a job; the time of a run began at `begun`.
-pub fn prepare_program(program: Program, job: &Job, begun: Instant) -> Result<Ready, Failure> {
-    let (program, image) = inputs::observe(program, job)?;
-    let chooses = program.interface().params.iter().any(|p| p.name == "person");
-    Ok(Ready { model: program.compile()?, image, chooses, begun })
 }
 
 /// Ctrl-C, which ends all current runs.
@@ -365,7 +317,7 @@ fn fill(
     manner: RunMode,
     watched: &Watched,
 ) -> Result<Outcome, Failure> {
-    let Ready { model, image, begun, chooses } = ready;
+    let Ready { model, named_image: image, begun, chooses } = ready;
     let s = &job.sampling;
     let joints = Joints::new(s.chains(), ready.size());
     let Watched { progress, best, kept, trajectory, memories } = watched;

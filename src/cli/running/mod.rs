@@ -9,6 +9,7 @@ pub(in crate::cli) mod keypoints;
 pub(in crate::cli) mod places;
 pub(in crate::cli) mod progress;
 pub(in crate::cli) mod quality;
+pub(in crate::cli) mod ready;
 pub(in crate::cli) mod resume;
 pub(in crate::cli) mod run;
 pub(in crate::cli) mod watched;

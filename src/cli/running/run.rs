@@ -6,7 +6,7 @@ use crate::cli::print::paragraph;
 use crate::cli::programs::explain::{Explanation, explain};
 use crate::cli::running::files::write_in;
 use crate::cli::running::job::{self, Interrupt, Outcome, RunMode};
-use crate::cli::running::{quality, resume};
+use crate::cli::running::{quality, ready, resume};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
@@ -14,7 +14,7 @@ use std::path::Path;
 /// Runs a program and writes its folder.
 pub fn run(a: &Run) -> Result<(), Failure> {
     let job = &quality::filled(&a.job, a.quiet)?;
-    let ready = job::prepare(job, a.quiet)?;
+    let ready = ready::prepare(job, a.quiet)?;
     let (_, default_plan) = ready.model.plan()?;
     if let (Some(text), false) = (&default_plan, a.quiet) {
         error_line!(

@@ -1,11 +1,13 @@
 //! What others may look at while the chains of a run are under way.
 
 use crate::cli::args::Job;
-use crate::cli::running::job::ROOM;
 use pcadlang::Model;
 use pcadlang::infer::{BestSoFar, KeptTraces, Progress, Trajectory};
 use pcadlang::report::Memory;
 use std::sync::Arc;
+
+/// How many numbers are kept in memory for the summary, over all chains: 32 MiB.
+pub const ROOM: usize = 4 << 20;
 
 /// Shared with the chains of one run.
 pub struct Watched {

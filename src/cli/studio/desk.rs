@@ -17,7 +17,9 @@ use pcadlang::render::View;
 use pcadlang::report::embedded;
 use pcadlang::report::pictures::png;
 use pcadlang::scene::ImageValue;
-use pcadlang::session::{ChoiceRow, Layer, Request, Scores, from_json, observed_image, to_json};
+use pcadlang::session::{
+    ChoiceRow, Layer, Marks, Request, Scores, from_json, observed_image, to_json,
+};
 use pcadlang::trace::{Stop, Trace};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -234,12 +236,12 @@ impl Desk {
     fn choices(&self, c: protocol::Choices) -> Result<Value, Problem> {
         let (from, count) = (c.from, c.count.unwrap_or(CHOICES).min(CHOICES));
         let wanted = c.select.unwrap_or_default();
-        let listed = move |trace: &Trace, rates: &BTreeMap<String, f64>| {
+        let listed = move |trace: &Trace, rates: &BTreeMap<String, f64>, marks: &Marks| {
             let mut all = ChoiceRow::all(trace);
             all.retain(|c| c.address.contains(&wanted));
             let total = all.len();
             let rows: Vec<Value> =
-                all.iter().skip(from).take(count).map(|c| row(c, rates)).collect();
+                all.iter().skip(from).take(count).map(|c| row(c, rates, marks)).collect();
             let observed = trace.observations();
             let observed = observed.iter().take(CHOICES);
             let observed = observed
@@ -255,14 +257,16 @@ impl Desk {
                 let rates =
                     self.runs.of_session(*id).map(|r| results::acceptance(&r)).unwrap_or_default();
                 self.sessions.get(*id)?.ask(move |open| {
-                    let mut out = listed(open.session.trace(), &rates);
+                    let marks = open.session.marks();
+                    let mut out = listed(open.session.trace(), &rates, &marks);
                     out["revision"] = json!(open.session.revision());
                     Ok(out)
                 })
             }
             (None, Some(run)) => {
                 let run = self.runs.get(run)?;
-                Ok(listed(&run.state(&c.state)?.trace, &results::acceptance(&run)))
+                let state = run.state(&c.state)?;
+                Ok(listed(&state.trace, &results::acceptance(&run), &Marks::default()))
             }
             _ => Err(no_state()),
         }
@@ -359,10 +363,13 @@ fn scores(s: Scores) -> Value {
     })
 }
 
-fn row(c: &ChoiceRow, rates: &BTreeMap<String, f64>) -> Value {
+fn row(c: &ChoiceRow, rates: &BTreeMap<String, f64>, marks: &Marks) -> Value {
+    let tags = marks.tags.iter().filter(|(_, of)| of.contains(&c.address)).map(|(tag, _)| tag);
     json!({
         "address": c.address, "value": to_json(&c.value), "text": c.text(), "family": c.family,
         "log_density": finite(c.log_density), "support": c.support, "low": c.bounds[0],
         "high": c.bounds[1], "scale": c.scale, "acceptance": rates.get(&c.address),
+        "tags": tags.collect::<Vec<_>>(), "forced": marks.forced.contains(&c.address),
+        "frozen": marks.frozen.contains(&c.address),
     })
 }

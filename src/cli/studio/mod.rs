@@ -12,6 +12,7 @@ mod language;
 mod language_socket;
 mod layout;
 mod listener;
+mod pictures;
 mod protocol;
 mod results;
 mod run;

@@ -6,7 +6,7 @@ use super::layout::finite;
 use super::run::Run;
 use crate::cli::reopening::compare::Comparison;
 use crate::cli::reopening::reopened::{Reopened, quoted};
-use crate::cli::running::job;
+use crate::cli::running::watched::ROOM;
 use pcadlang::report::{
     ChainDraws, Memory, Quantity, RunDir, modes, quantities, rename, reread, warnings,
 };
@@ -24,7 +24,7 @@ fn draws(run: &Run) -> Result<Vec<ChainDraws>, Problem> {
         Some(w) => Ok(w.memories.iter().map(Memory::draws).collect()),
         None => {
             let dir = RunDir::open(&run.folder).map_err(|e| Problem::plain(e.to_string()))?;
-            reread(&dir, job::ROOM).map_err(|e| Problem::plain(e.to_string()))
+            reread(&dir, ROOM).map_err(|e| Problem::plain(e.to_string()))
         }
     }
 }

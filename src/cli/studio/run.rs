@@ -6,7 +6,8 @@ use super::slots::Slots;
 use crate::cli::args::Job;
 use crate::cli::failure::Failure;
 use crate::cli::reopening::reopened::Reopened;
-use crate::cli::running::job::{self, CHECKPOINT, Interrupt, Ready, RunMode};
+use crate::cli::running::job::{self, CHECKPOINT, Interrupt, RunMode};
+use crate::cli::running::ready::{self, Ready};
 use crate::cli::running::resume;
 use crate::cli::running::watched::Watched;
 use pcadlang::infer::Progress;
@@ -80,7 +81,7 @@ pub struct Run {
     stop: AtomicBool,
     inner: Mutex<Inner>,
     /// Pictures of its states, see `states`.
-    pub(super) pictures: super::states::Pictures,
+    pub(super) pictures: super::pictures::Pictures,
 }
 
 struct Inner {
@@ -186,7 +187,7 @@ impl Run {
             return Err(Problem::plain("the run has not begun yet"));
         }
         let run = Reopened::open(&self.folder)?;
-        let ready = Arc::new(job::prepare_program(run.program()?, &run.job, Instant::now())?);
+        let ready = Arc::new(ready::prepare_program(run.program()?, &run.job, Instant::now())?);
         self.lock().ready = Some(Arc::clone(&ready));
         Ok(ready)
     }
@@ -280,9 +281,9 @@ impl Run {
         let ready = match resume {
             true => {
                 let run = Reopened::open(&self.folder)?;
-                job::prepare_program(run.program()?, job, Instant::now())?
+                ready::prepare_program(run.program()?, job, Instant::now())?
             }
-            false => job::prepare(job, true)?,
+            false => ready::prepare(job, true)?,
         };
         let watched = Arc::new(Watched::new(job, &ready.model, KEEP));
         let ready = Arc::new(ready);
@@ -355,7 +356,7 @@ impl Run {
                 json!({
                     "phase": inner.doing.name(), "ended": chains, "steps": of("steps") + of("warmup"), "draws": of("draws"),
                     "best": record["best_log_joint"], "done": null, "left": null, "rate": null,
-                    "revision": 0, "film": null,
+                    "revision": record["best_log_joint"].as_f64().map_or(0, revision), "film": null,
                 })
             }
         };

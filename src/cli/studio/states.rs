@@ -1,12 +1,12 @@
-//! States of runs: which trace a name stands for, and pictures of it that neither slow the
-//! chains down nor are drawn twice.
+//! States of runs: which trace a name stands for, and its picture.
 
 use super::answer::Problem;
+use super::pictures::Encoded;
 use super::protocol::{StateName, Viewpoint};
 use super::run::{Run, revision};
 use crate::cli::reopening::film::best_chain;
 use crate::cli::reopening::reopened::Reopened;
-use crate::cli::running::job::Ready;
+use crate::cli::running::ready::Ready;
 use crate::cli::scene;
 use pcadlang::infer::{KeptTrace, TrajectoryState};
 use pcadlang::lang::value::Located;
@@ -16,68 +16,10 @@ use pcadlang::scene::ImageValue;
 use pcadlang::session::Layer;
 use pcadlang::trace::{SavedTrace, Trace};
 use serde_json::{Map, Value, json};
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
 
-/// The least time between two pictures of a run whose chains are at work.
-const BETWEEN: Duration = Duration::from_millis(200);
-/// The part of the machine that may go to such pictures.
-const SHARE: f64 = 0.02;
-/// The most pictures of a run that are kept.
-const KEPT: usize = 24;
 /// The longer side of pictures, in pixels.
 const SIDES: std::ops::RangeInclusive<u32> = 16..=2048;
-
-/// A picture file with its header.
-pub type Encoded = (Map<String, Value>, Arc<Vec<u8>>);
-
-/// The pictures of a run that were drawn last, and when the next one may be drawn.
-#[derive(Default)]
-pub struct Pictures {
-    kept: Mutex<VecDeque<(String, Encoded)>>,
-    next: Mutex<Option<Instant>>,
-    /// Held while one is drawn, so that many tabs do not draw the same one.
-    drawing: Mutex<()>,
-}
-
-impl Pictures {
-    fn get(&self, key: &str) -> Option<Encoded> {
-        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.iter().find(|(k, _)| k == key).map(|(_, e)| e.clone())
-    }
-
-    fn keep(&self, key: String, picture: &Encoded) {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.push_back((key, picture.clone()));
-        while kept.len() > KEPT {
-            kept.pop_front();
-        }
-    }
-
-    /// Gives up the memory of all pictures.
-    pub fn forget(&self) {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner).clear();
-    }
-
-    /// Waits until a picture may be drawn beside the chains, draws it, and keeps account
-    /// of what that cost.
-    fn in_turn<T>(&self, is_working: bool, draw: impl FnOnce() -> T) -> T {
-        let next = *self.next.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(wait) =
-            next.filter(|_| is_working).and_then(|n| n.checked_duration_since(Instant::now()))
-        {
-            std::thread::sleep(wait);
-        }
-        let begun = Instant::now();
-        let drawn = draw();
-        let threads = crate::cli::running::job::machine_threads() as f64;
-        let rest = begun.elapsed().as_secs_f64() / (SHARE * threads);
-        let rest = BETWEEN.max(Duration::from_secs_f64(rest.min(10.0)));
-        *self.next.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now() + rest);
-        drawn
-    }
-}
 
 /// A trace of a run, with the program it belongs to.
 pub struct RunState {
@@ -92,6 +34,8 @@ impl Run {
     pub fn kept(&self) -> Result<Vec<KeptTrace>, Problem> {
         match self.watched() {
             Some(w) => Ok(w.kept.all()),
+            // It waits, or is being prepared.
+            None if self.is_active() => Ok(Vec::new()),
             None => Ok(Reopened::open(&self.folder)?.traces().unwrap_or_default()),
         }
     }
@@ -100,6 +44,7 @@ impl Run {
     pub fn film(&self) -> Result<Vec<TrajectoryState>, Problem> {
         let all = match self.watched() {
             Some(w) => w.trajectory.all(),
+            None if self.is_active() => Vec::new(),
             None => Reopened::open(&self.folder)?.trajectory().unwrap_or_default(),
         };
         Ok(best_chain(&all).into_iter().cloned().collect())
@@ -166,8 +111,7 @@ impl Run {
             None => (None, false),
         };
         let key = format!("{name:?} {layer:?} {size} {camera:?} {best:?}");
-        let alone = || self.pictures.drawing.lock().unwrap_or_else(PoisonError::into_inner);
-        let _drawing = watched.as_ref().map(|_| alone());
+        let _drawing = watched.as_ref().map(|_| self.pictures.alone());
         if let Some(picture) = self.pictures.get(&key) {
             return Ok(picture);
         }
@@ -219,34 +163,22 @@ pub fn picture(
         None => layer.draw(view, image, located, size),
     };
     let drawn = drawn.map_err(Problem::plain)?;
-    let (kind, bytes) = encoded(&drawn, layer)?;
+    let bytes = encoded(&drawn)?;
     let mut header = Map::new();
-    header.insert("type".into(), json!(kind));
+    header.insert("type".into(), json!("image/png"));
     header.insert("width".into(), json!(drawn.width()));
     header.insert("height".into(), json!(drawn.height()));
     Ok((header, bytes))
 }
 
-/// Photographs are encoded as JPEG, which is several times faster; exact values as PNG.
-fn encoded(picture: &image::RgbImage, layer: Layer) -> Result<(&'static str, Vec<u8>), Problem> {
+/// Encodes a picture as PNG at the least effort: the way to the page is short, and that takes
+/// a fraction of the time of JPEG.
+fn encoded(picture: &image::RgbImage) -> Result<Vec<u8>, Problem> {
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut bytes = Vec::new();
-    let done = match layer {
-        Layer::Overlay | Layer::Photo | Layer::Joints => {
-            let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 88);
-            picture.write_with_encoder(encoder).map(|()| "image/jpeg")
-        }
-        _ => {
-            use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-            let encoder = PngEncoder::new_with_quality(
-                &mut bytes,
-                CompressionType::Fast,
-                FilterType::Adaptive,
-            );
-            picture.write_with_encoder(encoder).map(|()| "image/png")
-        }
-    };
-    let kind = done.map_err(|e| Problem::plain(e.to_string()))?;
-    Ok((kind, bytes))
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
+    picture.write_with_encoder(encoder).map_err(|e| Problem::plain(e.to_string()))?;
+    Ok(bytes)
 }
 
 /// Returns a camera at a viewpoint, with the size of another one's pictures.

@@ -5,9 +5,10 @@ use super::running::{Running, RunningSums};
 use super::truth::Truth;
 use crate::cli::args::{Inputs, Job, QualityArg, Sampling, Tradeoff};
 use crate::cli::failure::{Failure, plain};
-use crate::cli::running::job::{self, Interrupt, Ready};
+use crate::cli::running::job::{self, Interrupt};
 use crate::cli::running::keypoints::Joints;
 use crate::cli::running::progress::Ending;
+use crate::cli::running::ready::{self, Ready};
 use crate::cli::scene;
 use indexmap::IndexMap;
 use pcadlang::infer::draws::Sink;
@@ -116,7 +117,7 @@ fn measure(
 ) -> Result<RunRecord, Failure> {
     let job = job(a, task, threads);
     let begun = Instant::now();
-    let ready = job::prepare(&job, true)?;
+    let ready = ready::prepare(&job, true)?;
     let chains = job.sampling.chains();
     let progress = Arc::new(Progress::default());
     let watched = Watched {

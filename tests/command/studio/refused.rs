@@ -123,7 +123,7 @@ fn large_uploads_are_refused_before_they_are_read() {
 fn malformed_frames_are_answered_and_the_socket_stays() {
     let s = Studio::new(&[]);
     let mut page = s.page();
-    let mut next = |page: &mut Page| -> Value {
+    let next = |page: &mut Page| -> Value {
         loop {
             let Some(Message::Text(text)) = page.next() else { panic!("closed") };
             let value: Value = serde_json::from_str(&text).unwrap();

@@ -220,7 +220,7 @@ fn a_program_that_fails_fails_alone() {
     if let Some(id) = opened["result"].get("session") {
         page.ask("run", json!({ "session": id, "settings": { "chains": 1 } }));
         let failed = page.wait("runs/bad", &["failed"]);
-        assert!(failed["error"].as_str().unwrap().contains("index"), "{failed}");
+        assert!(failed["error"].as_str().unwrap().contains("no element"), "{failed}");
     }
     page.ask("open", json!({ "program": "coin.pcad" }));
 }

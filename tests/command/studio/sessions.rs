@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 const CUP: &str = "include \"std/scene.pcad\" as scene;
 assume r ~ uniform(0.2, 1); assume up ~ flip(0.5); assume n ~ poisson(3);
-let view = scene.render(scene.ball(r));
+let view = scene.render(scene.sphere(r));
 observe normal(r, 0.1) = 0.5 as seen;";
 
 fn text(v: &Value) -> &str {
@@ -22,7 +22,8 @@ fn a_choice_is_dragged_and_the_drag_undone_at_once() {
     let state = json!({ "session": 1 });
     let choices = page.ask("choices", json!({ "state": state }));
     let all = choices["choices"].as_array().unwrap();
-    let one = all.iter().find(|c| c["value"].is_f64() && c["low"].is_null()).unwrap();
+    let is_free = |c: &&Value| c["value"].is_f64() && !c["scale"].is_null();
+    let one = all.iter().find(is_free).unwrap_or_else(|| panic!("{choices}"));
     let (address, value) = (&one["address"], one["value"].as_f64().unwrap());
     let picture = |page: &mut super::client::Page| {
         page.ask("picture", json!({ "state": state, "layer": "scene", "size": 128 }))
@@ -32,7 +33,7 @@ fn a_choice_is_dragged_and_the_drag_undone_at_once() {
     for i in 1..=10 {
         let to = value + 0.01 * f64::from(i);
         last = page
-            .ask("assign", json!({ "session": 1, "address": address, "value": to, "drag": true }));
+            .ask("assign", json!({ "session": 1, "address": address, "value": to, "drag": i > 1 }));
         assert!(picture(&mut page)["bytes"].as_u64().unwrap() > 100);
     }
     assert_ne!(last["log_joint"], choices["log_joint"]);
@@ -113,7 +114,7 @@ fn every_answer_of_a_session() {
     assert_eq!(words["words"][0]["word"], ":flip");
     let error = page.answer("enter", enter("assume y ~ norml(0, 1);"));
     let d = &error["error"]["diagnostics"][0];
-    assert_eq!((&d["line"], &d["column"]), (&json!(0), &json!(11)), "{error}");
+    assert_eq!((&d["line"], &d["column"]), (&json!(4), &json!(11)), "{error}");
     page.refused("enter", enter(":edit"));
 
     // Another text of the program.

@@ -80,9 +80,9 @@ fn wide(t: &glam::Affine3A) -> DAffine3 {
     let m = t.matrix3;
     DAffine3 {
         matrix3: glam::DMat3::from_cols(
-            DVec3::from(m.x_axis.as_dvec3()),
-            DVec3::from(m.y_axis.as_dvec3()),
-            DVec3::from(m.z_axis.as_dvec3()),
+            m.x_axis.as_dvec3(),
+            m.y_axis.as_dvec3(),
+            m.z_axis.as_dvec3(),
         ),
         translation: t.translation.as_dvec3(),
     }
