@@ -66,8 +66,11 @@ export class ComparePanel {
     const options = usable.map((r): [string, string] => [r, runName(r)]);
     setOptions(this.selects[0], options, this.a);
     setOptions(this.selects[1], options, this.b);
-    const revision = (name: string) => runs.find((r) => r.run === name)?.revision;
-    const key = `${this.a} ${revision(this.a)} ${this.b} ${revision(this.b)}`;
+    const version = (name: string) => {
+      const found = runs.find((r) => r.run === name);
+      return `${name} ${found?.state} ${found?.revision}`;
+    };
+    const key = `${version(this.a)} ${version(this.b)}`;
     if (key === this.shown) return;
     this.shown = key;
     this.showPicture(this.left, this.a);

@@ -80,6 +80,12 @@ impl Comparison {
         Ok(Comparison { runs: [RunSummary::of(a)?, RunSummary::of(b)?] })
     }
 
+    /// Compares runs whose `run.json` and summary are known, for example so far.
+    #[cfg(feature = "studio")]
+    pub fn between(runs: [(Value, Value); 2]) -> Comparison {
+        Comparison { runs: runs.map(|(run, summary)| RunSummary { run, summary }) }
+    }
+
     /// Returns what only one of the commands has.
     pub fn settings(&self) -> [Vec<String>; 2] {
         let [left, right] = self.runs.each_ref().map(RunSummary::settings);

@@ -126,7 +126,8 @@ pub fn quantity(run: &Run, names: &[String]) -> Result<Value, Problem> {
 
 /// Compares two runs.
 pub fn compared(a: &Run, b: &Run) -> Result<Value, Problem> {
-    let both = Comparison::of(&a.folder, &b.folder)?;
+    let of = |r: &Run| Ok::<_, Problem>((r.record(), summary(r)?));
+    let both = Comparison::between([of(a)?, of(b)?]);
     let of = |q: &crate::cli::reopening::compare::Apart| json!({ "name": q.name, "a": q.a, "b": q.b, "apart": finite(q.apart) });
     let [only_a, only_b] = both.settings();
     Ok(json!({

@@ -173,6 +173,11 @@ impl Run {
         matches!(self.doing(), Waiting | Running | Paused | Stopping)
     }
 
+    /// Returns what its `run.json` says.
+    pub fn record(&self) -> Value {
+        self.lock().record.clone()
+    }
+
     /// Returns the time at which it began, as text that sorts.
     pub fn begun_at(&self) -> String {
         self.lock().record["begun"].as_str().unwrap_or_default().to_owned()
