@@ -13,6 +13,7 @@ use super::detect::Detect;
 use super::manual::{Completions, Man};
 use super::people::PersonArgs;
 use super::running::files::program_name;
+use super::running::live::Live;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
 use pcadlang::tradeoff::Quality;
@@ -241,6 +242,10 @@ pub struct Run {
     /// How many complete states to keep for `show`, evenly spaced, over all chains
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(..=100_000))]
     pub keep: u32,
+    /// Send the best state as it improves to a folder or to http://HOST[:PORT]/PATH:
+    /// overlay.png, best.glb, state.json; for a viewer of your own
+    #[arg(long, value_name = "DIR|URL")]
+    pub live: Option<Live>,
     /// Also report what was modelled, proposed, redrawn and skipped, and why
     #[arg(long)]
     pub explain: bool,

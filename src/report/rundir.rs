@@ -14,7 +14,7 @@ pub const MARK: &str = "run.json";
 const CLEARED: &[u8] = b"{}";
 /// The files that a run writes besides `run.json`, numbered files, and the exports of its
 /// program.
-const WRITTEN: [&str; 23] = [
+const WRITTEN: [&str; 24] = [
     "program.pcad",
     "traces.jsonl",
     "trajectory.jsonl",
@@ -37,6 +37,7 @@ const WRITTEN: [&str; 23] = [
     "best.obj",
     "best.glb",
     "keypoints.json",
+    "keypoints.coco.json",
     "report.html",
 ];
 

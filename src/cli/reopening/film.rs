@@ -19,8 +19,10 @@ use pcadlang::trace::SavedTrace;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// How long a state is shown, the last state, and a picture of the turn, in milliseconds.
+/// How long a state is shown, the first and the last one, and a picture of the turn, in
+/// milliseconds.
 const STATE: u16 = 90;
+const FIRST: u16 = 800;
 const LAST: u16 = 1200;
 const TURN: u16 = 70;
 /// The pictures of one turn, and of the change from the photograph to the scene alone.
@@ -113,7 +115,8 @@ fn frames(
     for saved in states {
         let view = view_of(run, ready, saved)?;
         let picture = drawn(Layer::Overlay, &view, ready.image())?;
-        frames.push(FilmFrame { picture, milliseconds: STATE });
+        let milliseconds = if frames.is_empty() { FIRST } else { STATE };
+        frames.push(FilmFrame { picture, milliseconds });
         best = Some(view);
     }
     let (Some(view), Some(last)) = (best, frames.last_mut()) else { return Ok(frames) };

@@ -12,7 +12,8 @@ use crate::cli::reopening::{date, seen};
 use crate::cli::running::best::{disagreement, keep_best, outside, show_best};
 use crate::cli::running::embedded::write_scene;
 use crate::cli::running::files::write_in;
-use crate::cli::running::keypoints::Joints;
+use crate::cli::running::keypoints::{Joints, coco};
+use crate::cli::running::live::Live;
 use crate::cli::running::places::{best_of_each, show_places};
 use crate::cli::running::progress::{self, Ending};
 use crate::cli::running::ready::Ready;
@@ -243,7 +244,7 @@ pub fn record_failure(
 pub const CHECKPOINT: Duration = Duration::from_secs(10);
 
 /// How a run is carried out; its draws do not depend on this.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct RunMode {
     /// Whether progress is shown.
     pub live: bool,
@@ -253,6 +254,8 @@ pub struct RunMode {
     pub resume: bool,
     /// How many complete states are kept.
     pub keep: u32,
+    /// Where the best state is sent as it improves.
+    pub follow: Option<Live>,
 }
 
 /// Runs the chains and fills the folder. A failure is recorded in the folder, too.
@@ -341,6 +344,7 @@ fn fill(
         scope.spawn(|| progress::ask_for_checkpoints(progress, &ending, manner.checkpoint));
         scope.spawn(|| keep_best(dir, model, best, &ending, manner.checkpoint));
         scope.spawn(|| keep_traces(dir, kept, &ending, manner.checkpoint));
+        scope.spawn(|| manner.follow.iter().for_each(|l| l.follow(ready, watched, &ending)));
         ending.of(|| model.run_into(&options, threads(job), progress, sinks))
     })?;
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
@@ -397,6 +401,10 @@ fn fill(
     let elapsed = begun.elapsed().as_secs_f64();
     if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, &modes, elapsed)) {
         write_in(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
+        let picture = job.observe.first().map_or("", |o| stem(inputs::file_of(o)));
+        if let Some(coco) = coco(&found, picture) {
+            write_in(dir, "keypoints.coco.json", coco.to_string().as_bytes())?;
+        }
     }
     let mut more = counts(&chains, best.as_deref(), &quantities);
     more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));

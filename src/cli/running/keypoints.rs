@@ -132,6 +132,46 @@ impl Joints {
     }
 }
 
+/// The joints of COCO, in its order, by their names here.
+const COCO: [&str; 17] = [
+    "nose",
+    "l_eye",
+    "r_eye",
+    "l_ear",
+    "r_ear",
+    "l_shoulder",
+    "r_shoulder",
+    "l_elbow",
+    "r_elbow",
+    "l_wrist",
+    "r_wrist",
+    "l_hip",
+    "r_hip",
+    "l_knee",
+    "r_knee",
+    "l_ankle",
+    "r_ankle",
+];
+
+/// Returns the joints of [`Joints::report`] in the format of results of the COCO keypoint
+/// challenge: one person in the picture of this name. A joint that is not there has
+/// visibility 0, any other 2. `None` if there are none of COCO's joints.
+pub fn coco(found: &Value, picture: &str) -> Option<Value> {
+    let joint = |name: &&str| {
+        let at = &found["keypoints"][name];
+        let known = at[0].is_number() && at[1].is_number();
+        if known { json!([at[0], at[1], 2]) } else { json!([0, 0, 0]) }
+    };
+    let joints: Vec<Value> = COCO.iter().map(joint).collect();
+    if joints.iter().all(|j| j[2] == 0) {
+        return None;
+    }
+    let numbers: Vec<&Value> = joints.iter().filter_map(Value::as_array).flatten().collect();
+    // COCO numbers its pictures; their files are called by that number.
+    let image = picture.parse::<u64>().map_or_else(|_| json!(picture), |n| json!(n));
+    Some(json!([{ "image_id": image, "category_id": 1, "keypoints": numbers, "score": 1 }]))
+}
+
 /// Rounds a number of pixels or seconds to a thousandth.
 fn rounded(x: f64) -> Value {
     json!((x * 1000.0).round() / 1000.0)
@@ -187,5 +227,26 @@ impl Callback for Joints {
                 (None, None) => {}
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joints_are_in_the_order_of_coco() {
+        let found = json!({ "keypoints": { "nose": [3.5, 4, 1], "r_ankle": [7, 8, 1], "pelvis": [1, 1, 1] } });
+        let all = coco(&found, "000000442619").unwrap();
+        assert_eq!((&all[0]["image_id"], &all[0]["category_id"]), (&json!(442_619), &json!(1)));
+        let numbers = all[0]["keypoints"].as_array().unwrap();
+        assert_eq!(numbers.len(), 51);
+        assert_eq!(
+            (&numbers[..3], &numbers[48..]),
+            (&[json!(3.5), json!(4), json!(2)][..], &[json!(7), json!(8), json!(2)][..])
+        );
+        assert!(numbers[3..48].iter().all(|n| *n == 0));
+        assert_eq!(coco(&found, "skier").unwrap()[0]["image_id"], "skier");
+        assert!(coco(&json!({ "keypoints": { "pelvis": [1, 1, 1] } }), "a").is_none());
     }
 }

@@ -6,6 +6,7 @@ pub(in crate::cli) mod files;
 pub(in crate::cli) mod inputs;
 pub(in crate::cli) mod job;
 pub(in crate::cli) mod keypoints;
+pub(in crate::cli) mod live;
 pub(in crate::cli) mod places;
 pub(in crate::cli) mod progress;
 pub(in crate::cli) mod quality;

@@ -6,6 +6,7 @@ use crate::cli::print::paragraph;
 use crate::cli::programs::explain::{Explanation, explain};
 use crate::cli::running::files::write_in;
 use crate::cli::running::job::{self, Interrupt, Outcome, RunMode};
+use crate::cli::running::live::Live;
 use crate::cli::running::{quality, ready, resume};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
@@ -21,6 +22,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
             "note: the program has no `infer` block; using this default plan, which you can copy and edit:\n{text}"
         );
     }
+    a.live.iter().try_for_each(Live::check)?;
     let interrupt = Interrupt::listen();
     let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
     let (runs, name) = (Path::new("runs"), job::stem(&job.inputs.program));
@@ -40,6 +42,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         checkpoint: a.checkpoint,
         resume: a.resume,
         keep: a.keep,
+        follow: a.live.clone(),
     };
     let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
     let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));

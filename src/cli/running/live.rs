@@ -1,0 +1,188 @@
+//! `--live`: the best state so far for a viewer of the user's own, as files in a folder or
+//! sent to an address.
+
+use crate::cli::failure::{Failure, plain};
+use crate::cli::running::job::machine_threads;
+use crate::cli::running::progress::Ending;
+use crate::cli::running::ready::Ready;
+use crate::cli::running::watched::Watched;
+use crate::cli::scene;
+use pcadlang::geom::glb;
+use pcadlang::infer::BestState;
+use pcadlang::report::pictures::png;
+use pcadlang::report::write_file;
+use pcadlang::session::Layer;
+use serde_json::json;
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The least time between two states.
+const BETWEEN: Duration = Duration::from_millis(200);
+/// The part of the machine that may go to them.
+const SHARE: f64 = 0.025;
+/// The longer side of the picture, in pixels.
+const SIDE: u32 = 512;
+/// How long a viewer may take to answer.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Where states are sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Live {
+    /// A folder.
+    Folder(PathBuf),
+    /// A server, `HOST:PORT`, and a path on it.
+    Server(String, String),
+}
+
+impl FromStr for Live {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Live, String> {
+        if text.starts_with("https://") {
+            return Err("only http:// addresses can be reached".to_owned());
+        }
+        let Some(rest) = text.strip_prefix("http://") else {
+            return Ok(Live::Folder(PathBuf::from(text)));
+        };
+        let (host, path) = rest.split_once('/').unwrap_or((rest, ""));
+        if host.is_empty() || host.contains(|c: char| c.is_whitespace() || c == '@') {
+            return Err(format!("`{text}` has no host"));
+        }
+        let port = host.rsplit_once(':').is_some_and(|(_, p)| p.parse::<u16>().is_ok());
+        let host = if port { host.to_owned() } else { format!("{host}:80") };
+        let path = path.trim_end_matches('/');
+        let path = if path.is_empty() { String::new() } else { format!("/{path}") };
+        Ok(Live::Server(host, path))
+    }
+}
+
+impl Live {
+    /// Checks that states can be sent there, before the run begins.
+    ///
+    /// # Errors
+    /// If the folder cannot be made, or nobody listens at the address.
+    pub fn check(&self) -> Result<(), Failure> {
+        match self {
+            Live::Folder(path) => {
+                std::fs::create_dir_all(path).map_err(|e| plain(format!("{}: {e}", path.display())))
+            }
+            Live::Server(host, _) => TcpStream::connect(host)
+                .map(|_| ())
+                .map_err(|e| plain(format!("--live: {host}: {e}"))),
+        }
+    }
+
+    /// Sends the best state whenever it has improved, until the chains end, and once more
+    /// then. A viewer that cannot be reached misses states; the run goes on.
+    pub fn follow(&self, ready: &Ready, watched: &Watched, ending: &Ending) {
+        let (mut sent, mut rest, mut ended) = (f64::NEG_INFINITY, BETWEEN, false);
+        while !ended {
+            ended = ending.within(rest);
+            let Some(best) = watched.best.state().filter(|b| b.log_joint > sent) else { continue };
+            let begun = Instant::now();
+            // What cannot be drawn now may be drawable later.
+            let _ = self.show(ready, watched, &best);
+            sent = best.log_joint;
+            let share = SHARE * machine_threads() as f64;
+            rest = BETWEEN.max(begun.elapsed().div_f64(share).min(10 * BETWEEN));
+        }
+    }
+
+    fn show(&self, ready: &Ready, watched: &Watched, best: &BestState) -> Result<(), Failure> {
+        let draws = scene::predictive(0, 0);
+        let mut trace = scene::rebuilt(&ready.model, &best.choices, draws)?;
+        if let Some(view) = scene::view(&mut trace, draws, None) {
+            let picture =
+                Layer::Overlay.draw(&view, ready.image(), &trace.located(), SIDE).map_err(plain)?;
+            self.send(
+                "overlay.png",
+                "image/png",
+                &png(&picture).map_err(|e| plain(e.to_string()))?,
+            )?;
+            if let Ok(mesh) = view.solid().to_mesh() {
+                self.send("best.glb", "model/gltf-binary", &glb::write(&mesh))?;
+            }
+        }
+        let state = json!({
+            "log_joint": best.log_joint, "step": best.step,
+            "steps": watched.progress.steps.load(Ordering::Relaxed),
+        });
+        // The last one: who has read it finds the others there.
+        self.send("state.json", "application/json", state.to_string().as_bytes())
+    }
+
+    fn send(&self, name: &str, kind: &str, bytes: &[u8]) -> Result<(), Failure> {
+        match self {
+            Live::Folder(path) => {
+                write_file(&path.join(name), bytes).map_err(|e| plain(e.to_string()))
+            }
+            Live::Server(host, path) => {
+                post(host, &format!("{path}/{name}"), kind, bytes).map_err(|e| plain(e.to_string()))
+            }
+        }
+    }
+}
+
+/// Sends a file with HTTP/1.1 (RFC 9112), and reads the answer to its end.
+fn post(host: &str, path: &str, kind: &str, bytes: &[u8]) -> std::io::Result<()> {
+    let mut stream = TcpStream::connect(host)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    write!(
+        stream,
+        "POST {path} HTTP/1.1\r\nHost: {host}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
+        bytes.len()
+    )?;
+    stream.write_all(bytes)?;
+    // At most a few lines: the answer itself does not matter.
+    let mut answer = Vec::new();
+    stream.take(1 << 16).read_to_end(&mut answer).map(|_| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{BufRead, BufReader};
+    use std::net::TcpListener;
+
+    #[test]
+    fn a_folder_or_an_address() {
+        let of = |text: &str| text.parse::<Live>();
+        let server = |host: &str, path: &str| Ok(Live::Server(host.into(), path.into()));
+        assert_eq!(of("out/live"), Ok(Live::Folder("out/live".into())));
+        assert_eq!(of("http://127.0.0.1:9000"), server("127.0.0.1:9000", ""));
+        assert_eq!(of("http://viewer/a/b/"), server("viewer:80", "/a/b"));
+        assert!(
+            of("https://viewer").is_err() && of("http:///x").is_err() && of("http://a b").is_err()
+        );
+    }
+
+    #[test]
+    fn files_are_posted() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let host = listener.local_addr().unwrap().to_string();
+        let server = std::thread::spawn(move || {
+            let (stream, _) = listener.accept().unwrap();
+            let mut lines = BufReader::new(stream);
+            let mut head = String::new();
+            while !head.ends_with("\r\n\r\n") {
+                lines.read_line(&mut head).unwrap();
+            }
+            let mut body = [0; 3];
+            lines.read_exact(&mut body).unwrap();
+            lines.get_mut().write_all(b"HTTP/1.1 204 No Content\r\n\r\n").unwrap();
+            (head, body)
+        });
+        post(&host, "/live/a.bin", "application/x", &[1, 2, 3]).unwrap();
+        let (head, body) = server.join().unwrap();
+        assert!(
+            head.starts_with("POST /live/a.bin HTTP/1.1\r\n")
+                && head.contains("Content-Length: 3\r\n")
+        );
+        assert_eq!(body, [1, 2, 3]);
+    }
+}
