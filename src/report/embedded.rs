@@ -139,7 +139,7 @@ mod tests {
     use std::sync::Arc;
 
     fn draw(x: f64) -> EmbeddedDraw {
-        let ball = Solid::new(Arc::new(sphere(1.0, 16).unwrap()));
+        let ball = Solid::new(Arc::new(sphere(1.0, 40).unwrap()));
         let solid = ball.placed(Affine::new(DVec3::X * x, DVec3::ZERO, DVec3::ONE));
         EmbeddedDraw { chain: Some(1), draw: Some(3), log_joint: -x, label: None, solid }
     }

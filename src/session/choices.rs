@@ -168,17 +168,18 @@ pub fn from_json(v: &serde_json::Value) -> Result<Value, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Model;
 
     #[test]
     fn choices_are_described() {
-        let model = Model::from_text(
-            "assume x ~ normal(0, 2); assume n ~ poisson(3); assume up ~ flip(0.5);
-             assume w ~ uniform(-1, 4); assume p ~ dirichlet([1, 1, 1]);",
-        )
-        .unwrap();
-        let trace = model.simulate(1, 0).unwrap();
-        let all = ChoiceRow::all(&trace);
+        let mut session = Session::new(1, crate::trace::Stop::default()).unwrap();
+        session
+            .enter(
+                "assume x ~ normal(0, 2); assume n ~ poisson(3); assume up ~ flip(0.5);
+                 assume w ~ uniform(-1, 4); assume p ~ dirichlet([1, 1, 1]);",
+            )
+            .unwrap();
+        let trace = session.trace();
+        let all = ChoiceRow::all(trace);
         let of = |name: &str| all.iter().find(|c| c.address == name).unwrap();
         assert_eq!((of("@x").scale, of("@x").bounds), (Some(2.0), [None, None]));
         assert_eq!((of("@n").bounds, &*of("@n").family), ([Some(0.0), None], "poisson"));

@@ -342,6 +342,7 @@ impl Session {
     pub fn take_over(&mut self, other: Session, what: &str) -> Reply {
         let past = self.remember(what);
         (self.program, self.model, self.trace) = (other.program, other.model, other.trace);
+        self.trace.set_limits(self.limits.clone());
         self.keep(past);
         Reply::text(self.summary())
     }

@@ -23,7 +23,8 @@ use crate::cli::{edges, people};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{
-    BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, stuck_structure,
+    BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, Trajectory,
+    stuck_structure,
 };
 use pcadlang::report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
@@ -334,6 +335,11 @@ fn fill(
         trajectory.clone(),
     ];
     let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
+    if manner.resume {
+        let lines = std::fs::read_to_string(dir.file(TRAJECTORY)).unwrap_or_default();
+        let states = lines.lines().filter_map(|line| serde_json::from_str(line).ok());
+        trajectory.restore(states.collect());
+    }
     let sinks = sinks(dir, job, model, memories, record, manner.resume)?;
     let ending = Ending::default();
     interrupt.ends(progress);
@@ -343,7 +349,7 @@ fn fill(
         });
         scope.spawn(|| progress::ask_for_checkpoints(progress, &ending, manner.checkpoint));
         scope.spawn(|| keep_best(dir, model, best, &ending, manner.checkpoint));
-        scope.spawn(|| keep_traces(dir, kept, &ending, manner.checkpoint));
+        scope.spawn(|| keep_states(dir, kept, trajectory, &ending, manner.checkpoint));
         scope.spawn(|| manner.follow.iter().for_each(|l| l.follow(ready, watched, &ending)));
         ending.of(|| model.run_into(&options, threads(job), progress, sinks))
     })?;
@@ -442,10 +448,22 @@ fn structure_warning(state: &pcadlang::trace::Trace, sites: &[SiteStats]) -> Opt
 }
 
 /// Writes the states kept so far, one per line, at intervals until the chains end.
-fn keep_traces(dir: &RunDir, kept: &KeptTraces, ending: &Ending, every: Duration) {
+fn keep_states(
+    dir: &RunDir,
+    kept: &KeptTraces,
+    trajectory: &Trajectory,
+    ending: &Ending,
+    every: Duration,
+) {
+    let mut written = 0;
     while !ending.within(every) {
         // Errors are reported at the end of the run.
         let _ = write_traces(dir, kept);
+        let count = trajectory.count();
+        if count != written {
+            written = count;
+            let _ = write_lines(dir, TRAJECTORY, &trajectory.all());
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use pcadlang::lang::value::Located;
 use pcadlang::report::{Mode, Moments};
 use pcadlang::scene::ViewValue;
 use pcadlang::trace::{Draws, Trace};
+use pcadlang::vision::keypoints::COCO;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -131,27 +132,6 @@ impl Joints {
         }))
     }
 }
-
-/// The joints of COCO, in its order, by their names here.
-const COCO: [&str; 17] = [
-    "nose",
-    "l_eye",
-    "r_eye",
-    "l_ear",
-    "r_ear",
-    "l_shoulder",
-    "r_shoulder",
-    "l_elbow",
-    "r_elbow",
-    "l_wrist",
-    "r_wrist",
-    "l_hip",
-    "r_hip",
-    "l_knee",
-    "r_knee",
-    "l_ankle",
-    "r_ankle",
-];
 
 /// Returns the joints of [`Joints::report`] in the format of results of the COCO keypoint
 /// challenge: one person in the picture of this name. A joint that is not there has

@@ -71,8 +71,7 @@ pub fn job_of(program: &str, sets: &BTreeMap<String, String>, observe: &[String]
 impl Sessions {
     /// Opens a session for a job, or with the best state of a run.
     pub fn open(&self, job: Job, run: Option<Reopened>) -> Result<Arc<Handle>, Problem> {
-        let mut all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
-        if all.len() >= MOST {
+        if self.ids().len() >= MOST {
             let problem = Problem::plain(format!("{MOST} sessions are open"));
             return Err(problem.hint("close one of them first"));
         }
@@ -98,6 +97,8 @@ impl Sessions {
         begun.map_err(|e| Problem::plain(format!("no thread can be started: {e}")))?;
         opened.recv().unwrap_or_else(|_| Err(internal()))?;
         let handle = Arc::new(Handle { id, stop, work });
+        // Not locked while the program is compiled: the other sessions go on meanwhile.
+        let mut all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
         all.insert(id, Arc::clone(&handle));
         Ok(handle)
     }

@@ -2,7 +2,7 @@
 
 use super::answer::{Frame, frame};
 use super::desk::Desk;
-use super::protocol::{self, Request};
+use super::protocol::{self, Call, Request};
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::{SinkExt, StreamExt};
 use serde_json::json;
@@ -12,6 +12,8 @@ use tokio::sync::{Semaphore, mpsc};
 
 /// The most requests of a page that are being done; further ones wait.
 const AT_ONCE: usize = 8;
+/// The most requests of a page that are being done or wait; further ones are refused.
+const PENDING: usize = 256;
 /// The most frames that wait to be sent to a slow page.
 const WAITING: usize = 64;
 
@@ -40,7 +42,7 @@ pub async fn serve(socket: WebSocket, desk: Arc<Desk>) {
             }
         }
     });
-    let places = Arc::new(Semaphore::new(AT_ONCE));
+    let (places, pending) = (Arc::new(Semaphore::new(AT_ONCE)), Arc::new(Semaphore::new(PENDING)));
     while let Some(Ok(message)) = from.next().await {
         let request = match &message {
             Message::Text(text) => Request::read(text),
@@ -62,13 +64,32 @@ pub async fn serve(socket: WebSocket, desk: Arc<Desk>) {
                 continue;
             }
         };
-        let Ok(place) = Arc::clone(&places).acquire_owned().await else { break };
-        let (desk, send) = (Arc::clone(&desk), send.clone());
-        // What a session or a run does is not asynchronous, and may take long.
-        tokio::task::spawn_blocking(move || {
-            let done = frame(request.id, desk.answer(request.call));
-            drop(place);
-            let _ = send.blocking_send(done);
+        let Ok(held) = Arc::clone(&pending).try_acquire_owned() else {
+            let said = "too many requests are waiting for their answers";
+            let said = protocol::error(Some(request.id), said, None, json!([]));
+            if send.send(Frame::Text(said)).await.is_err() {
+                break;
+            }
+            continue;
+        };
+        let (desk, send, places) = (Arc::clone(&desk), send.clone(), Arc::clone(&places));
+        // What ends the work of others does not wait for it.
+        let ends = matches!(request.call, Call::Interrupt(_) | Call::Pause(_) | Call::Stop(_));
+        tokio::spawn(async move {
+            let place = match ends {
+                true => None,
+                false => places.acquire_owned().await.ok(),
+            };
+            // What a session or a run does is not asynchronous, and may take long.
+            let done = tokio::task::spawn_blocking(move || {
+                let done = frame(request.id, desk.answer(request.call));
+                drop(place);
+                done
+            });
+            if let Ok(done) = done.await {
+                let _ = send.send(done).await;
+            }
+            drop(held);
         });
     }
     drop(send);

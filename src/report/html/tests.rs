@@ -32,10 +32,11 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
     // Possible line breaks are not part of the names; the viewer's own program is a single
     // script.
     let page = page.replace("<wbr>", "");
-    let begin = page.find("<script>\n").filter(|i| page[..*i].contains("id=\"scene\""));
-    let end = begin.and_then(|b| page[b..].find("</script>").map(|e| b + e));
-    assert!(end.is_some_and(|e| page[begin.unwrap()..e].len() > 100_000), "the viewer is there");
-    let page = [&page[..begin.unwrap()], "<script>", &page[end.unwrap()..]].concat();
+    let data = page.find("id=\"scene\"").expect("the viewer has its data");
+    let begin = data + page[data..].find("<script>\n").expect("and its program");
+    let end = begin + page[begin..].find("</script>").unwrap();
+    assert!(end - begin > 100_000, "the viewer is there");
+    let page = [&page[..begin], "<script>", &page[end..]].concat();
     assert!(
         !page.contains("alert(1)</") && !page.contains("& ") && !page.contains("alert(1)<"),
         "escaped"

@@ -166,3 +166,37 @@ fn a_photograph_is_sent_and_observed() {
         page.ask("picture", json!({ "state": { "session": id }, "layer": layer, "size": 96 }));
     }
 }
+
+#[test]
+fn an_endless_command_is_interrupted_and_the_session_goes_on() {
+    let s = Studio::new(&["coin.pcad"]);
+    let mut page = s.page();
+    // More requests of the busy session than are done at a time.
+    let slow = json!({ "session": 1, "text": ":infer mh(@heads) 100000000000" });
+    page.send(tungstenite::Message::text(
+        json!({ "id": 900, "method": "enter", "params": slow }).to_string(),
+    ));
+    for id in 901..920 {
+        let look =
+            json!({ "id": id, "method": "choices", "params": { "state": { "session": 1 } } });
+        page.send(tungstenite::Message::text(look.to_string()));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let stop = json!({ "id": 950, "method": "interrupt", "params": { "session": 1 } });
+    page.send(tungstenite::Message::text(stop.to_string()));
+    let mut answered = std::collections::BTreeSet::new();
+    while answered.len() < 21 {
+        let Some(tungstenite::Message::Text(text)) = page.next() else { panic!("closed") };
+        let value: Value = serde_json::from_str(&text).unwrap();
+        if let Some(id) = value["id"].as_u64() {
+            if id == 900 {
+                assert!(
+                    value["result"]["text"].as_str().unwrap().contains("stopped early"),
+                    "{value}"
+                );
+            }
+            answered.insert(id);
+        }
+    }
+    assert_eq!(text(&page.ask("enter", json!({ "session": 1, "text": "1 + 1" }))["text"]), "2\n");
+}
