@@ -4,7 +4,7 @@
 //! Invariant: `run.json` has the state `done` only when all other files of the folder are
 //! complete.
 
-use crate::cli::args::Job;
+use crate::cli::args::{Job, Live};
 use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::write_page;
 use crate::cli::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
@@ -13,7 +13,6 @@ use crate::cli::running::best::{disagreement, keep_best, outside, show_best};
 use crate::cli::running::embedded::write_scene;
 use crate::cli::running::files::write_in;
 use crate::cli::running::keypoints::{Joints, coco};
-use crate::cli::running::live::Live;
 use crate::cli::running::places::{best_of_each, show_places};
 use crate::cli::running::progress::{self, Ending};
 use crate::cli::running::ready::Ready;

@@ -1,6 +1,7 @@
 //! `--live`: the best state so far for a viewer of the user's own, as files in a folder or
 //! sent to an address.
 
+use crate::cli::args::Live;
 use crate::cli::failure::{Failure, plain};
 use crate::cli::running::job::machine_threads;
 use crate::cli::running::progress::Ending;
@@ -15,8 +16,6 @@ use pcadlang::session::Layer;
 use serde_json::json;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -28,37 +27,6 @@ const SHARE: f64 = 0.025;
 const SIDE: u32 = 512;
 /// How long a viewer may take to answer.
 const PATIENCE: Duration = Duration::from_secs(2);
-
-/// Where states are sent.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Live {
-    /// A folder.
-    Folder(PathBuf),
-    /// A server, `HOST:PORT`, and a path on it.
-    Server(String, String),
-}
-
-impl FromStr for Live {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Live, String> {
-        if text.starts_with("https://") {
-            return Err("only http:// addresses can be reached".to_owned());
-        }
-        let Some(rest) = text.strip_prefix("http://") else {
-            return Ok(Live::Folder(PathBuf::from(text)));
-        };
-        let (host, path) = rest.split_once('/').unwrap_or((rest, ""));
-        if host.is_empty() || host.contains(|c: char| c.is_whitespace() || c == '@') {
-            return Err(format!("`{text}` has no host"));
-        }
-        let port = host.rsplit_once(':').is_some_and(|(_, p)| p.parse::<u16>().is_ok());
-        let host = if port { host.to_owned() } else { format!("{host}:80") };
-        let path = path.trim_end_matches('/');
-        let path = if path.is_empty() { String::new() } else { format!("/{path}") };
-        Ok(Live::Server(host, path))
-    }
-}
 
 impl Live {
     /// Checks that states can be sent there, before the run begins.
@@ -148,18 +116,6 @@ mod tests {
     use super::*;
     use std::io::{BufRead, BufReader};
     use std::net::TcpListener;
-
-    #[test]
-    fn a_folder_or_an_address() {
-        let of = |text: &str| text.parse::<Live>();
-        let server = |host: &str, path: &str| Ok(Live::Server(host.into(), path.into()));
-        assert_eq!(of("out/live"), Ok(Live::Folder("out/live".into())));
-        assert_eq!(of("http://127.0.0.1:9000"), server("127.0.0.1:9000", ""));
-        assert_eq!(of("http://viewer/a/b/"), server("viewer:80", "/a/b"));
-        assert!(
-            of("https://viewer").is_err() && of("http:///x").is_err() && of("http://a b").is_err()
-        );
-    }
 
     #[test]
     fn files_are_posted() {

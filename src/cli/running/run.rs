@@ -1,12 +1,11 @@
 //! `pcadlang run`: one run, its folder, and the summary printed at the end.
 
-use crate::cli::args::{Job, Run};
+use crate::cli::args::{Job, Live, Run};
 use crate::cli::failure::{Failure, plain};
 use crate::cli::print::paragraph;
 use crate::cli::programs::explain::{Explanation, explain};
 use crate::cli::running::files::write_in;
 use crate::cli::running::job::{self, Interrupt, Outcome, RunMode};
-use crate::cli::running::live::Live;
 use crate::cli::running::{quality, ready, resume};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;

@@ -18,6 +18,7 @@ mod lathe;
 mod mesh;
 pub mod obj;
 mod patches;
+pub(crate) mod posed_skin;
 mod profile_path;
 mod real;
 mod revolve;
@@ -35,9 +36,10 @@ pub use lathe::{Caps, LatheGradient, lathe, vjp_lathe};
 pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
 pub use patches::Patches;
 pub(crate) use patches::Run;
+pub use posed_skin::{PosedSkin, RestJoint, Skinned};
 pub use profile_path::{Profile, Wall};
 pub(crate) use solid::MeshesMark;
-pub use solid::{Instance, PlacedGradient, PosedSkin, Solid};
+pub use solid::{Instance, PlacedGradient, Solid};
 pub use sphere::{sphere, vjp_sphere};
 
 /// Returns the matrix a b'.

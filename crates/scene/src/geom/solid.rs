@@ -5,12 +5,12 @@
 //! Invariants: a member's parts are numbered after those of the members before it
 //! (numbers beyond 65534 are all drawn as that one); all landmarks have different names.
 
-use super::armature::Armature;
 use super::detail::{Coarse, Detail};
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
+use super::posed_skin::PosedSkin;
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
-use glam::{Affine3A, DMat3, DVec3};
+use glam::{DMat3, DVec3};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::{Arc, LazyLock, Weak};
@@ -28,18 +28,6 @@ pub struct Instance {
     pub detail: Option<Arc<Detail>>,
     /// The body it is a part of, if it is the part of a posed one.
     pub skin: Option<PosedSkin>,
-}
-
-/// The body that a mesh is a part of, and the transforms that pose it.
-#[derive(Clone, Debug)]
-pub struct PosedSkin {
-    /// The body at rest.
-    pub body: Arc<Armature>,
-    /// The transform of each joint. Those of joints that do not move this part may be of
-    /// an earlier pose.
-    pub transforms: Arc<[Affine3A]>,
-    /// The part, by its place among those of the body.
-    pub part: usize,
 }
 
 impl Instance {

@@ -337,18 +337,18 @@ impl Armature {
         &self.skin.parts
     }
 
-    /// Whether another body is the same but for its shape: vertices and joints correspond.
-    pub(in crate::geom) fn shares_skin(&self, other: &Armature) -> bool {
-        Arc::ptr_eq(&self.skin, &other.skin)
+    /// A number that bodies share if they differ in shape only.
+    pub(super) fn identity(&self) -> usize {
+        Arc::as_ptr(&self.skin) as usize
     }
 
     /// The joints that move a part, by its place.
-    pub(in crate::geom) fn joints_of_part(&self, part: usize) -> &[u16] {
+    pub(super) fn joints_of_part(&self, part: usize) -> &[u16] {
         self.skin.parts.get(part).map_or(&[], |p| &p.joints)
     }
 
     /// The normals of the vertices at rest.
-    pub(in crate::geom) fn normals(&self) -> &[Vec3] {
+    pub(super) fn normals(&self) -> &[Vec3] {
         &self.surface.normals
     }
 

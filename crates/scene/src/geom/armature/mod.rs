@@ -9,6 +9,7 @@ mod pose;
 mod posed;
 mod rig;
 mod rig_json;
+mod skinned;
 mod stretch;
 mod torque;
 

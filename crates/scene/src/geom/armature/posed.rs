@@ -3,7 +3,8 @@
 
 use super::body::{Armature, Part};
 use super::{JointPose, Keypoint, Rules};
-use crate::geom::{GeomError, Instance, Landmark, PosedSkin, Solid};
+use crate::geom::posed_skin::{PosedSkin, Skinned};
+use crate::geom::{GeomError, Instance, Landmark, Solid};
 use glam::{Affine3A, DAffine3};
 use std::sync::{Arc, OnceLock};
 
@@ -39,7 +40,7 @@ impl Pose {
                 });
                 same.unwrap_or_else(|| {
                     let skin = PosedSkin {
-                        body: Arc::clone(&self.body),
+                        body: Arc::clone(&self.body) as Arc<dyn Skinned>,
                         transforms: Arc::clone(&self.transforms),
                         part: i,
                     };

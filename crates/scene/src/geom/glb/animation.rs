@@ -1,28 +1,10 @@
 //! Several states of a scene as one animation: by the joints of its bodies where it has
 //! any, otherwise by moving vertices.
 
+use super::channels::Animation;
 use super::document::Document;
 use super::{morphs, skins};
 use crate::geom::{GeomError, Solid};
-use serde_json::{Value, json};
-
-/// The channels and samplers of an animation under way.
-pub struct Animation {
-    /// The accessor of the times.
-    times: usize,
-    channels: Vec<Value>,
-    samplers: Vec<Value>,
-}
-
-impl Animation {
-    /// Animates a property of a node. `how` is `LINEAR` or `STEP`.
-    pub fn channel(&mut self, node: usize, path: &str, output: usize, how: &str) {
-        let sampler = json!({ "input": self.times, "output": output, "interpolation": how });
-        let target = json!({ "node": node, "path": path });
-        self.channels.push(json!({ "sampler": self.samplers.len(), "target": target }));
-        self.samplers.push(sampler);
-    }
-}
 
 /// Returns the bytes of a `.glb` file that plays states one after another, `seconds`
 /// apart. A body keeps its skin: its joints move. Anything else moves by morph targets;
@@ -36,14 +18,11 @@ pub fn write_animation(states: &[Solid], seconds: f64) -> Result<Vec<u8>, GeomEr
     }
     let mut d = Document::default();
     let times: Vec<f32> = (0..states.len()).map(|i| (i as f64 * seconds) as f32).collect();
-    let mut animation =
-        Animation { times: d.numbers(&times), channels: Vec::new(), samplers: Vec::new() };
+    let mut animation = Animation::at(d.numbers(&times));
     if !skins::add(&mut d, &mut animation, states) {
         morphs::add(&mut d, &mut animation, states)?;
     }
-    d.animation(json!({
-        "name": "states", "channels": animation.channels, "samplers": animation.samplers,
-    }));
+    d.animation(animation.finish());
     Ok(d.finish())
 }
 
@@ -52,6 +31,7 @@ mod tests {
     use super::*;
     use crate::geom::{Affine, cuboid, sphere};
     use glam::{DVec3, Vec3};
+    use serde_json::Value;
     use std::sync::Arc;
 
     fn json_of(glb: &[u8]) -> Value {

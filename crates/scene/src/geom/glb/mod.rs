@@ -5,6 +5,7 @@
 //! bytes.
 
 mod animation;
+mod channels;
 mod document;
 mod morphs;
 mod skins;

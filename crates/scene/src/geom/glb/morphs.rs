@@ -1,7 +1,7 @@
 //! States by morph targets: each state is a target, and the animation moves the weight from
 //! one to the next.
 
-use super::animation::Animation;
+use super::channels::Animation;
 use super::document::Document;
 use crate::geom::{GeomError, Mesh, Solid};
 use glam::Vec3;

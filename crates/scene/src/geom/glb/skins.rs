@@ -1,9 +1,8 @@
 //! States by skeletal animation: each body is a skinned mesh at rest, whose joints move.
 
-use super::animation::Animation;
+use super::channels::Animation;
 use super::document::Document;
-use crate::geom::armature::Armature;
-use crate::geom::{Instance, Solid};
+use crate::geom::{Instance, RestJoint, Skinned, Solid};
 use glam::{DAffine3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -15,7 +14,7 @@ const SHEAR: f64 = 1e-3;
 
 /// A body in one state.
 struct PlacedBody {
-    body: Arc<Armature>,
+    body: Arc<dyn Skinned>,
     /// Where its root is.
     placed: DAffine3,
     /// The transform of each joint.
@@ -38,7 +37,8 @@ pub fn add(d: &mut Document, animation: &mut Animation, states: &[Solid]) -> boo
     // Joints are animated about the shape of the last state, the best one of a film.
     let Some(last) = states.last().filter(|s| !s.is_empty()) else { return false };
     let is_same = |s: &Vec<PlacedBody>| {
-        s.len() == last.len() && s.iter().zip(last).all(|(a, b)| a.body.shares_skin(&b.body))
+        s.len() == last.len()
+            && s.iter().zip(last).all(|(a, b)| a.body.identity() == b.body.identity())
     };
     if !states.iter().all(is_same) {
         return false;
@@ -60,7 +60,7 @@ fn bodies(state: &Solid) -> Option<Vec<PlacedBody>> {
     for Instance { skin, affine, .. } in state.instances() {
         let skin = skin.as_ref()?;
         let is_next = all.last().is_none_or(|b| {
-            !Arc::ptr_eq(&b.body, &skin.body) || b.placed != affine.0 || skin.part <= before
+            b.body.identity() != skin.body.identity() || b.placed != affine.0 || skin.part <= before
         });
         if is_next {
             let transforms = skin.transforms.iter().map(wide).collect();
@@ -91,10 +91,10 @@ fn wide(t: &glam::Affine3A) -> DAffine3 {
 /// Returns, for the root and each joint of a body, its motion over the states, relative to
 /// its parent; `None` if a motion has shear.
 fn motion(states: &[&PlacedBody]) -> Option<Vec<Vec<Parts>>> {
-    let rig = states.last()?.body.rig();
-    let at_rest = |j: usize| DAffine3::from_translation(rig.joints()[j].head);
+    let joints = states.last()?.body.joints();
+    let at_rest = |j: usize| DAffine3::from_translation(joints[j].head);
     let mut all = vec![states.iter().map(|s| parts(s.placed)).collect::<Option<Vec<_>>>()?];
-    for (j, joint) in rig.joints().iter().enumerate() {
+    for (j, joint) in joints.iter().enumerate() {
         let of = |s: &&PlacedBody| {
             let own = s.transforms[j] * at_rest(j);
             let parent = joint.parent.map_or(DAffine3::IDENTITY, |p| s.transforms[p] * at_rest(p));
@@ -121,12 +121,11 @@ fn add_body(
     motion: &[Vec<Parts>],
 ) {
     let Some(PlacedBody { body, .. }) = states.last() else { return };
-    let rig = body.rig();
+    let rest: Vec<RestJoint> = body.joints();
     let root = d.root(json!({ "name": "body" }));
-    let nodes: Vec<usize> =
-        rig.joints().iter().map(|j| d.node(json!({ "name": &*j.name }))).collect();
+    let nodes: Vec<usize> = rest.iter().map(|j| d.node(json!({ "name": &*j.name }))).collect();
     let mut children: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (j, joint) in rig.joints().iter().enumerate() {
+    for (j, joint) in rest.iter().enumerate() {
         children.entry(joint.parent.map_or(root, |p| nodes[p])).or_default().push(nodes[j]);
     }
     for (node, of) in children {
@@ -137,13 +136,11 @@ fn add_body(
     }
     // From the body's own coordinates to those of a joint at rest.
     let inverse: Vec<Mat4> =
-        rig.joints().iter().map(|j| Mat4::from_translation(-j.head.as_vec3())).collect();
+        rest.iter().map(|j| Mat4::from_translation(-j.head.as_vec3())).collect();
     let inverse = d.matrices(&inverse);
     let skin =
         d.skin(json!({ "joints": nodes, "inverseBindMatrices": inverse, "skeleton": nodes[0] }));
-    let influences = body.influences();
-    let joints: Vec<[u16; 4]> = influences.iter().map(|i| i.joints).collect();
-    let weights: Vec<[f32; 4]> = influences.iter().map(|i| i.weights).collect();
+    let (joints, weights): (Vec<_>, Vec<_>) = body.weights().into_iter().unzip();
     let [joints, weights] = d.influences(&joints, &weights);
     let (positions, normals) = (d.positions(body.positions()), d.vectors(body.normals()));
     let corners = d.corners(body.triangles());
@@ -173,7 +170,7 @@ fn add_body(
 /// Returns the targets, and the weight of each in each state.
 fn shapes(d: &mut Document, states: &[&PlacedBody]) -> (Vec<Value>, Vec<f32>) {
     let Some(last) = states.last() else { return Default::default() };
-    let mut shapes: Vec<&Arc<Armature>> = Vec::new();
+    let mut shapes: Vec<&Arc<dyn Skinned>> = Vec::new();
     let mut own: Vec<Option<usize>> = Vec::new();
     for state in states {
         let known = shapes.iter().position(|s| s.positions() == state.body.positions());
@@ -236,7 +233,7 @@ mod tests {
     use super::super::animation::write_animation;
     use super::*;
     use crate::geom::Affine;
-    use crate::geom::armature::{Influence, JointPose, NamedJoint, Rig, Rules};
+    use crate::geom::armature::{Armature, Influence, JointPose, NamedJoint, Rig, Rules};
 
     /// A strip of four joints in a row, with two vertices a joint.
     fn worm() -> Arc<Armature> {
