@@ -145,15 +145,14 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
 
 /// Formats a table of the quantities of both runs.
 fn quantities(compared: &Comparison) -> String {
-    let ([one, two], both) = (&compared.runs, compared.quantities());
+    let both = compared.quantities();
     let head =
         ["quantity", "mean A", "sd A", "mean B", "sd B", "difference/sd", "r_hat A", "r_hat B"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for Apart { name, apart, .. } in both.iter().take(LISTED) {
-        let of = |t: &RunSummary, what: &str| number(t.number(name, what));
-        let mut row =
-            vec![name.clone(), of(one, "mean"), of(one, "sd"), of(two, "mean"), of(two, "sd")];
-        row.extend([number(*apart), of(one, "r_hat"), of(two, "r_hat")]);
+    for Apart { name, a, b, apart } in both.iter().take(LISTED) {
+        let of = |summary: &Value, what: &str| number(summary[what].as_f64().unwrap_or(f64::NAN));
+        let mut row = vec![name.clone(), of(a, "mean"), of(a, "sd"), of(b, "mean"), of(b, "sd")];
+        row.extend([number(*apart), of(a, "r_hat"), of(b, "r_hat")]);
         rows.push(row);
     }
     let mut text = table::aligned(&rows);
