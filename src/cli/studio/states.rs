@@ -64,8 +64,11 @@ impl Run {
         let missing =
             |what: &str, n: usize| Problem::plain(format!("{} has no {what} {n}", self.name));
         let saved: SavedTrace = match *name {
+            // Kept draws are thinned while a run goes on: a page may know of more.
             StateName { draw: Some(n), .. } => {
-                self.kept()?.into_iter().nth(n).ok_or_else(|| missing("kept draw", n))?.trace
+                let mut kept = self.kept()?;
+                let last = kept.len().checked_sub(1).ok_or_else(|| missing("kept draw", n))?;
+                kept.swap_remove(n.min(last)).trace
             }
             StateName { film: Some(n), .. } => {
                 self.film()?.into_iter().nth(n).ok_or_else(|| missing("film state", n))?.trace
