@@ -25,4 +25,4 @@ pub use format::Header;
 pub use learn::{Learn, learn};
 pub use read::Bank;
 pub use record::{Entry, Named};
-pub use view::{as_view, picture};
+pub use view::{as_view, picture, view};

@@ -34,3 +34,11 @@ pub fn as_view(value: &Value, camera: Option<Camera>) -> Option<Arc<View>> {
     let camera = camera.unwrap_or_else(|| Camera::default_for(256, 256));
     value.downcast::<SolidValue>().map(|s| Arc::new(View::new(s.0.clone(), camera)))
 }
+
+/// Returns a program's view: the last top-level name that is a view, or else the last
+/// solid, seen from a camera.
+pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<Arc<View>> {
+    let at = picture(trace, draws)?;
+    let values = trace.query(&[at], draws).ok()?;
+    as_view(values.first()?, camera)
+}

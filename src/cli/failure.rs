@@ -1,9 +1,11 @@
 //! Why a command fails.
 
 use pcadlang::Error;
+use pcadlang::session::Trouble;
 use std::fmt::{Display, Formatter};
 
 /// Why a command failed.
+#[derive(Debug)]
 pub enum Failure {
     /// Diagnostics with source locations.
     Program(Box<Error>),
@@ -11,6 +13,17 @@ pub enum Failure {
     Plain(String, Option<String>),
     /// The user interrupted the command; results so far are kept.
     Interrupted,
+}
+
+impl Failure {
+    /// Adds a hint to a plain message.
+    #[must_use]
+    pub fn hint(self, hint: impl Into<String>) -> Failure {
+        match self {
+            Failure::Plain(message, _) => Failure::Plain(message, Some(hint.into())),
+            other => other,
+        }
+    }
 }
 
 /// The message, without colours or a final line break.
@@ -33,4 +46,14 @@ impl From<Error> for Failure {
 /// Makes a failure from a message without a hint.
 pub fn plain(message: impl Into<String>) -> Failure {
     Failure::Plain(message.into(), None)
+}
+
+impl From<Trouble> for Failure {
+    fn from(t: Trouble) -> Self {
+        match t {
+            Trouble::Program(e) => Failure::Program(e),
+            Trouble::Plain(message, hint) => Failure::Plain(message, hint),
+            Trouble::Stopped => Failure::Interrupted,
+        }
+    }
 }

@@ -1,12 +1,11 @@
 //! Finds and evaluates the view of a program in a trace.
 
-use pcadlang::bank;
+pub use pcadlang::bank::view;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Value;
-use pcadlang::render::{Camera, View};
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::scene::ViewValue;
-use pcadlang::trace::{Constraint, Draws, Trace};
+use pcadlang::trace::{Constraint, Draws, SaveError, SavedTrace, Trace};
 use pcadlang::{Error, Model};
 use std::sync::Arc;
 
@@ -22,18 +21,15 @@ pub fn rebuilt(model: &Model, choices: &[(u64, Constraint)], draws: Draws) -> Re
     built.map(|(trace, _)| trace).map_err(|e| model.run_error(*e))
 }
 
+/// Loads a saved state.
+pub fn loaded(model: &Model, saved: &SavedTrace) -> Result<Trace, SaveError> {
+    Trace::load(Arc::clone(model.code()), model.hash(), saved, model.limits().clone())
+}
+
 /// Returns the operand of the program's view: the last top-level name that is a view.
 pub fn view_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
     let is_view =
         |values: Vec<Value>| values.first().is_some_and(|v| v.downcast::<ViewValue>().is_some());
     globals.into_iter().find(|o| trace.query(&[*o], draws).is_ok_and(is_view))
-}
-
-/// Returns the program's view: the last top-level name that is a view, or else the last
-/// solid, seen from a camera.
-pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<Arc<View>> {
-    let at = bank::picture(trace, draws)?;
-    let values = trace.query(&[at], draws).ok()?;
-    bank::as_view(values.first()?, camera)
 }

@@ -4,7 +4,7 @@
 
 use std::fmt;
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// A source of files.
 pub trait Loader: Send + Sync {
@@ -142,4 +142,48 @@ pub fn folder_of(file: &Path) -> &Path {
 /// Replaces the empty path by the current folder.
 fn existing(path: &Path) -> &Path {
     if path.as_os_str().is_empty() { Path::new(".") } else { path }
+}
+
+/// Returns a path within a folder. Neither `..` nor a link leads out of it.
+///
+/// # Errors
+/// If it leads out of the folder, or names nothing.
+pub fn path_within(folder: &Path, asked: &str) -> Result<PathBuf, String> {
+    let out = || format!("{asked}: only files of the opened folder can be used");
+    let asked_path = Path::new(asked);
+    let is_plain = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
+    if asked.is_empty() || asked.contains('\0') || !asked_path.components().all(is_plain) {
+        return Err(out());
+    }
+    let path = folder.join(asked_path);
+    // A file that does not exist yet is judged by the nearest folder that does.
+    let there = path.ancestors().find(|p| p.exists()).unwrap_or(folder);
+    let real = |p: &Path| p.canonicalize().map_err(|e| format!("{asked}: {e}"));
+    match real(there)?.starts_with(real(folder)?) {
+        true => Ok(path),
+        false => Err(out()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_path_leads_out_of_the_folder() {
+        let folder = std::env::temp_dir().join(format!("pcadlang-guard-{}", std::process::id()));
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        std::fs::write(folder.join("sub/a.png"), b"a").unwrap();
+        let ok = |p: &str| path_within(&folder, p).is_ok();
+        assert!(ok("sub/a.png") && ok("./sub/a.png") && ok("new/b.png"));
+        for out in ["..", "../x", "sub/../../x", "/etc/passwd", "", "sub/\0", "sub/../.."] {
+            assert!(!ok(out), "{out:?}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("/etc", folder.join("link")).unwrap();
+            assert!(!ok("link/passwd") && !ok("link/new"));
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }

@@ -3,7 +3,7 @@
 
 use super::picture::detected;
 use crate::lang::value::Located;
-use crate::render::{ContourSlice, View};
+use crate::render::View;
 use crate::report::pictures;
 use crate::scene::ImageValue;
 use crate::vision::{ContourMap, Photo};
@@ -88,6 +88,7 @@ impl Layer {
     ) -> Result<RgbImage, String> {
         let photo = image.and_then(ImageValue::as_photo);
         let needed = || photo.ok_or("there is no photograph".to_owned());
+        let seen = || image.and_then(photo_contours).ok_or("there is no photograph".to_owned());
         let camera = view.camera();
         let of = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
         let (width, height) = scaled(of, size);
@@ -108,16 +109,12 @@ impl Layer {
             Layer::Regions => pictures::parts(&frame()),
             Layer::Mask => image::DynamicImage::ImageLuma8(pictures::mask(&frame())).to_rgb8(),
             Layer::Contours => pictures::contours(width, height, &view.contours(size).slice()),
-            Layer::PhotoContours => with_strokes(&observed(image)?, |strokes| {
-                pictures::contours(width, height, strokes)
-            }),
+            Layer::PhotoContours => pictures::contour_map(width, height, &seen()?),
             Layer::Residuals => {
-                let map = observed(image)?;
+                let map = seen()?;
                 let contours = view.contours(map.width.max(map.height));
                 let far = FAR * map.width.max(map.height) as f32;
-                with_strokes(&map, |seen| {
-                    pictures::residuals((width, height), &contours.slice(), seen, far)
-                })
+                pictures::residuals((width, height), &contours.slice(), &map, far)
             }
             Layer::Joints => {
                 if located.is_empty() {
@@ -139,23 +136,12 @@ impl Layer {
     }
 }
 
-/// Returns the contours of the photograph: those that the program compared with, or else
-/// those of the built-in detector.
-fn observed(image: Option<&ImageValue>) -> Result<ContourMap, String> {
-    let image = image.ok_or("there is no photograph")?;
-    if let Some(map) = image.seen() {
-        return Ok(map);
-    }
-    let photo = image.as_photo().ok_or("there is no photograph")?.clone();
-    // On a copy, so that the contours do not count as used.
-    ImageValue::photo(photo).map().cloned()
-}
-
-/// Calls with the points of a map as strokes of one pixel, about which they are apart.
-fn with_strokes<T>(map: &ContourMap, f: impl FnOnce(&ContourSlice) -> T) -> T {
-    let length = vec![1.0; map.len()];
-    let ContourMap { x, y, tx, ty, .. } = map;
-    f(&ContourSlice { width: map.width, height: map.height, x, y, tx, ty, length: &length })
+/// Returns the contours of a photograph, to look at: those that the program compared with
+/// or, if it used none, those of the built-in detector. `None` if there is no photograph.
+pub fn photo_contours(image: &ImageValue) -> Option<ContourMap> {
+    // On a copy, so that contours detected here do not count as used.
+    let found = || ImageValue::photo(image.as_photo()?.clone()).map().ok().cloned();
+    image.seen().or_else(found)
 }
 
 /// Returns a size with this longer side.

@@ -34,7 +34,7 @@ pub use choices::{ChoiceRow, Marks, from_json, to_json};
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use export::{exported, exported_operand};
-pub use layers::Layer;
+pub use layers::{Layer, photo_contours};
 pub use picture::{Picture, detected, over};
 pub use render::observed_image;
 pub use reply::{Reply, Request, Trouble};

@@ -4,12 +4,13 @@ use super::background::{Background, Finished, Status};
 use super::reply::{Reply, Trouble};
 use crate::bank;
 use crate::lang::code::{Eager, Observed};
+use crate::lang::reach::path_within;
 use crate::model::{Model, Program};
-use crate::render::{Camera, View};
+use crate::render::View;
 use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Address, Constraint, Draws, Limits, Stop, Trace};
 use std::collections::{BTreeSet, VecDeque};
-use std::path::{Component, Path};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -51,8 +52,8 @@ pub struct Session {
     /// The address that [`Session::assign`] changed last, if the next change of it joins
     /// that one.
     pub(super) dragged: Option<Address>,
-    /// Whether entries may use only files below the current folder.
-    is_confined: bool,
+    /// The folder below which entries may use files, if not everywhere.
+    confined: Option<PathBuf>,
 }
 
 /// A state for `:undo`. Its choices are enough to rebuild the trace, to the last bit.
@@ -112,7 +113,7 @@ impl Session {
             last: None,
             watch: None,
             dragged: None,
-            is_confined: false,
+            confined: None,
         };
         let model = Arc::clone(&session.model);
         let (mut trace, said) = session.restart(&model, &[], &Arc::default())?;
@@ -127,21 +128,19 @@ impl Session {
         self.watch = Some(Box::new(watch));
     }
 
-    /// From now on, entries read and write only files below the current folder.
-    pub fn confine(&mut self) {
-        self.is_confined = true;
+    /// From now on, entries read and write only files below a folder, to which their paths
+    /// are relative.
+    pub fn confine(&mut self, folder: &Path) {
+        self.confined = Some(folder.to_owned());
     }
 
     /// Checks a file that an entry names.
     pub(super) fn permit(&self, path: &str) -> Result<(), Trouble> {
-        let is_below = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
-        match self.is_confined && !Path::new(path).components().all(is_below) {
-            true => {
-                let trouble = Trouble::plain(format!("{path}: not a file of this folder"));
-                Err(trouble.hint("only files below the current folder can be used here"))
-            }
-            false => Ok(()),
-        }
+        let Some(folder) = &self.confined else { return Ok(()) };
+        path_within(folder, path).map(|_| ()).map_err(|_| {
+            let trouble = Trouble::plain(format!("{path}: not a file of this folder"));
+            trouble.hint("only files below the current folder can be used here")
+        })
     }
 
     /// Returns the text of the program.
@@ -174,13 +173,11 @@ impl Session {
         [self.past.back(), self.undone.last()].map(|s| s.map(|s| s.what.as_str()))
     }
 
-    /// Returns the view of the scene in the present state, from another camera if one is
-    /// given; `None` if the program has no view and no solid.
-    pub fn view(&mut self, camera: Option<Camera>) -> Option<Arc<View>> {
+    /// Returns the view of the scene in the present state; `None` if the program has no view
+    /// and no solid.
+    pub fn view(&mut self) -> Option<Arc<View>> {
         let draws = self.looks();
-        let at = bank::picture(&mut self.trace, draws)?;
-        let values = self.trace.query(&[at], draws).ok()?;
-        bank::as_view(values.first()?, camera)
+        bank::view(&mut self.trace, draws, None)
     }
 
     /// Returns the random stream for values that are only inspected.

@@ -3,7 +3,7 @@
 
 mod documents;
 mod edits;
-mod positions;
+pub(in crate::cli) mod positions;
 mod published;
 mod requests;
 mod tokens;

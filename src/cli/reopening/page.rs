@@ -10,10 +10,9 @@ use crate::cli::running::embedded::SCENE;
 use crate::cli::running::files::write_in;
 use crate::cli::running::places;
 use image::RgbImage;
-use image::codecs::jpeg::JpegEncoder;
 use pcadlang::infer::draws::KernelStats;
 use pcadlang::report::html::{Page, Picture, page};
-use pcadlang::report::pictures::png;
+use pcadlang::report::pictures::{jpeg, png};
 use pcadlang::report::{Mode, Quantity, RunDir, seconds};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -183,8 +182,9 @@ fn fitted(file: Vec<u8>) -> Option<Vec<u8>> {
 /// fifth of the space.
 fn sized(file: Vec<u8>) -> Option<Vec<u8>> {
     let file = fitted(file)?;
-    let picture = image::load_from_memory(&file).ok()?.to_rgb8();
-    let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&picture).ok()?;
+    if file.starts_with(b"\xff\xd8") {
+        return Some(file);
+    }
+    let bytes = jpeg(&image::load_from_memory(&file).ok()?.to_rgb8(), QUALITY).ok()?;
     Some(if bytes.len() < file.len() { bytes } else { file })
 }

@@ -4,13 +4,14 @@
 use crate::cli::args::{Cli, Command, Job};
 use crate::cli::failure::{Failure, plain};
 use crate::cli::running::inputs;
+use crate::cli::scene;
 use clap::Parser;
 use pcadlang::infer::{KeptTrace, TrajectoryState};
-use pcadlang::trace::{SavedTrace, Trace};
+use pcadlang::session::{Reply, Session};
+use pcadlang::trace::{SavedTrace, Stop, Trace};
 use pcadlang::{Model, Program};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// The program's text, as it was run.
 pub const PROGRAM: &str = "program.pcad";
@@ -98,6 +99,22 @@ impl Reopened {
         }
     }
 
+    /// Returns its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Opens a session with the program, data, settings and best state of the run.
+    ///
+    /// # Errors
+    /// If any of them cannot be read.
+    pub fn session(&self, seed: u64, stop: Stop) -> Result<(Session, Reply), Failure> {
+        let (program, _) = inputs::observe(self.program()?, &self.job)?;
+        let (mut session, _) = Session::open(program, seed, stop)?;
+        let said = session.take_up(&self.best()?)?;
+        Ok((session, said))
+    }
+
     /// Reads the program, as it was run: its file may have changed since.
     ///
     /// # Errors
@@ -152,8 +169,7 @@ impl Reopened {
     /// # Errors
     /// If the program, its data or its settings are no longer those of the run.
     pub fn trace(&self, model: &Model, saved: &SavedTrace) -> Result<Trace, Failure> {
-        let loaded =
-            Trace::load(Arc::clone(model.code()), model.hash(), saved, model.limits().clone());
-        loaded.map_err(|e| plain(format!("a state of {}: {e}", self.folder.display())))
+        scene::loaded(model, saved)
+            .map_err(|e| plain(format!("a state of {}: {e}", self.folder.display())))
     }
 }

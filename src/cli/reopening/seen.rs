@@ -5,14 +5,12 @@ use crate::cli::failure::{Failure, plain};
 use crate::cli::running::files::write_in;
 use crate::cli::running::places::sized;
 use image::RgbImage;
-use image::codecs::jpeg::JpegEncoder;
 use image::imageops::crop_imm;
 use pcadlang::lang::value::Located;
-use pcadlang::render::ContourSlice;
 use pcadlang::report::RunDir;
-use pcadlang::report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, png};
+use pcadlang::report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, jpeg, png};
 use pcadlang::scene::ImageValue;
-use pcadlang::vision::ContourMap;
+use pcadlang::session::photo_contours;
 
 /// The maximum longer side of the photograph, in pixels.
 const LARGEST: u32 = 1024;
@@ -28,17 +26,17 @@ pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Resul
     let told = |e: image::ImageError| plain(e.to_string());
     if let Some(photo) = image.as_photo() {
         let (w, h) = pictures::picture_size(width, height);
-        let mut bytes = Vec::new();
         let small = sized(photo.rgb(), w.max(h).min(LARGEST));
-        JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&small).map_err(told)?;
+        let bytes = jpeg(&small, QUALITY).map_err(told)?;
         write_in(dir, "photo.jpg", &bytes)?;
         if let Some(joints) = joints(photo.rgb(), located) {
             write_in(dir, "joints.png", &png(&joints).map_err(told)?)?;
         }
     }
-    match image.seen().or_else(|| found(image)) {
+    match photo_contours(image) {
         Some(map) => {
-            write_in(dir, "photo_contours.png", &png(&lines(&map, (width, height))).map_err(told)?)
+            let lines = pictures::contour_map(width, height, &map);
+            write_in(dir, "photo_contours.png", &png(&lines).map_err(told)?)
         }
         None => Ok(()),
     }
@@ -66,26 +64,6 @@ pub fn warnings(
         ));
     }
     all
-}
-
-/// Detects contours with the built-in detector for visual comparison, if the program did
-/// not use any: a person with detected joints is fitted without them. The detection is
-/// made on a copy, so that the contours do not count as used.
-fn found(image: &ImageValue) -> Option<ContourMap> {
-    let photo = image.as_photo()?.clone();
-    ImageValue::photo(photo).map().ok().cloned()
-}
-
-/// Draws the contours of a photograph like those of a scene.
-fn lines(map: &ContourMap, (width, height): (u32, u32)) -> RgbImage {
-    // Points are about one pixel of the map apart.
-    let length = vec![1.0; map.len()];
-    let ContourMap { x, y, tx, ty, .. } = map;
-    pictures::contours(
-        width,
-        height,
-        &ContourSlice { width: map.width, height: map.height, x, y, tx, ty, length: &length },
-    )
 }
 
 /// Crops a photograph to the joints, and draws a line from each detected position to the
@@ -119,6 +97,7 @@ fn joints(photo: &RgbImage, located: &[Located]) -> Option<RgbImage> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pcadlang::vision::ContourMap;
 
     fn located(own: [f64; 2], observed: [f64; 2]) -> Located {
         Located { name: "a".into(), at: own, variance: 0.0, observed, own, own_variance: 0.0 }

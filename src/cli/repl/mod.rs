@@ -61,20 +61,11 @@ fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
         return Session::new(a.seed, stop).map(|s| (s, Reply::default())).map_err(Failure::from);
     };
     if Path::new(path).join("run.json").is_file() {
-        return reopened(Path::new(path), a.seed, stop);
+        return Reopened::open(Path::new(path))?.session(a.seed, stop);
     }
     let job = job(a, path);
     let (program, _) = inputs::observe(inputs::program(&job.inputs, false)?, &job)?;
     Ok(Session::open(program, a.seed, stop)?)
-}
-
-/// Opens a session with the program, data, settings and best state of a run.
-fn reopened(folder: &Path, seed: u64, stop: Stop) -> Result<(Session, Reply), Failure> {
-    let run = Reopened::open(folder)?;
-    let (program, _) = inputs::observe(inputs::program(&run.job.inputs, true)?, &run.job)?;
-    let (mut session, _) = Session::open(program, seed, stop)?;
-    let said = session.take_up(&run.best()?)?;
-    Ok((session, said))
 }
 
 /// Returns the equivalent arguments of `run`.
@@ -101,16 +92,6 @@ fn graphics(a: &Repl) -> Graphics {
     let variable = |name: &str| std::env::var(name).ok();
     a.graphics
         .unwrap_or_else(|| pictures::graphics_from_env(variable, std::io::stdout().is_terminal()))
-}
-
-impl From<Trouble> for Failure {
-    fn from(t: Trouble) -> Self {
-        match t {
-            Trouble::Program(e) => Failure::Program(e),
-            Trouble::Plain(message, hint) => Failure::Plain(message, hint),
-            Trouble::Stopped => Failure::Interrupted,
-        }
-    }
 }
 
 /// A session and how it is displayed.
@@ -242,8 +223,8 @@ impl Front {
             Some(Request::Edit) => reply = self.edit()?,
             Some(Request::Open(folder)) => {
                 let seed = self.seed;
-                let (other, _) =
-                    reopened(&folder, seed, Stop::when(Arc::clone(&self.interrupts.asked)))?;
+                let stop = Stop::when(Arc::clone(&self.interrupts.asked));
+                let (other, _) = Reopened::open(&folder)?.session(seed, stop)?;
                 reply = self
                     .session
                     .borrow_mut()

@@ -31,6 +31,8 @@ const FIRST: Duration = Duration::from_millis(200);
 pub struct Shown {
     /// Its view.
     pub view: Option<ViewValue>,
+    /// Its joints beside those that were found in the photograph.
+    pub located: Vec<Located>,
     /// The fraction of the mesh's vertices that are in the picture.
     pub inside: Option<f64>,
     /// How far the chains' last states cover the same pixels: the number of pixels that
@@ -59,6 +61,7 @@ pub fn show_best(
         draw(dir, &view, &located, chains, seed, image.and_then(ImageValue::as_photo), &mut shown)?;
         image.map_or(Ok(()), |image| show_seen(dir, image, &located))?;
         shown.view = Some(ViewValue(view));
+        shown.located = located;
     }
     for x in model.exports() {
         export(dir, model, &mut trace, x, seed)?;

@@ -2,19 +2,20 @@
 //! of its page.
 
 use crate::cli::failure::Failure;
+use crate::cli::running::best::Shown;
 use crate::cli::running::files::write_in;
 use crate::cli::running::ready::Ready;
 use crate::cli::scene;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use image::RgbImage;
-use image::codecs::jpeg::JpegEncoder;
-use pcadlang::infer::{BestState, KeptTrace};
+use pcadlang::infer::KeptTrace;
 use pcadlang::lang::value::Located;
 use pcadlang::render::View;
 use pcadlang::report::RunDir;
 use pcadlang::report::embedded::{EmbeddedDraw, embedded};
+use pcadlang::report::pictures::jpeg;
+use pcadlang::scene::ViewValue;
 use pcadlang::session::Layer;
-use pcadlang::trace::Trace;
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
@@ -26,29 +27,27 @@ const DRAWS: usize = 40;
 const SIDE: u32 = 512;
 const QUALITY: u8 = 85;
 
-/// Writes the file, if the program has a view.
+/// Writes the file for the best state, of this density and as it was `shown`, if the
+/// program has a view.
 pub fn write_scene(
     dir: &RunDir,
     seed: u64,
     ready: &Ready,
-    best: Option<&BestState>,
+    (log_joint, shown): (f64, &Shown),
     kept: &[KeptTrace],
 ) -> Result<(), Failure> {
-    let Some(best) = best else { return Ok(()) };
-    let (model, draws) = (&ready.model, scene::predictive(seed, 0));
-    let mut trace = scene::rebuilt(model, &best.choices, draws)?;
-    let Some(view) = scene::view(&mut trace, draws, None) else { return Ok(()) };
+    let Shown { view: Some(ViewValue(view)), located, .. } = shown else { return Ok(()) };
+    let draws = scene::predictive(seed, 0);
     let mut all = vec![EmbeddedDraw {
         chain: None,
         draw: None,
-        log_joint: best.log_joint,
+        log_joint,
         label: Some("the best state".to_owned()),
         solid: view.solid().clone(),
     }];
     let every = kept.len().div_ceil(DRAWS).max(1);
     for k in kept.iter().step_by(every) {
-        let code = Arc::clone(model.code());
-        let loaded = Trace::load(code, model.hash(), &k.trace, model.limits().clone());
+        let loaded = scene::loaded(&ready.model, &k.trace);
         // A state that cannot be rebuilt is one fewer to look at.
         let Some(view) = loaded.ok().and_then(|mut t| scene::view(&mut t, draws, None)) else {
             continue;
@@ -61,11 +60,10 @@ pub fn write_scene(
             solid: view.solid().clone(),
         });
     }
-    let Some(mut shown) = embedded(view.camera(), &all) else { return Ok(()) };
-    let located = trace.located();
-    shown["photo"] = json!(layer(Layer::Photo, &view, ready, &located));
-    shown["layers"] = Value::Object(layers(&view, ready, &located));
-    write_in(dir, SCENE, shown.to_string().as_bytes())
+    let Some(mut scene) = embedded(view.camera(), &all) else { return Ok(()) };
+    scene["photo"] = json!(layer(Layer::Photo, view, ready, located));
+    scene["layers"] = Value::Object(layers(view, ready, located));
+    write_in(dir, SCENE, scene.to_string().as_bytes())
 }
 
 /// Draws the layers that apply, as `data:` addresses.
@@ -76,7 +74,6 @@ fn layers(view: &Arc<View>, ready: &Ready, located: &[Located]) -> Map<String, V
 
 fn layer(layer: Layer, view: &Arc<View>, ready: &Ready, located: &[Located]) -> Option<String> {
     let picture: RgbImage = layer.draw(view, ready.image(), located, SIDE).ok()?;
-    let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&picture).ok()?;
+    let bytes = jpeg(&picture, QUALITY).ok()?;
     Some(format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes)))
 }

@@ -395,7 +395,8 @@ fn fill(
     let best = best.state();
     let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;
     show_places(dir, s.seed, model, &places, ready.photo())?;
-    write_scene(dir, s.seed, ready, best.as_deref(), &kept.all())?;
+    let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
+    write_scene(dir, s.seed, ready, (log_joint, &drawn), &kept.all())?;
     warnings.extend(disagreement(&drawn));
     warnings.extend(outside(&drawn));
     let summary = json!({

@@ -3,8 +3,8 @@
 
 use crate::cli::args::Live;
 use crate::cli::failure::{Failure, plain};
-use crate::cli::running::job::machine_threads;
 use crate::cli::running::progress::Ending;
+use crate::cli::running::ration::Ration;
 use crate::cli::running::ready::Ready;
 use crate::cli::running::watched::Watched;
 use crate::cli::scene;
@@ -19,10 +19,8 @@ use std::net::TcpStream;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// The least time between two states.
-const BETWEEN: Duration = Duration::from_millis(200);
-/// The part of the machine that may go to them.
-const SHARE: f64 = 0.025;
+/// The time between two looks whether the best state has improved.
+const LOOK: Duration = Duration::from_millis(200);
 /// The longer side of the picture, in pixels.
 const SIDE: u32 = 512;
 /// How long a viewer may take to answer.
@@ -47,16 +45,15 @@ impl Live {
     /// Sends the best state whenever it has improved, until the chains end, and once more
     /// then. A viewer that cannot be reached misses states; the run goes on.
     pub fn follow(&self, ready: &Ready, watched: &Watched, ending: &Ending) {
-        let (mut sent, mut rest, mut ended) = (f64::NEG_INFINITY, BETWEEN, false);
+        let (mut sent, mut ration, mut ended) = (f64::NEG_INFINITY, Ration::default(), false);
         while !ended {
-            ended = ending.within(rest);
+            ended = ending.within(ration.rest().max(LOOK));
             let Some(best) = watched.best.state().filter(|b| b.log_joint > sent) else { continue };
             let begun = Instant::now();
             // What cannot be drawn now may be drawable later.
             let _ = self.show(ready, watched, &best);
             sent = best.log_joint;
-            let share = SHARE * machine_threads() as f64;
-            rest = BETWEEN.max(begun.elapsed().div_f64(share).min(10 * BETWEEN));
+            ration.took(begun.elapsed());
         }
     }
 

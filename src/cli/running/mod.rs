@@ -10,6 +10,7 @@ pub(in crate::cli) mod live;
 pub(in crate::cli) mod places;
 pub(in crate::cli) mod progress;
 pub(in crate::cli) mod quality;
+pub(in crate::cli) mod ration;
 pub(in crate::cli) mod ready;
 pub(in crate::cli) mod resume;
 pub(in crate::cli) mod run;

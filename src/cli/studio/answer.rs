@@ -2,11 +2,11 @@
 
 use super::protocol;
 use crate::cli::failure::Failure;
+use crate::cli::lsp::positions::Encoding;
 use axum::body::Bytes;
 use pcadlang::diag::{Diagnostic, Severity, SourceMap};
 use pcadlang::session::Trouble;
 use serde_json::{Map, Value, json};
-use std::fmt;
 use std::sync::Arc;
 
 /// An answer to a request.
@@ -15,14 +15,6 @@ pub enum Answer {
     Json(Value),
     /// Data with a header.
     Bytes(Map<String, Value>, Arc<Vec<u8>>),
-}
-
-/// Why a request was not done.
-#[derive(Debug)]
-pub struct Problem {
-    message: String,
-    hint: Option<String>,
-    diagnostics: Value,
 }
 
 /// A frame for the page.
@@ -35,14 +27,29 @@ pub enum Frame {
 }
 
 /// Returns the frame of an answer to the request with this number.
-pub fn frame(id: u64, done: Result<Answer, Problem>) -> Frame {
+pub fn frame(id: u64, done: Result<Answer, Failure>) -> Frame {
     match done {
         Ok(Answer::Json(value)) => Frame::Text(protocol::result(id, &value)),
         Ok(Answer::Bytes(header, data)) => {
             Frame::Binary(protocol::binary(id, header, &data).into())
         }
-        Err(p) => {
-            Frame::Text(protocol::error(Some(id), &p.message, p.hint.as_deref(), p.diagnostics))
+        Err(failure) => Frame::Text(refusal(id, &failure)),
+    }
+}
+
+fn refusal(id: u64, failure: &Failure) -> String {
+    let error = |message: &str, hint: Option<&str>, diagnostics| {
+        protocol::error(Some(id), message, hint, diagnostics)
+    };
+    match failure {
+        Failure::Plain(message, hint) => error(message, hint.as_deref(), json!([])),
+        Failure::Interrupted => error(&Trouble::Stopped.to_string(), None, json!([])),
+        Failure::Program(e) => {
+            let first = e.diagnostics.first();
+            let message = first.map_or("", |d| &d.message);
+            let hint = first.and_then(|d| d.hints.first()).map(String::as_str);
+            let all: Vec<Value> = e.diagnostics.iter().map(|d| place(d, &e.sources)).collect();
+            error(message, hint, json!(all))
         }
     }
 }
@@ -50,53 +57,6 @@ pub fn frame(id: u64, done: Result<Answer, Problem>) -> Frame {
 impl From<Value> for Answer {
     fn from(value: Value) -> Answer {
         Answer::Json(value)
-    }
-}
-
-impl Problem {
-    /// A message without a place in a program.
-    pub fn plain(message: impl Into<String>) -> Problem {
-        Problem { message: message.into(), hint: None, diagnostics: json!([]) }
-    }
-
-    /// Adds what may help.
-    pub fn hint(self, hint: impl Into<String>) -> Problem {
-        Problem { hint: Some(hint.into()), ..self }
-    }
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
-    }
-}
-
-impl From<pcadlang::Error> for Problem {
-    fn from(e: pcadlang::Error) -> Problem {
-        let first = e.diagnostics.first().map_or_else(String::new, |d| d.message.clone());
-        let hint = e.diagnostics.first().and_then(|d| d.hints.first().cloned());
-        let all: Vec<Value> = e.diagnostics.iter().map(|d| place(d, &e.sources)).collect();
-        Problem { message: first, hint, diagnostics: json!(all) }
-    }
-}
-
-impl From<Failure> for Problem {
-    fn from(f: Failure) -> Problem {
-        match f {
-            Failure::Program(e) => (*e).into(),
-            Failure::Plain(message, hint) => Problem { hint, ..Problem::plain(message) },
-            Failure::Interrupted => Problem::plain("interrupted"),
-        }
-    }
-}
-
-impl From<Trouble> for Problem {
-    fn from(t: Trouble) -> Problem {
-        match t {
-            Trouble::Program(e) => (*e).into(),
-            Trouble::Plain(message, hint) => Problem { hint, ..Problem::plain(message) },
-            stopped @ Trouble::Stopped => Problem::plain(stopped.to_string()),
-        }
     }
 }
 
@@ -114,20 +74,13 @@ fn place(d: &Diagnostic, sources: &SourceMap) -> Value {
         Severity::Note => "note",
     };
     let mut out = json!({ "severity": severity, "message": said, "hint": d.hints.first() });
-    let file = label.and_then(|l| Some((l, sources.get(l.span.file)?)));
-    if let Some((label, file)) = file {
-        let at = |byte: u32| {
-            let line = file.line_index(byte as usize);
-            let start = file.line_range(line).start;
-            let before = file.text().get(start..byte as usize).unwrap_or_default();
-            (line, before.encode_utf16().count())
-        };
-        let (from, to) = (at(label.span.start), at(label.span.end));
+    if let Some((label, file)) = label.and_then(|l| Some((l, sources.get(l.span.file)?))) {
+        let range = Encoding::Utf16.range(file, label.span);
         out["file"] = json!(file.name());
-        out["line"] = json!(from.0);
-        out["column"] = json!(from.1);
-        out["end_line"] = json!(to.0);
-        out["end_column"] = json!(to.1);
+        out["line"] = json!(range.start.line);
+        out["column"] = json!(range.start.character);
+        out["end_line"] = json!(range.end.line);
+        out["end_column"] = json!(range.end.character);
     }
     out
 }

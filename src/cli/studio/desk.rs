@@ -1,17 +1,17 @@
 //! Does what the page asks: every method of the protocol, by the sessions of the prompt and
 //! the runs of `pcadlang run`.
 
-use super::answer::{Answer, Problem};
+use super::answer::Answer;
 use super::folder::Folder;
 use super::layout::{self, finite};
 use super::protocol::{self, Call, StateName};
 use super::results;
 use super::runs::Runs;
-use super::sessions::{Handle, OpenSession, Sessions, job_of};
+use super::sessions::{OpenSession, Sessions, job_of};
 use super::states::{no_view, picture};
-use crate::cli::args::Job;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::reopened::Reopened;
-use crate::cli::running::files;
+use crate::cli::running::{files, inputs};
 use crate::cli::scene;
 use pcadlang::render::View;
 use pcadlang::report::embedded;
@@ -43,7 +43,7 @@ pub struct Desk {
 
 impl Desk {
     /// Does what is asked, which may take as long as the program does.
-    pub fn answer(&self, call: Call) -> Result<Answer, Problem> {
+    pub fn answer(&self, call: Call) -> Result<Answer, Failure> {
         let json = match call {
             Call::Folder(_) => self.described(),
             Call::Read(r) => json!({ "text": self.folder.read(&r.file)? }),
@@ -62,9 +62,7 @@ impl Desk {
             Call::Replace(r) => self
                 .change(r.session, move |open| Ok(open.session.replace(&r.text).map(|_| ())?))?,
             Call::Observe(o) => {
-                for spec in &o.observe {
-                    self.folder.file(crate::cli::running::inputs::file_of(spec))?;
-                }
+                self.permit(&o.observe)?;
                 self.change(o.session, move |open| open.observe(o.observe, Stop::default()))?
             }
             Call::Enter(e) => self.enter(e.session, e.text)?,
@@ -118,10 +116,15 @@ impl Desk {
             Call::Picture(p) => return self.picture(p),
             Call::Mesh(m) => return self.mesh(&m),
             Call::CameraOf(c) => {
-                self.with_view(&c.state, |view, _, _| Ok(embedded::camera(view.camera())))?
+                self.with_view(&c.state, |view, _| Ok(embedded::camera(view.camera())))?
             }
         };
         Ok(json.into())
+    }
+
+    /// Checks that observed files are of the opened folder.
+    fn permit(&self, observe: &[String]) -> Result<(), Failure> {
+        observe.iter().try_for_each(|spec| self.folder.file(inputs::file_of(spec)).map(|_| ()))
     }
 
     /// Sends an event to every page.
@@ -135,6 +138,11 @@ impl Desk {
         run
     }
 
+    fn tell_session(&self, id: u64, said: Value) -> Value {
+        self.tell(json!({ "event": "session", "session": id, "revision": said["revision"] }));
+        said
+    }
+
     fn described(&self) -> Value {
         let mut out = self.folder.described();
         out["version"] = json!(env!("CARGO_PKG_VERSION"));
@@ -145,31 +153,24 @@ impl Desk {
         out
     }
 
-    fn open(&self, o: &protocol::Open) -> Result<Value, Problem> {
+    fn open(&self, o: &protocol::Open) -> Result<Value, Failure> {
         let handle = match (&o.program, &o.run) {
             (Some(program), None) => {
                 self.folder.file(program)?;
-                for spec in &o.observe {
-                    self.folder.file(crate::cli::running::inputs::file_of(spec))?;
-                }
+                self.permit(&o.observe)?;
                 self.sessions.open(job_of(program, &o.set, &o.observe), None)?
             }
             (None, Some(run)) => {
                 let run = Reopened::open(&self.runs.get(run)?.folder)?;
                 self.sessions.open(run.job.clone(), Some(run))?
             }
-            _ => return Err(Problem::plain("`open` needs either a program or a run")),
+            _ => return Err(plain("`open` needs either a program or a run")),
         };
         let id = handle.id;
         handle.ask(move |open| Ok(open.described(id)))
     }
 
-    /// Opens a session with the job of the command line.
-    pub fn open_job(&self, job: Job, run: Option<Reopened>) -> Result<Arc<Handle>, Problem> {
-        self.sessions.open(job, run)
-    }
-
-    fn session(&self, id: u64) -> Result<Value, Problem> {
+    fn session(&self, id: u64) -> Result<Value, Failure> {
         self.sessions.get(id)?.ask(move |open| Ok(open.described(id)))
     }
 
@@ -177,17 +178,16 @@ impl Desk {
     fn change(
         &self,
         id: u64,
-        f: impl FnOnce(&mut OpenSession) -> Result<(), Problem> + Send + 'static,
-    ) -> Result<Value, Problem> {
+        f: impl FnOnce(&mut OpenSession) -> Result<(), Failure> + Send + 'static,
+    ) -> Result<Value, Failure> {
         let said = self.sessions.get(id)?.ask(move |open| {
             f(open)?;
             Ok(open.described(id))
         })?;
-        self.tell(json!({ "event": "session", "session": id, "revision": said["revision"] }));
-        Ok(said)
+        Ok(self.tell_session(id, said))
     }
 
-    fn enter(&self, id: u64, text: String) -> Result<Value, Problem> {
+    fn enter(&self, id: u64, text: String) -> Result<Value, Failure> {
         let handle = self.sessions.get(id)?;
         let (said, opens) = handle.ask(move |open| {
             let reply = open.session.enter(&text)?;
@@ -198,14 +198,14 @@ impl Desk {
                 }
                 Some(Request::Open(folder)) => opens = Some(folder),
                 Some(Request::Edit) => {
-                    return Err(Problem::plain("the program is in the editor beside the prompt"));
+                    return Err(plain("the program is in the editor beside the prompt"));
                 }
                 None => {}
             }
             if let Some((picture, file)) =
                 reply.picture.as_ref().and_then(|p| Some((p, p.file.as_ref()?)))
             {
-                let bytes = png(&picture.pixels()).map_err(|e| Problem::plain(e.to_string()))?;
+                let bytes = png(&picture.pixels()).map_err(|e| plain(e.to_string()))?;
                 files::write(file, &bytes)?;
             }
             let said = json!({
@@ -217,23 +217,12 @@ impl Desk {
         if let Some(folder) = opens {
             let name = folder.to_string_lossy().into_owned();
             let run = Reopened::open(&self.runs.get(&name)?.folder)?;
-            handle.ask(move |open| {
-                let program = run.program()?;
-                let (program, _) = crate::cli::running::inputs::observe(program, &run.job)?;
-                let seed = open.job.sampling.seed;
-                let (mut other, _) =
-                    pcadlang::session::Session::open(program, seed, Stop::default())?;
-                other.take_up(&run.best()?)?;
-                open.session.take_over(other, &format!(":load {name}"));
-                open.job = run.job.clone();
-                Ok(())
-            })?;
+            handle.ask(move |open| open.load(&run, Stop::default()))?;
         }
-        self.tell(json!({ "event": "session", "session": id, "revision": said["revision"] }));
-        Ok(said)
+        Ok(self.tell_session(id, said))
     }
 
-    fn choices(&self, c: protocol::Choices) -> Result<Value, Problem> {
+    fn choices(&self, c: protocol::Choices) -> Result<Value, Failure> {
         let (from, count) = (c.from, c.count.unwrap_or(CHOICES).min(CHOICES));
         let wanted = c.select.unwrap_or_default();
         let listed = move |trace: &Trace, rates: &BTreeMap<String, f64>, marks: &Marks| {
@@ -272,8 +261,8 @@ impl Desk {
         }
     }
 
-    fn assign(&self, a: protocol::Assign) -> Result<Value, Problem> {
-        let value = from_json(&a.value).map_err(Problem::plain)?;
+    fn assign(&self, a: protocol::Assign) -> Result<Value, Failure> {
+        let value = from_json(&a.value).map_err(plain)?;
         let id = a.session;
         let said = self.sessions.get(id)?.ask(move |open| {
             let after = open.session.assign(&a.address, value, a.drag)?;
@@ -281,11 +270,10 @@ impl Desk {
             out["revision"] = json!(open.session.revision());
             Ok(out)
         })?;
-        self.tell(json!({ "event": "session", "session": id, "revision": said["revision"] }));
-        Ok(said)
+        Ok(self.tell_session(id, said))
     }
 
-    fn begin(&self, b: protocol::Begin) -> Result<Value, Problem> {
+    fn begin(&self, b: protocol::Begin) -> Result<Value, Failure> {
         let folder = self.folder.path().to_owned();
         let job = self.sessions.get(b.session)?.ask(move |open| {
             open.write_program(&folder)?;
@@ -295,11 +283,11 @@ impl Desk {
         Ok(self.tell_run(run.described()))
     }
 
-    fn picture(&self, p: protocol::Picture) -> Result<Answer, Problem> {
+    fn picture(&self, p: protocol::Picture) -> Result<Answer, Failure> {
         let layer = Layer::ALL.into_iter().find(|l| l.name() == p.layer);
         let layer = layer.ok_or_else(|| {
             let names: Vec<&str> = Layer::ALL.iter().map(|l| l.name()).collect();
-            let problem = Problem::plain(format!("there is no layer `{}`", p.layer));
+            let problem = plain(format!("there is no layer `{}`", p.layer));
             problem.hint(format!("one of {}", names.join(", ")))
         })?;
         if let (None, Some(run)) = (&p.state.session, &p.state.run) {
@@ -308,7 +296,7 @@ impl Desk {
         }
         let id = p.state.session.ok_or_else(no_state)?;
         let (header, data) = self.sessions.get(id)?.ask(move |open| {
-            let view = open.session.view(None).ok_or_else(no_view)?;
+            let view = open.session.view().ok_or_else(no_view)?;
             let image = observed_image(open.session.model().code());
             let image = image.as_ref().and_then(|i| i.downcast::<ImageValue>());
             let located = open.session.trace().located();
@@ -320,10 +308,10 @@ impl Desk {
         Ok(Answer::Bytes(header, Arc::new(data)))
     }
 
-    fn mesh(&self, m: &protocol::Mesh) -> Result<Answer, Problem> {
+    fn mesh(&self, m: &protocol::Mesh) -> Result<Answer, Failure> {
         let limit = m.limit;
-        let (header, data) = self.with_view(&m.state, move |view, log_joint, _| {
-            let (mut header, data) = layout::mesh(view.solid(), limit).map_err(Problem::plain)?;
+        let (header, data) = self.with_view(&m.state, move |view, log_joint| {
+            let (mut header, data) = layout::mesh(view.solid(), limit).map_err(plain)?;
             header.insert("log_joint".into(), finite(log_joint));
             Ok((header, data))
         })?;
@@ -334,26 +322,26 @@ impl Desk {
     fn with_view<T: Send + 'static>(
         &self,
         name: &StateName,
-        f: impl FnOnce(&Arc<View>, f64, u64) -> Result<T, Problem> + Send + 'static,
-    ) -> Result<T, Problem> {
+        f: impl FnOnce(&Arc<View>, f64) -> Result<T, Failure> + Send + 'static,
+    ) -> Result<T, Failure> {
         match (name.session, &name.run) {
             (Some(id), None) => self.sessions.get(id)?.ask(move |open| {
-                let view = open.session.view(None).ok_or_else(no_view)?;
-                f(&view, open.session.trace().log_joint(), open.session.revision())
+                let view = open.session.view().ok_or_else(no_view)?;
+                f(&view, open.session.trace().log_joint())
             }),
             (None, Some(run)) => {
                 let mut state = self.runs.get(run)?.state(name)?;
                 let log_joint = state.trace.log_joint();
                 let view = scene::view(&mut state.trace, scene::predictive(0, 0), None);
-                f(&view.ok_or_else(no_view)?, log_joint, 0)
+                f(&view.ok_or_else(no_view)?, log_joint)
             }
             _ => Err(no_state()),
         }
     }
 }
 
-fn no_state() -> Problem {
-    Problem::plain("`state` needs either a session or a run")
+fn no_state() -> Failure {
+    plain("`state` needs either a session or a run")
 }
 
 fn scores(s: Scores) -> Value {

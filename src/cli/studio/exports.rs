@@ -1,17 +1,15 @@
 //! Files that show a run, written into its folder.
 
-use super::answer::Problem;
 use super::run::Run;
 use crate::cli::args::{Film, Report};
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::page::PAGE;
 use crate::cli::reopening::{film, report};
 
 /// Writes a file of a kind, and returns its name.
-pub fn export(run: &Run, kind: &str) -> Result<String, Problem> {
+pub fn export(run: &Run, kind: &str) -> Result<String, Failure> {
     if run.is_active() {
-        return Err(
-            Problem::plain("the run has not ended").hint("stop it first; it can go on later")
-        );
+        return Err(plain("the run has not ended").hint("stop it first; it can go on later"));
     }
     match kind {
         PAGE => {
@@ -25,7 +23,7 @@ pub fn export(run: &Run, kind: &str) -> Result<String, Problem> {
             Ok(kind.to_owned())
         }
         _ => {
-            let problem = Problem::plain(format!("a run cannot be exported as `{kind}`"));
+            let problem = plain(format!("a run cannot be exported as `{kind}`"));
             Err(problem.hint("film.png, film.glb or report.html"))
         }
     }

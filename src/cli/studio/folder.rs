@@ -1,11 +1,10 @@
 //! The files of the opened folder: programs, pictures, evaluations.
 
-use super::answer::Problem;
-use super::guard::path_within;
 use super::layout::finite;
-use super::sessions::is_picture;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::running::files;
 use pcadlang::lang::load::{embedded, shipped};
+use pcadlang::lang::reach::path_within;
 use pcadlang::report::evaluation::MARK;
 use pcadlang::vision::{Limits, photo};
 use serde_json::{Value, json};
@@ -34,8 +33,8 @@ impl Folder {
     }
 
     /// Returns a path in it.
-    pub fn file(&self, asked: &str) -> Result<PathBuf, Problem> {
-        path_within(&self.path, asked).map_err(Problem::plain)
+    pub fn file(&self, asked: &str) -> Result<PathBuf, Failure> {
+        path_within(&self.path, asked).map_err(plain)
     }
 
     /// Lists its files up to some depth, by name; folders of runs and hidden ones are
@@ -93,38 +92,36 @@ impl Folder {
     }
 
     /// Returns the text of a program, of the folder or shipped.
-    pub fn read(&self, file: &str) -> Result<String, Problem> {
+    pub fn read(&self, file: &str) -> Result<String, Failure> {
         if !file.ends_with(".pcad") {
-            return Err(Problem::plain(format!("{file}: only programs (.pcad) can be read")));
+            return Err(plain(format!("{file}: only programs (.pcad) can be read")));
         }
         let path = self.file(file)?;
         match embedded(file).filter(|_| !path.exists()) {
             Some(text) => Ok(text.to_owned()),
             None => String::from_utf8(files::read(&path)?)
-                .map_err(|_| Problem::plain(format!("{file}: not text"))),
+                .map_err(|_| plain(format!("{file}: not text"))),
         }
     }
 
     /// Writes a program.
-    pub fn write(&self, file: &str, text: &str) -> Result<(), Problem> {
+    pub fn write(&self, file: &str, text: &str) -> Result<(), Failure> {
         if !file.ends_with(".pcad") {
-            return Err(Problem::plain(format!("{file}: only programs (.pcad) can be written")));
+            return Err(plain(format!("{file}: only programs (.pcad) can be written")));
         }
-        Ok(files::write(&self.file(file)?, text.as_bytes())?)
+        files::write(&self.file(file)?, text.as_bytes())
     }
 
     /// Stores a photograph, and returns its name. An equal file is used again; another one
     /// of the same name is kept.
-    pub fn store_picture(&self, name: &str, bytes: &[u8]) -> Result<String, Problem> {
-        let plain = Path::new(name).file_name().and_then(|n| n.to_str());
-        let name = plain.filter(|n| is_picture(n) && !n.starts_with('.'));
-        let name = name.ok_or_else(|| {
-            Problem::plain("the picture needs a name that ends in .png, .jpg or .jpeg")
-        })?;
-        photo::decode(bytes, &Limits::default())
-            .map_err(|e| Problem::plain(format!("{name}: {e}")))?;
+    pub fn store_picture(&self, name: &str, bytes: &[u8]) -> Result<String, Failure> {
+        let own = Path::new(name).file_name().and_then(|n| n.to_str());
+        let name = own.filter(|n| is_picture(n) && !n.starts_with('.'));
+        let name =
+            name.ok_or_else(|| plain("the picture needs a name that ends in .png, .jpg or .jpeg"))?;
+        photo::decode(bytes, &Limits::default()).map_err(|e| plain(format!("{name}: {e}")))?;
         std::fs::create_dir_all(self.file(PICTURES)?)
-            .map_err(|e| Problem::plain(format!("{PICTURES}: {e}")))?;
+            .map_err(|e| plain(format!("{PICTURES}: {e}")))?;
         let (stem, end) = name.rsplit_once('.').unwrap_or((name, "png"));
         for n in 1..10_000 {
             let file = match n {
@@ -141,15 +138,15 @@ impl Folder {
                 }
             }
         }
-        Err(Problem::plain(format!("{name}: too many pictures have this name")))
+        Err(plain(format!("{name}: too many pictures have this name")))
     }
 
     /// Lists the cases of an evaluation: failures first, then those whose chains agree
     /// least.
-    pub fn evaluation(&self, folder: &str) -> Result<Value, Problem> {
+    pub fn evaluation(&self, folder: &str) -> Result<Value, Failure> {
         let path = self.file(folder)?.join(MARK);
         let all: Value = serde_json::from_slice(&files::read(&path)?)
-            .map_err(|e| Problem::plain(format!("{}: {e}", path.display())))?;
+            .map_err(|e| plain(format!("{}: {e}", path.display())))?;
         let read = |case: &str, name: &str| -> Value {
             let path = self.path.join(folder).join(case).join(name);
             std::fs::read(path)
@@ -184,6 +181,12 @@ impl Folder {
         });
         Ok(json!({ "cases": cases }))
     }
+}
+
+/// Whether a file name is that of a picture.
+pub fn is_picture(name: &str) -> bool {
+    let end = Path::new(name).extension().and_then(|e| e.to_str()).map(str::to_lowercase);
+    matches!(end.as_deref(), Some("png" | "jpg" | "jpeg"))
 }
 
 /// Returns the first comment of a program, without its own name.

@@ -1,10 +1,8 @@
-//! Who may use the studio, and what it may touch: the token of the address, the `Host` and
-//! `Origin` of a request, paths within the opened folder.
+//! Who may use the studio: the token of the address, the `Host` and `Origin` of a request.
 
 use axum::http::header::{HOST, ORIGIN};
 use axum::http::{HeaderMap, StatusCode};
 use std::fmt::Write;
-use std::path::{Component, Path, PathBuf};
 
 /// The bytes of a token.
 const TOKEN: usize = 16;
@@ -83,27 +81,6 @@ impl Guard {
 /// Why a request is refused.
 pub type Refusal = (StatusCode, &'static str);
 
-/// Returns a path within a folder. Neither `..` nor a link leads out of it.
-///
-/// # Errors
-/// If it leads out of the folder, or names nothing.
-pub fn path_within(folder: &Path, asked: &str) -> Result<PathBuf, String> {
-    let out = || format!("{asked}: only files of the opened folder can be used");
-    let asked_path = Path::new(asked);
-    let is_plain = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
-    if asked.is_empty() || asked.contains('\0') || !asked_path.components().all(is_plain) {
-        return Err(out());
-    }
-    let path = folder.join(asked_path);
-    // A file that does not exist yet is judged by the nearest folder that does.
-    let there = path.ancestors().find(|p| p.exists()).unwrap_or(folder);
-    let real = |p: &Path| p.canonicalize().map_err(|e| format!("{asked}: {e}"));
-    match real(there)?.starts_with(real(folder)?) {
-        true => Ok(path),
-        false => Err(out()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,23 +113,5 @@ mod tests {
         let open = Guard::new(7000, true).unwrap();
         assert!(open.check_origin(&headers("studio.lan:7000", None)).is_ok());
         assert!(open.check_origin(&headers("studio.lan:7000", Some("http://other"))).is_err());
-    }
-
-    #[test]
-    fn no_path_leads_out_of_the_folder() {
-        let folder = std::env::temp_dir().join(format!("pcadlang-guard-{}", std::process::id()));
-        std::fs::create_dir_all(folder.join("sub")).unwrap();
-        std::fs::write(folder.join("sub/a.png"), b"a").unwrap();
-        let ok = |p: &str| path_within(&folder, p).is_ok();
-        assert!(ok("sub/a.png") && ok("./sub/a.png") && ok("new/b.png"));
-        for out in ["..", "../x", "sub/../../x", "/etc/passwd", "", "sub/\0", "sub/../.."] {
-            assert!(!ok(out), "{out:?}");
-        }
-        #[cfg(unix)]
-        {
-            std::os::unix::fs::symlink("/etc", folder.join("link")).unwrap();
-            assert!(!ok("link/passwd") && !ok("link/new"));
-        }
-        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

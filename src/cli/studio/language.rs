@@ -1,9 +1,9 @@
 //! The language server of `pcadlang lsp`, for the editor of the page: the same messages over
 //! a WebSocket. Documents are those of the opened folder, as `file:///studio/NAME`.
 
-use super::guard::path_within;
 use crate::cli::lsp;
 use lsp_server::{Connection, Message};
+use pcadlang::lang::reach::path_within;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

@@ -11,7 +11,7 @@ use tokio::sync::mpsc;
 const WAITING: usize = 256;
 
 /// Serves an editor until it leaves.
-pub async fn serve(socket: WebSocket, desk: &Arc<Desk>) {
+pub async fn serve(socket: WebSocket, desk: Arc<Desk>) {
     let (mut out, mut from) = socket.split();
     let (send, mut answers) = mpsc::channel::<String>(WAITING);
     let started = Language::start(desk.folder.path(), move |text| {

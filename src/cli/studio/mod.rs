@@ -124,5 +124,5 @@ fn open(desk: &Desk, program: &str, a: &Studio) -> Result<u64, Failure> {
         false => None,
     };
     let job = run.as_ref().map_or(job, |r| r.job.clone());
-    Ok(desk.open_job(job, run)?.id)
+    Ok(desk.sessions.open(job, run)?.id)
 }

@@ -1,21 +1,15 @@
 //! Pictures of one run: kept, so that none is drawn twice, and drawn so rarely that the
 //! chains do not slow down.
 
+use crate::cli::running::ration::Ration;
 use serde_json::{Map, Value};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-/// The least time between two pictures of a run whose chains are at work.
-const BETWEEN: Duration = Duration::from_millis(200);
-/// The part of the machine that may go to such pictures.
-const SHARE: f64 = 0.025;
-/// The longest time between two pictures, in seconds.
-const MOST_REST: f64 = 2.0;
-/// The number of pictures whose times are remembered.
-const REMEMBERED: usize = 8;
 /// The most pictures of a run that are kept.
 const KEPT: usize = 24;
+
 /// A picture file with its header.
 pub type Encoded = (Map<String, Value>, Arc<Vec<u8>>);
 
@@ -23,31 +17,9 @@ pub type Encoded = (Map<String, Value>, Arc<Vec<u8>>);
 #[derive(Default)]
 pub struct Pictures {
     kept: Mutex<VecDeque<(String, Encoded)>>,
-    turn: Mutex<Turn>,
+    turn: Mutex<Ration>,
     /// Held while one is drawn, so that many tabs do not draw the same one.
     drawing: Mutex<()>,
-}
-
-/// When the next picture of a run may be drawn.
-#[derive(Default)]
-struct Turn {
-    next: Option<Instant>,
-    /// How long the last pictures took. The least of these times is near to what one costs:
-    /// beside chains that use the whole machine, a picture takes longer than that.
-    took: VecDeque<Duration>,
-}
-
-impl Turn {
-    fn done(&mut self, took: Duration) {
-        self.took.push_back(took);
-        if self.took.len() > REMEMBERED {
-            self.took.pop_front();
-        }
-        let cost = self.took.iter().min().copied().unwrap_or_default();
-        let threads = crate::cli::running::job::machine_threads() as f64;
-        let rest = (cost.as_secs_f64() / (SHARE * threads)).min(MOST_REST);
-        self.next = Some(Instant::now() + BETWEEN.max(Duration::from_secs_f64(rest)));
-    }
 }
 
 impl Pictures {
@@ -80,13 +52,13 @@ impl Pictures {
     /// of what that cost.
     pub fn in_turn<T>(&self, is_working: bool, draw: impl FnOnce() -> T) -> T {
         let turn = || self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        let next = turn().next.filter(|_| is_working);
-        if let Some(wait) = next.and_then(|n| n.checked_duration_since(Instant::now())) {
-            std::thread::sleep(wait);
+        if is_working {
+            let rest = turn().rest();
+            std::thread::sleep(rest);
         }
         let begun = Instant::now();
         let drawn = draw();
-        turn().done(begun.elapsed());
+        turn().took(begun.elapsed());
         drawn
     }
 }

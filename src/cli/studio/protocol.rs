@@ -77,9 +77,6 @@ pub struct Viewpoint {
     pub fov_y: f64,
 }
 
-/// A JSON value with a default.
-type Json = Value;
-
 /// Declares the methods, with the fields of their parameters.
 macro_rules! methods {
     ($($(#[$doc:meta])* $variant:ident = $name:literal { $($(#[$of:meta])* $field:ident: $ty:ty),* $(,)? })*) => {
@@ -98,7 +95,7 @@ macro_rules! methods {
             pub const NAMES: &[&str] = &[$($name),*];
 
             /// Reads the parameters of a method; `None` if there is no such method.
-            fn read(method: &str, params: Json) -> Option<Result<Call, String>> {
+            fn read(method: &str, params: Value) -> Option<Result<Call, String>> {
                 match method {
                     $($name => Some(read(params).map(Call::$variant)),)*
                     _ => None,
@@ -148,7 +145,7 @@ methods! {
     Assign = "assign" {
         session: u64,
         address: String,
-        value: Json,
+        value: Value,
         #[serde(default)] drag: bool,
     }
     /// What a choice depends on, and what depends on it.
@@ -192,7 +189,7 @@ methods! {
     CameraOf = "camera" { state: StateName }
 }
 
-fn read<T: DeserializeOwned>(params: Json) -> Result<T, String> {
+fn read<T: DeserializeOwned>(params: Value) -> Result<T, String> {
     serde_json::from_value(params).map_err(|e| e.to_string())
 }
 

@@ -1,9 +1,9 @@
 //! What a run has found: its draws, its summary, their comparison with another run's, and
 //! files that show it.
 
-use super::answer::Problem;
 use super::layout::finite;
 use super::run::Run;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::compare::Comparison;
 use crate::cli::reopening::reopened::{Reopened, quoted};
 use crate::cli::running::watched::ROOM;
@@ -19,17 +19,17 @@ const NUMBERS: usize = 2000;
 const LIVE: usize = 4000;
 
 /// Returns the draws of a run, from memory or from its folder.
-fn draws(run: &Run) -> Result<Vec<ChainDraws>, Problem> {
+fn draws(run: &Run) -> Result<Vec<ChainDraws>, Failure> {
     match run.watched() {
         Some(w) => Ok(w.memories.iter().map(Memory::draws).collect()),
         None => {
-            let dir = RunDir::open(&run.folder).map_err(|e| Problem::plain(e.to_string()))?;
-            reread(&dir, ROOM).map_err(|e| Problem::plain(e.to_string()))
+            let dir = RunDir::open(&run.folder).map_err(|e| plain(e.to_string()))?;
+            reread(&dir, ROOM).map_err(|e| plain(e.to_string()))
         }
     }
 }
 
-fn all_quantities(run: &Run) -> Result<Vec<Quantity>, Problem> {
+fn all_quantities(run: &Run) -> Result<Vec<Quantity>, Failure> {
     let mut draws = draws(run)?;
     if run.watched().is_some() {
         let all: usize = draws.iter().map(|d| d.rows.len()).sum();
@@ -43,23 +43,15 @@ fn all_quantities(run: &Run) -> Result<Vec<Quantity>, Problem> {
         }
     }
     let mut all = quantities(&draws);
-    let summary = summary_file(run);
+    let summary = run.summary_file();
     let names: Vec<&String> =
         summary["quantities"].as_object().into_iter().flat_map(|q| q.keys()).collect();
     rename(&mut all, names.into_iter().map(String::as_str));
     Ok(all)
 }
 
-fn summary_file(run: &Run) -> Value {
-    let bytes = match run.watched() {
-        Some(_) => None,
-        None => std::fs::read(run.folder.join("summary.json")).ok(),
-    };
-    bytes.and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default()
-}
-
 /// Lists the kept draws.
-pub fn kept(run: &Run) -> Result<Value, Problem> {
+pub fn kept(run: &Run) -> Result<Value, Failure> {
     let of = |k: &pcadlang::infer::KeptTrace| json!({ "chain": k.chain, "draw": k.draw, "log_joint": finite(k.log_joint) });
     let kept = run.kept()?;
     let film = run.film()?;
@@ -73,8 +65,8 @@ pub fn kept(run: &Run) -> Result<Value, Problem> {
 }
 
 /// Summarises a run: from its file, or the draws so far.
-pub fn summary(run: &Run) -> Result<Value, Problem> {
-    let mut out = summary_file(run);
+pub fn summary(run: &Run) -> Result<Value, Failure> {
+    let mut out = run.summary_file();
     if out.is_null() {
         let all = all_quantities(run)?;
         let found = modes(&all, None);
@@ -107,12 +99,12 @@ fn files(run: &Run) -> Vec<String> {
 }
 
 /// Returns the draws of some quantities, thinned evenly.
-pub fn quantity(run: &Run, names: &[String]) -> Result<Value, Problem> {
+pub fn quantity(run: &Run, names: &[String]) -> Result<Value, Failure> {
     let all = all_quantities(run)?;
     let mut found = Vec::new();
     for name in names {
         let q = all.iter().find(|q| q.name == *name);
-        let q = q.ok_or_else(|| Problem::plain(format!("the run has no quantity `{name}`")))?;
+        let q = q.ok_or_else(|| plain(format!("the run has no quantity `{name}`")))?;
         let thinned = |c: &Vec<f64>| -> Vec<Value> {
             let every = c.len().div_ceil(NUMBERS).max(1);
             c.iter().step_by(every).map(|x| finite(*x)).collect()
@@ -125,8 +117,8 @@ pub fn quantity(run: &Run, names: &[String]) -> Result<Value, Problem> {
 }
 
 /// Compares two runs.
-pub fn compared(a: &Run, b: &Run) -> Result<Value, Problem> {
-    let of = |r: &Run| Ok::<_, Problem>((r.record(), summary(r)?));
+pub fn compared(a: &Run, b: &Run) -> Result<Value, Failure> {
+    let of = |r: &Run| Ok::<_, Failure>((r.record(), summary(r)?));
     let both = Comparison::between([of(a)?, of(b)?]);
     let of = |q: &crate::cli::reopening::compare::Apart| json!({ "name": q.name, "a": q.a, "b": q.b, "apart": finite(q.apart) });
     let [only_a, only_b] = both.settings();
@@ -140,7 +132,7 @@ pub fn compared(a: &Run, b: &Run) -> Result<Value, Problem> {
 
 /// Returns the acceptance rate of each choice in a run, by address.
 pub fn acceptance(run: &Run) -> BTreeMap<String, f64> {
-    let summary = summary_file(run);
+    let summary = run.summary_file();
     let rate = |c: &Value| {
         let (tried, accepted) = (c["proposals"].as_f64()?, c["accepted"].as_f64()?);
         (tried > 0.0).then_some((c["address"].as_str()?.to_owned(), accepted / tried))

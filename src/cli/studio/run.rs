@@ -1,10 +1,9 @@
 //! One run: under way, with its chains in memory, or ended, with what its folder holds.
 
-use super::answer::Problem;
 use super::layout::finite;
 use super::slots::Slots;
 use crate::cli::args::Job;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::reopened::Reopened;
 use crate::cli::running::job::{self, CHECKPOINT, Interrupt, RunMode};
 use crate::cli::running::ready::{self, Ready};
@@ -123,7 +122,7 @@ impl Run {
     }
 
     /// A run that another command has left in a folder.
-    pub fn left(name: &str, folder: &Path) -> Result<Run, Problem> {
+    pub fn left(name: &str, folder: &Path) -> Result<Run, Failure> {
         let record = resume::run(folder)?;
         let doing = match record["state"].as_str() {
             Some("done") => Doing::Done,
@@ -178,18 +177,27 @@ impl Run {
         self.lock().record.clone()
     }
 
+    /// Returns what its `summary.json` says; null while its chains run.
+    pub fn summary_file(&self) -> Value {
+        let bytes = match self.watched() {
+            Some(_) => None,
+            None => std::fs::read(self.folder.join("summary.json")).ok(),
+        };
+        bytes.and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default()
+    }
+
     /// Returns the time at which it began, as text that sorts.
     pub fn begun_at(&self) -> String {
         self.lock().record["begun"].as_str().unwrap_or_default().to_owned()
     }
 
     /// Returns the compiled program, which is compiled now if it was not before.
-    pub fn ready(&self) -> Result<Arc<Ready>, Problem> {
+    pub fn ready(&self) -> Result<Arc<Ready>, Failure> {
         if let Some(ready) = &self.lock().ready {
             return Ok(Arc::clone(ready));
         }
         if self.is_active() {
-            return Err(Problem::plain("the run has not begun yet"));
+            return Err(plain("the run has not begun yet"));
         }
         let run = Reopened::open(&self.folder)?;
         let ready = Arc::new(ready::prepare_program(run.program()?, &run.job, Instant::now())?);
@@ -203,7 +211,7 @@ impl Run {
     }
 
     /// Makes its chains wait.
-    pub fn pause(&self) -> Result<(), Problem> {
+    pub fn pause(&self) -> Result<(), Failure> {
         let mut inner = self.lock();
         match inner.doing {
             Doing::Paused => {}
@@ -214,13 +222,13 @@ impl Run {
                 inner.clock.halt();
                 inner.doing = Doing::Paused;
             }
-            _ => return Err(Problem::plain(format!("{} is not running", self.name))),
+            _ => return Err(plain(format!("{} is not running", self.name))),
         }
         Ok(())
     }
 
     /// Ends a pause. Returns whether the run must be started again instead.
-    pub fn unpause(&self) -> Result<Begun, Problem> {
+    pub fn unpause(&self) -> Result<Begun, Failure> {
         let mut inner = self.lock();
         match inner.doing {
             Doing::Waiting | Doing::Running => {}
@@ -237,19 +245,19 @@ impl Run {
                 return Ok(Begun::Not);
             }
             Doing::Stopping => {
-                return Err(Problem::plain("the run is still writing its files"));
+                return Err(plain("the run is still writing its files"));
             }
-            _ => return Err(Problem::plain(format!("{} has ended", self.name))),
+            _ => return Err(plain(format!("{} has ended", self.name))),
         }
         Ok(Begun::Already)
     }
 
     /// Ends it at its next step; its draws and a checkpoint are kept.
-    pub fn stop(&self) -> Result<(), Problem> {
+    pub fn stop(&self) -> Result<(), Failure> {
         let mut inner = self.lock();
         if !matches!(inner.doing, Doing::Waiting | Doing::Running | Doing::Paused | Doing::Stopping)
         {
-            return Err(Problem::plain(format!("{} has ended", self.name)));
+            return Err(plain(format!("{} has ended", self.name)));
         }
         self.stop.store(true, Ordering::SeqCst);
         if let Some(w) = &inner.watched {
@@ -278,7 +286,7 @@ impl Run {
     /// Returns whether the run was stopped.
     fn perform(&self, interrupt: &Interrupt, resume: bool) -> Result<bool, Failure> {
         let Some(job) = &self.job else {
-            return Err(crate::cli::failure::plain("the folder does not record its command"));
+            return Err(plain("the folder does not record its command"));
         };
         self.lock().clock.go();
         // A run that was stopped while it waited has left nothing.
@@ -296,8 +304,7 @@ impl Run {
         let record = job::record(job, ready.model.hash(), &inputs);
         let dir = match resume {
             true => resume::resumed(&self.folder, &record)?,
-            false => RunDir::create(&self.folder)
-                .map_err(|e| crate::cli::failure::plain(e.to_string()))?,
+            false => RunDir::create(&self.folder).map_err(|e| plain(e.to_string()))?,
         };
         {
             let mut inner = self.lock();

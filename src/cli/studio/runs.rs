@@ -1,12 +1,13 @@
 //! The runs of the opened folder: those under way, and those that earlier commands left.
 
-use super::answer::Problem;
 use super::protocol::Settings;
 use super::run::{Begun, Run};
 use super::slots::Slots;
 use crate::cli::args::{Job, QualityArg};
+use crate::cli::failure::{Failure, plain};
 use crate::cli::running::job::{self, Interrupt};
 use crate::cli::running::quality;
+use pcadlang::lang::reach::path_within;
 use pcadlang::report::RunDir;
 use pcadlang::tradeoff::Quality;
 use serde_json::Value;
@@ -50,11 +51,11 @@ impl Runs {
     }
 
     /// Returns a run by its folder, which may be any folder of a run within the opened one.
-    pub fn get(&self, name: &str) -> Result<Arc<Run>, Problem> {
+    pub fn get(&self, name: &str) -> Result<Arc<Run>, Failure> {
         if let Some(run) = self.lock().get(name) {
             return Ok(Arc::clone(run));
         }
-        let path = super::guard::path_within(&self.folder, name).map_err(Problem::plain)?;
+        let path = path_within(&self.folder, name).map_err(plain)?;
         let run = Arc::new(Run::left(name, &path)?);
         Ok(Arc::clone(self.lock().entry(name.to_owned()).or_insert(run)))
     }
@@ -77,7 +78,7 @@ impl Runs {
         mut job: Job,
         settings: &Settings,
         session: u64,
-    ) -> Result<Arc<Run>, Problem> {
+    ) -> Result<Arc<Run>, Failure> {
         apply(&mut job, settings)?;
         let keypoints = job.keypoints.is_some();
         quality::apply(&mut job, keypoints)?;
@@ -85,12 +86,12 @@ impl Runs {
             // Folders are given out one at a time, so that two runs never share one.
             let mut all = self.lock();
             if all.values().filter(|r| r.is_active()).count() >= MOST {
-                let problem = Problem::plain(format!("{MOST} runs are under way or waiting"));
+                let problem = plain(format!("{MOST} runs are under way or waiting"));
                 return Err(problem.hint("stop one of them first"));
             }
             let runs = self.folder.join(RUNS);
             let dir = RunDir::fresh(&runs, job::stem(&job.inputs.program))
-                .map_err(|e| Problem::plain(e.to_string()))?;
+                .map_err(|e| plain(e.to_string()))?;
             let folder = dir.path().file_name().unwrap_or_default().to_string_lossy();
             let name = format!("{RUNS}/{folder}");
             let run = Arc::new(Run::new(&name, dir, job, session));
@@ -102,7 +103,7 @@ impl Runs {
     }
 
     /// Goes on with a paused run, or with one that was stopped or interrupted.
-    pub fn go_on(&self, name: &str) -> Result<Arc<Run>, Problem> {
+    pub fn go_on(&self, name: &str) -> Result<Arc<Run>, Failure> {
         let run = self.get(name)?;
         if run.unpause()? == Begun::Already {
             return Ok(run);
@@ -112,21 +113,21 @@ impl Runs {
     }
 
     /// Forgets a run that has ended.
-    pub fn remove(&self, name: &str) -> Result<(), Problem> {
+    pub fn remove(&self, name: &str) -> Result<(), Failure> {
         let run = self.get(name)?;
         if run.is_active() {
-            return Err(Problem::plain(format!("{name} has not ended")).hint("stop it first"));
+            return Err(plain(format!("{name} has not ended")).hint("stop it first"));
         }
         self.lock().remove(name);
         Ok(())
     }
 
-    fn start(&self, run: &Arc<Run>, resume: bool) -> Result<(), Problem> {
+    fn start(&self, run: &Arc<Run>, resume: bool) -> Result<(), Failure> {
         let (run, slots) = (Arc::clone(run), Arc::clone(&self.slots));
         let interrupt = Arc::clone(&self.interrupt);
         let thread = std::thread::Builder::new().name(run.name.clone());
         let spawned = thread.spawn(move || run.work(&slots, &interrupt, resume));
-        spawned.map_err(|e| Problem::plain(format!("no thread can be started: {e}")))?;
+        spawned.map_err(|e| plain(format!("no thread can be started: {e}")))?;
         Ok(())
     }
 
@@ -137,23 +138,23 @@ impl Runs {
 }
 
 /// Fills in the settings of a run.
-fn apply(job: &mut Job, settings: &Settings) -> Result<(), Problem> {
+fn apply(job: &mut Job, settings: &Settings) -> Result<(), Failure> {
     let s = &mut job.sampling;
     if let Some(name) = &settings.quality {
         let known = Quality::ALL.into_iter().find(|q| q.name() == name);
         s.quality = match (known, name.as_str()) {
             (Some(q), _) => Some(QualityArg::Known(q)),
             (None, "own") => Some(QualityArg::Own),
-            _ => return Err(Problem::plain(format!("there is no preset `{name}`"))),
+            _ => return Err(plain(format!("there is no preset `{name}`"))),
         };
     }
     if let Some(time) = settings.time {
         let time = Duration::try_from_secs_f64(time).ok().filter(|t| !t.is_zero());
-        let wrong = || Problem::plain("`time` must be a number of seconds above 0");
+        let wrong = || plain("`time` must be a number of seconds above 0");
         s.time = Some(time.ok_or_else(wrong)?);
     }
     if settings.chains.is_some_and(|n| !(1..=1024).contains(&n)) {
-        return Err(Problem::plain("`chains` must be from 1 to 1024"));
+        return Err(plain("`chains` must be from 1 to 1024"));
     }
     s.seed = settings.seed.unwrap_or(s.seed);
     s.chains = settings.chains.or(s.chains);

@@ -1,14 +1,14 @@
 //! The web server: the page, the two sockets, photographs that are sent, files of the
 //! opened folder.
 
-use super::answer::Problem;
 use super::assets;
 use super::desk::Desk;
 use super::guard::{Guard, Refusal};
 use super::{language_socket, socket};
+use crate::cli::failure::Failure;
 use axum::Router;
 use axum::body::{Body, Bytes};
-use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::ws::{WebSocket, WebSocketUpgrade};
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::{
@@ -19,6 +19,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use std::collections::HashMap;
+use std::future::Future;
 use std::sync::Arc;
 use tokio::sync::Semaphore;
 
@@ -62,18 +63,21 @@ pub fn router(desk: Arc<Desk>, guard: Arc<Guard>, page: Option<Arc<std::path::Pa
         sockets: Arc::new(Semaphore::new(SOCKETS)),
         uploads: Arc::new(Semaphore::new(UPLOADS)),
     };
-    Router::new()
-        .route("/", get(|State(s): State<Server>| async move { asset(&s, "index.html").await }))
+    let user = Router::new()
         .route("/socket", get(open_socket))
         .route("/language", get(open_language))
         .route("/pictures", post(take_picture).layer(DefaultBodyLimit::max(PHOTOGRAPH)))
         .route("/files/{*path}", get(send_file))
+        .route_layer(from_fn_with_state(server.clone(), with_token));
+    let page = Router::new()
+        .route("/", get(|State(s): State<Server>| async move { asset(&s, "index.html").await }))
         .route(
             "/{name}",
             get(|State(s): State<Server>, Path(name): Path<String>| async move {
                 asset(&s, &name).await
             }),
-        )
+        );
+    user.merge(page)
         .fallback(|| async { refused((StatusCode::NOT_FOUND, "there is nothing at this address")) })
         .layer(from_fn_with_state(server.clone(), guarded))
         .with_state(server)
@@ -109,54 +113,52 @@ async fn asset(server: &Server, name: &str) -> Response {
     }
 }
 
-fn token(asked: &Asked) -> Option<&str> {
-    asked.get("token").map(String::as_str)
+/// Refuses requests without the token, before anything of them is read.
+async fn with_token(
+    State(server): State<Server>,
+    asked: Asked,
+    request: Request,
+    next: Next,
+) -> Response {
+    match server.guard.check_token(asked.get("token").map(String::as_str)) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refused(refusal),
+    }
 }
 
 const BUSY: Refusal =
     (StatusCode::SERVICE_UNAVAILABLE, "too many pages are open: close some of them");
 
-async fn open_socket(
-    State(server): State<Server>,
-    asked: Asked,
+/// Opens a socket, if there is a place, and holds that until it has been served.
+fn opened<F>(
+    server: Server,
     upgrade: WebSocketUpgrade,
-) -> Response {
-    if let Err(refusal) = server.guard.check_token(token(&asked)) {
-        return refused(refusal);
-    }
-    let Ok(place) = Arc::clone(&server.sockets).try_acquire_owned() else { return refused(BUSY) };
+    serve: impl FnOnce(WebSocket, Arc<Desk>) -> F + Send + 'static,
+) -> Response
+where
+    F: Future<Output = ()> + Send,
+{
+    let Ok(place) = server.sockets.try_acquire_owned() else { return refused(BUSY) };
     let upgrade = upgrade.max_message_size(FRAME).max_frame_size(FRAME);
     upgrade.on_upgrade(move |socket| async move {
-        socket::serve(socket, server.desk).await;
+        serve(socket, server.desk).await;
         drop(place);
     })
 }
 
-async fn open_language(
-    State(server): State<Server>,
-    asked: Asked,
-    upgrade: WebSocketUpgrade,
-) -> Response {
-    if let Err(refusal) = server.guard.check_token(token(&asked)) {
-        return refused(refusal);
-    }
-    let Ok(place) = Arc::clone(&server.sockets).try_acquire_owned() else { return refused(BUSY) };
-    let upgrade = upgrade.max_message_size(FRAME).max_frame_size(FRAME);
-    upgrade.on_upgrade(move |socket| async move {
-        language_socket::serve(socket, &server.desk).await;
-        drop(place);
-    })
+async fn open_socket(State(server): State<Server>, upgrade: WebSocketUpgrade) -> Response {
+    opened(server, upgrade, socket::serve)
 }
 
-fn problem(status: StatusCode, problem: &Problem) -> Response {
+async fn open_language(State(server): State<Server>, upgrade: WebSocketUpgrade) -> Response {
+    opened(server, upgrade, language_socket::serve)
+}
+
+fn problem(status: StatusCode, problem: &Failure) -> Response {
     (status, format!("{problem}\n")).into_response()
 }
 
 async fn take_picture(State(server): State<Server>, asked: Asked, request: Request) -> Response {
-    // The token is checked before anything of a photograph is read.
-    if let Err(refusal) = server.guard.check_token(token(&asked)) {
-        return refused(refusal);
-    }
     let name = asked.get("name").cloned().unwrap_or_default();
     let Ok(_place) = Arc::clone(&server.uploads).acquire_owned().await else {
         return refused(BUSY);
@@ -175,7 +177,7 @@ async fn take_picture(State(server): State<Server>, asked: Asked, request: Reque
     let stored = tokio::task::spawn_blocking(move || {
         let file = desk.folder.store_picture(&name, &bytes)?;
         desk.tell(serde_json::json!({ "event": "folder" }));
-        Ok::<_, Problem>(file)
+        Ok::<_, Failure>(file)
     });
     match stored.await {
         Ok(Ok(file)) => axum::Json(serde_json::json!({ "file": file })).into_response(),
@@ -184,14 +186,7 @@ async fn take_picture(State(server): State<Server>, asked: Asked, request: Reque
     }
 }
 
-async fn send_file(
-    State(server): State<Server>,
-    asked: Asked,
-    Path(path): Path<String>,
-) -> Response {
-    if let Err(refusal) = server.guard.check_token(token(&asked)) {
-        return refused(refusal);
-    }
+async fn send_file(State(server): State<Server>, Path(path): Path<String>) -> Response {
     let file = match server.desk.folder.file(&path) {
         Ok(file) => file,
         Err(e) => return problem(StatusCode::FORBIDDEN, &e),

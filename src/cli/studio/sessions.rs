@@ -1,13 +1,14 @@
 //! The open sessions: each has a thread of its own, on which everything that is asked of it
 //! is done in turn.
 
-use super::answer::Problem;
+use super::folder::is_picture;
 use super::layout::finite;
 use crate::cli::args::{Inputs, Job, Sampling};
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::reopened::Reopened;
 use crate::cli::running::{inputs, quality};
 use pcadlang::Program;
+use pcadlang::lang::reach::path_within;
 use pcadlang::scene::ImageValue;
 use pcadlang::session::{Session, observed_image};
 use pcadlang::trace::Stop;
@@ -70,9 +71,9 @@ pub fn job_of(program: &str, sets: &BTreeMap<String, String>, observe: &[String]
 
 impl Sessions {
     /// Opens a session for a job, or with the best state of a run.
-    pub fn open(&self, job: Job, run: Option<Reopened>) -> Result<Arc<Handle>, Problem> {
+    pub fn open(&self, job: Job, run: Option<Reopened>) -> Result<Arc<Handle>, Failure> {
         if self.ids().len() >= MOST {
-            let problem = Problem::plain(format!("{MOST} sessions are open"));
+            let problem = plain(format!("{MOST} sessions are open"));
             return Err(problem.hint("close one of them first"));
         }
         let id = self.opened.fetch_add(1, Ordering::SeqCst) + 1;
@@ -94,7 +95,7 @@ impl Sessions {
                 work(&mut open);
             }
         });
-        begun.map_err(|e| Problem::plain(format!("no thread can be started: {e}")))?;
+        begun.map_err(|e| plain(format!("no thread can be started: {e}")))?;
         opened.recv().unwrap_or_else(|_| Err(internal()))?;
         let handle = Arc::new(Handle { id, stop, work });
         // Not locked while the program is compiled: the other sessions go on meanwhile.
@@ -104,13 +105,13 @@ impl Sessions {
     }
 
     /// Returns an open session.
-    pub fn get(&self, id: u64) -> Result<Arc<Handle>, Problem> {
+    pub fn get(&self, id: u64) -> Result<Arc<Handle>, Failure> {
         let all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
-        all.get(&id).cloned().ok_or_else(|| Problem::plain(format!("session {id} is not open")))
+        all.get(&id).cloned().ok_or_else(|| plain(format!("session {id} is not open")))
     }
 
     /// Closes a session, which ends when it is done with what it is doing.
-    pub fn close(&self, id: u64) -> Result<(), Problem> {
+    pub fn close(&self, id: u64) -> Result<(), Failure> {
         let handle = self.get(id)?;
         handle.interrupt();
         self.all.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
@@ -124,16 +125,16 @@ impl Sessions {
 }
 
 /// The message for a defect of the studio itself.
-fn internal() -> Problem {
-    Problem::plain("an internal error; the other sessions and the runs go on")
+fn internal() -> Failure {
+    plain("an internal error; the other sessions and the runs go on")
 }
 
 impl Handle {
     /// Does something with the session, after what was asked before, and waits for it.
     pub fn ask<T: Send + 'static>(
         &self,
-        f: impl FnOnce(&mut OpenSession) -> Result<T, Problem> + Send + 'static,
-    ) -> Result<T, Problem> {
+        f: impl FnOnce(&mut OpenSession) -> Result<T, Failure> + Send + 'static,
+    ) -> Result<T, Failure> {
         let (told, done) = channel();
         let stop = Arc::clone(&self.stop);
         let work: Work = Box::new(move |open| {
@@ -142,8 +143,8 @@ impl Handle {
                 catch_unwind(AssertUnwindSafe(|| f(open))).unwrap_or_else(|_| Err(internal()));
             let _ = told.send(done);
         });
-        self.work.send(work).map_err(|_| Problem::plain("the session was closed"))?;
-        done.recv().unwrap_or_else(|_| Err(Problem::plain("the session was closed")))
+        self.work.send(work).map_err(|_| plain("the session was closed"))?;
+        done.recv().unwrap_or_else(|_| Err(plain("the session was closed")))
     }
 
     /// Stops what the session is doing.
@@ -153,55 +154,69 @@ impl Handle {
 }
 
 impl OpenSession {
-    fn open(job: Job, run: Option<Reopened>, stop: Arc<AtomicBool>) -> Result<Self, Problem> {
-        let program = match &run {
-            Some(run) => run.program()?,
-            None => inputs::program(&job.inputs, true)?,
-        };
-        let mut open = OpenSession::of(program, job, Stop::when(stop))?;
-        if let Some(run) = &run {
-            open.note = open.session.take_up(&run.best()?)?.text;
+    fn open(job: Job, run: Option<Reopened>, stop: Arc<AtomicBool>) -> Result<Self, Failure> {
+        let stop = Stop::when(stop);
+        match run {
+            Some(run) => OpenSession::of_run(&run, job.sampling.seed, stop),
+            None => OpenSession::of(inputs::program(&job.inputs, true)?, job, stop),
         }
-        Ok(open)
     }
 
-    fn of(program: Program, job: Job, stop: Stop) -> Result<Self, Problem> {
+    /// A session with the best state of a run.
+    fn of_run(run: &Reopened, seed: u64, stop: Stop) -> Result<Self, Failure> {
+        let (mut session, said) = run.session(seed, stop)?;
+        session.confine(Path::new("."));
+        let missing = session.program().missing_data();
+        Ok(OpenSession { session, job: run.job.clone(), note: said.text, missing })
+    }
+
+    fn of(program: Program, job: Job, stop: Stop) -> Result<Self, Failure> {
         let (program, _) = inputs::observe(program, &job)?;
         let missing = program.missing_data();
         let (mut session, said) = Session::open(program, job.sampling.seed, stop)?;
-        session.confine();
+        session.confine(Path::new("."));
         Ok(OpenSession { session, job, note: said.text, missing })
     }
 
     /// Gives the program other data. `:undo` goes back to the program with the old data.
-    pub fn observe(&mut self, observe: Vec<String>, stop: Stop) -> Result<(), Problem> {
+    pub fn observe(&mut self, observe: Vec<String>, stop: Stop) -> Result<(), Failure> {
         let job = Job { observe, ..self.job.clone() };
         let program = inputs::program(&job.inputs, true)?;
         let program = match program.text() == self.session.text() {
             true => program,
             false => program.edited(self.session.text())?,
         };
-        let other = OpenSession::of(program, job, stop)?;
-        self.session.take_over(other.session, "other data");
-        (self.job, self.note, self.missing) = (other.job, other.note, other.missing);
+        self.take_over(OpenSession::of(program, job, stop)?, "other data");
         Ok(())
+    }
+
+    /// Goes on with a run. `:undo` goes back.
+    pub fn load(&mut self, run: &Reopened, stop: Stop) -> Result<(), Failure> {
+        let other = OpenSession::of_run(run, self.job.sampling.seed, stop)?;
+        self.take_over(other, &format!(":load {}", run.folder().display()));
+        Ok(())
+    }
+
+    fn take_over(&mut self, other: OpenSession, what: &str) {
+        self.session.take_over(other.session, what);
+        (self.job, self.note, self.missing) = (other.job, other.note, other.missing);
     }
 
     /// Writes the program to its file if it was changed, so that a run can read it. An
     /// edited shipped program becomes a file of the folder.
-    pub fn write_program(&self, folder: &Path) -> Result<(), Problem> {
+    pub fn write_program(&self, folder: &Path) -> Result<(), Failure> {
         let (name, text) = (&self.job.inputs.program, self.session.text());
         let there = Program::open_allowing(name, &self.job.inputs.allowed.allow_read);
         if there.is_ok_and(|p| p.text() == text) {
             return Ok(());
         }
-        let path = super::guard::path_within(folder, name).map_err(Problem::plain)?;
-        crate::cli::running::files::write(&path, text.as_bytes()).map_err(Problem::from)
+        let path = path_within(folder, name).map_err(plain)?;
+        crate::cli::running::files::write(&path, text.as_bytes())
     }
 
     /// Describes the session, for the page.
     pub fn described(&mut self, id: u64) -> Value {
-        let view = self.session.view(None);
+        let view = self.session.view();
         let s = &self.session;
         let interface = s.program().interface();
         let image = observed_image(s.model().code());
@@ -243,12 +258,6 @@ impl OpenSession {
     }
 }
 
-/// Whether a file name is that of a picture.
-pub fn is_picture(name: &str) -> bool {
-    let end = Path::new(name).extension().and_then(|e| e.to_str()).map(str::to_lowercase);
-    matches!(end.as_deref(), Some("png" | "jpg" | "jpeg"))
-}
-
 /// Lists the presets that a run of a job can use.
 fn presets(job: &Job) -> Vec<Value> {
     let Ok(Some((_, presets))) = quality::presets(&job.inputs.program) else { return Vec::new() };
@@ -258,10 +267,4 @@ fn presets(job: &Job) -> Vec<Value> {
         Some(json!({ "name": q.name(), "about": about }))
     };
     Quality::ALL.into_iter().filter_map(of).collect()
-}
-
-impl From<Problem> for Failure {
-    fn from(p: Problem) -> Failure {
-        Failure::Plain(p.to_string(), None)
-    }
 }

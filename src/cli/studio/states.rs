@@ -1,9 +1,9 @@
 //! States of runs: which trace a name stands for, and its picture.
 
-use super::answer::Problem;
 use super::pictures::Encoded;
 use super::protocol::{StateName, Viewpoint};
 use super::run::{Run, revision};
+use crate::cli::failure::{Failure, plain};
 use crate::cli::reopening::film::best_chain;
 use crate::cli::reopening::reopened::Reopened;
 use crate::cli::running::ready::Ready;
@@ -31,7 +31,7 @@ pub struct RunState {
 
 impl Run {
     /// Returns the kept draws, chain by chain.
-    pub fn kept(&self) -> Result<Vec<KeptTrace>, Problem> {
+    pub fn kept(&self) -> Result<Vec<KeptTrace>, Failure> {
         match self.watched() {
             Some(w) => Ok(w.kept.all()),
             // It waits, or is being prepared.
@@ -41,7 +41,7 @@ impl Run {
     }
 
     /// Returns the states on the way of the chain that ended best.
-    pub fn film(&self) -> Result<Vec<TrajectoryState>, Problem> {
+    pub fn film(&self) -> Result<Vec<TrajectoryState>, Failure> {
         let all = match self.watched() {
             Some(w) => w.trajectory.all(),
             None if self.is_active() => Vec::new(),
@@ -52,17 +52,13 @@ impl Run {
 
     /// Returns the modes, once the run has ended.
     pub fn modes(&self) -> Vec<Mode> {
-        let summary = std::fs::read(self.folder.join("summary.json")).ok();
-        let summary: Option<Value> = summary.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        let modes = summary.map(|s| s["modes"].clone()).unwrap_or_default();
-        serde_json::from_value(modes).unwrap_or_default()
+        serde_json::from_value(self.summary_file()["modes"].clone()).unwrap_or_default()
     }
 
     /// Builds the trace of a state.
-    pub fn state(&self, name: &StateName) -> Result<RunState, Problem> {
+    pub fn state(&self, name: &StateName) -> Result<RunState, Failure> {
         let ready = self.ready()?;
-        let missing =
-            |what: &str, n: usize| Problem::plain(format!("{} has no {what} {n}", self.name));
+        let missing = |what: &str, n: usize| plain(format!("{} has no {what} {n}", self.name));
         let saved: SavedTrace = match *name {
             // Kept draws are thinned while a run goes on: a page may know of more.
             StateName { draw: Some(n), .. } => {
@@ -83,8 +79,7 @@ impl Run {
             }
             _ => match self.watched() {
                 Some(w) => {
-                    let state =
-                        w.best.state().ok_or_else(|| Problem::plain("the run has no state yet"))?;
+                    let state = w.best.state().ok_or_else(|| plain("the run has no state yet"))?;
                     let draws = scene::predictive(0, 0);
                     let trace = scene::rebuilt(&ready.model, &state.choices, draws)?;
                     return Ok(RunState { ready, trace });
@@ -92,10 +87,7 @@ impl Run {
                 None => Reopened::open(&self.folder)?.best()?,
             },
         };
-        let model = &ready.model;
-        let loaded =
-            Trace::load(Arc::clone(model.code()), model.hash(), &saved, model.limits().clone());
-        let trace = loaded.map_err(|e| Problem::plain(e.to_string()))?;
+        let trace = scene::loaded(&ready.model, &saved).map_err(|e| plain(e.to_string()))?;
         Ok(RunState { ready, trace })
     }
 
@@ -106,7 +98,7 @@ impl Run {
         layer: Layer,
         size: u32,
         camera: Option<Viewpoint>,
-    ) -> Result<Encoded, Problem> {
+    ) -> Result<Encoded, Failure> {
         let is_best = name.draw.or(name.film).or(name.mode).is_none();
         let watched = self.watched().filter(|_| is_best);
         let (best, is_working) = match &watched {
@@ -128,7 +120,7 @@ impl Run {
                 picture(&view, state.ready.image(), &located, layer, size, camera)?;
             header.insert("log_joint".into(), super::layout::finite(log_joint));
             header.insert("revision".into(), json!(revision(log_joint)));
-            Ok::<_, Problem>((header, Arc::new(data)))
+            Ok::<_, Failure>((header, Arc::new(data)))
         })?;
         self.pictures.keep(key, &picture);
         Ok(picture)
@@ -136,8 +128,8 @@ impl Run {
 }
 
 /// The message where nothing can be drawn.
-pub fn no_view() -> Problem {
-    Problem::plain("the program has no view and no solid").hint("let view = scene.render(solid);")
+pub fn no_view() -> Failure {
+    plain("the program has no view and no solid").hint("let view = scene.render(solid);")
 }
 
 /// Draws a picture of a scene as a file, with its header.
@@ -148,13 +140,9 @@ pub fn picture(
     layer: Layer,
     size: u32,
     camera: Option<Viewpoint>,
-) -> Result<(Map<String, Value>, Vec<u8>), Problem> {
+) -> Result<(Map<String, Value>, Vec<u8>), Failure> {
     if !SIDES.contains(&size) {
-        return Err(Problem::plain(format!(
-            "`size` must be from {} to {}",
-            SIDES.start(),
-            SIDES.end()
-        )));
+        return Err(plain(format!("`size` must be from {} to {}", SIDES.start(), SIDES.end())));
     }
     // From elsewhere the photograph does not lie behind the scene.
     let drawn = match camera {
@@ -165,7 +153,7 @@ pub fn picture(
         }
         None => layer.draw(view, image, located, size),
     };
-    let drawn = drawn.map_err(Problem::plain)?;
+    let drawn = drawn.map_err(plain)?;
     let bytes = encoded(&drawn)?;
     let mut header = Map::new();
     header.insert("type".into(), json!("image/png"));
@@ -176,19 +164,19 @@ pub fn picture(
 
 /// Encodes a picture as PNG at the least effort: the way to the page is short, and that takes
 /// a fraction of the time of JPEG.
-fn encoded(picture: &image::RgbImage) -> Result<Vec<u8>, Problem> {
+fn encoded(picture: &image::RgbImage) -> Result<Vec<u8>, Failure> {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
-    picture.write_with_encoder(encoder).map_err(|e| Problem::plain(e.to_string()))?;
+    picture.write_with_encoder(encoder).map_err(|e| plain(e.to_string()))?;
     Ok(bytes)
 }
 
 /// Returns a camera at a viewpoint, with the size of another one's pictures.
-fn seen_from(v: Viewpoint, other: &Camera) -> Result<Camera, Problem> {
+fn seen_from(v: Viewpoint, other: &Camera) -> Result<Camera, Failure> {
     use glam::DVec3;
     let wrong = || {
-        Problem::plain(
+        plain(
             "`camera` needs an eye, another target, and an up that is not the direction between them",
         )
     };

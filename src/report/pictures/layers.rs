@@ -1,9 +1,10 @@
 //! Depth, normals and parts of a drawn frame as colours, and two sets of contours coloured
 //! by how far they are from each other.
 
-use super::strokes::coverage;
+use super::strokes::{as_strokes, coverage};
 use super::{mix, surface};
 use crate::render::{ContourSlice, Frame};
+use crate::vision::ContourMap;
 use image::{Rgb, RgbImage};
 
 /// The colours of parts, used in turn (Okabe and Ito 2008: distinct also to people who see
@@ -63,6 +64,15 @@ pub fn parts(drawn: &Frame) -> RgbImage {
 /// none within `far`) and those of the photograph (dim where the scene has one, blue
 /// where it has none). `far` is in pixels of the photograph's contours.
 pub fn residuals(
+    (width, height): (u32, u32),
+    own: &ContourSlice,
+    seen: &ContourMap,
+    far: f32,
+) -> RgbImage {
+    as_strokes(seen, |seen| apart((width, height), own, seen, far))
+}
+
+fn apart(
     (width, height): (u32, u32),
     own: &ContourSlice,
     seen: &ContourSlice,
@@ -170,7 +180,7 @@ mod tests {
         };
         let own = slice(&[20.0, 80.0], &[20.0, 80.0]);
         let seen = slice(&[20.0, 20.0], &[20.0, 80.0]);
-        let out = residuals((100, 100), &own, &seen, 5.0);
+        let out = apart((100, 100), &own, &seen, 5.0);
         let at = |x, y| out.get_pixel(x, y).0;
         assert!(at(20, 20)[1] > at(20, 20)[0], "{:?}: met", at(20, 20));
         assert!(at(80, 80)[0] > 150 && at(80, 80)[1] < 100, "{:?}: only the scene", at(80, 80));

@@ -17,7 +17,7 @@ pub use dots::{DETECTED, OF_SCENE, dots};
 pub use layers::{depth, normals, parts, residuals};
 pub use limbs::limbs;
 pub use sheet::{captioned_sheet, contact_sheet};
-pub use strokes::contours;
+pub use strokes::{contour_map, contours};
 pub use surface::{frequency, mask, overlaid, overlay, shaded};
 
 /// Pictures are enlarged until their longer side has this many pixels.
@@ -44,6 +44,18 @@ where
 {
     let mut bytes = Vec::new();
     picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png)?;
+    Ok(bytes)
+}
+
+/// Encodes a picture as a JPEG file of a quality from 1 to 100.
+///
+/// # Errors
+/// Returns an error if the picture has no pixels.
+#[cfg(feature = "codecs")]
+pub fn jpeg(picture: &image::RgbImage, quality: u8) -> Result<Vec<u8>, image::ImageError> {
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality);
+    picture.write_with_encoder(encoder)?;
     Ok(bytes)
 }
 

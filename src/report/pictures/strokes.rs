@@ -2,6 +2,7 @@
 
 use super::{LONGER_SIDE, mix};
 use crate::render::ContourSlice;
+use crate::vision::ContourMap;
 use image::RgbImage;
 
 /// Draws bright contours on black, like a contour map.
@@ -9,6 +10,18 @@ pub fn contours(width: u32, height: u32, strokes: &ContourSlice) -> RgbImage {
     let mut out = RgbImage::new(width, height);
     draw_strokes(&mut out, strokes, [255.0; 3]);
     out
+}
+
+/// Draws the points of a contour map like the contours of a scene.
+pub fn contour_map(width: u32, height: u32, map: &ContourMap) -> RgbImage {
+    as_strokes(map, |strokes| contours(width, height, strokes))
+}
+
+/// Calls with the points of a map as strokes of one pixel, about which they are apart.
+pub(super) fn as_strokes<T>(map: &ContourMap, f: impl FnOnce(&ContourSlice) -> T) -> T {
+    let length = vec![1.0; map.len()];
+    let ContourMap { x, y, tx, ty, .. } = map;
+    f(&ContourSlice { width: map.width, height: map.height, x, y, tx, ty, length: &length })
 }
 
 /// Draws strokes, scaled to the picture, about 2 pixels wide in one of [`LONGER_SIDE`].
