@@ -1,11 +1,19 @@
 //! Small groups of a mesh's faces, so that many faces can be skipped at once.
 
+use std::fmt;
 use std::sync::OnceLock;
 
 /// Groups of [`Patches::FACES`] consecutive faces, with the vertices of each group.
-/// Computed on first use from the faces alone, so all values compare equal.
-#[derive(Debug, Default)]
+/// Computed on first use from the faces alone, so all values compare equal, and are printed
+/// alike: meshes share them, and whoever draws one first computes those of all.
+#[derive(Default)]
 pub struct Patches(OnceLock<Lists>);
+
+impl fmt::Debug for Patches {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Patches")
+    }
+}
 
 /// A run of consecutive vertices; in most meshes a patch has few runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,6 +113,7 @@ mod tests {
             let near = |v: &usize| own.clone().any(|w| w.abs_diff(*v) <= GAP);
             assert!(held.iter().all(near));
         }
+        assert_eq!(format!("{patches:?}"), format!("{:?}", Patches::default()), "printed alike");
         assert_eq!(patches.clone().of(&faces[..1]).count(), 1);
         assert_eq!(Patches::default().of(&[]).count(), 0);
         let strip: Vec<[u32; 3]> = (0..16).map(|i| [i / 2, 100 + i / 2, i / 2 + 1]).collect();
