@@ -27,6 +27,16 @@ pub struct View {
     contours: BySize<Arc<Contours>>,
     /// `None` where the picture is better drawn in full.
     changes: BySize<Option<Arc<ContourChange>>>,
+    expected: Expected,
+}
+
+/// The sizes at which the view before this one drew in full: comparators ask each view of a
+/// trace's node for the same, so contours are read from the drawing that will be asked for
+/// next, instead of drawing what they need by themselves.
+#[derive(Default)]
+struct Expected {
+    frames: Vec<u32>,
+    depths: Vec<u32>,
 }
 
 impl View {
@@ -48,6 +58,7 @@ impl View {
             depths: Mutex::default(),
             contours: Mutex::default(),
             changes: Mutex::default(),
+            expected: Expected::default(),
         }
     }
 
@@ -55,7 +66,19 @@ impl View {
     /// differs between the two.
     #[must_use]
     pub fn after(self, previous: &View) -> View {
-        View { canvas: previous.canvas.for_next(), ..self }
+        let sizes = |drawn: &BySize<Arc<Frame>>, expected: &[u32]| {
+            let mut sizes: Vec<u32> = lock(drawn).iter().map(|(size, _)| *size).collect();
+            // A view whose density was not needed has drawn nothing.
+            if sizes.is_empty() {
+                sizes.extend_from_slice(expected);
+            }
+            sizes
+        };
+        let expected = Expected {
+            frames: sizes(&previous.frames, &previous.expected.frames),
+            depths: sizes(&previous.depths, &previous.expected.depths),
+        };
+        View { canvas: previous.canvas.for_next(), expected, ..self }
     }
 
     /// The solid.
@@ -113,10 +136,12 @@ impl View {
                 return Arc::clone(&change.moving);
             }
             let Scene { solid, camera } = self.scene(size);
-            Arc::new(match (change, self.depth_drawn(size)) {
-                (Some(_), _) => self.canvas.contours(&solid, &camera),
-                (None, Some(frame)) => Contours::with_depth(&solid, &camera, &frame.depth),
-                (None, None) => Contours::of(&solid, &camera),
+            if change.is_some() {
+                return Arc::new(self.canvas.contours(&solid, &camera));
+            }
+            Arc::new(match self.depth_drawn(size).or_else(|| self.depth_expected(size)) {
+                Some(frame) => Contours::with_depth(&solid, &camera, &frame.depth),
+                None => Contours::of(&solid, &camera),
             })
         })
     }
@@ -163,6 +188,14 @@ impl View {
     /// shows the full meshes, so only if depth does too.
     fn frame_drawn(&self, size: u32) -> Option<Arc<Frame>> {
         if self.detail > 0.0 { None } else { find(&self.frames, size) }
+    }
+
+    /// A frame with depth at least, if one is expected to be asked for.
+    fn depth_expected(&self, size: u32) -> Option<Arc<Frame>> {
+        if self.detail <= 0.0 && self.expected.frames.contains(&size) {
+            return Some(self.frame(size));
+        }
+        self.expected.depths.contains(&size).then(|| self.depth(size))
     }
 
     /// A frame with depth at least, if one was drawn.
@@ -226,7 +259,14 @@ mod tests {
             view
         });
         let c = View::new(sphere(32, 16), Camera::default_for(96, 96));
+        let after = |previous: &View| View::new(sphere(32, 16), *b.camera()).after(previous);
+        let next = after(&b);
+        assert_eq!(*a.contours(96), *next.contours(96));
+        assert_eq!(find(&next.frames, 96).as_ref(), Some(&b.frame(96)), "drawn for the next one");
         let depth = c.depth(96);
+        let next = after(&after(&c));
+        assert_eq!(*a.contours(96), *next.contours(96));
+        assert_eq!(find(&next.depths, 96).as_ref(), Some(&depth), "drawn for the next one");
         assert!(depth.part.is_empty() && Arc::ptr_eq(&depth, &c.depth(96)));
         assert_eq!(depth.depth, b.frame(96).depth);
         assert!(Arc::ptr_eq(&b.depth(96), &b.frame(96)));

@@ -7,7 +7,8 @@
 //! outline is taken from the contours: where a coarse mesh covers pixels beyond its
 //! smooth silhouette, that part of it is missed.
 
-use crate::render::{Contours, View};
+use crate::render::View;
+use crate::render::derivatives::vjp::vjp_some;
 use glam::DVec3;
 
 /// Distance from a piece at which to test for the background, in pixels.
@@ -19,63 +20,73 @@ impl View {
     /// solid's meshes in turn, in world coordinates. `gain` has a number for each pixel,
     /// row by row.
     pub fn vjp_mask(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
-        // Drawn before the contours, which then reuse it.
         let frame = self.depth(size);
-        let contours = self.contours(size);
-        let by_piece: Vec<[f64; 4]> = (0..contours.len())
-            .map(|i| {
-                let Some([nx, ny]) = outward(&contours, &frame.depth, i) else { return [0.0; 4] };
-                let (x, y) = (f64::from(contours.x[i]), f64::from(contours.y[i]));
-                let by = f64::from(contours.length[i])
-                    * between(gain, contours.width, contours.height, x, y);
-                [by * nx, by * ny, 0.0, 0.0]
-            })
-            .collect();
         let camera = self.camera().scaled_to(size);
         let drawn = self.drawn(&camera);
-        drawn.by_vertices_of(self.solid(), contours.vjp_fixed(&drawn.solid, &camera, &by_piece))
+        let picture = Picture { width: camera.width, height: camera.height, depth: &frame.depth };
+        let by_vertex = vjp_some(&drawn.solid, &camera, &frame.depth, |piece| {
+            let [nx, ny] = picture.outward([piece.x, piece.y, piece.tx, piece.ty])?;
+            let at = picture.between(gain, f64::from(piece.x), f64::from(piece.y));
+            let by = f64::from(piece.length) * at;
+            Some([by * nx, by * ny])
+        });
+        drawn.by_vertices_of(self.solid(), by_vertex)
     }
 }
 
-/// The direction towards the background, if piece `i` is part of the outline.
-fn outward(c: &Contours, depth: &[f32], i: usize) -> Option<[f64; 2]> {
-    let [x, y, tx, ty] = [&c.x, &c.y, &c.tx, &c.ty].map(|list| f64::from(list[i]));
-    let shown = |sign: f64| {
-        let (u, v) = (x + sign * BESIDE * ty, y - sign * BESIDE * tx);
-        let inside = u >= 0.0 && v >= 0.0 && u < f64::from(c.width) && v < f64::from(c.height);
-        inside.then(|| {
-            depth.get(v as usize * c.width as usize + u as usize).is_some_and(|d| d.is_finite())
-        })
-    };
-    match (shown(1.0)?, shown(-1.0)?) {
-        (false, true) => Some([ty, -tx]),
-        (true, false) => Some([-ty, tx]),
-        _ => None,
-    }
+/// A depth image.
+struct Picture<'a> {
+    width: u32,
+    height: u32,
+    depth: &'a [f32],
 }
 
-/// The value interpolated bilinearly between pixel centres.
-fn between(values: &[f64], width: u32, height: u32, x: f64, y: f64) -> f64 {
-    let (w, h) = (width as usize, height as usize);
-    let (u, v) = ((x - 0.5).clamp(0.0, (w - 1) as f64), (y - 0.5).clamp(0.0, (h - 1) as f64));
-    let (u0, v0) = (u as usize, v as usize);
-    let at =
-        |u: usize, v: usize| values.get(v.min(h - 1) * w + u.min(w - 1)).copied().unwrap_or(0.0);
-    let (fu, fv) = (u - u0 as f64, v - v0 as f64);
-    let row = |v: usize| at(u0, v) + fu * (at(u0 + 1, v) - at(u0, v));
-    row(v0) + fv * (row(v0 + 1) - row(v0))
+impl Picture<'_> {
+    /// The direction towards the background, if a piece at this position with this tangent
+    /// is part of the outline.
+    fn outward(&self, piece: [f32; 4]) -> Option<[f64; 2]> {
+        let [x, y, tx, ty] = piece.map(f64::from);
+        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        let shown = |sign: f64| {
+            let (u, v) = (x + sign * BESIDE * ty, y - sign * BESIDE * tx);
+            let inside = u >= 0.0 && v >= 0.0 && u < width && v < height;
+            inside.then(|| {
+                let at = v as usize * self.width as usize + u as usize;
+                self.depth.get(at).is_some_and(|d| d.is_finite())
+            })
+        };
+        match (shown(1.0)?, shown(-1.0)?) {
+            (false, true) => Some([ty, -tx]),
+            (true, false) => Some([-ty, tx]),
+            _ => None,
+        }
+    }
+
+    /// The value interpolated bilinearly between pixel centres.
+    fn between(&self, values: &[f64], x: f64, y: f64) -> f64 {
+        let (w, h) = (self.width as usize, self.height as usize);
+        let (u, v) = ((x - 0.5).clamp(0.0, (w - 1) as f64), (y - 0.5).clamp(0.0, (h - 1) as f64));
+        let (u0, v0) = (u as usize, v as usize);
+        let at = |u: usize, v: usize| {
+            values.get(v.min(h - 1) * w + u.min(w - 1)).copied().unwrap_or(0.0)
+        };
+        let (fu, fv) = (u - u0 as f64, v - v0 as f64);
+        let row = |v: usize| at(u0, v) + fu * (at(u0 + 1, v) - at(u0, v));
+        row(v0) + fv * (row(v0 + 1) - row(v0))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::Affine;
+    use crate::geom::{Affine, Solid};
     use crate::render::Camera;
     use crate::render::testing::{cuboid, sphere};
     use glam::Vec3;
 
     #[test]
     fn gains_are_read_bilinearly_up_to_the_border() {
+        let picture = |width, height| Picture { width, height, depth: &[] };
         let gain = [1.0, 2.0, 4.0, 3.0, 5.0, 9.0];
         for (x, y, expected) in [
             (0.5, 0.5, 1.0),
@@ -89,10 +100,10 @@ mod tests {
             (3.0, 2.0, 9.0),
             (0.0, 2.0, 3.0),
         ] {
-            assert_eq!(between(&gain, 3, 2, x, y), expected, "{x} {y}");
+            assert_eq!(picture(3, 2).between(&gain, x, y), expected, "{x} {y}");
         }
-        assert_eq!(between(&[1.0, 2.0], 2, 1, 1.0, 0.9), 1.5);
-        assert_eq!(between(&[1.0, 2.0], 1, 2, 0.1, 1.0), 1.5);
+        assert_eq!(picture(2, 1).between(&[1.0, 2.0], 1.0, 0.9), 1.5);
+        assert_eq!(picture(1, 2).between(&[1.0, 2.0], 0.1, 1.0), 1.5);
     }
 
     #[test]
@@ -143,5 +154,37 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// The same sum by the general way: contours first, then the pieces of all of them.
+    #[test]
+    fn only_pieces_of_the_outline_count() {
+        let place = |x: f64, turn: f64| {
+            Affine::new(DVec3::new(x, 0.1, -0.3), DVec3::new(turn, 0.4, 0.2), DVec3::ONE)
+        };
+        let solid = Solid::group(&[
+            sphere(20, 12).placed(place(0.9, 0.0)),
+            cuboid(Vec3::new(0.8, 1.1, 0.6)).placed(place(0.2, -0.7)),
+            sphere(20, 12).placed(place(900.0, 0.0)),
+        ]);
+        let view = View::new(solid, Camera::default_for(96, 80));
+        let gain: Vec<f64> = (0..96 * 80).map(|i| 0.1 * f64::from(i % 37) - 1.0).collect();
+        let (frame, contours, camera) = (view.depth(96), view.contours(96), view.camera());
+        let picture = Picture { width: 96, height: 80, depth: &frame.depth };
+        let mut counted = 0;
+        let by: Vec<[f64; 4]> = (0..contours.len())
+            .map(|i| {
+                let [x, y] = [contours.x[i], contours.y[i]];
+                let Some([nx, ny]) = picture.outward([x, y, contours.tx[i], contours.ty[i]]) else {
+                    return [0.0; 4];
+                };
+                counted += 1;
+                let at = picture.between(&gain, f64::from(x), f64::from(y));
+                let by = f64::from(contours.length[i]) * at;
+                [by * nx, by * ny, 0.0, 0.0]
+            })
+            .collect();
+        assert!(counted > 100 && counted < contours.len());
+        assert_eq!(view.vjp_mask(96, &gain), contours.vjp_fixed(view.solid(), camera, &by));
     }
 }

@@ -7,12 +7,12 @@
 //! shorter there (`junctions`). Nothing is drawn: the pieces of the meshes are extracted
 //! again, and the visible ones are recognised by their values.
 
-use crate::geom::Solid;
+use crate::geom::{Instance, Solid};
 use crate::render::derivatives::junctions::{End, Extracted, moved_ends};
 use crate::render::derivatives::silhouette_derivative::{STEADY, SilhouetteDerivative};
 use crate::render::lines::extraction::{Origin, Room, extract_mesh};
-use crate::render::lines::visibility::Piece;
-use crate::render::pixels::project::{Lens, Placement, Projected};
+use crate::render::lines::visibility::{Depths, Piece};
+use crate::render::pixels::project::{Lens, Placement, Projected, project};
 use crate::render::{Camera, Contours};
 use glam::DVec3;
 
@@ -44,7 +44,9 @@ impl Contours {
         let mut silhouette_derivative = SilhouetteDerivative::new(out.len(), steady);
         for t in &extracted {
             let Some(by) = t.seen.and_then(|i| by_piece.get(i)) else { continue };
-            if let (Some(by_ends), Some(own)) = (by_ends(t, camera, by), out.get_mut(t.base..)) {
+            if let (Some(by_ends), Some(own)) =
+                (by_ends(t.instance, &t.origin, camera, by), out.get_mut(t.base..))
+            {
                 vjp_ends(&t.origin, &by_ends, own);
                 silhouette_derivative.add(t.instance, camera, t.base, &t.origin, &by_ends, own);
             }
@@ -54,6 +56,7 @@ impl Contours {
     }
 
     /// As [`Contours::vjp`], with each piece fixed to its points of the surface.
+    #[cfg(test)]
     pub(in crate::render) fn vjp_fixed(
         &self,
         solid: &Solid,
@@ -63,9 +66,10 @@ impl Contours {
         let mut out = vec![DVec3::ZERO; solid.vertex_count()];
         self.each(solid, camera, |t| {
             let by = t.seen.and_then(|i| by_piece.get(i));
-            if let (Some(by), Some(own)) =
-                (by.and_then(|by| by_ends(&t, camera, by)), out.get_mut(t.base..))
-            {
+            if let (Some(by), Some(own)) = (
+                by.and_then(|by| by_ends(t.instance, &t.origin, camera, by)),
+                out.get_mut(t.base..),
+            ) {
                 vjp_ends(&t.origin, &by, own);
             }
         });
@@ -109,14 +113,49 @@ impl Contours {
     }
 }
 
+/// The vector-Jacobian product of the contours of a solid whose depth was drawn, with each
+/// piece fixed to its points of the surface. `by` gives the derivatives with respect to a
+/// piece's x and y; pieces for which it gives none cost little, so this is cheap for
+/// functions of few pieces, such as those of the outline.
+pub(in crate::render) fn vjp_some(
+    solid: &Solid,
+    camera: &Camera,
+    depth: &[f32],
+    mut by: impl FnMut(&Piece) -> Option<[f64; 2]>,
+) -> Vec<DVec3> {
+    let mut out = vec![DVec3::ZERO; solid.vertex_count()];
+    let (mut projected, mut room) = (Projected::default(), Room::default());
+    let range = project(solid, camera, &mut projected);
+    let Some(depths) = Depths::new(depth, camera.width, camera.height, range.extent()) else {
+        return out;
+    };
+    let mut rest = &mut out[..];
+    for (i, instance) in solid.instances().iter().enumerate() {
+        let (placement, vertices) = (Placement::new(camera, &instance.affine), projected.mesh(i));
+        let (own, after) = rest.split_at_mut(vertices.len().min(rest.len()));
+        rest = after;
+        if vertices.outside(camera) {
+            continue;
+        }
+        extract_mesh(&instance.mesh, &placement, camera, &vertices, &mut room, |piece, origin| {
+            if let Some([x, y]) = by(&piece).filter(|_| depths.visible(&piece))
+                && let Some(by) = by_ends(instance, origin, camera, &[x, y, 0.0, 0.0])
+            {
+                vjp_ends(origin, &by, own);
+            }
+        });
+    }
+    out
+}
+
 /// Maps the derivatives with respect to a piece to those with respect to the ends of its
 /// segment, in world coordinates.
 fn by_ends(
-    t: &Extracted<'_>,
+    instance: &Instance,
+    origin: &Origin,
     camera: &Camera,
     &[gx, gy, by_length, by_angle]: &[f64; 4],
 ) -> Option<[DVec3; 2]> {
-    let Extracted { instance, origin, .. } = t;
     let corners = origin.corners.map(|v| instance.mesh.positions.get(v as usize));
     let [Some(p), Some(q), Some(r)] = corners else { return None };
     let ends = origin.ends.map(|[a, b, c]| {
