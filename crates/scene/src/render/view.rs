@@ -37,6 +37,7 @@ pub struct View {
 struct Expected {
     frames: Vec<u32>,
     depths: Vec<u32>,
+    contours: Vec<u32>,
 }
 
 impl View {
@@ -66,17 +67,15 @@ impl View {
     /// differs between the two.
     #[must_use]
     pub fn after(self, previous: &View) -> View {
-        let sizes = |drawn: &BySize<Arc<Frame>>, expected: &[u32]| {
-            let mut sizes: Vec<u32> = lock(drawn).iter().map(|(size, _)| *size).collect();
-            // A view whose density was not needed has drawn nothing.
-            if sizes.is_empty() {
-                sizes.extend_from_slice(expected);
-            }
-            sizes
-        };
+        // A view whose density was not needed has drawn nothing.
+        fn or(drawn: Vec<u32>, expected: &[u32]) -> Vec<u32> {
+            if drawn.is_empty() { expected.to_vec() } else { drawn }
+        }
+        let contours = [sizes(&previous.contours), sizes(&previous.changes)].concat();
         let expected = Expected {
-            frames: sizes(&previous.frames, &previous.expected.frames),
-            depths: sizes(&previous.depths, &previous.expected.depths),
+            frames: or(sizes(&previous.frames), &previous.expected.frames),
+            depths: or(sizes(&previous.depths), &previous.expected.depths),
+            contours: or(contours, &previous.expected.contours),
         };
         View { canvas: previous.canvas.for_next(), expected, ..self }
     }
@@ -116,10 +115,12 @@ impl View {
     /// that are requested later.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
         self.depth_drawn(size).unwrap_or_else(|| {
-            let on_canvas = self.change_on_canvas(size).is_some();
+            let contours = self.expects_contours(size);
+            let on_canvas = !contours || self.change_on_canvas(size).is_some();
             once(&self.depths, size, || {
                 let Scene { solid, camera } = self.scene(size);
-                let depth = on_canvas.then(|| self.canvas.depth(&solid, &camera)).flatten();
+                let drawn = || self.canvas.depth(&solid, &camera, contours);
+                let depth = on_canvas.then(drawn).flatten();
                 Arc::new(match depth {
                     Some(depth) => Frame::of_depth(&camera, depth),
                     None => Frame::render(&solid, &camera, Channels::Depth),
@@ -190,6 +191,11 @@ impl View {
         if self.detail > 0.0 { None } else { find(&self.frames, size) }
     }
 
+    /// Whether contours of this size are drawn, or expected to be asked for.
+    fn expects_contours(&self, size: u32) -> bool {
+        self.expected.contours.contains(&size) || find(&self.changes, size).is_some()
+    }
+
     /// A frame with depth at least, if one is expected to be asked for.
     fn depth_expected(&self, size: u32) -> Option<Arc<Frame>> {
         if self.detail <= 0.0 && self.expected.frames.contains(&size) {
@@ -212,6 +218,11 @@ impl std::fmt::Debug for View {
 
 fn lock<T>(cache: &BySize<T>) -> MutexGuard<'_, Vec<(u32, T)>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The sizes for which there are values.
+fn sizes<T>(cache: &BySize<T>) -> Vec<u32> {
+    lock(cache).iter().map(|(size, _)| *size).collect()
 }
 
 fn find<T: Clone>(cache: &BySize<T>, size: u32) -> Option<T> {
@@ -267,6 +278,7 @@ mod tests {
         let next = after(&after(&c));
         assert_eq!(*a.contours(96), *next.contours(96));
         assert_eq!(find(&next.depths, 96).as_ref(), Some(&depth), "drawn for the next one");
+        assert!(after(&next).expects_contours(96) && !after(&c).expects_contours(96));
         assert!(depth.part.is_empty() && Arc::ptr_eq(&depth, &c.depth(96)));
         assert_eq!(depth.depth, b.frame(96).depth);
         assert!(Arc::ptr_eq(&b.depth(96), &b.frame(96)));

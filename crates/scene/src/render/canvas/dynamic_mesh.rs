@@ -51,7 +51,7 @@ impl DynamicMesh {
     pub fn move_to(
         &mut self,
         instance: &Instance,
-        camera: &Camera,
+        (camera, contours): (&Camera, bool),
         tools: &mut Tools,
         behind: Option<&StaticLayer>,
     ) {
@@ -76,7 +76,7 @@ impl DynamicMesh {
             *hidden_by = by.map(|b| Arc::clone(&b.prepared));
             by.is_some()
         };
-        layer.draw(instance, camera, tools, hidden);
+        layer.draw(instance, (camera, contours), tools, hidden);
         (self.now.mesh, self.now.affine) = (Arc::downgrade(&instance.mesh), affine);
     }
 

@@ -37,11 +37,11 @@ pub(super) struct Layer {
 
 impl Layer {
     /// Draws a mesh alone, unless `hidden`, given its depth range and the area that it
-    /// covers, holds.
+    /// covers, holds; its pieces of contour only if `contours`.
     pub fn draw(
         &mut self,
         instance: &Instance,
-        camera: &Camera,
+        (camera, contours): (&Camera, bool),
         Tools { projected, candidates, room }: &mut Tools,
         hidden: impl FnOnce(&DepthRange, &Area) -> bool,
     ) {
@@ -65,9 +65,11 @@ impl Layer {
             return;
         }
         work::drawn(&instance.mesh);
-        extract_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| {
-            self.pieces.push(piece)
-        });
+        if contours {
+            extract_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| {
+                self.pieces.push(piece)
+            });
+        }
         self.looks = Area::looked_at(&self.pieces, camera);
         let (mesh, area) = (&instance.mesh, &self.area);
         draw_mesh(mesh, &placement, camera, &vertices, candidates, area, &mut self.depth);

@@ -22,7 +22,8 @@ use super::{Camera, ContourChange, Contours};
 use crate::geom::Solid;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-/// The number of pictures that a canvas keeps: several cameras, or several sizes.
+/// The number of pictures that a canvas keeps: several cameras or sizes, with contours or
+/// with depth alone.
 const PICTURES: usize = 4;
 
 /// A shared canvas. Clones draw on the same one; a new canvas is empty.
@@ -55,19 +56,20 @@ impl Canvas {
 
     /// The contours of a solid in a camera's picture, as [`Contours::of`].
     pub fn contours(&self, solid: &Solid, camera: &Camera) -> Contours {
-        self.shown(solid, camera, |picture| picture.contours(camera))
+        self.shown(solid, (camera, true), |picture| picture.contours(camera))
             .unwrap_or_else(|| Contours::of(solid, camera))
     }
 
-    /// The depth of a solid, row by row; `None` if it is better drawn in full.
-    pub(super) fn depth(&self, solid: &Solid, camera: &Camera) -> Option<Vec<f32>> {
-        self.shown(solid, camera, |picture| picture.depth().to_vec())
+    /// The depth of a solid, row by row, in the picture with contours or in that without;
+    /// `None` if it is better drawn in full.
+    pub(super) fn depth(&self, solid: &Solid, camera: &Camera, contours: bool) -> Option<Vec<f32>> {
+        self.shown(solid, (camera, contours), |picture| picture.depth().to_vec())
     }
 
     /// The change from the previous contours in this picture; `None` if the solid is
     /// better drawn in full.
     pub(super) fn change(&self, solid: &Solid, camera: &Camera) -> Option<ContourChange> {
-        self.with_picture(camera, |picture, tools| picture.draw(solid, camera, tools))
+        self.with_picture((camera, true), |picture, tools| picture.draw(solid, camera, tools))
     }
 
     /// Takes something from the picture that shows a solid, which is drawn only if it is
@@ -75,10 +77,10 @@ impl Canvas {
     fn shown<T>(
         &self,
         solid: &Solid,
-        camera: &Camera,
+        (camera, contours): (&Camera, bool),
         take: impl FnOnce(&Picture) -> T,
     ) -> Option<T> {
-        self.with_picture(camera, |picture, tools| {
+        self.with_picture((camera, contours), |picture, tools| {
             if !picture.shows(solid) {
                 picture.draw(solid, camera, tools)?;
             }
@@ -88,17 +90,17 @@ impl Canvas {
 
     fn with_picture<T>(
         &self,
-        camera: &Camera,
+        (camera, contours): (&Camera, bool),
         work: impl FnOnce(&mut Picture, &mut Tools) -> Option<T>,
     ) -> Option<T> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Pictures { pictures, tools } = &mut *all;
         let eye = camera_bits(camera);
-        match pictures.iter().position(|p| p.is_of(&eye)) {
+        match pictures.iter().position(|p| p.is_of(&eye, contours)) {
             Some(at) => pictures[..=at].rotate_right(1),
             None => {
                 pictures.truncate(PICTURES - 1);
-                pictures.insert(0, Picture::new(eye));
+                pictures.insert(0, Picture::new(eye, contours));
             }
         }
         work(pictures.first_mut()?, tools)

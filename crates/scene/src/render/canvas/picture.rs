@@ -28,8 +28,10 @@ const PATIENCE: u64 = 1024;
 
 /// The state of one camera's picture.
 pub(super) struct Picture {
-    /// The bits of the camera, which identify the picture.
+    /// The bits of the camera, which identify the picture, and whether it has contours, not
+    /// only depth.
     camera: [u64; 17],
+    contours: bool,
     /// The meshes shown.
     shown: Meshes,
     /// The meshes of the last solid most of which was not shown.
@@ -59,10 +61,11 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// A picture without meshes; nothing is drawn yet.
-    pub fn new(camera: [u64; 17]) -> Picture {
+    /// A picture without meshes, with or without contours; nothing is drawn yet.
+    pub fn new(camera: [u64; 17], contours: bool) -> Picture {
         Picture {
             camera,
+            contours,
             shown: Meshes::default(),
             last: Meshes::default(),
             dynamic: Vec::new(),
@@ -83,9 +86,9 @@ impl Picture {
         }
     }
 
-    /// Whether it is the picture of the camera with these bits.
-    pub fn is_of(&self, camera: &[u64; 17]) -> bool {
-        self.camera == *camera
+    /// Whether it is the picture of the camera with these bits, with or without contours.
+    pub fn is_of(&self, camera: &[u64; 17], contours: bool) -> bool {
+        self.contours == contours && self.camera == *camera
     }
 
     /// Whether it shows just this solid.
@@ -156,7 +159,7 @@ impl Picture {
                     continue;
                 };
                 self.areas.push(mesh.now.layer.area);
-                mesh.move_to(instance, camera, tools, Some(static_layer));
+                mesh.move_to(instance, (camera, self.contours), tools, Some(static_layer));
                 self.areas.push(mesh.now.layer.area);
             }
         }
@@ -225,7 +228,7 @@ impl Picture {
         let mut dynamic = self.dynamic.iter_mut().peekable();
         for (index, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
             if let Some(mesh) = dynamic.next_if(|m| m.index == index) {
-                mesh.move_to(instance, camera, tools, None);
+                mesh.move_to(instance, (camera, self.contours), tools, None);
             }
         }
     }
@@ -252,11 +255,11 @@ impl Picture {
         let mut dynamic = self.dynamic.iter_mut().peekable();
         for (index, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
             if let Some(mesh) = dynamic.next_if(|m| m.index == index) {
-                mesh.move_to(instance, camera, tools, None);
+                mesh.move_to(instance, (camera, self.contours), tools, None);
                 continue;
             }
             let layer = &mut self.scratch;
-            layer.draw(instance, camera, tools, |_, _| false);
+            layer.draw(instance, (camera, self.contours), tools, |_, _| false);
             layer.show(&mut static_layer.depth, width, &whole);
             static_layer.range = static_layer.range.and(&layer.range);
             static_layer.pieces.extend(layer.pieces.iter().map(|piece| (*piece, index)));

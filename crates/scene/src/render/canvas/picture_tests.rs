@@ -28,6 +28,8 @@ fn somewhere(random: &mut Uniform, reach: f64, size: f64) -> Affine {
 /// A picture, and the pieces that a follower of its changes has collected.
 struct Followed {
     picture: Picture,
+    /// The same without contours, if that is compared, too.
+    depth_alone: Option<Picture>,
     tools: Tools,
     at: Arc<()>,
     /// The current pieces of the stationary meshes as bits, in some order.
@@ -43,7 +45,8 @@ fn bits(c: &Contours) -> Vec<[u32; 5]> {
 impl Followed {
     fn new(camera: &Camera) -> Followed {
         Followed {
-            picture: Picture::new(camera_bits(camera)),
+            picture: Picture::new(camera_bits(camera), true),
+            depth_alone: None,
             tools: Tools::default(),
             at: Arc::default(),
             pieces: Vec::new(),
@@ -54,16 +57,24 @@ impl Followed {
     /// Returns whether it was drawn incrementally, and whether the change continued from the
     /// last one.
     fn check(&mut self, solid: &Solid, camera: &Camera) -> [bool; 2] {
-        let Some(change) = self.picture.draw(solid, camera, &mut self.tools) else {
-            return [false; 2];
-        };
+        let tools = &mut self.tools;
+        let alone =
+            self.depth_alone.as_mut().map(|alone| (alone.draw(solid, camera, tools), alone));
+        let drawn = self.picture.draw(solid, camera, tools);
+        let alone = alone.map(|(change, alone)| {
+            assert_eq!(change.is_some(), drawn.is_some());
+            assert!(change.is_none_or(|change| change.count == 0));
+            &*alone
+        });
+        let Some(change) = drawn else { return [false; 2] };
         let (got, wanted) = (self.picture.contours(camera), Contours::of(solid, camera));
         assert_eq!(bits(&got), bits(&wanted));
         assert_eq!(change.count, wanted.len());
         let depth = Frame::render(solid, camera, Channels::Depth).depth;
-        assert!(
-            self.picture.depth().iter().map(|d| d.to_bits()).eq(depth.iter().map(|d| d.to_bits()))
-        );
+        let is_depth = |picture: &Picture| {
+            picture.depth().iter().map(|d| d.to_bits()).eq(depth.iter().map(|d| d.to_bits()))
+        };
+        assert!(is_depth(&self.picture) && alone.is_none_or(is_depth));
         let follows = Arc::ptr_eq(&self.at, &change.from);
         if follows {
             for removed in bits(&change.removed) {
@@ -109,6 +120,7 @@ fn pictures_give_what_is_drawn_at_once() {
         let moving = 1 + round as usize % 3;
         let shapes: Vec<Solid> = (0..moving).map(|_| shape(&mut random)).collect();
         let mut followers = Followed::new(&camera);
+        followers.depth_alone = Some(Picture::new(camera_bits(&camera), false));
         for step in 0..60 {
             let before = solids.clone();
             // Far, near, and out of the picture; now and then another mesh moves as well.
