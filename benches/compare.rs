@@ -79,11 +79,8 @@ fn pixels(c: &mut Criterion) {
         let groups: Vec<u8> = seen.iter().copied().map(u8::from).collect();
         for (name, options) in regions() {
             let region = Region::prepare(&photo, size, size, &options).expect("a region");
-            let mut scratch = region::Scratch::default();
             c.bench_function(&format!("score/region, {name} at {size}"), |b| {
-                b.iter(|| {
-                    region.log_likelihood_with(black_box(&groups), &frame.normal, &mut scratch)
-                })
+                b.iter(|| region.log_likelihood(black_box(&groups), &frame.normal))
             });
         }
         let depth = DepthMap::new(size, size, frame.depth.clone()).expect("a depth map");

@@ -7,20 +7,22 @@
 use super::adjoints::BySolid;
 use super::compare::{SECTION, SEEN, by_view, likelihood, same_shape, view};
 use super::observed::KeypointsValue;
-use super::{ViewValue, native};
+use super::{ViewValue, incremental};
 use crate::diag::nearest;
 use crate::geom::Landmark;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Row, Type, opt};
+use crate::lang::builtins::{Args, PreviousEvaluation, Row, State, Type, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Located, Value};
 use crate::render::{Camera, View};
 use crate::rng::Stream;
-use crate::vision::keypoints::{Detection, KeypointLikelihood, KeypointOptions, Unit, matching};
+use crate::vision::keypoints::{
+    Detection, KeypointLikelihood, KeypointOptions, Keypoints, Unit, matching,
+};
 use glam::DVec3;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-pub(super) const TABLE: &[Row] = &[native(
+pub(super) const TABLE: &[Row] = &[incremental(
     "keypoints",
     SECTION,
     &[
@@ -79,44 +81,84 @@ pub(super) const TABLE: &[Row] = &[native(
     Type::Likelihood,
     "The density of detected joints: each near its landmark, or an outlier anywhere in the \
      picture; undetected joints are ignored.",
-    |a| {
-        let (outlier, offset, misses) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(6, 0.0)?);
-        let systematic = a.num_or(7, 0.0)?;
-        let unit = match a.choice(4, &["diagonal", "torso"])? {
-            "torso" => Unit::Torso,
-            _ => Unit::Diagonal,
-        };
-        let (sd, by_joint) = spreads(a)?;
-        let options = KeypointOptions { sd, outlier, offset, unit, misses, systematic };
-        if !(options.outlier > 0.0 && options.outlier < 1.0) {
-            return Err(a.outside(2, "strictly between 0 and 1"));
-        }
-        if !(options.offset >= 0.0 && options.offset.is_finite()) {
-            return Err(a.outside(3, "not negative and finite"));
-        }
-        if !(0.0..1.0).contains(&options.misses) {
-            return Err(a.outside(6, "from 0 to less than 1"));
-        }
-        if !(options.systematic >= 0.0 && options.systematic.is_finite()) {
-            return Err(a.outside(7, "not negative and finite"));
-        }
-        likelihood(KeypointsOf {
-            view: view(a)?,
-            options,
-            by_joint,
-            confident: a.bool_or(5, true)?,
-        })
-    },
+    keypoints,
 )
 .vjp(|_, _, by| Some(by_view(by.clone(), 7)))];
+
+fn keypoints(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
+    let (outlier, offset, misses) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(6, 0.0)?);
+    let systematic = a.num_or(7, 0.0)?;
+    let unit = match a.choice(4, &["diagonal", "torso"])? {
+        "torso" => Unit::Torso,
+        _ => Unit::Diagonal,
+    };
+    let (sd, by_joint) = spreads(a)?;
+    let options = KeypointOptions { sd, outlier, offset, unit, misses, systematic };
+    if !(options.outlier > 0.0 && options.outlier < 1.0) {
+        return Err(a.outside(2, "strictly between 0 and 1"));
+    }
+    if !(options.offset >= 0.0 && options.offset.is_finite()) {
+        return Err(a.outside(3, "not negative and finite"));
+    }
+    if !(0.0..1.0).contains(&options.misses) {
+        return Err(a.outside(6, "from 0 to less than 1"));
+    }
+    if !(options.systematic >= 0.0 && options.systematic.is_finite()) {
+        return Err(a.outside(7, "not negative and finite"));
+    }
+    let kept = previous.and_then(|p| Arc::clone(&p.state).downcast::<Kept>().ok());
+    let kept = kept.unwrap_or_default();
+    let value = likelihood(KeypointsOf {
+        view: view(a)?,
+        model: Model { options, by_joint, confident: a.bool_or(5, true)? },
+        kept: Arc::clone(&kept),
+    })?;
+    Ok((value, kept))
+}
 
 #[derive(Debug)]
 struct KeypointsOf {
     view: Arc<View>,
+    model: Model,
+    kept: Arc<Kept>,
+}
+
+/// The arguments besides the view.
+#[derive(Clone, Debug, PartialEq)]
+struct Model {
     options: KeypointOptions,
     by_joint: ByJoint,
     /// Whether the confidence of detections is used.
     confident: bool,
+}
+
+/// What the likelihoods of one node of a trace share: the detections with their landmarks
+/// and models, which stay the same while the scene moves.
+type Kept = Mutex<Option<Arc<Matched>>>;
+
+/// Detections matched to the landmarks of a scene.
+#[derive(Debug)]
+struct Matched {
+    observed: Value,
+    model: Model,
+    /// The width and height of the camera's picture.
+    camera: (u32, u32),
+    /// The names of the landmarks.
+    names: Vec<Arc<str>>,
+    /// The width and height of the picture in which joints were detected.
+    size: (u32, u32),
+    /// The length of the detected torso, in pixels of that picture.
+    torso: f64,
+    terms: Vec<MatchedTerm>,
+}
+
+/// One detection, the index of its landmark, and the model of its error.
+#[derive(Debug)]
+struct MatchedTerm {
+    model: Arc<KeypointLikelihood>,
+    seen: Detection,
+    landmark: usize,
+    point: usize,
 }
 
 /// Joints with individual standard deviations.
@@ -173,7 +215,7 @@ impl Likelihood for KeypointsOf {
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let mut sum = 0.0;
-        self.each(observed, |term| sum += term.model.log_density(&term.seen, term.joint))?;
+        self.each(observed, |term| sum += term.model.log_density(term.seen, term.joint))?;
         Ok(sum)
     }
 
@@ -184,7 +226,7 @@ impl Likelihood for KeypointsOf {
         let mut points = seen.points().to_vec();
         let mut torso = 0.0;
         let drawn = self.each(observed, |t| {
-            let at = t.model.sample(&t.seen, t.joint, rng);
+            let at = t.model.sample(t.seen, t.joint, rng);
             let [w, h] = if seen.is_normalised() { [t.size.0, t.size.1] } else { [1.0; 2] };
             torso = t.torso;
             if let (Some(p), Some((first, rest))) = (points.get_mut(t.point), at.split_first()) {
@@ -213,8 +255,8 @@ impl Likelihood for KeypointsOf {
         let landmarks = self.view.solid().landmarks();
         let add = |term: Term| {
             let Some(joint) = term.joint else { return };
-            let (at, variance) = term.model.located(&term.seen, joint);
-            let seen = term.model.meant(&term.seen, joint);
+            let (at, variance) = term.model.located(term.seen, joint);
+            let seen = term.model.meant(term.seen, joint);
             let (width, height) = term.size;
             all.push(Located {
                 name: Arc::clone(&landmarks[term.landmark].name),
@@ -236,7 +278,7 @@ impl Likelihood for KeypointsOf {
         let mut all = vec![DVec3::ZERO; landmarks.len()];
         let add = |term: Term| {
             let Some(joint) = term.joint else { return };
-            let by = term.model.gradient(&term.seen, joint);
+            let by = term.model.gradient(term.seen, joint);
             let by = [by[0] * term.scale[0], by[1] * term.scale[1]];
             all[term.landmark] += camera.vjp_point(landmarks[term.landmark].position, by);
         };
@@ -248,7 +290,7 @@ impl Likelihood for KeypointsOf {
 /// One detection and its landmark.
 struct Term<'a> {
     model: &'a KeypointLikelihood,
-    seen: Detection,
+    seen: &'a Detection,
     landmark: usize,
     /// The index of the detection.
     point: usize,
@@ -263,57 +305,95 @@ struct Term<'a> {
 }
 
 impl KeypointsOf {
+    /// Calls a function for each detection whose landmark the scene has.
     fn each(&self, observed: &Value, mut f: impl FnMut(Term)) -> Result<(), String> {
+        let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
+        let matched = self.matched(observed)?;
+        let size = matched.size;
+        let whole = (f64::from(size.0), f64::from(size.1));
+        let scale = [whole.0 / f64::from(camera.width), whole.1 / f64::from(camera.height)];
+        for MatchedTerm { model, seen, landmark, point } in &matched.terms {
+            let Some(l) = landmarks.get(*landmark) else { continue };
+            f(Term {
+                model,
+                seen,
+                landmark: *landmark,
+                point: *point,
+                joint: project(l, camera, size),
+                scale,
+                size: whole,
+                torso: matched.torso,
+            });
+        }
+        Ok(())
+    }
+
+    /// The detections with their landmarks, from the last evaluation if nothing but the
+    /// positions of the landmarks has changed.
+    fn matched(&self, observed: &Value) -> Result<Arc<Matched>, String> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
+        let names = || landmarks.iter().map(|l| &l.name);
+        let holds = |m: &&Arc<Matched>| {
+            m.observed.same(observed)
+                && m.camera == (camera.width, camera.height)
+                && m.names.len() == landmarks.len()
+                && m.names.iter().zip(names()).all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
+                && m.model == self.model
+        };
+        if let Some(matched) = kept.as_ref().filter(holds) {
+            return Ok(Arc::clone(matched));
+        }
         let Some(KeypointsValue(seen)) = observed.downcast::<KeypointsValue>() else {
             return Err(format!(
                 "scene.keypoints: the observed value must be keypoints, got {}",
                 observed.type_name()
             ));
         };
-        if seen.is_empty() {
-            return Ok(());
-        }
-        let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
         let size = seen.size().unwrap_or((camera.width, camera.height));
-        same_shape(size, &self.view, "scene.keypoints")?;
-        let names: Vec<&str> = landmarks.iter().map(|l| &*l.name).collect();
+        let mut matched = Matched {
+            observed: observed.clone(),
+            model: self.model.clone(),
+            camera: (camera.width, camera.height),
+            names: names().cloned().collect(),
+            size,
+            torso: 0.0,
+            terms: Vec::new(),
+        };
+        if !seen.is_empty() {
+            same_shape(size, &self.view, "scene.keypoints")?;
+            matched.torso = seen.torso(size);
+            matched.terms = self.terms(seen, &matched)?;
+        }
+        Ok(Arc::clone(kept.insert(Arc::new(matched))))
+    }
+
+    fn terms(&self, seen: &Keypoints, matched: &Matched) -> Result<Vec<MatchedTerm>, String> {
+        let Matched { size, torso, .. } = *matched;
+        let names: Vec<&str> = matched.names.iter().map(|name| &**name).collect();
         let near =
             |name: &str, known: &[&str]| nearest(name, known.iter().copied()).map(str::to_owned);
         let found = matching(seen, &names, near).map_err(|e| format!("scene.keypoints: {e}"))?;
         let whole = (f64::from(size.0), f64::from(size.1));
-        let torso = seen.torso(size);
         let model = |sd: f64| {
-            let options = KeypointOptions { sd, ..self.options.clone() };
+            let options = KeypointOptions { sd, ..self.model.options.clone() };
             KeypointLikelihood::new(whole.0, whole.1, torso.max(1e-3), &options)
+                .map(Arc::new)
                 .map_err(|e| format!("scene.keypoints: {e}"))
         };
-        let usual = model(self.options.sd)?;
-        let scale = [whole.0 / f64::from(camera.width), whole.1 / f64::from(camera.height)];
+        let usual = model(self.model.options.sd)?;
+        let mut terms = Vec::with_capacity(found.len());
         for (point, (p, at)) in seen.points().iter().zip(found).enumerate() {
-            let Some((landmark, l)) = at.and_then(|i| Some((i, landmarks.get(i)?))) else {
-                continue;
-            };
+            let Some(landmark) = at else { continue };
             let mut detection = seen.detection(p, size);
-            if !self.confident {
+            if !self.model.confident {
                 detection.confidence = 1.0;
             }
-            let own = self
-                .by_joint
-                .iter()
-                .find(|(name, _)| *name == p.name)
-                .map(|(_, sd)| model(*sd))
-                .transpose()?;
-            f(Term {
-                model: own.as_ref().unwrap_or(&usual),
-                seen: detection,
-                landmark,
-                point,
-                joint: project(l, camera, size),
-                scale,
-                size: whole,
-                torso,
-            });
+            let own = self.model.by_joint.iter().find(|(name, _)| *name == p.name);
+            let own = own.map(|(_, sd)| model(*sd)).transpose()?;
+            let model = own.unwrap_or_else(|| Arc::clone(&usual));
+            terms.push(MatchedTerm { model, seen: detection, landmark, point });
         }
-        Ok(())
+        Ok(terms)
     }
 }

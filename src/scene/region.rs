@@ -5,15 +5,16 @@
 use super::compare::{
     SECTION, SEEN, SIZE, by_silhouette, by_view, drawn, image, likelihood, size, view,
 };
-use super::native;
+use super::incremental;
 use super::observed::ImageValue;
+use super::shared_tally::SharedTally;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Row, Type, opt};
+use crate::lang::builtins::{Args, PreviousEvaluation, Row, State, Type, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
 use crate::render::{Frame, View};
 use crate::rng::Stream;
-use crate::vision::region::{Quantised, Scratch};
+use crate::vision::region::{Quantised, Tally};
 use crate::vision::{Region, RegionOptions};
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -21,7 +22,7 @@ use std::sync::Arc;
 /// The maximum number of groups besides the background; further parts share the last one.
 const MOST_GROUPS: u16 = 15;
 
-pub(super) const TABLE: &[Row] = &[native(
+pub(super) const TABLE: &[Row] = &[incremental(
     "region",
     SECTION,
     &[
@@ -71,9 +72,10 @@ struct RegionOf {
     size: u32,
     groups: Groups,
     options: RegionOptions,
+    tally: Arc<SharedTally<Region, Tally>>,
 }
 
-fn region(a: &Args) -> Result<Value, Fault> {
+fn region(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
     let d = RegionOptions::default();
     let whole = |i: usize, lo: i64, hi: i64, default: i64| {
         if a.given(i) { a.int_in(i, lo, hi) } else { Ok(default) }
@@ -90,11 +92,19 @@ fn region(a: &Args) -> Result<Value, Fault> {
         "parts" => Groups::Parts,
         _ => Groups::Silhouette,
     };
-    likelihood(RegionOf { view: view(a)?, size: size(a, 7)?, groups, options })
+    let tally = SharedTally::after(previous);
+    let value = likelihood(RegionOf {
+        view: view(a)?,
+        size: size(a, 7)?,
+        groups,
+        options,
+        tally: Arc::clone(&tally),
+    })?;
+    Ok((value, tally))
 }
 
 thread_local! {
-    static SCRATCH: RefCell<(Vec<u8>, Scratch)> = RefCell::default();
+    static GROUPS: RefCell<Vec<u8>> = RefCell::default();
 }
 
 impl RegionOf {
@@ -143,9 +153,10 @@ impl Likelihood for RegionOf {
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let (region, frame) = self.prepared(observed)?;
-        Ok(SCRATCH.with_borrow_mut(|(groups, scratch)| {
+        Ok(GROUPS.with_borrow_mut(|groups| {
             self.fill(&frame, groups);
-            region.log_likelihood_with(groups, &frame.normal, scratch)
+            let score = |tally: &mut _| region.log_likelihood_after(groups, &frame.normal, tally);
+            self.tally.with(&region, score)
         }))
     }
 
@@ -231,7 +242,8 @@ mod tests {
     }
 
     fn of(shift: f64, groups: Groups, options: &RegionOptions) -> RegionOf {
-        RegionOf { view: vase(shift), size: 64, groups, options: options.clone() }
+        let (view, options) = (vase(shift), options.clone());
+        RegionOf { view, size: 64, groups, options, tally: SharedTally::after(None) }
     }
 
     #[test]

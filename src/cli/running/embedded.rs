@@ -8,6 +8,7 @@ use crate::cli::running::ready::Ready;
 use crate::cli::scene;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use image::RgbImage;
+use pcadlang::bank::{as_view, picture};
 use pcadlang::infer::KeptTrace;
 use pcadlang::lang::value::Located;
 use pcadlang::render::View;
@@ -16,6 +17,7 @@ use pcadlang::report::embedded::{EmbeddedDraw, embedded};
 use pcadlang::report::pictures::jpeg;
 use pcadlang::scene::ViewValue;
 use pcadlang::session::Layer;
+use pcadlang::trace::Trace;
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
@@ -46,10 +48,17 @@ pub fn write_scene(
         solid: view.solid().clone(),
     }];
     let every = kept.len().div_ceil(DRAWS).max(1);
+    // Finding the picture evaluates all names after it, so it is done once.
+    let mut found = None;
     for k in kept.iter().step_by(every) {
-        let loaded = scene::loaded(&ready.model, &k.trace);
+        let view = |mut t: Trace| {
+            if found.is_none() {
+                found = picture(&mut t, draws);
+            }
+            as_view(t.query(&[found?], draws).ok()?.first()?, None)
+        };
         // A state that cannot be rebuilt is one fewer to look at.
-        let Some(view) = loaded.ok().and_then(|mut t| scene::view(&mut t, draws, None)) else {
+        let Some(view) = scene::loaded(&ready.model, &k.trace).ok().and_then(view) else {
             continue;
         };
         all.push(EmbeddedDraw {

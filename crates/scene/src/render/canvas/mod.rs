@@ -34,7 +34,8 @@ pub(super) struct Canvas(Arc<Mutex<Pictures>>);
 #[derive(Default)]
 struct Pictures {
     pictures: Vec<Picture>,
-    tools: Tools,
+    /// Large, and most canvases are never drawn on: made when it is needed.
+    tools: Option<Box<Tools>>,
 }
 
 impl std::fmt::Debug for Pictures {
@@ -103,6 +104,6 @@ impl Canvas {
                 pictures.insert(0, Picture::new(eye, contours));
             }
         }
-        work(pictures.first_mut()?, tools)
+        work(pictures.first_mut()?, tools.get_or_insert_default())
     }
 }

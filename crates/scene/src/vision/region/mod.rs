@@ -15,8 +15,10 @@
 mod counts;
 mod palette;
 mod shading;
+mod tally;
 
 pub use palette::Quantised;
+pub use tally::Tally;
 
 use self::counts::DirichletMultinomial;
 use super::elements::{ComparatorError, check, check_size};
@@ -91,21 +93,14 @@ pub struct Region {
     cells: Vec<u32>,
     /// Number of pixels of each cell.
     totals: Vec<u32>,
+    /// Number of pixels of each colour.
+    whole: Vec<u32>,
     urn: DirichletMultinomial,
     /// The score of each tile, and of the picture, if all of it is background.
     empty_tiles: Vec<f64>,
     empty: f64,
     /// Log brightness, if shading is scored.
     brightness: Vec<f32>,
-}
-
-/// Memory reused between evaluations.
-#[derive(Debug, Clone, Default)]
-pub struct Scratch {
-    /// Number of pixels of each cell, group after group, starting with group 1.
-    counts: Vec<u32>,
-    /// Number of pixels of each colour, group after group, starting with group 0.
-    colours: Vec<u32>,
 }
 
 impl Region {
@@ -150,12 +145,13 @@ impl Region {
             totals.chunks_exact(colours).map(|t| urn.score(t.iter().copied())).collect();
         let mut whole = vec![0; colours];
         totals.chunks_exact(colours).for_each(|t| add(&mut whole, t));
-        let empty = urn.score(whole.into_iter());
+        let empty = urn.score(whole.iter().copied());
         Ok(Region {
             options: options.clone(),
             colours,
             cells,
             totals,
+            whole,
             urn,
             empty_tiles,
             empty,
@@ -188,55 +184,28 @@ impl Region {
     /// for shading and where the group is not 0. Elements missing at the slices' ends
     /// count as background.
     pub fn log_likelihood(&self, groups: &[u8], normals: &[[f32; 3]]) -> f64 {
-        self.log_likelihood_with(groups, normals, &mut Scratch::default())
+        self.log_likelihood_after(groups, normals, &mut Tally::default())
     }
 
-    /// [`Region::log_likelihood`] without allocation once the scratch has grown.
-    pub fn log_likelihood_with(
+    /// [`Region::log_likelihood`], bit for bit, counting only the pixels whose group differs
+    /// from that in the picture before. A tally belongs to one region.
+    pub fn log_likelihood_after(
         &self,
         groups: &[u8],
         normals: &[[f32; 3]],
-        scratch: &mut Scratch,
+        tally: &mut Tally,
     ) -> f64 {
-        let most = usize::from(groups.iter().copied().max().unwrap_or(0));
-        if most == 0 {
+        tally.follow(self, groups);
+        if tally.is_empty() {
             return 0.0;
         }
-        let (cells, k) = (self.totals.len(), self.colours);
-        let Scratch { counts, colours } = scratch;
-        counts.clear();
-        counts.resize(most * cells, 0);
-        colours.clear();
-        colours.resize((most + 1) * k, 0);
-        for (g, cell) in groups.iter().zip(&self.cells).filter(|(g, _)| **g > 0) {
-            if let Some(n) = counts.get_mut((usize::from(*g) - 1) * cells + *cell as usize) {
-                *n += 1;
-            }
-        }
+        let mut sum = 0.0;
         let by_tile = self.options.by_tile();
-        let mut tiles = 0.0;
-        let (ground, own) = colours.split_at_mut(k);
-        for (i, (total, empty)) in self.totals.chunks_exact(k).zip(&self.empty_tiles).enumerate() {
-            ground.copy_from_slice(total);
-            let (mut seen, mut score) = (false, 0.0);
-            for (group, own) in counts.chunks_exact(cells).zip(own.chunks_exact_mut(k)) {
-                let Some(here) = group.get(i * k..(i + 1) * k) else { continue };
-                if here.iter().any(|n| *n > 0) {
-                    seen = true;
-                    ground.iter_mut().zip(here).for_each(|(g, n)| *g -= n);
-                    add(own, here);
-                    if by_tile > 0.0 {
-                        score += self.urn.score(here.iter().copied());
-                    }
-                }
-            }
-            if seen && by_tile > 0.0 {
-                tiles += score + self.urn.score(ground.iter().copied()) - empty;
-            }
+        if by_tile > 0.0 {
+            sum += by_tile * tally.tiles(self);
         }
-        let mut sum = by_tile * tiles;
         if self.options.power > 0.0 {
-            sum += self.options.power * (self.whole(ground, own) - self.empty);
+            sum += self.options.power * tally.whole(self);
         }
         if self.options.shading > 0.0 {
             sum += self.options.shading * shading::log_ratio(groups, normals, &self.brightness);
@@ -262,27 +231,12 @@ impl Region {
             };
             own.iter().zip(total).map(one).collect()
         };
-        let fold = |counts: &[u32]| {
-            let mut whole = vec![0; k];
-            counts.chunks_exact(k).for_each(|t| add(&mut whole, t));
-            whole
-        };
-        let whole = gain(&fold(&own), &fold(&self.totals), self.options.power);
+        let mut inside = vec![0; k];
+        own.chunks_exact(k).for_each(|t| add(&mut inside, t));
+        let whole = gain(&inside, &self.whole, self.options.power);
         let tiles = own.chunks_exact(k).zip(self.totals.chunks_exact(k));
         let tiles: Vec<f64> = tiles.flat_map(|(o, t)| gain(o, t, self.options.by_tile())).collect();
         self.cells.iter().map(|c| tiles[*c as usize] + whole[*c as usize % k]).collect()
-    }
-
-    /// Returns the whole picture's score from the counts of the groups' colours.
-    fn whole(&self, ground: &mut [u32], own: &[u32]) -> f64 {
-        ground.fill(0);
-        self.totals.chunks_exact(self.colours).for_each(|t| add(ground, t));
-        let mut score = 0.0;
-        for group in own.chunks_exact(self.colours) {
-            ground.iter_mut().zip(group).for_each(|(g, n)| *g -= n);
-            score += self.urn.score(group.iter().copied());
-        }
-        score + self.urn.score(ground.iter().copied())
     }
 
     /// Samples labels given groups (row-major, one per pixel; missing ones are

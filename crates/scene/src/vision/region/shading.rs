@@ -32,8 +32,9 @@ pub(super) fn log_brightness(picture: &LinearImage) -> Vec<f32> {
     picture.rgb.iter().map(log).collect()
 }
 
-fn terms([x, y, z]: [f32; 3]) -> [f64; TERMS] {
-    let (x, y, z) = (f64::from(x), f64::from(y), f64::from(z));
+/// The terms of a normal.
+#[inline(always)]
+fn terms([x, y, z]: [f64; 3]) -> [f64; TERMS] {
     [x, y, z, x * y, x * z, y * z, x * x - y * y]
 }
 
@@ -41,16 +42,23 @@ fn terms([x, y, z]: [f32; 3]) -> [f64; TERMS] {
 /// whose group is not 0: linear in functions of the normal versus constant. It is 0 with
 /// fewer than two pixels. Pixels whose normal or brightness is not finite are ignored.
 pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
-    let mut sums =
-        Moments { some: [[0.0; SOME]; ALL], count: 0, products: [[[0.0; LANES]; ALL]; ALL] };
+    let mut sums = Moments {
+        some: Pixels { numbers: [[0.0; SOME]; 4], count: 0 },
+        products: [[[0.0; LANES]; ALL]; ALL],
+    };
     vectorised(
         #[inline(always)]
         || {
-            for ((_, n), b) in
-                groups.iter().zip(normals).zip(brightness).filter(|((g, _), _)| **g > 0)
-            {
-                if (n[0] + n[1] + n[2] + b).is_finite() {
-                    sums.push(*n, *b);
+            let lists = groups.chunks(SOME).zip(normals.chunks(SOME)).zip(brightness.chunks(SOME));
+            for ((groups, normals), brightness) in lists {
+                // Most of a picture is background.
+                if groups.iter().fold(0, |any, g| any | g) == 0 {
+                    continue;
+                }
+                for ((g, n), b) in groups.iter().zip(normals).zip(brightness) {
+                    if *g > 0 && (n[0] + n[1] + n[2] + b).is_finite() {
+                        sums.push(*n, *b);
+                    }
                 }
             }
             sums.add();
@@ -65,25 +73,28 @@ const SOME: usize = 64;
 /// the machine.
 const LANES: usize = 8;
 
+/// Normals and brightness of some pixels.
+struct Pixels {
+    /// x, y and z of the normals, and brightness.
+    numbers: [[f32; SOME]; 4],
+    count: usize,
+}
+
 /// Sums of the products of (1, terms, brightness); only those on and above the diagonal
 /// are kept.
 struct Moments {
-    some: [[f64; SOME]; ALL],
-    count: usize,
+    some: Pixels,
     products: [[[f64; LANES]; ALL]; ALL],
 }
 
 impl Moments {
     #[inline(always)]
-    fn push(&mut self, normal: [f32; 3], brightness: f32) {
-        let i = self.count % SOME;
-        self.some[0][i] = 1.0;
-        for (column, x) in self.some[1..=TERMS].iter_mut().zip(terms(normal)) {
-            column[i] = x;
-        }
-        self.some[ALL - 1][i] = f64::from(brightness);
-        self.count = i + 1;
-        if self.count == SOME {
+    fn push(&mut self, [x, y, z]: [f32; 3], brightness: f32) {
+        let Pixels { numbers, count } = &mut self.some;
+        let i = *count & (SOME - 1);
+        numbers.iter_mut().zip([x, y, z, brightness]).for_each(|(list, x)| list[i] = x);
+        *count = i + 1;
+        if *count == SOME {
             self.add();
         }
     }
@@ -91,13 +102,20 @@ impl Moments {
     /// Adds the products of the buffered pixels; unused positions count as 0.
     #[inline(always)]
     fn add(&mut self) {
-        let Moments { some, count, products } = self;
-        some.iter_mut().for_each(|column| column[*count..].fill(0.0));
+        let Moments { some: Pixels { numbers: [x, y, z, brightness], count }, products } = self;
+        let mut columns = [[0.0; SOME]; ALL];
+        for i in 0..SOME {
+            columns[0][i] = if i < *count { 1.0 } else { 0.0 };
+            let there = |number: f32| if i < *count { f64::from(number) } else { 0.0 };
+            let terms = terms([x[i], y[i], z[i]].map(there));
+            columns[1..=TERMS].iter_mut().zip(terms).for_each(|(column, t)| column[i] = t);
+            columns[ALL - 1][i] = there(brightness[i]);
+        }
         for (i, row) in products.iter_mut().enumerate() {
             for (j, sums) in row.iter_mut().enumerate().skip(i) {
-                for (x, y) in
-                    some[i].as_chunks::<LANES>().0.iter().zip(some[j].as_chunks::<LANES>().0)
-                {
+                let lists =
+                    columns[i].as_chunks::<LANES>().0.iter().zip(columns[j].as_chunks::<LANES>().0);
+                for (x, y) in lists {
                     for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
                         *sum += x * y;
                     }
@@ -182,7 +200,7 @@ mod tests {
             (1..n).map(of).collect()
         };
         let y = contrast(&brightness.iter().map(|b| f64::from(*b)).collect::<Vec<_>>());
-        let rows: Vec<[f64; TERMS]> = normals.iter().map(|n| terms(*n)).collect();
+        let rows: Vec<[f64; TERMS]> = normals.iter().map(|n| terms(n.map(f64::from))).collect();
         let x: Vec<Vec<f64>> =
             (0..TERMS).map(|t| contrast(&rows.iter().map(|r| r[t]).collect::<Vec<_>>())).collect();
         let density = |with: bool| {

@@ -156,15 +156,15 @@ fn calibration(simulated: &RegionOptions, scored: &RegionOptions) -> [f64; 2] {
     let template = Region::of(&blank, simulated).unwrap();
     let mut rng = stream(9);
     let (runs, mut bins) = (600, [[0.0; 10]; 2]);
-    let mut scratch = Scratch::default();
     for _ in 0..runs {
         let truth = rng.index(states.len());
         let labels = template.simulate(&groups[truth], &mut rng);
         let region =
             Region::of(&Quantised::new(SIDE as u32, SIDE as u32, 4, labels).unwrap(), scored)
                 .unwrap();
+        let mut tally = Tally::default();
         let logs: Vec<f64> =
-            groups.iter().map(|g| region.log_likelihood_with(g, &[], &mut scratch)).collect();
+            groups.iter().map(|g| region.log_likelihood_after(g, &[], &mut tally)).collect();
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = logs.iter().map(|l| libm::exp(l - most)).collect();
         let all: f64 = weights.iter().sum();
@@ -254,4 +254,36 @@ fn options_are_checked_and_uniform_pictures_say_nothing() {
             && GLOBAL.is_proper()
             && !RegionOptions { shading: 0.1, ..GLOBAL }.is_proper()
     );
+}
+
+#[test]
+fn a_tally_follows_pictures_bit_for_bit() {
+    let (w, h, n) = (37, 29, 37 * 29);
+    let picture = Quantised::new(w, h, 5, random(n, 5, 1)).unwrap();
+    for o in [
+        RegionOptions { power: 0.3, tiles: 6, tile_power: 0.7, ..GLOBAL },
+        RegionOptions { power: 0.0, tiles: 3, tile_power: 1.0, ..GLOBAL },
+        GLOBAL,
+    ] {
+        let region = Region::of(&picture, &o).unwrap();
+        let (mut tally, mut groups) = (Tally::default(), vec![0; n]);
+        let mut rng = stream(4);
+        for step in 0..80 {
+            // A few pixels, all of another picture, none, or pixels cut off at the end.
+            match step % 5 {
+                0..3 => {
+                    for _ in 0..rng.index(90) {
+                        groups[rng.index(n)] = rng.index(4) as u8;
+                    }
+                }
+                3 if step % 2 == 0 => groups = random(n, 1 + step % 6, 50 + step as u64),
+                3 => groups.fill(0),
+                _ => {}
+            }
+            let end = if step % 7 == 6 { n - 100 } else { n };
+            let got = region.log_likelihood_after(&groups[..end], &[], &mut tally);
+            let plain = region.log_likelihood(&groups[..end], &[]);
+            assert_eq!(got.to_bits(), plain.to_bits(), "step {step}");
+        }
+    }
 }
