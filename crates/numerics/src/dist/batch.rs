@@ -22,6 +22,9 @@ pub trait Batch: fmt::Debug + Send + Sync {
         sum: &mut ExactSum,
     ) -> bool;
 
+    /// Appends the log densities of the numbers of the last `score`, one by one.
+    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>);
+
     /// Adds `weight` times the derivatives of the log densities of the last `score` to
     /// the adjoints, which are laid out like the buffer.
     fn vjp(
@@ -159,6 +162,16 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         match &self.0[..] {
             [(_, d)] => (0..n).all(|i| one(x.get(buffer, i), d)),
             all => all.iter().enumerate().all(|(i, (_, d))| one(x.get(buffer, i), d)),
+        }
+    }
+
+    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
+        match &self.0[..] {
+            [(_, d)] => out.extend((0..n).map(|i| d.log_density(x.get(buffer, i)))),
+            all => {
+                let one = |(i, (_, d)): (usize, &(_, T))| d.log_density(x.get(buffer, i));
+                out.extend(all.iter().enumerate().map(one));
+            }
         }
     }
 
