@@ -115,6 +115,10 @@ impl Tape {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
             rest = after;
             let jacobian = match (&input.form, own) {
+                (Form::Num(at), [y]) if matches!(input.support, Support::Real) => {
+                    self.values[*at] = input.support.from_free_scalar(*y).0;
+                    continue;
+                }
                 (Form::Num(at), [y]) => {
                     let (x, jacobian) = input.support.from_free_scalar(*y);
                     self.values[*at] = x;
@@ -185,6 +189,7 @@ impl Tape {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
             rest = after;
             match &input.form {
+                Form::Num(at) if matches!(input.support, Support::Real) => out.push(adjoints[*at]),
                 Form::Num(at) => input.support.free_gradient(own, &adjoints[*at..=*at], out),
                 form => {
                     scratch.clear();

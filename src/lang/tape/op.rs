@@ -63,8 +63,9 @@ pub(super) enum Op {
         n: usize,
         observed: bool,
     },
-    /// The log density of any value under any distribution or likelihood.
-    Score { dist: Form, x: Form, observed: bool, last: Option<density::Score> },
+    /// The log density of any value under any distribution or likelihood; those of the last
+    /// run are kept.
+    Score { dist: Form, x: Form, observed: bool, last: Option<(Value, density::Score)> },
     /// A log weight.
     Factor { x: usize },
 }
@@ -112,12 +113,12 @@ impl Op {
             }
             Op::Score { dist, x, observed, last } => {
                 let (Some(dist), Some(x)) = (dist.value(v), x.value(v)) else { return false };
-                *last = score(&dist, &x, *observed);
-                match last {
-                    Some(density::Score::One(score)) => sums.of(*observed).add(*score),
-                    Some(density::Score::Sum(scores)) => sums.of(*observed).merge(scores),
-                    None => return false,
+                let Some(found) = score(&dist, &x, *observed) else { return false };
+                match &found {
+                    density::Score::One(score) => sums.of(*observed).add(*score),
+                    density::Score::Sum(scores) => sums.of(*observed).merge(scores),
                 }
+                *last = Some((dist, found));
                 true
             }
             Op::Factor { x } => {
@@ -173,8 +174,9 @@ impl Op {
                 batch.vjp(v, g, *x, params, *n, weight(*observed));
                 true
             }
-            Op::Score { dist, x, observed, .. } => {
-                vjp_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false)
+            Op::Score { dist, x, observed, last } => {
+                let Some((made, _)) = last else { return false };
+                vjp_score((dist, made), x, *observed, v, g, weight(*observed)).unwrap_or(false)
             }
             Op::Factor { x } => {
                 g[*x] += power;
@@ -196,7 +198,7 @@ impl Op {
                     _ => Some(Terms::Each),
                 }
             }
-            Op::Score { last, .. } => match last.as_ref()? {
+            Op::Score { last, .. } => match &last.as_ref()?.1 {
                 density::Score::One(score) => Some(Terms::One(*score)),
                 density::Score::Sum(sum) => Some(Terms::Sum(sum.clone())),
             },
@@ -236,20 +238,20 @@ fn score(dist: &Value, x: &Value, observed: bool) -> Option<density::Score> {
 }
 
 fn vjp_score(
-    dist: &Form,
+    (dist, made): (&Form, &Value),
     x: &Form,
     observed: bool,
     v: &[f64],
     g: &mut [f64],
     weight: f64,
 ) -> Option<bool> {
-    let (made, value) = (dist.value(v)?, x.value(v)?);
-    if let Value::Likelihood(l) = &made {
+    let value = x.value(v)?;
+    if let Value::Likelihood(l) = made {
         let mut by = l.gradient(&value)?;
         by.scale(weight);
         return Some(dist.vjp(&by, v, g));
     }
-    let Value::Dist(d) = &made else { return None };
+    let Value::Dist(d) = made else { return None };
     let (mut by_x, mut params) = density::gradient(d, &value)?;
     by_x.scale(weight);
     params.iter_mut().for_each(|p| *p *= weight);

@@ -2,12 +2,13 @@
 //! from the tape, with the same bits that an update would give them. Nothing is
 //! invalidated, evaluated or journaled.
 
+use crate::lang::builtins::CovarianceValue;
 use crate::lang::code::{Code, Op, Operand};
 use crate::lang::tape::{Form, ScoreSums, Tape, Terms};
 use crate::lang::value::Value;
 use crate::num::ExactSum;
-use crate::trace::graph::Graph;
 use crate::trace::Trace;
+use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use std::sync::Arc;
 
@@ -59,7 +60,13 @@ impl InPlace {
     /// Moves the trace to the point of the tape's last run; `before` are the sums of its
     /// scores where the trace is. False, with nothing changed, if only an update can do
     /// that.
-    pub fn apply(&mut self, graph: &mut Graph, code: &Code, tape: &Tape, before: &ScoreSums) -> bool {
+    pub fn apply(
+        &mut self,
+        graph: &mut Graph,
+        code: &Code,
+        tape: &Tape,
+        before: &ScoreSums,
+    ) -> bool {
         self.made.clear();
         for (_, form) in self.values.iter().filter(|(_, form)| tape.numbers(form).is_none()) {
             let Some(value) = tape.value(form) else { return false };
@@ -142,10 +149,13 @@ impl Trace {
             return Err(format!("sums {:?}, {:?}", all(mine), all(theirs)));
         }
         for (i, (a, b)) in mine.nodes.iter().zip(&theirs.nodes).enumerate() {
-            // Distributions are the same only if they are one object.
+            // Distributions and objects are the same only if they are one.
             let same_value = match (&a.value, &b.value) {
                 (Value::Dist(a), Value::Dist(b)) => format!("{a:?}") == format!("{b:?}"),
-                (a, b) => a.same(b),
+                (a, b) => match (a.downcast(), b.downcast::<CovarianceValue>()) {
+                    (Some(CovarianceValue(a)), Some(CovarianceValue(b))) => a == b,
+                    _ => a.same(b),
+                },
             };
             let rest =
                 |n: &Node| (n.score.to_bits(), n.state, n.refs, n.flags, format!("{:?}", n.side));

@@ -148,6 +148,9 @@ impl Recorder<'_> {
     /// Returns how the trace can be moved in place; `None` if it cannot.
     fn in_place(&mut self) -> Option<InPlace> {
         let (graph, code) = (self.view.graph, self.view.code);
+        if !graph.incremental {
+            return None;
+        }
         let moving: Vec<_> = self.moving.iter().map(|n| (*n, self.form(*n))).collect();
         let scores = self.scores.take()?;
         let is_fixed = |frame, o| self.operand(frame, o).is_fixed();

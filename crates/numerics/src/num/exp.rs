@@ -70,8 +70,11 @@ mod tests {
             }
         }
         xs.extend((0..20_000).map(|i| (f64::from(i) - 10_000.0) * 0.070_8));
-        xs.extend((0..20_000).map(|i| libm::sin(f64::from(i)) * libm::exp2(f64::from(i % 40 - 35))));
-        for special in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 709.5, 800.0, -708.5, -744.0, -800.0]
+        xs.extend(
+            (0..20_000).map(|i| libm::sin(f64::from(i)) * libm::exp2(f64::from(i % 40 - 35))),
+        );
+        for special in
+            [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 709.5, 800.0, -708.5, -744.0, -800.0]
         {
             xs.extend([1.5, special, -0.25]);
         }

@@ -157,17 +157,25 @@ impl<'a> System<'a> {
     ) -> TraceResult<Option<Arc<Point>>> {
         let mut shared = self.memory.point();
         let Some(to) = Arc::get_mut(&mut shared) else { return Ok(None) };
-        to.momentum.clear();
-        to.momentum
-            .extend(from.momentum.iter().zip(&from.gradient).map(|(p, g)| p + 0.5 * step * g));
-        to.y.clear();
-        to.y.extend(
-            from.y.iter().zip(&to.momentum).zip(inverse_mass).map(|((y, p), m)| y + step * m * p),
-        );
+        let n = from.y.len();
+        for list in [&mut to.momentum, &mut to.y, &mut to.velocity] {
+            list.resize(n, 0.0);
+        }
+        let half = 0.5 * step;
+        let before = from.momentum.iter().zip(&from.gradient).zip(&from.y).zip(inverse_mass);
+        let after = to.momentum.iter_mut().zip(&mut to.y);
+        for ((p, y), (((from_p, g), from_y), m)) in after.zip(before) {
+            *p = from_p + half * g;
+            *y = from_y + step * m * *p;
+        }
         let there = self.evaluate(to)?;
-        to.momentum.iter_mut().zip(&to.gradient).for_each(|(p, g)| *p += 0.5 * step * g);
-        to.velocity.clear();
-        to.velocity.extend(to.momentum.iter().zip(inverse_mass).map(|(p, m)| p * m));
+        if there {
+            let forces = to.gradient.iter().zip(inverse_mass);
+            for ((p, v), (g, m)) in to.momentum.iter_mut().zip(&mut to.velocity).zip(forces) {
+                *p += half * g;
+                *v = *p * m;
+            }
+        }
         self.memory.keep(&shared);
         Ok(there.then_some(shared))
     }
