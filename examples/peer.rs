@@ -4,7 +4,8 @@
 //!     cargo run --release --example peer -- DATA.json OUT.json MODEL N BUDGET_S SEED
 //!
 //! The models are the programs in `benches/peers`; DATA holds the data sets by model (and
-//! by size, if there are several). OUT gets the time at which sampling could start, the
+//! by size, if there are several). BUDGET_S is a time in seconds, or a number of steps
+//! after warm-up, as in `20000steps`, to count instructions by the difference of two. OUT gets the time at which sampling could start, the
 //! number of transitions after warm-up, their processor time on one thread, and the
 //! draws.
 
@@ -77,12 +78,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         MODELS.iter().find(|(m, ..)| m == name).ok_or_else(|| format!("no model `{name}`"))?;
     let given = &data[name.as_str()];
     let model = compile(text, given.get(n).unwrap_or(given))?;
-    let budget: f64 = budget.parse()?;
+    let (time, steps) = match budget.strip_suffix("steps") {
+        Some(steps) => (None, Some(steps.parse()?)),
+        None => (Some(Duration::from_secs_f64(budget.parse()?)), None),
+    };
     let clock = Arc::new(Clock::default());
     let t_ready = SystemTime::now().duration_since(UNIX_EPOCH)?.as_secs_f64();
     let options = RunOptions {
         seed: seed.parse()?,
-        time: Some(Duration::from_secs_f64(budget)),
+        time,
+        steps,
         callback: Some(Arc::clone(&clock) as Arc<dyn Callback>),
         ..RunOptions::default()
     };

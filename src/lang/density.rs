@@ -12,6 +12,7 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 /// The score of an observation.
+#[derive(Clone, Debug)]
 pub(crate) enum Score {
     /// One term.
     One(f64),

@@ -2,7 +2,7 @@
 //! passes through it.
 
 use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Change, Draws, Target, Trace};
+use pcadlang::trace::{Change, Draws, Recording, Target, Trace};
 
 /// The outcome of a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,6 +14,8 @@ pub struct Told {
     /// The number of points at which the tape gave no density, so that a proposal is
     /// needed.
     pub asked: u32,
+    /// The number of points to which the trace was moved in place.
+    pub moved: u32,
 }
 
 /// Compares at the present state and at some points around it: densities to the last bit,
@@ -81,8 +83,34 @@ pub fn compare_tape(trace: &mut Trace, what: &str) -> Told {
         }
         trace.rollback();
         told.points += 1;
+        if w.log_weight.is_finite() && round % 3 != 2 {
+            told.moved += u32::from(move_in_place(trace, &mut tape, &y, what));
+            assert!(tape.begin(trace, &mut here), "{what}: the tape does not hold where it moved");
+        }
     }
     told
+}
+
+/// Moves the trace to a point and compares every node with a trace that a proposal moved
+/// there. False if the tape cannot move it in place.
+fn move_in_place(trace: &mut Trace, tape: &mut Recording, y: &[f64], what: &str) -> bool {
+    let mut proposed = trace.clone();
+    let mut changes = Vec::new();
+    tape.changes(y, &mut changes);
+    proposed.propose(&changes, Draws::default()).unwrap_or_else(|e| panic!("{what}\n{e}"));
+    proposed.commit();
+    let mut here = Vec::new();
+    if !tape.move_to(trace, y, &mut here) {
+        trace.propose(&changes, Draws::default()).unwrap_or_else(|e| panic!("{what}\n{e}"));
+        trace.commit();
+        tape.moved(trace);
+        return false;
+    }
+    assert!(tape.holds(trace), "{what}");
+    trace.same_nodes(&proposed).unwrap_or_else(|e| panic!("{what}\n{e}"));
+    let mut anew = Vec::new();
+    assert!(tape.begin(trace, &mut anew) && anew == here, "{what}: {here:?}, {anew:?}");
+    true
 }
 
 fn close(found: &[f64], expected: &[f64], what: &str) {

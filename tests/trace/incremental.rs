@@ -142,6 +142,30 @@ proptest! {
     }
 }
 
+/// Transitions that end in place and by proposals, alone and in turn with other kernels
+/// and under another power of the likelihood.
+#[test]
+fn trajectories_that_end_in_place() {
+    let model = "let y = [28, 8, -3, 7]; let sigma = [15, 10, 16, 11];
+         assume mu ~ normal(0, 5); assume tau ~ half_normal(5); assume e ~ iid(normal(0, 1), 4);
+         assume w ~ uniform(0, 2); assume k ~ flip(0.5);
+         for i in 0 .. 4 { let m = mu + tau * e[i]; observe normal(if k { m } else { 0.5 * m }, sigma[i] * w) = y[i]; }
+         let fit = mu + tau * e; observe normal(fit, sigma) = y;
+         observe gp(0, sq_exp(exp(w), tau + 0.1) + white(0.5), [0, 0.4, 1.1, 1.9]) = [0.1, 0.4, -0.2, 0.3];";
+    for body in [
+        "nuts($continuous);",
+        "hmc($continuous, steps = 3);",
+        "mala(@mu + @e); mala(@tau);",
+        "nuts(@mu + @tau); nuts(@e); mh(@k); repeat 3 { nuts($continuous, max_depth = 3); }",
+        "mix { 0.5 => nuts($continuous, max_depth = 4); 0.5 => drift(one($continuous)); }",
+    ] {
+        let text = format!(
+            "{model} infer {{ warmup 60 {{ anneal(20); {body} }} repeat 200 {{ {body} collect mu, tau, e, fit, w; }} }}"
+        );
+        same(body, || Program::parse(&text).unwrap_or_else(|e| panic!("{e}")), 200, 60);
+    }
+}
+
 /// A value read several times by the same reader, which stops and resumes depending on
 /// it.
 #[test]

@@ -3,6 +3,7 @@
 
 mod column;
 mod exact;
+mod exp;
 mod hash;
 mod incomplete;
 mod log_tails;
@@ -13,6 +14,7 @@ mod tails;
 
 pub use column::Column;
 pub use exact::ExactSum;
+pub use exp::exp_each;
 pub use hash::fnv1a;
 pub use incomplete::{chi_square_tail, upper_gamma};
 pub use log_tails::{beta_tails, gamma_tails};

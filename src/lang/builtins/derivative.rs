@@ -88,20 +88,48 @@ pub(super) fn vjp_pairs(
     n: usize,
     slopes: impl Fn(f64, f64, f64) -> [f64; 2],
 ) {
+    if n == 0 {
+        return;
+    }
     let (before, by) = g.split_at_mut(out);
     let (z, by) = (&v[out..out + n], &by[..n]);
+    let end = |c: Column| c.at + 1 + (n - 1) * c.step;
     for (side, c) in [x, y].into_iter().enumerate().filter(|(_, c)| c.live) {
-        let one =
-            |i: usize| times(by[i], slopes(v[x.at + i * x.step], v[y.at + i * y.step], z[i])[side]);
-        match c.step {
-            0 => before[c.at] += (0..n).fold(0.0, |sum, i| sum + one(i)),
-            _ => before[c.at..c.at + n].iter_mut().enumerate().for_each(|(i, g)| *g += one(i)),
+        // One loop for each way of stepping, so that bounds are checked once.
+        let one = |by: f64, x: f64, y: f64, z: f64| times(by, slopes(x, y, z)[side]);
+        let into = &mut before[c.at..end(c)];
+        let (xs, ys) = (&v[x.at..end(x)], &v[y.at..end(y)]);
+        match (into, xs, ys) {
+            ([into], [x], [y]) => {
+                *into += by.iter().zip(z).fold(0.0, |sum, (b, z)| sum + one(*b, *x, *y, *z));
+            }
+            ([into], xs, [y]) if c.step == 0 => {
+                let all = by.iter().zip(z).zip(xs);
+                *into += all.fold(0.0, |sum, ((b, z), x)| sum + one(*b, *x, *y, *z));
+            }
+            ([into], [x], ys) if c.step == 0 => {
+                let all = by.iter().zip(z).zip(ys);
+                *into += all.fold(0.0, |sum, ((b, z), y)| sum + one(*b, *x, *y, *z));
+            }
+            (into, [x], ys) => {
+                let all = into.iter_mut().zip(by.iter().zip(z).zip(ys));
+                all.for_each(|(g, ((b, z), y))| *g += one(*b, *x, *y, *z));
+            }
+            (into, xs, [y]) => {
+                let all = into.iter_mut().zip(by.iter().zip(z).zip(xs));
+                all.for_each(|(g, ((b, z), x))| *g += one(*b, *x, *y, *z));
+            }
+            (into, xs, ys) => {
+                let all = into.iter_mut().zip(by.iter().zip(z).zip(xs.iter().zip(ys)));
+                all.for_each(|(g, ((b, z), (x, y)))| *g += one(*b, *x, *y, *z));
+            }
         }
     }
 }
 
 /// The product, but 0 if `by` is 0: an infinite slope does not matter where the adjoint
 /// is zero.
+#[inline]
 pub(crate) fn times(by: f64, slope: f64) -> f64 {
     if by == 0.0 { 0.0 } else { by * slope }
 }

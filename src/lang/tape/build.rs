@@ -39,6 +39,11 @@ impl Builder {
         Tape { values, adjoints, inputs, ops, sums: ScoreSums::default(), scratch: Vec::new() }
     }
 
+    /// Returns the number of operations recorded so far.
+    pub fn operations(&self) -> usize {
+        self.ops.len()
+    }
+
     fn reserve(&mut self, n: usize) -> usize {
         let at = self.values.len();
         self.values.resize(at + n, f64::NAN);
@@ -340,7 +345,7 @@ impl Builder {
     }
 
     fn score(&mut self, dist: Form, x: Form, observed: bool) -> Option<()> {
-        self.ops.push(Op::Score { dist, x, observed });
+        self.ops.push(Op::Score { dist, x, observed, last: None });
         Some(())
     }
 

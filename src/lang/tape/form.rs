@@ -201,7 +201,8 @@ impl Form {
         let Form::Made(m) = self else {
             return self.vjp(&Adjoint::Array(params), buffer, adjoints);
         };
-        let Some((values, _)) = call(&m.builtin, &m.args, buffer) else { return false };
+        let values: Option<SmallVec<[Value; 4]>> = m.args.iter().map(|f| f.value(buffer)).collect();
+        let Some(values) = values else { return false };
         let values: SmallVec<[&Value; 4]> = values.iter().collect();
         let a = Args { builtin: &m.builtin, values: &values };
         let mut pulled = density::by_arguments(&a, dist, &params);

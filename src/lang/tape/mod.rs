@@ -18,7 +18,7 @@ mod op;
 
 pub use build::Builder;
 pub use form::Form;
-pub use op::ScoreSums;
+pub use op::{ScoreSums, Terms};
 
 use crate::dist::{Datum, Support};
 use crate::lang::value::Value;
@@ -75,6 +75,37 @@ impl Tape {
         self.forward()
     }
 
+    /// Runs it with the images of a point of unconstrained space as values of its inputs:
+    /// as [`Tape::run_at_values`], with their coordinates in `here`.
+    pub fn run_at_images(&mut self, y: &[f64], here: &mut Vec<f64>) -> bool {
+        self.sums = ScoreSums::default();
+        here.clear();
+        let mut rest = y;
+        for input in &self.inputs {
+            let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
+            rest = after;
+            let jacobian = match (&input.form, own) {
+                (Form::Num(at), [y]) => {
+                    let x = input.support.from_free_scalar(*y).0;
+                    let back = input.support.to_free_scalar(x);
+                    self.values[*at] = x;
+                    here.push(back);
+                    input.support.from_free_scalar(back).1
+                }
+                (form, own) => {
+                    let (x, from) = (input.support.from_free(own).0, here.len());
+                    input.support.to_free(&x, here);
+                    if !form.write(&mut self.values, &Value::from_datum(&x)) {
+                        return false;
+                    }
+                    input.support.from_free(&here[from..]).1
+                }
+            };
+            self.sums.jacobian.add(jacobian);
+        }
+        self.forward()
+    }
+
     /// Runs it at a point of unconstrained space. False if it cannot evaluate the program
     /// there.
     pub fn run(&mut self, y: &[f64]) -> bool {
@@ -84,6 +115,10 @@ impl Tape {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
             rest = after;
             let jacobian = match (&input.form, own) {
+                (Form::Num(at), [y]) if matches!(input.support, Support::Real) => {
+                    self.values[*at] = input.support.from_free_scalar(*y).0;
+                    continue;
+                }
                 (Form::Num(at), [y]) => {
                     let (x, jacobian) = input.support.from_free_scalar(*y);
                     self.values[*at] = x;
@@ -112,6 +147,27 @@ impl Tape {
         })
     }
 
+    /// Returns the value of a form at the last run; `None` if a call fails.
+    pub fn value(&self, form: &Form) -> Option<Value> {
+        form.value(&self.values)
+    }
+
+    /// Returns the numbers of a form in the buffer at the last run; `None` for others.
+    pub fn numbers(&self, form: &Form) -> Option<&[f64]> {
+        match form {
+            Form::Num(at) => self.values.get(*at..*at + 1),
+            Form::Array(at, n) => self.values.get(*at..at + n),
+            _ => None,
+        }
+    }
+
+    /// Returns the terms that operation `i` added to the sums in the last run, and puts
+    /// them into `each` if they are separate; `None` if it adds none.
+    pub fn terms(&self, i: usize, each: &mut Vec<f64>) -> Option<Terms> {
+        each.clear();
+        self.ops.get(i)?.terms(&self.values, each)
+    }
+
     fn forward(&mut self) -> bool {
         let (values, sums) = (&mut self.values, &mut self.sums);
         self.ops.iter_mut().all(|op| op.forward(values, sums))
@@ -133,6 +189,7 @@ impl Tape {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
             rest = after;
             match &input.form {
+                Form::Num(at) if matches!(input.support, Support::Real) => out.push(adjoints[*at]),
                 Form::Num(at) => input.support.free_gradient(own, &adjoints[*at..=*at], out),
                 form => {
                     scratch.clear();

@@ -20,6 +20,17 @@ pub struct ScoreSums {
     pub jacobian: ExactSum,
 }
 
+/// What an operation added to the sums of the scores.
+#[derive(Clone, Debug)]
+pub enum Terms {
+    /// One term.
+    One(f64),
+    /// Terms for the elements of an array.
+    Each,
+    /// The sum of such terms.
+    Sum(ExactSum),
+}
+
 /// An operation; the numbers it reads precede those it writes.
 #[derive(Debug)]
 pub(super) enum Op {
@@ -52,8 +63,9 @@ pub(super) enum Op {
         n: usize,
         observed: bool,
     },
-    /// The log density of any value under any distribution or likelihood.
-    Score { dist: Form, x: Form, observed: bool },
+    /// The log density of any value under any distribution or likelihood; those of the last
+    /// run are kept.
+    Score { dist: Form, x: Form, observed: bool, last: Option<(Value, density::Score)> },
     /// A log weight.
     Factor { x: usize },
 }
@@ -99,9 +111,15 @@ impl Op {
             Op::Density { batch, x, params, n, observed } => {
                 batch.score(v, *x, params, *n, sums.of(*observed))
             }
-            Op::Score { dist, x, observed } => {
+            Op::Score { dist, x, observed, last } => {
                 let (Some(dist), Some(x)) = (dist.value(v), x.value(v)) else { return false };
-                score(&dist, &x, *observed, sums.of(*observed))
+                let Some(found) = score(&dist, &x, *observed) else { return false };
+                match &found {
+                    density::Score::One(score) => sums.of(*observed).add(*score),
+                    density::Score::Sum(scores) => sums.of(*observed).merge(scores),
+                }
+                *last = Some((dist, found));
+                true
             }
             Op::Factor { x } => {
                 sums.likelihood.add(v[*x]);
@@ -156,8 +174,9 @@ impl Op {
                 batch.vjp(v, g, *x, params, *n, weight(*observed));
                 true
             }
-            Op::Score { dist, x, observed } => {
-                vjp_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false)
+            Op::Score { dist, x, observed, last } => {
+                let Some((made, _)) = last else { return false };
+                vjp_score((dist, made), x, *observed, v, g, weight(*observed)).unwrap_or(false)
             }
             Op::Factor { x } => {
                 g[*x] += power;
@@ -167,15 +186,47 @@ impl Op {
     }
 }
 
+impl Op {
+    /// Returns the terms that it added to the sums in the last run, and appends them to
+    /// `each` if they are separate; `None` if it added none.
+    pub fn terms(&self, v: &[f64], each: &mut Vec<f64>) -> Option<Terms> {
+        match self {
+            Op::Density { batch, x, n, .. } => {
+                batch.each(v, *x, *n, each);
+                match (x.step, &each[..]) {
+                    (0, [one]) => Some(Terms::One(*one)),
+                    _ => Some(Terms::Each),
+                }
+            }
+            Op::Score { last, .. } => match &last.as_ref()?.1 {
+                density::Score::One(score) => Some(Terms::One(*score)),
+                density::Score::Sum(sum) => Some(Terms::Sum(sum.clone())),
+            },
+            Op::Factor { x } => Some(Terms::One(v[*x])),
+            _ => None,
+        }
+    }
+}
+
 impl ScoreSums {
+    /// Moves sums of which these are a part from an earlier run, `old`, to this one.
+    pub fn replace(&self, old: &ScoreSums, prior: &mut ExactSum, likelihood: &mut ExactSum) {
+        for (sum, new, old) in
+            [(prior, &self.prior, &old.prior), (likelihood, &self.likelihood, &old.likelihood)]
+        {
+            sum.merge(new);
+            sum.unmerge(old);
+        }
+    }
+
     fn of(&mut self, observed: bool) -> &mut ExactSum {
         if observed { &mut self.likelihood } else { &mut self.prior }
     }
 }
 
-/// Adds the log density of a value; false if it is undefined.
-fn score(dist: &Value, x: &Value, observed: bool, sum: &mut ExactSum) -> bool {
-    let found = match dist {
+/// Returns the log density of a value; `None` if it is undefined.
+fn score(dist: &Value, x: &Value, observed: bool) -> Option<density::Score> {
+    match dist {
         // A value drawn as one choice has one density, even if it is an array.
         Value::Dist(d) if !observed && d.elements().is_none() => {
             x.to_datum().map(|x| density::Score::One(d.log_density_stored(&x)))
@@ -183,30 +234,24 @@ fn score(dist: &Value, x: &Value, observed: bool, sum: &mut ExactSum) -> bool {
         Value::Dist(d) => density::score(d, x).ok(),
         Value::Likelihood(_) => density::likelihood_score(dist, x).ok().map(density::Score::One),
         _ => None,
-    };
-    match found {
-        Some(density::Score::One(score)) => sum.add(score),
-        Some(density::Score::Sum(scores)) => sum.merge(&scores),
-        None => return false,
     }
-    true
 }
 
 fn vjp_score(
-    dist: &Form,
+    (dist, made): (&Form, &Value),
     x: &Form,
     observed: bool,
     v: &[f64],
     g: &mut [f64],
     weight: f64,
 ) -> Option<bool> {
-    let (made, value) = (dist.value(v)?, x.value(v)?);
-    if let Value::Likelihood(l) = &made {
+    let value = x.value(v)?;
+    if let Value::Likelihood(l) = made {
         let mut by = l.gradient(&value)?;
         by.scale(weight);
         return Some(dist.vjp(&by, v, g));
     }
-    let Value::Dist(d) = &made else { return None };
+    let Value::Dist(d) = made else { return None };
     let (mut by_x, mut params) = density::gradient(d, &value)?;
     by_x.scale(weight);
     params.iter_mut().for_each(|p| *p *= weight);

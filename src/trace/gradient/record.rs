@@ -6,6 +6,7 @@
 //! depends on something that moves, the tape has a guard that detects a change, or there
 //! is no tape at all. Nothing is evaluated, and the trace does not change.
 
+use super::in_place::InPlace;
 use super::{Inputs, Reverse};
 use crate::dist::Dist;
 use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
@@ -38,8 +39,13 @@ impl Graph {
     }
 
     /// Records the log density as a function of the unconstrained coordinates of the
-    /// targets, one after the other; `None` if it is not a straight-line program.
-    pub fn record(&mut self, code: &Code, targets: &[Target]) -> Option<Tape> {
+    /// targets, one after the other; `None` if it is not a straight-line program. With it
+    /// comes how the trace can be moved in place, if it can.
+    pub(super) fn record(
+        &mut self,
+        code: &Code,
+        targets: &[Target],
+    ) -> Option<(Tape, Option<InPlace>)> {
         let reached = self.reached(code, targets);
         let view = Reverse {
             graph: self,
@@ -55,6 +61,8 @@ impl Graph {
             reached: reached.iter().copied().collect(),
             placed: FxHashMap::default(),
             forms: FxHashMap::default(),
+            moving: Vec::new(),
+            scores: Some(Vec::new()),
             tape: Builder::new(self.incremental),
         };
         for t in targets {
@@ -63,7 +71,8 @@ impl Graph {
         for n in reached {
             r.visit(n)?;
         }
-        Some(r.tape.finish())
+        let in_place = r.in_place();
+        Some((r.tape.finish(), in_place))
     }
 }
 
@@ -74,6 +83,10 @@ struct Recorder<'a> {
     placed: FxHashMap<NodeId, Form>,
     /// The forms of the nodes recorded so far.
     forms: FxHashMap<NodeId, Form>,
+    /// The nodes whose inputs move.
+    moving: Vec<NodeId>,
+    /// The operation that scores each node; `None` if a node has none, or several.
+    scores: Option<Vec<(NodeId, usize)>>,
     tape: Builder,
 }
 
@@ -122,11 +135,35 @@ impl Recorder<'_> {
             stack.pop();
             let form = match fixed {
                 true => Form::Fixed(self.value(n).clone()),
-                false => self.record_op(n)?,
+                false => {
+                    self.moving.push(n);
+                    self.record_op(n)?
+                }
             };
             self.forms.insert(n, form);
         }
         Some(())
+    }
+
+    /// Returns how the trace can be moved in place; `None` if it cannot.
+    fn in_place(&mut self) -> Option<InPlace> {
+        let (graph, code) = (self.view.graph, self.view.code);
+        if !graph.incremental {
+            return None;
+        }
+        let moving: Vec<_> = self.moving.iter().map(|n| (*n, self.form(*n))).collect();
+        let scores = self.scores.take()?;
+        let is_fixed = |frame, o| self.operand(frame, o).is_fixed();
+        InPlace::new(graph, code, moving.into_iter(), scores, is_fixed)
+    }
+
+    /// Notes which operation scores a node: the only one since there were `before`.
+    fn note_score(&mut self, n: NodeId, before: usize) {
+        match (&mut self.scores, self.tape.operations() - before) {
+            (_, 0) => {}
+            (Some(scores), 1) => scores.push((n, before)),
+            _ => self.scores = None,
+        }
     }
 
     /// Returns all nodes from which a node's value, score or structure is derived.
@@ -280,7 +317,9 @@ impl Recorder<'_> {
             }
             Op::Factor { weight, .. } => {
                 let weight = self.operand(frame, *weight);
+                let before = self.tape.operations();
                 self.tape.factor(&weight)?;
+                self.note_score(n, before);
                 Some(Form::Fixed(now))
             }
             // Loops over values that move, and functions and containers whose structure
@@ -335,17 +374,20 @@ impl Recorder<'_> {
     fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
+        let before = self.tape.operations();
         match spec {
             DistSpec::Family { builtin, args } => {
                 let dist = graph.make_dist(code, n, frame, spec, &mut Deps::new()).ok()?;
                 let args = self.operands(frame, args);
-                self.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)
+                self.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)?;
             }
             DistSpec::Value(o) => {
                 let form = self.operand(frame, *o);
-                self.tape.distribution(&form, graph.value(code, frame, *o), x, observed)
+                self.tape.distribution(&form, graph.value(code, frame, *o), x, observed)?;
             }
         }
+        self.note_score(n, before);
+        Some(())
     }
 }
 

@@ -5,6 +5,7 @@
 //! is a function of reports that ([`Recording::moved`]). A clone of a trace has its own
 //! identity.
 
+use super::in_place::InPlace;
 use crate::lang::tape::{ScoreSums, Tape};
 use crate::num::ExactSum;
 use crate::trace::{Change, NONE, Target, Trace, Weight};
@@ -15,6 +16,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Recording {
     tape: Tape,
+    in_place: Option<InPlace>,
     targets: Vec<Target>,
     identity: Arc<()>,
     revision: u64,
@@ -29,11 +31,12 @@ impl Trace {
     /// before it is evaluated.
     pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
-        let tape = self.graph.record(&self.code, targets)?;
+        let (tape, in_place) = self.graph.record(&self.code, targets)?;
         let identity = Arc::clone(&self.identity);
         let revision = self.graph.revision;
         Some(Recording {
             tape,
+            in_place,
             targets: targets.to_vec(),
             identity,
             revision,
@@ -93,6 +96,22 @@ impl Recording {
     /// Appends the changes that move the state to these coordinates.
     pub fn changes(&self, y: &[f64], out: &mut Vec<(Target, Change)>) {
         out.extend(self.targets.iter().copied().zip(self.tape.images(y).map(Change::Set)));
+    }
+
+    /// Moves the trace to these coordinates in place, with the same result as a proposal of
+    /// [`Recording::changes`] and a commit, and makes that the state to which densities
+    /// are relative, with its coordinates in `here`. False, with the trace unchanged, if
+    /// only a proposal can do that.
+    pub fn move_to(&mut self, trace: &mut Trace, y: &[f64], here: &mut Vec<f64>) -> bool {
+        trace.rollback();
+        let Some(in_place) = &mut self.in_place else { return false };
+        let moved = self.tape.run_at_images(y, here)
+            && in_place.apply(&mut trace.graph, &trace.code, &self.tape, &self.start);
+        if moved {
+            self.start.clone_from(self.tape.sums());
+            self.revision = trace.graph.revision;
+        }
+        moved
     }
 
     /// Returns the log Jacobian in the state to which densities are relative.

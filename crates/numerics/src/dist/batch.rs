@@ -3,6 +3,7 @@
 //! number at a time, but there are no allocations, and work that depends only on
 //! unchanged parameters is not repeated.
 
+use super::normals::Normals;
 use super::*;
 use crate::num::{Column, ExactSum};
 use std::fmt;
@@ -21,6 +22,9 @@ pub trait Batch: fmt::Debug + Send + Sync {
         n: usize,
         sum: &mut ExactSum,
     ) -> bool;
+
+    /// Appends the log densities of the numbers of the last `score`, one by one.
+    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>);
 
     /// Adds `weight` times the derivatives of the log densities of the last `score` to
     /// the adjoints, which are laid out like the buffer.
@@ -152,13 +156,28 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         if !self.refresh(buffer, params) {
             return false;
         }
+        let mut numbers = true;
         let mut one = |x: f64, d: &T| {
-            sum.add(d.log_density(x));
-            !x.is_nan()
+            numbers &= !x.is_nan();
+            d.log_density(x)
         };
         match &self.0[..] {
-            [(_, d)] => (0..n).all(|i| one(x.get(buffer, i), d)),
-            all => all.iter().enumerate().all(|(i, (_, d))| one(x.get(buffer, i), d)),
+            [(_, d)] => sum.add_each((0..n).map(|i| one(x.get(buffer, i), d))),
+            all => {
+                let each = all.iter().enumerate();
+                sum.add_each(each.map(|(i, (_, d))| one(x.get(buffer, i), d)));
+            }
+        }
+        numbers
+    }
+
+    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
+        match &self.0[..] {
+            [(_, d)] => out.extend((0..n).map(|i| d.log_density(x.get(buffer, i)))),
+            all => {
+                let one = |(i, (_, d)): (usize, &(_, T))| d.log_density(x.get(buffer, i));
+                out.extend(all.iter().enumerate().map(one));
+            }
         }
     }
 
@@ -198,15 +217,22 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
 /// all of one family. Its parameters lie in these columns, or are fixed. `None` for other
 /// distributions, and if the columns do not fit the family.
 pub fn batch(dist: &Dist, params: &[Column]) -> Option<Box<dyn Batch>> {
-    Some(component(dist, params)?)
+    match Normals::new(parts(dist), params.len()) {
+        Some(normals) => Some(Box::new(normals)),
+        None => Some(component(dist, params)?),
+    }
+}
+
+/// Returns the distributions of the elements, or the one of all of them.
+fn parts(dist: &Dist) -> &[Dist] {
+    match dist {
+        Dist::Iid(d) => std::slice::from_ref(d.one()),
+        Dist::Product(d) => d.parts(),
+        one => std::slice::from_ref(one),
+    }
 }
 
 /// Like `batch`, but returns the batch as a [`Component`].
 pub(super) fn component(dist: &Dist, params: &[Column]) -> Option<Box<dyn Component>> {
-    let parts = match dist {
-        Dist::Iid(d) => std::slice::from_ref(d.one()),
-        Dist::Product(d) => d.parts(),
-        one => std::slice::from_ref(one),
-    };
-    families::component(parts, params.len())
+    families::component(parts(dist), params.len())
 }

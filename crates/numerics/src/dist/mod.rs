@@ -16,6 +16,7 @@ mod draw;
 mod families;
 mod family;
 mod joint;
+mod normals;
 mod param;
 mod scalar;
 mod support;

@@ -29,22 +29,55 @@ pub struct ExactSum {
 const LIMBS: usize = 26;
 
 /// Returns x 2^64 rounded towards zero, for |x| < 2^40: `(x * SCALE) as i128` in three
-/// exact pieces, each a machine word.
+/// exact pieces, each a machine word, in units of 2^64, 2^32 and 1.
 #[inline]
-fn quantised(x: f64) -> i128 {
+fn pieces(x: f64) -> [i64; 3] {
     const HALF: f64 = 4_294_967_296.0; // 2^32
     let whole = x as i64;
     let rest = (x - whole as f64) * HALF;
     let upper = rest as i64;
     let lower = ((rest - upper as f64) * HALF) as i64;
+    [whole, upper, lower]
+}
+
+/// Puts the pieces, or sums of them, together.
+#[inline]
+fn joined([whole, upper, lower]: [i64; 3]) -> i128 {
     (i128::from(whole) << 64) + (i128::from(upper) << 32) + i128::from(lower)
 }
+
+#[inline]
+fn quantised(x: f64) -> i128 {
+    joined(pieces(x))
+}
+
+/// How many pieces a machine word can sum: they are below 2^40.
+const MOST: u32 = 1 << 22;
 
 impl ExactSum {
     /// Adds a term.
     #[inline]
     pub fn add(&mut self, x: f64) {
         if x.abs() < LARGE { self.fine += quantised(x) } else { self.put(x, 1) }
+    }
+
+    /// Adds terms, with the same result as one by one.
+    #[inline]
+    pub fn add_each(&mut self, terms: impl Iterator<Item = f64>) {
+        let (mut sums, mut count) = ([0i64; 3], 0);
+        for x in terms {
+            if x.abs() >= LARGE || x.is_nan() {
+                self.put(x, 1);
+                continue;
+            }
+            sums.iter_mut().zip(pieces(x)).for_each(|(s, p)| *s += p);
+            count += 1;
+            if count == MOST {
+                self.fine += joined(std::mem::take(&mut sums));
+                count = 0;
+            }
+        }
+        self.fine += joined(sums);
     }
 
     /// Removes a term: the exact inverse of [`ExactSum::add`].
@@ -227,6 +260,9 @@ mod tests {
             shuffled.iter().for_each(|x| s.add(*x));
             extra.iter().rev().for_each(|x| s.sub(*x));
             prop_assert_eq!(&s, &plain);
+            let mut together = ExactSum::default();
+            together.add_each(shuffled.iter().copied());
+            prop_assert_eq!(&together, &plain);
             prop_assert_eq!(s.value().to_bits(), plain.value().to_bits());
         }
 

@@ -87,6 +87,9 @@ pub(super) struct Memory {
     wait: u32,
     waited: u32,
     kept: Kept,
+    /// Where the trace is, with the force there, if a step of this tape led there; and the
+    /// power of the likelihood for which the force is.
+    here: Option<(Arc<Point>, f64)>,
     changes: Vec<(Target, Change)>,
     points: Vec<Arc<Point>>,
     lists: Vec<Arc<Vec<f64>>>,
@@ -118,20 +121,37 @@ impl Memory {
     }
 
     /// Uses the tape of the last step, if it is still valid for this state and these
-    /// choices, and fills in the coordinates.
+    /// choices, and returns the point there; `None` if there is no such tape, or no force.
     pub fn stand(
         &mut self,
         trace: &Trace,
         asked: &[Target],
-        y: &mut Vec<f64>,
-    ) -> Option<Arc<Layout>> {
+        power: f64,
+    ) -> Option<(Arc<Layout>, Arc<Point>)> {
         let (tape, layout) = self.tape.as_mut()?;
-        let holds = tape.holds(trace) && layout.asked == asked && tape.begin(trace, y);
-        holds.then(|| Arc::clone(layout))
+        if !tape.holds(trace) || layout.asked != asked {
+            return None;
+        }
+        if let Some((here, _)) = self.here.as_ref().filter(|(_, at)| *at == power) {
+            return Some((Arc::clone(layout), Arc::clone(here)));
+        }
+        let layout = Arc::clone(layout);
+        let mut here = self.point();
+        let point = Arc::get_mut(&mut here)?;
+        let (tape, _) = self.tape.as_mut()?;
+        point.log_density = 0.0;
+        let known =
+            tape.begin(trace, &mut point.y) && tape.gradient(&point.y, power, &mut point.gradient);
+        self.keep(&here);
+        known.then(|| {
+            self.here = Some((Arc::clone(&here), power));
+            (layout, here)
+        })
     }
 
     /// Records a tape, if that has paid off so far; false if there is no tape.
     pub fn record(&mut self, trace: &mut Trace, layout: &Arc<Layout>, y: &mut Vec<f64>) -> bool {
+        self.here = None;
         let kept = std::mem::take(&mut self.kept);
         // Re-recording a tape that a checkpoint had does not count as a new recording.
         if kept != Kept::Present || !trace.is_new() {
@@ -166,8 +186,26 @@ impl Memory {
         self.wait = self.waited;
     }
 
+    /// Moves the trace to a point in place, without a proposal. False, with the trace
+    /// unchanged, if only a proposal can do that.
+    pub fn move_to(&mut self, trace: &mut Trace, to: &Point, power: f64) -> bool {
+        self.here = None;
+        let mut here = self.point();
+        let (Some(point), Some((tape, _))) = (Arc::get_mut(&mut here), &mut self.tape) else {
+            return false;
+        };
+        point.log_density = 0.0;
+        let moved = tape.move_to(trace, &to.y, &mut point.y);
+        if moved && tape.gradient(&point.y, power, &mut point.gradient) {
+            self.here = Some((Arc::clone(&here), power));
+        }
+        self.keep(&here);
+        moved
+    }
+
     /// Updates the tape after a commit of these choices.
     pub fn moved(&mut self, trace: &Trace) {
+        self.here = None;
         if let Some((tape, _)) = &mut self.tape {
             tape.moved(trace);
         }

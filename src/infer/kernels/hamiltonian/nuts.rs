@@ -110,10 +110,14 @@ impl Walk<'_, '_> {
 /// Whether the velocity at one of the ends no longer points along the sum of the momenta,
 /// which is given as two partial sums.
 fn turning(a: &Point, b: &Point, some: &[f64], more: &[f64]) -> bool {
-    let along =
-        |v: &[f64]| v.iter().zip(some.iter().zip(more)).map(|(v, (s, t))| v * (s + t)).sum::<f64>();
+    let (mut first, mut last) = (0.0, 0.0);
+    for (((s, t), v), w) in some.iter().zip(more).zip(&a.velocity).zip(&b.velocity) {
+        let sum = s + t;
+        first += v * sum;
+        last += w * sum;
+    }
     // Also true for NaN.
-    !(along(&a.velocity) > 0.0 && along(&b.velocity) > 0.0)
+    !(first > 0.0 && last > 0.0)
 }
 
 /// The same segment in reverse order.

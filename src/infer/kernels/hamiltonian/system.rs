@@ -2,7 +2,8 @@
 //!
 //! Densities and forces come from a tape of the trace if there is one (see
 //! [`super::memory`]), otherwise from pending proposals and reverse passes through the
-//! trace, with bit-for-bit equal densities. A transition ends with a proposal either way.
+//! trace, with bit-for-bit equal densities. A transition ends with a proposal, or with
+//! values and scores that the trace takes from the tape, which are the same.
 
 use super::memory::{Layout, Memory};
 use super::point::Point;
@@ -39,17 +40,16 @@ impl<'a> System<'a> {
         memory: &'a mut Memory,
     ) -> TraceResult<Option<(Self, Arc<Point>)>> {
         trace.rollback();
-        let mut here = memory.point();
-        let Some(point) = Arc::get_mut(&mut here) else { return Ok(None) };
-        point.log_density = 0.0;
         if marginal.is_none()
-            && let Some(layout) = memory.stand(trace, all, &mut point.y)
-            && memory.gradient(&point.y, at.power, &mut point.gradient)
+            && let Some((layout, here)) = memory.stand(trace, all, at.power)
         {
             let jacobian = memory.log_jacobian();
             let system = System { trace, at, layout, memory, taped: true, jacobian, summed: None };
             return Ok(system.usable(here));
         }
+        let mut here = memory.point();
+        let Some(point) = Arc::get_mut(&mut here) else { return Ok(None) };
+        point.log_density = 0.0;
         let mut jacobian = ExactSum::default();
         let mut layout = Layout::new(all);
         point.y.clear();
@@ -72,19 +72,19 @@ impl<'a> System<'a> {
             System { trace, at, memory, layout, taped, jacobian: jacobian.value(), summed: None };
         if let Some(marginal) = marginal {
             system.summed = Summed::begin(marginal, system.trace, at, &system.layout, point)?;
+            system.memory.keep(&here);
             return Ok(if system.summed.is_some() { system.usable(here) } else { None });
         }
         if !taped {
             system.memory.give_up();
             system.force(point)?;
         }
+        system.memory.keep(&here);
         Ok(system.usable(here))
     }
 
     fn usable(self, here: Arc<Point>) -> Option<(Self, Arc<Point>)> {
-        let finite = here.gradient.iter().all(|g| g.is_finite());
-        self.memory.keep(&here);
-        finite.then_some((self, here))
+        here.gradient.iter().all(|g| g.is_finite()).then_some((self, here))
     }
 
     pub fn dimensions(&self) -> usize {
@@ -157,17 +157,25 @@ impl<'a> System<'a> {
     ) -> TraceResult<Option<Arc<Point>>> {
         let mut shared = self.memory.point();
         let Some(to) = Arc::get_mut(&mut shared) else { return Ok(None) };
-        to.momentum.clear();
-        to.momentum
-            .extend(from.momentum.iter().zip(&from.gradient).map(|(p, g)| p + 0.5 * step * g));
-        to.y.clear();
-        to.y.extend(
-            from.y.iter().zip(&to.momentum).zip(inverse_mass).map(|((y, p), m)| y + step * m * p),
-        );
+        let n = from.y.len();
+        for list in [&mut to.momentum, &mut to.y, &mut to.velocity] {
+            list.resize(n, 0.0);
+        }
+        let half = 0.5 * step;
+        let before = from.momentum.iter().zip(&from.gradient).zip(&from.y).zip(inverse_mass);
+        let after = to.momentum.iter_mut().zip(&mut to.y);
+        for ((p, y), (((from_p, g), from_y), m)) in after.zip(before) {
+            *p = from_p + half * g;
+            *y = from_y + step * m * *p;
+        }
         let there = self.evaluate(to)?;
-        to.momentum.iter_mut().zip(&to.gradient).for_each(|(p, g)| *p += 0.5 * step * g);
-        to.velocity.clear();
-        to.velocity.extend(to.momentum.iter().zip(inverse_mass).map(|(p, m)| p * m));
+        if there {
+            let forces = to.gradient.iter().zip(inverse_mass);
+            for ((p, v), (g, m)) in to.momentum.iter_mut().zip(&mut to.velocity).zip(forces) {
+                *p += half * g;
+                *v = *p * m;
+            }
+        }
         self.memory.keep(&shared);
         Ok(there.then_some(shared))
     }
@@ -203,6 +211,9 @@ impl<'a> System<'a> {
             self.trace.rollback();
             return Ok(false);
         };
+        if self.taped && self.memory.move_to(self.trace, point, self.at.power) {
+            return Ok(true);
+        }
         // The value of the density no longer matters, only whether it is positive.
         let there = self.propose(&point.y, self.taped)?.is_some();
         if there {

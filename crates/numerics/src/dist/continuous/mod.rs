@@ -30,6 +30,7 @@ pub use inv_gamma::InvGamma;
 pub use laplace::Laplace;
 pub use lognormal::LogNormal;
 pub use normal::Normal;
+pub(super) use normal::log_norm;
 pub use student_t::StudentT;
 pub use truncated::{Truncated, truncated};
 pub use truncated_normal::TruncatedNormal;

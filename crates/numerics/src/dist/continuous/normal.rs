@@ -14,7 +14,19 @@ pub struct Normal {
 
 impl Normal {
     pub(in crate::dist) fn of(mean: f64, sd: f64) -> Result<Normal, ParamError> {
-        Ok(Normal { mean, sd, log_norm: -libm::log(sd) - LN_SQRT_2PI })
+        Ok(Normal { mean, sd, log_norm: log_norm(sd) })
+    }
+
+    pub(in crate::dist) fn location(&self) -> f64 {
+        self.mean
+    }
+
+    pub(in crate::dist) fn scale(&self) -> f64 {
+        self.sd
+    }
+
+    pub(in crate::dist) fn log_norm(&self) -> f64 {
+        self.log_norm
     }
 
     /// Like [`Normal::new`], but reuses the normalising constant of `self` if the
@@ -23,6 +35,11 @@ impl Normal {
     pub fn near(&self, mean: f64, sd: f64) -> Result<Normal, ParamError> {
         self.reused(&[mean, sd]).map_or_else(|| Normal::new(mean, sd), Ok)
     }
+}
+
+/// Returns the log density at the mean.
+pub(in crate::dist) fn log_norm(sd: f64) -> f64 {
+    -libm::log(sd) - LN_SQRT_2PI
 }
 
 impl Scalar for Normal {

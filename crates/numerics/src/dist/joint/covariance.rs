@@ -3,6 +3,7 @@
 
 use crate::dist::ParamError;
 use crate::dist::param::positive;
+use crate::num::exp_each;
 use nalgebra::DMatrix;
 use std::fmt;
 use std::ops::{Add, Mul};
@@ -142,6 +143,53 @@ impl Covariance {
         }
     }
 
+    /// Puts the covariances of two different points at each of these distances into `out`,
+    /// with the bits of [`Covariance::at_distance`].
+    fn at_distances(&self, distances: &[f64], out: &mut [f64]) {
+        let each = |out: &mut [f64], f: &dyn Fn(f64) -> f64| {
+            out.iter_mut().zip(distances).for_each(|(o, d)| *o = f(*d));
+        };
+        match self {
+            SqExp { length, sd } => {
+                out.iter_mut().zip(distances).for_each(|(o, d)| {
+                    let r = d / length;
+                    *o = -0.5 * r * r;
+                });
+                exp_each(out);
+                out.iter_mut().for_each(|k| *k *= sd * sd);
+            }
+            Matern32 { length, sd } => {
+                let scaled = |d: &f64| (3f64.sqrt() * (d / length)).min(1e3);
+                out.iter_mut().zip(distances).for_each(|(o, d)| *o = -scaled(d));
+                exp_each(out);
+                let scale = |(o, d): (&mut f64, &f64)| *o *= sd * sd * (1.0 + scaled(d));
+                out.iter_mut().zip(distances).for_each(scale);
+            }
+            Matern52 { length, sd } => {
+                let scaled = |d: &f64| (5f64.sqrt() * (d / length)).min(1e3);
+                out.iter_mut().zip(distances).for_each(|(o, d)| *o = -scaled(d));
+                exp_each(out);
+                out.iter_mut().zip(distances).for_each(|(o, d)| {
+                    let r = scaled(d);
+                    *o *= sd * sd * (1.0 + r * (1.0 + r / 3.0));
+                });
+            }
+            Periodic { .. } => each(out, &|d| self.at_distance(d)),
+            White { .. } => out.fill(0.0),
+            Sum(two) | Product(two) => {
+                let mut more = vec![0.0; out.len()];
+                two.0.at_distances(distances, out);
+                two.1.at_distances(distances, &mut more);
+                let both = out.iter_mut().zip(&more);
+                if matches!(self, Sum(_)) {
+                    both.for_each(|(o, m)| *o += m);
+                } else {
+                    both.for_each(|(o, m)| *o *= m);
+                }
+            }
+        }
+    }
+
     /// Returns the number of parameters: for a sum or product, those of the left side,
     /// then those of the right.
     pub fn param_count(&self) -> usize {
@@ -213,6 +261,40 @@ impl Covariance {
         }
     }
 
+    /// Adds [`Covariance::vjp`] of two points at each of these distances.
+    pub(in crate::dist) fn vjp_each(&self, distances: &[f64], by: &[f64], out: &mut [f64]) {
+        match (self, &mut *out) {
+            (SqExp { length, sd }, [by_length, by_sd]) => {
+                let mut k = vec![0.0; distances.len()];
+                self.at_distances(distances, &mut k);
+                k.iter_mut().zip(by).for_each(|(k, by)| *k *= by);
+                *by_sd += 2.0 * k.iter().sum::<f64>() / sd;
+                let square = |(k, d): (&f64, &f64)| k * (d / length) * (d / length);
+                *by_length += k.iter().zip(distances).map(square).sum::<f64>() / length;
+            }
+            (White { .. }, _) => {}
+            (Sum(two), out) => {
+                let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
+                two.0.vjp_each(distances, by, left);
+                two.1.vjp_each(distances, by, right);
+            }
+            (Product(two), out) => {
+                let times = |c: &Covariance| {
+                    let mut values = vec![0.0; distances.len()];
+                    c.at_distances(distances, &mut values);
+                    values.iter_mut().zip(by).for_each(|(v, by)| *v *= by);
+                    values
+                };
+                let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
+                two.0.vjp_each(distances, &times(&two.1), left);
+                two.1.vjp_each(distances, &times(&two.0), right);
+            }
+            (_, out) => {
+                distances.iter().zip(by).for_each(|(d, by)| self.vjp(Some(*d), *by, out));
+            }
+        }
+    }
+
     /// Returns the covariance matrix of values at these points.
     pub fn matrix(&self, at: &[f64]) -> DMatrix<f64> {
         let packed = self.packed(at, 0.0);
@@ -227,26 +309,26 @@ impl Covariance {
     /// reused: on a regular grid these are nearly all distances.
     pub(in crate::dist) fn packed(&self, at: &[f64], jitter: f64) -> Vec<f64> {
         let n = at.len();
+        let from_first: Vec<f64> = at.iter().map(|x| (x - at[0]).abs()).collect();
+        let mut known = vec![0.0; n];
+        self.at_distances(&from_first, &mut known);
         let mut packed = Vec::with_capacity(n * (n + 1) / 2);
-        let mut first: Vec<(f64, f64)> = Vec::with_capacity(n);
+        let (mut places, mut distances) = (Vec::new(), Vec::new());
         let diagonal = self.variance() + jitter;
         for i in 0..n {
             for j in 0..i {
                 let d = (at[i] - at[j]).abs();
-                let k = match first.get(i - j) {
-                    Some((known, k)) if *known == d => *k,
-                    _ => self.at_distance(d),
-                };
-                if j == 0 {
-                    first.push((d, k));
+                if from_first[i - j] != d {
+                    places.push(packed.len());
+                    distances.push(d);
                 }
-                packed.push(k);
-            }
-            if i == 0 {
-                first.push((0.0, f64::NAN));
+                packed.push(known[i - j]);
             }
             packed.push(diagonal);
         }
+        let mut others = vec![0.0; distances.len()];
+        self.at_distances(&distances, &mut others);
+        places.into_iter().zip(others).for_each(|(place, k)| packed[place] = k);
         packed
     }
 }
@@ -290,5 +372,59 @@ impl Mul for Covariance {
 
     fn mul(self, other: Covariance) -> Covariance {
         Product(Arc::new((self, other)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all() -> Vec<Covariance> {
+        let sq = Covariance::sq_exp(0.7, 1.3).unwrap();
+        let (m3, m5) =
+            (Covariance::matern32(2.0, 0.4).unwrap(), Covariance::matern52(0.3, 2.0).unwrap());
+        let (p, w) =
+            (Covariance::periodic(1.5, 0.8, 1.1).unwrap(), Covariance::white(0.3).unwrap());
+        let sum = sq.clone() + w.clone();
+        let both = (p.clone() + m3.clone()) * sq.clone();
+        vec![sq, m3, m5, p, w, sum, both]
+    }
+
+    /// Irregular points, with some equal distances, and far ones.
+    fn points() -> Vec<f64> {
+        let mut at: Vec<f64> = (0..40).map(|i| libm::sin(f64::from(i)) * 3.0).collect();
+        at.extend([10.0, 11.0, 12.0, 13.0, 400.0, -1e4]);
+        at
+    }
+
+    #[test]
+    fn a_matrix_has_the_bits_of_single_covariances() {
+        let at = points();
+        for cov in all() {
+            let mut packed = cov.packed(&at, 0.25).into_iter();
+            for i in 0..at.len() {
+                for j in 0..i {
+                    let expected = cov.at_distance((at[i] - at[j]).abs());
+                    assert_eq!(packed.next().map(f64::to_bits), Some(expected.to_bits()), "{cov}");
+                }
+                assert_eq!(packed.next(), Some(cov.variance() + 0.25));
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_of_many_are_sums_of_single_ones() {
+        let distances: Vec<f64> = points().windows(2).map(|p| (p[0] - p[1]).abs()).collect();
+        let by: Vec<f64> = (0..distances.len()).map(|i| libm::cos(i as f64)).collect();
+        for cov in all() {
+            let (mut expected, mut found) =
+                (vec![0.5; cov.param_count()], vec![0.5; cov.param_count()]);
+            distances.iter().zip(&by).for_each(|(d, by)| cov.vjp(Some(*d), *by, &mut expected));
+            cov.vjp_each(&distances, &by, &mut found);
+            for (found, expected) in found.iter().zip(&expected) {
+                let error = (found - expected).abs();
+                assert!(error <= 1e-12 * (1.0 + expected.abs()), "{cov}: {found}, {expected}");
+            }
+        }
     }
 }

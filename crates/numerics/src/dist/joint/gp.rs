@@ -80,14 +80,19 @@ impl Gp {
         by_factor: &[f64],
     ) -> Option<Vec<f64>> {
         let by = self.0.factor.vjp_cholesky(by_factor);
+        let n = at.len();
+        (by.len() == n * (n + 1) / 2).then_some(())?;
         let mut out = vec![0.0; cov.param_count()];
-        let mut entries = by.into_iter();
+        let (mut distances, mut off_diagonal) = (Vec::new(), Vec::new());
+        let mut diagonal = 0.0;
         for (i, x) in at.iter().enumerate() {
-            for y in &at[..i] {
-                cov.vjp(Some((x - y).abs()), entries.next()?, &mut out);
-            }
-            cov.vjp(None, entries.next()? * (1.0 + self.1), &mut out);
+            let row = &by[i * (i + 1) / 2..(i + 1) * (i + 2) / 2];
+            distances.extend(at[..i].iter().map(|y| (x - y).abs()));
+            off_diagonal.extend(&row[..i]);
+            diagonal += row[i];
         }
+        cov.vjp_each(&distances, &off_diagonal, &mut out);
+        cov.vjp(None, diagonal * (1.0 + self.1), &mut out);
         Some(out)
     }
 }

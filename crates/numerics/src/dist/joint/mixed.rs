@@ -64,6 +64,12 @@ impl Mixed {
         let all = Mixture::total(&self.log_shares, &scores);
         (scores, all)
     }
+
+    #[inline]
+    fn log_density(&self, x: f64) -> f64 {
+        let (_, all) = self.scores(x);
+        if all.is_nan() { f64::NEG_INFINITY } else { all }
+    }
 }
 
 impl Batch for Mixed {
@@ -78,10 +84,13 @@ impl Batch for Mixed {
         self.refresh(buffer)
             && (0..n).all(|i| {
                 let x = x.get(buffer, i);
-                let (_, all) = self.scores(x);
-                sum.add(if all.is_nan() { f64::NEG_INFINITY } else { all });
+                sum.add(self.log_density(x));
                 !x.is_nan()
             })
+    }
+
+    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
+        out.extend((0..n).map(|i| self.log_density(x.get(buffer, i))));
     }
 
     fn vjp(
