@@ -41,6 +41,43 @@ impl Graph {
     /// targets, one after the other; `None` if it is not a straight-line program.
     pub fn record(&mut self, code: &Code, targets: &[Target]) -> Option<Tape> {
         let reached = self.reached(code, targets);
+        let mut r = self.recorder(code, &reached, Recorded::new(self.incremental), true);
+        for t in targets {
+            r.place(*t)?;
+        }
+        for n in reached {
+            r.visit(n)?;
+        }
+        Some(r.recorded.tape.finish())
+    }
+
+    /// Records scores that `work` asks for, in one of several states of the trace that
+    /// share a tape.
+    pub(in crate::trace) fn record_scores(
+        &mut self,
+        code: &Code,
+        targets: &[Target],
+        recorded: Recorded,
+        work: impl FnOnce(&mut Recorder) -> Option<()>,
+    ) -> Option<Recorded> {
+        let reached = self.reached(code, targets);
+        let mut r = self.recorder(code, &reached, recorded, false);
+        if r.recorded.placed.is_empty() {
+            for t in targets {
+                r.place(*t)?;
+            }
+        }
+        work(&mut r)?;
+        Some(r.recorded)
+    }
+
+    fn recorder<'a>(
+        &'a self,
+        code: &'a Code,
+        reached: &[NodeId],
+        recorded: Recorded,
+        scores: bool,
+    ) -> Recorder<'a> {
         let view = Reverse {
             graph: self,
             code,
@@ -50,31 +87,33 @@ impl Graph {
             weight: 1.0,
             power: 1.0,
         };
-        let mut r = Recorder {
-            view,
-            reached: reached.iter().copied().collect(),
-            placed: FxHashMap::default(),
-            forms: FxHashMap::default(),
-            tape: Builder::new(self.incremental),
-        };
-        for t in targets {
-            r.place(*t)?;
-        }
-        for n in reached {
-            r.visit(n)?;
-        }
-        Some(r.tape.finish())
+        Recorder { view, reached: reached.iter().copied().collect(), recorded, scores }
     }
 }
 
-struct Recorder<'a> {
-    view: Reverse<'a>,
-    reached: FxHashSet<NodeId>,
+/// What has been recorded so far.
+pub(in crate::trace) struct Recorded {
     /// The values of the choices that move.
     placed: FxHashMap<NodeId, Form>,
     /// The forms of the nodes recorded so far.
-    forms: FxHashMap<NodeId, Form>,
-    tape: Builder,
+    pub forms: FxHashMap<NodeId, Form>,
+    pub tape: Builder,
+}
+
+impl Recorded {
+    /// Nothing yet; `keeps` as in [`Builder::new`].
+    pub fn new(keeps: bool) -> Recorded {
+        let (placed, forms) = (FxHashMap::default(), FxHashMap::default());
+        Recorded { placed, forms, tape: Builder::new(keeps) }
+    }
+}
+
+pub(in crate::trace) struct Recorder<'a> {
+    view: Reverse<'a>,
+    reached: FxHashSet<NodeId>,
+    pub recorded: Recorded,
+    /// Whether scores are recorded with the nodes that have them.
+    scores: bool,
 }
 
 impl Recorder<'_> {
@@ -84,11 +123,11 @@ impl Recorder<'_> {
         if dist.is_stored_whitened() || graph.is_whitened(t.node) {
             return None;
         }
-        let whole = match self.placed.get(&t.node) {
+        let whole = match self.recorded.placed.get(&t.node) {
             Some(form) => form.clone(),
             None => {
-                let form = self.tape.place(&graph.nodes[t.node as usize].value)?;
-                self.placed.insert(t.node, form.clone());
+                let form = self.recorded.tape.place(&graph.nodes[t.node as usize].value)?;
+                self.recorded.placed.insert(t.node, form.clone());
                 form
             }
         };
@@ -97,20 +136,20 @@ impl Recorder<'_> {
             NONE => (dist, whole),
             i => (dist.element(i as usize), whole.element(i as usize)?),
         };
-        self.tape.input(dist.stored_support(), form);
+        self.recorded.tape.input(dist.stored_support(), form);
         Some(())
     }
 
     /// Records a node, after everything it reads.
     fn visit(&mut self, root: NodeId) -> Option<()> {
-        if self.forms.contains_key(&root) {
+        if self.recorded.forms.contains_key(&root) {
             return Some(());
         }
         let mut stack: Vec<(NodeId, Inputs, usize)> = vec![(root, self.reads(root), 0)];
         while let Some((n, reads, next)) = stack.last_mut() {
             if let Some(read) = reads.get(*next).copied() {
                 *next += 1;
-                if self.reached.contains(&read) && !self.forms.contains_key(&read) {
+                if self.reached.contains(&read) && !self.recorded.forms.contains_key(&read) {
                     let inner = self.reads(read);
                     stack.push((read, inner, 0));
                 }
@@ -118,15 +157,33 @@ impl Recorder<'_> {
             }
             let n = *n;
             let fixed =
-                !self.placed.contains_key(&n) && reads.iter().all(|r| self.form(*r).is_fixed());
+                !self.recorded.placed.contains_key(&n) && reads.iter().all(|r| self.form(*r).is_fixed());
             stack.pop();
             let form = match fixed {
                 true => Form::Fixed(self.value(n).clone()),
                 false => self.record_op(n)?,
             };
-            self.forms.insert(n, form);
+            self.recorded.forms.insert(n, form);
         }
         Some(())
+    }
+
+    /// Records the score of a node; false if it is fixed.
+    pub fn score(&mut self, n: NodeId) -> Option<bool> {
+        let mut fixed = !self.recorded.placed.contains_key(&n);
+        for read in self.reads(n) {
+            if self.reached.contains(&read) {
+                self.visit(read)?;
+            }
+            fixed &= self.form(read).is_fixed();
+        }
+        if !fixed {
+            self.scores = true;
+            let recorded = self.record_op(n);
+            self.scores = false;
+            recorded?;
+        }
+        Some(!fixed)
     }
 
     /// Returns all nodes from which a node's value, score or structure is derived.
@@ -141,7 +198,7 @@ impl Recorder<'_> {
     }
 
     fn form(&self, n: NodeId) -> Form {
-        self.forms.get(&n).cloned().unwrap_or_else(|| Form::Fixed(self.value(n).clone()))
+        self.recorded.forms.get(&n).cloned().unwrap_or_else(|| Form::Fixed(self.value(n).clone()))
     }
 
     fn operand(&self, frame: FrameId, o: Operand) -> Form {
@@ -173,16 +230,16 @@ impl Recorder<'_> {
         match graph.op(code, n) {
             Op::Prim { builtin, args } => {
                 let args = self.operands(frame, args);
-                let form = self.tape.call(code.builtins.get(*builtin), args, &now)?;
+                let form = self.recorded.tape.call(code.builtins.get(*builtin), args, &now)?;
                 let has_place = !matches!(form, Form::Fixed(_) | Form::Made(_));
                 if let Some(before) = graph.kept(n).filter(|_| has_place) {
-                    self.tape.start_from(before);
+                    self.recorded.tape.start_from(before);
                 }
                 Some(form)
             }
             Op::Array(items) => {
                 let all = self.operands(frame, items);
-                self.tape.array(all)
+                self.recorded.tape.array(all)
             }
             Op::Record { names, values } => {
                 let values = self.operands(frame, values);
@@ -191,12 +248,12 @@ impl Recorder<'_> {
             Op::Index { base, keys } => {
                 for (form, k) in self.operands(frame, keys).iter().zip(keys.iter()) {
                     let now = graph.plain(code, frame, *k, &mut Deps::new()).clone();
-                    self.tape.guard(form, &now)?;
+                    self.recorded.tape.guard(form, &now)?;
                 }
                 match graph.resolve(frame, *base) {
                     Some(_) => {
                         let (source, keys) = self.view.indexed(n)?;
-                        self.tape.index(&self.form(source), &keys)
+                        self.recorded.tape.index(&self.form(source), &keys)
                     }
                     // An element of a constant at fixed keys.
                     None => Some(Form::Fixed(now)),
@@ -228,7 +285,7 @@ impl Recorder<'_> {
                     None => Form::Fixed(Value::Unit),
                 };
                 let args = order.iter().map(argument).collect();
-                self.tape.call(builtin, args, &now)
+                self.recorded.tape.call(builtin, args, &now)
             }
             Op::Call { .. } => self.record_call(n),
             Op::If { cond, .. } => {
@@ -250,7 +307,7 @@ impl Recorder<'_> {
                 let Value::Builtin(i) = graph.value(code, frame, *f) else { return None };
                 let (over, builtin) = (self.operand(frame, *over), code.builtins.get(*i));
                 let one = |(i, now): (usize, Value)| {
-                    self.tape.call(builtin, vec![over.position(i)?], &now)
+                    self.recorded.tape.call(builtin, vec![over.position(i)?], &now)
                 };
                 match &now {
                     Value::Record(r) => {
@@ -265,11 +322,12 @@ impl Recorder<'_> {
                             .enumerate()
                             .map(one)
                             .collect::<Option<Vec<_>>>()?;
-                        self.tape.array(all)
+                        self.recorded.tape.array(all)
                     }
                 }
             }
             Op::Draw { dist, keys, .. } => self.record_draw(n, dist, keys),
+            Op::Observe { .. } | Op::Factor { .. } if !self.scores => Some(Form::Fixed(now)),
             Op::Observe { dist, value, .. } => {
                 let x = match graph.replaced(code, n) {
                     Some(v) => Form::Fixed(v.clone()),
@@ -280,7 +338,7 @@ impl Recorder<'_> {
             }
             Op::Factor { weight, .. } => {
                 let weight = self.operand(frame, *weight);
-                self.tape.factor(&weight)?;
+                self.recorded.tape.factor(&weight)?;
                 Some(Form::Fixed(now))
             }
             // Loops over values that move, and functions and containers whose structure
@@ -291,7 +349,7 @@ impl Recorder<'_> {
 
     fn guard(&mut self, frame: FrameId, o: Operand) -> Option<()> {
         let form = self.operand(frame, o);
-        self.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
+        self.recorded.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
     }
 
     /// A call of a function of the program, whose frame is fixed.
@@ -306,7 +364,7 @@ impl Recorder<'_> {
         let all: Vec<Form> = self.view.gathered(n)?.iter().map(|d| self.form(*d)).collect();
         match now {
             Value::Record(r) => Some(Form::Record(r.keys().cloned().zip(all).collect())),
-            _ => self.tape.array(all),
+            _ => self.recorded.tape.array(all),
         }
     }
 
@@ -324,11 +382,13 @@ impl Recorder<'_> {
         if moves && !has_fixed_support(&dist, &params) {
             return None;
         }
-        let x = match self.placed.get(&n) {
+        let x = match self.recorded.placed.get(&n) {
             Some(form) => form.clone(),
             None => Form::Fixed(graph.nodes[n as usize].value.clone()),
         };
-        self.record_score(n, spec, &x, false)?;
+        if self.scores {
+            self.record_score(n, spec, &x, false)?;
+        }
         Some(x)
     }
 
@@ -339,11 +399,11 @@ impl Recorder<'_> {
             DistSpec::Family { builtin, args } => {
                 let dist = graph.make_dist(code, n, frame, spec, &mut Deps::new()).ok()?;
                 let args = self.operands(frame, args);
-                self.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)
+                self.recorded.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)
             }
             DistSpec::Value(o) => {
                 let form = self.operand(frame, *o);
-                self.tape.distribution(&form, graph.value(code, frame, *o), x, observed)
+                self.recorded.tape.distribution(&form, graph.value(code, frame, *o), x, observed)
             }
         }
     }
