@@ -7,10 +7,10 @@
 //! forward algorithm, for a tree its upward pass (Koller & Friedman 2009, chapter 9). In
 //! the reverse order, each choice can be drawn given those drawn before.
 
+use super::Tape;
 use super::build::Builder;
 use super::log_sum_exp::{LogSumExp, Term, Terms};
 use super::op::Op;
-use super::Tape;
 use crate::num::Column;
 use crate::rng::Stream;
 use smallvec::SmallVec;
@@ -68,13 +68,20 @@ impl Builder {
 
     fn log_sum_exp(&mut self, values: Vec<Terms>) -> usize {
         let out = self.reserve(1);
-        self.ops.push(Op::LogSumExp(LogSumExp { values: values.into(), out, n: 1, shares: Vec::new() }));
+        self.ops.push(Op::LogSumExp(LogSumExp {
+            values: values.into(),
+            out,
+            n: 1,
+            shares: Vec::new(),
+        }));
         out
     }
 
-    /// Sums all choices out of these factors and adds the logs of the sums to the score.
-    /// `None` if a table would be too large.
-    pub fn sum_out(&mut self, counts: &[usize], factors: Vec<Factor>) -> Option<()> {
+    /// Sums all choices, of which these are the numbers of values, out of these factors
+    /// and adds the logs of the sums to the score. Returns the number of terms of all
+    /// sums; `None` if a table would be too large.
+    pub fn sum_out(&mut self, counts: &[usize], factors: Vec<Factor>) -> Option<usize> {
+        let mut terms = 0;
         let mut alive: Vec<Option<(Vec<usize>, Vec<Terms>)>> = Vec::new();
         let mut of_choice: Vec<Vec<usize>> = vec![Vec::new(); counts.len()];
         let mut near: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); counts.len()];
@@ -93,13 +100,15 @@ impl Builder {
         while let Some((_, x)) = open.pop_first() {
             let others: Vec<usize> = std::mem::take(&mut near[x]).into_iter().collect();
             let given: Vec<(usize, usize)> = others.iter().map(|y| (*y, counts[*y])).collect();
-            let size =
-                given.iter().try_fold(counts[x], |n, g| n.checked_mul(g.1))?;
+            let size = given.iter().try_fold(counts[x], |n, g| n.checked_mul(g.1))?;
             if size > LARGEST {
                 return None;
             }
-            let mine: Vec<(Vec<usize>, Vec<Terms>)> =
-                std::mem::take(&mut of_choice[x]).into_iter().filter_map(|f| alive[f].take()).collect();
+            terms += size;
+            let mine: Vec<(Vec<usize>, Vec<Terms>)> = std::mem::take(&mut of_choice[x])
+                .into_iter()
+                .filter_map(|f| alive[f].take())
+                .collect();
             let mut sums = Vec::new();
             for joint in 0..size / counts[x].max(1) {
                 let values = (0..counts[x])
@@ -121,7 +130,10 @@ impl Builder {
                 open.insert((near[*y].len(), *y));
                 of_choice[*y].push(alive.len());
             }
-            let live = |at: &usize| Term { column: Column { at: *at, step: 0, live: true }, observed: false };
+            let live = |at: &usize| Term {
+                column: Column { at: *at, step: 0, live: true },
+                observed: false,
+            };
             match &sums[..] {
                 [sum] if others.is_empty() => roots.push(*sum),
                 _ => {
@@ -133,7 +145,7 @@ impl Builder {
             self.summed.push(Summed { choice: x, given, sums });
         }
         self.ops.push(Op::Total { from: roots.into() });
-        Some(())
+        Some(terms)
     }
 
     /// The terms of an entry, with its fixed scores among the numbers of the tape.

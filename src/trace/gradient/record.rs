@@ -156,8 +156,8 @@ impl Recorder<'_> {
                 continue;
             }
             let n = *n;
-            let fixed =
-                !self.recorded.placed.contains_key(&n) && reads.iter().all(|r| self.form(*r).is_fixed());
+            let fixed = !self.recorded.placed.contains_key(&n)
+                && reads.iter().all(|r| self.form(*r).is_fixed());
             stack.pop();
             let form = match fixed {
                 true => Form::Fixed(self.value(n).clone()),

@@ -31,6 +31,10 @@ pub(in crate::trace) struct SummedChoices {
     pub sites: Vec<Target>,
     /// The values of each.
     pub values: Vec<Vec<Datum>>,
+    /// The number of scores in a sum over the choices: of the entries of all tables.
+    pub entries: usize,
+    /// The number of scores that a sweep over the choices evaluates, one choice at a time.
+    pub sweep: usize,
 }
 
 impl Trace {
@@ -72,6 +76,12 @@ impl Recording {
     /// tempered within these sums, and not outside.
     pub fn set_power(&mut self, power: f64) {
         self.tape.set_power(power);
+    }
+
+    /// The number of scores in a sum over the choices, and in a sweep that updates one of
+    /// them at a time.
+    pub fn scores(&self) -> (usize, usize) {
+        (self.summed.entries, self.summed.sweep)
     }
 
     /// Appends the changes that set the choices that are summed out to a draw from their

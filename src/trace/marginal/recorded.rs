@@ -12,8 +12,8 @@
 //! As in [`super::explore`], what a factor depends on is what its evaluation reads, in
 //! any of the states; if a state shows that it reads more, the states are made again.
 
-use super::reads::{Label, Reader, Sets};
 use super::Partition;
+use super::reads::{Label, Reader, Sets};
 use crate::dist::{Datum, Support};
 use crate::lang::code::Op;
 use crate::lang::tape::{Entry, Factor};
@@ -73,9 +73,9 @@ impl Trace {
         self.propose(&start, draws)?;
         self.commit();
         self.release_held(held)?;
-        let summed = SummedChoices { sites: sites.targets, values: sites.values };
-        let recording = |r: Recorded| Recording::new(self, r.tape.finish(), targets, summed);
-        Ok(tape.map(recording))
+        let Some((recorded, entries, sweep)) = tape else { return Ok(None) };
+        let summed = SummedChoices { sites: sites.targets, values: sites.values, entries, sweep };
+        Ok(Some(Recording::new(self, recorded.tape.finish(), targets, summed)))
     }
 
     fn sites(&self, targets: &[Target], sites: &[Target]) -> Option<Sites> {
@@ -96,13 +96,14 @@ impl Trace {
         Some(Sites { targets: sites.to_vec(), values, supports, own, colours, scopes })
     }
 
-    /// Records everything; `None` if that is not possible.
+    /// Records everything, and counts the scores in the sum and in a sweep; `None` if that
+    /// is not possible.
     fn record_states(
         &mut self,
         targets: &[Target],
         sites: &mut Sites,
         draws: Draws,
-    ) -> Option<Recorded> {
+    ) -> Option<(Recorded, usize, usize)> {
         loop {
             let counts = sites.colour()?;
             let states = counts.iter().try_fold(1, |n: usize, c| n.checked_mul(*c))?;
@@ -151,8 +152,11 @@ impl Trace {
                     return None;
                 }
                 let counts: Vec<usize> = sites.values.iter().map(Vec::len).collect();
-                recorded.tape.sum_out(&counts, table.factors)?;
-                return Some(recorded);
+                let of_scope = |f: &Factor| f.scope.iter().map(|x| counts[*x]).sum::<usize>();
+                let sweep = table.factors.iter().map(of_scope).sum();
+                let recordings: usize = table.factors.iter().map(|f| f.entries.len()).sum();
+                let sums = recorded.tape.sum_out(&counts, table.factors)?;
+                return Some((recorded, recordings + sums, sweep));
             }
         }
     }
@@ -163,9 +167,8 @@ impl Trace {
         let values = sites.values.iter().zip(indices).map(|(v, i)| Change::Set(v[*i].clone()));
         let changes: Vec<_> = sites.targets.iter().copied().zip(values).collect();
         let weight = self.propose(&changes, draws).ok()?;
-        let same = |(t, s): (&Target, &Support)| {
-            self.dist(*t).is_some_and(|d| d.stored_support() == *s)
-        };
+        let same =
+            |(t, s): (&Target, &Support)| self.dist(*t).is_some_and(|d| d.stored_support() == *s);
         if weight.appeared + weight.vanished > 0
             || !sites.targets.iter().zip(&sites.supports).all(same)
         {

@@ -121,7 +121,7 @@ fn sums_on_tapes_are_those_of_enumeration() {
            else { observe normal(x, 0.5) = -1; observe normal(0, exp(x)) = i; } }",
         // Two choices in one score, and a tree.
         "assume e ~ normal(0, 2); for i in 0 .. 3 { a[i] ~ categorical([1, 2, 1]); b[i] ~ categorical([1, 1, 3]);
-           observe normal(if a[i] == 0 and b[i] == 2 { e } else { 0 }, 0.5) = [2.1, 0.1, 1.8][i]; }",
+           observe normal(if a[i] + b[i] == 2 { e } else { 0 }, 0.5) = [2.1, 0.1, 1.8][i]; }",
         "assume e ~ normal(0, 1); z[0] ~ flip(0.5);
          for i in 1 .. 7 { z[i] ~ flip(if z[floor((i - 1) / 2)] { expit(e) } else { 0.3 }); }
          for i in 3 .. 7 { observe normal(if z[i] { e } else { 1 }, 1) = i; }",

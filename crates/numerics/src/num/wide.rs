@@ -47,7 +47,8 @@ fn exp(x: f64) -> f64 {
 fn ln(x: f64) -> f64 {
     // x = 2^k m with m between sqrt(1/2) and sqrt(2).
     let shifted = x.to_bits() + (0x3ff0_0000_0000_0000 - 0x3fe6_a09e_667f_3bcd);
-    let k = f64::from_bits(0x4330_0000_0000_0000 | (shifted >> 52)) - (4_503_599_627_370_496.0 + 1023.0);
+    let k = f64::from_bits(0x4330_0000_0000_0000 | (shifted >> 52))
+        - (4_503_599_627_370_496.0 + 1023.0);
     let m = f64::from_bits((shifted & 0x000f_ffff_ffff_ffff) + 0x3fe6_a09e_667f_3bcd);
     // ln m = 2 atanh(f), a series in f^2 < 0.03.
     let f = (m - 1.0) / (m + 1.0);
@@ -96,7 +97,8 @@ pub fn log_sum_exp_rows(rows: &mut [f64], out: &mut [f64]) -> bool {
                     }
                 }
                 for row in rows.chunks_exact_mut(n) {
-                    for ((x, m), s) in row[from..].iter_mut().zip(most.iter()).zip(sums.iter_mut()) {
+                    for ((x, m), s) in row[from..].iter_mut().zip(most.iter()).zip(sums.iter_mut())
+                    {
                         // The difference of two infinities is not a number; its
                         // exponential is 0 here.
                         *x = exp(*x - *m);

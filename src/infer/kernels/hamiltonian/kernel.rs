@@ -96,7 +96,9 @@ impl<T: Trajectory> Hamiltonian<T> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
         match System::begin(trace, at, &targets, marginal, &mut self.memory)? {
-            Some(begun) => Self::follow(&self.trajectory, &mut self.adaptation, begun, at, &mut rng),
+            Some(begun) => {
+                Self::follow(&self.trajectory, &mut self.adaptation, begun, at, &mut rng)
+            }
             None => Ok(Outcome::default()),
         }
     }
@@ -163,11 +165,21 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let selections = (self.summed.selection(trace), self.scope.selection(trace));
-        if !trace.targets(selections.0).is_empty()
+        if trace.targets(selections.0).is_empty() {
+            return self.go(trace, at, None);
+        }
+        if let Some(outcome) = self.go_summed(trace, at, selections)? {
+            return Ok(outcome);
+        }
+        let go = |trace: &mut Trace, marginal| self.go(trace, at, marginal);
+        let outcome = with_alternatives(selections, trace, at, go);
+        // Long chains can be summed out by a tape only, whether or not recording one pays.
+        if outcome.is_err()
+            && self.memory.stop_waiting()
             && let Some(outcome) = self.go_summed(trace, at, selections)?
         {
             return Ok(outcome);
         }
-        with_alternatives(selections, trace, at, |trace, marginal| self.go(trace, at, marginal))
+        outcome
     }
 }

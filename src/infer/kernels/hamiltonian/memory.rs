@@ -179,6 +179,11 @@ impl Memory {
         }
     }
 
+    /// Makes the next attempt now; false if it would have been made anyway.
+    pub fn stop_waiting(&mut self) -> bool {
+        std::mem::take(&mut self.wait) > 0
+    }
+
     /// Delays the next attempt, by ever longer waits.
     fn back_off(&mut self) {
         self.waited = self.waited.saturating_mul(2).clamp(1, LONGEST);
@@ -231,11 +236,19 @@ impl Memory {
     /// The changes that make a point the state of the trace: the values at these
     /// coordinates, and choices summed out drawn from their conditional there. `None` if
     /// they have none.
-    pub fn changes_with_draws(&mut self, y: &[f64], rng: &mut Stream) -> Option<&[(Target, Change)]> {
+    pub fn changes_with_draws(
+        &mut self,
+        trace: &Trace,
+        y: &[f64],
+        rng: &mut Stream,
+    ) -> Option<&[(Target, Change)]> {
         let (tape, _) = self.tape.as_mut()?;
         self.changes.clear();
         tape.changes(y, &mut self.changes);
-        tape.draw(y, rng, &mut self.changes).then_some(&self.changes)
+        let there = tape.draw(y, rng, &mut self.changes);
+        let same = |(t, c): &(Target, Change)| matches!(c, Change::Set(x) if trace.stored(*t).is_some_and(|now| now == *x));
+        self.changes.retain(|change| !same(change));
+        there.then_some(&self.changes)
     }
 
     /// A point to fill in, to which there is no other reference.

@@ -300,7 +300,7 @@ impl<'a> System<'a> {
             self.memory.coordinates(self.trace, &mut here);
         }
         let y = to.map_or(&here, |point| &point.y);
-        let Some(changes) = self.memory.changes_with_draws(y, &mut rng) else {
+        let Some(changes) = self.memory.changes_with_draws(self.trace, y, &mut rng) else {
             return Ok(self.by_states(|s, trace, at| s.finish_at(trace, at, to))?.unwrap_or(false));
         };
         let draws = self.at.draws(0);
