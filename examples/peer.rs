@@ -26,6 +26,11 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 const MODELS: &[(&str, &str, &[&str])] = &[
     ("coin", include_str!("../benches/peers/coin.pcad"), &["p"]),
     ("linreg", include_str!("../benches/peers/linreg.pcad"), &["slope", "intercept", "log_noise"]),
+    (
+        "linreg_summed",
+        include_str!("../benches/peers/linreg_summed.pcad"),
+        &["slope", "intercept", "log_noise"],
+    ),
     ("hmm", include_str!("../benches/peers/hmm.pcad"), &["z"]),
     ("gmm", include_str!("../benches/peers/gmm.pcad"), &["mu0", "mu1", "mu2"]),
     ("schools", include_str!("../benches/peers/schools.pcad"), &["mu", "tau"]),
@@ -76,7 +81,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let data: Json = serde_json::from_str(&std::fs::read_to_string(data)?)?;
     let (_, text, names) =
         MODELS.iter().find(|(m, ..)| m == name).ok_or_else(|| format!("no model `{name}`"))?;
-    let given = &data[name.as_str()];
+    // Both programs of a model have the same data.
+    let given = &data[name.trim_end_matches("_summed")];
     let model = compile(text, given.get(n).unwrap_or(given))?;
     let (time, steps) = match budget.strip_suffix("steps") {
         Some(steps) => (None, Some(steps.parse()?)),

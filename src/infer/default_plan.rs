@@ -1,13 +1,21 @@
 //! The plan of a program without an `infer` block. It depends on the kinds of the
 //! program's choices, and is printed so that it can be copied.
 
-use crate::trace::{ChoiceKind, Selector, Trace};
+use crate::trace::{ChoiceKind, Draws, Selector, Trace};
+
+/// A gradient with choices summed out pays if it sums at most this many times as many
+/// scores as a sweep of `gibbs` evaluates. On a tape a score takes a small part of the time
+/// that `gibbs` takes for it, a transition needs several gradients, and a sum never mixes
+/// worse than a sweep.
+const SUM_PAYS: usize = 4;
 
 /// The plan for a program, as program text, from the choices of several draws from its
 /// prior: another draw may have choices that the first one lacks.
 ///
-/// If the density has a gradient, `nuts` moves all continuous choices together and a
-/// sweep of `gibbs` the finite ones; other choices are left to kernels without gradients.
+/// If the density has a gradient, `nuts` moves all continuous choices together. If a tape
+/// can sum the finite choices out of the density at a similar cost as that of a sweep of
+/// `gibbs`, `nuts` does so, otherwise they are left to that sweep; other choices are left
+/// to kernels without gradients.
 /// `nuts` and sweeps stay within one structure: if the structure depends on their
 /// choices, single-site kernels are added that can change it.
 pub fn default_plan(draws: &mut [Trace]) -> String {
@@ -27,7 +35,15 @@ pub fn default_plan(draws: &mut [Trace]) -> String {
         let depends = |kind| draws.iter().any(|t: &Trace| t.structure_depends_on(kind));
         let (on_continuous, on_finite) =
             (depends(ChoiceKind::Continuous), depends(ChoiceKind::Finite));
-        with_gradient(finite, discrete, on_continuous, on_finite)
+        if finite > 0 && draws.iter_mut().all(sum_pays) {
+            return with_gradient(
+                "nuts($continuous, marginal = $finite)",
+                (0, discrete - finite),
+                on_continuous,
+                false,
+            );
+        }
+        with_gradient("nuts($continuous)", (finite, discrete - finite), on_continuous, on_finite)
     } else {
         without_gradient(continuous, discrete, finite, gaussian)
     }
@@ -40,8 +56,33 @@ fn has_gradient(trace: &mut Trace) -> bool {
     trace.gradient(&targets, 1.0, &mut Vec::new()).is_ok()
 }
 
-fn with_gradient(finite: usize, discrete: usize, on_continuous: bool, on_finite: bool) -> String {
-    let mut pass = String::from(" nuts($continuous);");
+/// Whether all finite choices can be summed out on a tape, and that costs little compared
+/// with a sweep over them.
+fn sum_pays(trace: &mut Trace) -> bool {
+    let of = |kind, trace: &mut Trace| {
+        let selection = trace.select(&Selector::Kind(kind));
+        trace.targets(selection).to_vec()
+    };
+    let (moving, sites) = (of(ChoiceKind::Continuous, trace), of(ChoiceKind::Finite, trace));
+    if moving.is_empty() || sites.is_empty() {
+        return false;
+    }
+    let recording = trace.record_summed(&moving, &sites, Draws::default()).ok().flatten();
+    recording.is_some_and(|r| {
+        let (sum, sweep) = r.scores();
+        sum <= SUM_PAYS * sweep
+    })
+}
+
+/// The plan with a kernel for the continuous choices, and numbers of finite choices that
+/// are left and of other discrete ones.
+fn with_gradient(
+    nuts: &str,
+    (finite, unbounded): (usize, usize),
+    on_continuous: bool,
+    on_finite: bool,
+) -> String {
+    let mut pass = format!(" {nuts};");
     if on_continuous {
         pass += " mh(one($continuous));";
     }
@@ -53,8 +94,7 @@ fn with_gradient(finite: usize, discrete: usize, on_continuous: bool, on_finite:
         0..4 => pass += " gibbs(one($finite));",
         _ => pass += &format!(" repeat {} {{ gibbs(one($finite)); }}", (finite / 2).min(50)),
     }
-    if discrete > finite {
-        let unbounded = discrete - finite;
+    if unbounded > 0 {
         pass += &format!(
             " repeat {} {{ mh(one($discrete - $finite)); drift(one($discrete - $finite)); }}",
             unbounded.min(50)

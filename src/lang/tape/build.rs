@@ -5,9 +5,11 @@
 //! run the program itself.
 
 use super::form::{Form, Made};
+use super::log_sum_exp::{Term, Terms};
 use super::op::Op;
-use super::{Input, ScoreSums, Tape};
-use crate::dist::{Dist, Support, batch, batch_of_mixture};
+use super::sum_out::Summed;
+use super::{Input, Tape, lanes};
+use crate::dist::{Batch, Dist, Support, batch, batch_of_mixture};
 use crate::lang::builtins::{
     Binary, Builtin, CovarianceValue, Derivative, Kind, PreviousEvaluation, Reduction, Scalar,
 };
@@ -19,9 +21,14 @@ use std::sync::Arc;
 /// A tape under construction.
 #[derive(Debug, Default)]
 pub struct Builder {
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     inputs: Vec<Input>,
-    ops: Vec<Op>,
+    pub(super) ops: Vec<Op>,
+    /// The choices summed out.
+    pub(super) summed: Vec<Summed>,
+    /// The scores recorded since [`Builder::begin_terms`]; if there are none, scores are
+    /// added to the sums of the tape.
+    terms: Option<Terms>,
     /// Whether incremental functions start from their evaluation in the last run.
     keeps: bool,
 }
@@ -34,9 +41,18 @@ impl Builder {
 
     /// Returns the tape of everything recorded.
     pub fn finish(self) -> Tape {
-        let adjoints = vec![0.0; self.values.len()];
-        let (values, inputs, ops) = (self.values, self.inputs, self.ops);
-        Tape { values, adjoints, inputs, ops, sums: ScoreSums::default(), scratch: Vec::new() }
+        let mut tape = Tape {
+            values: self.values,
+            inputs: self.inputs,
+            ops: self.ops,
+            summed: self.summed,
+            ..Tape::default()
+        };
+        if !tape.summed.is_empty() {
+            lanes::merge(&mut tape);
+        }
+        tape.adjoints = vec![0.0; tape.values.len()];
+        tape
     }
 
     /// Returns the number of operations recorded so far.
@@ -44,7 +60,42 @@ impl Builder {
         self.ops.len()
     }
 
-    fn reserve(&mut self, n: usize) -> usize {
+    /// From here on, scores are numbers in the buffer, which [`Builder::end_terms`]
+    /// returns, and are not added to the sums of the tape.
+    pub fn begin_terms(&mut self) {
+        self.terms = Some(Terms::new());
+    }
+
+    /// Returns the scores recorded since [`Builder::begin_terms`].
+    pub(super) fn end_terms(&mut self) -> Terms {
+        self.terms.take().unwrap_or_default()
+    }
+
+    fn term(&mut self, at: usize, observed: bool) {
+        if let Some(terms) = &mut self.terms {
+            terms.push(Term { column: Column { at, step: 0, live: true }, observed });
+        }
+    }
+
+    /// Records log densities.
+    fn densities(
+        &mut self,
+        (batch, dist): (Box<dyn Batch>, Option<Dist>),
+        x: Column,
+        params: SmallVec<[Column; 3]>,
+        n: usize,
+        observed: bool,
+    ) {
+        if self.terms.is_none() {
+            self.ops.push(Op::Density { batch, x, params, n, observed, dist });
+            return;
+        }
+        let out = self.reserve(n);
+        self.ops.push(Op::DensityEach { batch, x, params, out, n, dist });
+        (out..out + n).for_each(|at| self.term(at, observed));
+    }
+
+    pub(super) fn reserve(&mut self, n: usize) -> usize {
         let at = self.values.len();
         self.values.resize(at + n, f64::NAN);
         at
@@ -280,6 +331,7 @@ impl Builder {
     /// Records a log weight.
     pub fn factor(&mut self, weight: &Form) -> Option<()> {
         match *weight {
+            Form::Num(x) if self.terms.is_some() => self.term(x, true),
             Form::Num(x) => self.ops.push(Op::Factor { x }),
             _ if weight.is_fixed() => {}
             _ => return None,
@@ -345,7 +397,11 @@ impl Builder {
     }
 
     fn score(&mut self, dist: Form, x: Form, observed: bool) -> Option<()> {
-        self.ops.push(Op::Score { dist, x, observed, last: None });
+        let out = self.terms.is_some().then(|| self.reserve(1));
+        self.ops.push(Op::Score { dist, x, observed, out, last: None });
+        if let Some(out) = out {
+            self.term(out, observed);
+        }
         Some(())
     }
 
@@ -369,7 +425,7 @@ impl Builder {
         let batch = batch_of_mixture(d, weights, columns)?;
         let x_column = self.column(x)?;
         let n = x.len().unwrap_or(1);
-        self.ops.push(Op::Density { batch, x: x_column, params: SmallVec::new(), n, observed });
+        self.densities((batch, None), x_column, SmallVec::new(), n, observed);
         Some(())
     }
 
@@ -401,7 +457,8 @@ impl Builder {
         };
         let batch = batch(dist, &columns)?;
         let x = self.column(x)?;
-        self.ops.push(Op::Density { batch, x, params: columns, n, observed });
+        let alone = (n == 1 && dist.elements().is_none()).then(|| dist.clone());
+        self.densities((batch, alone), x, columns, n, observed);
         Some(())
     }
 }

@@ -138,6 +138,16 @@ impl Form {
         }
     }
 
+    /// Calls `f` with the index of each number that the value is computed from.
+    pub(super) fn each_number(&self, f: &mut impl FnMut(usize)) {
+        match self {
+            Form::Made(m) => m.args.iter().for_each(|a| a.each_number(f)),
+            Form::List(all) => all.iter().for_each(|one| one.each_number(f)),
+            Form::Record(all) => all.iter().for_each(|(_, one)| one.each_number(f)),
+            plain => plain.each_place(f),
+        }
+    }
+
     /// Returns the adjoint of a value that is stored in the buffer.
     pub(super) fn adjoint(&self, adjoints: &[f64]) -> Adjoint {
         match self {

@@ -14,15 +14,21 @@
 
 mod build;
 mod form;
+mod lanes;
+mod log_sum_exp;
 mod op;
+mod sum_out;
 
 pub use build::Builder;
 pub use form::Form;
 pub use op::{ScoreSums, Terms};
+pub use sum_out::{Entry, Factor};
 
 use crate::dist::{Datum, Support};
 use crate::lang::value::Value;
 use op::Op;
+use std::ops::Range;
+use sum_out::Summed;
 
 /// An input of a tape: a value that is the image of unconstrained coordinates under its
 /// support.
@@ -34,7 +40,7 @@ struct Input {
 }
 
 /// A recorded log density.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Tape {
     values: Vec<f64>,
     adjoints: Vec<f64>,
@@ -42,6 +48,22 @@ pub struct Tape {
     ops: Vec<Op>,
     sums: ScoreSums,
     scratch: Vec<f64>,
+    /// The choices summed out, in the order of elimination.
+    summed: Vec<Summed>,
+    /// The power of the likelihood within sums over choices.
+    power: Power,
+    /// The runs of numbers that operations use; empty if they use all.
+    used: Vec<Range<usize>>,
+}
+
+/// A power of the likelihood.
+#[derive(Clone, Copy, Debug)]
+struct Power(f64);
+
+impl Default for Power {
+    fn default() -> Self {
+        Power(1.0)
+    }
 }
 
 impl Tape {
@@ -169,8 +191,19 @@ impl Tape {
     }
 
     fn forward(&mut self) -> bool {
-        let (values, sums) = (&mut self.values, &mut self.sums);
-        self.ops.iter_mut().all(|op| op.forward(values, sums))
+        let (values, sums, Power(power)) = (&mut self.values, &mut self.sums, self.power);
+        self.ops.iter_mut().all(|op| op.forward(values, sums, power))
+    }
+
+    /// Whether choices are summed out.
+    pub fn is_summed(&self) -> bool {
+        !self.summed.is_empty()
+    }
+
+    /// Sets the power of the likelihood within sums over choices: there, scores cannot be
+    /// told apart afterwards. The sum is the log prior of [`Tape::sums`], tempered.
+    pub fn set_power(&mut self, power: f64) {
+        self.power = Power(power);
     }
 
     /// Computes the derivatives, with respect to the coordinates `y` at which it was last
@@ -178,8 +211,10 @@ impl Tape {
     /// Jacobians. False if one is not known.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         out.clear();
-        self.adjoints.clear();
-        self.adjoints.resize(self.values.len(), 0.0);
+        if self.used.is_empty() {
+            self.adjoints.fill(0.0);
+        }
+        self.used.iter().for_each(|run| self.adjoints[run.clone()].fill(0.0));
         let (values, adjoints, scratch) = (&self.values, &mut self.adjoints, &mut self.scratch);
         if !self.ops.iter().rev().all(|op| op.reverse(values, adjoints, power, scratch)) {
             return false;

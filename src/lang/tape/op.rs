@@ -1,6 +1,7 @@
 //! The operations of a tape, forwards and backwards.
 
 use super::form::{Form, call_from, vjp_call};
+use super::log_sum_exp::LogSumExp;
 use crate::dist::{Batch, Dist};
 use crate::lang::builtins::{Binary, Builtin, PreviousEvaluation, Reduction, times};
 use crate::lang::density;
@@ -55,24 +56,45 @@ pub(super) enum Op {
     },
     /// A value that must be the same as when the tape was recorded.
     Guard { form: Form, value: Value },
-    /// The log densities of numbers.
+    /// The log densities of numbers, added to the sums of scores.
     Density {
         batch: Box<dyn Batch>,
         x: Column,
         params: SmallVec<[Column; 3]>,
         n: usize,
         observed: bool,
+        /// The distribution when it was recorded, if it is of one number.
+        dist: Option<Dist>,
     },
-    /// The log density of any value under any distribution or likelihood; those of the last
-    /// run are kept.
-    Score { dist: Form, x: Form, observed: bool, last: Option<(Value, density::Score)> },
+    /// The log densities of numbers, as numbers in the buffer.
+    DensityEach {
+        batch: Box<dyn Batch>,
+        x: Column,
+        params: SmallVec<[Column; 3]>,
+        out: usize,
+        n: usize,
+        dist: Option<Dist>,
+    },
+    /// The log density of any value under any distribution or likelihood: added to the
+    /// sums of scores, or a number in the buffer. Those of the last run are kept.
+    Score {
+        dist: Form,
+        x: Form,
+        observed: bool,
+        out: Option<usize>,
+        last: Option<(Value, density::Score)>,
+    },
     /// A log weight.
     Factor { x: usize },
+    /// The log of a sum of exponentials of sums of terms.
+    LogSumExp(LogSumExp),
+    /// Log densities from which choices are summed out.
+    Total { from: Box<[usize]> },
 }
 
 impl Op {
     /// Runs it; false if the tape cannot evaluate the program here.
-    pub fn forward(&mut self, v: &mut [f64], sums: &mut ScoreSums) -> bool {
+    pub fn forward(&mut self, v: &mut [f64], sums: &mut ScoreSums, power: f64) -> bool {
         match self {
             Op::Unary { f, x, out, n, .. } => {
                 let (before, y) = v.split_at_mut(*out);
@@ -108,15 +130,23 @@ impl Op {
                 }
             }
             Op::Guard { form, value } => form.value(v).is_some_and(|now| now.same(value)),
-            Op::Density { batch, x, params, n, observed } => {
+            Op::Density { batch, x, params, n, observed, .. } => {
                 batch.score(v, *x, params, *n, sums.of(*observed))
             }
-            Op::Score { dist, x, observed, last } => {
+            Op::DensityEach { batch, x, params, out, n, .. } => {
+                batch.score_each(v, *x, params, *n, *out)
+            }
+            Op::Score { dist, x, observed, out, last } => {
                 let (Some(dist), Some(x)) = (dist.value(v), x.value(v)) else { return false };
                 let Some(found) = score(&dist, &x, *observed) else { return false };
+                let mut own = ExactSum::default();
+                let sum = if out.is_some() { &mut own } else { sums.of(*observed) };
                 match &found {
-                    density::Score::One(score) => sums.of(*observed).add(*score),
-                    density::Score::Sum(scores) => sums.of(*observed).merge(scores),
+                    density::Score::One(score) => sum.add(*score),
+                    density::Score::Sum(scores) => sum.merge(scores),
+                }
+                if let Some(out) = out {
+                    v[*out] = own.value();
                 }
                 *last = Some((dist, found));
                 true
@@ -124,6 +154,11 @@ impl Op {
             Op::Factor { x } => {
                 sums.likelihood.add(v[*x]);
                 !v[*x].is_nan()
+            }
+            Op::LogSumExp(l) => l.forward(v, power),
+            Op::Total { from } => {
+                from.iter().for_each(|at| sums.prior.add(v[*at]));
+                true
             }
         }
     }
@@ -170,16 +205,30 @@ impl Op {
                 out.value(v).is_some_and(|value| vjp_call(builtin, args, value, &by, v, g))
             }
             Op::Guard { .. } => true,
-            Op::Density { batch, x, params, n, observed } => {
+            Op::Density { batch, x, params, n, observed, .. } => {
                 batch.vjp(v, g, *x, params, *n, weight(*observed));
                 true
             }
-            Op::Score { dist, x, observed, last } => {
+            Op::DensityEach { batch, x, params, out, n, .. } => {
+                batch.vjp_each(v, g, *x, params, *n, *out);
+                true
+            }
+            Op::Score { dist, x, observed, out, last } => {
                 let Some((made, _)) = last else { return false };
-                vjp_score((dist, made), x, *observed, v, g, weight(*observed)).unwrap_or(false)
+                let weight = out.map_or(weight(*observed), |out| g[out]);
+                weight == 0.0
+                    || vjp_score((dist, made), x, *observed, v, g, weight).unwrap_or(false)
             }
             Op::Factor { x } => {
                 g[*x] += power;
+                true
+            }
+            Op::LogSumExp(l) => {
+                l.reverse(g, power);
+                true
+            }
+            Op::Total { from } => {
+                from.iter().for_each(|at| g[*at] += 1.0);
                 true
             }
         }

@@ -14,7 +14,9 @@ mod recording;
 mod scores;
 mod vjp;
 
+pub(in crate::trace) use record::{Recorded, Recorder};
 pub use recording::Recording;
+pub(in crate::trace) use recording::SummedChoices;
 
 use super::choices::Target;
 use super::graph::Graph;

@@ -47,6 +47,44 @@ impl Graph {
         targets: &[Target],
     ) -> Option<(Tape, Option<InPlace>)> {
         let reached = self.reached(code, targets);
+        let mut r = self.recorder(code, &reached, Recorded::new(self.incremental), true);
+        for t in targets {
+            r.place(*t)?;
+        }
+        for n in reached {
+            r.visit(n)?;
+        }
+        let in_place = r.in_place();
+        Some((r.recorded.tape.finish(), in_place))
+    }
+
+    /// Records scores that `work` asks for, in one of several states of the trace that
+    /// share a tape.
+    pub(in crate::trace) fn record_scores(
+        &mut self,
+        code: &Code,
+        targets: &[Target],
+        recorded: Recorded,
+        work: impl FnOnce(&mut Recorder) -> Option<()>,
+    ) -> Option<Recorded> {
+        let reached = self.reached(code, targets);
+        let mut r = self.recorder(code, &reached, recorded, false);
+        if r.recorded.placed.is_empty() {
+            for t in targets {
+                r.place(*t)?;
+            }
+        }
+        work(&mut r)?;
+        Some(r.recorded)
+    }
+
+    fn recorder<'a>(
+        &'a self,
+        code: &'a Code,
+        reached: &[NodeId],
+        recorded: Recorded,
+        scores: bool,
+    ) -> Recorder<'a> {
         let view = Reverse {
             graph: self,
             code,
@@ -56,38 +94,44 @@ impl Graph {
             weight: 1.0,
             power: 1.0,
         };
-        let mut r = Recorder {
+        Recorder {
             view,
             reached: reached.iter().copied().collect(),
-            placed: FxHashMap::default(),
-            forms: FxHashMap::default(),
+            recorded,
+            scores,
             moving: Vec::new(),
-            scores: Some(Vec::new()),
-            tape: Builder::new(self.incremental),
-        };
-        for t in targets {
-            r.place(*t)?;
+            scored: Some(Vec::new()),
         }
-        for n in reached {
-            r.visit(n)?;
-        }
-        let in_place = r.in_place();
-        Some((r.tape.finish(), in_place))
     }
 }
 
-struct Recorder<'a> {
-    view: Reverse<'a>,
-    reached: FxHashSet<NodeId>,
+/// What has been recorded so far.
+pub(in crate::trace) struct Recorded {
     /// The values of the choices that move.
     placed: FxHashMap<NodeId, Form>,
     /// The forms of the nodes recorded so far.
-    forms: FxHashMap<NodeId, Form>,
+    pub forms: FxHashMap<NodeId, Form>,
+    pub tape: Builder,
+}
+
+impl Recorded {
+    /// Nothing yet; `keeps` as in [`Builder::new`].
+    pub fn new(keeps: bool) -> Recorded {
+        let (placed, forms) = (FxHashMap::default(), FxHashMap::default());
+        Recorded { placed, forms, tape: Builder::new(keeps) }
+    }
+}
+
+pub(in crate::trace) struct Recorder<'a> {
+    view: Reverse<'a>,
+    reached: FxHashSet<NodeId>,
+    pub recorded: Recorded,
+    /// Whether scores are recorded with the nodes that have them.
+    scores: bool,
     /// The nodes whose inputs move.
     moving: Vec<NodeId>,
     /// The operation that scores each node; `None` if a node has none, or several.
-    scores: Option<Vec<(NodeId, usize)>>,
-    tape: Builder,
+    scored: Option<Vec<(NodeId, usize)>>,
 }
 
 impl Recorder<'_> {
@@ -97,11 +141,11 @@ impl Recorder<'_> {
         if dist.is_stored_whitened() || graph.is_whitened(t.node) {
             return None;
         }
-        let whole = match self.placed.get(&t.node) {
+        let whole = match self.recorded.placed.get(&t.node) {
             Some(form) => form.clone(),
             None => {
-                let form = self.tape.place(&graph.nodes[t.node as usize].value)?;
-                self.placed.insert(t.node, form.clone());
+                let form = self.recorded.tape.place(&graph.nodes[t.node as usize].value)?;
+                self.recorded.placed.insert(t.node, form.clone());
                 form
             }
         };
@@ -110,28 +154,28 @@ impl Recorder<'_> {
             NONE => (dist, whole),
             i => (dist.element(i as usize), whole.element(i as usize)?),
         };
-        self.tape.input(dist.stored_support(), form);
+        self.recorded.tape.input(dist.stored_support(), form);
         Some(())
     }
 
     /// Records a node, after everything it reads.
     fn visit(&mut self, root: NodeId) -> Option<()> {
-        if self.forms.contains_key(&root) {
+        if self.recorded.forms.contains_key(&root) {
             return Some(());
         }
         let mut stack: Vec<(NodeId, Inputs, usize)> = vec![(root, self.reads(root), 0)];
         while let Some((n, reads, next)) = stack.last_mut() {
             if let Some(read) = reads.get(*next).copied() {
                 *next += 1;
-                if self.reached.contains(&read) && !self.forms.contains_key(&read) {
+                if self.reached.contains(&read) && !self.recorded.forms.contains_key(&read) {
                     let inner = self.reads(read);
                     stack.push((read, inner, 0));
                 }
                 continue;
             }
             let n = *n;
-            let fixed =
-                !self.placed.contains_key(&n) && reads.iter().all(|r| self.form(*r).is_fixed());
+            let fixed = !self.recorded.placed.contains_key(&n)
+                && reads.iter().all(|r| self.form(*r).is_fixed());
             stack.pop();
             let form = match fixed {
                 true => Form::Fixed(self.value(n).clone()),
@@ -140,7 +184,7 @@ impl Recorder<'_> {
                     self.record_op(n)?
                 }
             };
-            self.forms.insert(n, form);
+            self.recorded.forms.insert(n, form);
         }
         Some(())
     }
@@ -152,18 +196,36 @@ impl Recorder<'_> {
             return None;
         }
         let moving: Vec<_> = self.moving.iter().map(|n| (*n, self.form(*n))).collect();
-        let scores = self.scores.take()?;
+        let scores = self.scored.take()?;
         let is_fixed = |frame, o| self.operand(frame, o).is_fixed();
         InPlace::new(graph, code, moving.into_iter(), scores, is_fixed)
     }
 
     /// Notes which operation scores a node: the only one since there were `before`.
     fn note_score(&mut self, n: NodeId, before: usize) {
-        match (&mut self.scores, self.tape.operations() - before) {
+        match (&mut self.scored, self.recorded.tape.operations() - before) {
             (_, 0) => {}
             (Some(scores), 1) => scores.push((n, before)),
-            _ => self.scores = None,
+            _ => self.scored = None,
         }
+    }
+
+    /// Records the score of a node; false if it is fixed.
+    pub fn score(&mut self, n: NodeId) -> Option<bool> {
+        let mut fixed = !self.recorded.placed.contains_key(&n);
+        for read in self.reads(n) {
+            if self.reached.contains(&read) {
+                self.visit(read)?;
+            }
+            fixed &= self.form(read).is_fixed();
+        }
+        if !fixed {
+            self.scores = true;
+            let recorded = self.record_op(n);
+            self.scores = false;
+            recorded?;
+        }
+        Some(!fixed)
     }
 
     /// Returns all nodes from which a node's value, score or structure is derived.
@@ -178,7 +240,7 @@ impl Recorder<'_> {
     }
 
     fn form(&self, n: NodeId) -> Form {
-        self.forms.get(&n).cloned().unwrap_or_else(|| Form::Fixed(self.value(n).clone()))
+        self.recorded.forms.get(&n).cloned().unwrap_or_else(|| Form::Fixed(self.value(n).clone()))
     }
 
     fn operand(&self, frame: FrameId, o: Operand) -> Form {
@@ -210,16 +272,16 @@ impl Recorder<'_> {
         match graph.op(code, n) {
             Op::Prim { builtin, args } => {
                 let args = self.operands(frame, args);
-                let form = self.tape.call(code.builtins.get(*builtin), args, &now)?;
+                let form = self.recorded.tape.call(code.builtins.get(*builtin), args, &now)?;
                 let has_place = !matches!(form, Form::Fixed(_) | Form::Made(_));
                 if let Some(before) = graph.kept(n).filter(|_| has_place) {
-                    self.tape.start_from(before);
+                    self.recorded.tape.start_from(before);
                 }
                 Some(form)
             }
             Op::Array(items) => {
                 let all = self.operands(frame, items);
-                self.tape.array(all)
+                self.recorded.tape.array(all)
             }
             Op::Record { names, values } => {
                 let values = self.operands(frame, values);
@@ -228,12 +290,12 @@ impl Recorder<'_> {
             Op::Index { base, keys } => {
                 for (form, k) in self.operands(frame, keys).iter().zip(keys.iter()) {
                     let now = graph.plain(code, frame, *k, &mut Deps::new()).clone();
-                    self.tape.guard(form, &now)?;
+                    self.recorded.tape.guard(form, &now)?;
                 }
                 match graph.resolve(frame, *base) {
                     Some(_) => {
                         let (source, keys) = self.view.indexed(n)?;
-                        self.tape.index(&self.form(source), &keys)
+                        self.recorded.tape.index(&self.form(source), &keys)
                     }
                     // An element of a constant at fixed keys.
                     None => Some(Form::Fixed(now)),
@@ -265,7 +327,7 @@ impl Recorder<'_> {
                     None => Form::Fixed(Value::Unit),
                 };
                 let args = order.iter().map(argument).collect();
-                self.tape.call(builtin, args, &now)
+                self.recorded.tape.call(builtin, args, &now)
             }
             Op::Call { .. } => self.record_call(n),
             Op::If { cond, .. } => {
@@ -287,7 +349,7 @@ impl Recorder<'_> {
                 let Value::Builtin(i) = graph.value(code, frame, *f) else { return None };
                 let (over, builtin) = (self.operand(frame, *over), code.builtins.get(*i));
                 let one = |(i, now): (usize, Value)| {
-                    self.tape.call(builtin, vec![over.position(i)?], &now)
+                    self.recorded.tape.call(builtin, vec![over.position(i)?], &now)
                 };
                 match &now {
                     Value::Record(r) => {
@@ -302,11 +364,12 @@ impl Recorder<'_> {
                             .enumerate()
                             .map(one)
                             .collect::<Option<Vec<_>>>()?;
-                        self.tape.array(all)
+                        self.recorded.tape.array(all)
                     }
                 }
             }
             Op::Draw { dist, keys, .. } => self.record_draw(n, dist, keys),
+            Op::Observe { .. } | Op::Factor { .. } if !self.scores => Some(Form::Fixed(now)),
             Op::Observe { dist, value, .. } => {
                 let x = match graph.replaced(code, n) {
                     Some(v) => Form::Fixed(v.clone()),
@@ -317,8 +380,8 @@ impl Recorder<'_> {
             }
             Op::Factor { weight, .. } => {
                 let weight = self.operand(frame, *weight);
-                let before = self.tape.operations();
-                self.tape.factor(&weight)?;
+                let before = self.recorded.tape.operations();
+                self.recorded.tape.factor(&weight)?;
                 self.note_score(n, before);
                 Some(Form::Fixed(now))
             }
@@ -330,7 +393,7 @@ impl Recorder<'_> {
 
     fn guard(&mut self, frame: FrameId, o: Operand) -> Option<()> {
         let form = self.operand(frame, o);
-        self.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
+        self.recorded.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
     }
 
     /// A call of a function of the program, whose frame is fixed.
@@ -345,7 +408,7 @@ impl Recorder<'_> {
         let all: Vec<Form> = self.view.gathered(n)?.iter().map(|d| self.form(*d)).collect();
         match now {
             Value::Record(r) => Some(Form::Record(r.keys().cloned().zip(all).collect())),
-            _ => self.tape.array(all),
+            _ => self.recorded.tape.array(all),
         }
     }
 
@@ -363,27 +426,34 @@ impl Recorder<'_> {
         if moves && !has_fixed_support(&dist, &params) {
             return None;
         }
-        let x = match self.placed.get(&n) {
+        let x = match self.recorded.placed.get(&n) {
             Some(form) => form.clone(),
             None => Form::Fixed(graph.nodes[n as usize].value.clone()),
         };
-        self.record_score(n, spec, &x, false)?;
+        if self.scores {
+            self.record_score(n, spec, &x, false)?;
+        }
         Some(x)
     }
 
     fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
-        let before = self.tape.operations();
+        let before = self.recorded.tape.operations();
         match spec {
             DistSpec::Family { builtin, args } => {
                 let dist = graph.make_dist(code, n, frame, spec, &mut Deps::new()).ok()?;
                 let args = self.operands(frame, args);
-                self.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)?;
+                self.recorded.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)?;
             }
             DistSpec::Value(o) => {
                 let form = self.operand(frame, *o);
-                self.tape.distribution(&form, graph.value(code, frame, *o), x, observed)?;
+                self.recorded.tape.distribution(
+                    &form,
+                    graph.value(code, frame, *o),
+                    x,
+                    observed,
+                )?;
             }
         }
         self.note_score(n, before);

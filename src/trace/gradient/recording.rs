@@ -6,8 +6,10 @@
 //! identity.
 
 use super::in_place::InPlace;
+use crate::dist::Datum;
 use crate::lang::tape::{ScoreSums, Tape};
 use crate::num::ExactSum;
+use crate::rng::Stream;
 use crate::trace::{Change, NONE, Target, Trace, Weight};
 use std::sync::Arc;
 
@@ -22,6 +24,19 @@ pub struct Recording {
     revision: u64,
     /// The sums of scores in the state to which densities are relative.
     start: ScoreSums,
+    summed: SummedChoices,
+}
+
+/// Finite choices that are summed out of a recorded density.
+#[derive(Debug, Default)]
+pub(in crate::trace) struct SummedChoices {
+    pub sites: Vec<Target>,
+    /// The values of each.
+    pub values: Vec<Vec<Datum>>,
+    /// The number of scores in a sum over the choices: of the entries of all tables.
+    pub entries: usize,
+    /// The number of scores that a sweep over the choices evaluates, one choice at a time.
+    pub sweep: usize,
 }
 
 impl Trace {
@@ -32,20 +47,65 @@ impl Trace {
     pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
         let (tape, in_place) = self.graph.record(&self.code, targets)?;
-        let identity = Arc::clone(&self.identity);
-        let revision = self.graph.revision;
         Some(Recording {
-            tape,
             in_place,
-            targets: targets.to_vec(),
-            identity,
-            revision,
-            start: ScoreSums::default(),
+            ..Recording::new(self, tape, targets, SummedChoices::default())
         })
     }
 }
 
 impl Recording {
+    /// A recording of the current state.
+    pub(in crate::trace) fn new(
+        trace: &Trace,
+        tape: Tape,
+        targets: &[Target],
+        summed: SummedChoices,
+    ) -> Recording {
+        Recording {
+            tape,
+            in_place: None,
+            targets: targets.to_vec(),
+            identity: Arc::clone(&trace.identity),
+            revision: trace.graph.revision,
+            start: ScoreSums::default(),
+            summed,
+        }
+    }
+
+    /// The choices that are summed out.
+    pub fn summed(&self) -> &[Target] {
+        &self.summed.sites
+    }
+
+    /// Sets the power of the likelihood for sums over choices; densities are then
+    /// tempered within these sums, and not outside.
+    pub fn set_power(&mut self, power: f64) {
+        self.tape.set_power(power);
+    }
+
+    /// The number of scores in a sum over the choices, and in a sweep that updates one of
+    /// them at a time.
+    pub fn scores(&self) -> (usize, usize) {
+        (self.summed.entries, self.summed.sweep)
+    }
+
+    /// Appends the changes that set the choices that are summed out to a draw from their
+    /// conditional at coordinates. False if the density does not exist there.
+    pub fn draw(&mut self, y: &[f64], rng: &mut Stream, out: &mut Vec<(Target, Change)>) -> bool {
+        if self.summed.sites.is_empty() {
+            return true;
+        }
+        if !self.tape.run(y) {
+            return false;
+        }
+        let drawn = self.tape.draw(rng);
+        for ((t, values), i) in self.summed.sites.iter().zip(&self.summed.values).zip(drawn) {
+            out.push((*t, Change::Set(values[i].clone())));
+        }
+        true
+    }
+
     /// Whether it is valid for the current state of a trace.
     pub fn holds(&self, trace: &Trace) -> bool {
         self.revision == trace.graph.revision && Arc::ptr_eq(&self.identity, &trace.identity)

@@ -149,11 +149,11 @@ impl Trace {
         draws: Draws,
     ) -> TraceResult<Explored> {
         let mut own: FxHashMap<NodeId, Label> =
-            m.moving.iter().map(|n| (*n, Label { site: NONE, moves: true })).collect();
+            m.moving.iter().map(|n| (*n, Label { site: NONE, moves: true, set: 0 })).collect();
         for (i, t) in m.sites.iter().enumerate() {
-            let label = own.entry(t.node).or_insert(Label { site: i as u32, moves: false });
+            let label = own.entry(t.node).or_insert(Label { site: i as u32, moves: false, set: 0 });
             // Elements of one choice are read together.
-            *label = Label { site: label.site.min(i as u32), moves: false };
+            *label = Label { site: label.site.min(i as u32), moves: false, set: 0 };
             m.partition.join(label.site, i as u32);
         }
         loop {

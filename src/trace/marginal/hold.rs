@@ -153,6 +153,22 @@ impl Trace {
         Ok(())
     }
 
+    /// Keeps all choices until [`Trace::release_held`], even if nothing depends on them.
+    ///
+    /// # Errors
+    /// If some are in a `mem` function that makes observations.
+    pub(crate) fn hold_choices(&mut self) -> TraceResult<Held> {
+        self.rollback();
+        let mut held = Held::default();
+        match self.hold_all(&mut held) {
+            Ok(()) => Ok(held),
+            Err(e) => {
+                self.release_held(held)?;
+                Err(e)
+            }
+        }
+    }
+
     fn hold_all(&mut self, held: &mut Held) -> TraceResult<()> {
         let mut new: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
         new.sort_unstable();

@@ -11,6 +11,7 @@ mod explore;
 mod hold;
 mod partition;
 mod reads;
+mod recorded;
 
 pub(crate) use explore::Explored;
 
@@ -109,7 +110,7 @@ impl Trace {
         let selector = Selector::Kind(kind);
         let moving =
             self.all_targets().iter().filter(|t| self.graph.selects(&self.code, &selector, t));
-        let own = moving.map(|t| (t.node, Label { site: NONE, moves: true })).collect();
+        let own = moving.map(|t| (t.node, Label { site: NONE, moves: true, set: 0 })).collect();
         let mut partition = Partition::default();
         partition.grow(1);
         let mut reader = Reader::new(&self.graph, &self.code, &own, &mut partition);
@@ -222,3 +223,6 @@ impl Trace {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

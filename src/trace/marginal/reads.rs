@@ -23,9 +23,66 @@ pub(super) struct Label {
     pub site: u32,
     /// Whether it depends on a choice that the kernel moves.
     pub moves: bool,
+    /// All of the summed-out choices, if [`Sets`] are kept.
+    pub set: u32,
 }
 
-const NOTHING: Label = Label { site: NONE, moves: false };
+const NOTHING: Label = Label { site: NONE, moves: false, set: 0 };
+
+/// Sets of choices, by number; 0 is the empty one.
+#[derive(Debug)]
+pub(super) struct Sets {
+    all: Vec<SmallVec<[u32; 4]>>,
+    unions: FxHashMap<(u32, u32), u32>,
+    /// Whether a set has become too large.
+    pub overflow: bool,
+}
+
+impl Sets {
+    /// The largest set that is kept.
+    const LARGEST: usize = 12;
+
+    /// Creates the empty set, and the sets of one of `n` choices, which are numbered from
+    /// 1.
+    pub fn singletons(n: usize) -> Sets {
+        let alone = (0..n as u32).map(|i| SmallVec::from_slice(&[i]));
+        let all = std::iter::once(SmallVec::new()).chain(alone).collect();
+        Sets { all, unions: FxHashMap::default(), overflow: false }
+    }
+
+    /// Returns the members of a set, in ascending order.
+    pub fn members(&self, set: u32) -> &[u32] {
+        &self.all[set as usize]
+    }
+
+    fn union(&mut self, a: u32, b: u32) -> u32 {
+        if a == b || b == 0 || self.overflow {
+            return a;
+        }
+        if a == 0 {
+            return b;
+        }
+        let key = (a.min(b), a.max(b));
+        if let Some(known) = self.unions.get(&key) {
+            return *known;
+        }
+        let mut both = self.all[a as usize].clone();
+        both.extend_from_slice(&self.all[b as usize]);
+        both.sort_unstable();
+        both.dedup();
+        self.overflow |= both.len() > Self::LARGEST;
+        let made = if both == self.all[a as usize] {
+            a
+        } else if both == self.all[b as usize] {
+            b
+        } else {
+            self.all.push(both);
+            self.all.len() as u32 - 1
+        };
+        self.unions.insert(key, made);
+        made
+    }
+}
 
 /// The progress of following a node.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -44,6 +101,9 @@ pub(super) struct Found {
     /// exist for some of its values only or are other nodes in each state; with that
     /// choice.
     pub owners: FxHashMap<NodeId, u32>,
+    /// The scores, and the nodes that contain some, that depend on choices, each with the
+    /// set of choices, if sets are kept.
+    pub factors: Vec<(NodeId, u32)>,
     /// The choices that observations and factors depend on.
     pub asked: Vec<NodeId>,
     /// Whether what is read depends on choices that the kernel moves.
@@ -77,6 +137,7 @@ pub(super) struct Reader<'a> {
     seen: Vec<Visit>,
     labels: Vec<Label>,
     pub found: Found,
+    pub sets: Option<Sets>,
 }
 
 impl<'a> Reader<'a> {
@@ -88,7 +149,16 @@ impl<'a> Reader<'a> {
     ) -> Self {
         let n = graph.nodes.len();
         let (seen, labels) = (vec![Visit::Not; n], vec![NOTHING; n]);
-        Reader { graph, code, own, partition, seen, labels, found: Found::default() }
+        let found = Found::default();
+        Reader { graph, code, own, partition, seen, labels, found, sets: None }
+    }
+
+    /// Whether neither the value of a node nor its existence depends on choices that are
+    /// summed out, as far as it was followed.
+    pub fn is_free(&mut self, n: NodeId) -> bool {
+        self.seen[n as usize] == Visit::Done
+            && self.labels[n as usize].site == NONE
+            && self.placed(n).0.site == NONE
     }
 
     /// Follows every score, and merges the groups of choices that one score reads.
@@ -147,6 +217,9 @@ impl<'a> Reader<'a> {
             matches!(self.graph.op(self.code, n), Op::Observe { .. } | Op::Factor { .. });
         let own = if is_score { read } else { self.decided(n) };
         let label = self.join(own, placed);
+        if label.site != NONE {
+            self.found.factors.push((owner.unwrap_or(n), label.set));
+        }
         match owner {
             _ if label.site == NONE => {}
             Some(owner) => self.found.own(owner, label.site, self.partition),
@@ -159,7 +232,8 @@ impl<'a> Reader<'a> {
         if a.site != NONE && b.site != NONE {
             self.partition.join(a.site, b.site);
         }
-        Label { site: a.site.min(b.site), moves: a.moves || b.moves }
+        let set = self.sets.as_mut().map_or(0, |sets| sets.union(a.set, b.set));
+        Label { site: a.site.min(b.site), moves: a.moves || b.moves, set }
     }
 
     /// Returns what a node's value depends on.
@@ -209,6 +283,7 @@ impl<'a> Reader<'a> {
         let score = self.join(own, read);
         if score.site != NONE {
             self.found.scores.push((n, score.site));
+            self.found.factors.push((n, score.set));
         }
         // A choice keeps its value whatever its distribution becomes, except white noise,
         // whose value depends on its parameters.

@@ -37,6 +37,30 @@ pub trait Batch: fmt::Debug + Send + Sync {
         n: usize,
         weight: f64,
     );
+
+    /// Writes the log densities of `n` numbers to the buffer, from `out` on; minus
+    /// infinity where a parameter is outside its domain. Returns false if a number is
+    /// NaN.
+    fn score_each(
+        &mut self,
+        buffer: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    ) -> bool;
+
+    /// Adds the derivatives of the log densities of the last `score_each` to the
+    /// adjoints, each times the adjoint of its log density.
+    fn vjp_each(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    );
 }
 
 /// A batch of one family that also gives the density and derivatives of its first
@@ -67,6 +91,29 @@ pub(super) trait Member<const N: usize>:
 
     fn log_density(&self, x: f64) -> f64;
 
+    /// See [`Scalar::score_columns`].
+    fn score_columns(
+        _buffer: &mut [f64],
+        _x: Column,
+        _params: &[Column],
+        _n: usize,
+        _out: usize,
+    ) -> Option<bool> {
+        None
+    }
+
+    /// See [`Scalar::vjp_columns`].
+    fn vjp_columns(
+        _buffer: &[f64],
+        _by: &mut [f64],
+        _x: Column,
+        _params: &[Column],
+        _n: usize,
+        _out: usize,
+    ) -> bool {
+        false
+    }
+
     /// Returns the derivatives with respect to the number (0 if it is discrete) and to
     /// the parameters.
     fn slopes(&self, x: f64) -> (f64, [f64; N]);
@@ -84,6 +131,27 @@ where
     #[inline]
     fn log_density(&self, x: f64) -> f64 {
         self.log_density_num(x)
+    }
+
+    fn score_columns(
+        buffer: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    ) -> Option<bool> {
+        <T as Scalar>::score_columns(buffer, x, params, n, out)
+    }
+
+    fn vjp_columns(
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    ) -> bool {
+        <T as Scalar>::vjp_columns(buffer, by, x, params, n, out)
     }
 
     #[inline]
@@ -209,6 +277,86 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
             columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live && c.step == 0)
         {
             by[c.at] += of_params[k] * weight;
+        }
+    }
+
+    fn score_each(
+        &mut self,
+        buffer: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    ) -> bool {
+        let columns = <&[Column; N]>::try_from(params).ok();
+        if let Some(there) = T::score_columns(buffer, x, params, n, out) {
+            return there;
+        }
+        let alike = columns.is_some_and(|all| all.iter().skip(1).all(|c| c.step == 0));
+        let mut there = true;
+        for i in 0..self.0.len() {
+            let mut inside = true;
+            if let Some(columns) = columns {
+                let p = columns.map(|c| c.get(buffer, i));
+                if !self.0[i].0.is_some_and(|old| old.map(f64::to_bits) == p.map(f64::to_bits)) {
+                    let before =
+                        if alike && i > 0 && self.0[i - 1].0.is_some() { i - 1 } else { i };
+                    let made = self.0[before].1.moved(p);
+                    inside = made.is_some();
+                    self.0[i].0 = made.as_ref().map(|_| p);
+                    if let Some(made) = made {
+                        self.0[i].1 = made;
+                    }
+                }
+            }
+            // One distribution may be that of all numbers.
+            let own = if self.0.len() == 1 { 0..n } else { i..i + 1 };
+            for j in own {
+                let at = x.get(buffer, j);
+                there &= !at.is_nan();
+                buffer[out + j] =
+                    if inside { self.0[i].1.log_density(at) } else { f64::NEG_INFINITY };
+            }
+        }
+        there
+    }
+
+    fn vjp_each(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    ) {
+        if T::vjp_columns(buffer, by, x, params, n, out) {
+            return;
+        }
+        let each = self.0.len() != 1;
+        let columns = <&[Column; N]>::try_from(params).ok();
+        let (mut of_x, mut of_params) = (0.0, [0.0; N]);
+        for i in 0..n {
+            let weight = by[out + i];
+            if weight == 0.0 {
+                continue;
+            }
+            let (gx, gp) = self.0[if each { i } else { 0 }].1.slopes(x.get(buffer, i));
+            if x.live {
+                if x.step == 0 { of_x += gx * weight } else { by[x.at + i] += gx * weight }
+            }
+            for (k, c) in columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live) {
+                let g = gp[k] * weight;
+                if c.step == 0 { of_params[k] += g } else { by[c.at + i] += g }
+            }
+        }
+        if x.live && x.step == 0 {
+            by[x.at] += of_x;
+        }
+        for (k, c) in columns.into_iter().flatten().enumerate() {
+            if c.live && c.step == 0 {
+                by[c.at] += of_params[k];
+            }
         }
     }
 }

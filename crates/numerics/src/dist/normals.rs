@@ -3,7 +3,7 @@
 
 use super::continuous::log_norm;
 use super::draw::standard;
-use super::{Batch, Dist, Normal};
+use super::{Batch, Dist, Normal, Scalar};
 use crate::num::{Column, ExactSum};
 
 /// Numbers under one normal distribution, or under one each.
@@ -60,6 +60,15 @@ impl Normals {
             _ => self.mean.copy_from_slice(&buffer[mean.at..mean.at + n]),
         }
         self.mean.iter().fold(true, |all, m| all & m.is_finite())
+    }
+
+    /// The distribution of number `i`; `None` if a parameter is outside its domain.
+    fn own(&self, buffer: &[f64], params: &[Column], i: usize) -> Option<Normal> {
+        let [mean, sd] = match params {
+            [mean, sd] => [mean, sd].map(|c| c.get(buffer, i)),
+            _ => [&self.mean, &self.sd].map(|list| list[if list.len() == 1 { 0 } else { i }]),
+        };
+        Normal::new(mean, sd).ok()
     }
 
     /// Standardises the numbers. False if one is NaN.
@@ -169,6 +178,54 @@ impl Batch for Normals {
             }
             if sd.live {
                 self.add(by, sd, n, weight, |z, sd| (z * z - 1.0) / sd);
+            }
+        }
+    }
+    fn score_each(
+        &mut self,
+        buffer: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    ) -> bool {
+        if let Some(there) = Normal::score_columns(buffer, x, params, n, out) {
+            return there;
+        }
+        (0..n).fold(true, |there, i| {
+            let at = x.get(buffer, i);
+            let own = self.own(buffer, params, i);
+            buffer[out + i] = own.map_or(f64::NEG_INFINITY, |d| d.log_density_num(at));
+            there && !at.is_nan()
+        })
+    }
+
+    fn vjp_each(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        out: usize,
+    ) {
+        if Normal::vjp_columns(buffer, by, x, params, n, out) {
+            return;
+        }
+        for i in 0..n {
+            let (weight, own) = (by[out + i], self.own(buffer, params, i));
+            let Some(own) = own.filter(|_| weight != 0.0) else { continue };
+            let z = standard(x.get(buffer, i), own.location(), own.scale());
+            let by_mean = z / own.scale() * weight;
+            let mut give = |c: &Column, g: f64| {
+                if c.live {
+                    by[c.at + i * c.step] += g;
+                }
+            };
+            give(&x, -by_mean);
+            if let [mean, sd] = params {
+                give(mean, by_mean);
+                give(sd, (z * z - 1.0) / own.scale() * weight);
             }
         }
     }

@@ -9,7 +9,7 @@ use super::system::System;
 use crate::infer::kernel::{Kernel, Outcome, Pick, Registered, SiteSelection, StepContext};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
-use crate::trace::{Marginal, Selector, Trace, TraceResult};
+use crate::trace::{Marginal, Selection, Selector, Trace, TraceResult};
 use std::sync::Arc;
 
 /// The energy error from which a trajectory counts as divergent (Stan's bound).
@@ -95,19 +95,46 @@ impl<T: Trajectory> Hamiltonian<T> {
     ) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) =
-            System::begin(trace, at, &targets, marginal, &mut self.memory)?
-        else {
-            return Ok(Outcome::default());
-        };
-        let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
-        let inverse_mass = &self.adaptation.inverse_mass;
-        let mut path = Path { system: &mut system, here: &here, step, inverse_mass, rng: &mut rng };
-        let end = self.trajectory.walk(&mut path)?;
+        match System::begin(trace, at, &targets, marginal, &mut self.memory)? {
+            Some(begun) => {
+                Self::follow(&self.trajectory, &mut self.adaptation, begun, at, &mut rng)
+            }
+            None => Ok(Outcome::default()),
+        }
+    }
+
+    /// Like `go`, with choices summed out by a tape; `None` if there is no such tape.
+    fn go_summed(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        sums: (Selection, Selection),
+    ) -> TraceResult<Option<Outcome>> {
+        let mut rng = at.stream();
+        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        match System::begin_summed(trace, at, &targets, sums, &mut self.memory)? {
+            Some(begun) => {
+                Self::follow(&self.trajectory, &mut self.adaptation, begun, at, &mut rng).map(Some)
+            }
+            None => Ok(None),
+        }
+    }
+
+    fn follow(
+        trajectory: &T,
+        adaptation: &mut Adaptation,
+        (mut system, here): (System, Arc<Point>),
+        at: &StepContext,
+        rng: &mut Stream,
+    ) -> TraceResult<Outcome> {
+        let step = adaptation.step(&mut system, &here, at.adapting, rng)?;
+        let inverse_mass = &adaptation.inverse_mass;
+        let mut path = Path { system: &mut system, here: &here, step, inverse_mass, rng };
+        let end = trajectory.walk(&mut path)?;
         let moved = system.finish_at(end.to.as_deref())?;
         if at.adapting {
             let y = end.to.as_ref().filter(|_| moved).map_or(&here.y, |to| &to.y);
-            self.adaptation.learn(end.acceptance, y);
+            adaptation.learn(end.acceptance, y);
         }
         Ok(Outcome {
             failed: u32::from(end.failed),
@@ -138,6 +165,21 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let selections = (self.summed.selection(trace), self.scope.selection(trace));
-        with_alternatives(selections, trace, at, |trace, marginal| self.go(trace, at, marginal))
+        if trace.targets(selections.0).is_empty() {
+            return self.go(trace, at, None);
+        }
+        if let Some(outcome) = self.go_summed(trace, at, selections)? {
+            return Ok(outcome);
+        }
+        let go = |trace: &mut Trace, marginal| self.go(trace, at, marginal);
+        let outcome = with_alternatives(selections, trace, at, go);
+        // Long chains can be summed out by a tape only, whether or not recording one pays.
+        if outcome.is_err()
+            && self.memory.stop_waiting()
+            && let Some(outcome) = self.go_summed(trace, at, selections)?
+        {
+            return Ok(outcome);
+        }
+        outcome
     }
 }

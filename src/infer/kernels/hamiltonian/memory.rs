@@ -8,7 +8,9 @@
 //! bits of gradients.
 
 use super::point::Point;
-use crate::trace::{Change, Recording, Target, Trace, Weight};
+use crate::infer::kernel::StepContext;
+use crate::rng::Stream;
+use crate::trace::{Change, Recording, Target, Trace, TraceResult, Weight};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
@@ -126,12 +128,13 @@ impl Memory {
         &mut self,
         trace: &Trace,
         asked: &[Target],
-        power: f64,
+        (sites, power): (&[Target], f64),
     ) -> Option<(Arc<Layout>, Arc<Point>)> {
         let (tape, layout) = self.tape.as_mut()?;
-        if !tape.holds(trace) || layout.asked != asked {
+        if !tape.holds(trace) || layout.asked != asked || tape.summed() != sites {
             return None;
         }
+        tape.set_power(power);
         if let Some((here, _)) = self.here.as_ref().filter(|(_, at)| *at == power) {
             return Some((Arc::clone(layout), Arc::clone(here)));
         }
@@ -149,8 +152,15 @@ impl Memory {
         })
     }
 
-    /// Records a tape, if that has paid off so far; false if there is no tape.
-    pub fn record(&mut self, trace: &mut Trace, layout: &Arc<Layout>, y: &mut Vec<f64>) -> bool {
+    /// Records a tape with the choices of `sites` summed out, if that has paid off so far;
+    /// false if there is no tape.
+    pub fn record(
+        &mut self,
+        trace: &mut Trace,
+        layout: &Arc<Layout>,
+        (sites, at): (&[Target], &StepContext),
+        y: &mut Vec<f64>,
+    ) -> TraceResult<bool> {
         self.here = None;
         let kept = std::mem::take(&mut self.kept);
         // Re-recording a tape that a checkpoint had does not count as a new recording.
@@ -160,17 +170,24 @@ impl Memory {
             }
             if self.wait > 0 {
                 self.wait -= 1;
-                return false;
+                return Ok(false);
             }
             self.runs = 0;
         }
-        self.tape = trace.record(&layout.targets).map(|tape| (tape, Arc::clone(layout)));
-        let told = self.tape.as_mut().is_some_and(|(tape, _)| tape.begin(trace, y));
+        let tape = match sites {
+            [] => trace.record(&layout.targets),
+            sites => trace.record_summed(&layout.targets, sites, at.draws(0))?,
+        };
+        self.tape = tape.map(|tape| (tape, Arc::clone(layout)));
+        let told = self.tape.as_mut().is_some_and(|(tape, _)| {
+            tape.set_power(at.power);
+            tape.begin(trace, y)
+        });
         if !told {
             self.tape = None;
             self.back_off();
         }
-        told
+        Ok(told)
     }
 
     /// Drops a tape that cannot evaluate what is needed.
@@ -178,6 +195,11 @@ impl Memory {
         if self.tape.take().is_some() {
             self.back_off();
         }
+    }
+
+    /// Makes the next attempt now; false if it would have been made anyway.
+    pub fn stop_waiting(&mut self) -> bool {
+        std::mem::take(&mut self.wait) > 0
     }
 
     /// Delays the next attempt, by ever longer waits.
@@ -224,6 +246,13 @@ impl Memory {
         self.tape.as_mut().is_some_and(|(tape, _)| tape.gradient(y, power, out))
     }
 
+    /// The coordinates of the state of the trace.
+    pub fn coordinates(&mut self, trace: &Trace, y: &mut Vec<f64>) {
+        if let Some((tape, _)) = &mut self.tape {
+            tape.begin(trace, y);
+        }
+    }
+
     /// The log Jacobian at the state of the trace.
     pub fn log_jacobian(&self) -> f64 {
         self.tape.as_ref().map_or(0.0, |(tape, _)| tape.log_jacobian())
@@ -238,6 +267,24 @@ impl Memory {
             _ => layout.changes(y, &mut self.changes),
         }
         &self.changes
+    }
+
+    /// The changes that make a point the state of the trace: the values at these
+    /// coordinates, and choices summed out drawn from their conditional there. `None` if
+    /// they have none.
+    pub fn changes_with_draws(
+        &mut self,
+        trace: &Trace,
+        y: &[f64],
+        rng: &mut Stream,
+    ) -> Option<&[(Target, Change)]> {
+        let (tape, _) = self.tape.as_mut()?;
+        self.changes.clear();
+        tape.changes(y, &mut self.changes);
+        let there = tape.draw(y, rng, &mut self.changes);
+        let same = |(t, c): &(Target, Change)| matches!(c, Change::Set(x) if trace.stored(*t).is_some_and(|now| now == *x));
+        self.changes.retain(|change| !same(change));
+        there.then_some(&self.changes)
     }
 
     /// A point to fill in, to which there is no other reference.

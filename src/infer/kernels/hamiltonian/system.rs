@@ -11,7 +11,7 @@ use super::summed::Summed;
 use crate::infer::kernel::{StepContext, recoverable};
 use crate::num::ExactSum;
 use crate::rng::Stream;
-use crate::trace::{Marginal, Target, Trace, TraceResult};
+use crate::trace::{Marginal, Selection, Target, Trace, TraceResult};
 use std::sync::Arc;
 
 /// A trace as a dynamical system; proposals are pending until [`System::finish_at`].
@@ -24,9 +24,63 @@ pub(super) struct System<'a> {
     taped: bool,
     jacobian: f64,
     summed: Option<Summed>,
+    /// The choices summed out by the tape, and those that move.
+    sums: Option<(Selection, Selection)>,
 }
 
 impl<'a> System<'a> {
+    /// Like [`System::begin`], with the choices of the first selection summed out by the
+    /// tape while those of the second move; `None` if there is no such tape.
+    pub fn begin_summed(
+        trace: &'a mut Trace,
+        at: &'a StepContext,
+        all: &[Target],
+        sums: (Selection, Selection),
+        memory: &'a mut Memory,
+    ) -> TraceResult<Option<(Self, Arc<Point>)>> {
+        trace.rollback();
+        let sites = trace.targets(sums.0).to_vec();
+        let (layout, here) = match memory.stand(trace, all, (&sites, at.power)) {
+            Some(known) => known,
+            None => {
+                let mut here = memory.point();
+                let Some(point) = Arc::get_mut(&mut here) else { return Ok(None) };
+                point.log_density = 0.0;
+                let layout = Arc::new(Self::layout(trace, all, &mut point.y).0);
+                let taped = !point.y.is_empty()
+                    && memory.record(trace, &layout, (&sites, at), &mut point.y)?;
+                let known = taped && memory.gradient(&point.y, at.power, &mut point.gradient);
+                memory.keep(&here);
+                if !known {
+                    if taped {
+                        memory.give_up();
+                    }
+                    return Ok(None);
+                }
+                (layout, here)
+            }
+        };
+        let (jacobian, sums) = (memory.log_jacobian(), Some(sums));
+        let system =
+            System { trace, at, layout, memory, taped: true, jacobian, summed: None, sums };
+        Ok(system.usable(here))
+    }
+
+    /// The choices that move, and their coordinates and log Jacobian.
+    fn layout(trace: &Trace, all: &[Target], y: &mut Vec<f64>) -> (Layout, ExactSum) {
+        let (mut layout, mut jacobian) = (Layout::new(all), ExactSum::default());
+        y.clear();
+        for t in all {
+            let Some((own, j)) = trace.free_to_move(*t).filter(|(own, _)| !own.is_empty()) else {
+                continue;
+            };
+            layout.add(trace, *t, own.len());
+            jacobian.add(j);
+            y.extend(own);
+        }
+        (layout, jacobian)
+    }
+
     /// The continuous choices among `all`, their position, and the choices to sum out.
     /// `None` if there are no continuous choices, or the density has no gradient there.
     ///
@@ -41,35 +95,26 @@ impl<'a> System<'a> {
     ) -> TraceResult<Option<(Self, Arc<Point>)>> {
         trace.rollback();
         if marginal.is_none()
-            && let Some((layout, here)) = memory.stand(trace, all, at.power)
+            && let Some((layout, here)) = memory.stand(trace, all, (&[], at.power))
         {
             let jacobian = memory.log_jacobian();
-            let system = System { trace, at, layout, memory, taped: true, jacobian, summed: None };
+            let (taped, summed, sums) = (true, None, None);
+            let system = System { trace, at, layout, memory, taped, jacobian, summed, sums };
             return Ok(system.usable(here));
         }
         let mut here = memory.point();
         let Some(point) = Arc::get_mut(&mut here) else { return Ok(None) };
         point.log_density = 0.0;
-        let mut jacobian = ExactSum::default();
-        let mut layout = Layout::new(all);
-        point.y.clear();
-        for t in all {
-            let Some((own, j)) = trace.free_to_move(*t).filter(|(own, _)| !own.is_empty()) else {
-                continue;
-            };
-            layout.add(trace, *t, own.len());
-            jacobian.add(j);
-            point.y.extend(own);
-        }
+        let (layout, jacobian) = Self::layout(trace, all, &mut point.y);
         if point.y.is_empty() {
             return Ok(None);
         }
         let layout = Arc::new(layout);
         let taped = marginal.is_none()
-            && memory.record(trace, &layout, &mut point.y)
+            && memory.record(trace, &layout, (&[], at), &mut point.y)?
             && memory.gradient(&point.y, at.power, &mut point.gradient);
-        let mut system =
-            System { trace, at, memory, layout, taped, jacobian: jacobian.value(), summed: None };
+        let (jacobian, summed, sums) = (jacobian.value(), None, None);
+        let mut system = System { trace, at, memory, layout, taped, jacobian, summed, sums };
         if let Some(marginal) = marginal {
             system.summed = Summed::begin(marginal, system.trace, at, &system.layout, point)?;
             system.memory.keep(&here);
@@ -121,10 +166,34 @@ impl<'a> System<'a> {
                 return Ok(point.gradient.iter().all(|g| g.is_finite()));
             }
         }
+        if self.sums.is_some() {
+            let there = self.by_states(|mut s, trace, at| s.evaluate(trace, at, point))?;
+            return Ok(there.unwrap_or(false));
+        }
         let Some(log_density) = self.propose(&point.y, false)? else { return Ok(false) };
         point.log_density = log_density;
         self.force(point)?;
         Ok(point.gradient.iter().all(|g| g.is_finite()))
+    }
+
+    /// Does something with proposals of all values of the choices that are summed out, for
+    /// points at which the tape has no density; `None` if there is none at the start.
+    fn by_states<R>(
+        &mut self,
+        work: impl FnOnce(Summed, &mut Trace, &StepContext) -> TraceResult<R>,
+    ) -> TraceResult<Option<R>> {
+        let Some((sites, moving)) = self.sums else { return Ok(None) };
+        let mut here = Point::default();
+        self.memory.coordinates(self.trace, &mut here.y);
+        let (marginal, held) = self.trace.marginalise(sites, moving, self.at.draws(0))?;
+        let done = match Summed::begin(marginal, self.trace, self.at, &self.layout, &mut here) {
+            Ok(Some(summed)) => work(summed, self.trace, self.at).map(Some),
+            Ok(None) => Ok(None),
+            Err(e) => Err(e),
+        };
+        self.trace.release_held(held)?;
+        self.memory.moved(self.trace);
+        done
     }
 
     /// Proposes a point and returns its log density; `None` if it has none.
@@ -207,6 +276,9 @@ impl<'a> System<'a> {
         if let Some(summed) = self.summed.take() {
             return summed.finish_at(self.trace, self.at, to);
         }
+        if self.sums.is_some() {
+            return self.finish_with_draws(to);
+        }
         let Some(point) = to else {
             self.trace.rollback();
             return Ok(false);
@@ -223,5 +295,40 @@ impl<'a> System<'a> {
             self.trace.rollback();
         }
         Ok(there)
+    }
+
+    /// Makes a point, or the initial one, the state of the trace, with the choices summed
+    /// out drawn from their conditional there.
+    fn finish_with_draws(mut self, to: Option<&Point>) -> TraceResult<bool> {
+        self.trace.rollback();
+        let mut rng = self.at.within(0).stream();
+        let mut here = Vec::new();
+        if to.is_none() {
+            self.memory.coordinates(self.trace, &mut here);
+        }
+        let y = to.map_or(&here, |point| &point.y);
+        let Some(changes) = self.memory.changes_with_draws(self.trace, y, &mut rng) else {
+            return Ok(self.by_states(|s, trace, at| s.finish_at(trace, at, to))?.unwrap_or(false));
+        };
+        let draws = self.at.draws(0);
+        let Some(w) = recoverable(self.trace.propose(changes, draws))? else { return Ok(false) };
+        if w.appeared + w.vanished == 0 {
+            self.trace.commit();
+            self.memory.moved(self.trace);
+            return Ok(to.is_some());
+        }
+        // Nothing depends on some of the choices at these values: they may vanish after the
+        // move, which then was one between states that have all of them.
+        self.trace.rollback();
+        let held = self.trace.hold_choices()?;
+        let w = recoverable(self.trace.propose(changes, draws))?;
+        let there = w.is_some_and(|w| w.appeared + w.vanished == 0);
+        if there {
+            self.trace.commit();
+        } else {
+            self.trace.rollback();
+        }
+        self.trace.release_held(held)?;
+        Ok(there && to.is_some())
     }
 }

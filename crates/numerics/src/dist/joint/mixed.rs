@@ -47,6 +47,8 @@ impl Mixed {
             if moved {
                 self.weights.iter_mut().enumerate().for_each(|(i, w)| *w = c.get(buffer, i));
                 if Categorical::new(&self.weights[..]).is_err() {
+                    // They count as moved the next time.
+                    self.weights.fill(f64::NAN);
                     return false;
                 }
                 (self.total, self.log_shares) =
@@ -69,6 +71,32 @@ impl Mixed {
     fn log_density(&self, x: f64) -> f64 {
         let (_, all) = self.scores(x);
         if all.is_nan() { f64::NEG_INFINITY } else { all }
+    }
+
+    /// Adds the derivatives of the log density of number `i`, times a weight.
+    fn vjp_one(&self, buffer: &[f64], by: &mut [f64], x: Column, i: usize, weight: f64) {
+        let at = x.get(buffer, i);
+        let (scores, all) = self.scores(at);
+        for (k, (part, columns)) in self.parts.iter().enumerate() {
+            let s = scores[k];
+            if let Some(c) = self.place.filter(|c| c.live) {
+                by[c.at + k] += weight * Mixture::by_weight(s, all, self.total);
+            }
+            let share = Mixture::share(self.log_shares[k], s, all);
+            if share <= 0.0 || !s.is_finite() {
+                continue;
+            }
+            let mut of_params = [0.0; 3];
+            let of_x = part.slopes_num(at, &mut of_params);
+            if x.live {
+                by[x.at + i * x.step] += weight * share * of_x;
+            }
+            columns
+                .iter()
+                .zip(of_params)
+                .filter(|(c, _)| c.live)
+                .for_each(|(c, p)| by[c.at] += weight * share * p);
+        }
     }
 }
 
@@ -102,28 +130,39 @@ impl Batch for Mixed {
         n: usize,
         weight: f64,
     ) {
-        for i in 0..n {
+        (0..n).for_each(|i| self.vjp_one(buffer, by, x, i, weight));
+    }
+
+    fn score_each(
+        &mut self,
+        buffer: &mut [f64],
+        x: Column,
+        _params: &[Column],
+        n: usize,
+        out: usize,
+    ) -> bool {
+        let inside = self.refresh(buffer);
+        (0..n).fold(true, |there, i| {
             let at = x.get(buffer, i);
-            let (scores, all) = self.scores(at);
-            for (k, (part, columns)) in self.parts.iter().enumerate() {
-                let s = scores[k];
-                if let Some(c) = self.place.filter(|c| c.live) {
-                    by[c.at + k] += weight * Mixture::by_weight(s, all, self.total);
-                }
-                let share = Mixture::share(self.log_shares[k], s, all);
-                if share <= 0.0 || !s.is_finite() {
-                    continue;
-                }
-                let mut of_params = [0.0; 3];
-                let of_x = part.slopes_num(at, &mut of_params);
-                if x.live {
-                    by[x.at + i * x.step] += weight * share * of_x;
-                }
-                columns
-                    .iter()
-                    .zip(of_params)
-                    .filter(|(c, _)| c.live)
-                    .for_each(|(c, p)| by[c.at] += weight * share * p);
+            let all = if inside { self.scores(at).1 } else { f64::NEG_INFINITY };
+            buffer[out + i] = if all.is_nan() { f64::NEG_INFINITY } else { all };
+            there && !at.is_nan()
+        })
+    }
+
+    fn vjp_each(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        x: Column,
+        _params: &[Column],
+        n: usize,
+        out: usize,
+    ) {
+        for i in 0..n {
+            let weight = by[out + i];
+            if weight != 0.0 {
+                self.vjp_one(buffer, by, x, i, weight);
             }
         }
     }
