@@ -22,11 +22,16 @@ const THREE_HALVES_LN2: f64 = f64::from_bits(0x3ff0_a2b2_0000_0000);
 /// The magnitude up to which results, and the powers of two that scale them, are normal.
 const NORMAL: f64 = 708.0;
 
+/// Adding 3/2 2^52 rounds to an integer, and leaves it in the low bits.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
 /// Returns the exponential of a number of a magnitude up to [`NORMAL`].
 #[inline(always)]
 fn normal(x: f64) -> f64 {
     let (size, sign) = (x.abs(), if x < 0.0 { -1.0 } else { 1.0 });
-    let whole = (INVERSE_LN2 * x + 0.5 * sign) as i32 as f64;
+    let scaled = INVERSE_LN2 * x + 0.5 * sign;
+    let near = scaled + ROUND - ROUND;
+    let whole = if near.abs() > scaled.abs() { near - sign } else { near };
     let k = if size >= THREE_HALVES_LN2 { whole } else { sign };
     let k = if size >= HALF_LN2 { k } else { 0.0 };
     let (high, low) = (x - k * LN2_HIGH, k * LN2_LOW);
@@ -34,7 +39,8 @@ fn normal(x: f64) -> f64 {
     let rr = r * r;
     let c = r - rr * (P1 + rr * (P2 + rr * (P3 + rr * (P4 + rr * P5))));
     let y = 1.0 + (r * c / (2.0 - c) - low + high);
-    let power = f64::from_bits(((i64::from(k as i32) + 1023) as u64) << 52);
+    // The sum has k + 1023 in its low bits.
+    let power = f64::from_bits((k + (ROUND + 1023.0)).to_bits() << 52);
     if size >= TINY { y * power } else { 1.0 + x }
 }
 
