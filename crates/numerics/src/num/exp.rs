@@ -5,9 +5,10 @@
 
 use super::simd::vectorised;
 
-const LN2_HIGH: f64 = 6.93147180369123816490e-01;
+/// The leading bits of ln 2, so that products with small integers are exact, and the rest.
+const LN2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 const LN2_LOW: f64 = 1.90821492927058770002e-10;
-const INVERSE_LN2: f64 = 1.44269504088896338700e+00;
+const INVERSE_LN2: f64 = core::f64::consts::LOG2_E;
 const P1: f64 = 1.66666666666666019037e-01;
 const P2: f64 = -2.77777777770155933842e-03;
 const P3: f64 = 6.61375632143793436117e-05;
