@@ -138,7 +138,7 @@ impl Tape {
             rest = after;
             let jacobian = match (&input.form, own) {
                 (Form::Num(at), [y]) if matches!(input.support, Support::Real) => {
-                    self.values[*at] = input.support.from_free_scalar(*y).0;
+                    self.values[*at] = if y.is_nan() { 0.0 } else { y.clamp(f64::MIN, f64::MAX) };
                     continue;
                 }
                 (Form::Num(at), [y]) => {

@@ -150,12 +150,9 @@ impl Trace {
         }
         for (i, (a, b)) in mine.nodes.iter().zip(&theirs.nodes).enumerate() {
             // Distributions and objects are the same only if they are one.
-            let same_value = match (&a.value, &b.value) {
-                (Value::Dist(a), Value::Dist(b)) => format!("{a:?}") == format!("{b:?}"),
-                (a, b) => match (a.downcast(), b.downcast::<CovarianceValue>()) {
-                    (Some(CovarianceValue(a)), Some(CovarianceValue(b))) => a == b,
-                    _ => a.same(b),
-                },
+            let same_value = match (a.value.downcast(), b.value.downcast()) {
+                (Some(CovarianceValue(a)), Some(CovarianceValue(b))) => a == b,
+                _ => a.value.same(&b.value) || format!("{:?}", a.value) == format!("{:?}", b.value),
             };
             let rest =
                 |n: &Node| (n.score.to_bits(), n.state, n.refs, n.flags, format!("{:?}", n.side));

@@ -3,7 +3,6 @@
 //! number at a time, but there are no allocations, and work that depends only on
 //! unchanged parameters is not repeated.
 
-use super::normals::Normals;
 use super::*;
 use crate::num::{Column, ExactSum};
 use std::fmt;
@@ -361,18 +360,8 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
     }
 }
 
-/// Creates the batch of a scalar distribution, or of a distribution whose elements are
-/// all of one family. Its parameters lie in these columns, or are fixed. `None` for other
-/// distributions, and if the columns do not fit the family.
-pub fn batch(dist: &Dist, params: &[Column]) -> Option<Box<dyn Batch>> {
-    match Normals::new(parts(dist), params.len()) {
-        Some(normals) => Some(Box::new(normals)),
-        None => Some(component(dist, params)?),
-    }
-}
-
 /// Returns the distributions of the elements, or the one of all of them.
-fn parts(dist: &Dist) -> &[Dist] {
+pub(super) fn parts(dist: &Dist) -> &[Dist] {
     match dist {
         Dist::Iid(d) => std::slice::from_ref(d.one()),
         Dist::Product(d) => d.parts(),
@@ -380,7 +369,7 @@ fn parts(dist: &Dist) -> &[Dist] {
     }
 }
 
-/// Like `batch`, but returns the batch as a [`Component`].
+/// Like [`batch`], but returns the batch as a [`Component`].
 pub(super) fn component(dist: &Dist, params: &[Column]) -> Option<Box<dyn Component>> {
     families::component(parts(dist), params.len())
 }

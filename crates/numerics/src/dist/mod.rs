@@ -23,7 +23,7 @@ mod support;
 mod tails;
 mod transform;
 
-pub use batch::{Batch, batch};
+pub use batch::Batch;
 pub use continuous::*;
 pub use datum::Datum;
 pub use discrete::*;
@@ -31,6 +31,7 @@ pub use distribution::{Distribution, Gradient};
 pub use families::{Dist, FAMILIES};
 pub use family::{Family, Named, Numbers, ParamDoc, ParamKind};
 pub use joint::*;
+pub use normals::batch;
 pub use param::ParamError;
 pub use scalar::{Scalar, Slope};
 pub use support::{MAX_ENUMERATED, Support};

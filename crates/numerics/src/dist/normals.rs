@@ -1,10 +1,21 @@
 //! Batches of normal distributions: the same arithmetic as [`Normal`]'s, in loops over
 //! columns that the compiler can vectorise.
 
+use super::batch::{component, parts};
 use super::continuous::log_norm;
 use super::draw::standard;
 use super::{Batch, Dist, Normal, Scalar};
 use crate::num::{Column, ExactSum};
+
+/// Creates the batch of a scalar distribution, or of a distribution whose elements are
+/// all of one family. Its parameters lie in these columns, or are fixed. `None` for other
+/// distributions, and if the columns do not fit the family.
+pub fn batch(dist: &Dist, params: &[Column]) -> Option<Box<dyn Batch>> {
+    match Normals::new(parts(dist), params.len()) {
+        Some(normals) => Some(Box::new(normals)),
+        None => Some(component(dist, params)?),
+    }
+}
 
 /// Numbers under one normal distribution, or under one each.
 #[derive(Debug)]

@@ -28,16 +28,28 @@ pub struct ExactSum {
 /// The number of limbs, for exponents up to 1024.
 const LIMBS: usize = 26;
 
+/// Returns the nearest integer to a number below 2^51, as both types: adding this constant
+/// rounds to it, and leaves it in the low bits.
+#[inline]
+fn nearest(x: f64) -> (f64, i64) {
+    const ROUND: f64 = 6_755_399_441_055_744.0; // 3/2 2^52
+    let shifted = x + ROUND;
+    (shifted - ROUND, (shifted.to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64))
+}
+
 /// Returns x 2^64 rounded towards zero, for |x| < 2^40: `(x * SCALE) as i128` in three
 /// exact pieces, each a machine word, in units of 2^64, 2^32 and 1.
 #[inline]
 fn pieces(x: f64) -> [i64; 3] {
     const HALF: f64 = 4_294_967_296.0; // 2^32
-    let whole = x as i64;
-    let rest = (x - whole as f64) * HALF;
-    let upper = rest as i64;
-    let lower = ((rest - upper as f64) * HALF) as i64;
-    [whole, upper, lower]
+    let (near, whole) = nearest(x);
+    let rest = (x - near) * HALF;
+    let (near, upper) = nearest(rest);
+    let rest = (rest - near) * HALF;
+    let (near, lower) = nearest(rest);
+    // What was rounded away from zero is taken back.
+    let beyond = i64::from((x > 0.0) & (near > rest)) - i64::from((x < 0.0) & (near < rest));
+    [whole, upper, lower - beyond]
 }
 
 /// Puts the pieces, or sums of them, together.
@@ -287,6 +299,7 @@ mod tests {
             LARGE.next_down(),
             -LARGE.next_down(),
         ];
+        xs.extend([2.5, -2.5, -1e-300, 5.4e-20, -5.4e-20, 0.1, -0.1, f64::from_bits(1)]);
         xs.extend((0..2000).map(|i| libm::sin(f64::from(i)) * libm::exp2(f64::from(i % 120 - 80))));
         for x in xs {
             assert_eq!(quantised(x), (x * SCALE) as i128, "{x}");

@@ -5,9 +5,10 @@
 
 use super::simd::vectorised;
 
-const LN2_HIGH: f64 = 6.93147180369123816490e-01;
+/// The leading bits of ln 2, so that products with small integers are exact, and the rest.
+const LN2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 const LN2_LOW: f64 = 1.90821492927058770002e-10;
-const INVERSE_LN2: f64 = 1.44269504088896338700e+00;
+const INVERSE_LN2: f64 = core::f64::consts::LOG2_E;
 const P1: f64 = 1.66666666666666019037e-01;
 const P2: f64 = -2.77777777770155933842e-03;
 const P3: f64 = 6.61375632143793436117e-05;
@@ -22,11 +23,16 @@ const THREE_HALVES_LN2: f64 = f64::from_bits(0x3ff0_a2b2_0000_0000);
 /// The magnitude up to which results, and the powers of two that scale them, are normal.
 const NORMAL: f64 = 708.0;
 
+/// Adding 3/2 2^52 rounds to an integer, and leaves it in the low bits.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
 /// Returns the exponential of a number of a magnitude up to [`NORMAL`].
 #[inline(always)]
 fn normal(x: f64) -> f64 {
     let (size, sign) = (x.abs(), if x < 0.0 { -1.0 } else { 1.0 });
-    let whole = (INVERSE_LN2 * x + 0.5 * sign) as i32 as f64;
+    let scaled = INVERSE_LN2 * x + 0.5 * sign;
+    let near = scaled + ROUND - ROUND;
+    let whole = if near.abs() > scaled.abs() { near - sign } else { near };
     let k = if size >= THREE_HALVES_LN2 { whole } else { sign };
     let k = if size >= HALF_LN2 { k } else { 0.0 };
     let (high, low) = (x - k * LN2_HIGH, k * LN2_LOW);
@@ -34,7 +40,8 @@ fn normal(x: f64) -> f64 {
     let rr = r * r;
     let c = r - rr * (P1 + rr * (P2 + rr * (P3 + rr * (P4 + rr * P5))));
     let y = 1.0 + (r * c / (2.0 - c) - low + high);
-    let power = f64::from_bits(((i64::from(k as i32) + 1023) as u64) << 52);
+    // The sum has k + 1023 in its low bits.
+    let power = f64::from_bits((k + (ROUND + 1023.0)).to_bits() << 52);
     if size >= TINY { y * power } else { 1.0 + x }
 }
 

@@ -305,30 +305,47 @@ impl Covariance {
     }
 
     /// Returns the lower triangle of the covariance matrix, packed by rows, with `jitter`
-    /// added to the diagonal. Distances from the first point are evaluated once and
-    /// reused: on a regular grid these are nearly all distances.
+    /// added to the diagonal. If most distances are also distances from the first point,
+    /// as on a regular grid, these are evaluated once and reused.
     pub(in crate::dist) fn packed(&self, at: &[f64], jitter: f64) -> Vec<f64> {
         let n = at.len();
+        let row = |i: usize| at[..i].iter().map(move |x| (at[i] - x).abs());
         let from_first: Vec<f64> = at.iter().map(|x| (x - at[0]).abs()).collect();
-        let mut known = vec![0.0; n];
-        self.at_distances(&from_first, &mut known);
-        let mut packed = Vec::with_capacity(n * (n + 1) / 2);
-        let (mut places, mut distances) = (Vec::new(), Vec::new());
-        let diagonal = self.variance() + jitter;
+        let is_known = |i: usize| row(i).zip(from_first[..=i].iter().rev()).map(|(d, f)| d == *f);
+        let pairs = n * n.saturating_sub(1) / 2;
+        let mut distances: Vec<f64> = Vec::with_capacity(pairs);
+        let known: usize = (0..n).map(|i| is_known(i).filter(|known| *known).count()).sum();
+        let reuse = 2 * known > pairs;
         for i in 0..n {
-            for j in 0..i {
-                let d = (at[i] - at[j]).abs();
-                if from_first[i - j] != d {
-                    places.push(packed.len());
-                    distances.push(d);
-                }
-                packed.push(known[i - j]);
+            match reuse {
+                true => distances.extend(row(i).zip(is_known(i)).filter(|d| !d.1).map(|d| d.0)),
+                false => distances.extend(row(i)),
             }
-            packed.push(diagonal);
         }
         let mut others = vec![0.0; distances.len()];
         self.at_distances(&distances, &mut others);
-        places.into_iter().zip(others).for_each(|(place, k)| packed[place] = k);
+        let mut first = vec![0.0; if reuse { n } else { 0 }];
+        self.at_distances(&from_first[..first.len()], &mut first);
+        let mut packed = Vec::with_capacity(n * (n + 1) / 2);
+        let (diagonal, mut others) = (self.variance() + jitter, &others[..]);
+        for i in 0..n {
+            if reuse {
+                for (known, k) in is_known(i).zip(first[..=i].iter().rev()) {
+                    match (known, others) {
+                        (false, [other, rest @ ..]) => {
+                            packed.push(*other);
+                            others = rest;
+                        }
+                        _ => packed.push(*k),
+                    }
+                }
+            } else {
+                let (own, rest) = others.split_at(i);
+                packed.extend_from_slice(own);
+                others = rest;
+            }
+            packed.push(diagonal);
+        }
         packed
     }
 }
@@ -399,15 +416,21 @@ mod tests {
 
     #[test]
     fn a_matrix_has_the_bits_of_single_covariances() {
-        let at = points();
-        for cov in all() {
-            let mut packed = cov.packed(&at, 0.25).into_iter();
-            for i in 0..at.len() {
-                for j in 0..i {
-                    let expected = cov.at_distance((at[i] - at[j]).abs());
-                    assert_eq!(packed.next().map(f64::to_bits), Some(expected.to_bits()), "{cov}");
+        // Irregular, regular, nearly regular, a single one, none.
+        let grid: Vec<f64> = (0..40).map(|i| 0.125 * f64::from(i)).collect();
+        let rounded: Vec<f64> = (0..40).map(|i| 0.1 * f64::from(i)).collect();
+        for at in [points(), grid, rounded, vec![3.0], Vec::new()] {
+            for cov in all() {
+                let mut packed = cov.packed(&at, 0.25).into_iter();
+                for i in 0..at.len() {
+                    for j in 0..i {
+                        let (found, expected) =
+                            (packed.next(), cov.at_distance((at[i] - at[j]).abs()));
+                        assert_eq!(found.map(f64::to_bits), Some(expected.to_bits()), "{cov}");
+                    }
+                    assert_eq!(packed.next(), Some(cov.variance() + 0.25));
                 }
-                assert_eq!(packed.next(), Some(cov.variance() + 0.25));
+                assert_eq!(packed.next(), None);
             }
         }
     }

@@ -213,21 +213,29 @@ fn decompose_row(packed: &mut [f64], i: usize, from: usize) -> Result<(), usize>
 /// Returns [`dot`] of each of these with `b`, all of one length.
 #[inline(always)]
 fn dots(all: [&[f64]; ROWS], b: &[f64]) -> [f64; ROWS] {
-    let n = b.len();
-    let all = all.map(|a| &a[..n]);
+    let (b4, b_rest) = b.as_chunks::<4>();
+    let all = all.map(|a| a[..b.len()].as_chunks::<4>());
     let mut sums = [[0.0; 4]; ROWS];
-    let whole = n - n % 4;
-    let mut at = 0;
-    while at < whole {
-        for r in 0..ROWS {
-            for k in 0..4 {
-                sums[r][k] += all[r][at + k] * b[at + k];
-            }
+    let [p, q, r, s] = all.map(|(a4, _)| a4);
+    for ((((b, p), q), r), s) in b4.iter().zip(p).zip(q).zip(r).zip(s) {
+        for (sum, a) in sums.iter_mut().zip([p, q, r, s]) {
+            *sum = [
+                sum[0] + a[0] * b[0],
+                sum[1] + a[1] * b[1],
+                sum[2] + a[2] * b[2],
+                sum[3] + a[3] * b[3],
+            ];
         }
-        at += 4;
     }
+    // Otherwise the compiler vectorises the sums of pairs below, and the loop in halves.
+    let sums = std::hint::black_box(sums);
     core::array::from_fn(|r| {
-        let tail: f64 = all[r][whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum();
+        let tail = match (all[r].1, b_rest) {
+            ([a], [b]) => a * b,
+            ([a, c], [b, d]) => a * b + c * d,
+            ([a, c, e], [b, d, f]) => a * b + c * d + e * f,
+            _ => -0.0,
+        };
         let s = sums[r];
         (s[0] + s[1]) + (s[2] + s[3]) + tail
     })
