@@ -277,7 +277,7 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         for i in 0..self.0.len() {
             if let Some(columns) = columns {
                 let p = columns.map(|c| c.get(buffer, i));
-                if !self.0[i].0.is_some_and(|old| old.map(f64::to_bits) == p.map(f64::to_bits)) {
+                if self.0[i].0.is_none_or(|old| old.map(f64::to_bits) != p.map(f64::to_bits)) {
                     let before = if alike && i > 0 { i - 1 } else { i };
                     let Some(made) = self.0[before].1.moved(p) else { return false };
                     self.0[i] = (Some(p), made);
