@@ -251,6 +251,62 @@ fn values_that_the_program_has_not() {
     }
 }
 
+/// A chain of hidden states, too long for joint values, against the forward algorithm and
+/// quadrature.
+#[test]
+fn a_chain_of_states() {
+    let y = [0.4, 2.1, 1.9, 2.4, -0.3, 0.1, 1.2, 2.2, 0.3, -0.6, 0.2, 1.7, 2.0, 1.1];
+    let text = format!(
+        "assume m ~ normal(0, 3);
+         for t in 0 .. {} {{ z[t] ~ flip(if t == 0 {{ 0.5 }} else {{ if z[t - 1] {{ 0.8 }} else {{ 0.3 }} }});
+           observe normal(if z[t] {{ m }} else {{ 0 }}, 0.7) = {y:?}[t]; }}
+         infer {{ warmup 300 {{ nuts(@m, marginal = @z); }} repeat 4000 {{ nuts(@m, marginal = @z); collect m, z; }} }}",
+        y.len()
+    );
+    // The density of m and y, and the part of it with the fourth state on.
+    let density = |m: f64, on: bool| {
+        let mut f = [0.5, 0.5];
+        for (t, y) in y.iter().enumerate() {
+            if t > 0 {
+                f = [f[0] * 0.7 + f[1] * 0.2, f[0] * 0.3 + f[1] * 0.8];
+            }
+            f = [f[0] * normal_pdf(*y, 0.0, 0.7), f[1] * normal_pdf(*y, m, 0.7)];
+            f[0] *= f64::from(u8::from(!(on && t == 3)));
+        }
+        normal_pdf(m, 0.0, 3.0) * (f[0] + f[1])
+    };
+    let z = integrate(|m| density(m, false), -14.0, 14.0, 8000);
+    let d = run(&text, 3, 2);
+    let mean = integrate(|m| m * density(m, false), -14.0, 14.0, 8000) / z;
+    assert_mean("m", &d["m"], mean, 0.2);
+    let on = integrate(|m| density(m, true), -14.0, 14.0, 8000) / z;
+    assert_mean("z[3]", &d["z[3]"], on, 0.1);
+}
+
+/// Flags of a regression, summed out and moved by `gibbs`.
+#[test]
+#[ignore = "a minute"]
+fn summed_and_unsummed_posteriors_agree() {
+    let text = |pass: &str| {
+        format!(
+            "assume slope ~ normal(0, 2); assume base ~ normal(0, 2); assume s ~ normal(0, 1);
+             let y = [0.1, 0.7, 0.9, 1.8, 9, 2.4, 3.1, 3.3, -6, 4.7, 4.9, 5.2];
+             for i in 0 .. 12 {{ z[i] ~ flip(0.2);
+               observe normal(if z[i] {{ 0 }} else {{ slope * i / 2 + base }}, if z[i] {{ 8 }} else {{ exp(s) }}) = y[i]; }}
+             infer {{ warmup 500 {{ {pass} }} repeat 6000 {{ {pass} collect slope, base, s, z; }} }}"
+        )
+    };
+    let summed = run(&text("nuts($continuous, marginal = @z);"), 5, 2);
+    let moved = run(&text("nuts($continuous); gibbs(each(@z));"), 6, 2);
+    for (name, draws) in &summed {
+        let other = &moved[name.as_str()];
+        let error = standard_error(draws).hypot(standard_error(other));
+        let gap = (mean(draws) - mean(other)).abs();
+        assert!(gap < 5.0 * error + 1e-12, "{name}: {} and {}", mean(draws), mean(other));
+        assert!(error < 0.1, "{name}: run longer");
+    }
+}
+
 /// Choices that cannot be summed out give an error.
 #[test]
 fn what_cannot_be_summed_out_is_an_error() {

@@ -44,7 +44,8 @@ const MARGINAL: Arg = opt(
     "none",
     "Finite discrete choices to marginalise: they are summed out of the density and then drawn \
      given the rest. Choices that no score depends on together are summed one by one, others \
-     jointly (at most 1000 joint values). Choices that cannot be summed out are an error.",
+     jointly: at most 1000 joint values, or chains and trees of any length where their density \
+     can be recorded. Choices that cannot be summed out are an error.",
 );
 const INNER: Arg = arg("move", Type::Kernel, "The inner kernel.");
 const X: Arg = arg("x", Type::Any, "A numeric quantity of the model, as in `collect`.");

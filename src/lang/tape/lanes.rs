@@ -275,7 +275,7 @@ impl Merger<'_> {
             Op::Unary { f, slope, .. } => {
                 Op::Unary { f: *f, slope: *slope, x: columns[0].at, out, n }
             }
-            Op::Binary { f, .. } => Op::Binary { f: *f, x: columns[0], y: columns[1], out, n },
+            Op::Binary { f, .. } => Op::Binary { f, x: columns[0], y: columns[1], out, n },
             Op::Density { observed, .. } => {
                 let params: SmallVec<[Column; 3]> = SmallVec::from_slice(&columns[1..]);
                 let Some(batch) = side_by_side(members, &params) else { return false };

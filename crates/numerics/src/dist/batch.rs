@@ -37,9 +37,8 @@ pub trait Batch: fmt::Debug + Send + Sync {
         weight: f64,
     );
 
-    /// Writes the log densities of `n` numbers to the buffer, from `out` on; minus
-    /// infinity where a parameter is outside its domain. Returns false if a number is
-    /// NaN.
+    /// Writes the log densities of `n` numbers to the buffer, from `out` on. Returns false
+    /// if a number is NaN or a parameter is outside its domain.
     fn score_each(
         &mut self,
         buffer: &mut [f64],
@@ -294,18 +293,12 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         let alike = columns.is_some_and(|all| all.iter().skip(1).all(|c| c.step == 0));
         let mut there = true;
         for i in 0..self.0.len() {
-            let mut inside = true;
             if let Some(columns) = columns {
                 let p = columns.map(|c| c.get(buffer, i));
-                if !self.0[i].0.is_some_and(|old| old.map(f64::to_bits) == p.map(f64::to_bits)) {
-                    let before =
-                        if alike && i > 0 && self.0[i - 1].0.is_some() { i - 1 } else { i };
-                    let made = self.0[before].1.moved(p);
-                    inside = made.is_some();
-                    self.0[i].0 = made.as_ref().map(|_| p);
-                    if let Some(made) = made {
-                        self.0[i].1 = made;
-                    }
+                if self.0[i].0.is_none_or(|old| old.map(f64::to_bits) != p.map(f64::to_bits)) {
+                    let before = if alike && i > 0 { i - 1 } else { i };
+                    let Some(made) = self.0[before].1.moved(p) else { return false };
+                    self.0[i] = (Some(p), made);
                 }
             }
             // One distribution may be that of all numbers.
@@ -313,8 +306,7 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
             for j in own {
                 let at = x.get(buffer, j);
                 there &= !at.is_nan();
-                buffer[out + j] =
-                    if inside { self.0[i].1.log_density(at) } else { f64::NEG_INFINITY };
+                buffer[out + j] = self.0[i].1.log_density(at);
             }
         }
         there

@@ -177,7 +177,9 @@ impl<'a> System<'a> {
     }
 
     /// Does something with proposals of all values of the choices that are summed out, for
-    /// points at which the tape has no density; `None` if there is none at the start.
+    /// points at which the tape has no density; `None` if there is none at the start. There
+    /// is none either if only a tape can sum the choices out: then the chain moves among
+    /// the points at which the tape has a density.
     fn by_states<R>(
         &mut self,
         work: impl FnOnce(Summed, &mut Trace, &StepContext) -> TraceResult<R>,
@@ -185,7 +187,10 @@ impl<'a> System<'a> {
         let Some((sites, moving)) = self.sums else { return Ok(None) };
         let mut here = Point::default();
         self.memory.coordinates(self.trace, &mut here.y);
-        let (marginal, held) = self.trace.marginalise(sites, moving, self.at.draws(0))?;
+        let draws = self.at.within(1).draws(0);
+        let Ok((marginal, held)) = self.trace.marginalise(sites, moving, draws) else {
+            return Ok(None);
+        };
         let done = match Summed::begin(marginal, self.trace, self.at, &self.layout, &mut here) {
             Ok(Some(summed)) => work(summed, self.trace, self.at).map(Some),
             Ok(None) => Ok(None),

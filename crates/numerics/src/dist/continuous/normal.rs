@@ -96,20 +96,16 @@ impl Scalar for Normal {
         let [mean, sd @ Column { step: 0, .. }] = *params else { return None };
         let (before, out) = buffer.split_at_mut(out);
         let out = &mut out[..n];
-        let Ok(one) = Normal::new(0.0, before[sd.at]) else {
-            out.fill(f64::NEG_INFINITY);
-            return Some((0..n).all(|i| !x.get(before, i).is_nan()));
-        };
+        let Ok(one) = Normal::new(0.0, before[sd.at]) else { return Some(false) };
         let (sd, log_norm) = (one.sd, one.log_norm);
         Some(vectorised(
             #[inline(always)]
             || {
                 let mut there = true;
                 each_pair(before, x, mean, out, |x, mean, out| {
-                    there &= !x.is_nan();
+                    there &= !x.is_nan() && mean.is_finite();
                     let z = (x - mean) / sd;
-                    let inside = mean.is_finite() && !z.is_nan();
-                    *out = if inside { log_norm - 0.5 * z * z } else { f64::NEG_INFINITY };
+                    *out = log_norm - 0.5 * z * z;
                 });
                 there
             },

@@ -141,13 +141,13 @@ impl Batch for Mixed {
         n: usize,
         out: usize,
     ) -> bool {
-        let inside = self.refresh(buffer);
-        (0..n).fold(true, |there, i| {
-            let at = x.get(buffer, i);
-            let all = if inside { self.scores(at).1 } else { f64::NEG_INFINITY };
-            buffer[out + i] = if all.is_nan() { f64::NEG_INFINITY } else { all };
-            there && !at.is_nan()
-        })
+        self.refresh(buffer)
+            && (0..n).all(|i| {
+                let at = x.get(buffer, i);
+                let (_, all) = self.scores(at);
+                buffer[out + i] = if all.is_nan() { f64::NEG_INFINITY } else { all };
+                !at.is_nan()
+            })
     }
 
     fn vjp_each(
