@@ -10,7 +10,7 @@ use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Profile, Tolerance, Wall, floor_height, inner_wall};
 use super::real::{Real, Tape};
 use super::revolve::{Strip, revolve, vjp_rings};
-use super::{GeomError, Mesh, Solid};
+use super::{GeomError, Mesh, Revolution, Solid};
 use glam::DVec3;
 
 /// Which ends of an object of revolution are closed.
@@ -30,6 +30,8 @@ pub enum Caps {
 const MOST_POINTS: usize = 4096;
 /// The maximum number of profiles.
 const MOST_PROFILES: usize = 1000;
+/// The minimum number of sides.
+const FEWEST_SIDES: u32 = 3;
 /// The maximum height or radius, in scene units.
 const LARGEST: f64 = 1e6;
 
@@ -94,6 +96,23 @@ impl Solid {
     ) -> Result<Solid, GeomError> {
         turned(parts, sides, wall.into(), caps)
             .map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
+    }
+}
+
+impl Revolution {
+    /// The surface that [`lathe`] makes a mesh of, with any number of sides.
+    ///
+    /// # Errors
+    /// As [`lathe`].
+    pub fn lathe(
+        parts: &[Profile],
+        wall: impl Into<Wall>,
+        caps: Caps,
+    ) -> Result<Revolution, GeomError> {
+        let wall = wall.into();
+        check(parts, FEWEST_SIDES, wall)?;
+        let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
+        Ok(Revolution::new(&strips, closed, parts.len() as u16 + 5))
     }
 }
 
@@ -233,7 +252,7 @@ fn check(parts: &[Profile], sides: u32, wall: Wall) -> Result<(), GeomError> {
     if points > MOST_POINTS {
         return wrong(format!("{points} points; at most {MOST_POINTS}"));
     }
-    if !(3..=1024).contains(&sides) {
+    if !(FEWEST_SIDES..=1024).contains(&sides) {
         return wrong(format!("3 to 1024 sides, got {sides}"));
     }
     for (what, x) in [("thickness", wall.thickness), ("floor", wall.floor)] {

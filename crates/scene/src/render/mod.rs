@@ -12,6 +12,7 @@ mod derivatives;
 mod detail;
 mod lines;
 mod pixels;
+mod revolution;
 mod view;
 mod work;
 

@@ -1,0 +1,13 @@
+//! Surfaces of revolution drawn exactly, without a mesh.
+//!
+//! In the coordinates of the surface, turned about its axis so that the camera lies in the
+//! plane z = 0, everything is symmetric in z: each curve is traced on one side of that
+//! plane, and its visibility tested there, for both. The placement may be any invertible
+//! affine map. The contours are those of the mesh of a lathe as the number of its sides
+//! grows.
+
+mod contours;
+mod rays;
+mod samples;
+mod sight;
+mod silhouettes;

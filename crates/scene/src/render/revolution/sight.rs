@@ -1,0 +1,150 @@
+//! A camera in the coordinates of a surface of revolution, and the surface in the camera's.
+//!
+//! The surface is turned about its axis so that the camera (for a parallel projection, the
+//! direction to it) has z = 0 and x > 0. Invariant: the placement is invertible and all
+//! numbers are finite.
+
+use crate::geom::{Affine, Revolution, Ring};
+use crate::render::Camera;
+use crate::render::pixels::place::Point;
+use crate::render::pixels::project::{DepthRange, Lens};
+use glam::{DMat3, DVec3};
+
+/// A line of sight, by depth: `origin + depth * way` in the surface's turned coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ray {
+    /// Squared distance from the axis: `square[0] + 2 square[1] depth + square[2] depth^2`.
+    pub square: [f64; 3],
+    /// Height: `height[0] + height[1] depth`.
+    pub height: [f64; 2],
+}
+
+/// A camera and a placed surface of revolution.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sight {
+    pub lens: Lens,
+    /// From turned coordinates to the camera's.
+    pub m: DMat3,
+    pub t: DVec3,
+    /// The inverse of `m`.
+    inverse: DMat3,
+    /// Maps outward normals to outward normals.
+    pub cofactor: DMat3,
+    /// `facing = normal . (view - bend * point)`; the third component of `view` is 0.
+    pub view: [f64; 2],
+    pub bend: f64,
+    /// How far one unit across the axis shows at most, divided by the lens's scale: at
+    /// depth 1, for a pinhole.
+    across: f64,
+}
+
+/// The camera's distance from the axis is at least this fraction of its distance from the
+/// middle, so that silhouettes seen from the axis itself have a beginning and an end.
+const ASIDE: f64 = 1e-9;
+
+impl Sight {
+    /// `None` if the placement is not invertible or not finite.
+    pub fn new(camera: &Camera, affine: &Affine) -> Option<Sight> {
+        let turn = DMat3::from_cols(camera.right, camera.up, -camera.forward).transpose();
+        let m = turn * affine.0.matrix3;
+        let t = turn * (affine.0.translation - camera.eye);
+        let lens = Lens::new(camera);
+        let inverse = finite_inverse(m)?;
+        let view = if lens.pinhole { inverse * -t } else { inverse * DVec3::Z };
+        let rho = libm::hypot(view.x, view.z);
+        let least = ASIDE * view.y.abs();
+        let (c, s) = if rho > least { (view.x / rho, view.z / rho) } else { (1.0, 0.0) };
+        let turned = DMat3::from_cols(DVec3::new(c, 0.0, s), DVec3::Y, DVec3::new(-s, 0.0, c));
+        let m = m * turned;
+        let inverse = turned.transpose() * inverse;
+        let [a, b, d] = [m.x_axis, m.y_axis, m.z_axis];
+        let sign = if a.dot(b.cross(d)) < 0.0 { -1.0 } else { 1.0 };
+        let cofactor = DMat3::from_cols(b.cross(d) * sign, d.cross(a) * sign, a.cross(b) * sign);
+        let [p, q] = [a.truncate(), d.truncate()];
+        let (half, off) = (0.5 * (p.dot(p) - q.dot(q)), p.dot(q));
+        let across = (0.5 * (p.dot(p) + q.dot(q)) + (half * half + off * off).sqrt()).sqrt();
+        let finite = m.is_finite() && t.is_finite() && cofactor.is_finite() && view.is_finite();
+        finite.then_some(Sight {
+            lens,
+            m,
+            t,
+            inverse,
+            cofactor,
+            view: [rho.max(least).max(f64::MIN_POSITIVE), view.y],
+            bend: if lens.pinhole { 1.0 } else { 0.0 },
+            across,
+        })
+    }
+
+    /// A point in camera coordinates.
+    #[inline(always)]
+    pub fn camera(&self, p: DVec3) -> DVec3 {
+        self.m * p + self.t
+    }
+
+    /// A point in the image.
+    #[inline(always)]
+    pub fn image(&self, p: DVec3) -> Point {
+        self.lens.point(self.camera(p))
+    }
+
+    /// Camera coordinates of a direction per depth, in the image: `x / depth` and
+    /// `y / depth`, or `x` and `y` for a parallel projection.
+    #[inline(always)]
+    pub fn slopes(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [(x - self.lens.cx) / self.lens.scale, (self.lens.cy - y) / self.lens.scale]
+    }
+
+    /// The line of sight through a position in the image.
+    #[inline(always)]
+    pub fn ray(&self, at: [f64; 2]) -> Ray {
+        let [a, b] = self.slopes(at);
+        let (origin, way) = if self.lens.pinhole {
+            let way = self.inverse * DVec3::new(a, b, -1.0);
+            (DVec3::new(self.view[0], self.view[1], 0.0), way)
+        } else {
+            (self.inverse * (DVec3::new(a, b, 0.0) - self.t), -self.inverse.z_axis)
+        };
+        let square = [
+            origin.x * origin.x + origin.z * origin.z,
+            origin.x * way.x + origin.z * way.z,
+            way.x * way.x + way.z * way.z,
+        ];
+        // Never quite level, so that it meets each height once.
+        let least = 1e-9 * square[2].sqrt();
+        let climb = if way.y.abs() < least { least } else { way.y };
+        Ray { square, height: [origin.y, climb] }
+    }
+
+    /// The depths between which a ring lies.
+    fn depths(&self, ring: &Ring) -> DepthRange {
+        let [x, y, z] = [self.m.x_axis.z, self.m.y_axis.z, self.m.z_axis.z];
+        let (middle, reach) = (-(self.t.z + y * ring.y), ring.r * libm::hypot(x, z));
+        DepthRange { near: middle - reach, far: middle + reach }
+    }
+
+    /// The depths between which a surface lies.
+    pub fn range(&self, surface: &Revolution) -> DepthRange {
+        let all = surface.rings().iter().map(|ring| self.depths(ring));
+        all.fold(DepthRange::EMPTY, |a, b| a.and(&b))
+    }
+
+    /// A bound on the radius of a ring in the image, in pixels.
+    pub fn radius(&self, ring: &Ring) -> f64 {
+        if !self.lens.pinhole {
+            return ring.r * self.across * self.lens.scale;
+        }
+        let near = self.depths(ring).near.max(Camera::NEAR);
+        // Away from the camera's axis, motion along it also shows.
+        let middle = self.t + self.m.y_axis * ring.y;
+        let slant = libm::hypot(middle.x, middle.y) / near;
+        let along = libm::hypot(self.m.x_axis.z, self.m.z_axis.z);
+        ring.r * (self.across + slant * along) * self.lens.scale / near
+    }
+}
+
+/// The inverse of a matrix, if it exists and is finite.
+fn finite_inverse(m: DMat3) -> Option<DMat3> {
+    let d = m.determinant();
+    (d != 0.0 && d.is_finite()).then(|| m.inverse()).filter(DMat3::is_finite)
+}
