@@ -1,17 +1,19 @@
 //! The visible contours of a surface of revolution.
 
-use super::rays::Spans;
-use super::samples::{Kind, Run, Sample, Samples};
+use super::chords::{Chords, Face, reach};
+use super::rays::{LANES, Row, Spans};
+use super::samples::{LAST, Samples};
 use super::sight::Sight;
 use super::silhouettes::is_speck;
 use crate::contours::Contours;
-use crate::geom::{Affine, Revolution, Rim};
+use crate::geom::{Affine, Revolution};
 use crate::render::Camera;
 use crate::render::lines::extraction::{LONGEST, clip};
-use crate::render::lines::visibility::{BESIDE, EDGE_SLACK, SILHOUETTE_SLACK, TOLERANCE};
+use crate::render::lines::visibility::{BESIDE, SILHOUETTE_SLACK, TOLERANCE};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::beyond_near;
 use crate::render::simd::vectorised;
+use glam::DVec3;
 use std::cell::RefCell;
 
 /// Buffers reused from call to call.
@@ -26,6 +28,9 @@ struct Scratch {
 thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::new(Scratch::default());
 }
+
+/// Surfaces beyond this depth (scene units) are not drawn, as meshes.
+const HUGE: f64 = 1e9;
 
 impl Contours {
     /// The contours of a placed surface of revolution in a camera's image, computed
@@ -44,16 +49,16 @@ impl Contours {
 impl Scratch {
     fn contours(&mut self, surface: &Revolution, sight: &Sight, camera: &Camera) -> Contours {
         let range = sight.range(surface);
-        let mut out = Contours::with_room(camera, self.found);
+        let out = Contours::with_room(camera, self.found);
         if !(range.far > Camera::NEAR && range.far < HUGE) {
             return out;
         }
         let whole = range.near > Camera::NEAR;
         let extent = range.far - range.near.max(Camera::NEAR);
         let Scratch { samples, spans, found } = self;
-        vectorised(
+        let out = vectorised(
             #[inline(always)]
-            || {
+            move || {
                 samples.clear();
                 samples.add_silhouettes(surface, sight, whole);
                 samples.add_rims(surface, sight, whole);
@@ -64,28 +69,17 @@ impl Scratch {
                     rim.spans.contains(&None) && ring.is_some_and(|r| !is_speck(r, sight, whole))
                 });
                 let size = [f64::from(camera.width), f64::from(camera.height)];
-                let mut drawer = Drawer {
-                    surface,
-                    sight,
-                    samples,
-                    spans,
-                    open,
-                    whole,
-                    tolerance: TOLERANCE * extent,
-                    most: [SILHOUETTE_SLACK * extent, EDGE_SLACK * extent],
-                    size,
-                    out: &mut out,
-                };
-                samples.runs.iter().for_each(|run| drawer.run(run));
+                let mut drawer =
+                    Drawer { surface, sight, samples, spans, open, whole, extent, size, out };
+                drawer.silhouettes();
+                drawer.rims();
+                drawer.out
             },
         );
         *found = out.len();
         out
     }
 }
-
-/// Surfaces beyond this depth (scene units) are not drawn, as in a mesh.
-const HUGE: f64 = 1e9;
 
 struct Drawer<'a> {
     surface: &'a Revolution,
@@ -96,258 +90,303 @@ struct Drawer<'a> {
     open: bool,
     /// Whether all of the surface is beyond the near plane.
     whole: bool,
-    /// Depth tolerance of visibility, in scene units.
-    tolerance: f64,
-    /// Largest slack of silhouettes and of rims.
-    most: [f64; 2],
+    /// The depth range of the surface.
+    extent: f64,
     size: [f64; 2],
-    out: &'a mut Contours,
+    out: Contours,
 }
 
-/// A chord of a curve: two samples, and the side of the plane of symmetry.
-#[derive(Clone, Copy)]
-struct Chord<'a> {
-    kind: Kind,
-    ends: [&'a Sample; 2],
-    side: f64,
-}
-
-/// How a chord appears: unit tangent in the image, with the object on its right, and which
-/// sides are tested.
+/// Pieces to be tested for visibility: middle, depth, unit tangent, and how much nearer
+/// their own surface may reach on either side.
 #[derive(Clone, Copy, Default)]
-struct Look {
-    tangent: [f64; 2],
-    both: bool,
+struct Pieces {
+    at: [Row; 2],
+    depth: Row,
+    tangent: [Row; 2],
+    slack: [Row; 2],
+    there: [bool; LANES],
 }
 
 impl Drawer<'_> {
     #[inline(always)]
-    fn run(&mut self, run: &Run) {
-        for i in run.first..run.past.saturating_sub(1) {
-            self.chord(run.kind, i);
+    fn silhouettes(&mut self) {
+        let mut first = 0;
+        while first + 1 < self.samples.silhouettes {
+            let count = (self.samples.silhouettes - 1 - first).min(LANES);
+            let (mut sides, cut) = self.chords(first, count);
+            for (side, chords) in sides.iter_mut().enumerate() {
+                chords.orient(self.sight, self.samples, first, side);
+            }
+            let own = self.samples.spans.get(first..first + count).unwrap_or(&[]);
+            for chords in &mut sides {
+                let joined = own.iter().map(|span| *span != LAST);
+                chords.there.iter_mut().zip(joined).for_each(|(there, joined)| *there &= joined);
+            }
+            self.finish(first, sides, cut, self.open, true);
+            first += LANES;
         }
     }
 
-    /// Adds the visible pieces of a chord, on both sides.
     #[inline(always)]
-    fn chord(&mut self, kind: Kind, i: usize) {
-        let samples = self.samples;
-        let (Some(a), Some(b)) = (samples.list.get(i), samples.list.get(i + 1)) else { return };
-        let chords = [1.0, -1.0].map(|side| Chord { kind, ends: [a, b], side });
+    fn rims(&mut self) {
+        for circle in &self.samples.circles {
+            let Some(rim) = self.surface.rims().get(circle.rim) else { continue };
+            let faces = Face::both(self.surface, rim, self.sight);
+            let mut first = circle.first;
+            while first + 1 < circle.past {
+                let (mut sides, cut) = self.chords(first, (circle.past - 1 - first).min(LANES));
+                for (side, chords) in sides.iter_mut().enumerate() {
+                    let options = (self.open, self.extent);
+                    chords.orient_rim(&faces, self.sight, self.samples, first, side, options);
+                }
+                self.finish(first, sides, cut, true, false);
+                first += LANES;
+            }
+        }
+    }
+
+    /// The chords from some samples on both sides, and which of them are not a single
+    /// piece on both sides.
+    #[inline(always)]
+    fn chords(&self, first: usize, count: usize) -> ([Chords; 2], [bool; LANES]) {
+        let mut cut = [false; LANES];
+        let near = self.side(first, count, 0, &mut cut);
+        let far = self.side(first, count, 1, &mut cut);
+        ([near, far], cut)
+    }
+
+    /// The chords on one side; marks those that are not a single piece.
+    #[inline(always)]
+    fn side(&self, first: usize, count: usize, side: usize, cut: &mut [bool; LANES]) -> Chords {
+        let mut chords = Chords::new(self.samples, first, side);
+        let mut behind = [false; LANES];
         if !self.whole {
-            return chords.iter().for_each(|chord| self.cut(chord));
+            self.cut_near(&mut chords, &mut behind, first, count, side);
         }
-        let ends = [0, 1].map(|side| [samples.image(side, i), samples.image(side, i + 1)]);
-        let lengths = ends.map(|[a, b]| {
-            let (dx, dy) = (b.x - a.x, b.y - a.y);
-            (dx * dx + dy * dy).sqrt()
-        });
-        let inside = ends.iter().flatten().all(|p| self.inside(p));
-        if !(inside && lengths.iter().all(|l| *l < LONGEST && *l > 1e-9)) {
-            return chords.iter().for_each(|chord| self.cut(chord));
+        chords.measure(count);
+        let [width, height] = self.size;
+        let Chords { from, to, length, there, .. } = &mut chords;
+        for i in 0..LANES {
+            there[i] &= !behind[i];
+            let starts = (from[0][i] >= 0.0)
+                & (from[1][i] >= 0.0)
+                & (from[0][i] <= width)
+                & (from[1][i] <= height);
+            let ends =
+                (to[0][i] >= 0.0) & (to[1][i] >= 0.0) & (to[0][i] <= width) & (to[1][i] <= height);
+            cut[i] |= !(starts & ends & (length[i] < LONGEST) & there[i]);
         }
-        let looks = [0, 1].map(|k| self.look(&chords[k], &ends[k], lengths[k]));
-        let [Some(first), Some(second)] = looks else { return };
-        if self.visible(&chords[0], &ends[0], 0.5, lengths[0], &first) {
-            self.push(&ends[0], lengths[0], &first);
-            self.push(&ends[1], lengths[1], &second);
-        }
+        chords
     }
 
-    #[inline(always)]
-    fn push(&mut self, [a, b]: &[Point; 2], length: f64, look: &Look) {
-        let [tx, ty] = look.tangent;
-        self.add([0.5 * (a.x + b.x), 0.5 * (a.y + b.y)], [tx, ty], length);
-    }
-
-    #[inline(always)]
-    fn add(&mut self, [x, y]: [f64; 2], [tx, ty]: [f64; 2], length: f64) {
-        self.out.x.push(x as f32);
-        self.out.y.push(y as f32);
-        self.out.tx.push(tx as f32);
-        self.out.ty.push(ty as f32);
-        self.out.length.push(length as f32);
-    }
-
-    #[inline(always)]
-    fn inside(&self, p: &Point) -> bool {
-        p.x >= 0.0 && p.y >= 0.0 && p.x <= self.size[0] && p.y <= self.size[1]
-    }
-
-    /// The tangent of a chord and the sides to be tested; `None` if it never shows.
-    #[inline(always)]
-    fn look(&self, chord: &Chord<'_>, [a, b]: &[Point; 2], length: f64) -> Option<Look> {
-        let (tx, ty) = ((b.x - a.x) / length, (b.y - a.y) / length);
-        match chord.kind {
-            Kind::Silhouette(_) => {
-                let n = self.sight.cofactor * chord.ends[0].normal(chord.side);
-                // Outward in the image is (n.x, -n.y).
-                let way = if n.x * ty + n.y * tx < 0.0 { -1.0 } else { 1.0 };
-                Some(Look { tangent: [way * tx, way * ty], both: self.open })
-            }
-            Kind::Rim(rim) => {
-                let rim = self.surface.rims().get(rim)?;
-                let (mut any_front, mut side) = (false, 0.0f64);
-                for (k, span) in rim.spans.iter().enumerate() {
-                    let Some(front) = span.and_then(|s| self.front(s, k, chord)) else { continue };
-                    any_front |= front;
-                    if front || self.open {
-                        let [du, dv, _] = self.across(rim, k, chord, a);
-                        side -= (du * ty - dv * tx).signum();
-                    }
-                }
-                let way = if side < 0.0 { -1.0 } else { 1.0 };
-                (any_front || self.open)
-                    .then_some(Look { tangent: [way * tx, way * ty], both: true })
-            }
-        }
-    }
-
-    /// Whether the span on one side of a rim faces the camera.
-    #[inline(always)]
-    fn front(&self, span: usize, _: usize, chord: &Chord<'_>) -> Option<bool> {
-        let [a, b] = self.surface.ends(self.surface.spans().get(span)?)?;
-        let (nr, ny) = (b.y - a.y, a.r - b.r);
-        let c = 0.5 * (chord.ends[0].c + chord.ends[1].c);
-        let [x, y] = self.sight.view;
-        Some(nr * (c * x - self.sight.bend * a.r) + ny * (y - self.sight.bend * a.y) > 0.0)
-    }
-
-    /// The image of the way from a rim across the span on one side of it, per span: to the
-    /// right, down, nearness. The point in the image is given.
-    #[inline(always)]
-    fn across(&self, rim: &Rim, k: usize, chord: &Chord<'_>, at: &Point) -> [f64; 3] {
-        let span = rim.spans[k].and_then(|s| self.surface.spans().get(s));
-        let Some([a, b]) = span.and_then(|s| self.surface.ends(s)) else { return [0.0; 3] };
-        let way = if k == 0 { -1.0 } else { 1.0 };
-        let (dr, dy) = (way * (b.r - a.r), way * (b.y - a.y));
-        let p = chord.ends[0];
-        self.motion([dr * p.c, dy, chord.side * dr * p.s], at)
-    }
-
-    /// The motion in the image of a point that moves on the surface.
-    #[inline(always)]
-    fn motion(&self, [x, y, z]: [f64; 3], at: &Point) -> [f64; 3] {
-        let m = &self.sight.m;
-        let d = m.x_axis * x + m.y_axis * y + m.z_axis * z;
-        let lens = &self.sight.lens;
-        if lens.pinhole {
-            let [a, b] = self.sight.slopes([at.x, at.y]);
-            let k = lens.scale * at.nearness;
-            [k * (d.x + a * d.z), -k * (d.y + b * d.z), d.z * at.nearness * at.nearness]
-        } else {
-            [lens.scale * d.x, -lens.scale * d.y, d.z]
-        }
-    }
-
-    /// Whether a piece of a chord is visible: its position along the chord's image is
-    /// given.
-    #[inline(always)]
-    fn visible(
+    /// Cuts chords at the near plane.
+    #[inline(never)]
+    fn cut_near(
         &self,
-        chord: &Chord<'_>,
-        ends: &[Point; 2],
-        at: f64,
-        length: f64,
-        look: &Look,
-    ) -> bool {
-        let [a, b] = ends;
-        let (dx, dy) = (b.x - a.x, b.y - a.y);
-        let middle = [a.x + dx * at, a.y + dy * at];
-        let depth = self.sight.lens.depth(a.nearness + (b.nearness - a.nearness) * at);
-        let [tx, ty] = look.tangent;
-        let outward = [ty, -tx];
-        let limit = depth - self.tolerance - 1e-6 * depth;
-        let free = |way: f64, slack: f64| {
-            let beside = [0, 1].map(|axis| middle[axis] + way * BESIDE * outward[axis]);
-            let ray = self.sight.ray(beside);
-            !self.spans.meets(&ray, [Camera::NEAR, limit - slack])
+        chords: &mut Chords,
+        behind: &mut [bool; LANES],
+        first: usize,
+        count: usize,
+        side: usize,
+    ) {
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let point = |i: usize| {
+            let [x, y, z] = self.samples.points.each_ref().map(|l| l.get(i).copied());
+            self.sight.camera(DVec3::new(
+                x.unwrap_or(0.0),
+                y.unwrap_or(0.0),
+                sign * z.unwrap_or(0.0),
+            ))
         };
-        if free(1.0, 0.0) || (look.both && free(-1.0, 0.0)) {
-            return true;
+        for i in 0..count.min(LANES) {
+            let Some(ends) = beyond_near([point(first + i), point(first + i + 1)]) else {
+                behind[i] = true;
+                continue;
+            };
+            let [a, b] = ends.map(|p| self.sight.lens.point(p));
+            [chords.from[0][i], chords.from[1][i], chords.from[2][i]] = [a.x, a.y, a.nearness];
+            [chords.to[0][i], chords.to[1][i], chords.to[2][i]] = [b.x, b.y, b.nearness];
         }
-        let slack = self.slack(chord, ends, length, look);
-        (slack[0] > 0.0 && free(1.0, slack[0]))
-            || (look.both && slack[1] > 0.0 && free(-1.0, slack[1]))
     }
 
-    /// How much nearer than a chord the surface beside it reaches, on the outward and on
-    /// the other side, in scene units.
-    #[inline(never)]
-    fn slack(&self, chord: &Chord<'_>, [a, b]: &[Point; 2], length: f64, look: &Look) -> [f64; 2] {
-        let (ux, uy) = ((b.x - a.x) / length, (b.y - a.y) / length);
-        let steep = (b.nearness - a.nearness) / length;
-        let in_depth = |nearness: f64| {
-            let pinhole = self.sight.lens.pinhole;
-            if pinhole { nearness / (a.nearness * a.nearness) } else { nearness }.max(0.0)
-        };
-        match chord.kind {
-            Kind::Silhouette(span) => {
-                if length < 0.02 {
-                    return [0.0; 2];
-                }
-                let ends = self.surface.spans().get(span).and_then(|s| self.surface.ends(s));
-                let ahead = ends.into_iter().flatten().map(|ring| {
-                    let at = Sample { r: ring.r, y: ring.y, ..*chord.ends[0] };
-                    let p = self.sight.image(at.point(chord.side));
-                    if !(p.nearness > 0.0 || !self.sight.lens.pinhole) {
-                        return 0.0;
-                    }
-                    p.nearness - a.nearness - steep * ((p.x - a.x) * ux + (p.y - a.y) * uy)
-                });
-                let slack = in_depth(ahead.fold(0.0, f64::max)).min(self.most[0]);
-                [slack; 2]
+    /// Adds the visible pieces of chords on both sides: `both` if both sides of a chord
+    /// may be seen, `smooth` for silhouettes.
+    #[inline(always)]
+    fn finish(
+        &mut self,
+        first: usize,
+        sides: [Chords; 2],
+        cut: [bool; LANES],
+        both: bool,
+        smooth: bool,
+    ) {
+        let [near, _] = &sides;
+        let mut pieces = Pieces { tangent: near.tangent, slack: near.slack, ..Pieces::default() };
+        for i in 0..LANES {
+            for axis in 0..2 {
+                pieces.at[axis][i] = 0.5 * (near.from[axis][i] + near.to[axis][i]);
             }
-            Kind::Rim(rim) => {
-                let Some(rim) = self.surface.rims().get(rim) else { return [0.0; 2] };
-                let [tx, ty] = look.tangent;
-                let mut slack = [0.0f64; 2];
-                for (k, span) in rim.spans.iter().enumerate() {
-                    let Some(front) = span.and_then(|s| self.front(s, k, chord)) else { continue };
-                    if !(front || self.open) {
-                        continue;
-                    }
-                    let [du, dv, dn] = self.across(rim, k, chord, a);
-                    let away = du * ty - dv * tx;
-                    if away.abs() > 1e-3 {
-                        let per_pixel = (dn - steep * (du * ux + dv * uy)) / away.abs();
-                        let i = usize::from(away < 0.0);
-                        slack[i] = slack[i].max(in_depth(2.0 * per_pixel)).min(self.most[1]);
+            pieces.depth[i] = self.sight.lens.depth(0.5 * (near.from[2][i] + near.to[2][i]));
+            pieces.there[i] = near.there[i] & sides[1].there[i] & !cut[i];
+        }
+        let mut visible = self.visible(&pieces, both);
+        if smooth {
+            self.again(first, near, &pieces, both, &mut visible);
+        }
+        self.add(&sides, &visible);
+        for i in 0..LANES {
+            if cut[i] {
+                for (side, chords) in sides.iter().enumerate() {
+                    if chords.there[i] {
+                        self.cut(first, chords, i, side, both, smooth);
                     }
                 }
-                slack
             }
         }
     }
 
-    /// Adds the visible pieces of a chord that is long, leaves the image or crosses the
-    /// near plane.
-    #[inline(never)]
-    fn cut(&mut self, chord: &Chord<'_>) {
-        let ends = chord.ends.map(|p| self.sight.camera(p.point(chord.side)));
-        let Some(ends) = beyond_near(ends) else { return };
-        let [a, b] = ends.map(|p| self.sight.lens.point(p));
-        let (dx, dy) = (b.x - a.x, b.y - a.y);
-        let all = (dx * dx + dy * dy).sqrt();
-        if !(all > 1e-9 && all.is_finite()) {
-            return;
+    /// Which pieces are visible.
+    #[inline(always)]
+    fn visible(&self, pieces: &Pieces, both: bool) -> [bool; LANES] {
+        let mut visible = [false; LANES];
+        for (side, way) in [(0, BESIDE), (1, -BESIDE)] {
+            let open = (0..LANES).any(|i| pieces.there[i] & !visible[i]);
+            if !open || (side == 1 && !both) {
+                break;
+            }
+            let (mut beside, mut to) = ([[0.0; LANES]; 2], [0.0; LANES]);
+            for i in 0..LANES {
+                beside[0][i] = pieces.at[0][i] + way * pieces.tangent[1][i];
+                beside[1][i] = pieces.at[1][i] - way * pieces.tangent[0][i];
+                let depth = pieces.depth[i];
+                let limit = depth - pieces.slack[side][i] - TOLERANCE * self.extent - 1e-6 * depth;
+                to[i] = if pieces.there[i] { limit } else { Camera::NEAR };
+            }
+            let rays = self.sight.rays([&beside[0], &beside[1]]);
+            let met = self.spans.meets(&rays, [&[Camera::NEAR; LANES], &to]);
+            for i in 0..LANES {
+                visible[i] |= pieces.there[i] & !met[i];
+            }
         }
-        let part = match self.inside(&a) && self.inside(&b) {
+        visible
+    }
+
+    /// Tests the hidden pieces of silhouettes again, with their slack.
+    #[inline(always)]
+    fn again(
+        &self,
+        first: usize,
+        chords: &Chords,
+        pieces: &Pieces,
+        both: bool,
+        visible: &mut [bool; LANES],
+    ) {
+        let mut again = *pieces;
+        let mut any = false;
+        for i in 0..LANES {
+            again.there[i] = pieces.there[i] & !visible[i];
+            if again.there[i] {
+                let slack = self.slack(first + i, chords, i, 0);
+                (again.slack[0][i], again.slack[1][i]) = (slack, slack);
+                // Too little to matter.
+                again.there[i] = slack > 0.1 * TOLERANCE * self.extent;
+                any |= again.there[i];
+            }
+        }
+        if any {
+            let more = self.visible(&again, both);
+            visible.iter_mut().zip(more).for_each(|(visible, more)| *visible |= more);
+        }
+    }
+
+    /// How much nearer than a silhouette its own span reaches.
+    #[inline(never)]
+    fn slack(&self, sample: usize, chords: &Chords, i: usize, side: usize) -> f64 {
+        let at = |list: &Vec<f64>| list.get(sample).copied().unwrap_or(0.0);
+        let [x, _, z] = self.samples.points.each_ref().map(at);
+        let r = libm::hypot(x, z);
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let angle = if r > 0.0 { [x / r, sign * z / r] } else { [1.0, 0.0] };
+        let span = self.samples.spans.get(sample).copied().unwrap_or(LAST);
+        let ends = [&chords.from, &chords.to].map(|p| [p[0][i], p[1][i], p[2][i]]);
+        reach(self.surface, self.sight, span, angle, ends).min(SILHOUETTE_SLACK * self.extent)
+    }
+
+    /// Adds the pieces of chords that are single visible pieces, on both sides.
+    #[inline(always)]
+    fn add(&mut self, sides: &[Chords; 2], visible: &[bool; LANES]) {
+        for chords in sides {
+            let mut count = 0;
+            let mut rows = [[0.0f32; LANES]; 5];
+            for i in 0..LANES {
+                // Overwritten by the next one unless this one counts.
+                let at = count.min(LANES - 1);
+                rows[0][at] = (0.5 * (chords.from[0][i] + chords.to[0][i])) as f32;
+                rows[1][at] = (0.5 * (chords.from[1][i] + chords.to[1][i])) as f32;
+                rows[2][at] = chords.tangent[0][i] as f32;
+                rows[3][at] = chords.tangent[1][i] as f32;
+                rows[4][at] = chords.length[i] as f32;
+                count += usize::from(visible[i]);
+            }
+            let count = count.min(LANES);
+            self.out.x.extend_from_slice(&rows[0][..count]);
+            self.out.y.extend_from_slice(&rows[1][..count]);
+            self.out.tx.extend_from_slice(&rows[2][..count]);
+            self.out.ty.extend_from_slice(&rows[3][..count]);
+            self.out.length.extend_from_slice(&rows[4][..count]);
+        }
+    }
+
+    /// Adds the visible pieces of a chord that is long or leaves the image.
+    #[inline(never)]
+    fn cut(
+        &mut self,
+        first: usize,
+        chords: &Chords,
+        i: usize,
+        side: usize,
+        both: bool,
+        smooth: bool,
+    ) {
+        let [a, b] =
+            [&chords.from, &chords.to].map(|p| Point { x: p[0][i], y: p[1][i], nearness: p[2][i] });
+        let (dx, dy) = (b.x - a.x, b.y - a.y);
+        let inside =
+            |p: &Point| p.x >= 0.0 && p.y >= 0.0 && p.x <= self.size[0] && p.y <= self.size[1];
+        let part = match inside(&a) && inside(&b) {
             true => Some((0.0, 1.0)),
             false => clip(&a, [dx, dy], self.size),
         };
         let Some((t0, t1)) = part else { return };
-        let length = all * (t1 - t0);
+        let length = chords.length[i] * (t1 - t0);
         if !(length > 1e-9 && length.is_finite()) {
             return;
         }
-        let Some(look) = self.look(chord, &[a, b], all) else { return };
-        let pieces = if length < LONGEST { 1.0 } else { (length + 0.5).floor() };
-        let step = (t1 - t0) / pieces;
-        for i in 0..pieces as usize {
-            let t = t0 + step * (i as f64 + 0.5);
-            if self.visible(chord, &[a, b], t, all, &look) {
-                self.add([a.x + dx * t, a.y + dy * t], look.tangent, length / pieces);
+        let tangent = chords.tangent.map(|row| row[i]);
+        let slack = match smooth {
+            true => [self.slack(first + i, chords, i, side); 2],
+            false => chords.slack.map(|row| row[i]),
+        };
+        let count = if length < LONGEST { 1.0 } else { (length + 0.5).floor() };
+        let step = (t1 - t0) / count;
+        for k in 0..count as usize {
+            let t = t0 + step * (k as f64 + 0.5);
+            let at = [a.x + dx * t, a.y + dy * t];
+            let depth = self.sight.lens.depth(a.nearness + (b.nearness - a.nearness) * t);
+            let mut piece = Pieces::default();
+            for axis in 0..2 {
+                (piece.at[axis][0], piece.tangent[axis][0]) = (at[axis], tangent[axis]);
+                piece.slack[axis][0] = slack[axis];
+            }
+            (piece.depth[0], piece.there[0]) = (depth, depth.is_finite());
+            if self.visible(&piece, both)[0] {
+                let values = [at[0], at[1], tangent[0], tangent[1], length / count];
+                let [x, y, tx, ty, length] = values.map(|v| v as f32);
+                self.out.x.push(x);
+                self.out.y.push(y);
+                self.out.tx.push(tx);
+                self.out.ty.push(ty);
+                self.out.length.push(length);
             }
         }
     }

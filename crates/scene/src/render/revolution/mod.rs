@@ -6,6 +6,7 @@
 //! affine map. The contours are those of the mesh of a lathe as the number of its sides
 //! grows.
 
+mod chords;
 mod contours;
 mod rays;
 mod samples;

@@ -4,19 +4,20 @@
 //! direction to it) has z = 0 and x > 0. Invariant: the placement is invertible and all
 //! numbers are finite.
 
+use super::rays::{LANES, Row};
 use crate::geom::{Affine, Revolution, Ring};
 use crate::render::Camera;
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{DepthRange, Lens};
 use glam::{DMat3, DVec3};
 
-/// A line of sight, by depth: `origin + depth * way` in the surface's turned coordinates.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ray {
+/// Lines of sight, by depth: `origin + depth * way` in the surface's turned coordinates.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rays {
     /// Squared distance from the axis: `square[0] + 2 square[1] depth + square[2] depth^2`.
-    pub square: [f64; 3],
+    pub square: [Row; 3],
     /// Height: `height[0] + height[1] depth`.
-    pub height: [f64; 2],
+    pub height: [Row; 2],
 }
 
 /// A camera and a placed surface of revolution.
@@ -26,8 +27,9 @@ pub(super) struct Sight {
     /// From turned coordinates to the camera's.
     pub m: DMat3,
     pub t: DVec3,
-    /// The inverse of `m`.
+    /// The inverse of `m`, and that of `t`.
     inverse: DMat3,
+    back: [f64; 3],
     /// Maps outward normals to outward normals.
     pub cofactor: DMat3,
     /// `facing = normal . (view - bend * point)`; the third component of `view` is 0.
@@ -69,6 +71,7 @@ impl Sight {
             m,
             t,
             inverse,
+            back: (inverse * t).to_array(),
             cofactor,
             view: [rho.max(least).max(f64::MIN_POSITIVE), view.y],
             bend: if lens.pinhole { 1.0 } else { 0.0 },
@@ -95,25 +98,29 @@ impl Sight {
         [(x - self.lens.cx) / self.lens.scale, (self.lens.cy - y) / self.lens.scale]
     }
 
-    /// The line of sight through a position in the image.
+    /// The lines of sight through positions in the image.
     #[inline(always)]
-    pub fn ray(&self, at: [f64; 2]) -> Ray {
-        let [a, b] = self.slopes(at);
-        let (origin, way) = if self.lens.pinhole {
-            let way = self.inverse * DVec3::new(a, b, -1.0);
-            (DVec3::new(self.view[0], self.view[1], 0.0), way)
-        } else {
-            (self.inverse * (DVec3::new(a, b, 0.0) - self.t), -self.inverse.z_axis)
-        };
-        let square = [
-            origin.x * origin.x + origin.z * origin.z,
-            origin.x * way.x + origin.z * way.z,
-            way.x * way.x + way.z * way.z,
-        ];
-        // Never quite level, so that it meets each height once.
-        let least = 1e-9 * square[2].sqrt();
-        let climb = if way.y.abs() < least { least } else { way.y };
-        Ray { square, height: [origin.y, climb] }
+    pub fn rays(&self, [x, y]: [&Row; 2]) -> Rays {
+        let mut rays = Rays::default();
+        let [p, q, r] = self.inverse.to_cols_array_2d();
+        for i in 0..LANES {
+            let [a, b] = self.slopes([x[i], y[i]]);
+            let [x, y, z] = [p[0] * a + q[0] * b, p[1] * a + q[1] * b, p[2] * a + q[2] * b];
+            let (way, origin) = if self.lens.pinhole {
+                ([x - r[0], y - r[1], z - r[2]], [self.view[0], self.view[1], 0.0])
+            } else {
+                let back = &self.back;
+                ([-r[0], -r[1], -r[2]], [x - back[0], y - back[1], z - back[2]])
+            };
+            rays.square[0][i] = origin[0] * origin[0] + origin[2] * origin[2];
+            rays.square[1][i] = origin[0] * way[0] + origin[2] * way[2];
+            rays.square[2][i] = way[0] * way[0] + way[2] * way[2];
+            // Never quite level, so that it meets each height once.
+            let least = 1e-9 * rays.square[2][i].sqrt();
+            rays.height[0][i] = origin[1];
+            rays.height[1][i] = if way[1].abs() < least { least } else { way[1] };
+        }
+        rays
     }
 
     /// The depths between which a ring lies.

@@ -5,7 +5,7 @@
 //! silhouette is cos(angle) = -B(t) / A(t). Samples are about a pixel apart, and closer
 //! where the image of a curve bends.
 
-use super::samples::{Kind, Run, Sample, Samples};
+use super::samples::{Circle, LAST, Sample, Samples};
 use super::sight::Sight;
 use crate::geom::{Revolution, Ring};
 use crate::render::Camera;
@@ -65,15 +65,20 @@ impl Piece<'_> {
     #[inline(always)]
     fn sample(&self, t: f64, [c, s]: [f64; 2]) -> Sample {
         let [a, b] = self.rings;
-        let mix = |a: f64, b: f64| a + (b - a) * t;
         Sample {
             c,
             s,
-            r: mix(a.r, b.r),
-            y: mix(a.y, b.y),
-            nr: mix(a.nr, b.nr),
-            ny: mix(a.ny, b.ny),
+            r: a.r + (b.r - a.r) * t,
+            y: a.y + (b.y - a.y) * t,
+            nr: a.nr + (b.nr - a.nr) * t,
+            ny: a.ny + (b.ny - a.ny) * t,
         }
+    }
+
+    /// The sample of the silhouette at a fraction of the span.
+    #[inline(always)]
+    fn at(&self, t: f64) -> Sample {
+        self.sample(t, self.facing[0].mixed(&self.facing[1], t).edge())
     }
 
     /// The fraction of the span at which its silhouette has an angle.
@@ -111,6 +116,7 @@ impl Samples {
             }
             self.add_parts(i, &piece, [near, far], sight, whole);
         }
+        self.silhouettes = self.count;
     }
 
     /// Adds the silhouettes of a span that do not run through all of it.
@@ -157,35 +163,66 @@ impl Samples {
         sight: &Sight,
         whole: bool,
     ) {
-        let first = self.list.len();
         let (dc, ds) = (end[0] - start[0], end[1] - start[1]);
         let turn = dc * dc + ds * ds;
         let [begin, finish] = [piece.sample(from, start), piece.sample(to, end)];
-        self.list.push(begin);
         // By the fraction of the span, unless the angle depends strongly on it.
         if turn < 1e-6 || (turn < 0.25 && start[1].min(end[1]) > 0.25) {
-            let at = |part: f64| {
-                let t = from + (to - from) * part;
-                piece.sample(t, piece.facing[0].mixed(&piece.facing[1], t).edge())
-            };
-            let count = chords([&begin, &at(0.5), &finish], sight, whole);
-            let step = 1.0 / count;
-            self.list.extend((1..count as usize).map(|i| at(i as f64 * step)));
+            let middle = piece.at(0.5 * (from + to));
+            let count = chords([&begin, &middle, &finish], sight, whole);
+            self.begin(span, &begin, count);
+            let step = (to - from) / count;
+            for i in 1..count as usize {
+                self.push(&piece.at(from + i as f64 * step), span as u32);
+            }
+            self.push(&finish, LAST);
         } else {
-            let angle = |v: [f64; 2]| libm::atan2(v[1], v[0]);
-            let (a, b) = (angle(start), angle(end));
-            let at = |part: f64| {
-                let angle = a + (b - a) * part;
-                let at = [libm::cos(angle), libm::sin(angle)];
-                let t = piece.share(at[0]).clamp(from, to);
-                piece.sample(if t.is_finite() { t } else { from }, at)
-            };
-            let count = chords([&begin, &at(0.5), &finish], sight, whole);
-            let step = 1.0 / count;
-            self.list.extend((1..count as usize).map(|i| at(i as f64 * step)));
+            self.turn(span, piece, [from, to], [start, end], sight, whole);
         }
-        self.list.push(finish);
-        self.runs.push(Run { first, past: self.list.len(), kind: Kind::Silhouette(span) });
+    }
+
+    /// Adds a stretch of a silhouette by its angle.
+    #[inline(never)]
+    fn turn(
+        &mut self,
+        span: usize,
+        piece: &Piece<'_>,
+        [from, to]: [f64; 2],
+        [start, end]: [[f64; 2]; 2],
+        sight: &Sight,
+        whole: bool,
+    ) {
+        let [begin, finish] = [piece.sample(from, start), piece.sample(to, end)];
+        let angle = |v: [f64; 2]| libm::atan2(v[1], v[0]);
+        let (a, b) = (angle(start), angle(end));
+        let at = |part: f64| {
+            let angle = a + (b - a) * part;
+            let at = [libm::cos(angle), libm::sin(angle)];
+            let t = piece.share(at[0]).clamp(from, to);
+            piece.sample(if t.is_finite() { t } else { from }, at)
+        };
+        let count = chords([&begin, &at(0.5), &finish], sight, whole);
+        self.begin(span, &begin, count);
+        let step = 1.0 / count;
+        for i in 1..count as usize {
+            self.push(&at(i as f64 * step), span as u32);
+        }
+        self.push(&finish, LAST);
+    }
+
+    /// Adds the first sample of a stretch with a number of chords, and makes room for them.
+    #[inline(always)]
+    fn begin(&mut self, span: usize, begin: &Sample, count: f64) {
+        self.reserve(count as usize + 1);
+        // Where it continues the stretch before, this sample is there already.
+        if let Some(i) = self.count.checked_sub(1) {
+            let (p, [x, y, z], [nx, ny, _]) = (begin.point(), &self.points, &self.normals);
+            let same = (at(x, i) == p.x) & (at(y, i) == p.y) & (at(z, i) == p.z);
+            if same & (at(nx, i) == begin.nr * begin.c) & (at(ny, i) == begin.ny) {
+                self.count = i;
+            }
+        }
+        self.push(begin, span as u32);
     }
 
     /// Adds the sharp circles that are not too small to be seen.
@@ -197,18 +234,19 @@ impl Samples {
                 continue;
             }
             let count = if whole { circle_chords(sight.radius(ring)) } else { NEARBY };
-            let first = self.list.len();
+            let first = self.count;
+            self.reserve(count as usize + 1);
             let step = core::f64::consts::PI / count;
             let (dc, ds) = (libm::cos(step), libm::sin(step));
-            let at = |c: f64, s: f64| Sample { c, s, r: ring.r, y: ring.y, nr: 0.0, ny: 0.0 };
+            let at = |c: f64, s: f64| Sample { c, s, r: ring.r, y: ring.y, nr: 1.0, ny: 0.0 };
             let (mut c, mut s) = (1.0, 0.0);
-            self.list.push(at(c, s));
+            self.push(&at(c, s), 0);
             for _ in 1..count as usize {
                 (c, s) = (c * dc - s * ds, s * dc + c * ds);
-                self.list.push(at(c, s));
+                self.push(&at(c, s), 0);
             }
-            self.list.push(at(-1.0, 0.0));
-            self.runs.push(Run { first, past: self.list.len(), kind: Kind::Rim(i) });
+            self.push(&at(-1.0, 0.0), LAST);
+            self.circles.push(Circle { first, past: self.count, rim: i });
         }
     }
 }
@@ -235,16 +273,26 @@ fn circle_chords(radius: f64) -> f64 {
 #[inline(always)]
 fn chords(curve: [&Sample; 3], sight: &Sight, whole: bool) -> f64 {
     if !whole {
-        let ends = curve.map(|p| -sight.camera(p.point(1.0)).z);
+        let ends = curve.map(|p| -sight.camera(p.point()).z);
         if ends.iter().any(|depth| *depth < 2.0 * Camera::NEAR) {
             return 64.0;
         }
     }
-    let [a, b, c] = curve.map(|p| sight.image(p.point(1.0)));
-    let length = |x: f64, y: f64| (x * x + y * y).sqrt();
+    let [a, b, c] = curve;
+    let (a, b, c) = (sight.image(a.point()), sight.image(b.point()), sight.image(c.point()));
     let long = length(b.x - a.x, b.y - a.y) + length(c.x - b.x, c.y - b.y);
     let bend = length(a.x - 2.0 * b.x + c.x, a.y - 2.0 * b.y + c.y);
     // The second difference falls with the square of the number of chords.
     let count = (long / STEP).max((bend / (2.0 * STRAY)).sqrt()).ceil();
     if count > 1.0 { count.min(MOST_OF_SPAN) } else { 1.0 }
+}
+
+#[inline(always)]
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
+#[inline(always)]
+fn at(list: &[f64], i: usize) -> f64 {
+    list.get(i).copied().unwrap_or(f64::NAN)
 }
