@@ -8,7 +8,7 @@
 use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Profile, Tolerance, Wall, floor_height, inner_wall};
-use super::real::{Real, Tape};
+use super::real::{Real, Tape, Var};
 use super::revolve::{Strip, revolve, vjp_rings};
 use super::{GeomError, Mesh, Revolution, Solid};
 use glam::DVec3;
@@ -114,6 +114,23 @@ impl Revolution {
         let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
         Ok(Revolution::new(&strips, closed, parts.len() as u16 + 5))
     }
+
+    /// The vector-Jacobian product of [`Revolution::lathe`], given derivatives with respect
+    /// to the radius and the height of each ring. Which points are merged and which ends
+    /// are closed is held fixed.
+    ///
+    /// # Errors
+    /// As [`lathe`].
+    pub fn vjp_lathe(
+        parts: &[Profile],
+        wall: impl Into<Wall>,
+        caps: Caps,
+        by_ring: &[(f64, f64)],
+    ) -> Result<LatheGradient, GeomError> {
+        let wall = wall.into();
+        check(parts, FEWEST_SIDES, wall)?;
+        vjp_layout(parts, wall, caps, |_| by_ring.to_vec())
+    }
 }
 
 /// Derivatives with respect to the inputs of [`lathe`].
@@ -139,6 +156,16 @@ pub fn vjp_lathe(
 ) -> Result<LatheGradient, GeomError> {
     let wall = wall.into();
     check(parts, sides, wall)?;
+    vjp_layout(parts, wall, caps, |strips| vjp_rings(strips, sides, by_vertex))
+}
+
+/// Maps derivatives with respect to the points of the path, in order, to the inputs.
+fn vjp_layout(
+    parts: &[Profile],
+    wall: Wall,
+    caps: Caps,
+    by_point: impl FnOnce(&[Strip<Var<'_>>]) -> Vec<(f64, f64)>,
+) -> Result<LatheGradient, GeomError> {
     let tape = Tape::default();
     let wall = Wall { thickness: tape.variable(wall.thickness), floor: tape.variable(wall.floor) };
     let mut inputs = Vec::new();
@@ -148,7 +175,7 @@ pub fn vjp_lathe(
         v
     };
     let strips = layout(parts, caps, wall, number)?.strips;
-    let rings = vjp_rings(&strips, sides, by_vertex);
+    let rings = by_point(&strips);
     let outputs = strips
         .iter()
         .flat_map(|s| &s.points)

@@ -3,7 +3,7 @@
 //!
 //! The rules are those of the contours of meshes (`lines/extraction.rs`).
 
-use super::rays::{LANES, Row};
+use super::rays::{LANES, Mask, Row, mask};
 use super::samples::{Samples, row, rows};
 use super::sight::Sight;
 use crate::geom::{Revolution, Rim};
@@ -12,7 +12,7 @@ use crate::render::lines::visibility::EDGE_SLACK;
 
 /// Chords on one side of the plane of symmetry. Pairs are image axes, triples x, y,
 /// nearness.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Chords {
     pub from: [Row; 3],
     pub to: [Row; 3],
@@ -20,56 +20,65 @@ pub(super) struct Chords {
     /// Unit tangent, with the object on its right.
     pub tangent: [Row; 2],
     /// Whether it may be visible.
-    pub there: [bool; LANES],
+    pub there: Mask,
     /// How much nearer than the chord its own surface reaches, on the outward and on the
     /// other side, in scene units.
     pub slack: [Row; 2],
 }
 
 impl Chords {
-    /// The chords from consecutive samples, on a side: 0 for positive z, 1 for negative.
+    /// Sets the ends to consecutive samples, on a side: 0 for positive z, 1 for negative.
     #[inline(always)]
-    pub fn new(samples: &Samples, first: usize, side: usize) -> Chords {
+    pub fn load(&mut self, samples: &Samples, first: usize, side: usize) {
         let images = &samples.images[side.min(1)];
-        let (from, to) = (rows(images, first), rows(images, first + 1));
-        let zero = [0.0; LANES];
-        let (tangent, slack) = ([zero; 2], [zero; 2]);
-        Chords { from, to, length: zero, tangent, there: [false; LANES], slack }
+        (self.from, self.to) = (rows(images, first), rows(images, first + 1));
     }
 
-    /// Measures lengths and tangents; `count` is the number of chords.
+    /// Measures lengths and tangents of the first `count` chords.
     #[inline(always)]
     pub fn measure(&mut self, count: usize) {
         for i in 0..LANES {
             let (dx, dy) = (self.to[0][i] - self.from[0][i], self.to[1][i] - self.from[1][i]);
             let length = (dx * dx + dy * dy).sqrt();
+            let per = 1.0 / length;
             self.length[i] = length;
-            (self.tangent[0][i], self.tangent[1][i]) = (dx / length, dy / length);
-            self.there[i] = (i < count) & (length > 1e-9) & (length < f64::INFINITY);
+            (self.tangent[0][i], self.tangent[1][i]) = (dx * per, dy * per);
+            self.there[i] = mask((i < count) & (length > 1e-9) & (length < f64::INFINITY));
         }
     }
 
-    /// Orients chords of silhouettes.
+    /// Turns tangents around where the factor is -1.
     #[inline(always)]
-    pub fn orient(&mut self, sight: &Sight, samples: &Samples, first: usize, side: usize) {
+    pub fn turn(&mut self, way: &Row) {
+        for i in 0..LANES {
+            self.tangent[0][i] *= way[i];
+            self.tangent[1][i] *= way[i];
+        }
+    }
+
+    /// Whether the chords of silhouettes have the object on the right of their tangents (1)
+    /// or on the left (-1).
+    #[inline(always)]
+    pub fn way(&self, sight: &Sight, samples: &Samples, first: usize, side: usize) -> Row {
         let [nx, ny, nz] = rows(&samples.normals, first);
         let [a, b, c] = sight.cofactor.to_cols_array_2d();
         let sign = if side == 0 { 1.0 } else { -1.0 };
+        let mut way = [1.0; LANES];
         for i in 0..LANES {
             let (p, q, r) = (nx[i], ny[i], sign * nz[i]);
             let x = p * a[0] + q * b[0] + r * c[0];
             let y = p * a[1] + q * b[1] + r * c[1];
             // Outward in the image is (x, -y), and to the left of the tangent.
-            let (tx, ty) = (self.tangent[0][i], self.tangent[1][i]);
-            let way = if x * ty + y * tx < 0.0 { -1.0 } else { 1.0 };
-            (self.tangent[0][i], self.tangent[1][i]) = (way * tx, way * ty);
+            let left = x * self.tangent[1][i] + y * self.tangent[0][i];
+            way[i] = if left < 0.0 { -1.0 } else { 1.0 };
         }
+        way
     }
 
-    /// Orients chords of a rim, drops those whose spans all face away, and finds their
-    /// slack. `first` is the number of the first chord's sample.
+    /// As [`Chords::way`] for the chords of a rim. Drops those whose spans all face away,
+    /// and finds the slack. `first` is the number of the first chord's sample.
     #[inline(always)]
-    pub fn orient_rim(
+    pub fn rim_way(
         &mut self,
         faces: &[Option<Face>; 2],
         sight: &Sight,
@@ -77,18 +86,19 @@ impl Chords {
         first: usize,
         side: usize,
         (open, extent): (bool, f64),
-    ) {
+    ) -> Row {
         let (c, d) = (row(&samples.normals[0], first), row(&samples.normals[0], first + 1));
         let s = row(&samples.normals[2], first);
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let [ax, ay, az] = sight.m.to_cols_array_2d();
         let lens = sight.lens;
         let pinhole = if lens.pinhole { 1.0 } else { 0.0 };
-        let (mut front, mut balance) = ([false; LANES], [0.0; LANES]);
+        let (mut front, mut balance) = ([0; LANES], [0.0; LANES]);
+        self.slack = [[0.0; LANES]; 2];
         for face in faces.iter().flatten() {
             for i in 0..LANES {
                 let facing = face.a * (0.5 * (c[i] + d[i])) + face.b > 0.0;
-                front[i] |= facing;
+                front[i] |= mask(facing);
                 // The motion in the image from the rim across the span.
                 let (p, q, r) = (face.dr * c[i], face.dy, sign * face.dr * s[i]);
                 let dx = p * ax[0] + q * ay[0] + r * az[0];
@@ -118,16 +128,16 @@ impl Chords {
                 self.slack[1][i] = if r > right { r } else { right };
             }
         }
+        let mut way = [1.0; LANES];
         for i in 0..LANES {
-            self.there[i] &= front[i] | open;
+            self.there[i] &= front[i] | mask(open);
             let turned = balance[i] < 0.0;
-            let way = if turned { -1.0 } else { 1.0 };
-            let (tx, ty) = (self.tangent[0][i], self.tangent[1][i]);
-            (self.tangent[0][i], self.tangent[1][i]) = (way * tx, way * ty);
+            way[i] = if turned { -1.0 } else { 1.0 };
             let [left, right] = [self.slack[0][i], self.slack[1][i]];
-            (self.slack[0][i], self.slack[1][i]) =
-                if turned { (right, left) } else { (left, right) };
+            self.slack[0][i] = if turned { right } else { left };
+            self.slack[1][i] = if turned { left } else { right };
         }
+        way
     }
 }
 

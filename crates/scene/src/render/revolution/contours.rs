@@ -1,7 +1,7 @@
 //! The visible contours of a surface of revolution.
 
 use super::chords::{Chords, Face, reach};
-use super::rays::{LANES, Row, Spans};
+use super::rays::{LANES, Mask, Row, Spans, mask};
 use super::samples::{LAST, Samples};
 use super::sight::Sight;
 use super::silhouettes::is_speck;
@@ -40,14 +40,46 @@ impl Contours {
             return Contours::new(camera.width, camera.height);
         };
         SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
-            Ok(mut scratch) => scratch.contours(surface, &sight, camera),
-            Err(_) => Scratch::default().contours(surface, &sight, camera),
+            Ok(mut scratch) => scratch.contours(surface, &sight, camera, None),
+            Err(_) => Scratch::default().contours(surface, &sight, camera, None),
         })
+    }
+
+    /// Calls `f` with the samples of the contours and where each piece comes from.
+    pub(super) fn sources(
+        surface: &Revolution,
+        sight: &Sight,
+        camera: &Camera,
+        f: impl FnOnce(&Samples, &[Source]),
+    ) {
+        let (mut scratch, mut sources) = (Scratch::default(), Vec::new());
+        scratch.contours(surface, sight, camera, Some(&mut sources));
+        f(&scratch.samples, &sources);
     }
 }
 
+/// Where a piece comes from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Source {
+    /// The number of the sample where its chord begins.
+    pub sample: usize,
+    /// 0 for the side of positive z, 1 for the other.
+    pub side: usize,
+    /// The position of the piece's middle along the chord, and the share that it covers.
+    pub at: f64,
+    pub share: f64,
+    /// Whether the chord reaches from sample to sample: it is not cut at the near plane.
+    pub whole: bool,
+}
+
 impl Scratch {
-    fn contours(&mut self, surface: &Revolution, sight: &Sight, camera: &Camera) -> Contours {
+    fn contours(
+        &mut self,
+        surface: &Revolution,
+        sight: &Sight,
+        camera: &Camera,
+        sources: Option<&mut Vec<Source>>,
+    ) -> Contours {
         let range = sight.range(surface);
         let out = Contours::with_room(camera, self.found);
         if !(range.far > Camera::NEAR && range.far < HUGE) {
@@ -69,11 +101,22 @@ impl Scratch {
                     rim.spans.contains(&None) && ring.is_some_and(|r| !is_speck(r, sight, whole))
                 });
                 let size = [f64::from(camera.width), f64::from(camera.height)];
-                let mut drawer =
-                    Drawer { surface, sight, samples, spans, open, whole, extent, size, out };
+                let mut drawer = Drawer {
+                    surface,
+                    sight,
+                    samples,
+                    spans,
+                    open,
+                    whole,
+                    extent,
+                    size,
+                    count: 0,
+                    out,
+                    sources,
+                };
                 drawer.silhouettes();
                 drawer.rims();
-                drawer.out
+                drawer.pieces()
             },
         );
         *found = out.len();
@@ -93,7 +136,11 @@ struct Drawer<'a> {
     /// The depth range of the surface.
     extent: f64,
     size: [f64; 2],
+    /// The number of pieces in `out`, whose lists are longer.
+    count: usize,
     out: Contours,
+    /// Where the pieces come from, if somebody asks.
+    sources: Option<&'a mut Vec<Source>>,
 }
 
 /// Pieces to be tested for visibility: middle, depth, unit tangent, and how much nearer
@@ -104,79 +151,96 @@ struct Pieces {
     depth: Row,
     tangent: [Row; 2],
     slack: [Row; 2],
-    there: [bool; LANES],
+    there: Mask,
 }
 
 impl Drawer<'_> {
     #[inline(always)]
     fn silhouettes(&mut self) {
+        let (samples, sight) = (self.samples, self.sight);
+        let (mut sides, mut cut) = ([Chords::default(); 2], [0; LANES]);
         let mut first = 0;
-        while first + 1 < self.samples.silhouettes {
-            let count = (self.samples.silhouettes - 1 - first).min(LANES);
-            let (mut sides, cut) = self.chords(first, count);
-            for (side, chords) in sides.iter_mut().enumerate() {
-                chords.orient(self.sight, self.samples, first, side);
+        while first + 1 < samples.silhouettes {
+            self.load(&mut sides, &mut cut, first, samples.silhouettes);
+            let own = samples.spans.get(first..).and_then(|spans| spans.first_chunk::<LANES>());
+            let own = own.unwrap_or(&[LAST; LANES]);
+            let [near, far] = &mut sides;
+            for i in 0..LANES {
+                let joined = mask(own[i] != LAST);
+                near.there[i] &= joined;
+                far.there[i] &= joined;
             }
-            let own = self.samples.spans.get(first..first + count).unwrap_or(&[]);
-            for chords in &mut sides {
-                let joined = own.iter().map(|span| *span != LAST);
-                chords.there.iter_mut().zip(joined).for_each(|(there, joined)| *there &= joined);
-            }
-            self.finish(first, sides, cut, self.open, true);
+            let way = near.way(sight, samples, first, 0);
+            near.turn(&way);
+            // By symmetry, the other side runs the other way around.
+            let back = match self.whole {
+                true => reversed(&way),
+                false => far.way(sight, samples, first, 1),
+            };
+            far.turn(&back);
+            self.finish(first, &sides, &cut, self.open, true);
             first += LANES;
         }
     }
 
     #[inline(always)]
     fn rims(&mut self) {
-        for circle in &self.samples.circles {
+        let (samples, sight) = (self.samples, self.sight);
+        let (mut sides, mut cut) = ([Chords::default(); 2], [0; LANES]);
+        for circle in &samples.circles {
             let Some(rim) = self.surface.rims().get(circle.rim) else { continue };
-            let faces = Face::both(self.surface, rim, self.sight);
+            let faces = Face::both(self.surface, rim, sight);
+            let options = (self.open, self.extent);
             let mut first = circle.first;
             while first + 1 < circle.past {
-                let (mut sides, cut) = self.chords(first, (circle.past - 1 - first).min(LANES));
-                for (side, chords) in sides.iter_mut().enumerate() {
-                    let options = (self.open, self.extent);
-                    chords.orient_rim(&faces, self.sight, self.samples, first, side, options);
-                }
-                self.finish(first, sides, cut, true, false);
+                self.load(&mut sides, &mut cut, first, circle.past);
+                let [near, far] = &mut sides;
+                let way = near.rim_way(&faces, sight, samples, first, 0, options);
+                near.turn(&way);
+                let back = if self.whole {
+                    far.slack = near.slack;
+                    for i in 0..LANES {
+                        far.there[i] &= near.there[i];
+                    }
+                    reversed(&way)
+                } else {
+                    far.rim_way(&faces, sight, samples, first, 1, options)
+                };
+                far.turn(&back);
+                self.finish(first, &sides, &cut, true, false);
                 first += LANES;
             }
         }
     }
 
-    /// The chords from some samples on both sides, and which of them are not a single
-    /// piece on both sides.
+    /// Loads the chords from some samples on both sides; `past` is one past the curve's
+    /// last sample. Marks those that are not a single piece on both sides.
     #[inline(always)]
-    fn chords(&self, first: usize, count: usize) -> ([Chords; 2], [bool; LANES]) {
-        let mut cut = [false; LANES];
-        let near = self.side(first, count, 0, &mut cut);
-        let far = self.side(first, count, 1, &mut cut);
-        ([near, far], cut)
-    }
-
-    /// The chords on one side; marks those that are not a single piece.
-    #[inline(always)]
-    fn side(&self, first: usize, count: usize, side: usize, cut: &mut [bool; LANES]) -> Chords {
-        let mut chords = Chords::new(self.samples, first, side);
-        let mut behind = [false; LANES];
-        if !self.whole {
-            self.cut_near(&mut chords, &mut behind, first, count, side);
-        }
-        chords.measure(count);
+    fn load(&self, sides: &mut [Chords; 2], cut: &mut Mask, first: usize, past: usize) {
+        *cut = [0; LANES];
+        let count = past.saturating_sub(first + 1).min(LANES);
         let [width, height] = self.size;
-        let Chords { from, to, length, there, .. } = &mut chords;
-        for i in 0..LANES {
-            there[i] &= !behind[i];
-            let starts = (from[0][i] >= 0.0)
-                & (from[1][i] >= 0.0)
-                & (from[0][i] <= width)
-                & (from[1][i] <= height);
-            let ends =
-                (to[0][i] >= 0.0) & (to[1][i] >= 0.0) & (to[0][i] <= width) & (to[1][i] <= height);
-            cut[i] |= !(starts & ends & (length[i] < LONGEST) & there[i]);
+        for (side, chords) in sides.iter_mut().enumerate() {
+            chords.load(self.samples, first, side);
+            let mut behind = [0; LANES];
+            if !self.whole {
+                self.cut_near(chords, &mut behind, first, count, side);
+            }
+            chords.measure(count);
+            let Chords { from, to, length, there, .. } = chords;
+            for i in 0..LANES {
+                there[i] &= !behind[i];
+                let starts = (from[0][i] >= 0.0)
+                    & (from[1][i] >= 0.0)
+                    & (from[0][i] <= width)
+                    & (from[1][i] <= height);
+                let ends = (to[0][i] >= 0.0)
+                    & (to[1][i] >= 0.0)
+                    & (to[0][i] <= width)
+                    & (to[1][i] <= height);
+                cut[i] |= mask(!(starts & ends & (length[i] < LONGEST))) | !there[i];
+            }
         }
-        chords
     }
 
     /// Cuts chords at the near plane.
@@ -184,7 +248,7 @@ impl Drawer<'_> {
     fn cut_near(
         &self,
         chords: &mut Chords,
-        behind: &mut [bool; LANES],
+        behind: &mut Mask,
         first: usize,
         count: usize,
         side: usize,
@@ -200,7 +264,7 @@ impl Drawer<'_> {
         };
         for i in 0..count.min(LANES) {
             let Some(ends) = beyond_near([point(first + i), point(first + i + 1)]) else {
-                behind[i] = true;
+                behind[i] = u64::MAX;
                 continue;
             };
             let [a, b] = ends.map(|p| self.sight.lens.point(p));
@@ -212,34 +276,36 @@ impl Drawer<'_> {
     /// Adds the visible pieces of chords on both sides: `both` if both sides of a chord
     /// may be seen, `smooth` for silhouettes.
     #[inline(always)]
-    fn finish(
-        &mut self,
-        first: usize,
-        sides: [Chords; 2],
-        cut: [bool; LANES],
-        both: bool,
-        smooth: bool,
-    ) {
-        let [near, _] = &sides;
+    fn finish(&mut self, first: usize, sides: &[Chords; 2], cut: &Mask, both: bool, smooth: bool) {
+        let [near, far] = sides;
+        let lens = self.sight.lens;
         let mut pieces = Pieces { tangent: near.tangent, slack: near.slack, ..Pieces::default() };
         for i in 0..LANES {
-            for axis in 0..2 {
-                pieces.at[axis][i] = 0.5 * (near.from[axis][i] + near.to[axis][i]);
-            }
-            pieces.depth[i] = self.sight.lens.depth(0.5 * (near.from[2][i] + near.to[2][i]));
-            pieces.there[i] = near.there[i] & sides[1].there[i] & !cut[i];
+            pieces.at[0][i] = 0.5 * (near.from[0][i] + near.to[0][i]);
+            pieces.at[1][i] = 0.5 * (near.from[1][i] + near.to[1][i]);
+            pieces.depth[i] = lens.depth(0.5 * (near.from[2][i] + near.to[2][i]));
+            pieces.there[i] = near.there[i] & far.there[i] & !cut[i];
         }
-        let mut visible = self.visible(&pieces, both);
         if smooth {
-            self.again(first, near, &pieces, both, &mut visible);
+            pieces.slack = [[0.0; LANES]; 2];
         }
-        self.add(&sides, &visible);
-        for i in 0..LANES {
-            if cut[i] {
-                for (side, chords) in sides.iter().enumerate() {
-                    if chords.there[i] {
-                        self.cut(first, chords, i, side, both, smooth);
-                    }
+        if any(&pieces.there) {
+            let mut visible = self.visible(&pieces, both);
+            if smooth {
+                self.again(first, near, &pieces, both, &mut visible);
+            }
+            if any(&visible) {
+                self.add(near, &visible);
+                self.add(far, &visible);
+                if self.sources.is_some() {
+                    self.note(first, &visible);
+                }
+            }
+        }
+        for (side, chords) in sides.iter().enumerate() {
+            for i in 0..LANES {
+                if cut[i] & chords.there[i] != 0 {
+                    self.cut(first, chords, i, side, both, smooth);
                 }
             }
         }
@@ -247,28 +313,42 @@ impl Drawer<'_> {
 
     /// Which pieces are visible.
     #[inline(always)]
-    fn visible(&self, pieces: &Pieces, both: bool) -> [bool; LANES] {
-        let mut visible = [false; LANES];
-        for (side, way) in [(0, BESIDE), (1, -BESIDE)] {
-            let open = (0..LANES).any(|i| pieces.there[i] & !visible[i]);
-            if !open || (side == 1 && !both) {
-                break;
-            }
-            let (mut beside, mut to) = ([[0.0; LANES]; 2], [0.0; LANES]);
+    fn visible(&self, pieces: &Pieces, both: bool) -> Mask {
+        let mut visible = self.visible_beside(pieces, &pieces.there, 0, BESIDE);
+        if both {
+            let mut hidden = [0; LANES];
             for i in 0..LANES {
-                beside[0][i] = pieces.at[0][i] + way * pieces.tangent[1][i];
-                beside[1][i] = pieces.at[1][i] - way * pieces.tangent[0][i];
-                let depth = pieces.depth[i];
-                let limit = depth - pieces.slack[side][i] - TOLERANCE * self.extent - 1e-6 * depth;
-                to[i] = if pieces.there[i] { limit } else { Camera::NEAR };
+                hidden[i] = pieces.there[i] & !visible[i];
             }
-            let rays = self.sight.rays([&beside[0], &beside[1]]);
-            let met = self.spans.meets(&rays, [&[Camera::NEAR; LANES], &to]);
-            for i in 0..LANES {
-                visible[i] |= pieces.there[i] & !met[i];
+            if any(&hidden) {
+                let more = self.visible_beside(pieces, &hidden, 1, -BESIDE);
+                for i in 0..LANES {
+                    visible[i] |= more[i];
+                }
             }
         }
         visible
+    }
+
+    /// Which of some pieces are visible, tested this far outward.
+    #[inline(always)]
+    fn visible_beside(&self, pieces: &Pieces, there: &Mask, side: usize, way: f64) -> Mask {
+        let (mut beside, mut to) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        let tolerance = TOLERANCE * self.extent;
+        let slack = &pieces.slack[side.min(1)];
+        for i in 0..LANES {
+            beside[0][i] = pieces.at[0][i] + way * pieces.tangent[1][i];
+            beside[1][i] = pieces.at[1][i] - way * pieces.tangent[0][i];
+            let depth = pieces.depth[i];
+            let limit = depth - slack[i] - tolerance - 1e-6 * depth;
+            to[i] = if there[i] != 0 { limit } else { Camera::NEAR };
+        }
+        let rays = self.sight.rays([&beside[0], &beside[1]]);
+        let mut seen = self.spans.meets(&rays, [&[Camera::NEAR; LANES], &to]);
+        for i in 0..LANES {
+            seen[i] = there[i] & !seen[i];
+        }
+        seen
     }
 
     /// Tests the hidden pieces of silhouettes again, with their slack.
@@ -279,23 +359,29 @@ impl Drawer<'_> {
         chords: &Chords,
         pieces: &Pieces,
         both: bool,
-        visible: &mut [bool; LANES],
+        visible: &mut Mask,
     ) {
-        let mut again = *pieces;
-        let mut any = false;
+        let mut hidden = [0; LANES];
         for i in 0..LANES {
-            again.there[i] = pieces.there[i] & !visible[i];
-            if again.there[i] {
+            hidden[i] = pieces.there[i] & !visible[i];
+        }
+        if !any(&hidden) {
+            return;
+        }
+        let mut again = Pieces { there: hidden, ..*pieces };
+        for i in 0..LANES {
+            if hidden[i] != 0 {
                 let slack = self.slack(first + i, chords, i, 0);
                 (again.slack[0][i], again.slack[1][i]) = (slack, slack);
                 // Too little to matter.
-                again.there[i] = slack > 0.1 * TOLERANCE * self.extent;
-                any |= again.there[i];
+                again.there[i] = mask(slack > 0.1 * TOLERANCE * self.extent);
             }
         }
-        if any {
+        if any(&again.there) {
             let more = self.visible(&again, both);
-            visible.iter_mut().zip(more).for_each(|(visible, more)| *visible |= more);
+            for i in 0..LANES {
+                visible[i] |= more[i];
+            }
         }
     }
 
@@ -312,29 +398,72 @@ impl Drawer<'_> {
         reach(self.surface, self.sight, span, angle, ends).min(SILHOUETTE_SLACK * self.extent)
     }
 
-    /// Adds the pieces of chords that are single visible pieces, on both sides.
+    /// Adds chords that are single visible pieces.
     #[inline(always)]
-    fn add(&mut self, sides: &[Chords; 2], visible: &[bool; LANES]) {
-        for chords in sides {
-            let mut count = 0;
-            let mut rows = [[0.0f32; LANES]; 5];
-            for i in 0..LANES {
-                // Overwritten by the next one unless this one counts.
-                let at = count.min(LANES - 1);
-                rows[0][at] = (0.5 * (chords.from[0][i] + chords.to[0][i])) as f32;
-                rows[1][at] = (0.5 * (chords.from[1][i] + chords.to[1][i])) as f32;
-                rows[2][at] = chords.tangent[0][i] as f32;
-                rows[3][at] = chords.tangent[1][i] as f32;
-                rows[4][at] = chords.length[i] as f32;
-                count += usize::from(visible[i]);
-            }
-            let count = count.min(LANES);
-            self.out.x.extend_from_slice(&rows[0][..count]);
-            self.out.y.extend_from_slice(&rows[1][..count]);
-            self.out.tx.extend_from_slice(&rows[2][..count]);
-            self.out.ty.extend_from_slice(&rows[3][..count]);
-            self.out.length.extend_from_slice(&rows[4][..count]);
+    fn add(&mut self, chords: &Chords, visible: &Mask) {
+        let (mut x, mut y, mut tx, mut ty, mut length) =
+            ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            x[i] = (0.5 * (chords.from[0][i] + chords.to[0][i])) as f32;
+            y[i] = (0.5 * (chords.from[1][i] + chords.to[1][i])) as f32;
+            (tx[i], ty[i]) = (chords.tangent[0][i] as f32, chords.tangent[1][i] as f32);
+            length[i] = chords.length[i] as f32;
         }
+        if *visible == [u64::MAX; LANES] {
+            return self.write([&x, &y, &tx, &ty, &length], LANES);
+        }
+        let mut count = 0;
+        for i in 0..LANES {
+            if visible[i] != 0 {
+                let at = count.min(i);
+                (x[at], y[at], tx[at], ty[at], length[at]) = (x[i], y[i], tx[i], ty[i], length[i]);
+                count += 1;
+            }
+        }
+        self.write([&x, &y, &tx, &ty, &length], count);
+    }
+
+    /// Notes where chords that are single visible pieces come from.
+    #[inline(never)]
+    fn note(&mut self, first: usize, visible: &Mask) {
+        let Some(sources) = &mut self.sources else { return };
+        for side in 0..2 {
+            let seen = (0..LANES).filter(|i| visible[*i] != 0);
+            sources.extend(seen.map(|i| Source {
+                sample: first + i,
+                side,
+                at: 0.5,
+                share: 1.0,
+                whole: true,
+            }));
+        }
+    }
+
+    /// Adds the first `count` of some pieces.
+    #[inline(always)]
+    fn write(&mut self, rows: [&[f32; LANES]; 5], count: usize) {
+        if self.out.x.len() < self.count + LANES {
+            self.grow();
+        }
+        let at = self.count;
+        let Contours { x, y, tx, ty, length, .. } = &mut self.out;
+        (put(x, at, rows[0]), put(y, at, rows[1]), put(tx, at, rows[2]), put(ty, at, rows[3]));
+        put(length, at, rows[4]);
+        self.count += count;
+    }
+
+    #[inline(never)]
+    fn grow(&mut self) {
+        let needed = 2 * self.count + 2 * self.samples.count + LANES;
+        let Contours { x, y, tx, ty, length, .. } = &mut self.out;
+        [x, y, tx, ty, length].into_iter().for_each(|list| list.resize(needed, 0.0));
+    }
+
+    /// The pieces found.
+    fn pieces(mut self) -> Contours {
+        let Contours { x, y, tx, ty, length, .. } = &mut self.out;
+        [x, y, tx, ty, length].into_iter().for_each(|list| list.truncate(self.count));
+        self.out
     }
 
     /// Adds the visible pieces of a chord that is long or leaves the image.
@@ -378,17 +507,42 @@ impl Drawer<'_> {
                 (piece.at[axis][0], piece.tangent[axis][0]) = (at[axis], tangent[axis]);
                 piece.slack[axis][0] = slack[axis];
             }
-            (piece.depth[0], piece.there[0]) = (depth, depth.is_finite());
-            if self.visible(&piece, both)[0] {
+            (piece.depth[0], piece.there[0]) = (depth, mask(depth.is_finite()));
+            if self.visible(&piece, both)[0] != 0 {
                 let values = [at[0], at[1], tangent[0], tangent[1], length / count];
-                let [x, y, tx, ty, length] = values.map(|v| v as f32);
-                self.out.x.push(x);
-                self.out.y.push(y);
-                self.out.tx.push(tx);
-                self.out.ty.push(ty);
-                self.out.length.push(length);
+                let rows = values.map(|v| [v as f32; LANES]);
+                self.write(rows.each_ref(), 1);
+                let whole = self.whole;
+                if let Some(sources) = &mut self.sources {
+                    sources.push(Source { sample: first + i, side, at: t, share: step, whole });
+                }
             }
         }
+    }
+}
+
+#[inline(always)]
+fn any(mask: &Mask) -> bool {
+    let mut all = 0;
+    for bits in mask {
+        all |= bits;
+    }
+    all != 0
+}
+
+#[inline(always)]
+fn reversed(way: &Row) -> Row {
+    let mut out = [0.0; LANES];
+    for i in 0..LANES {
+        out[i] = -way[i];
+    }
+    out
+}
+
+#[inline(always)]
+fn put(list: &mut [f32], at: usize, row: &[f32; LANES]) {
+    if let Some(place) = list.get_mut(at..).and_then(|list| list.first_chunk_mut()) {
+        *place = *row;
     }
 }
 

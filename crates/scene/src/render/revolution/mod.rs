@@ -8,7 +8,14 @@
 
 mod chords;
 mod contours;
+mod derivative;
+mod frame;
 mod rays;
 mod samples;
 mod sight;
 mod silhouettes;
+
+pub use derivative::RevolutionGradient;
+
+#[cfg(test)]
+mod testing;

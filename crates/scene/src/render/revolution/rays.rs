@@ -13,6 +13,15 @@ pub(super) const LANES: usize = 8;
 /// A number for each line.
 pub(super) type Row = [f64; LANES];
 
+/// For each line, all bits set or none.
+pub(super) type Mask = [u64; LANES];
+
+/// All bits set or none.
+#[inline(always)]
+pub(super) fn mask(on: bool) -> u64 {
+    if on { u64::MAX } else { 0 }
+}
+
 /// A span that is not level.
 #[derive(Clone, Copy, Debug)]
 struct Cone {
@@ -21,6 +30,8 @@ struct Cone {
     /// Radius at height 0 of the cone, and its change per height.
     radius: f64,
     slope: f64,
+    /// The number of the span.
+    span: u64,
 }
 
 /// A level span: height and least and greatest squared radius.
@@ -28,6 +39,8 @@ struct Cone {
 struct Level {
     y: f64,
     square: [f64; 2],
+    /// The number of the span.
+    span: u64,
 }
 
 /// The spans of a surface.
@@ -48,54 +61,38 @@ impl Spans {
         let most =
             surface.rings().iter().fold(0.0f64, |m, ring| if ring.r > m { ring.r } else { m });
         self.around = most * most * (1.0 + 1e-9);
-        for span in surface.spans() {
-            let Some([a, b]) = surface.ends(span) else { continue };
+        for (span, ends) in (0u64..).zip(surface.spans().iter().map(|s| surface.ends(s))) {
+            let Some([a, b]) = ends else { continue };
             if a.y == b.y {
                 let (least, most) = (a.r.min(b.r), a.r.max(b.r));
-                self.levels.push(Level { y: a.y, square: [least * least, most * most] });
+                let square = [least * least, most * most];
+                self.levels.push(Level { y: a.y, square, span });
             } else {
                 let slope = (b.r - a.r) / (b.y - a.y);
-                self.cones.push(Cone { ends: [a.y, b.y], radius: a.r - slope * a.y, slope });
+                let radius = a.r - slope * a.y;
+                self.cones.push(Cone { ends: [a.y, b.y], radius, slope, span });
             }
         }
     }
 
     /// Whether each line of sight meets a span between two depths.
     #[inline(always)]
-    pub fn meets(&self, rays: &Rays, [from, to]: [&Row; 2]) -> [bool; LANES] {
+    pub fn meets(&self, rays: &Rays, [from, to]: [&Row; 2]) -> Mask {
         let Rays { square: [c, b, a], height: [at, climb] } = rays;
-        let (mut near, mut far, mut per) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for i in 0..LANES {
-            // Where the line is inside of the cylinder.
-            let root = (b[i] * b[i] - a[i] * (c[i] - self.around)).max(0.0).sqrt();
-            let way = 1.0 / a[i];
-            let (enters, leaves) = ((-b[i] - root) * way, (root - b[i]) * way);
-            near[i] = if enters > from[i] { enters } else { from[i] };
-            far[i] = if leaves < to[i] { leaves } else { to[i] };
-            per[i] = 1.0 / climb[i];
-        }
-        for i in 0..LANES {
-            let (u, v) = (at[i] + climb[i] * near[i], at[i] + climb[i] * far[i]);
-            let some = near[i] < far[i];
-            let (least, most) = if u < v { (u, v) } else { (v, u) };
-            low = if some & (least < low) { least } else { low };
-            high = if some & (most > high) { most } else { high };
-        }
-        // All bits set where the line meets something.
-        let mut met = [0u64; LANES];
+        let Inside { near, far, per, low, high } = self.inside(rays, [from, to]);
+        let mut met = [0; LANES];
         for level in self.levels.iter().filter(|level| level.y >= low && level.y <= high) {
             for i in 0..LANES {
                 let depth = (level.y - at[i]) * per[i];
                 let square = c[i] + depth * (2.0 * b[i] + a[i] * depth);
                 let between = (depth > near[i]) & (depth < far[i]);
                 let on = (square >= level.square[0]) & (square <= level.square[1]);
-                met[i] |= if between & on { u64::MAX } else { 0 };
+                met[i] |= mask(between & on);
             }
         }
         for cone in &self.cones {
             let [from, to] = cone.ends;
-            if !((from <= high || to <= high) && (from >= low || to >= low)) {
+            if !cone.between(low, high) {
                 continue;
             }
             for i in 0..LANES {
@@ -110,11 +107,111 @@ impl Spans {
                 let apart = e * f < 0.0;
                 let between = (u * v < 0.0) & (e * a2 > 0.0) & (c0 * a2 < b1 * b1);
                 let some = (near[i] < far[i]) & (s != t);
-                met[i] |= if some & (apart | between) { u64::MAX } else { 0 };
+                met[i] |= mask(some & (apart | between));
             }
         }
-        met.map(|met| met != 0)
+        met
     }
+}
+
+/// The parts of lines of sight inside of a cylinder around the surface, as depths, the
+/// reciprocal of how fast each climbs, and the heights between which all of them lie.
+struct Inside {
+    near: Row,
+    far: Row,
+    per: Row,
+    low: f64,
+    high: f64,
+}
+
+impl Cone {
+    /// Whether a part of it lies between two heights.
+    #[inline(always)]
+    fn between(&self, low: f64, high: f64) -> bool {
+        let [from, to] = self.ends;
+        let (least, most) = if from < to { (from, to) } else { (to, from) };
+        (least <= high) & (most >= low)
+    }
+}
+
+impl Spans {
+    #[inline(always)]
+    fn inside(&self, rays: &Rays, [from, to]: [&Row; 2]) -> Inside {
+        let Rays { square: [c, b, a], height: [at, climb] } = rays;
+        let zero = [0.0; LANES];
+        let (mut near, mut far, mut per) = (zero, zero, zero);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for i in 0..LANES {
+            let inside = b[i] * b[i] - a[i] * (c[i] - self.around);
+            let root = (if inside > 0.0 { inside } else { 0.0 }).sqrt();
+            let way = 1.0 / a[i];
+            let (enters, leaves) = ((-b[i] - root) * way, (root - b[i]) * way);
+            near[i] = if enters > from[i] { enters } else { from[i] };
+            far[i] = if leaves < to[i] { leaves } else { to[i] };
+            per[i] = 1.0 / climb[i];
+        }
+        for i in 0..LANES {
+            let (u, v) = (at[i] + climb[i] * near[i], at[i] + climb[i] * far[i]);
+            let some = near[i] < far[i];
+            let (least, most) = if u < v { (u, v) } else { (v, u) };
+            low = if some & (least < low) { least } else { low };
+            high = if some & (most > high) { most } else { high };
+        }
+        Inside { near, far, per, low, high }
+    }
+
+    /// What each line of sight meets first beyond a depth.
+    #[inline(always)]
+    pub fn nearest(&self, rays: &Rays, from: f64) -> Seen {
+        let Rays { square: [c, b, a], height: [at, climb] } = rays;
+        let Inside { near, far, per, low, high } =
+            self.inside(rays, [&[from; LANES], &[f64::INFINITY; LANES]]);
+        let (mut depth, mut span) = ([f64::INFINITY; LANES], [0; LANES]);
+        for level in self.levels.iter().filter(|level| level.y >= low && level.y <= high) {
+            for i in 0..LANES {
+                let d = (level.y - at[i]) * per[i];
+                let square = c[i] + d * (2.0 * b[i] + a[i] * d);
+                let on = (square >= level.square[0]) & (square <= level.square[1]);
+                let first = on & (d >= near[i]) & (d <= far[i]) & (d < depth[i]);
+                depth[i] = if first { d } else { depth[i] };
+                span[i] = if first { level.span } else { span[i] };
+            }
+        }
+        for cone in self.cones.iter().filter(|cone| cone.between(low, high)) {
+            let (middle, half) =
+                (0.5 * (cone.ends[0] + cone.ends[1]), 0.5 * (cone.ends[1] - cone.ends[0]).abs());
+            // A little more, so that no line passes between two cones.
+            let half = half * (1.0 + 1e-9) + 1e-12 * middle.abs();
+            for i in 0..LANES {
+                let (g, k) = (cone.radius + cone.slope * at[i], cone.slope * climb[i]);
+                let (c0, b1, a2) = (c[i] - g * g, b[i] - g * k, a[i] - k * k);
+                let inside = b1 * b1 - a2 * c0;
+                let root = (if inside > 0.0 { inside } else { 0.0 }).sqrt();
+                // Without cancellation: Press et al. 2007, section 5.6.
+                let q = -(b1 + if b1 < 0.0 { -root } else { root });
+                let (s, t) = (q / a2, c0 / q);
+                for d in [s, t] {
+                    let height = at[i] + climb[i] * d - middle;
+                    let on = (inside >= 0.0) & (height >= -half) & (height <= half);
+                    let first = on & (d >= from) & (d < depth[i]);
+                    depth[i] = if first { d } else { depth[i] };
+                    span[i] = if first { cone.span } else { span[i] };
+                }
+            }
+        }
+        for i in 0..LANES {
+            depth[i] = if near[i] <= far[i] { depth[i] } else { f64::INFINITY };
+        }
+        Seen { depth, span }
+    }
+}
+
+/// What lines of sight meet first.
+pub(super) struct Seen {
+    /// Infinite where there is nothing.
+    pub depth: Row,
+    /// The number of the span.
+    pub span: [u64; LANES],
 }
 
 #[inline(always)]

@@ -35,9 +35,13 @@ pub(super) struct Sight {
     /// `facing = normal . (view - bend * point)`; the third component of `view` is 0.
     pub view: [f64; 2],
     pub bend: f64,
+    /// The reciprocal of the lens's scale.
+    per_pixel: f64,
     /// How far one unit across the axis shows at most, divided by the lens's scale: at
     /// depth 1, for a pinhole.
     across: f64,
+    /// How much depth changes at most along one unit across the axis.
+    turn: f64,
 }
 
 /// The camera's distance from the axis is at least this fraction of its distance from the
@@ -76,6 +80,8 @@ impl Sight {
             view: [rho.max(least).max(f64::MIN_POSITIVE), view.y],
             bend: if lens.pinhole { 1.0 } else { 0.0 },
             across,
+            turn: libm::hypot(m.x_axis.z, m.z_axis.z),
+            per_pixel: 1.0 / lens.scale,
         })
     }
 
@@ -95,7 +101,7 @@ impl Sight {
     /// `y / depth`, or `x` and `y` for a parallel projection.
     #[inline(always)]
     pub fn slopes(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [(x - self.lens.cx) / self.lens.scale, (self.lens.cy - y) / self.lens.scale]
+        [(x - self.lens.cx) * self.per_pixel, (self.lens.cy - y) * self.per_pixel]
     }
 
     /// The lines of sight through positions in the image.
@@ -123,10 +129,48 @@ impl Sight {
         rays
     }
 
+    /// The point on the surface, in turned coordinates, at a position in the image and a
+    /// depth.
+    pub fn point(&self, at: [f64; 2], depth: f64) -> DVec3 {
+        let [a, b] = self.slopes(at);
+        let way = if self.lens.pinhole { depth } else { 1.0 };
+        self.inverse * (DVec3::new(a * way, b * way, -depth) - self.t)
+    }
+
+    /// The columns and rows, from the first to one past the last, outside of which a
+    /// surface does not show.
+    pub fn window(&self, surface: &Revolution, camera: &Camera) -> [[usize; 2]; 2] {
+        let sides = [camera.width, camera.height].map(|n| n as usize);
+        let rings = surface.rings();
+        let most = rings.iter().fold(0.0f64, |most, ring| most.max(ring.r));
+        let ends = rings.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], ring| {
+            [a.min(ring.y), b.max(ring.y)]
+        });
+        let mut reach = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for corner in 0..8u32 {
+            let sign = |bit: u32| if corner & bit == 0 { -most } else { most };
+            let y = if corner & 4 == 0 { ends[0] } else { ends[1] };
+            let at = self.camera(DVec3::new(sign(1), y, sign(2)));
+            if !(-at.z > Camera::NEAR) {
+                return sides.map(|side| [0, side]);
+            }
+            let p = self.lens.point(at);
+            for (reach, v) in reach.iter_mut().zip([p.x, p.y]) {
+                *reach = [reach[0].min(v), reach[1].max(v)];
+            }
+        }
+        let mut out = sides.map(|side| [0, side]);
+        for (out, reach) in out.iter_mut().zip(reach) {
+            // Numbers that do not fit are clamped, and NaN is 0.
+            let [from, to] = [reach[0].floor() as usize, reach[1].ceil().max(0.0) as usize + 1];
+            *out = [from.min(out[1]), to.min(out[1])];
+        }
+        out
+    }
+
     /// The depths between which a ring lies.
     fn depths(&self, ring: &Ring) -> DepthRange {
-        let [x, y, z] = [self.m.x_axis.z, self.m.y_axis.z, self.m.z_axis.z];
-        let (middle, reach) = (-(self.t.z + y * ring.y), ring.r * libm::hypot(x, z));
+        let (middle, reach) = (-(self.t.z + self.m.y_axis.z * ring.y), ring.r * self.turn);
         DepthRange { near: middle - reach, far: middle + reach }
     }
 
@@ -145,8 +189,7 @@ impl Sight {
         // Away from the camera's axis, motion along it also shows.
         let middle = self.t + self.m.y_axis * ring.y;
         let slant = libm::hypot(middle.x, middle.y) / near;
-        let along = libm::hypot(self.m.x_axis.z, self.m.z_axis.z);
-        ring.r * (self.across + slant * along) * self.lens.scale / near
+        ring.r * (self.across + slant * self.turn) * self.lens.scale / near
     }
 }
 
