@@ -108,6 +108,10 @@ fn by_ends(
     Some([end(1.0 - source.at, -1.0), end(source.at, 1.0)])
 }
 
+/// A silhouette's bends stay on their rings unless the sine of the angle at which it
+/// crosses a ring is about this or less.
+const STEADY: f64 = 0.02;
+
 /// Derivatives on their way back to the surface.
 struct Back<'a> {
     surface: &'a Revolution,
@@ -157,7 +161,9 @@ impl Back<'_> {
         let r = libm::hypot(p.x, p.z);
         let (c, s) = if r > 0.0 { (p.x / r, p.z / r) } else { (1.0, 0.0) };
         let t = if dr.abs() > dy.abs() { (r - a.r) / dr } else { (p.y - a.y) / dy };
-        let t = t.clamp(0.0, 1.0);
+        // Rings are met up to rounding.
+        let t = if t < 1e-9 { 0.0 } else { t };
+        let t = if t > 1.0 - 1e-9 { 1.0 } else { t };
         let shares = [1.0 - t, t];
         for (k, share) in shares.into_iter().enumerate() {
             if let Some(place) = self.out.rings.get_mut(span.ring + k) {
@@ -184,8 +190,11 @@ impl Back<'_> {
         let around = -(a.nr + (b.nr - a.nr) * t) * s * x / r;
         let along = (one(b) - one(a)) / long;
         let (to_side, to_end) = (DVec3::new(-s, 0.0, c), DVec3::new(dr * c, dy, dr * s) / long);
+        // The silhouette bends at rings, and its bends stay on them; unless it runs along
+        // one there, so that they move fast.
         let ends = [t == 0.0 && self.is_end(first), t == 1.0 && self.is_end(first + 1)];
-        if ends.contains(&true) {
+        let steady = around.abs() > STEADY * along.abs();
+        if ends.contains(&true) || ((t == 0.0 || t == 1.0) && steady) {
             return -g.dot(to_side) / around;
         }
         -(g.dot(to_side) * around + g.dot(to_end) * along) / (around * around + along * along)
@@ -193,8 +202,7 @@ impl Back<'_> {
 
     /// Whether a ring is an end of a smooth strip.
     fn is_end(&self, ring: usize) -> bool {
-        let [before, after] = self.neighbours(ring);
-        before == ring || after == ring
+        self.neighbours(ring).contains(&ring)
     }
 
     /// The rings before and after a ring in its strip, or the ring itself at an end.

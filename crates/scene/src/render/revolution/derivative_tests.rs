@@ -44,6 +44,7 @@ fn value(surface: &Revolution, affine: &Affine, camera: &Camera) -> f64 {
 
 #[test]
 fn pieces_follow_the_placement() {
+    let mut wrong = 0.0f64;
     for camera in cameras() {
         for (parts, caps) in bodies() {
             let surface = Revolution::lathe(&parts, 0.0, caps).unwrap();
@@ -51,7 +52,7 @@ fn pieces_follow_the_placement() {
             let by = weighted(&Contours::of_revolution(&surface, &here, &camera)).1;
             let found = Contours::vjp_revolution(&surface, &here, &camera, &by);
             for k in 0..7 {
-                let h = 1e-3;
+                let h = 1e-2;
                 let at = |h: f64| {
                     let mut p = [0.0; 7];
                     p[k] = h;
@@ -63,17 +64,16 @@ fn pieces_follow_the_placement() {
                 let shift = (at(1e-6).0.translation - at(-1e-6).0.translation) * 5e5;
                 let along = found.shift.dot(shift)
                     + (0..3).map(|i| found.linear.col(i).dot(way.col(i))).sum::<f64>();
-                assert!(
-                    (along - slope).abs() < 0.01 * slope.abs() + 0.5,
-                    "number {k}: {along} {slope}"
-                );
+                wrong = wrong.max((along - slope).abs() - 0.01 * slope.abs());
             }
         }
     }
+    assert!(wrong < 0.3, "{wrong}");
 }
 
 #[test]
 fn pieces_follow_the_profile() {
+    let mut wrong = 0.0f64;
     for camera in cameras() {
         for (parts, caps) in bodies() {
             let at = |h: f64, k: usize| {
@@ -94,7 +94,7 @@ fn pieces_follow_the_profile() {
             let rings = Contours::vjp_revolution(&surface(0.0, 0), &here, &camera, &by).rings;
             let found = Revolution::vjp_lathe(&parts, 0.0, caps, &rings).unwrap();
             for k in 0..4 {
-                let h = 1e-3;
+                let h = 1e-2;
                 let slope = (value(&surface(h, k), &here, &camera)
                     - value(&surface(-h, k), &here, &camera))
                     / (2.0 * h);
@@ -106,11 +106,9 @@ fn pieces_follow_the_profile() {
                         along += g.y[i] * (p.y[i] - q.y[i]) * 5e5;
                     }
                 }
-                assert!(
-                    (along - slope).abs() < 0.01 * slope.abs() + 0.5,
-                    "number {k}: {along} {slope}"
-                );
+                wrong = wrong.max((along - slope).abs() - 0.01 * slope.abs());
             }
         }
     }
+    assert!(wrong < 0.3, "{wrong}");
 }
