@@ -3,7 +3,7 @@
 //!
 //! The rules are those of the contours of meshes (`lines/extraction.rs`).
 
-use super::rays::{LANES, Mask, Row, mask};
+use super::lanes::{LANES, Mask, Row, mask};
 use super::samples::{Samples, row, rows};
 use super::sight::Sight;
 use crate::geom::{Revolution, Rim};

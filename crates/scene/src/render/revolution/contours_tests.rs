@@ -6,6 +6,7 @@ use crate::render::Projection;
 use crate::render::revolution::testing::{Vessel, random_pose};
 use crate::render::simd::portable;
 use crate::render::testing::Uniform;
+use glam::DVec3;
 
 /// The distance from a point to the nearest piece.
 fn nearest(x: f32, y: f32, c: &Contours) -> f64 {

@@ -5,7 +5,7 @@
 //! least motion over the surface or, at the end of a smooth strip, along that end. Where
 //! contours pass behind others, the ends of what is visible are held fixed.
 
-use super::contours::Source;
+use super::drawer::Source;
 use super::samples::LAST;
 use super::sight::Sight;
 use crate::contours::Contours;

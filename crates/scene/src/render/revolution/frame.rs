@@ -1,7 +1,8 @@
 //! Depth, parts and normals of a surface of revolution: a line of sight for each pixel
 //! against its cones and level spans.
 
-use super::rays::{LANES, Seen, Spans};
+use super::lanes::LANES;
+use super::rays::{Seen, Spans};
 use super::sight::Sight;
 use crate::geom::{Affine, Revolution};
 use crate::render::simd::vectorised;

@@ -5,11 +5,17 @@
 //! plane, and its visibility tested there, for both. The placement may be any invertible
 //! affine map. The contours are those of the mesh of a lathe as the number of its sides
 //! grows.
+//!
+//! `sight` has the camera and the surface in each other's coordinates, `silhouettes` makes
+//! curves (`samples`), `chords` orients their pieces, `rays` decides what is visible, `drawer`
+//! puts this together, and `contours`, `frame` and `derivative` are what others call.
 
 mod chords;
 mod contours;
 mod derivative;
+mod drawer;
 mod frame;
+mod lanes;
 mod rays;
 mod samples;
 mod sight;

@@ -4,23 +4,9 @@
 //! depth, and the squared radius of a cone at the line's height another; whether their
 //! difference has a root in an interval is decided without a square root.
 
+use super::lanes::{LANES, Mask, Row, mask};
 use super::sight::Rays;
 use crate::geom::Revolution;
-
-/// Lines of sight tested at a time.
-pub(super) const LANES: usize = 8;
-
-/// A number for each line.
-pub(super) type Row = [f64; LANES];
-
-/// For each line, all bits set or none.
-pub(super) type Mask = [u64; LANES];
-
-/// All bits set or none.
-#[inline(always)]
-pub(super) fn mask(on: bool) -> u64 {
-    if on { u64::MAX } else { 0 }
-}
 
 /// A span that is not level.
 #[derive(Clone, Copy, Debug)]

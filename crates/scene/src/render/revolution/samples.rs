@@ -1,7 +1,7 @@
 //! Points along curves on a surface of revolution, and their images on both sides of the
 //! plane of symmetry.
 
-use super::rays::{LANES, Row};
+use super::lanes::{LANES, Row};
 use super::sight::Sight;
 use glam::DVec3;
 

@@ -4,7 +4,7 @@
 //! direction to it) has z = 0 and x > 0. Invariant: the placement is invertible and all
 //! numbers are finite.
 
-use super::rays::{LANES, Row};
+use super::lanes::{LANES, Row};
 use crate::geom::{Affine, Revolution, Ring};
 use crate::render::Camera;
 use crate::render::pixels::place::Point;
