@@ -10,8 +10,9 @@ use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Profile, Tolerance, Wall, floor_height, inner_wall};
 use super::real::{Real, Tape, Var};
 use super::revolve::{Strip, revolve, vjp_rings};
-use super::{GeomError, Mesh, Revolution, Solid};
+use super::{Affine, GeomError, Instance, Mesh, Revolution, Solid};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// Which ends of an object of revolution are closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,6 +97,32 @@ impl Solid {
     ) -> Result<Solid, GeomError> {
         turned(parts, sides, wall.into(), caps)
             .map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
+    }
+
+    /// As [`Solid::lathe`], for a solid that is drawn as the [`Revolution`] itself where it
+    /// is the only object. `sides` is for the mesh, which is made when something else needs
+    /// it: several objects in one picture, export, bounds.
+    ///
+    /// # Errors
+    /// As [`lathe`].
+    pub fn exact_lathe(
+        parts: &[Profile],
+        sides: u32,
+        wall: impl Into<Wall>,
+        caps: Caps,
+    ) -> Result<Solid, GeomError> {
+        let wall = wall.into();
+        check(parts, sides, wall)?;
+        let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
+        let count = parts.len() as u16 + 5;
+        let surface = Revolution::new(&strips, closed, count);
+        Ok(Solid::turned(surface, move || Instance {
+            mesh: Arc::new(revolve(&strips, sides, closed, count)),
+            affine: Affine::IDENTITY,
+            first_part: 0,
+            detail: Some(Arc::new(Detail::turned(Turned::new(strips, sides, closed, count)))),
+            skin: None,
+        }))
     }
 }
 

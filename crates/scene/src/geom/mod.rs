@@ -41,7 +41,7 @@ pub use posed_skin::{PosedSkin, RestJoint, Skinned};
 pub use profile_path::{Profile, Wall};
 pub use revolution::{Revolution, Rim, Ring, Span};
 pub(crate) use solid::MeshesMark;
-pub use solid::{Instance, PlacedGradient, Solid};
+pub use solid::{Instance, PlacedGradient, PlacedRevolution, Solid};
 pub use sphere::{sphere, vjp_sphere};
 
 /// Returns the matrix a b'.

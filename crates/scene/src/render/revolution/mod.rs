@@ -20,6 +20,7 @@ mod rays;
 mod samples;
 mod sight;
 mod silhouettes;
+mod vertices;
 
 pub use derivative::RevolutionGradient;
 
