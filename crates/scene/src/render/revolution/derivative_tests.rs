@@ -82,8 +82,8 @@ fn pieces_follow_the_profile() {
                     for (i, (r, y)) in p.r.iter_mut().zip(&mut p.y).enumerate() {
                         let bump = libm::sin(0.3 * i as f64 + k as f64);
                         // Tips stay on the axis.
-                        *r *= 1.0 + if k % 2 == 0 { h * bump } else { 0.0 };
-                        *y += if k % 2 == 1 { h * 0.3 * *y } else { 0.0 };
+                        *r *= 1.0 + if k.is_multiple_of(2) { h * bump } else { 0.0 };
+                        *y += if !k.is_multiple_of(2) { h * 0.3 * *y } else { 0.0 };
                     }
                 }
                 parts

@@ -358,7 +358,10 @@ impl Drawer<'_> {
         }
         let at = self.count;
         let Contours { x, y, tx, ty, length, .. } = &mut self.out;
-        (put(x, at, rows[0]), put(y, at, rows[1]), put(tx, at, rows[2]), put(ty, at, rows[3]));
+        put(x, at, rows[0]);
+        put(y, at, rows[1]);
+        put(tx, at, rows[2]);
+        put(ty, at, rows[3]);
         put(length, at, rows[4]);
         self.count += count;
     }

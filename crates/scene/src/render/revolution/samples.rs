@@ -85,9 +85,13 @@ impl Samples {
     pub fn push(&mut self, p: &Sample, span: u32) {
         let i = self.count;
         let [x, y, z] = &mut self.points;
-        (set(x, i, p.r * p.c), set(y, i, p.y), set(z, i, p.r * p.s));
+        set(x, i, p.r * p.c);
+        set(y, i, p.y);
+        set(z, i, p.r * p.s);
         let [x, y, z] = &mut self.normals;
-        (set(x, i, p.nr * p.c), set(y, i, p.ny), set(z, i, p.nr * p.s));
+        set(x, i, p.nr * p.c);
+        set(y, i, p.ny);
+        set(z, i, p.nr * p.s);
         if let Some(place) = self.spans.get_mut(i) {
             *place = span;
         }

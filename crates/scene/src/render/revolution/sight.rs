@@ -151,7 +151,8 @@ impl Sight {
             let sign = |bit: u32| if corner & bit == 0 { -most } else { most };
             let y = if corner & 4 == 0 { ends[0] } else { ends[1] };
             let at = self.camera(DVec3::new(sign(1), y, sign(2)));
-            if !(-at.z > Camera::NEAR) {
+            // Also if it is not a number.
+            if !at.z.is_finite() || -at.z <= Camera::NEAR {
                 return sides.map(|side| [0, side]);
             }
             let p = self.lens.point(at);
