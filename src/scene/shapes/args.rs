@@ -34,17 +34,28 @@ pub(in crate::scene) fn vector_of(v: &Value) -> Option<DVec3> {
     }
 }
 
+/// The number of flat sides of a round lathe's mesh, which is made for export and for
+/// pictures of several objects.
+const SIDES_OF_ROUND: u32 = 96;
+
 /// The arguments of `lathe`.
 pub(super) struct LatheArgs {
     pub profiles: Vec<Profile>,
     pub sides: u32,
+    /// Whether it is drawn without a mesh where it is the only object.
+    pub round: bool,
     pub wall: Wall,
     pub caps: Caps,
 }
 
 pub(super) fn lathe_args(a: &Args) -> Result<LatheArgs, Fault> {
     let profiles = profiles(a)?;
-    let sides = if a.given(1) { a.int_in(1, 3, 1024)? as u32 } else { 48 };
+    let round = matches!(a.get(1), Value::Num(0.0));
+    let sides = match a.given(1) {
+        _ if round => SIDES_OF_ROUND,
+        true => a.int_in(1, 3, 1024)? as u32,
+        false => 48,
+    };
     let caps = match a.choice(3, &["both", "bottom", "top", "none"])? {
         "bottom" => Caps::Bottom,
         "top" => Caps::Top,
@@ -52,7 +63,7 @@ pub(super) fn lathe_args(a: &Args) -> Result<LatheArgs, Fault> {
         _ => Caps::Both,
     };
     let wall = Wall { thickness: a.num_or(2, 0.0)?, floor: a.num_or(4, 0.0)? };
-    Ok(LatheArgs { profiles, sides, wall, caps })
+    Ok(LatheArgs { profiles, sides, round, wall, caps })
 }
 
 /// Reads one profile or an array of them.

@@ -26,7 +26,13 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("parts", Type::Any, "A profile `{ y: heights, r: radii }`, or an array of them, from the bottom up.")
                 .unit("scene units"),
-            opt("sides", Type::Int, "48", "The number of flat sides, 3 to 1024."),
+            opt(
+                "sides",
+                Type::Int,
+                "48",
+                "The number of flat sides, 3 to 1024; 0 for a round surface, drawn without a mesh where it is the \
+                 only object.",
+            ),
             opt(
                 "thickness",
                 Type::Num,
@@ -47,8 +53,12 @@ pub(super) const TABLE: &[Row] = &[
         "A surface of revolution: profiles stacked and swept around the y axis; a step from one \
          profile to the next is closed by a ring.",
         |a| {
-            let LatheArgs { profiles, sides, wall, caps } = lathe_args(a)?;
-            Solid::lathe(&profiles, sides, wall, caps).map(solid).map_err(fault)
+            let LatheArgs { profiles, sides, round, wall, caps } = lathe_args(a)?;
+            let made = match round {
+                true => Solid::exact_lathe(&profiles, sides, wall, caps),
+                false => Solid::lathe(&profiles, sides, wall, caps),
+            };
+            made.map(solid).map_err(fault)
         },
     )
     .vjp(vjps::lathe),

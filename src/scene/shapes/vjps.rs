@@ -23,7 +23,7 @@ fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> 
 /// For `scene.lathe`.
 pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let Some((_, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
-    let LatheArgs { profiles, sides, wall, caps } = lathe_args(a).ok()?;
+    let LatheArgs { profiles, sides, wall, caps, .. } = lathe_args(a).ok()?;
     let g = vjp_lathe(&profiles, sides, wall, caps, &by_vertex).ok()?;
     let parts = match a.get(0) {
         Value::List(all) => {

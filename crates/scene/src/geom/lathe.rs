@@ -8,10 +8,11 @@
 use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Profile, Tolerance, Wall, floor_height, inner_wall};
-use super::real::{Real, Tape};
+use super::real::{Real, Tape, Var};
 use super::revolve::{Strip, revolve, vjp_rings};
-use super::{GeomError, Mesh, Solid};
+use super::{Affine, GeomError, Instance, Mesh, Revolution, Solid};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// Which ends of an object of revolution are closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +31,8 @@ pub enum Caps {
 const MOST_POINTS: usize = 4096;
 /// The maximum number of profiles.
 const MOST_PROFILES: usize = 1000;
+/// The minimum number of sides.
+const FEWEST_SIDES: u32 = 3;
 /// The maximum height or radius, in scene units.
 const LARGEST: f64 = 1e6;
 
@@ -95,6 +98,66 @@ impl Solid {
         turned(parts, sides, wall.into(), caps)
             .map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
     }
+
+    /// As [`Solid::lathe`], for a solid that is drawn as the [`Revolution`] itself where it
+    /// is the only object. `sides` is for the mesh, which is made when something else needs
+    /// it: several objects in one picture, export, bounds.
+    ///
+    /// # Errors
+    /// As [`lathe`].
+    pub fn exact_lathe(
+        parts: &[Profile],
+        sides: u32,
+        wall: impl Into<Wall>,
+        caps: Caps,
+    ) -> Result<Solid, GeomError> {
+        let wall = wall.into();
+        check(parts, sides, wall)?;
+        let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
+        let count = parts.len() as u16 + 5;
+        let surface = Revolution::new(&strips, closed, count);
+        Ok(Solid::turned(surface, move || Instance {
+            mesh: Arc::new(revolve(&strips, sides, closed, count)),
+            affine: Affine::IDENTITY,
+            first_part: 0,
+            detail: Some(Arc::new(Detail::turned(Turned::new(strips, sides, closed, count)))),
+            skin: None,
+        }))
+    }
+}
+
+impl Revolution {
+    /// The surface that [`lathe`] makes a mesh of, with any number of sides.
+    ///
+    /// # Errors
+    /// As [`lathe`].
+    pub fn lathe(
+        parts: &[Profile],
+        wall: impl Into<Wall>,
+        caps: Caps,
+    ) -> Result<Revolution, GeomError> {
+        let wall = wall.into();
+        check(parts, FEWEST_SIDES, wall)?;
+        let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
+        Ok(Revolution::new(&strips, closed, parts.len() as u16 + 5))
+    }
+
+    /// The vector-Jacobian product of [`Revolution::lathe`], given derivatives with respect
+    /// to the radius and the height of each ring. Which points are merged and which ends
+    /// are closed is held fixed.
+    ///
+    /// # Errors
+    /// As [`lathe`].
+    pub fn vjp_lathe(
+        parts: &[Profile],
+        wall: impl Into<Wall>,
+        caps: Caps,
+        by_ring: &[(f64, f64)],
+    ) -> Result<LatheGradient, GeomError> {
+        let wall = wall.into();
+        check(parts, FEWEST_SIDES, wall)?;
+        vjp_layout(parts, wall, caps, |_| by_ring.to_vec())
+    }
 }
 
 /// Derivatives with respect to the inputs of [`lathe`].
@@ -120,6 +183,16 @@ pub fn vjp_lathe(
 ) -> Result<LatheGradient, GeomError> {
     let wall = wall.into();
     check(parts, sides, wall)?;
+    vjp_layout(parts, wall, caps, |strips| vjp_rings(strips, sides, by_vertex))
+}
+
+/// Maps derivatives with respect to the points of the path, in order, to the inputs.
+fn vjp_layout(
+    parts: &[Profile],
+    wall: Wall,
+    caps: Caps,
+    by_point: impl FnOnce(&[Strip<Var<'_>>]) -> Vec<(f64, f64)>,
+) -> Result<LatheGradient, GeomError> {
     let tape = Tape::default();
     let wall = Wall { thickness: tape.variable(wall.thickness), floor: tape.variable(wall.floor) };
     let mut inputs = Vec::new();
@@ -129,7 +202,7 @@ pub fn vjp_lathe(
         v
     };
     let strips = layout(parts, caps, wall, number)?.strips;
-    let rings = vjp_rings(&strips, sides, by_vertex);
+    let rings = by_point(&strips);
     let outputs = strips
         .iter()
         .flat_map(|s| &s.points)
@@ -233,7 +306,7 @@ fn check(parts: &[Profile], sides: u32, wall: Wall) -> Result<(), GeomError> {
     if points > MOST_POINTS {
         return wrong(format!("{points} points; at most {MOST_POINTS}"));
     }
-    if !(3..=1024).contains(&sides) {
+    if !(FEWEST_SIDES..=1024).contains(&sides) {
         return wrong(format!("3 to 1024 sides, got {sides}"));
     }
     for (what, x) in [("thickness", wall.thickness), ("floor", wall.floor)] {

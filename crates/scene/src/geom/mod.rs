@@ -21,6 +21,7 @@ mod patches;
 pub(crate) mod posed_skin;
 mod profile_path;
 mod real;
+mod revolution;
 mod revolve;
 mod solid;
 mod sphere;
@@ -38,8 +39,9 @@ pub use patches::Patches;
 pub(crate) use patches::Run;
 pub use posed_skin::{PosedSkin, RestJoint, Skinned};
 pub use profile_path::{Profile, Wall};
+pub use revolution::{Revolution, Rim, Ring, Span};
 pub(crate) use solid::MeshesMark;
-pub use solid::{Instance, PlacedGradient, Solid};
+pub use solid::{Instance, PlacedGradient, PlacedRevolution, Solid};
 pub use sphere::{sphere, vjp_sphere};
 
 /// Returns the matrix a b'.

@@ -49,10 +49,7 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
         let last = s.points.len() - 1;
         for (i, (r, y)) in s.points.iter().enumerate() {
             let (a, b) = (s.points[i.saturating_sub(1)], s.points[(i + 1).min(last)]);
-            // The outside is on the right of the path's direction (dr, dy).
-            let (nr, ny) = (b.1 - a.1, -(b.0 - a.0));
-            let length = libm::hypot(nr, ny);
-            let (nr, ny) = if length > 0.0 { (nr / length, ny / length) } else { (1.0, 0.0) };
+            let (nr, ny) = ring_normal([a, b]);
             if *r == 0.0 {
                 positions.push(Vec3::new(0.0, *y as f32, 0.0));
                 normals.push(Vec3::new(0.0, if ny < 0.0 { -1.0 } else { 1.0 }, 0.0));
@@ -65,6 +62,14 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
         }
     }
     Mesh { positions, normals, topology }
+}
+
+/// The unit normal of a ring, away from the axis and along it, from the points before and
+/// after it. The outside is on the right of the path's direction.
+pub(super) fn ring_normal([a, b]: [(f64, f64); 2]) -> (f64, f64) {
+    let (nr, ny) = (b.1 - a.1, -(b.0 - a.0));
+    let length = libm::hypot(nr, ny);
+    if length > 0.0 { (nr / length, ny / length) } else { (1.0, 0.0) }
 }
 
 /// Returns the topology of [`revolve`]'s mesh.

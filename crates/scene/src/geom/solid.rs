@@ -9,6 +9,7 @@ use super::detail::{Coarse, Detail};
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::posed_skin::PosedSkin;
+use super::revolution::Revolution;
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
 use glam::{DMat3, DVec3};
 use std::fmt;
@@ -57,6 +58,17 @@ pub struct Solid {
     landmarks: Arc<Lazy<Landmark>>,
     /// The depth of nested lists that have not been computed yet.
     lazy_depth: u32,
+    /// The surface that its only mesh stands for.
+    revolution: Option<PlacedRevolution>,
+}
+
+/// A placed surface of revolution.
+#[derive(Clone, Debug)]
+pub struct PlacedRevolution {
+    /// The surface.
+    pub surface: Arc<Revolution>,
+    /// The placement.
+    pub affine: Affine,
 }
 
 /// The members of a group.
@@ -170,7 +182,25 @@ impl Solid {
             group: None,
             landmarks: ready(Arc::default()),
             lazy_depth: 0,
+            revolution: None,
         }
+    }
+
+    /// A surface of revolution, which is drawn without a mesh where it is the only object.
+    /// Its mesh is made when something else needs one, such as export.
+    pub(super) fn turned(
+        surface: Revolution,
+        mesh: impl FnOnce() -> Instance + Send + 'static,
+    ) -> Solid {
+        let (surface, affine) = (Arc::new(surface), Affine::IDENTITY);
+        let revolution = Some(PlacedRevolution { surface, affine });
+        Solid { revolution, ..Solid::of_parts(move || [mesh()]) }
+    }
+
+    /// The surface of revolution that the solid shows, if it is one and its placement can
+    /// be inverted.
+    pub fn revolution(&self) -> Option<&PlacedRevolution> {
+        self.revolution.as_ref().filter(|r| r.affine.inverse().is_some())
     }
 
     /// Replaces the landmarks (in world coordinates); repeated names get `#2`, `#3`, …
@@ -201,7 +231,8 @@ impl Solid {
         M: IntoIterator<Item = Instance>,
     {
         let instances = Meshes(later(move || make().into_iter().collect()));
-        Solid { instances, group: None, landmarks: ready(Arc::default()), lazy_depth: 1 }
+        let landmarks = ready(Arc::default());
+        Solid { instances, group: None, landmarks, lazy_depth: 1, revolution: None }
     }
 
     /// The placed meshes.
@@ -219,8 +250,12 @@ impl Solid {
             of.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() }).collect()
         };
         let (instances, landmarks) = (Meshes(later(placed)), later(moved));
-        Solid { instances, group: None, landmarks, lazy_depth: self.lazy_depth + 1 }
-            .forced_if_deep()
+        let revolution = self
+            .revolution
+            .as_ref()
+            .map(|r| PlacedRevolution { surface: Arc::clone(&r.surface), affine: by * r.affine });
+        let lazy_depth = self.lazy_depth + 1;
+        Solid { instances, group: None, landmarks, lazy_depth, revolution }.forced_if_deep()
     }
 
     /// Computes the lists now if they are nested too deeply.
@@ -265,7 +300,8 @@ impl Solid {
         let landmarks =
             later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
         let lazy_depth = solids.iter().map(|s| s.lazy_depth).max().unwrap_or(0) + 1;
-        Solid { instances, group: Some(group), landmarks, lazy_depth }.forced_if_deep()
+        Solid { instances, group: Some(group), landmarks, lazy_depth, revolution: None }
+            .forced_if_deep()
     }
 
     /// The number of meshes.
@@ -456,127 +492,5 @@ impl Solid {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geom::{cuboid, sphere};
-
-    #[test]
-    fn groups_and_centring() {
-        let a = Solid::new(Arc::new(cuboid(DVec3::new(1.0, 4.0, 2.0)).unwrap()));
-        let b = Solid::new(Arc::new(sphere(1.0, 16).unwrap()));
-        let shift = Affine::new(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO, DVec3::ONE);
-        let g = Solid::group(&[a.clone(), b.placed(shift)]);
-        assert_eq!((g.instances().len(), g.part_count()), (2, 2));
-        let bounds = g.bounds().unwrap();
-        assert!((bounds.max - DVec3::new(4.0, 2.0, 1.0)).length() < 1e-5);
-        let c = g.centred(true).bounds().unwrap();
-        assert!(c.centre().length() < 1e-6);
-        assert!((c.size().max_element() - 2.0).abs() < 1e-6);
-        let m = g.to_mesh().unwrap();
-        assert_eq!(m.topology.triangles.len(), 12 + b.instances()[0].mesh.topology.triangles.len());
-        assert_eq!(m.topology.part_count, 2);
-    }
-
-    fn block(size: DVec3) -> Solid {
-        Solid::new(Arc::new(cuboid(size).unwrap()))
-    }
-
-    #[test]
-    fn centring_without_fit_keeps_sizes_and_survives_extremes() {
-        let shift = Affine::new(DVec3::new(3.0, -5.0, 0.25), DVec3::new(0.3, 0.0, 0.0), DVec3::ONE);
-        let s = block(DVec3::new(1.0, 4.0, 2.0)).placed(shift);
-        let (before, after) = (s.bounds().unwrap(), s.centred(false).bounds().unwrap());
-        assert!(after.centre().length() < 1e-12 && (after.size() - before.size()).length() < 1e-12);
-        assert!(Solid::group(&[]).centred(true).bounds().is_none());
-        for scale in [0.0, 1e-320, 1e308] {
-            let extreme = block(DVec3::ONE).placed(Affine::new(
-                DVec3::ZERO,
-                DVec3::ZERO,
-                DVec3::splat(scale),
-            ));
-            assert!(
-                extreme.centred(true).instances().iter().all(|i| i.affine.is_finite()),
-                "{scale}"
-            );
-        }
-    }
-
-    #[test]
-    fn landmarks_go_where_their_solid_goes() {
-        let at = |name: &str, position| Landmark { name: Arc::from(name), position };
-        let tip = DVec3::new(0.0, 2.0, 0.0);
-        let arm = block(DVec3::new(1.0, 4.0, 1.0))
-            .with_landmarks([at("elbow", DVec3::ZERO), at("hand", tip)]);
-        let turned = Affine::new(
-            DVec3::X,
-            DVec3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2),
-            DVec3::splat(3.0),
-        );
-        let two = Solid::group(&[arm.clone(), arm.placed(turned), block(DVec3::ONE)]);
-        let names: Vec<&str> = two.landmarks().iter().map(|l| &*l.name).collect();
-        assert_eq!(names, ["elbow", "hand", "elbow#2", "hand#2"]);
-        assert!((two.landmarks()[3].position - DVec3::new(-5.0, 0.0, 0.0)).length() < 1e-12);
-        let lifted = arm.placed(Affine::new(DVec3::Y, DVec3::ZERO, DVec3::ONE));
-        let fit = lifted.centred(true);
-        assert!(
-            (fit.landmarks()[1].position - DVec3::Y).length() < 1e-6,
-            "half the longest edge is 1 now"
-        );
-        assert!(fit.landmarks()[0].position.length() < 1e-6);
-        assert!(block(DVec3::ONE).landmarks().is_empty());
-    }
-
-    #[test]
-    fn parts_of_nested_groups_follow_one_another() {
-        let b = block(DVec3::ONE);
-        let inner = Solid::group(&[b.clone(), b.clone()]);
-        let outer = Solid::group(&[b.clone(), inner.clone(), inner]);
-        assert_eq!(
-            outer.instances().iter().map(|i| i.first_part).collect::<Vec<_>>(),
-            [0, 1, 2, 3, 4]
-        );
-        let far = (0..17).fold(b, |s, _| Solid::group(&[s.clone(), s]));
-        assert_eq!(far.part_count(), u16::MAX, "numbers end there");
-        let m = far.to_mesh().unwrap();
-        assert_eq!(
-            (m.topology.triangles.len(), m.topology.parts.iter().max()),
-            (12 << 17, Some(&65534))
-        );
-    }
-
-    #[test]
-    fn export_keeps_normals_and_creases_and_turns_mirrored_faces() {
-        // A coarse sphere is smooth although its faces meet at 90 degrees.
-        let s = Solid::new(Arc::new(sphere(1.0, 4).unwrap()));
-        let scale = DVec3::new(-1.0, 2.0, 1.0);
-        let m = s.placed(Affine::new(DVec3::ZERO, DVec3::ZERO, scale)).to_mesh().unwrap();
-        assert!(m.topology.edges.iter().all(|e| !e.crease && e.faces[1] != NO_FACE));
-        for (p, n) in m.positions.iter().zip(&m.normals) {
-            // The gradient of x^2 + (y/2)^2 + z^2.
-            let expected = (p.as_dvec3() / (scale * scale)).normalize();
-            assert!((n.as_dvec3() - expected).length() < 1e-6);
-        }
-        let t = &m.topology;
-        for face in &t.triangles {
-            let p = face.map(|v| m.positions[v as usize]);
-            assert!((p[1] - p[0]).cross(p[2] - p[0]).dot(p[0] + p[1] + p[2]) > 0.0, "outward");
-        }
-        for e in t.edges.iter() {
-            let face = t.triangles[e.faces[0] as usize];
-            assert!(
-                (0..3).any(|c| e.vertices == [face[c], face[(c + 1) % 3]]),
-                "as the first face runs"
-            );
-        }
-    }
-
-    #[test]
-    fn squashed_and_endless_solids() {
-        let flat = |y: f64| {
-            block(DVec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, y, 1.0)))
-        };
-        assert_eq!(flat(0.0).to_mesh().unwrap().topology.triangles.len(), 4, "the sides are gone");
-        assert!(flat(1e300).to_mesh().unwrap_err().to_string().contains("not finite"));
-        assert!(Solid::group(&[]).to_mesh().is_err());
-    }
-}
+#[path = "solid_tests.rs"]
+mod tests;

@@ -18,9 +18,9 @@ pub(super) struct Drawn {
 
 impl Drawn {
     /// The solid, nowhere off by more than `detail` pixels; 0 (or less, or NaN) leaves it
-    /// unchanged.
+    /// unchanged, as are surfaces that are drawn without a mesh.
     pub fn new(solid: &Solid, camera: &Camera, detail: f64) -> Drawn {
-        if detail <= 0.0 || detail.is_nan() {
+        if detail <= 0.0 || detail.is_nan() || solid.revolution().is_some() {
             return Drawn { solid: solid.clone(), coarse: Vec::new() };
         }
         let find = |instance: &Instance| instance.coarse(allowed(instance, camera, detail)?);

@@ -12,6 +12,7 @@ mod derivatives;
 mod detail;
 mod lines;
 mod pixels;
+mod revolution;
 mod view;
 mod work;
 
@@ -27,5 +28,6 @@ pub use batch::{BatchRenderer, ContourBatch, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
 pub use pixels::frame::{Channels, Frame};
 pub use pixels::shade::shade;
+pub use revolution::RevolutionGradient;
 pub use view::View;
 pub use work::{Work, work};

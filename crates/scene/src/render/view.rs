@@ -106,7 +106,7 @@ impl View {
     /// with the full meshes.
     pub fn frame(&self, size: u32) -> Arc<Frame> {
         once(&self.frames, size, || {
-            Arc::new(Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All))
+            Arc::new(drawn_frame(&self.solid, &self.camera.scaled_to(size), Channels::All))
         })
     }
 
@@ -123,7 +123,7 @@ impl View {
                 let depth = on_canvas.then(drawn).flatten();
                 Arc::new(match depth {
                     Some(depth) => Frame::of_depth(&camera, depth),
-                    None => Frame::render(&solid, &camera, Channels::Depth),
+                    None => drawn_frame(&solid, &camera, Channels::Depth),
                 })
             })
         })
@@ -157,7 +157,7 @@ impl View {
     /// The change, unless the picture is better drawn in full, or its depth is known.
     fn change_on_canvas(&self, size: u32) -> Option<Arc<ContourChange>> {
         once(&self.changes, size, || {
-            if self.depth_drawn(size).is_some() {
+            if self.solid.revolution().is_some() || self.depth_drawn(size).is_some() {
                 return None;
             }
             let Scene { solid, camera } = self.scene(size);
@@ -213,6 +213,14 @@ impl View {
 impl std::fmt::Debug for View {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("View").field("camera", &self.camera).finish_non_exhaustive()
+    }
+}
+
+/// Draws a solid, without a mesh if it is a surface of revolution.
+fn drawn_frame(solid: &Solid, camera: &Camera, channels: Channels) -> Frame {
+    match solid.revolution() {
+        Some(r) => Frame::of_revolution(&r.surface, &r.affine, camera, channels),
+        None => Frame::render(solid, camera, channels),
     }
 }
 

@@ -8,7 +8,7 @@
 //! smooth silhouette, that part of it is missed.
 
 use crate::render::View;
-use crate::render::derivatives::vjp::vjp_some;
+use crate::render::derivatives::vjp::{vjp_some, vjp_turned};
 use glam::DVec3;
 
 /// Distance from a piece at which to test for the background, in pixels.
@@ -24,11 +24,22 @@ impl View {
         let camera = self.camera().scaled_to(size);
         let drawn = self.drawn(&camera);
         let picture = Picture { width: camera.width, height: camera.height, depth: &frame.depth };
-        let by_vertex = vjp_some(&drawn.solid, &camera, &frame.depth, |piece| {
-            let [nx, ny] = picture.outward([piece.x, piece.y, piece.tx, piece.ty])?;
-            let at = picture.between(gain, f64::from(piece.x), f64::from(piece.y));
-            let by = f64::from(piece.length) * at;
+        let by = |[x, y, tx, ty]: [f32; 4], length: f32| {
+            let [nx, ny] = picture.outward([x, y, tx, ty])?;
+            let by = f64::from(length) * picture.between(gain, f64::from(x), f64::from(y));
             Some([by * nx, by * ny])
+        };
+        if drawn.solid.revolution().is_some() {
+            let c = self.contours(size);
+            let one = |i: usize| match by([c.x[i], c.y[i], c.tx[i], c.ty[i]], c.length[i]) {
+                Some([x, y]) => [x, y, 0.0, 0.0],
+                None => [0.0; 4],
+            };
+            let by_piece: Vec<[f64; 4]> = (0..c.len()).map(one).collect();
+            return vjp_turned(&drawn.solid, &camera, &by_piece).unwrap_or_default();
+        }
+        let by_vertex = vjp_some(&drawn.solid, &camera, &frame.depth, |piece| {
+            by([piece.x, piece.y, piece.tx, piece.ty], piece.length)
         });
         drawn.by_vertices_of(self.solid(), by_vertex)
     }

@@ -37,6 +37,9 @@ impl Contours {
         by_piece: &[[f64; 4]],
         steady: f64,
     ) -> Vec<DVec3> {
+        if let Some(by_vertex) = vjp_turned(solid, camera, by_piece) {
+            return by_vertex;
+        }
         let mut extracted = Vec::with_capacity(self.len() + self.len() / 4);
         self.each(solid, camera, |t| extracted.push(t));
         let by_piece = moved_ends(&extracted, camera, by_piece);
@@ -63,6 +66,9 @@ impl Contours {
         camera: &Camera,
         by_piece: &[[f64; 4]],
     ) -> Vec<DVec3> {
+        if let Some(by_vertex) = vjp_turned(solid, camera, by_piece) {
+            return by_vertex;
+        }
         let mut out = vec![DVec3::ZERO; solid.vertex_count()];
         self.each(solid, camera, |t| {
             let by = t.seen.and_then(|i| by_piece.get(i));
@@ -146,6 +152,18 @@ pub(in crate::render) fn vjp_some(
         });
     }
     out
+}
+
+/// The derivatives for a surface that is drawn without a mesh, by the vertices of its mesh.
+pub(in crate::render) fn vjp_turned(
+    solid: &Solid,
+    camera: &Camera,
+    by_piece: &[[f64; 4]],
+) -> Option<Vec<DVec3>> {
+    let r = solid.revolution()?;
+    let mesh = &solid.instances().first()?.mesh;
+    let gradient = Contours::vjp_revolution(&r.surface, &r.affine, camera, by_piece);
+    Some(gradient.by_vertex(&r.surface, &r.affine, &mesh.positions))
 }
 
 /// Maps the derivatives with respect to a piece to those with respect to the ends of its

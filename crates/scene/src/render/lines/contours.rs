@@ -36,6 +36,9 @@ thread_local! {
 impl Contours {
     /// The contours of a solid in a camera's image.
     pub fn of(solid: &Solid, camera: &Camera) -> Contours {
+        if let Some(r) = solid.revolution() {
+            return Contours::of_revolution(&r.surface, &r.affine, camera);
+        }
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
@@ -75,6 +78,9 @@ impl Contours {
     /// As [`Contours::of`], with the depth image of the same solid and camera already
     /// drawn.
     pub(in crate::render) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {
+        if let Some(r) = solid.revolution() {
+            return Contours::of_revolution(&r.surface, &r.affine, camera);
+        }
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let depths = Depths::new(depth, camera.width, camera.height, range.extent());

@@ -79,7 +79,7 @@ pub(in crate::render) fn extract_mesh(
 const SPECK: f32 = 0.1;
 
 /// Segments of this length or longer, in pixels, are divided.
-const LONGEST: f64 = 1.5;
+pub(in crate::render) const LONGEST: f64 = 1.5;
 
 /// A segment's corners and ends, as in [`Origin`].
 type Segment = ([u32; 3], [[f64; 3]; 2]);
@@ -273,7 +273,7 @@ fn tangent(a: &Point, b: &Point) -> Option<[f64; 3]> {
 }
 
 /// The part of `a + t d`, t in 0..1, inside the image (Liang and Barsky 1984).
-fn clip(a: &Point, d: [f64; 2], size: [f64; 2]) -> Option<(f64, f64)> {
+pub(in crate::render) fn clip(a: &Point, d: [f64; 2], size: [f64; 2]) -> Option<(f64, f64)> {
     let (mut t0, mut t1) = (0.0f64, 1.0f64);
     for (start, delta, limit) in [(a.x, d[0], size[0]), (a.y, d[1], size[1])] {
         if delta == 0.0 {

@@ -13,14 +13,14 @@ use crate::render::pixels::project::DepthRange;
 pub(in crate::render) const BESIDE: f64 = 1.2;
 
 /// Depth tolerance as a fraction of the object's depth range.
-const TOLERANCE: f64 = 0.006;
+pub(in crate::render) const TOLERANCE: f64 = 0.006;
 
 /// Largest slack for the slope of an edge's own faces, as a fraction of the depth range.
-const EDGE_SLACK: f64 = 0.06;
+pub(in crate::render) const EDGE_SLACK: f64 = 0.06;
 
 /// Largest slack for the extent of a silhouette's own face, as a fraction of the depth
 /// range.
-const SILHOUETTE_SLACK: f64 = 0.15;
+pub(in crate::render) const SILHOUETTE_SLACK: f64 = 0.15;
 
 /// On which sides a piece is tested.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,116 @@
+//! Surfaces of revolution without a mesh: the path in the half plane (r, y) with its
+//! normals, which is all that drawing them exactly needs.
+//!
+//! The surface is the one that the mesh of a lathe approaches as the number of its sides
+//! grows: cones between rings, normals linear along them. Invariant: a span's two rings
+//! are consecutive and differ.
+
+use super::revolve::{Strip, ring_normal};
+
+/// A ring of the surface: a circle around the y axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ring {
+    /// Its radius; 0 is a pole.
+    pub r: f64,
+    /// Its height.
+    pub y: f64,
+    /// The unit normal's component away from the axis.
+    pub nr: f64,
+    /// The unit normal's component along the axis.
+    pub ny: f64,
+}
+
+/// A cone frustum, disc or annulus between two rings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// The number of its first ring; the next one is its last.
+    pub ring: usize,
+    /// Its part.
+    pub part: u16,
+}
+
+/// A sharp circle: a crease between two spans, or a boundary of one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rim {
+    /// The ring that it runs along.
+    pub ring: usize,
+    /// The numbers of the spans beside it.
+    pub spans: [Option<usize>; 2],
+}
+
+/// A surface of revolution around the y axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Revolution {
+    rings: Vec<Ring>,
+    spans: Vec<Span>,
+    rims: Vec<Rim>,
+    part_count: u16,
+}
+
+impl Revolution {
+    /// From the path of a lathe, as it is swept into a mesh by [`super::revolve::revolve`].
+    pub(super) fn new(strips: &[Strip], closed: bool, part_count: u16) -> Revolution {
+        let (mut rings, mut spans, mut rims) = (Vec::new(), Vec::new(), Vec::new());
+        let mut before: Option<usize> = None;
+        for (i, s) in strips.iter().enumerate() {
+            let first = rings.len();
+            rings.extend(strip_rings(s));
+            let sharp = match before {
+                // Seams are sharp unless the strip says otherwise, ends always.
+                Some(_) => !s.blend,
+                None => !closed,
+            };
+            if sharp && s.points.first().is_some_and(|p| p.0 != 0.0) {
+                rims.push(Rim { ring: first, spans: [before, Some(spans.len())] });
+            }
+            spans.extend(
+                s.parts.iter().enumerate().map(|(k, part)| Span { ring: first + k, part: *part }),
+            );
+            before = spans.len().checked_sub(1);
+            if i + 1 == strips.len() && s.points.last().is_some_and(|p| p.0 != 0.0) {
+                let next = if closed { Some(0) } else { None };
+                if !closed || strips.len() > 1 {
+                    rims.push(Rim { ring: rings.len() - 1, spans: [before, next] });
+                }
+            }
+        }
+        Revolution { rings, spans, rims, part_count }
+    }
+
+    /// The rings, along the path.
+    pub fn rings(&self) -> &[Ring] {
+        &self.rings
+    }
+
+    /// The spans between rings, along the path.
+    pub fn spans(&self) -> &[Span] {
+        &self.spans
+    }
+
+    /// The two rings of a span.
+    pub fn ends(&self, span: &Span) -> Option<[&Ring; 2]> {
+        Some([self.rings.get(span.ring)?, self.rings.get(span.ring + 1)?])
+    }
+
+    /// The sharp circles, which show as lines from every viewpoint.
+    pub fn rims(&self) -> &[Rim] {
+        &self.rims
+    }
+
+    /// The number of parts.
+    pub fn part_count(&self) -> u16 {
+        self.part_count
+    }
+}
+
+/// The rings of a strip, with normals from central differences.
+fn strip_rings(s: &Strip) -> impl Iterator<Item = Ring> {
+    let last = s.points.len().saturating_sub(1);
+    s.points.iter().enumerate().map(move |(i, &(r, y))| {
+        let (nr, ny) = ring_normal([s.points[i.saturating_sub(1)], s.points[(i + 1).min(last)]]);
+        match r == 0.0 {
+            true => Ring { r, y, nr: 0.0, ny: if ny < 0.0 { -1.0 } else { 1.0 } },
+            false => Ring { r, y, nr, ny },
+        }
+    })
+}
