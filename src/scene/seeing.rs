@@ -124,19 +124,7 @@ pub(super) const TABLE: &[Row] = &[
          outside the picture. Infinite if it extends behind the camera, or has no vertices.",
         |a| {
             let view = a.object::<ViewValue>(0, "a view")?;
-            let (camera, mut b) = (
-                view.0.camera(),
-                [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY],
-            );
-            for v in view.0.solid().vertices() {
-                let (x, y, depth) = camera.project(v);
-                if depth.is_nan() || depth <= Camera::NEAR {
-                    b = [f64::NEG_INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::INFINITY];
-                    break;
-                }
-                let (x, y) = (x / f64::from(camera.width), y / f64::from(camera.height));
-                b = [b[0].min(x), b[1].min(y), b[2].max(x), b[3].max(y)];
-            }
+            let b = view.0.image_bounds();
             Ok(Value::array(b.to_vec()))
         },
     ),

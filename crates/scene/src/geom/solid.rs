@@ -71,6 +71,21 @@ pub struct PlacedRevolution {
     pub affine: Affine,
 }
 
+impl PlacedRevolution {
+    /// The bounding box of its rings.
+    fn bounds(&self) -> Option<Bounds> {
+        let matrix = self.affine.0.matrix3;
+        let across = DVec3::from_array([0, 1, 2].map(|axis| {
+            let row = matrix.row(axis);
+            libm::hypot(row.x, row.z)
+        }));
+        Bounds::around(self.surface.rings().iter().flat_map(|ring| {
+            let centre = self.affine.point(DVec3::new(0.0, ring.y, 0.0));
+            [centre - across * ring.r, centre + across * ring.r]
+        }))
+    }
+}
+
 /// The members of a group.
 struct Group {
     lists: Box<[Meshes]>,
@@ -323,9 +338,13 @@ impl Solid {
         self.instances.part_count()
     }
 
-    /// Returns the bounding box of all vertices; `None` if there are none.
+    /// Returns the bounding box of all vertices, of a surface of revolution that of its
+    /// rings; `None` if there are none.
     pub fn bounds(&self) -> Option<Bounds> {
-        Bounds::around(self.vertices())
+        match self.revolution() {
+            Some(r) => r.bounds(),
+            None => Bounds::around(self.vertices()),
+        }
     }
 
     /// Returns the solid translated so that the centre of its bounding box is the origin;
@@ -414,8 +433,10 @@ impl Solid {
                 size[axis] == size.max_element() && (0..axis).all(|a| size[a] < size[axis]);
             let by_half = if longest { 0.5 * by_half } else { 0.0 };
             for (end, sign) in [(b.max[axis], 1.0), (b.min[axis], -1.0)] {
-                // The first vertex on that side of the box.
-                if let Some(v) = self.vertices().position(|p| p[axis] == end) {
+                // The first vertex on that side of the box, or the nearest to it.
+                let off = |(_, p): &(usize, DVec3)| (p[axis] - end).abs();
+                let nearest = self.vertices().enumerate();
+                if let Some((v, _)) = nearest.min_by(|a, b| off(a).total_cmp(&off(b))) {
                     vertices[v][axis] += 0.5 * by_centre[axis] + sign * by_half;
                 }
             }

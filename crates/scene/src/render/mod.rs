@@ -10,6 +10,7 @@ mod camera_json;
 mod canvas;
 mod derivatives;
 mod detail;
+mod image_bounds;
 mod lines;
 mod pixels;
 mod revolution;
