@@ -42,6 +42,10 @@ impl Frame {
                     let mut first = columns[0];
                     while first < columns[1] {
                         let seen = spans.nearest_at(&sight, [first, y]);
+                        if seen.depth.iter().all(|d| *d == f64::INFINITY) {
+                            first += LANES;
+                            continue;
+                        }
                         let past = (first + LANES).min(columns[1]);
                         let from = y * width as usize + first;
                         for (i, at) in (from..from + (past - first)).enumerate() {
@@ -118,7 +122,7 @@ fn shown(
     let Some([a, b]) = surface.ends(span) else { return (u16::MAX, [0.0; 3]) };
     let at = [column as f64 + 0.5, row as f64 + 0.5];
     let p = sight.point(at, depth);
-    let r = libm::hypot(p.x, p.z);
+    let r = (p.x * p.x + p.z * p.z).sqrt();
     // The share along the longer side is the more accurate one.
     let (dr, dy) = (b.r - a.r, b.y - a.y);
     let t = if dr.abs() > dy.abs() { (r - a.r) / dr } else { (p.y - a.y) / dy };

@@ -11,7 +11,7 @@ use crate::geom::Revolution;
 /// A span that is not level.
 #[derive(Clone, Copy, Debug)]
 struct Cone {
-    /// Heights of the two ends.
+    /// Heights of the lower and the upper end.
     ends: [f64; 2],
     /// Radius at height 0 of the cone, and its change per height.
     radius: f64,
@@ -32,7 +32,10 @@ struct Level {
 /// The spans of a surface.
 #[derive(Debug, Default)]
 pub(super) struct Spans {
+    /// By the height of their lower end.
     cones: Vec<Cone>,
+    /// The same by the height of their upper end, from the top.
+    downwards: Vec<Cone>,
     levels: Vec<Level>,
     /// The squared radius of a cylinder around the surface.
     around: f64,
@@ -56,9 +59,16 @@ impl Spans {
             } else {
                 let slope = (b.r - a.r) / (b.y - a.y);
                 let radius = a.r - slope * a.y;
-                self.cones.push(Cone { ends: [a.y, b.y], radius, slope, span });
+                let ends = if a.y < b.y { [a.y, b.y] } else { [b.y, a.y] };
+                self.cones.push(Cone { ends, radius, slope, span });
             }
         }
+        self.downwards.clone_from(&self.cones);
+        let by = |end: usize| {
+            move |a: &Cone, b: &Cone| a.ends[end].total_cmp(&b.ends[end]).then(a.span.cmp(&b.span))
+        };
+        self.cones.sort_unstable_by(by(0));
+        self.downwards.sort_unstable_by(|a, b| by(1)(b, a));
     }
 
     /// Whether each line of sight meets a span between two depths.
@@ -114,8 +124,7 @@ impl Cone {
     /// Whether a part of it lies between two heights.
     #[inline(always)]
     fn between(&self, low: f64, high: f64) -> bool {
-        let [from, to] = self.ends;
-        let (least, most) = if from < to { (from, to) } else { (to, from) };
+        let [least, most] = self.ends;
         (least <= high) & (most >= low)
     }
 }
@@ -163,7 +172,22 @@ impl Spans {
                 span[i] = if first { level.span } else { span[i] };
             }
         }
-        for cone in self.cones.iter().filter(|cone| cone.between(low, high)) {
+        // In the order in which lines that climb reach them, or those that descend; lines that
+        // differ need all.
+        let (up, down) =
+            climb.iter().fold((true, true), |(up, down), c| (up & (*c > 0.0), down & (*c < 0.0)));
+        let (cones, entry) = if down { (&self.downwards, 1) } else { (&self.cones, 0) };
+        for cone in cones.iter().filter(|cone| cone.between(low, high)) {
+            if up | down {
+                let mut open = false;
+                for i in 0..LANES {
+                    let reached = (cone.ends[entry] - at[i]) * per[i];
+                    open |= (near[i] <= far[i]) & (depth[i] > reached);
+                }
+                if !open {
+                    break;
+                }
+            }
             let (middle, half) =
                 (0.5 * (cone.ends[0] + cone.ends[1]), 0.5 * (cone.ends[1] - cone.ends[0]).abs());
             // A little more, so that no line passes between two cones.
