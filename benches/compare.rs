@@ -13,7 +13,7 @@ use pcadlang::vision::features::{Query, contour_features, observed, rendered};
 use pcadlang::vision::{
     Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
     DepthMap, GradientDetector, Limits, Mask, MaskLikelihood, Region, RegionOptions, chamfer,
-    contour_ratio, distance_transform, gradient, nms, photo, region,
+    contour_ratio, distance_transform, gradient, nms, photo,
 };
 use std::hint::black_box;
 

@@ -7,7 +7,7 @@
 use super::form::{Form, Made};
 use super::log_sum_exp::{Term, Terms};
 use super::op::Op;
-use super::sum_out::Summed;
+use super::summed::Summed;
 use super::{Input, Tape, lanes};
 use crate::dist::{Batch, Dist, Support, batch, batch_of_mixture};
 use crate::lang::builtins::{

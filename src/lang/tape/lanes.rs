@@ -6,10 +6,10 @@
 //! depend on each other, and are run side by side. Their results get consecutive places,
 //! so that what reads them in the same order finds an array.
 
-use super::Tape;
 use super::form::Form;
 use super::log_sum_exp::{LogSumExp, Term};
 use super::op::Op;
+use super::{Tape, summed};
 use crate::dist::{Batch, Dist, Product, batch};
 use crate::num::Column;
 use rustc_hash::FxHashMap;
@@ -176,8 +176,8 @@ pub(super) fn merge(tape: &mut Tape) {
     }
     let Merger { moved, ops, .. } = merger;
     tape.ops = ops;
-    tape.move_sums(|at| moved.get(&at).copied().unwrap_or(at));
-    tape.find_sums();
+    summed::move_sums(&mut tape.summed, |at| moved.get(&at).copied().unwrap_or(at));
+    summed::find_sums(&mut tape.summed, &tape.ops);
     tape.used = used(tape);
 }
 

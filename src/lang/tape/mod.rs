@@ -18,6 +18,7 @@ mod lanes;
 mod log_sum_exp;
 mod op;
 mod sum_out;
+mod summed;
 
 pub use build::Builder;
 pub use form::Form;
@@ -26,9 +27,10 @@ pub use sum_out::{Entry, Factor};
 
 use crate::dist::{Datum, Support};
 use crate::lang::value::Value;
+use crate::rng::Stream;
 use op::Op;
 use std::ops::Range;
-use sum_out::Summed;
+use summed::Summed;
 
 /// An input of a tape: a value that is the image of unconstrained coordinates under its
 /// support.
@@ -193,6 +195,12 @@ impl Tape {
     fn forward(&mut self) -> bool {
         let (values, sums, Power(power)) = (&mut self.values, &mut self.sums, self.power);
         self.ops.iter_mut().all(|op| op.forward(values, sums, power))
+    }
+
+    /// Draws the choices that are summed out from their conditional at the point of the
+    /// last run. Returns the index of each one's value.
+    pub fn draw(&self, rng: &mut Stream) -> Vec<usize> {
+        summed::draw(&self.summed, &self.ops, rng)
     }
 
     /// Whether choices are summed out.

@@ -7,12 +7,11 @@
 //! forward algorithm, for a tree its upward pass (Koller & Friedman 2009, chapter 9). In
 //! the reverse order, each choice can be drawn given those drawn before.
 
-use super::Tape;
 use super::build::Builder;
 use super::log_sum_exp::{LogSumExp, Term, Terms};
 use super::op::Op;
+use super::summed::Summed;
 use crate::num::Column;
-use crate::rng::Stream;
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
@@ -36,17 +35,6 @@ pub struct Factor {
     pub scope: Vec<usize>,
     /// By joint value; that of the first choice varies fastest.
     pub entries: Vec<Entry>,
-}
-
-/// A choice that is summed out.
-#[derive(Clone, Debug)]
-pub(super) struct Summed {
-    choice: usize,
-    /// The choices on which its conditional depends, with their numbers of values.
-    given: Vec<(usize, usize)>,
-    /// By joint value of those, the result of the sum; after the tape is complete, the
-    /// operation and the place in it.
-    sums: Vec<(usize, usize)>,
 }
 
 impl Builder {
@@ -171,36 +159,4 @@ fn digit(given: &[(usize, usize)], mut joint: usize, y: usize) -> usize {
         joint /= n;
     }
     0
-}
-
-impl Tape {
-    /// Resolves the results of sums to the operations that compute them.
-    pub(super) fn find_sums(&mut self) {
-        let mut found = rustc_hash::FxHashMap::default();
-        for (k, op) in self.ops.iter().enumerate() {
-            if let Op::LogSumExp(l) = op {
-                found.extend((0..l.n).map(|i| (l.out + i, (k, i))));
-            }
-        }
-        let sums = self.summed.iter_mut().flat_map(|s| &mut s.sums);
-        sums.for_each(|s| *s = found.get(&s.0).copied().unwrap_or(*s));
-    }
-
-    /// Moves the results of sums.
-    pub(super) fn move_sums(&mut self, to: impl Fn(usize) -> usize) {
-        self.summed.iter_mut().flat_map(|s| &mut s.sums).for_each(|s| s.0 = to(s.0));
-    }
-
-    /// Draws the choices that are summed out from their conditional at the point of the
-    /// last run. Returns the index of each one's value.
-    pub fn draw(&self, rng: &mut Stream) -> Vec<usize> {
-        let mut values = vec![0; self.summed.len()];
-        for s in self.summed.iter().rev() {
-            let joint = s.given.iter().rev().fold(0, |p, (y, n)| p * n + values[*y]);
-            let Some((op, i)) = s.sums.get(joint).copied() else { continue };
-            let Some(Op::LogSumExp(l)) = self.ops.get(op) else { continue };
-            values[s.choice] = rng.weighted(&l.conditional(i), 1.0);
-        }
-        values
-    }
 }

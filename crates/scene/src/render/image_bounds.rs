@@ -48,7 +48,7 @@ fn ring_box(r: &PlacedRevolution, ring: &Ring, camera: &Camera) -> Option<Bounds
     let along = |axis: DVec3| [centre.dot(axis), u.dot(axis), v.dot(axis)];
     let [x, y, depth] = [camera.right, camera.up, camera.forward].map(along);
     let nearest = depth[0] - libm::hypot(depth[1], depth[2]);
-    if !(nearest > Camera::NEAR) {
+    if nearest.is_nan() || nearest <= Camera::NEAR {
         return None;
     }
     let ([left, right], [low, high], scale, cx, cy) = match camera.projection {
