@@ -60,7 +60,7 @@ impl Builder {
         self.ops.len()
     }
 
-    /// From here on, scores are numbers in the buffer, which [`Builder::end_terms`]
+    /// From here on, scores are numbers in the buffer, which `end_terms`
     /// returns, and are not added to the sums of the tape.
     pub fn begin_terms(&mut self) {
         self.terms = Some(Terms::new());

@@ -93,7 +93,7 @@ pub trait Scalar: Named + fmt::Debug + Send + Sync {
 
     /// Writes the log densities of `n` numbers to the buffer, from `out` on, whose
     /// parameters lie in these columns, all before `out`; `None` if the family has no
-    /// quicker way than one by one. See [`Batch::score_each`].
+    /// quicker way than one by one. See [`score_each`](super::Batch::score_each).
     fn score_columns(
         _buffer: &mut [f64],
         _x: Column,
@@ -108,7 +108,7 @@ pub trait Scalar: Named + fmt::Debug + Send + Sync {
     }
 
     /// Adds the derivatives of log densities that `score_columns` wrote; false if the
-    /// family has no quicker way than one by one. See [`Batch::vjp_each`].
+    /// family has no quicker way than one by one. See [`vjp_each`](super::Batch::vjp_each).
     fn vjp_columns(
         _buffer: &[f64],
         _by: &mut [f64],
