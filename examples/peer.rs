@@ -5,9 +5,9 @@
 //!
 //! The models are the programs in `benches/peers`; DATA holds the data sets by model (and
 //! by size, if there are several). BUDGET_S is a time in seconds, or a number of steps
-//! after warm-up, as in `20000steps`, to count instructions by the difference of two. OUT gets the time at which sampling could start, the
-//! number of transitions after warm-up, their processor time on one thread, and the
-//! draws.
+//! after warm-up, as in `20000steps`, to count instructions by the difference of two. OUT
+//! gets the time at which sampling could start, the number of transitions after warm-up,
+//! their processor time on one thread, and the draws.
 
 mod clock;
 

@@ -11,7 +11,7 @@ mod saddle;
 pub mod simd;
 mod special;
 mod tails;
-mod wide;
+pub mod wide;
 
 pub use column::Column;
 pub use exact::ExactSum;
@@ -25,7 +25,6 @@ pub use special::{
     log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
 };
 pub use tails::{log_scaled_i0, mills_ratio, one_minus_i1_over_i0};
-pub use wide::log_sum_exp_rows;
 
 /// Adds `more` to `all` element by element, extending `all` with zeros if it is shorter.
 pub fn accumulate(all: &mut Vec<f64>, more: &[f64]) {

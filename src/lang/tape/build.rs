@@ -86,13 +86,11 @@ impl Builder {
         n: usize,
         observed: bool,
     ) {
-        if self.terms.is_none() {
-            self.ops.push(Op::Density { batch, x, params, n, observed, dist });
-            return;
+        let out = self.terms.is_some().then(|| self.reserve(n));
+        self.ops.push(Op::Density { batch, x, params, n, observed, out, dist });
+        if let Some(out) = out {
+            (out..out + n).for_each(|at| self.term(at, observed));
         }
-        let out = self.reserve(n);
-        self.ops.push(Op::DensityEach { batch, x, params, out, n, dist });
-        (out..out + n).for_each(|at| self.term(at, observed));
     }
 
     pub(super) fn reserve(&mut self, n: usize) -> usize {

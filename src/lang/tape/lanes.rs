@@ -21,7 +21,8 @@ use std::ops::Range;
 enum Kind {
     Unary(usize, usize),
     Binary(usize),
-    /// The family, whether its parameters are fixed, and where the density goes.
+    /// The family, the number of columns of parameters, and to which sum the density is
+    /// added, if it is.
     Density(std::mem::Discriminant<Dist>, usize, Option<bool>),
     /// By value: which of the terms are observations.
     LogSumExp(Vec<SmallVec<[bool; 4]>>),
@@ -40,13 +41,10 @@ fn arguments(op: &Op) -> Option<(Kind, SmallVec<[Column; 6]>, Option<usize>)> {
             let kind = Kind::Binary(std::ptr::from_ref(*f) as usize);
             (kind, SmallVec::from_slice(&[*x, *y]), Some(*out))
         }
-        Op::Density { x, params, n: 1, observed, dist: Some(d), .. } => {
-            let kind = Kind::Density(std::mem::discriminant(d), params.len(), Some(*observed));
-            (kind, std::iter::once(*x).chain(params.iter().copied()).collect(), None)
-        }
-        Op::DensityEach { x, params, out, n: 1, dist: Some(d), .. } => {
-            let kind = Kind::Density(std::mem::discriminant(d), params.len(), None);
-            (kind, std::iter::once(*x).chain(params.iter().copied()).collect(), Some(*out))
+        Op::Density { x, params, n: 1, observed, out, dist: Some(d), .. } => {
+            let added = out.is_none().then_some(*observed);
+            let kind = Kind::Density(std::mem::discriminant(d), params.len(), added);
+            (kind, std::iter::once(*x).chain(params.iter().copied()).collect(), *out)
         }
         Op::LogSumExp(l) if l.n == 1 => {
             let observed = l.values.iter().map(|ts| ts.iter().map(|t| t.observed).collect());
@@ -94,12 +92,11 @@ fn each_run(op: &Op, f: &mut dyn FnMut(usize, usize, bool)) {
             form(out, true, f);
         }
         Op::Guard { form: g, .. } => form(g, false, f),
-        Op::Density { x, params, n, .. } => {
+        Op::Density { x, params, out, n, .. } => {
             std::iter::once(x).chain(params).for_each(|c| column(c, *n, f));
-        }
-        Op::DensityEach { x, params, out, n, .. } => {
-            std::iter::once(x).chain(params).for_each(|c| column(c, *n, f));
-            f(*out, *n, true);
+            if let Some(out) = out {
+                f(*out, *n, true);
+            }
         }
         Op::Score { dist, x, out, .. } => {
             form(dist, false, f);
@@ -234,7 +231,7 @@ impl Merger<'_> {
             match op {
                 Op::Unary { out, .. }
                 | Op::Binary { out, .. }
-                | Op::DensityEach { out, .. }
+                | Op::Density { out: Some(out), .. }
                 | Op::LogSumExp(LogSumExp { out, .. }) => *out = after,
                 _ => {}
             }
@@ -249,7 +246,7 @@ impl Merger<'_> {
         match op {
             Op::Unary { x, .. } => to(x),
             Op::Binary { x, y, .. } => [x, y].into_iter().for_each(|c| to(&mut c.at)),
-            Op::Density { x, params, .. } | Op::DensityEach { x, params, .. } => {
+            Op::Density { x, params, .. } => {
                 std::iter::once(x).chain(params).for_each(|c| to(&mut c.at));
             }
             Op::LogSumExp(l) => {
@@ -279,12 +276,8 @@ impl Merger<'_> {
             Op::Density { observed, .. } => {
                 let params: SmallVec<[Column; 3]> = SmallVec::from_slice(&columns[1..]);
                 let Some(batch) = side_by_side(members, &params) else { return false };
-                Op::Density { batch, x: columns[0], params, n, observed: *observed, dist: None }
-            }
-            Op::DensityEach { .. } => {
-                let params: SmallVec<[Column; 3]> = SmallVec::from_slice(&columns[1..]);
-                let Some(batch) = side_by_side(members, &params) else { return false };
-                Op::DensityEach { batch, x: columns[0], params, out, n, dist: None }
+                let (x, observed, out) = (columns[0], *observed, has_result.map(|_| out));
+                Op::Density { batch, x, params, n, observed, out, dist: None }
             }
             Op::LogSumExp(l) => {
                 let mut columns = columns.into_iter();
@@ -346,7 +339,7 @@ impl Merger<'_> {
 /// Returns the batch of densities that were recorded one by one.
 fn side_by_side(members: &[Op], params: &[Column]) -> Option<Box<dyn Batch>> {
     let of = |op: &Op| match op {
-        Op::Density { dist, .. } | Op::DensityEach { dist, .. } => dist.clone(),
+        Op::Density { dist, .. } => dist.clone(),
         _ => None,
     };
     let parts = members.iter().map(of).collect::<Option<Vec<Dist>>>()?;

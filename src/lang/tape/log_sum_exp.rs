@@ -1,7 +1,8 @@
 //! The operation that sums a choice out: for each of its values the sum of the scores
 //! that depend on it, and the log of the sum of their exponentials.
 
-use crate::num::{Column, log_sum_exp_rows};
+use crate::num::Column;
+use crate::num::wide::log_sum_exp_rows;
 use smallvec::SmallVec;
 
 /// Scores that are added, in columns.

@@ -22,7 +22,7 @@ mod summed;
 
 pub use build::Builder;
 pub use form::Form;
-pub use op::{ScoreSums, Terms};
+pub use op::{ScoreSums, ScoreTerms};
 pub use sum_out::{Entry, Factor};
 
 use crate::dist::{Datum, Support};
@@ -140,7 +140,8 @@ impl Tape {
             rest = after;
             let jacobian = match (&input.form, own) {
                 (Form::Num(at), [y]) if matches!(input.support, Support::Real) => {
-                    self.values[*at] = if y.is_nan() { 0.0 } else { y.clamp(f64::MIN, f64::MAX) };
+                    // Its Jacobian is 1: there is nothing to add.
+                    self.values[*at] = input.support.from_free_scalar(*y).0;
                     continue;
                 }
                 (Form::Num(at), [y]) => {
@@ -187,7 +188,7 @@ impl Tape {
 
     /// Returns the terms that operation `i` added to the sums in the last run, and puts
     /// them into `each` if they are separate; `None` if it adds none.
-    pub fn terms(&self, i: usize, each: &mut Vec<f64>) -> Option<Terms> {
+    pub fn terms(&self, i: usize, each: &mut Vec<f64>) -> Option<ScoreTerms> {
         each.clear();
         self.ops.get(i)?.terms(&self.values, each)
     }
@@ -201,11 +202,6 @@ impl Tape {
     /// last run. Returns the index of each one's value.
     pub fn draw(&self, rng: &mut Stream) -> Vec<usize> {
         summed::draw(&self.summed, &self.ops, rng)
-    }
-
-    /// Whether choices are summed out.
-    pub fn is_summed(&self) -> bool {
-        !self.summed.is_empty()
     }
 
     /// Sets the power of the likelihood within sums over choices: there, scores cannot be

@@ -23,10 +23,10 @@ pub struct ScoreSums {
 
 /// What an operation added to the sums of the scores.
 #[derive(Clone, Debug)]
-pub enum Terms {
+pub enum ScoreTerms {
     /// One term.
     One(f64),
-    /// Terms for the elements of an array.
+    /// ScoreTerms for the elements of an array.
     Each,
     /// The sum of such terms.
     Sum(ExactSum),
@@ -56,23 +56,15 @@ pub(super) enum Op {
     },
     /// A value that must be the same as when the tape was recorded.
     Guard { form: Form, value: Value },
-    /// The log densities of numbers, added to the sums of scores.
+    /// The log densities of numbers: added to the sums of scores, or numbers in the buffer.
     Density {
         batch: Box<dyn Batch>,
         x: Column,
         params: SmallVec<[Column; 3]>,
         n: usize,
         observed: bool,
+        out: Option<usize>,
         /// The distribution when it was recorded, if it is of one number.
-        dist: Option<Dist>,
-    },
-    /// The log densities of numbers, as numbers in the buffer.
-    DensityEach {
-        batch: Box<dyn Batch>,
-        x: Column,
-        params: SmallVec<[Column; 3]>,
-        out: usize,
-        n: usize,
         dist: Option<Dist>,
     },
     /// The log density of any value under any distribution or likelihood: added to the
@@ -130,12 +122,10 @@ impl Op {
                 }
             }
             Op::Guard { form, value } => form.value(v).is_some_and(|now| now.same(value)),
-            Op::Density { batch, x, params, n, observed, .. } => {
-                batch.score(v, *x, params, *n, sums.of(*observed))
-            }
-            Op::DensityEach { batch, x, params, out, n, .. } => {
-                batch.score_each(v, *x, params, *n, *out)
-            }
+            Op::Density { batch, x, params, n, observed, out, .. } => match out {
+                Some(out) => batch.score_each(v, *x, params, *n, *out),
+                None => batch.score(v, *x, params, *n, sums.of(*observed)),
+            },
             Op::Score { dist, x, observed, out, last } => {
                 let (Some(dist), Some(x)) = (dist.value(v), x.value(v)) else { return false };
                 let Some(found) = score(&dist, &x, *observed) else { return false };
@@ -205,12 +195,11 @@ impl Op {
                 out.value(v).is_some_and(|value| vjp_call(builtin, args, value, &by, v, g))
             }
             Op::Guard { .. } => true,
-            Op::Density { batch, x, params, n, observed, .. } => {
-                batch.vjp(v, g, *x, params, *n, weight(*observed));
-                true
-            }
-            Op::DensityEach { batch, x, params, out, n, .. } => {
-                batch.vjp_each(v, g, *x, params, *n, *out);
+            Op::Density { batch, x, params, n, observed, out, .. } => {
+                match out {
+                    Some(out) => batch.vjp_each(v, g, *x, params, *n, *out),
+                    None => batch.vjp(v, g, *x, params, *n, weight(*observed)),
+                }
                 true
             }
             Op::Score { dist, x, observed, out, last } => {
@@ -238,20 +227,20 @@ impl Op {
 impl Op {
     /// Returns the terms that it added to the sums in the last run, and appends them to
     /// `each` if they are separate; `None` if it added none.
-    pub fn terms(&self, v: &[f64], each: &mut Vec<f64>) -> Option<Terms> {
+    pub fn terms(&self, v: &[f64], each: &mut Vec<f64>) -> Option<ScoreTerms> {
         match self {
-            Op::Density { batch, x, n, .. } => {
+            Op::Density { batch, x, n, out: None, .. } => {
                 batch.each(v, *x, *n, each);
                 match (x.step, &each[..]) {
-                    (0, [one]) => Some(Terms::One(*one)),
-                    _ => Some(Terms::Each),
+                    (0, [one]) => Some(ScoreTerms::One(*one)),
+                    _ => Some(ScoreTerms::Each),
                 }
             }
             Op::Score { last, .. } => match &last.as_ref()?.1 {
-                density::Score::One(score) => Some(Terms::One(*score)),
-                density::Score::Sum(sum) => Some(Terms::Sum(sum.clone())),
+                density::Score::One(score) => Some(ScoreTerms::One(*score)),
+                density::Score::Sum(sum) => Some(ScoreTerms::Sum(sum.clone())),
             },
-            Op::Factor { x } => Some(Terms::One(v[*x])),
+            Op::Factor { x } => Some(ScoreTerms::One(v[*x])),
             _ => None,
         }
     }

@@ -4,7 +4,7 @@
 
 use crate::lang::builtins::CovarianceValue;
 use crate::lang::code::{Code, Op, Operand};
-use crate::lang::tape::{Form, ScoreSums, Tape, Terms};
+use crate::lang::tape::{Form, ScoreSums, ScoreTerms, Tape};
 use crate::lang::value::Value;
 use crate::num::ExactSum;
 use crate::trace::Trace;
@@ -76,13 +76,15 @@ impl InPlace {
             let terms = tape.terms(*i, &mut self.each);
             let node = &graph.nodes[*n as usize];
             match (graph.op(code, *n), node.side.as_deref(), terms) {
-                (Op::Draw { .. }, Some(Side::Choice(c)), Some(Terms::Each)) => {
+                (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
                     c.scores.len() == self.each.len() && c.elements != NONE
                 }
-                (Op::Draw { .. }, Some(Side::Choice(c)), Some(Terms::One(_))) => c.elements == NONE,
-                (Op::Draw { .. }, None, Some(Terms::One(_))) => true,
+                (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::One(_))) => {
+                    c.elements == NONE
+                }
+                (Op::Draw { .. }, None, Some(ScoreTerms::One(_))) => true,
                 (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
-                (Op::Observe { .. } | Op::Factor { .. }, None, Some(Terms::One(_))) => true,
+                (Op::Observe { .. } | Op::Factor { .. }, None, Some(ScoreTerms::One(_))) => true,
                 _ => false,
             }
         });
@@ -102,21 +104,23 @@ impl InPlace {
             let terms = tape.terms(*i, &mut self.each);
             let node = &mut graph.nodes[*n as usize];
             match (node.side.as_deref_mut(), terms) {
-                (Some(Side::Choice(c)), Some(Terms::Each)) => c.scores.copy_from_slice(&self.each),
-                (Some(Side::Total(t)), Some(Terms::Each)) => {
+                (Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
+                    c.scores.copy_from_slice(&self.each)
+                }
+                (Some(Side::Total(t)), Some(ScoreTerms::Each)) => {
                     node.score = 0.0;
                     t.sum = ExactSum::default();
                     self.each.iter().for_each(|s| t.sum.add(*s));
                 }
-                (Some(Side::Total(t)), Some(Terms::Sum(sum))) => {
+                (Some(Side::Total(t)), Some(ScoreTerms::Sum(sum))) => {
                     node.score = 0.0;
                     t.sum = sum;
                 }
-                (Some(Side::Total(t)), Some(Terms::One(score))) => {
+                (Some(Side::Total(t)), Some(ScoreTerms::One(score))) => {
                     node.score = score;
                     t.sum = ExactSum::default();
                 }
-                (_, Some(Terms::One(score))) => node.score = score,
+                (_, Some(ScoreTerms::One(score))) => node.score = score,
                 _ => {}
             }
         }

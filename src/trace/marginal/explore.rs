@@ -270,6 +270,15 @@ impl Trace {
 
     /// Fails if a detached frame contains a held choice, or a loop around one.
     fn check_held(&self, t: Target) -> TraceResult<()> {
+        match self.detaches_held() {
+            true => Err(self.cannot_sum(t, "other choices are created or removed with it")),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether the pending update detaches a frame that contains a held choice, or a loop
+    /// around one.
+    pub(super) fn detaches_held(&self) -> bool {
         let g = &self.graph;
         let stays = |f: &FrameId| {
             let frame = &g.frames[*f as usize];
@@ -277,10 +286,7 @@ impl Trace {
                 frame.base..frame.base + self.code.blocks[frame.block as usize].len() as u32;
             nodes.any(|n| g.nodes[n as usize].refs > 0)
         };
-        match g.detached.iter().any(stays) {
-            true => Err(self.cannot_sum(t, "other choices are created or removed with it")),
-            false => Ok(()),
-        }
+        g.detached.iter().any(stays)
     }
 }
 

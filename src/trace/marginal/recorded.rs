@@ -170,6 +170,7 @@ impl Trace {
         let same =
             |(t, s): (&Target, &Support)| self.dist(*t).is_some_and(|d| d.stored_support() == *s);
         if weight.appeared + weight.vanished > 0
+            || self.detaches_held()
             || !sites.targets.iter().zip(&sites.supports).all(same)
         {
             self.rollback();
@@ -241,14 +242,12 @@ impl Trace {
                 let scores: Vec<(NodeId, [f64; 2])> = own
                     .into_iter()
                     .map(|n| {
-                        let mut sum = ExactSum::default();
+                        let mut sums = [ExactSum::default(), ExactSum::default()];
                         match self.graph.op(&self.code, n) {
-                            Op::Draw { .. } => self.put_prior(n, &mut sum),
-                            _ => self.graph.put_score(n, &mut sum),
+                            Op::Draw { .. } => self.put_prior(n, &mut sums[0]),
+                            _ => self.graph.put_score(n, &mut sums[1]),
                         }
-                        let is_prior = matches!(self.graph.op(&self.code, n), Op::Draw { .. });
-                        let x = sum.value();
-                        (n, if is_prior { [x, 0.0] } else { [0.0, x] })
+                        (n, sums.map(|sum| sum.value()))
                     })
                     .collect();
                 open.push((place, scores));

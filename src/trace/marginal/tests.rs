@@ -51,12 +51,18 @@ fn selected(trace: &mut Trace, kind: ChoiceKind) -> Vec<Target> {
     trace.targets(s).to_vec()
 }
 
-/// Compares at some points; false if nothing was recorded.
-fn agrees(text: &str) -> bool {
-    let mut trace = Model::from_text(text).unwrap().simulate(4, 0).unwrap();
+/// A state of a program that keeps all its choices, those to sum out, and those that move.
+fn begun(text: &str, seed: u64) -> (Trace, Vec<Target>, Vec<Target>) {
+    let mut trace = Model::from_text(text).unwrap().simulate(seed, 0).unwrap();
     let _held = trace.hold_choices().unwrap();
     let sites = selected(&mut trace, ChoiceKind::Finite);
     let moving = selected(&mut trace, ChoiceKind::Continuous);
+    (trace, sites, moving)
+}
+
+/// Compares at some points; false if nothing was recorded.
+fn agrees(text: &str) -> bool {
+    let (mut trace, sites, moving) = begun(text, 4);
     let before = trace.log_joint();
     let Some(mut tape) = trace.record_summed(&moving, &sites, Draws::default()).unwrap() else {
         return false;
@@ -143,10 +149,7 @@ fn sums_on_tapes_are_those_of_enumeration() {
 #[test]
 fn values_that_the_program_does_not_have_everywhere() {
     let text = "assume z ~ flip(0.5); assume x ~ normal(1, 0.1); observe normal(0, if z { 1 } else { x }) = 0.5;";
-    let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
-    let _held = trace.hold_choices().unwrap();
-    let sites = selected(&mut trace, ChoiceKind::Finite);
-    let moving = selected(&mut trace, ChoiceKind::Continuous);
+    let (mut trace, sites, moving) = begun(text, 1);
     let mut tape = trace.record_summed(&moving, &sites, Draws::default()).unwrap().unwrap();
     let mut here = Vec::new();
     assert!(tape.begin(&trace, &mut here));
@@ -181,10 +184,7 @@ fn what_a_tape_cannot_sum_out() {
 #[test]
 fn choices_are_drawn_from_their_conditional() {
     for text in [FLAGS, CHAIN] {
-        let mut trace = Model::from_text(text).unwrap().simulate(4, 0).unwrap();
-        let _held = trace.hold_choices().unwrap();
-        let sites = selected(&mut trace, ChoiceKind::Finite);
-        let moving = selected(&mut trace, ChoiceKind::Continuous);
+        let (mut trace, sites, moving) = begun(text, 4);
         let mut tape = trace.record_summed(&moving, &sites, Draws::default()).unwrap().unwrap();
         let mut here = Vec::new();
         assert!(tape.begin(&trace, &mut here));

@@ -308,22 +308,34 @@ const ONCE_WRONG: [(u64, &str); 4] = [
     (106_735, "mala($continuous, marginal = @z9[2] + @d0);"),
 ];
 
-#[test]
-fn plans_that_were_wrong_once() {
+/// The same, where the choices to sum out create or remove others, so that the plans must
+/// be refused.
+const ONCE_NOT_REFUSED: [(u64, &str); 2] = [
+    (1064, "nuts($continuous, max_depth = 2, marginal = @d0 + @l8[0]/f0/w4 + @l8[1]/f0/w4);"),
+    (1238, "nuts($continuous, max_depth = 2, marginal = @d1 + @d2 + @l11/w10);"),
+];
+
+fn tally_plans(plans: &[(u64, &str)]) -> Tally {
     let mut all = Tally::default();
-    for (seed, statements) in ONCE_WRONG {
-        let (program, integration) = generate::program(seed);
+    for (seed, statements) in plans {
+        let (program, integration) = generate::program(*seed);
         let posterior = Posterior::of(&program, integration)
             .unwrap_or_else(|| panic!("{seed} is not enumerated"));
-        all.plan(
-            seed,
-            &program.to_string(),
-            &Arc::new(posterior),
-            &Plan::of("once wrong", statements),
-        );
+        let plan = Plan::of("once wrong", *statements);
+        all.plan(*seed, &program.to_string(), &Arc::new(posterior), &plan);
     }
+    all
+}
+
+#[test]
+fn plans_that_were_wrong_once() {
+    let all = tally_plans(&ONCE_WRONG);
     judge(&all);
     assert!(all.refused.is_empty(), "{:?}", all.refused);
+    let all = tally_plans(&ONCE_NOT_REFUSED);
+    judge(&all);
+    let refused: u64 = all.refused.values().sum();
+    assert_eq!(refused, ONCE_NOT_REFUSED.len() as u64, "{:?}", all.refused);
 }
 
 #[test]

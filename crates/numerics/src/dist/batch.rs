@@ -89,29 +89,6 @@ pub(super) trait Member<const N: usize>:
 
     fn log_density(&self, x: f64) -> f64;
 
-    /// See [`Scalar::score_columns`].
-    fn score_columns(
-        _buffer: &mut [f64],
-        _x: Column,
-        _params: &[Column],
-        _n: usize,
-        _out: usize,
-    ) -> Option<bool> {
-        None
-    }
-
-    /// See [`Scalar::vjp_columns`].
-    fn vjp_columns(
-        _buffer: &[f64],
-        _by: &mut [f64],
-        _x: Column,
-        _params: &[Column],
-        _n: usize,
-        _out: usize,
-    ) -> bool {
-        false
-    }
-
     /// Returns the derivatives with respect to the number (0 if it is discrete) and to
     /// the parameters.
     fn slopes(&self, x: f64) -> (f64, [f64; N]);
@@ -129,27 +106,6 @@ where
     #[inline]
     fn log_density(&self, x: f64) -> f64 {
         self.log_density_num(x)
-    }
-
-    fn score_columns(
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> Option<bool> {
-        <T as Scalar>::score_columns(buffer, x, params, n, out)
-    }
-
-    fn vjp_columns(
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
-        <T as Scalar>::vjp_columns(buffer, by, x, params, n, out)
     }
 
     #[inline]
@@ -210,6 +166,52 @@ impl<T: Member<N>, const N: usize> Component for Members<T, N> {
     }
 }
 
+impl<T: Member<N>, const N: usize> Members<T, N> {
+    /// Returns each number with its distribution.
+    fn numbers(&self, buffer: &[f64], x: Column, n: usize) -> impl Iterator<Item = (f64, &T)> {
+        let each = usize::from(self.0.len() != 1);
+        (0..n).map(move |i| (x.get(buffer, i), &self.0[i * each].1))
+    }
+
+    /// Adds the derivatives of the log densities, times `all`, and times the adjoint of
+    /// each, of which the first is at `weights`, if there are any.
+    fn add_slopes(
+        &self,
+        buffer: &[f64],
+        by: &mut [f64],
+        (x, params, n): (Column, &[Column], usize),
+        weights: Option<usize>,
+        all: f64,
+    ) {
+        let columns = <&[Column; N]>::try_from(params).ok();
+        let (mut of_x, mut of_params) = (0.0, [0.0; N]);
+        for (i, (at, d)) in self.numbers(buffer, x, n).enumerate() {
+            let weight = weights.map_or(1.0, |from| by[from + i]);
+            // An infinite slope does not matter there.
+            if weight == 0.0 {
+                continue;
+            }
+            let (gx, gp) = d.slopes(at);
+            if x.live {
+                let g = gx * weight;
+                if x.step == 0 { of_x += g } else { by[x.at + i] += g * all }
+            }
+            for (k, c) in columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live) {
+                let g = gp[k] * weight;
+                if c.step == 0 { of_params[k] += g } else { by[c.at + i] += g * all }
+            }
+        }
+        if x.live && x.step == 0 {
+            by[x.at] += of_x * all;
+        }
+        for (k, c) in
+            columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live && c.step == 0)
+        {
+            by[c.at] += of_params[k] * all;
+        }
+    }
+}
+
 impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
     fn score(
         &mut self,
@@ -222,29 +224,16 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         if !self.refresh(buffer, params) {
             return false;
         }
-        let mut numbers = true;
-        let mut one = |x: f64, d: &T| {
-            numbers &= !x.is_nan();
+        let mut there = true;
+        sum.add_each(self.numbers(buffer, x, n).map(|(x, d)| {
+            there &= !x.is_nan();
             d.log_density(x)
-        };
-        match &self.0[..] {
-            [(_, d)] => sum.add_each((0..n).map(|i| one(x.get(buffer, i), d))),
-            all => {
-                let each = all.iter().enumerate();
-                sum.add_each(each.map(|(i, (_, d))| one(x.get(buffer, i), d)));
-            }
-        }
-        numbers
+        }));
+        there
     }
 
     fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
-        match &self.0[..] {
-            [(_, d)] => out.extend((0..n).map(|i| d.log_density(x.get(buffer, i)))),
-            all => {
-                let one = |(i, (_, d)): (usize, &(_, T))| d.log_density(x.get(buffer, i));
-                out.extend(all.iter().enumerate().map(one));
-            }
-        }
+        out.extend(self.numbers(buffer, x, n).map(|(x, d)| d.log_density(x)));
     }
 
     fn vjp(
@@ -256,26 +245,7 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         n: usize,
         weight: f64,
     ) {
-        let each = self.0.len() != 1;
-        let columns = <&[Column; N]>::try_from(params).ok();
-        let (mut of_x, mut of_params) = (0.0, [0.0; N]);
-        for i in 0..n {
-            let (gx, gp) = self.0[if each { i } else { 0 }].1.slopes(x.get(buffer, i));
-            if x.live {
-                if x.step == 0 { of_x += gx } else { by[x.at + i] += gx * weight }
-            }
-            for (k, c) in columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live) {
-                if c.step == 0 { of_params[k] += gp[k] } else { by[c.at + i] += gp[k] * weight }
-            }
-        }
-        if x.live && x.step == 0 {
-            by[x.at] += of_x * weight;
-        }
-        for (k, c) in
-            columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live && c.step == 0)
-        {
-            by[c.at] += of_params[k] * weight;
-        }
+        self.add_slopes(buffer, by, (x, params, n), None, weight);
     }
 
     fn score_each(
@@ -286,28 +256,15 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         n: usize,
         out: usize,
     ) -> bool {
-        let columns = <&[Column; N]>::try_from(params).ok();
-        if let Some(there) = T::score_columns(buffer, x, params, n, out) {
-            return there;
+        if !self.refresh(buffer, params) {
+            return false;
         }
-        let alike = columns.is_some_and(|all| all.iter().skip(1).all(|c| c.step == 0));
+        // What is read is before what is written.
+        let (before, out) = buffer.split_at_mut(out);
         let mut there = true;
-        for i in 0..self.0.len() {
-            if let Some(columns) = columns {
-                let p = columns.map(|c| c.get(buffer, i));
-                if self.0[i].0.is_none_or(|old| old.map(f64::to_bits) != p.map(f64::to_bits)) {
-                    let before = if alike && i > 0 { i - 1 } else { i };
-                    let Some(made) = self.0[before].1.moved(p) else { return false };
-                    self.0[i] = (Some(p), made);
-                }
-            }
-            // One distribution may be that of all numbers.
-            let own = if self.0.len() == 1 { 0..n } else { i..i + 1 };
-            for j in own {
-                let at = x.get(buffer, j);
-                there &= !at.is_nan();
-                buffer[out + j] = self.0[i].1.log_density(at);
-            }
+        for (out, (x, d)) in out.iter_mut().zip(self.numbers(before, x, n)) {
+            there &= !x.is_nan();
+            *out = d.log_density(x);
         }
         there
     }
@@ -321,34 +278,7 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
         n: usize,
         out: usize,
     ) {
-        if T::vjp_columns(buffer, by, x, params, n, out) {
-            return;
-        }
-        let each = self.0.len() != 1;
-        let columns = <&[Column; N]>::try_from(params).ok();
-        let (mut of_x, mut of_params) = (0.0, [0.0; N]);
-        for i in 0..n {
-            let weight = by[out + i];
-            if weight == 0.0 {
-                continue;
-            }
-            let (gx, gp) = self.0[if each { i } else { 0 }].1.slopes(x.get(buffer, i));
-            if x.live {
-                if x.step == 0 { of_x += gx * weight } else { by[x.at + i] += gx * weight }
-            }
-            for (k, c) in columns.into_iter().flatten().enumerate().filter(|(_, c)| c.live) {
-                let g = gp[k] * weight;
-                if c.step == 0 { of_params[k] += g } else { by[c.at + i] += g }
-            }
-        }
-        if x.live && x.step == 0 {
-            by[x.at] += of_x;
-        }
-        for (k, c) in columns.into_iter().flatten().enumerate() {
-            if c.live && c.step == 0 {
-                by[c.at] += of_params[k];
-            }
-        }
+        self.add_slopes(buffer, by, (x, params, n), Some(out), 1.0);
     }
 }
 

@@ -4,7 +4,7 @@
 use super::batch::{component, parts};
 use super::continuous::log_norm;
 use super::draw::standard;
-use super::{Batch, Dist, Normal, Scalar};
+use super::{Batch, Dist, Normal};
 use crate::num::{Column, ExactSum};
 
 /// Creates the batch of a scalar distribution, or of a distribution whose elements are
@@ -73,15 +73,6 @@ impl Normals {
         self.mean.iter().fold(true, |all, m| all & m.is_finite())
     }
 
-    /// The distribution of number `i`; `None` if a parameter is outside its domain.
-    fn own(&self, buffer: &[f64], params: &[Column], i: usize) -> Option<Normal> {
-        let [mean, sd] = match params {
-            [mean, sd] => [mean, sd].map(|c| c.get(buffer, i)),
-            _ => [&self.mean, &self.sd].map(|list| list[if list.len() == 1 { 0 } else { i }]),
-        };
-        Normal::new(mean, sd).ok()
-    }
-
     /// Standardises the numbers. False if one is NaN.
     fn standardise(&mut self, buffer: &[f64], x: Column, n: usize) -> bool {
         self.z.resize(n, 0.0);
@@ -121,43 +112,9 @@ impl Normals {
         (0..self.z.len()).all(|i| !x.get(buffer, i).is_nan())
     }
 
-    /// Adds the derivatives with respect to a column, as a function of the standardised
-    /// number and the standard deviation.
-    #[inline(always)]
-    fn add(
-        &self,
-        by: &mut [f64],
-        c: &Column,
-        n: usize,
-        weight: f64,
-        slope: impl Fn(f64, f64) -> f64,
-    ) {
-        let z = &self.z[..];
-        if c.step == 0 {
-            by[c.at] += weight
-                * match &self.sd[..] {
-                    [sd] => z.iter().fold(0.0, |sum, z| sum + slope(*z, *sd)),
-                    all => z.iter().zip(all).fold(0.0, |sum, (z, sd)| sum + slope(*z, *sd)),
-                };
-            return;
-        }
-        let each = by[c.at..c.at + n].iter_mut().zip(z);
-        match &self.sd[..] {
-            [sd] => each.for_each(|(g, z)| *g += slope(*z, *sd) * weight),
-            all => each.zip(all).for_each(|((g, z), sd)| *g += slope(*z, *sd) * weight),
-        }
-    }
-}
-
-impl Batch for Normals {
-    fn score(
-        &mut self,
-        buffer: &[f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        sum: &mut ExactSum,
-    ) -> bool {
+    /// Computes the log densities. False if a number is NaN or a parameter is outside its
+    /// domain.
+    fn compute(&mut self, buffer: &[f64], x: Column, params: &[Column], n: usize) -> bool {
         if !self.refresh(buffer, params) || !self.standardise(buffer, x, n) {
             return false;
         }
@@ -171,27 +128,87 @@ impl Batch for Normals {
             [one] => pairs.for_each(|(t, z)| *t = term(*z, *one)),
             all => pairs.zip(all).for_each(|((t, z), one)| *t = term(*z, *one)),
         }
-        sum.add_each(self.terms.iter().copied());
         true
+    }
+
+    /// Adds the derivatives with respect to a column, as a function of the standardised
+    /// number and the standard deviation, each times its weight, and all times `all`.
+    #[inline(always)]
+    fn add(
+        &self,
+        by: &mut [f64],
+        c: &Column,
+        weights: impl Iterator<Item = f64>,
+        all: f64,
+        slope: impl Fn(f64, f64) -> f64,
+    ) {
+        // An infinite slope does not matter where the weight is 0.
+        let times = |slope: f64, weight: f64| if weight == 0.0 { 0.0 } else { slope * weight };
+        let each = self.z.iter().zip(weights);
+        if c.step == 0 {
+            by[c.at] += all
+                * match &self.sd[..] {
+                    [sd] => each.fold(0.0, |sum, (z, w)| sum + times(slope(*z, *sd), w)),
+                    sds => {
+                        each.zip(sds).fold(0.0, |sum, ((z, w), sd)| sum + times(slope(*z, *sd), w))
+                    }
+                };
+            return;
+        }
+        let each = by[c.at..].iter_mut().zip(each);
+        match &self.sd[..] {
+            [sd] => each.for_each(|(g, (z, w))| *g += times(slope(*z, *sd), w) * all),
+            sds => each.zip(sds).for_each(|((g, (z, w)), sd)| *g += times(slope(*z, *sd), w) * all),
+        }
+    }
+
+    /// Adds the derivatives with respect to all columns.
+    #[inline(always)]
+    fn add_slopes(
+        &self,
+        by: &mut [f64],
+        (x, params): (Column, &[Column]),
+        weights: impl Iterator<Item = f64> + Clone,
+        all: f64,
+    ) {
+        if x.live {
+            self.add(by, &x, weights.clone(), all, |z, sd| -z / sd);
+        }
+        if let [mean, sd] = params {
+            if mean.live {
+                self.add(by, mean, weights.clone(), all, |z, sd| z / sd);
+            }
+            if sd.live {
+                self.add(by, sd, weights, all, |z, sd| (z * z - 1.0) / sd);
+            }
+        }
+    }
+}
+
+impl Batch for Normals {
+    fn score(
+        &mut self,
+        buffer: &[f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        sum: &mut ExactSum,
+    ) -> bool {
+        let there = self.compute(buffer, x, params, n);
+        if there {
+            sum.add_each(self.terms.iter().copied());
+        }
+        there
     }
 
     fn each(&self, _: &[f64], _: Column, _: usize, out: &mut Vec<f64>) {
         out.extend_from_slice(&self.terms);
     }
 
-    fn vjp(&self, _: &[f64], by: &mut [f64], x: Column, params: &[Column], n: usize, weight: f64) {
-        if x.live {
-            self.add(by, &x, n, weight, |z, sd| -z / sd);
-        }
-        if let [mean, sd] = params {
-            if mean.live {
-                self.add(by, mean, n, weight, |z, sd| z / sd);
-            }
-            if sd.live {
-                self.add(by, sd, n, weight, |z, sd| (z * z - 1.0) / sd);
-            }
-        }
+    fn vjp(&self, _: &[f64], by: &mut [f64], x: Column, params: &[Column], _: usize, weight: f64) {
+        self.add_slopes(by, (x, params), std::iter::repeat(1.0), weight);
     }
+
     fn score_each(
         &mut self,
         buffer: &mut [f64],
@@ -200,43 +217,81 @@ impl Batch for Normals {
         n: usize,
         out: usize,
     ) -> bool {
-        if let Some(there) = Normal::score_columns(buffer, x, params, n, out) {
-            return there;
+        let there = self.compute(buffer, x, params, n);
+        if there {
+            buffer[out..out + n].copy_from_slice(&self.terms);
         }
-        (0..n).fold(true, |there, i| {
-            let at = x.get(buffer, i);
-            let own = self.own(buffer, params, i);
-            buffer[out + i] = own.map_or(f64::NEG_INFINITY, |d| d.log_density_num(at));
-            there && !at.is_nan()
-        })
+        there
     }
 
     fn vjp_each(
         &self,
-        buffer: &[f64],
+        _: &[f64],
         by: &mut [f64],
         x: Column,
         params: &[Column],
         n: usize,
         out: usize,
     ) {
-        if Normal::vjp_columns(buffer, by, x, params, n, out) {
-            return;
-        }
-        for i in 0..n {
-            let (weight, own) = (by[out + i], self.own(buffer, params, i));
-            let Some(own) = own.filter(|_| weight != 0.0) else { continue };
-            let z = standard(x.get(buffer, i), own.location(), own.scale());
-            let by_mean = z / own.scale() * weight;
-            let mut give = |c: &Column, g: f64| {
-                if c.live {
-                    by[c.at + i * c.step] += g;
-                }
+        // What is read is before what is written.
+        let (by, weights) = by.split_at_mut(out);
+        self.add_slopes(by, (x, params), weights[..n].iter().copied(), 1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The distributions themselves, one by one.
+    #[test]
+    fn columns_are_those_of_single_distributions() {
+        let n = 5;
+        // Numbers, means and standard deviations, then a place for each log density.
+        let mut buffer: Vec<f64> = vec![0.3, -1.0, 2.5, 1e100, 0.0];
+        buffer.extend([0.1, 0.2, -0.3, 0.4, 0.5]);
+        buffer.extend([1.0, 0.5, 2.0, 1e-3, 0.7]);
+        buffer.resize(4 * n, f64::NAN);
+        let weights = [0.5, -2.0, 0.0, 1e-3, 1.5];
+        let column = |at: usize, step: usize| Column { at, step, live: true };
+        let one = Dist::Normal(Normal::new(0.0, 1.0).unwrap());
+        for steps in 0..8 {
+            let step = |bit: usize| (steps >> bit) & 1;
+            let (x, params) = (column(0, step(0)), [column(n, step(1)), column(2 * n, step(2))]);
+            let parts = vec![one.clone(); if step(1) + step(2) == 0 { 1 } else { n }];
+            let mut normals = Normals::new(&parts, 2).unwrap();
+            let mut plain = super::super::families::component(&parts, 2).unwrap();
+            let score = |batch: &mut dyn Batch| {
+                let mut own = buffer.clone();
+                assert!(batch.score_each(&mut own, x, &params, n, 3 * n));
+                let mut by = vec![0.0; 3 * n];
+                by.extend(weights);
+                batch.vjp_each(&own, &mut by, x, &params, n, 3 * n);
+                by.truncate(3 * n);
+                (own, by)
             };
-            give(&x, -by_mean);
-            if let [mean, sd] = params {
-                give(mean, by_mean);
-                give(sd, (z * z - 1.0) / own.scale() * weight);
+            let ((found, by), (expected, by_expected)) = (score(&mut normals), score(&mut *plain));
+            let bits = |xs: &[f64]| xs.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&found), bits(&expected), "{steps}");
+            for (found, expected) in by.iter().zip(&by_expected) {
+                let error = (found - expected).abs();
+                assert!(error <= 1e-12 * expected.abs(), "{steps}: {found}, {expected}");
+            }
+            // Outside of the domain there is no density, wherever that is.
+            for (at, bad) in
+                [(2 * n, 0.0), (2 * n + 3, -1.0), (n + 1, f64::INFINITY), (2, f64::NAN)]
+            {
+                let read = at % n == 0
+                    || step(match at / n {
+                        0 => 0,
+                        1 => 1,
+                        _ => 2,
+                    }) == 1;
+                let mut own = buffer.clone();
+                own[at] = bad;
+                for batch in [&mut normals as &mut dyn Batch, &mut *plain] {
+                    assert_eq!(batch.score_each(&mut own, x, &params, n, 3 * n), !read, "{at}");
+                }
             }
         }
     }

@@ -3,7 +3,6 @@
 
 use super::tails::{CdfSlopes, Tails};
 use super::{Datum, Distribution, Gradient, Named, Support};
-use crate::num::Column;
 use crate::rng::Stream;
 use smallvec::SmallVec;
 use std::fmt;
@@ -89,38 +88,6 @@ pub trait Scalar: Named + fmt::Debug + Send + Sync {
         Self: Sized,
     {
         None
-    }
-
-    /// Writes the log densities of `n` numbers to the buffer, from `out` on, whose
-    /// parameters lie in these columns, all before `out`; `None` if the family has no
-    /// quicker way than one by one. See [`score_each`](super::Batch::score_each).
-    fn score_columns(
-        _buffer: &mut [f64],
-        _x: Column,
-        _params: &[Column],
-        _n: usize,
-        _out: usize,
-    ) -> Option<bool>
-    where
-        Self: Sized,
-    {
-        None
-    }
-
-    /// Adds the derivatives of log densities that `score_columns` wrote; false if the
-    /// family has no quicker way than one by one. See [`vjp_each`](super::Batch::vjp_each).
-    fn vjp_columns(
-        _buffer: &[f64],
-        _by: &mut [f64],
-        _x: Column,
-        _params: &[Column],
-        _n: usize,
-        _out: usize,
-    ) -> bool
-    where
-        Self: Sized,
-    {
-        false
     }
 
     /// Maps a number to the scale of the standard normal, for normal distributions.

@@ -6,6 +6,8 @@
 //! an incrementally updated sum equals one computed from scratch. Infinities and NaN are
 //! counted, not added.
 
+use super::exp::ROUND;
+
 /// 2^64, the inverse of the finest quantum.
 const SCALE: f64 = 18_446_744_073_709_551_616.0;
 /// Terms of this magnitude or above go to coarser limbs.
@@ -28,11 +30,9 @@ pub struct ExactSum {
 /// The number of limbs, for exponents up to 1024.
 const LIMBS: usize = 26;
 
-/// Returns the nearest integer to a number below 2^51, as both types: adding this constant
-/// rounds to it, and leaves it in the low bits.
+/// Returns the nearest integer to a number below 2^51, as both types.
 #[inline]
 fn nearest(x: f64) -> (f64, i64) {
-    const ROUND: f64 = 6_755_399_441_055_744.0; // 3/2 2^52
     let shifted = x + ROUND;
     (shifted - ROUND, (shifted.to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64))
 }

@@ -24,11 +24,11 @@ const THREE_HALVES_LN2: f64 = f64::from_bits(0x3ff0_a2b2_0000_0000);
 const NORMAL: f64 = 708.0;
 
 /// Adding 3/2 2^52 rounds to an integer, and leaves it in the low bits.
-const ROUND: f64 = 6_755_399_441_055_744.0;
+pub(super) const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// Returns the exponential of a number of a magnitude up to [`NORMAL`].
 #[inline(always)]
-fn normal(x: f64) -> f64 {
+pub(super) fn normal(x: f64) -> f64 {
     let (size, sign) = (x.abs(), if x < 0.0 { -1.0 } else { 1.0 });
     let scaled = INVERSE_LN2 * x + 0.5 * sign;
     let near = scaled + ROUND - ROUND;

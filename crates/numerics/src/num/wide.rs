@@ -1,50 +1,29 @@
-//! The logarithm of sums of exponentials for many numbers at a time.
+//! Exponentials and logarithms for loops over many numbers, and the logarithm of sums of
+//! exponentials.
 //!
 //! Exponential and logarithm are computed by the same operations for every number,
 //! without branches, so that loops over them are vectorised; nothing is fused, so results
 //! are the same on every platform. Both are accurate to about 1e-15.
 
+use super::exp::normal;
 use super::simd::vectorised;
 
-/// 1.5 * 2^52: adding it rounds a number to the nearest integer, held in the low bits.
-const ROUND: f64 = 6_755_399_441_055_744.0;
 /// ln 2 in two parts, the first with few enough bits that its multiples are exact.
 const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
 /// Returns exp(x) for x <= 0; 0 below -700, where it would be at most 1e-304.
 #[inline(always)]
-fn exp(x: f64) -> f64 {
-    let at = if x > -700.0 { x } else { -700.0 };
-    let shifted = at * std::f64::consts::LOG2_E + ROUND;
-    let k = shifted - ROUND;
-    let r = (at - k * LN_2_HIGH) - k * LN_2_LOW;
-    // Taylor's series: |r| < 0.35, so the first term left out is below 1e-17.
-    let mut p = 1.0 / 6_227_020_800.0;
-    for c in [
-        1.0 / 479_001_600.0,
-        1.0 / 39_916_800.0,
-        1.0 / 3_628_800.0,
-        1.0 / 362_880.0,
-        1.0 / 40_320.0,
-        1.0 / 5_040.0,
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        0.5,
-        1.0,
-        1.0,
-    ] {
-        p = p * r + c;
-    }
-    let scale = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
-    if x > -700.0 { p * scale } else { 0.0 }
+pub fn exp(x: f64) -> f64 {
+    let near = x > -700.0;
+    let found = normal(if near { x } else { -700.0 });
+    if near { found } else { 0.0 }
 }
 
-/// Returns ln(x) for a normal x >= 1.
+/// Returns ln(x) for a normal x above 0, with an error of at most 1e-15 relative to one
+/// plus its magnitude.
 #[inline(always)]
-fn ln(x: f64) -> f64 {
+pub fn ln(x: f64) -> f64 {
     // x = 2^k m with m between sqrt(1/2) and sqrt(2).
     let shifted = x.to_bits() + (0x3ff0_0000_0000_0000 - 0x3fe6_a09e_667f_3bcd);
     let k = f64::from_bits(0x4330_0000_0000_0000 | (shifted >> 52))

@@ -144,3 +144,16 @@ pub fn along(by_vertex: &[DVec3], before: &Solid, after: &Solid, way: f64) -> f6
     let moved = before.vertices().zip(after.vertices()).map(|(a, b)| (b - a) / way);
     by_vertex.iter().zip(moved).map(|(g, d)| g.dot(d)).sum()
 }
+
+/// Asserts what holds for all contours.
+pub fn check_invariants(c: &Contours) {
+    let n = c.len();
+    assert!([c.y.len(), c.tx.len(), c.ty.len(), c.length.len()].iter().all(|&m| m == n));
+    for i in 0..n {
+        assert!(
+            (0.0..=c.width as f32).contains(&c.x[i]) && (0.0..=c.height as f32).contains(&c.y[i])
+        );
+        assert!((c.tx[i] * c.tx[i] + c.ty[i] * c.ty[i] - 1.0).abs() < 1e-5);
+        assert!(c.length[i] > 0.0 && c.length[i] <= 1.5);
+    }
+}

@@ -282,8 +282,10 @@ impl Memory {
         self.changes.clear();
         tape.changes(y, &mut self.changes);
         let there = tape.draw(y, rng, &mut self.changes);
-        let same = |(t, c): &(Target, Change)| matches!(c, Change::Set(x) if trace.stored(*t).is_some_and(|now| now == *x));
-        self.changes.retain(|change| !same(change));
+        self.changes.retain(|(t, change)| match change {
+            Change::Set(x) => trace.stored(*t).as_ref() != Some(x),
+            _ => true,
+        });
         there.then_some(&self.changes)
     }
 

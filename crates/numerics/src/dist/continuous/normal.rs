@@ -2,8 +2,7 @@
 
 use crate::dist::draw::standard;
 use crate::dist::*;
-use crate::num::simd::vectorised;
-use crate::num::{Column, LN_SQRT_2PI, log_normal_cdf};
+use crate::num::{LN_SQRT_2PI, log_normal_cdf};
 
 /// `normal(mean, sd)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,108 +85,11 @@ impl Scalar for Normal {
         }
     }
 
-    fn score_columns(
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> Option<bool> {
-        let [mean, sd @ Column { step: 0, .. }] = *params else { return None };
-        let (before, out) = buffer.split_at_mut(out);
-        let out = &mut out[..n];
-        let Ok(one) = Normal::new(0.0, before[sd.at]) else { return Some(false) };
-        let (sd, log_norm) = (one.sd, one.log_norm);
-        Some(vectorised(
-            #[inline(always)]
-            || {
-                let mut there = true;
-                each_pair(before, x, mean, out, |x, mean, out| {
-                    there &= !x.is_nan() && mean.is_finite();
-                    let z = (x - mean) / sd;
-                    *out = log_norm - 0.5 * z * z;
-                });
-                there
-            },
-        ))
-    }
-
-    fn vjp_columns(
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
-        let [mean, sd @ Column { step: 0, .. }] = *params else { return false };
-        let scale = buffer[sd.at];
-        let (by, weights) = by.split_at_mut(out);
-        let weights = &mut weights[..n];
-        // The weights become the derivatives with respect to the means.
-        let mut of_sd = [0.0; 4];
-        vectorised(
-            #[inline(always)]
-            || {
-                let mut sums = [0.0; 4];
-                let mut i = 0;
-                each_pair(buffer, x, mean, weights, |x, mean, weight| {
-                    let z = (x - mean) / scale;
-                    let used = *weight != 0.0;
-                    sums[i % 4] += if used { (z * z - 1.0) * *weight } else { 0.0 };
-                    *weight = if used { z * *weight / scale } else { 0.0 };
-                    i += 1;
-                });
-                of_sd = sums;
-            },
-        );
-        let mut give = |c: Column, sign: f64| match c {
-            Column { live: false, .. } => {}
-            Column { step: 0, at, .. } => by[at] += sign * weights.iter().sum::<f64>(),
-            Column { at, .. } => {
-                by[at..at + n].iter_mut().zip(weights.iter()).for_each(|(b, w)| *b += sign * w);
-            }
-        };
-        give(mean, 1.0);
-        give(x, -1.0);
-        if sd.live {
-            by[sd.at] += of_sd.iter().sum::<f64>() / scale;
-        }
-        true
-    }
-
     fn standardised(&self, x: f64) -> Option<f64> {
         Some(standard(x, self.mean, self.sd))
     }
 
     fn unstandardised(&self, z: f64) -> Option<f64> {
         Some(self.mean + self.sd * z)
-    }
-}
-
-/// Calls `f` with the elements of two columns of a buffer and of `out`.
-#[inline(always)]
-fn each_pair(
-    buffer: &[f64],
-    x: Column,
-    y: Column,
-    out: &mut [f64],
-    mut f: impl FnMut(f64, f64, &mut f64),
-) {
-    let n = out.len();
-    match (x.step, y.step) {
-        (0, 0) => out.iter_mut().for_each(|o| f(buffer[x.at], buffer[y.at], o)),
-        (0, _) => {
-            let x = buffer[x.at];
-            out.iter_mut().zip(&buffer[y.at..y.at + n]).for_each(|(o, y)| f(x, *y, o));
-        }
-        (_, 0) => {
-            let y = buffer[y.at];
-            out.iter_mut().zip(&buffer[x.at..x.at + n]).for_each(|(o, x)| f(*x, y, o));
-        }
-        _ => {
-            let pairs = buffer[x.at..x.at + n].iter().zip(&buffer[y.at..y.at + n]);
-            out.iter_mut().zip(pairs).for_each(|(o, (x, y))| f(*x, *y, o));
-        }
     }
 }

@@ -144,8 +144,7 @@ impl Batch for Mixed {
         self.refresh(buffer)
             && (0..n).all(|i| {
                 let at = x.get(buffer, i);
-                let (_, all) = self.scores(at);
-                buffer[out + i] = if all.is_nan() { f64::NEG_INFINITY } else { all };
+                buffer[out + i] = self.log_density(at);
                 !at.is_nan()
             })
     }

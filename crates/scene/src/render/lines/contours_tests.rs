@@ -3,24 +3,12 @@
 
 use super::*;
 use crate::geom::Affine;
-use crate::render::testing::{Uniform, cuboid, lathe, sphere};
+use crate::render::testing::{Uniform, check_invariants, cuboid, lathe, sphere};
 use crate::render::{Channels, Frame, Projection};
 use glam::{DVec3, Vec3};
 
 fn place(at: [f64; 3], turn: [f64; 3], scale: f64) -> Affine {
     Affine::new(DVec3::from_array(at), DVec3::from_array(turn), DVec3::splat(scale))
-}
-
-fn check_invariants(c: &Contours) {
-    let n = c.len();
-    assert!([c.y.len(), c.tx.len(), c.ty.len(), c.length.len()].iter().all(|&m| m == n));
-    for i in 0..n {
-        assert!(
-            (0.0..=c.width as f32).contains(&c.x[i]) && (0.0..=c.height as f32).contains(&c.y[i])
-        );
-        assert!((c.tx[i] * c.tx[i] + c.ty[i] * c.ty[i] - 1.0).abs() < 1e-5);
-        assert!(c.length[i] > 0.0 && c.length[i] <= 1.5);
-    }
 }
 
 #[test]

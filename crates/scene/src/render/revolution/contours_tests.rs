@@ -5,7 +5,7 @@ use super::*;
 use crate::render::Projection;
 use crate::render::revolution::testing::{Vessel, random_pose};
 use crate::render::simd::portable;
-use crate::render::testing::Uniform;
+use crate::render::testing::{Uniform, check_invariants};
 use glam::DVec3;
 
 /// The distance from a point to the nearest piece.
@@ -23,18 +23,6 @@ fn nearest(x: f32, y: f32, c: &Contours) -> f64 {
 fn apart(a: &Contours, b: &Contours, most: f64) -> f64 {
     let far = |i: &usize| nearest(a.x[*i], a.y[*i], b) > most;
     (0..a.len()).filter(far).map(|i| f64::from(a.length[i])).sum()
-}
-
-fn check_invariants(c: &Contours) {
-    let n = c.len();
-    assert!([c.y.len(), c.tx.len(), c.ty.len(), c.length.len()].iter().all(|&m| m == n));
-    for i in 0..n {
-        assert!(
-            (0.0..=c.width as f32).contains(&c.x[i]) && (0.0..=c.height as f32).contains(&c.y[i])
-        );
-        assert!((c.tx[i] * c.tx[i] + c.ty[i] * c.ty[i] - 1.0).abs() < 1e-5);
-        assert!(c.length[i] > 0.0 && c.length[i] <= 1.5);
-    }
 }
 
 /// Compares with meshes of 512 sides. Where they differ, it is by a piece or two where a

@@ -9,15 +9,12 @@
 
 use super::options::ContourRatioOptions;
 use pcadlang_numerics::num::simd::vectorised;
-use std::f64::consts::{LN_2, LOG2_E, PI};
+use pcadlang_numerics::num::wide::{exp, ln};
+use std::f64::consts::PI;
 
 /// Error bound of the fast path relative to one plus the score's magnitude; many times
 /// the actual error.
 const DOUBT: f64 = 1e-12;
-
-/// Adding and subtracting this number rounds to an integer, which the lowest bits of the
-/// sum hold.
-const ROUND: f64 = 6755399441055744.0;
 
 /// The parameters of the score other than distance and density.
 pub(super) struct Ratio {
@@ -49,8 +46,8 @@ impl Ratio {
             || {
                 for ((out, &distance), &density) in out.iter_mut().zip(distance).zip(density) {
                     let z = distance / self.sd;
-                    let own = self.norm * quick_exp(-0.5 * z * z);
-                    let score = quick_ln(self.foreground * own / density + 1.0 - self.foreground);
+                    let own = self.norm * exp(-0.5 * z * z);
+                    let score = ln(self.foreground * own / density + 1.0 - self.foreground);
                     let doubt = DOUBT * (1.0 + score.abs());
                     let (low, high) = ((score - doubt) as f32, (score + doubt) as f32);
                     *out = if low == high { low } else { f32::NAN };
@@ -63,54 +60,6 @@ impl Ratio {
     }
 }
 
-/// Returns the exponential of a number of at most 0 with a relative error of at most
-/// 1e-14. Numbers below -700 are treated as -700.
-#[inline(always)]
-fn quick_exp(x: f64) -> f64 {
-    let x = if x < -700.0 { -700.0 } else { x };
-    let shifted = x * LOG2_E + ROUND;
-    let r = x - (shifted - ROUND) * LN_2;
-    // Taylor series for magnitudes of at most half of ln 2, from the last term.
-    let mut sum = 1.0 / 6227020800.0;
-    for factorial in [
-        479001600.0,
-        39916800.0,
-        3628800.0,
-        362880.0,
-        40320.0,
-        5040.0,
-        720.0,
-        120.0,
-        24.0,
-        6.0,
-        2.0,
-        1.0,
-    ] {
-        sum = sum * r + 1.0 / factorial;
-    }
-    let power = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
-    (sum * r + 1.0) * power
-}
-
-/// Returns the natural logarithm of a number above 1e-300, with an error of at most 1e-14
-/// relative to one plus its magnitude.
-#[inline(always)]
-fn quick_ln(x: f64) -> f64 {
-    const HALF: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
-    const MANTISSA: u64 = (1 << 52) - 1;
-    // x = m 2^e with m between sqrt(1/2) and sqrt(2).
-    let above = x.to_bits().wrapping_sub(HALF).wrapping_add(1023 << 52);
-    let m = f64::from_bits((above & MANTISSA).wrapping_add(HALF));
-    let e = f64::from_bits((above >> 52) | 0x4330_0000_0000_0000) - (4503599627370496.0 + 1023.0);
-    let s = (m - 1.0) / (m + 1.0);
-    let squared = s * s;
-    let mut sum = 1.0 / 21.0;
-    for odd in [19.0, 17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0] {
-        sum = sum * squared + 1.0 / odd;
-    }
-    e * LN_2 + 2.0 * s * (sum * squared + 1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,12 +68,12 @@ mod tests {
     fn quick_functions_are_right_to_thirteen_digits() {
         for i in 0..200_000 {
             let x = -f64::from(i) * 3.45e-3;
-            assert!((quick_exp(x) / libm::exp(x) - 1.0).abs() < 1e-13, "exp {x}");
+            assert!((exp(x) / libm::exp(x) - 1.0).abs() < 1e-13, "exp {x}");
             let y = libm::exp(f64::from(i - 100_000) * 6.5e-3);
             let expected = libm::log(y);
-            assert!((quick_ln(y) - expected).abs() < 1e-14 * (1.0 + expected.abs()), "ln {y}");
+            assert!((ln(y) - expected).abs() < 1e-14 * (1.0 + expected.abs()), "ln {y}");
         }
-        assert!(quick_exp(-1e300) < 1e-300 && quick_ln(1.0) == 0.0 && quick_exp(-0.0) == 1.0);
+        assert!(exp(-1e300) < 1e-300 && ln(1.0) == 0.0 && exp(-0.0) == 1.0);
     }
 
     #[test]
