@@ -6,7 +6,7 @@
 
 use super::form::{Form, Made};
 use super::log_sum_exp::{Term, Terms};
-use super::op::Op;
+use super::op::{Op, Scored};
 use super::summed::Summed;
 use super::{Input, Tape, lanes};
 use crate::dist::{Batch, Dist, Support, batch, batch_of_mixture};
@@ -55,9 +55,24 @@ impl Builder {
         tape
     }
 
-    /// Returns the number of operations recorded so far.
-    pub fn operations(&self) -> usize {
-        self.ops.len()
+    /// Returns the numbers of operations and of terms recorded so far.
+    pub fn mark(&self) -> (usize, usize) {
+        (self.ops.len(), self.terms.as_ref().map_or(0, Terms::len))
+    }
+
+    /// Returns where the score recorded since `mark` is; `None` if there is none, an error if
+    /// it is in several places.
+    pub fn scored(&self, mark: (usize, usize)) -> Result<Option<Scored>, ()> {
+        let terms = self.terms.as_ref().map(|terms| &terms[mark.1..]);
+        match (&self.ops[mark.0..], terms) {
+            ([], None | Some([])) => Ok(None),
+            ([], Some([t])) => Ok(Some(Scored::Numbers(t.column.at..t.column.at + 1, false))),
+            ([Op::Density { x, n, out: Some(at), .. }], Some(_)) => {
+                Ok(Some(Scored::Numbers(*at..at + n, *n != 1 || x.step != 0)))
+            }
+            ([_], _) => Ok(Some(Scored::Operation(mark.0))),
+            _ => Err(()),
+        }
     }
 
     /// From here on, scores are numbers in the buffer, which `end_terms`

@@ -127,6 +127,22 @@ impl Form {
         }
     }
 
+    /// The same form with its numbers at other places.
+    pub(super) fn with_places(&self, to: &dyn Fn(usize) -> usize) -> Form {
+        match self {
+            Form::Num(at) => Form::Num(to(*at)),
+            Form::List(all) => Form::List(all.iter().map(|f| f.with_places(to)).collect()),
+            Form::Record(all) => Form::Record(
+                all.iter().map(|(name, f)| (Arc::clone(name), f.with_places(to))).collect(),
+            ),
+            Form::Made(m) => Form::Made(Arc::new(Made {
+                builtin: m.builtin.clone(),
+                args: m.args.iter().map(|f| f.with_places(to)).collect(),
+            })),
+            Form::Fixed(_) | Form::Array(..) => self.clone(),
+        }
+    }
+
     /// Calls `f` with the index of each number, in order.
     pub(super) fn each_place(&self, f: &mut impl FnMut(usize)) {
         match self {

@@ -8,7 +8,7 @@
 
 use super::form::Form;
 use super::log_sum_exp::{LogSumExp, Term};
-use super::op::Op;
+use super::op::{Op, Scored};
 use super::{Tape, summed};
 use crate::dist::{Batch, Dist, Product, batch};
 use crate::num::Column;
@@ -160,20 +160,57 @@ fn groups(ops: &[Op], size: usize) -> Vec<Group> {
     groups
 }
 
+/// Where merging put the results and operations that were elsewhere before.
+#[derive(Debug, Default)]
+pub(super) struct Moved {
+    numbers: FxHashMap<usize, usize>,
+    /// By old operation: where its scores are.
+    scores: Vec<Scored>,
+}
+
+impl Moved {
+    fn number(&self, at: usize) -> usize {
+        self.numbers.get(&at).copied().unwrap_or(at)
+    }
+
+    /// Where the numbers of a form are now.
+    pub fn form(&self, form: &Form) -> Form {
+        form.with_places(&|at| self.number(at))
+    }
+
+    /// Where a score is now.
+    pub fn scored(&self, scored: &Scored) -> Scored {
+        match scored {
+            Scored::Operation(op) => self.scores.get(*op).unwrap_or(scored).clone(),
+            // Only results of one number are moved.
+            Scored::Numbers(at, is_array) => {
+                let first = self.number(at.start);
+                Scored::Numbers(first..first + at.len(), *is_array)
+            }
+            Scored::Member(..) => scored.clone(),
+        }
+    }
+}
+
 /// Merges the operations of a tape.
 pub(super) fn merge(tape: &mut Tape) {
     let ops = std::mem::take(&mut tape.ops);
     let groups = groups(&ops, tape.values.len());
     let mut old: Vec<Option<Op>> = ops.into_iter().map(Some).collect();
-    let mut merger =
-        Merger { values: &mut tape.values, moved: FxHashMap::default(), ops: Vec::new() };
+    let mut merger = Merger {
+        values: &mut tape.values,
+        moved: FxHashMap::default(),
+        ops: Vec::new(),
+        scores: vec![Scored::Operation(0); old.len()],
+    };
     for group in groups {
-        let members: Vec<Op> = group.members.iter().filter_map(|k| old[*k].take()).collect();
+        let members: Vec<(usize, Op)> =
+            group.members.iter().filter_map(|k| Some((*k, old[*k].take()?))).collect();
         merger.add(members);
     }
-    let Merger { moved, ops, .. } = merger;
-    tape.ops = ops;
-    summed::move_sums(&mut tape.summed, |at| moved.get(&at).copied().unwrap_or(at));
+    tape.ops = merger.ops;
+    tape.moved = Moved { numbers: merger.moved, scores: merger.scores };
+    summed::move_sums(&mut tape.summed, |at| tape.moved.number(at));
     summed::find_sums(&mut tape.summed, &tape.ops);
     tape.used = used(tape);
 }
@@ -200,6 +237,8 @@ struct Merger<'a> {
     /// Where results are that were elsewhere before.
     moved: FxHashMap<usize, usize>,
     ops: Vec<Op>,
+    /// By old operation: where its scores are.
+    scores: Vec<Scored>,
 }
 
 impl Merger<'_> {
@@ -210,12 +249,20 @@ impl Merger<'_> {
     }
 
     /// Adds the operations of one group.
-    fn add(&mut self, mut members: Vec<Op>) {
-        if members.len() == 1 || !self.side_by_side(&members) {
-            for mut op in members.drain(..) {
-                self.redirect(&mut op);
-                self.ops.push(op);
+    fn add(&mut self, members: Vec<(usize, Op)>) {
+        let (old, members): (Vec<usize>, Vec<Op>) = members.into_iter().unzip();
+        if members.len() > 1 && self.side_by_side(&members) {
+            let op = self.ops.len() - 1;
+            for (place, (k, member)) in old.iter().zip(&members).enumerate() {
+                let is_array = matches!(member, Op::Density { x, .. } if x.step != 0);
+                self.scores[*k] = Scored::Member(op, place, is_array);
             }
+            return;
+        }
+        for (k, mut op) in old.into_iter().zip(members) {
+            self.redirect(&mut op);
+            self.scores[k] = Scored::Operation(self.ops.len());
+            self.ops.push(op);
         }
     }
 

@@ -22,13 +22,14 @@ mod summed;
 
 pub use build::Builder;
 pub use form::Form;
-pub use op::{ScoreSums, ScoreTerms};
+pub use op::{ScoreSums, ScoreTerms, Scored};
 pub use sum_out::{Entry, Factor};
 
 use crate::dist::{Datum, Support};
 use crate::lang::value::Value;
 use crate::rng::Stream;
 use op::Op;
+use rustc_hash::FxHashMap;
 use std::ops::Range;
 use summed::Summed;
 
@@ -52,6 +53,8 @@ pub struct Tape {
     scratch: Vec<f64>,
     /// The choices summed out, in the order of elimination.
     summed: Vec<Summed>,
+    /// Where the end of the recording moved results and operations.
+    moved: lanes::Moved,
     /// The power of the likelihood within sums over choices.
     power: Power,
     /// The runs of numbers that operations use; empty if they use all.
@@ -186,11 +189,47 @@ impl Tape {
         }
     }
 
-    /// Returns the terms that operation `i` added to the sums in the last run, and puts
-    /// them into `each` if they are separate; `None` if it adds none.
-    pub fn terms(&self, i: usize, each: &mut Vec<f64>) -> Option<ScoreTerms> {
+    /// Where a form is that was recorded.
+    pub fn place_of(&self, form: &Form) -> Form {
+        self.moved.form(form)
+    }
+
+    /// Where a score is that was recorded.
+    pub fn place_of_score(&self, scored: &Scored) -> Scored {
+        self.moved.scored(scored)
+    }
+
+    /// Returns the terms of a score in the last run, and puts them into `each` if they are
+    /// separate; `None` if there are none. `columns` keeps the terms of operations for
+    /// several scores, of one run.
+    pub fn terms(
+        &self,
+        scored: &Scored,
+        each: &mut Vec<f64>,
+        columns: &mut FxHashMap<usize, Vec<f64>>,
+    ) -> Option<ScoreTerms> {
         each.clear();
-        self.ops.get(i)?.terms(&self.values, each)
+        match scored {
+            Scored::Operation(op) => self.ops.get(*op)?.terms(&self.values, each),
+            Scored::Member(op, place, is_array) => {
+                let column = columns.entry(*op).or_insert_with(|| {
+                    let mut column = Vec::new();
+                    self.ops.get(*op).and_then(|op| op.terms(&self.values, &mut column));
+                    column
+                });
+                let term = column.get(*place).copied()?;
+                if !is_array {
+                    return Some(ScoreTerms::One(term));
+                }
+                each.push(term);
+                Some(ScoreTerms::Each)
+            }
+            Scored::Numbers(at, false) => self.values.get(at.start).copied().map(ScoreTerms::One),
+            Scored::Numbers(at, true) => {
+                each.extend_from_slice(self.values.get(at.clone())?);
+                Some(ScoreTerms::Each)
+            }
+        }
     }
 
     fn forward(&mut self) -> bool {

@@ -8,6 +8,7 @@ use crate::lang::density;
 use crate::lang::value::Value;
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The sums of the scores on a tape.
@@ -26,11 +27,26 @@ pub struct ScoreSums {
 pub enum ScoreTerms {
     /// One term.
     One(f64),
-    /// ScoreTerms for the elements of an array.
+    /// Terms of the elements of an array.
     Each,
     /// The sum of such terms.
     Sum(ExactSum),
 }
+
+/// Where the score of one choice, observation or factor is on a tape.
+#[derive(Clone, Debug)]
+pub enum Scored {
+    /// The terms of an operation.
+    Operation(usize),
+    /// One of the terms of an operation for several scores.
+    Member(usize, usize, IsArray),
+    /// Numbers of the buffer from an index on: the terms of the elements of an array, or a
+    /// single one.
+    Numbers(Range<usize>, IsArray),
+}
+
+/// Whether terms are those of an array's elements, which may be one.
+type IsArray = bool;
 
 /// An operation; the numbers it reads precede those it writes.
 #[derive(Debug)]

@@ -200,6 +200,24 @@ impl Graph {
         }
     }
 
+    /// Adds the score of a choice to one sum, that of an observation or factor to the other.
+    pub(crate) fn put_scored(
+        &self,
+        code: &Code,
+        n: NodeId,
+        prior: &mut ExactSum,
+        likelihood: &mut ExactSum,
+    ) {
+        let node = &self.nodes[n as usize];
+        match (self.op(code, n), node.side.as_deref()) {
+            (Op::Draw { .. }, Some(Side::Choice(c))) if c.elements != NONE => {
+                c.scores.iter().for_each(|s| prior.add(*s));
+            }
+            (Op::Draw { .. }, _) => prior.add(node.score),
+            _ => self.put_score(n, likelihood),
+        }
+    }
+
     /// Subtracts an observation's or factor's score from a sum.
     pub(crate) fn take_score(&self, n: NodeId, from: &mut ExactSum) {
         let node = &self.nodes[n as usize];

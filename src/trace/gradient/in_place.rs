@@ -4,95 +4,121 @@
 
 use crate::lang::builtins::CovarianceValue;
 use crate::lang::code::{Code, Op, Operand};
-use crate::lang::tape::{Form, ScoreSums, ScoreTerms, Tape};
+use crate::lang::tape::{Form, ScoreSums, ScoreTerms, Scored, Tape};
 use crate::lang::value::Value;
 use crate::num::ExactSum;
 use crate::trace::Trace;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// The nodes that a tape gives values and scores.
-#[derive(Debug)]
-pub(super) struct InPlace {
-    values: Vec<(NodeId, Form)>,
-    /// Nodes that contribute to the score, and the operation of the tape with their terms.
-    scores: Vec<(NodeId, usize)>,
+/// The values of choices summed out, by number, for which something holds; without any it
+/// always does.
+pub(in crate::trace) type Given = SmallVec<[(u32, u32); 2]>;
+
+/// The nodes that a tape gives values and scores. Of those that depend on choices summed
+/// out, it gives them to the nodes that exist at the values of these choices.
+#[derive(Debug, Default)]
+pub(in crate::trace) struct InPlace {
+    values: Vec<(Given, NodeId, Form)>,
+    /// Nodes that contribute to the score, and where their terms are on the tape.
+    scores: Vec<(Given, NodeId, Scored)>,
     each: Vec<f64>,
     made: Vec<Value>,
+    columns: FxHashMap<usize, Vec<f64>>,
 }
 
 impl InPlace {
-    /// For the nodes whose inputs move, with their forms on a tape, and those among them
-    /// whose score one operation computes; `None` if a node keeps anything else that
-    /// moves.
-    pub fn new(
-        graph: &Graph,
-        code: &Code,
-        moving: impl Iterator<Item = (NodeId, Form)>,
-        scores: Vec<(NodeId, usize)>,
+    /// Adds the value of a node whose inputs move; false if the node keeps anything else
+    /// that moves.
+    pub fn add_value(
+        &mut self,
+        (graph, code): (&Graph, &Code),
+        n: NodeId,
+        given: Given,
+        form: Form,
         is_fixed: impl Fn(FrameId, Operand) -> bool,
-    ) -> Option<InPlace> {
-        let mut values = Vec::new();
-        for (n, form) in moving {
-            let node = &graph.nodes[n as usize];
-            let op = graph.op(code, n);
-            let fits = match node.side.as_deref() {
-                None | Some(Side::Deps(_) | Side::Child(_) | Side::MemoCall(_)) => true,
-                Some(Side::Choice(c)) => c.stored.is_none(),
-                Some(Side::Total(_)) => matches!(op, Op::Observe { .. }),
-                Some(Side::Loop(_)) => match op {
-                    Op::Map { over, .. } | Op::Fold { over, .. } => is_fixed(node.frame, *over),
-                    _ => false,
-                },
-                Some(Side::Kept(_) | Side::Table(_) | Side::Memo(_)) => false,
-            };
-            if !fits {
-                return None;
-            }
-            if !form.is_fixed() {
-                values.push((n, form));
-            }
+    ) -> bool {
+        let node = &graph.nodes[n as usize];
+        let op = graph.op(code, n);
+        let fits = match node.side.as_deref() {
+            None | Some(Side::Deps(_) | Side::Child(_) | Side::MemoCall(_)) => true,
+            Some(Side::Choice(c)) => c.stored.is_none(),
+            Some(Side::Total(_)) => matches!(op, Op::Observe { .. }),
+            Some(Side::Loop(_)) => match op {
+                Op::Map { over, .. } | Op::Fold { over, .. } => is_fixed(node.frame, *over),
+                _ => false,
+            },
+            Some(Side::Kept(_) | Side::Table(_) | Side::Memo(_)) => false,
+        };
+        if fits && !form.is_fixed() {
+            self.values.push((given, n, form));
         }
-        Some(InPlace { values, scores, each: Vec::new(), made: Vec::new() })
+        fits
     }
 
-    /// Moves the trace to the point of the tape's last run; `before` are the sums of its
-    /// scores where the trace is. False, with nothing changed, if only an update can do
-    /// that.
+    /// Adds the score of a node.
+    pub fn add_score(&mut self, n: NodeId, given: Given, scored: Scored) {
+        self.scores.push((given, n, scored));
+    }
+
+    /// Everything where the complete tape has it.
+    pub fn on(mut self, tape: &Tape) -> InPlace {
+        self.values.iter_mut().for_each(|(_, _, form)| *form = tape.place_of(form));
+        self.scores.iter_mut().for_each(|(_, _, at)| *at = tape.place_of_score(at));
+        self
+    }
+
+    /// Whether [`InPlace::apply`] can move the trace to the point of the tape's last run,
+    /// with choices that are summed out at these values.
+    pub fn fits(&mut self, graph: &Graph, code: &Code, tape: &Tape, values: &[usize]) -> bool {
+        self.made.clear();
+        self.columns.clear();
+        for (given, n, form) in &self.values {
+            if tape.numbers(form).is_none() && holds(graph, given, *n, values) {
+                let Some(value) = tape.value(form) else { return false };
+                self.made.push(value);
+            }
+        }
+        self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
+            |(_, n, scored)| {
+                let terms = tape.terms(scored, &mut self.each, &mut self.columns);
+                let node = &graph.nodes[*n as usize];
+                match (graph.op(code, *n), node.side.as_deref(), terms) {
+                    (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
+                        c.scores.len() == self.each.len() && c.elements != NONE
+                    }
+                    (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::One(_))) => {
+                        c.elements == NONE
+                    }
+                    (Op::Draw { .. }, None, Some(ScoreTerms::One(_))) => true,
+                    (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
+                    (Op::Observe { .. } | Op::Factor { .. }, None, Some(ScoreTerms::One(_))) => {
+                        true
+                    }
+                    _ => false,
+                }
+            },
+        )
+    }
+
+    /// Moves the trace to the point of the tape's last run, after [`InPlace::fits`]. The
+    /// sums of its scores where the trace is are `before`, if that is known.
     pub fn apply(
         &mut self,
         graph: &mut Graph,
         code: &Code,
         tape: &Tape,
-        before: &ScoreSums,
-    ) -> bool {
-        self.made.clear();
-        for (_, form) in self.values.iter().filter(|(_, form)| tape.numbers(form).is_none()) {
-            let Some(value) = tape.value(form) else { return false };
-            self.made.push(value);
-        }
-        let fits = self.scores.iter().all(|(n, i)| {
-            let terms = tape.terms(*i, &mut self.each);
-            let node = &graph.nodes[*n as usize];
-            match (graph.op(code, *n), node.side.as_deref(), terms) {
-                (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
-                    c.scores.len() == self.each.len() && c.elements != NONE
-                }
-                (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::One(_))) => {
-                    c.elements == NONE
-                }
-                (Op::Draw { .. }, None, Some(ScoreTerms::One(_))) => true,
-                (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
-                (Op::Observe { .. } | Op::Factor { .. }, None, Some(ScoreTerms::One(_))) => true,
-                _ => false,
-            }
-        });
-        if !fits {
-            return false;
-        }
+        values: &[usize],
+        before: Option<&ScoreSums>,
+    ) {
         let mut made = self.made.drain(..);
-        for (n, form) in &self.values {
+        for (given, n, form) in &self.values {
+            if !holds(graph, given, *n, values) {
+                continue;
+            }
             let value = &mut graph.nodes[*n as usize].value;
             match (tape.numbers(form), form) {
                 (Some([x]), Form::Num(_)) => *value = Value::Num(*x),
@@ -100,8 +126,15 @@ impl InPlace {
                 (None, _) => *value = made.next().unwrap_or_default(),
             }
         }
-        for (n, i) in &self.scores {
-            let terms = tape.terms(*i, &mut self.each);
+        let (mut old, mut new) = (ScoreSums::default(), ScoreSums::default());
+        for (given, n, scored) in &self.scores {
+            if !holds(graph, given, *n, values) {
+                continue;
+            }
+            if before.is_none() {
+                graph.put_scored(code, *n, &mut old.prior, &mut old.likelihood);
+            }
+            let terms = tape.terms(scored, &mut self.each, &mut self.columns);
             let node = &mut graph.nodes[*n as usize];
             match (node.side.as_deref_mut(), terms) {
                 (Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
@@ -123,11 +156,23 @@ impl InPlace {
                 (_, Some(ScoreTerms::One(score))) => node.score = score,
                 _ => {}
             }
+            if before.is_none() {
+                graph.put_scored(code, *n, &mut new.prior, &mut new.likelihood);
+            }
         }
-        tape.sums().replace(before, &mut graph.prior, &mut graph.likelihood);
+        let (new, old) = match before {
+            Some(before) => (tape.sums(), before),
+            None => (&new, &old),
+        };
+        new.replace(old, &mut graph.prior, &mut graph.likelihood);
         graph.revision += 1;
-        true
     }
+}
+
+/// Whether a node exists, and depends on choices that are summed out through these values.
+fn holds(graph: &Graph, given: &Given, n: NodeId, values: &[usize]) -> bool {
+    let same = |(x, value): &(u32, u32)| values.get(*x as usize) == Some(&(*value as usize));
+    given.iter().all(same) && graph.nodes[n as usize].state == State::Clean
 }
 
 /// Replaces an array, in its own memory if nothing else holds it.

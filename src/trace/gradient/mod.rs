@@ -14,6 +14,7 @@ mod recording;
 mod scores;
 mod vjp;
 
+pub(in crate::trace) use in_place::Given;
 pub(in crate::trace) use record::{Recorded, Recorder};
 pub use recording::Recording;
 pub(in crate::trace) use recording::SummedChoices;

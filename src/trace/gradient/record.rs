@@ -6,11 +6,11 @@
 //! depends on something that moves, the tape has a guard that detects a change, or there
 //! is no tape at all. Nothing is evaluated, and the trace does not change.
 
-use super::in_place::InPlace;
+use super::in_place::{Given, InPlace};
 use super::{Inputs, Reverse};
 use crate::dist::Dist;
 use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
-use crate::lang::tape::{Builder, Form, Tape};
+use crate::lang::tape::{Builder, Form, Scored, Tape};
 use crate::lang::value::Value;
 use crate::trace::choices::Target;
 use crate::trace::graph::Graph;
@@ -54,17 +54,22 @@ impl Graph {
         for n in reached {
             r.visit(n)?;
         }
-        let in_place = r.in_place();
-        Some((r.recorded.tape.finish(), in_place))
+        r.put_scores(&Given::new());
+        r.put_values(|_| Some(Given::new()));
+        let tape = r.recorded.tape.finish();
+        let in_place = r.recorded.in_place.map(|in_place| in_place.on(&tape));
+        Some((tape, in_place))
     }
 
     /// Records scores that `work` asks for, in one of several states of the trace that
-    /// share a tape.
+    /// share a tape, and what else moves. `given` tells through which values of choices
+    /// that are summed out a node has its value; `None` if it exists for some only.
     pub(in crate::trace) fn record_scores(
         &mut self,
         code: &Code,
         targets: &[Target],
         recorded: Recorded,
+        given: &FxHashMap<NodeId, Option<Given>>,
         work: impl FnOnce(&mut Recorder) -> Option<()>,
     ) -> Option<Recorded> {
         let reached = self.reached(code, targets);
@@ -75,6 +80,16 @@ impl Graph {
             }
         }
         work(&mut r)?;
+        let known = |r: &Recorder, n: &NodeId| match given.get(n) {
+            Some(Some(given)) => r.recorded.known.contains(&(*n, given.clone())),
+            _ => false,
+        };
+        for n in reached {
+            if r.recorded.in_place.is_some() && !known(&r, &n) && r.visit(n).is_none() {
+                r.recorded.in_place = None;
+            }
+        }
+        r.put_values(|n| given.get(&n).cloned().flatten());
         Some(r.recorded)
     }
 
@@ -100,7 +115,7 @@ impl Graph {
             recorded,
             scores,
             moving: Vec::new(),
-            scored: Some(Vec::new()),
+            scored: Vec::new(),
         }
     }
 }
@@ -112,13 +127,22 @@ pub(in crate::trace) struct Recorded {
     /// The forms of the nodes recorded so far.
     pub forms: FxHashMap<NodeId, Form>,
     pub tape: Builder,
+    /// How the trace can be moved in place, if it can.
+    pub in_place: Option<InPlace>,
+    /// The nodes whose values are in `in_place`, with what they are given.
+    known: FxHashSet<(NodeId, Given)>,
 }
 
 impl Recorded {
     /// Nothing yet; `keeps` as in [`Builder::new`].
     pub fn new(keeps: bool) -> Recorded {
-        let (placed, forms) = (FxHashMap::default(), FxHashMap::default());
-        Recorded { placed, forms, tape: Builder::new(keeps) }
+        Recorded {
+            placed: FxHashMap::default(),
+            forms: FxHashMap::default(),
+            tape: Builder::new(keeps),
+            in_place: keeps.then(InPlace::default),
+            known: FxHashSet::default(),
+        }
     }
 }
 
@@ -130,8 +154,8 @@ pub(in crate::trace) struct Recorder<'a> {
     scores: bool,
     /// The nodes whose inputs move.
     moving: Vec<NodeId>,
-    /// The operation that scores each node; `None` if a node has none, or several.
-    scored: Option<Vec<(NodeId, usize)>>,
+    /// Where the scores are that have been recorded.
+    scored: Vec<(NodeId, Scored)>,
 }
 
 impl Recorder<'_> {
@@ -189,24 +213,38 @@ impl Recorder<'_> {
         Some(())
     }
 
-    /// Returns how the trace can be moved in place; `None` if it cannot.
-    fn in_place(&mut self) -> Option<InPlace> {
-        let (graph, code) = (self.view.graph, self.view.code);
-        if !graph.incremental {
-            return None;
-        }
-        let moving: Vec<_> = self.moving.iter().map(|n| (*n, self.form(*n))).collect();
-        let scores = self.scored.take()?;
+    /// Lets the trace's values be moved in place too, if that is possible: of the nodes
+    /// recorded since the last call.
+    fn put_values(&mut self, given: impl Fn(NodeId) -> Option<Given>) {
+        let Some(mut in_place) = self.recorded.in_place.take() else { return };
+        let mut known = std::mem::take(&mut self.recorded.known);
         let is_fixed = |frame, o| self.operand(frame, o).is_fixed();
-        InPlace::new(graph, code, moving.into_iter(), scores, is_fixed)
+        let fits = self.moving.iter().all(|n| {
+            let Some(given) = given(*n) else { return false };
+            let of = (self.view.graph, self.view.code);
+            !known.insert((*n, given.clone()))
+                || in_place.add_value(of, *n, given, self.form(*n), is_fixed)
+        });
+        self.moving.clear();
+        self.recorded.known = known;
+        self.recorded.in_place = fits.then_some(in_place);
     }
 
-    /// Notes which operation scores a node: the only one since there were `before`.
-    fn note_score(&mut self, n: NodeId, before: usize) {
-        match (&mut self.scored, self.recorded.tape.operations() - before) {
-            (_, 0) => {}
-            (Some(scores), 1) => scores.push((n, before)),
-            _ => self.scored = None,
+    /// Does the same with the scores recorded since the last call, which are these for
+    /// some values of choices that are summed out.
+    pub fn put_scores(&mut self, given: &Given) {
+        let scored = self.scored.drain(..);
+        if let Some(in_place) = &mut self.recorded.in_place {
+            scored.for_each(|(n, scored)| in_place.add_score(n, given.clone(), scored));
+        }
+    }
+
+    /// Notes where the score of a node is: what was recorded since `mark`.
+    fn note_score(&mut self, n: NodeId, mark: (usize, usize)) {
+        match self.recorded.tape.scored(mark) {
+            Ok(Some(scored)) => self.scored.push((n, scored)),
+            Ok(None) => {}
+            Err(()) => self.recorded.in_place = None,
         }
     }
 
@@ -380,9 +418,9 @@ impl Recorder<'_> {
             }
             Op::Factor { weight, .. } => {
                 let weight = self.operand(frame, *weight);
-                let before = self.recorded.tape.operations();
+                let mark = self.recorded.tape.mark();
                 self.recorded.tape.factor(&weight)?;
-                self.note_score(n, before);
+                self.note_score(n, mark);
                 Some(Form::Fixed(now))
             }
             // Loops over values that move, and functions and containers whose structure
@@ -439,7 +477,7 @@ impl Recorder<'_> {
     fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
-        let before = self.recorded.tape.operations();
+        let mark = self.recorded.tape.mark();
         match spec {
             DistSpec::Family { builtin, args } => {
                 let dist = graph.make_dist(code, n, frame, spec, &mut Deps::new()).ok()?;
@@ -456,7 +494,7 @@ impl Recorder<'_> {
                 )?;
             }
         }
-        self.note_score(n, before);
+        self.note_score(n, mark);
         Some(())
     }
 }

@@ -10,7 +10,7 @@ use crate::dist::Datum;
 use crate::lang::tape::{ScoreSums, Tape};
 use crate::num::ExactSum;
 use crate::rng::Stream;
-use crate::trace::{Change, NONE, Target, Trace, Weight};
+use crate::trace::{Change, Draws, NONE, Target, Trace, Weight};
 use std::sync::Arc;
 
 /// The log density of a trace as a function of the unconstrained coordinates of some of
@@ -46,25 +46,22 @@ impl Trace {
     /// before it is evaluated.
     pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
-        let (tape, in_place) = self.graph.record(&self.code, targets)?;
-        Some(Recording {
-            in_place,
-            ..Recording::new(self, tape, targets, SummedChoices::default())
-        })
+        let recorded = self.graph.record(&self.code, targets)?;
+        Some(Recording::new(self, recorded, targets, SummedChoices::default()))
     }
 }
 
 impl Recording {
-    /// A recording of the current state.
+    /// A recording of the current state: a tape, and how it moves the trace in place.
     pub(in crate::trace) fn new(
         trace: &Trace,
-        tape: Tape,
+        (tape, in_place): (Tape, Option<InPlace>),
         targets: &[Target],
         summed: SummedChoices,
     ) -> Recording {
         Recording {
             tape,
-            in_place: None,
+            in_place,
             targets: targets.to_vec(),
             identity: Arc::clone(&trace.identity),
             revision: trace.graph.revision,
@@ -166,12 +163,63 @@ impl Recording {
         trace.rollback();
         let Some(in_place) = &mut self.in_place else { return false };
         let moved = self.tape.run_at_images(y, here)
-            && in_place.apply(&mut trace.graph, &trace.code, &self.tape, &self.start);
+            && in_place.fits(&trace.graph, &trace.code, &self.tape, &[]);
         if moved {
+            in_place.apply(&mut trace.graph, &trace.code, &self.tape, &[], Some(&self.start));
             self.start.clone_from(self.tape.sums());
             self.revision = trace.graph.revision;
         }
         moved
+    }
+
+    /// Gives the choices that are summed out a draw from their conditional at these
+    /// coordinates, or where the trace is, by an update of those that change, and moves the
+    /// trace there in place, as [`Recording::move_to`] does. False, with the trace
+    /// unchanged, if that is not possible.
+    pub fn draw_and_move_to(
+        &mut self,
+        trace: &mut Trace,
+        y: Option<&[f64]>,
+        here: &mut Vec<f64>,
+        rng: &mut Stream,
+        draws: Draws,
+    ) -> bool {
+        trace.rollback();
+        let there = match y {
+            Some(y) => self.tape.run_at_images(y, here),
+            None => self.begin(trace, here),
+        };
+        if !there || self.in_place.is_none() {
+            return false;
+        }
+        let drawn = self.tape.draw(rng);
+        let all = self.summed.sites.iter().zip(&self.summed.values).zip(&drawn);
+        let changes: Vec<(Target, Change)> = all
+            .filter(|((t, values), i)| trace.stored(**t).as_ref() != Some(&values[**i]))
+            .map(|((t, values), i)| (*t, Change::Set(values[*i].clone())))
+            .collect();
+        if !changes.is_empty() {
+            // Where the trace is, these values may be impossible.
+            let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();
+            if !trace.propose(&changes, draws).is_ok_and(possible) {
+                trace.rollback();
+                return false;
+            }
+        }
+        if y.is_some()
+            && let Some(in_place) = &mut self.in_place
+        {
+            if !in_place.fits(&trace.graph, &trace.code, &self.tape, &drawn) {
+                trace.rollback();
+                return false;
+            }
+            trace.commit();
+            in_place.apply(&mut trace.graph, &trace.code, &self.tape, &drawn, None);
+            self.start.clone_from(self.tape.sums());
+        }
+        trace.commit();
+        self.revision = trace.graph.revision;
+        true
     }
 
     /// Returns the log Jacobian in the state to which densities are relative.

@@ -162,10 +162,7 @@ impl Trace {
         for group in &elimination.groups {
             let (mut own_prior, mut own_likelihood) = (ExactSum::default(), ExactSum::default());
             for n in &group.scores {
-                match self.graph.op(&self.code, *n) {
-                    Op::Draw { .. } => self.put_prior(*n, &mut own_prior),
-                    _ => self.graph.put_score(*n, &mut own_likelihood),
-                }
+                self.graph.put_scored(&self.code, *n, &mut own_prior, &mut own_likelihood);
             }
             group.owners.iter().for_each(|n| self.put_scores_below(*n, &mut own_likelihood));
             terms.push(tempered(&own_prior, &own_likelihood));
@@ -173,14 +170,6 @@ impl Trace {
             likelihood.unmerge(&own_likelihood);
         }
         tempered(&prior, &likelihood)
-    }
-
-    fn put_prior(&self, n: NodeId, to: &mut ExactSum) {
-        let node = &self.graph.nodes[n as usize];
-        match node.side.as_deref() {
-            Some(Side::Choice(c)) if c.elements != NONE => c.scores.iter().for_each(|s| to.add(*s)),
-            _ => to.add(node.score),
-        }
     }
 
     /// Adds the scores of the observations and factors in the frames of a node.

@@ -153,12 +153,12 @@ impl<'a> Reader<'a> {
         Reader { graph, code, own, partition, seen, labels, found, sets: None }
     }
 
-    /// Whether neither the value of a node nor its existence depends on choices that are
-    /// summed out, as far as it was followed.
-    pub fn is_free(&mut self, n: NodeId) -> bool {
-        self.seen[n as usize] == Visit::Done
-            && self.labels[n as usize].site == NONE
-            && self.placed(n).0.site == NONE
+    /// Returns the choices that the value of a node depends on, if sets are kept; `None` if
+    /// its existence depends on some, or on too many to tell.
+    pub fn reads(&mut self, n: NodeId) -> Option<&[u32]> {
+        let (label, placed) = (self.visit(n), self.placed(n).0);
+        let sets = self.sets.as_ref().filter(|s| !s.overflow && placed.site == NONE)?;
+        Some(sets.members(label.set))
     }
 
     /// Follows every score, and merges the groups of choices that one score reads.

@@ -17,8 +17,7 @@ use super::reads::{Label, Reader, Sets};
 use crate::dist::{Datum, Support};
 use crate::lang::code::Op;
 use crate::lang::tape::{Entry, Factor};
-use crate::num::ExactSum;
-use crate::trace::gradient::{Recorded, Recorder, Recording, SummedChoices};
+use crate::trace::gradient::{Given, Recorded, Recorder, Recording, SummedChoices};
 use crate::trace::node::*;
 use crate::trace::{Change, Draws, Target, Trace, TraceResult};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -75,7 +74,9 @@ impl Trace {
         self.release_held(held)?;
         let Some((recorded, entries, sweep)) = tape else { return Ok(None) };
         let summed = SummedChoices { sites: sites.targets, values: sites.values, entries, sweep };
-        Ok(Some(Recording::new(self, recorded.tape.finish(), targets, summed)))
+        let tape = recorded.tape.finish();
+        let in_place = recorded.in_place.map(|in_place| in_place.on(&tape));
+        Ok(Some(Recording::new(self, (tape, in_place), targets, summed)))
     }
 
     fn sites(&self, targets: &[Target], sites: &[Target]) -> Option<Sites> {
@@ -130,8 +131,10 @@ impl Trace {
                     recorded = None;
                 }
                 let Some(before) = recorded.take() else { continue };
+                let given = self.given(sites, &indices, &choices);
                 let scores = self.scores_by_factor(&sites.scopes, &choices);
                 let record = RecordState {
+                    given: &given,
                     table: &mut table,
                     scopes: &sites.scopes,
                     counts: &sites.values.iter().map(Vec::len).collect::<Vec<_>>(),
@@ -139,12 +142,10 @@ impl Trace {
                     first: state == 0,
                 };
                 let mut now = self.record_state(targets, before, scores, record)?;
-                if state + 1 < states {
-                    let mut reader =
-                        Reader::new(&self.graph, &self.code, &sites.own, &mut partition);
-                    reader.read_all(choices.iter().copied());
-                    now.forms.retain(|n, _| reader.is_free(*n));
-                }
+                let is_free = |n: &NodeId| {
+                    given.get(n).is_some_and(|g| g.as_ref().is_some_and(|g| g.is_empty()))
+                };
+                now.forms.retain(|n, _| is_free(n));
                 recorded = Some(now);
             }
             if let Some(mut recorded) = recorded {
@@ -178,6 +179,28 @@ impl Trace {
         }
         self.commit();
         Some(())
+    }
+
+    /// Returns through which of their values in a state the choices determine each node, and
+    /// `None` for nodes that exist for some of their values only.
+    fn given(
+        &self,
+        sites: &Sites,
+        indices: &[usize],
+        choices: &[NodeId],
+    ) -> FxHashMap<NodeId, Option<Given>> {
+        let mut partition = Partition::default();
+        partition.grow(sites.targets.len());
+        let mut reader = Reader::new(&self.graph, &self.code, &sites.own, &mut partition);
+        reader.sets = Some(Sets::singletons(sites.targets.len()));
+        reader.read_all(choices.iter().copied());
+        let nodes = 0..self.graph.nodes.len() as NodeId;
+        let exists = |n: &NodeId| self.graph.nodes[*n as usize].state == State::Clean;
+        let at = |x: &u32| (*x, indices[*x as usize] as u32);
+        nodes
+            .filter(exists)
+            .map(|n| (n, reader.reads(n).map(|read| read.iter().map(at).collect())))
+            .collect()
     }
 
     /// Returns all nodes with scores, each with the factor that it is part of.
@@ -242,26 +265,26 @@ impl Trace {
                 let scores: Vec<(NodeId, [f64; 2])> = own
                     .into_iter()
                     .map(|n| {
-                        let mut sums = [ExactSum::default(), ExactSum::default()];
-                        match self.graph.op(&self.code, n) {
-                            Op::Draw { .. } => self.put_prior(n, &mut sums[0]),
-                            _ => self.graph.put_score(n, &mut sums[1]),
-                        }
-                        (n, sums.map(|sum| sum.value()))
+                        let (mut prior, mut likelihood) = Default::default();
+                        self.graph.put_scored(&self.code, n, &mut prior, &mut likelihood);
+                        (n, [prior.value(), likelihood.value()])
                     })
                     .collect();
                 open.push((place, scores));
             }
         }
         let (first, table) = (record.first, &mut *record.table);
-        self.graph.record_scores(&self.code, targets, before, |r: &mut Recorder| {
+        self.graph.record_scores(&self.code, targets, before, record.given, |r: &mut Recorder| {
             if first {
                 for n in base {
                     r.score(n)?;
                 }
+                r.put_scores(&Given::new());
             }
             for ((factor, entry), scores) in open {
                 r.recorded.tape.begin_terms();
+                let scope = table.factors[factor].scope.iter();
+                let given = scope.map(|x| (*x as u32, record.indices[*x] as u32)).collect();
                 let mut fixed = [0.0; 2];
                 for (n, now) in scores {
                     if !r.score(n)? {
@@ -269,6 +292,7 @@ impl Trace {
                         fixed[1] += now[1];
                     }
                 }
+                r.put_scores(&given);
                 table.factors[factor].entries[entry] = r.recorded.tape.entry(fixed);
             }
             Some(())
@@ -280,6 +304,7 @@ impl Trace {
 struct RecordState<'a> {
     table: &'a mut Table,
     scopes: &'a BTreeMap<NodeId, Vec<usize>>,
+    given: &'a FxHashMap<NodeId, Option<Given>>,
     /// The numbers of values of the choices, and the indices of their values.
     counts: &'a [usize],
     indices: &'a [usize],

@@ -165,6 +165,81 @@ fn values_that_the_program_does_not_have_everywhere() {
     }
 }
 
+/// Ends moves in place and by proposals; returns how many ended in place.
+fn ended_in_place(text: &str, power: f64) -> usize {
+    let record = |seed| {
+        let (mut trace, sites, moving) = begun(text, seed);
+        let tape = trace.record_summed(&moving, &sites, Draws::default()).unwrap();
+        let mut tape = tape.unwrap_or_else(|| panic!("not recorded: {text}"));
+        tape.set_power(power);
+        assert!(tape.begin(&trace, &mut Vec::new()));
+        (trace, tape)
+    };
+    let ((mut trace, mut tape), (mut proposed, mut other)) = (record(4), record(4));
+    let mut rng = StreamKey::new(6, 0, Purpose::KERNEL).stream(0, 0, 0);
+    let (mut here, mut ended) = (Vec::new(), 0);
+    assert!(other.begin(&proposed, &mut here));
+    for round in 0..30 {
+        let wide = [0.0, 0.1, 0.7][round % 3];
+        let y: Vec<f64> = here.iter().map(|y| y + wide * rng.standard_normal()).collect();
+        let to = (round % 5 != 0).then_some(&y[..]);
+        let mut draws = rng.clone();
+        let now = &mut here;
+        let there = tape.draw_and_move_to(&mut trace, to, now, &mut draws, Draws::default());
+        let mut changes = Vec::new();
+        if let Some(y) = to {
+            other.changes(y, &mut changes);
+        }
+        assert!(other.draw(to.unwrap_or(&here), &mut rng, &mut changes), "{text}");
+        changes.retain(
+            |(t, c)| !matches!(c, Change::Set(x) if proposed.stored(*t).as_ref() == Some(x)),
+        );
+        if !there {
+            trace.propose(&changes, Draws::default()).unwrap();
+            trace.commit();
+            tape.moved(&trace);
+        }
+        proposed.propose(&changes, Draws::default()).unwrap();
+        proposed.commit();
+        other.moved(&proposed);
+        assert!(other.begin(&proposed, &mut here) && tape.begin(&trace, &mut Vec::new()));
+        trace.same_nodes(&proposed).unwrap_or_else(|e| panic!("round {round} of {text}\n{e}"));
+        assert_eq!(tape.log_jacobian(), other.log_jacobian());
+        assert_eq!(tape.weigh(&y), other.weigh(&y), "{text}");
+        ended += usize::from(there);
+    }
+    ended
+}
+
+#[test]
+fn moves_that_end_in_place_are_those_of_proposals() {
+    for text in [
+        FLAGS,
+        CHAIN,
+        // Values that nothing scores, scores of arrays, and weights that move.
+        "assume w ~ beta(2, 2); assume m ~ iid(normal(0, 3), 2); assume r ~ gamma(2, 1);
+         let y = [[1, 2, 3, 1, 2, 2], [0, 1, 1, 2, 0, 0]];
+         for i in 0 .. 2 { z[i] ~ flip(w); let mean = if z[i] { m[0] } else { m[1] * r };
+           let twice = 2 * mean; observe normal(mean, r) = y[i]; observe normal(mean + 1, 2) = [y[i][0]]; }
+         observe normal(m[0], r) = [0.4, 0.5]; factor(-r); let more = exp(m[1] - w);",
+        "assume z ~ uniform_discrete(0, 2); assume x ~ normal(z, 1); assume s ~ exponential(1);
+         factor(if z == 1 { x } else { -x * s }); observe normal(x * z, s) = [1, 2, 3, 4, 5, 6, 7];
+         observe normal(x, s) = 1; observe normal(s, 1) = 1;",
+        "assume m ~ normal(0, 1); z ~ flip(0.3); let d = normal(m, 2);
+         observe mixture([1, 2], [normal(if z { m } else { 2 }, 1), normal(3, 1)]) = 0.7;
+         observe d = if z { 1 } else { 3 }; observe student_t(3, max([m, if z { 0.1 } else { -0.1 }]), 1) = 1;",
+    ] {
+        for power in [1.0, 0.4] {
+            let ended = ended_in_place(text, power);
+            assert!(ended == 30, "{ended} in place: {text}");
+        }
+    }
+    // Frames that come and go with a choice are not the same nodes.
+    let text = "for i in 0 .. 3 { z[i] ~ flip(0.4); } assume x ~ normal(0, 1);
+        for i in 0 .. 3 { if z[i] { observe normal(x, 0.5) = 1; } else { observe normal(x, 0.5) = -1; } }";
+    assert_eq!(ended_in_place(text, 1.0), 0);
+}
+
 #[test]
 fn what_a_tape_cannot_sum_out() {
     for text in [

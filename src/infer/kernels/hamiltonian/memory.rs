@@ -225,6 +225,33 @@ impl Memory {
         moved
     }
 
+    /// Draws the choices that are summed out at a point, or where the trace is, and moves the
+    /// trace there without a proposal of the other choices. False, with the trace unchanged,
+    /// if only a proposal can do that.
+    pub fn draw_and_move_to(
+        &mut self,
+        trace: &mut Trace,
+        to: Option<&Point>,
+        at: &StepContext,
+        rng: &mut Stream,
+    ) -> bool {
+        let mut here = self.point();
+        let (Some(point), Some((tape, _))) = (Arc::get_mut(&mut here), &mut self.tape) else {
+            return false;
+        };
+        point.log_density = 0.0;
+        let y = to.map(|to| &to.y[..]);
+        let moved = tape.draw_and_move_to(trace, y, &mut point.y, rng, at.draws(0));
+        if to.is_some() {
+            self.here = None;
+        }
+        if moved && to.is_some() && tape.gradient(&point.y, at.power, &mut point.gradient) {
+            self.here = Some((Arc::clone(&here), at.power));
+        }
+        self.keep(&here);
+        moved
+    }
+
     /// Updates the tape after a commit of these choices.
     pub fn moved(&mut self, trace: &Trace) {
         self.here = None;

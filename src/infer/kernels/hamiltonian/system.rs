@@ -305,7 +305,11 @@ impl<'a> System<'a> {
     /// Makes a point, or the initial one, the state of the trace, with the choices summed
     /// out drawn from their conditional there.
     fn finish_with_draws(mut self, to: Option<&Point>) -> TraceResult<bool> {
+        if self.memory.draw_and_move_to(self.trace, to, self.at, &mut self.at.within(0).stream()) {
+            return Ok(to.is_some());
+        }
         self.trace.rollback();
+        // The same draws as above: which of them are possible must not decide.
         let mut rng = self.at.within(0).stream();
         let mut here = Vec::new();
         if to.is_none() {
