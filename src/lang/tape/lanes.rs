@@ -215,7 +215,11 @@ pub(super) fn merge(tape: &mut Tape) {
     tape.used = used(tape);
 }
 
-/// Returns the runs of numbers whose adjoints are used.
+/// Up to how many numbers without use are filled with the others around them: a call for
+/// each short run costs more.
+const GAP: usize = 128;
+
+/// Returns the runs of numbers whose adjoints are used, and of few others.
 fn used(tape: &Tape) -> Vec<Range<usize>> {
     let mut is_used = vec![false; tape.values.len()];
     for op in &tape.ops {
@@ -225,7 +229,7 @@ fn used(tape: &Tape) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for at in (0..is_used.len()).filter(|at| is_used[*at]) {
         match runs.last_mut() {
-            Some(run) if run.end == at => run.end += 1,
+            Some(run) if at - run.end <= GAP => run.end = at + 1,
             _ => runs.push(at..at + 1),
         }
     }

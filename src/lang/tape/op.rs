@@ -163,7 +163,7 @@ impl Op {
             }
             Op::LogSumExp(l) => l.forward(v, power),
             Op::Total { from } => {
-                from.iter().for_each(|at| sums.prior.add(v[*at]));
+                sums.prior.add_each(from.iter().map(|at| v[*at]));
                 true
             }
         }

@@ -6,7 +6,7 @@ use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Lens, Placement, Vertices, beyond_near};
 use glam::DVec3;
 
-/// As [`MOST`], for the last faces of a mesh and for small meshes.
+/// The last faces of a mesh are processed in a multiple of this many.
 const FEW: usize = 16;
 /// Faces processed at a time: a compile-time constant, so that loops over them are
 /// vectorised.
@@ -86,8 +86,8 @@ impl Default for Batch {
 }
 
 impl Crossed {
-    /// Calls `out` with the segments in all faces of a mesh, batch by batch in the order
-    /// of the faces, and the number of faces in each batch. By vertex, `facing` is given,
+    /// Calls `out` with the segments in the faces of a mesh that `keep` accepts, batch by
+    /// batch in the order of the faces, and the number of faces in each batch. By vertex, `facing` is given,
     /// and in `front` whether it is not negative.
     #[inline(always)]
     pub fn each(
@@ -97,19 +97,23 @@ impl Crossed {
         lens: &Lens,
         vertices: &Vertices<'_>,
         (facing, front): (&[f64], &[u8]),
+        keep: impl Fn(&[u32; 3]) -> bool,
         mut out: impl FnMut(&Batch, usize),
     ) {
         self.find(&mesh.topology, front);
+        self.keep(&mesh.topology.triangles, keep);
         let Crossed { faces, count, batch } = self;
         for faces in faces[..*count].chunks(MOST) {
             for (i, face) in faces.iter().enumerate() {
                 let Some(face) = mesh.topology.triangles.get(*face as usize) else { continue };
                 batch.set(i, first_odd(face, front), mesh, vertices, facing);
             }
-            if faces.len() <= FEW {
-                batch.work::<FEW>(placement, lens, faces.len(), vertices.whole)
-            } else {
-                batch.work::<MOST>(placement, lens, faces.len(), vertices.whole)
+            let (count, whole) = (faces.len(), vertices.whole);
+            match count.div_ceil(FEW) {
+                1 => batch.work::<FEW>(placement, lens, count, whole),
+                2 => batch.work::<{ 2 * FEW }>(placement, lens, count, whole),
+                3 => batch.work::<{ 3 * FEW }>(placement, lens, count, whole),
+                _ => batch.work::<MOST>(placement, lens, count, whole),
             }
             out(batch, faces.len());
         }
@@ -151,6 +155,20 @@ impl Crossed {
             }
         }
         self.count = count;
+    }
+}
+
+impl Crossed {
+    /// Leaves out the faces that `keep` does not accept.
+    #[inline(always)]
+    fn keep(&mut self, triangles: &[[u32; 3]], keep: impl Fn(&[u32; 3]) -> bool) {
+        let mut kept = 0;
+        for i in 0..self.count {
+            let face = self.faces[i];
+            self.faces[kept] = face;
+            kept += usize::from(triangles.get(face as usize).is_some_and(&keep));
+        }
+        self.count = kept;
     }
 }
 
