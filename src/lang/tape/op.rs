@@ -163,7 +163,7 @@ impl Op {
             }
             Op::LogSumExp(l) => l.forward(v, power),
             Op::Total { from } => {
-                sums.prior.add_each(from.iter().map(|at| v[*at]));
+                sums.prior.add(sum(from, v));
                 true
             }
         }
@@ -276,6 +276,16 @@ impl ScoreSums {
     fn of(&mut self, observed: bool) -> &mut ExactSum {
         if observed { &mut self.likelihood } else { &mut self.prior }
     }
+}
+
+/// The sum of some numbers, in a fixed order. These are logs of sums, which are rounded
+/// themselves, so an exact sum would be no more accurate.
+fn sum(from: &[usize], v: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    for some in from.chunks(lanes.len()) {
+        lanes.iter_mut().zip(some).for_each(|(lane, at)| *lane += v[*at]);
+    }
+    lanes.iter().sum()
 }
 
 /// Returns the log density of a value; `None` if it is undefined.
