@@ -8,9 +8,11 @@
 //! smooth silhouette, that part of it is missed.
 
 use crate::render::View;
-use crate::render::derivatives::vjp::{vjp_outline, vjp_turned};
-use crate::render::lines::visibility::BESIDE;
+use crate::render::derivatives::vjp::{vjp_some, vjp_turned};
 use glam::DVec3;
+
+/// Distance from a piece at which to test for the background, in pixels.
+const BESIDE: f64 = 1.2;
 
 impl View {
     /// The derivatives of the sum of `gain` over the pixels that show the solid, in the
@@ -36,7 +38,7 @@ impl View {
             let by_piece: Vec<[f64; 4]> = (0..c.len()).map(one).collect();
             return vjp_turned(&drawn.solid, &camera, &by_piece).unwrap_or_default();
         }
-        let by_vertex = vjp_outline(&drawn.solid, &camera, &frame.depth, |piece| {
+        let by_vertex = vjp_some(&drawn.solid, &camera, &frame.depth, |piece| {
             by([piece.x, piece.y, piece.tx, piece.ty], piece.length)
         });
         drawn.by_vertices_of(self.solid(), by_vertex)

@@ -10,8 +10,8 @@
 use crate::geom::{Instance, Solid};
 use crate::render::derivatives::junctions::{End, Extracted, moved_ends};
 use crate::render::derivatives::silhouette_derivative::{STEADY, SilhouetteDerivative};
-use crate::render::lines::extraction::{Origin, Room, extract_mesh, extract_mesh_where};
-use crate::render::lines::visibility::{BESIDE, Depths, Piece};
+use crate::render::lines::extraction::{Origin, Room, extract_mesh};
+use crate::render::lines::visibility::{Depths, Piece};
 use crate::render::pixels::project::{Lens, Placement, Projected, project};
 use crate::render::{Camera, Contours};
 use glam::DVec3;
@@ -121,9 +121,9 @@ impl Contours {
 
 /// The vector-Jacobian product of the contours of a solid whose depth was drawn, with each
 /// piece fixed to its points of the surface. `by` gives the derivatives with respect to a
-/// piece's x and y, and none for pieces that are not part of the outline, which are mostly
-/// not even extracted.
-pub(in crate::render) fn vjp_outline(
+/// piece's x and y; pieces for which it gives none cost little, so this is cheap for
+/// functions of few pieces, such as those of the outline.
+pub(in crate::render) fn vjp_some(
     solid: &Solid,
     camera: &Camera,
     depth: &[f32],
@@ -143,48 +143,15 @@ pub(in crate::render) fn vjp_outline(
         if vertices.outside(camera) {
             continue;
         }
-        let near = |face: &[u32; 3]| {
-            !vertices.whole || may_be_outline(vertices.bounds(face), camera, depth)
-        };
-        let mesh = &instance.mesh;
-        extract_mesh_where(
-            mesh,
-            &placement,
-            camera,
-            &vertices,
-            &mut room,
-            near,
-            |piece, origin| {
-                if let Some([x, y]) = by(&piece).filter(|_| depths.visible(&piece))
-                    && let Some(by) = by_ends(instance, origin, camera, &[x, y, 0.0, 0.0])
-                {
-                    vjp_ends(origin, &by, own);
-                }
-            },
-        );
+        extract_mesh(&instance.mesh, &placement, camera, &vertices, &mut room, |piece, origin| {
+            if let Some([x, y]) = by(&piece).filter(|_| depths.visible(&piece))
+                && let Some(by) = by_ends(instance, origin, camera, &[x, y, 0.0, 0.0])
+            {
+                vjp_ends(origin, &by, own);
+            }
+        });
     }
     out
-}
-
-/// The most pixels of a face that are looked at one by one.
-const LOOKED_AT: usize = 64;
-
-/// Whether a piece of contour in a rectangle of the image (left, top, right, bottom) may be
-/// part of the outline: there is background beside it.
-fn may_be_outline(bounds: [f32; 4], camera: &Camera, depth: &[f32]) -> bool {
-    // Rounding of positions is below the margin.
-    let beside = BESIDE as f32 + 0.01;
-    let side = |x: f32, size: u32| x.clamp(0.0, size as f32 - 1.0) as usize;
-    let [left, right] = [bounds[0] - beside, bounds[2] + beside].map(|x| side(x, camera.width));
-    let [top, bottom] = [bounds[1] - beside, bounds[3] + beside].map(|y| side(y, camera.height));
-    let is_finite = bounds.iter().all(|x| x.is_finite());
-    if !is_finite || (right + 1 - left) * (bottom + 1 - top) > LOOKED_AT {
-        return true;
-    }
-    (top..=bottom).any(|row| {
-        let from = row * camera.width as usize;
-        depth.get(from + left..=from + right).is_none_or(|row| !row.iter().all(|d| d.is_finite()))
-    })
 }
 
 /// The derivatives for a surface that is drawn without a mesh, by the vertices of its mesh.

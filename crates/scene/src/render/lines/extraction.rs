@@ -50,20 +50,7 @@ pub(in crate::render) fn extract_mesh(
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
-    room: &mut Room,
-    out: impl FnMut(Piece, &Origin),
-) {
-    extract_mesh_where(mesh, placement, camera, vertices, room, |_| true, out);
-}
-
-/// As [`extract_mesh`], without the silhouettes in faces that `keep` does not accept.
-pub(in crate::render) fn extract_mesh_where(
-    mesh: &Mesh,
-    placement: &Placement,
-    camera: &Camera,
-    vertices: &Vertices<'_>,
     Room { fronts, crossed }: &mut Room,
-    keep: impl Fn(&[u32; 3]) -> bool,
     out: impl FnMut(Piece, &Origin),
 ) {
     let Some(image) = Image::new(camera.width, camera.height) else { return };
@@ -79,7 +66,7 @@ pub(in crate::render) fn extract_mesh_where(
     vectorised(
         #[inline(always)]
         || {
-            crossed.each(mesh, placement, &lens, vertices, signs, &keep, |batch, count| {
+            crossed.each(mesh, placement, &lens, vertices, signs, |batch, count| {
                 tracer.silhouettes(batch, count)
             })
         },

@@ -86,8 +86,8 @@ impl Default for Batch {
 }
 
 impl Crossed {
-    /// Calls `out` with the segments in the faces of a mesh that `keep` accepts, batch by
-    /// batch in the order of the faces, and the number of faces in each batch. By vertex, `facing` is given,
+    /// Calls `out` with the segments in all faces of a mesh, batch by batch in the order
+    /// of the faces, and the number of faces in each batch. By vertex, `facing` is given,
     /// and in `front` whether it is not negative.
     #[inline(always)]
     pub fn each(
@@ -97,11 +97,9 @@ impl Crossed {
         lens: &Lens,
         vertices: &Vertices<'_>,
         (facing, front): (&[f64], &[u8]),
-        keep: impl Fn(&[u32; 3]) -> bool,
         mut out: impl FnMut(&Batch, usize),
     ) {
         self.find(&mesh.topology, front);
-        self.keep(&mesh.topology.triangles, keep);
         let Crossed { faces, count, batch } = self;
         for faces in faces[..*count].chunks(MOST) {
             for (i, face) in faces.iter().enumerate() {
@@ -155,20 +153,6 @@ impl Crossed {
             }
         }
         self.count = count;
-    }
-}
-
-impl Crossed {
-    /// Leaves out the faces that `keep` does not accept.
-    #[inline(always)]
-    fn keep(&mut self, triangles: &[[u32; 3]], keep: impl Fn(&[u32; 3]) -> bool) {
-        let mut kept = 0;
-        for i in 0..self.count {
-            let face = self.faces[i];
-            self.faces[kept] = face;
-            kept += usize::from(triangles.get(face as usize).is_some_and(&keep));
-        }
-        self.count = kept;
     }
 }
 

@@ -328,15 +328,6 @@ impl Vertices<'_> {
         -(least.x + least.y + least.z + least.w)
     }
 
-    /// The bounding box of some vertices in pixels, to within a thousandth: left, top, right,
-    /// bottom.
-    #[inline(always)]
-    pub fn bounds(&self, of: &[u32]) -> [f32; 4] {
-        let places = of.iter().filter_map(|v| self.places.get(*v as usize));
-        let least = places.fold(Place::INFINITY, |a, b| a.min(*b));
-        [0.5 + least.x, 0.5 + least.y, 0.5 - least.z, 0.5 - least.w]
-    }
-
     /// The least coordinates of the rounded positions in some runs.
     #[inline(always)]
     pub fn least(&self, of: &[Run]) -> Place {
