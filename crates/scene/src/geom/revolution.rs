@@ -45,6 +45,7 @@ pub struct Revolution {
     spans: Vec<Span>,
     rims: Vec<Rim>,
     part_count: u16,
+    encloses: bool,
 }
 
 impl Revolution {
@@ -74,7 +75,9 @@ impl Revolution {
                 }
             }
         }
-        Revolution { rings, spans, rims, part_count }
+        let rising = rings.is_sorted_by(|a, b| a.y <= b.y);
+        let encloses = rising && rims.iter().all(|rim| !rim.spans.contains(&None));
+        Revolution { rings, spans, rims, part_count, encloses }
     }
 
     /// The rings, along the path.
@@ -95,6 +98,12 @@ impl Revolution {
     /// The sharp circles, which show as lines from every viewpoint.
     pub fn rims(&self) -> &[Rim] {
         &self.rims
+    }
+
+    /// Whether it surely encloses a body, so that its inside does not show from outside of
+    /// that.
+    pub fn encloses(&self) -> bool {
+        self.encloses
     }
 
     /// The number of parts.

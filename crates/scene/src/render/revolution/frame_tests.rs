@@ -4,6 +4,7 @@ use super::*;
 use crate::render::Projection;
 use crate::render::revolution::testing::{Vessel, random_pose};
 use crate::render::testing::Uniform;
+use glam::DVec3;
 
 #[test]
 fn pictures_are_those_of_meshes_with_many_sides() {
@@ -22,9 +23,10 @@ fn pictures_are_those_of_meshes_with_many_sides() {
         let exact = Frame::of_revolution(&vessel.exact(), &pose, &camera, Channels::All);
         let alone = Frame::of_revolution(&vessel.exact(), &pose, &camera, Channels::Depth);
         assert_eq!(exact.depth, alone.depth);
-        let pixels: Vec<u32> = (0..camera.pixels() as u32).filter(|i| i % 3 == 1).collect();
-        let some = vessel.exact().depth_at(&pose, &camera, &pixels);
-        assert!(pixels.iter().zip(&some).all(|(i, d)| exact.depth[*i as usize] == *d));
+        let pixels: Vec<u32> = (0..camera.pixels() as u32).collect();
+        let plain = vessel.exact().depth_at(&pose, &camera, &pixels);
+        let other = (0..pixels.len()).filter(|i| plain[*i] != exact.depth[*i]).count();
+        assert_eq!(other, 0, "round {round}");
         for i in 0..camera.pixels() {
             let (d, e) = (mesh.depth[i], exact.depth[i]);
             assert_eq!(e.is_finite(), exact.part[i] != u16::MAX);
