@@ -6,7 +6,7 @@
 //! of a wall is narrow in each row. Invariant: the surface is beyond the near plane; pixels
 //! that show a span are among those listed for it.
 
-use super::lanes::{LANES, Row};
+use super::lanes::{LANES, Row, mask};
 use super::rays::Shape;
 use super::samples::row;
 use super::sight::Sight;
@@ -63,7 +63,10 @@ impl Cover {
             let [top, bottom] = rows(hoop.extent, height);
             let mut at = top;
             while at < bottom {
-                let chord = hoop.chord(&sight.lens, at);
+                let chord = match sight.lens.pinhole {
+                    true => hoop.chord::<true>(&sight.lens, at),
+                    false => hoop.chord::<false>(&sight.lens, at),
+                };
                 for (list, ends) in self.chords.iter_mut().zip(chord) {
                     let place = list.get_mut(hoop.first + at..).and_then(|l| l.first_chunk_mut());
                     if let Some(place) = place {
@@ -74,23 +77,28 @@ impl Cover {
             }
             self.hoops.push(hoop);
         }
+        let Cover { patches, columns, hoops, chords } = self;
+        let mut lists = Lists { patches, columns, chords };
         for far in [false, true] {
             for (number, span) in (0..).zip(surface.spans()) {
                 let Some(ends) = surface.ends(span) else { continue };
-                let hoops = [span.ring, span.ring + 1].map(|ring| self.hoops.get(ring).copied());
-                let [Some(a), Some(b)] = hoops else { continue };
+                let Some([a, b]) =
+                    hoops.get(span.ring..span.ring + 2).and_then(|h| h.first_chunk())
+                else {
+                    continue;
+                };
                 let shape = Shape::new(ends, number);
                 match shape {
                     Shape::Level(_) if far => {}
                     Shape::Level(_) => {
                         let (outer, inner) = if ends[0].r > ends[1].r { (a, b) } else { (b, a) };
-                        self.add(shape, camera, &Outline::disc(outer, inner), 0.0);
+                        lists.add(shape, camera, &Outline::disc(outer, inner), 0.0);
                     }
                     // The inside of what encloses itself does not show.
                     Shape::Cone(_) if far && surface.encloses() => {}
                     Shape::Cone(_) => {
                         let (outline, beyond) = Outline::wall(ends, [a, b], sight, far);
-                        self.add(shape, camera, &outline, beyond);
+                        lists.add(shape, camera, &outline, beyond);
                     }
                 }
             }
@@ -106,20 +114,29 @@ impl Cover {
         let [from, left, right, past] = columns.unwrap_or_default();
         [from as usize, left as usize, right as usize, past as usize]
     }
+}
 
+/// Where patches are listed.
+struct Lists<'a> {
+    patches: &'a mut Vec<Patch>,
+    columns: &'a mut Vec<[u32; 4]>,
+    chords: &'a [Vec<f64>; 2],
+}
+
+impl Lists<'_> {
     #[inline(always)]
     fn add(&mut self, shape: Shape, camera: &Camera, outline: &Outline, beyond: f64) {
         let [a, b] = &outline.hull;
         let extent = [a.extent[0].min(b.extent[0]), a.extent[1].max(b.extent[1])];
         let rows = rows(extent, camera.height as usize);
         let first = self.columns.len();
-        let [left, right] = &self.chords;
+        let [left, right] = self.chords;
         let mut at = rows[0];
         while at < rows[1] {
             let [mut from, mut past] = [row(left, a.first + at), row(right, a.first + at)];
             let other = [row(left, b.first + at), row(right, b.first + at)];
             let mut hole = [[f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]];
-            if let Some(hoop) = &outline.without {
+            if let Some(hoop) = outline.without {
                 hole = [row(left, hoop.first + at), row(right, hoop.first + at)];
             }
             for i in 0..LANES {
@@ -127,9 +144,9 @@ impl Cover {
                 past[i] = most(past[i], other[1][i]);
             }
             for [p, q] in &outline.edges {
-                let per = 1.0 / (q[1] - p[1]);
+                let (per, top) = (1.0 / (q[1] - p[1]), at as f64);
                 for i in 0..LANES {
-                    let y = (at + i) as f64 + 0.5;
+                    let y = top + (i as f64 + 0.5);
                     // Shares of the edge in a little more than the row.
                     let (s, t) = ((y - MARGIN - p[1]) * per, (y + MARGIN - p[1]) * per);
                     let crosses = (least(s, t) <= 1.0) & (most(s, t) >= 0.0);
@@ -163,24 +180,24 @@ impl Cover {
 
 /// What contains the picture of a span: the convex hull of two circles, without the disc
 /// of a third.
-struct Outline {
-    hull: [Hoop; 2],
+struct Outline<'a> {
+    hull: [&'a Hoop; 2],
     /// Lines between the two circles.
     edges: [[[f64; 2]; 2]; 2],
-    without: Option<Hoop>,
+    without: Option<&'a Hoop>,
 }
 
-impl Outline {
+impl<'a> Outline<'a> {
     /// Of a level span.
     #[inline(always)]
-    fn disc(outer: Hoop, inner: Hoop) -> Outline {
+    fn disc(outer: &'a Hoop, inner: &'a Hoop) -> Outline<'a> {
         Outline { hull: [outer; 2], edges: [[[f64::NAN; 2]; 2]; 2], without: inner.open() }
     }
 
     /// Of the outside of a cone, or of its inside, which is farther; and a depth that no
     /// part of that is nearer than.
     #[inline(always)]
-    fn wall(ends: [&Ring; 2], hull: [Hoop; 2], sight: &Sight, far: bool) -> (Outline, f64) {
+    fn wall(ends: [&Ring; 2], hull: [&'a Hoop; 2], sight: &Sight, far: bool) -> (Outline<'a>, f64) {
         let [a, b] = ends;
         // The flat normal is that of the whole cone.
         let flat = Ring { nr: b.y - a.y, ny: a.r - b.r, ..*a };
@@ -242,39 +259,61 @@ impl Hoop {
 
     /// Itself, unless its disc is seen edge-on.
     #[inline(always)]
-    fn open(self) -> Option<Hoop> {
+    fn open(&self) -> Option<&Hoop> {
         (self.extent[1] - self.extent[0] > EDGE_ON).then_some(self)
     }
 
     /// The left and the right end of its picture in rows from one on.
     #[inline(always)]
-    fn chord(&self, lens: &Lens, first: usize) -> [Row; 2] {
+    fn chord<const PINHOLE: bool>(&self, lens: &Lens, first: usize) -> [Row; 2] {
         let Hoop { middle, across, aside, .. } = self;
-        let bend = if lens.pinhole { 1.0 } else { 0.0 };
-        let (mut left, mut right) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        let (mut u, mut v, mut q) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut root, mut some) = ([0.0; LANES], [0; LANES]);
+        let top = first as f64;
         for i in 0..LANES {
             // A point p of the circle is in this row if p.y + slope * p.z is 0, where p.z is
             // -1 for a parallel projection: p + u cosine + v sine = 0.
-            let slope = (lens.cy - ((first + i) as f64 + 0.5)) / lens.scale;
-            let bent = slope * bend;
-            let p = middle.y + bent * middle.z - slope * (1.0 - bend);
-            let (u, v) = (across.y + bent * across.z, aside.y + bent * aside.z);
-            let per = 1.0 / (u * u + v * v).sqrt();
-            let (u, v, q) = (u * per, v * per, -p * per);
-            let square = 1.0 - q * q;
-            let root = most(square, 0.0).sqrt();
-            let x = |c: f64, s: f64| {
-                let x = middle.x + across.x * c + aside.x * s;
-                let depth = -(middle.z + across.z * c + aside.z * s);
-                lens.cx + lens.scale * (if bend > 0.0 { x / depth } else { x })
+            let slope = (lens.cy - (top + (i as f64 + 0.5))) / lens.scale;
+            let (a, b, c) = match PINHOLE {
+                true => (
+                    middle.y + slope * middle.z,
+                    across.y + slope * across.z,
+                    aside.y + slope * aside.z,
+                ),
+                false => (middle.y - slope, across.y, aside.y),
             };
-            let (x, y) =
-                (x(q * u - root * v, q * v + root * u), x(q * u + root * v, q * v - root * u));
-            let some = square >= -1e-9;
-            left[i] = if some { least(x, y) } else { f64::INFINITY };
-            right[i] = if some { most(x, y) } else { f64::NEG_INFINITY };
+            let per = 1.0 / (b * b + c * c).sqrt();
+            (u[i], v[i], q[i]) = (b * per, c * per, -a * per);
+            let square = 1.0 - q[i] * q[i];
+            root[i] = most(square, 0.0).sqrt();
+            some[i] = mask(square >= -1e-9);
+        }
+        let (mut c, mut s) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        for i in 0..LANES {
+            (c[0][i], s[0][i]) = (q[i] * u[i] - root[i] * v[i], q[i] * v[i] + root[i] * u[i]);
+            (c[1][i], s[1][i]) = (q[i] * u[i] + root[i] * v[i], q[i] * v[i] - root[i] * u[i]);
+        }
+        let a = self.columns::<PINHOLE>(lens, &c[0], &s[0]);
+        let b = self.columns::<PINHOLE>(lens, &c[1], &s[1]);
+        let (mut left, mut right) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            left[i] = if some[i] != 0 { least(a[i], b[i]) } else { f64::INFINITY };
+            right[i] = if some[i] != 0 { most(a[i], b[i]) } else { f64::NEG_INFINITY };
         }
         [left, right]
+    }
+
+    /// The x in the image of points at some cosines and sines.
+    #[inline(always)]
+    fn columns<const PINHOLE: bool>(&self, lens: &Lens, c: &Row, s: &Row) -> Row {
+        let Hoop { middle, across, aside, .. } = self;
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            let x = middle.x + across.x * c[i] + aside.x * s[i];
+            let depth = -(middle.z + across.z * c[i] + aside.z * s[i]);
+            out[i] = lens.cx + lens.scale * (if PINHOLE { x / depth } else { x });
+        }
+        out
     }
 }
 

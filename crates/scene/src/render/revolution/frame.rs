@@ -1,7 +1,7 @@
 //! Depth, parts and normals of a surface of revolution: a line of sight for each pixel
 //! against the cones and level spans that may show there.
 
-use super::cover::Cover;
+use super::cover::{Cover, Patch};
 use super::lanes::LANES;
 use super::rays::Spans;
 use super::scan::{MOST, Scan, centres};
@@ -11,6 +11,7 @@ use crate::geom::{Affine, Revolution};
 use crate::render::simd::vectorised;
 use crate::render::{Camera, Channels, Frame};
 use std::cell::RefCell;
+use wide::f32x8;
 
 /// Buffers reused from call to call.
 #[derive(Default)]
@@ -19,6 +20,8 @@ struct Scratch {
     spans: Spans,
     scan: Scan,
     shading: Shading,
+    /// The patches of a row and their columns there.
+    here: Vec<(Patch, [usize; 4])>,
 }
 
 thread_local! {
@@ -81,30 +84,28 @@ impl Scratch {
     /// Draws where spans may show.
     #[inline(always)]
     fn covered<const PINHOLE: bool>(&mut self, sight: &Sight, frame: &mut Frame) {
-        let patches = &self.cover.patches;
-        let top = patches.iter().map(|p| p.rows[0]).min().unwrap_or(0);
-        let bottom = patches.iter().map(|p| p.rows[1]).max().unwrap_or(0);
+        let Scratch { cover, scan, shading, here, .. } = self;
+        let top = cover.patches.iter().map(|p| p.rows[0]).min().unwrap_or(0);
+        let bottom = cover.patches.iter().map(|p| p.rows[1]).max().unwrap_or(0);
         for row in top..bottom {
-            let here = || {
-                let there = patches.iter().filter(|p| (p.rows[0] <= row) & (row < p.rows[1]));
-                there.map(|p| (p, self.cover.columns(p, row)))
-            };
-            let window = here().fold([usize::MAX, 0], |[from, past], (_, [first, .., last])| {
-                // Empty ones do not count.
-                if first < last { [from.min(first), past.max(last)] } else { [from, past] }
-            });
-            if window[0] >= window[1] {
-                continue;
-            }
-            let mut from = window[0];
-            while from < window[1] {
-                self.scan.begin::<PINHOLE>(sight, row, [from, window[1]]);
-                for (patch, [from, left, right, past]) in here() {
-                    self.scan.test::<PINHOLE>(patch, [from, left]);
-                    self.scan.test::<PINHOLE>(patch, [right, past]);
+            here.clear();
+            let (mut first, mut end) = (usize::MAX, 0);
+            for patch in &cover.patches {
+                if (patch.rows[0] <= row) & (row < patch.rows[1]) {
+                    let columns = cover.columns(patch, row);
+                    if columns[0] < columns[3] {
+                        (first, end) = (first.min(columns[0]), end.max(columns[3]));
+                        here.push((*patch, columns));
+                    }
                 }
-                finish::<PINHOLE>(&self.scan, &self.shading, sight, row, frame);
-                from += MOST;
+            }
+            while first < end {
+                scan.begin::<PINHOLE>(sight, row, [first, end]);
+                for (patch, [from, left, right, past]) in here.iter() {
+                    scan.test::<PINHOLE>(patch, [[*from, *left], [*right, *past]]);
+                }
+                finish::<PINHOLE>(scan, shading, sight, row, frame);
+                first += MOST;
             }
         }
     }
@@ -147,16 +148,22 @@ fn finish<const PINHOLE: bool>(
     while from + at < past {
         let (seen, count) = (scan.seen(at), (past - from - at).min(LANES));
         let first = row * frame.width as usize + from + at;
-        let (mut depth, mut some) = ([0.0; LANES], 0);
+        let mut depth = [0.0; LANES];
         for i in 0..LANES {
             depth[i] = seen.depth[i] as f32;
-            some |= u64::from(seen.depth[i] < f64::INFINITY);
         }
         write(&mut frame.depth, [first, count], &depth);
-        if some != 0 && !frame.part.is_empty() {
-            let shown = shading.shown::<PINHOLE>(sight, &centres(from + at, row), &seen);
+        let there = f32x8::from(depth).simd_lt(f32x8::splat(f32::INFINITY)).to_bitmask();
+        if there != 0 && !frame.part.is_empty() {
+            let (lines, at) = (scan.lines::<PINHOLE>(sight, at), centres(from + at, row));
+            let shown = shading.shown::<PINHOLE>(sight, &lines, &at, &seen, there);
             write(&mut frame.part, [first, count], &shown.part);
-            write(&mut frame.normal, [first, count], &shown.normal);
+            let [x, y, z] = shown.normal;
+            let mut normal = [[0.0; 3]; LANES];
+            for (i, n) in normal.iter_mut().enumerate() {
+                *n = [x[i], y[i], z[i]];
+            }
+            write(&mut frame.normal, [first, count], &normal);
         }
         at += LANES;
     }

@@ -192,7 +192,9 @@ impl Spans {
             cone.first(rays, &mut seen);
         }
         for i in 0..LANES {
-            seen.depth[i] = if near[i] <= far[i] { seen.depth[i] } else { f64::INFINITY };
+            let inside = near[i] <= far[i];
+            seen.depth[i] = if inside { seen.depth[i] } else { f64::INFINITY };
+            seen.span[i] = if inside { seen.span[i] } else { u64::MAX };
         }
         seen
     }
@@ -203,12 +205,12 @@ impl Spans {
 pub(super) struct Seen {
     /// Infinite where there is nothing.
     pub depth: Row,
-    /// The number of the span.
+    /// The number of the span; that of no span where there is nothing.
     pub span: [u64; LANES],
 }
 
 impl Seen {
-    pub const NOTHING: Seen = Seen { depth: [f64::INFINITY; LANES], span: [0; LANES] };
+    pub const NOTHING: Seen = Seen { depth: [f64::INFINITY; LANES], span: [u64::MAX; LANES] };
 
     /// Notes a span where it is beyond the near plane and nearer than what was seen.
     #[inline(always)]

@@ -3,7 +3,7 @@
 use super::cover::Patch;
 use super::lanes::{LANES, Row, mask};
 use super::rays::{Seen, Shape};
-use super::sight::{Rays, Sight};
+use super::sight::{Lines, Rays, Sight};
 
 /// The number of pixels of a part; a power of 2. It is fixed, so that indices are known to
 /// be inside.
@@ -19,6 +19,8 @@ pub(super) struct Scan {
     /// and given only once.
     square: [Part<f64>; 3],
     height: [Part<f64>; 2],
+    /// The ways of [`Lines`] from a pinhole, or else their origins.
+    lines: [Part<f64>; 3],
     depth: Part<f64>,
     span: Part<u64>,
     /// The columns.
@@ -29,7 +31,14 @@ impl Default for Scan {
     fn default() -> Scan {
         let none = [0.0; MOST + LANES];
         let span = [0; MOST + LANES];
-        Scan { square: [none; 3], height: [none; 2], depth: none, span, window: [0; 2] }
+        Scan {
+            square: [none; 3],
+            height: [none; 2],
+            lines: [none; 3],
+            depth: none,
+            span,
+            window: [0; 2],
+        }
     }
 }
 
@@ -45,7 +54,12 @@ impl Scan {
         self.window = [from, past.min(from + MOST)];
         let mut at = 0;
         while from + at < self.window[1] {
-            let rays = Rays::of(&sight.lines::<PINHOLE>(centres(from + at, row).each_ref()));
+            let lines = sight.lines::<PINHOLE>(centres(from + at, row).each_ref());
+            let rays = Rays::of(&lines);
+            let vary = if PINHOLE { &lines.way } else { &lines.origin };
+            put(&mut self.lines[0], at, &vary[0]);
+            put(&mut self.lines[1], at, &vary[1]);
+            put(&mut self.lines[2], at, &vary[2]);
             if PINHOLE {
                 (self.square[0][0], self.height[0][0]) = (rays.square[0][0], rays.height[0][0]);
             } else {
@@ -66,9 +80,10 @@ impl Scan {
         self.window
     }
 
-    /// Tests those from one column to one past another that are here against a patch.
+    /// Tests the columns of two intervals, from the first to one past the last, against a
+    /// patch.
     #[inline(always)]
-    pub fn test<const PINHOLE: bool>(&mut self, patch: &Patch, columns: [usize; 2]) {
+    pub fn test<const PINHOLE: bool>(&mut self, patch: &Patch, columns: [[usize; 2]; 2]) {
         let beyond = patch.beyond;
         match patch.shape {
             Shape::Cone(cone) => self.each::<PINHOLE>(
@@ -90,22 +105,32 @@ impl Scan {
     fn each<const PINHOLE: bool>(
         &mut self,
         beyond: f64,
-        [from, past]: [usize; 2],
+        columns: [[usize; 2]; 2],
         first: impl Fn(&Rays, &mut Seen),
     ) {
         let [begin, end] = self.window;
-        let (mut at, past) = (from.max(begin) - begin, past.min(end).saturating_sub(begin));
-        while at < past {
-            let mut seen = self.seen(at);
-            let mut open = 0;
-            for i in 0..LANES {
-                open |= mask(seen.depth[i] > beyond);
+        for [from, past] in columns {
+            let (mut at, past) = (from.max(begin) - begin, past.min(end).saturating_sub(begin));
+            while at < past {
+                let mut seen = self.seen(at);
+                if beyond <= 0.0 || any_beyond(&seen.depth, beyond) {
+                    first(&self.rays::<PINHOLE>(at), &mut seen);
+                    self.note(at, &seen);
+                }
+                at += LANES;
             }
-            if open != 0 {
-                first(&self.rays::<PINHOLE>(at), &mut seen);
-                self.note(at, &seen);
-            }
-            at += LANES;
+        }
+    }
+
+    /// The lines of sight of pixels from one on, counted from the first.
+    #[inline(always)]
+    pub fn lines<const PINHOLE: bool>(&self, sight: &Sight, at: usize) -> Lines {
+        let [x, y, z] = &self.lines;
+        let vary = [get(x, at), get(y, at), get(z, at)];
+        let same = sight.shared::<PINHOLE>();
+        match PINHOLE {
+            true => Lines { origin: same, way: vary },
+            false => Lines { origin: vary, way: same },
         }
     }
 
@@ -142,6 +167,16 @@ pub(super) fn centres(column: usize, row: usize) -> [Row; 2] {
         *x = first + (i as f64 + 0.5);
     }
     [x, [row as f64 + 0.5; LANES]]
+}
+
+/// Whether any of some depths is greater than another.
+#[inline(always)]
+fn any_beyond(depth: &Row, beyond: f64) -> bool {
+    let mut open = 0;
+    for depth in depth {
+        open |= mask(*depth > beyond);
+    }
+    open != 0
 }
 
 #[inline(always)]

@@ -1,10 +1,11 @@
 //! Parts and normals of what lines of sight meet, eight pixels at a time.
 
-use super::lanes::{LANES, Row, mask};
+use super::lanes::{LANES, Row};
 use super::rays::Seen;
 use super::sight::{Lines, Sight};
 use crate::geom::{Revolution, Ring};
 use glam::Vec3;
+use wide::f32x8;
 
 /// How the normal changes over a span.
 #[derive(Clone, Copy, Debug)]
@@ -42,10 +43,10 @@ pub(super) struct Shading {
     turn: [[f32; 3]; 3],
 }
 
-/// Parts and unit normals, as in a frame.
+/// Parts and unit normals, as in a frame: `u16::MAX` and 0 where nothing is met.
 pub(super) struct Shown {
     pub part: [u16; LANES],
-    pub normal: [[f32; 3]; LANES],
+    pub normal: [[f32; LANES]; 3],
 }
 
 impl Shading {
@@ -60,10 +61,17 @@ impl Shading {
         self.turn = columns.map(|column| column.map(|v| (v / most) as f32));
     }
 
-    /// The parts and normals of what is met at pixels of a row; `u16::MAX` and 0 where that
-    /// is nothing.
+    /// The parts and normals of what lines of sight meet, which is something for those
+    /// `there`.
     #[inline(always)]
-    pub fn shown<const PINHOLE: bool>(&self, sight: &Sight, at: &[Row; 2], seen: &Seen) -> Shown {
+    pub fn shown<const PINHOLE: bool>(
+        &self,
+        sight: &Sight,
+        Lines { origin: [ox, oy, oz], way: [u, v, w] }: &Lines,
+        at: &[Row; 2],
+        seen: &Seen,
+        there: u32,
+    ) -> Shown {
         let (mut share, mut away, mut along) =
             ([[0.0f64; LANES]; 3], [[0.0f32; LANES]; 2], [[0.0f32; LANES]; 2]);
         let mut part = [u16::MAX; LANES];
@@ -72,9 +80,8 @@ impl Shading {
             (share[0][i], share[1][i], share[2][i]) = (slope.at[0], slope.at[1], slope.at[2]);
             (away[0][i], away[1][i]) = (slope.away[0], slope.away[1]);
             (along[0][i], along[1][i]) = (slope.along[0], slope.along[1]);
-            part[i] = if seen.depth[i] < f64::INFINITY { slope.part } else { u16::MAX };
+            part[i] = slope.part;
         }
-        let Lines { origin: [ox, oy, oz], way: [u, v, w] } = sight.lines::<PINHOLE>(at.each_ref());
         let (mut cosine, mut sine, mut t) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
         for i in 0..LANES {
             let d = seen.depth[i];
@@ -92,41 +99,50 @@ impl Shading {
                 (right[i], up[i]) = (-x as f32, -y as f32);
             }
         }
-        let [a, b, c] = &self.turn;
-        let (mut x, mut y, mut z) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-        let mut wrong = 0;
-        for i in 0..LANES {
-            let radial = away[0][i] + away[1][i] * t[i];
-            let q = along[0][i] + along[1][i] * t[i];
-            let (p, r) = (radial * cosine[i], radial * sine[i]);
-            let nx = a[0] * p + b[0] * q + c[0] * r;
-            let ny = a[1] * p + b[1] * q + c[1] * r;
-            let nz = a[2] * p + b[2] * q + c[2] * r;
-            let square = nx * nx + ny * ny + nz * nz;
-            let per = (1.0 / square.sqrt()).copysign(nx * right[i] + ny * up[i] + nz);
-            (x[i], y[i], z[i]) = (nx * per, ny * per, nz * per);
-            wrong |= mask(!(square > 1e-30)) & mask(seen.depth[i] < f64::INFINITY);
-        }
-        let mut normal = [[0.0; 3]; LANES];
-        for i in 0..LANES {
-            let there = seen.depth[i] < f64::INFINITY;
-            normal[i][0] = if there { x[i] } else { 0.0 };
-            normal[i][1] = if there { y[i] } else { 0.0 };
-            normal[i][2] = if there { z[i] } else { 0.0 };
-        }
-        if wrong != 0 {
-            facing(&mut normal, &right, &up);
-        }
+        let normal = self.normals([away, along], [cosine, sine, t], [right, up], there);
         Shown { part, normal }
+    }
+
+    /// Unit normals in the camera's coordinates, towards the eye; 0 where nothing is met.
+    #[inline(always)]
+    fn normals(
+        &self,
+        [away, along]: [[[f32; LANES]; 2]; 2],
+        [cosine, sine, t]: [[f32; LANES]; 3],
+        to_eye: [[f32; LANES]; 2],
+        there: u32,
+    ) -> [[f32; LANES]; 3] {
+        let (row, all) = (f32x8::from, f32x8::splat);
+        let [a, b, c] = self.turn;
+        let t = row(t);
+        let radial = row(away[0]) + row(away[1]) * t;
+        let q = row(along[0]) + row(along[1]) * t;
+        let (p, r) = (radial * row(cosine), radial * row(sine));
+        let x = p * all(a[0]) + q * all(b[0]) + r * all(c[0]);
+        let y = p * all(a[1]) + q * all(b[1]) + r * all(c[1]);
+        let z = p * all(a[2]) + q * all(b[2]) + r * all(c[2]);
+        let square = x * x + y * y + z * z;
+        let facing = x * row(to_eye[0]) + y * row(to_eye[1]) + z;
+        let some = square.simd_gt(all(TINY));
+        let per = (all(1.0) / square.sqrt()) ^ (facing & all(-0.0));
+        let mut normal =
+            [(x * per & some).to_array(), (y * per & some).to_array(), (z * per & some).to_array()];
+        let odd = there & !some.to_bitmask();
+        if odd != 0 {
+            face(&mut normal, odd, &to_eye);
+        }
+        normal
     }
 }
 
-/// Where a normal has no direction, it faces the camera.
+/// Squared lengths below this count as 0.
+const TINY: f32 = 1e-30;
+
+/// Turns some normals to the eye, as they have no direction.
 #[inline(never)]
-fn facing(normal: &mut [[f32; 3]; LANES], right: &[f32; LANES], up: &[f32; LANES]) {
-    for (i, normal) in normal.iter_mut().enumerate() {
-        if !Vec3::from_array(*normal).is_normalized() && *normal != [0.0; 3] {
-            *normal = Vec3::new(right[i], up[i], 1.0).normalize().to_array();
-        }
+fn face(normal: &mut [[f32; LANES]; 3], which: u32, [right, up]: &[[f32; LANES]; 2]) {
+    for i in (0..LANES).filter(|i| which >> i & 1 != 0) {
+        let n = Vec3::new(right[i], up[i], 1.0).normalize();
+        [normal[0][i], normal[1][i], normal[2][i]] = n.to_array();
     }
 }

@@ -135,6 +135,7 @@ impl Sight {
         let mut lines = Lines::default();
         let [p, q, r] = self.inverse.to_cols_array_2d();
         let Lines { origin, way } = &mut lines;
+        *(if PINHOLE { &mut *origin } else { &mut *way }) = self.shared::<PINHOLE>();
         for i in 0..LANES {
             let [a, b] = self.slopes([x[i], y[i]]);
             let x = p[0] * a + q[0] * b;
@@ -142,15 +143,23 @@ impl Sight {
             let z = p[2] * a + q[2] * b;
             if PINHOLE {
                 (way[0][i], way[1][i], way[2][i]) = (x - r[0], y - r[1], z - r[2]);
-                (origin[0][i], origin[1][i], origin[2][i]) = (self.view[0], self.view[1], 0.0);
             } else {
                 let back = &self.back;
-                (way[0][i], way[1][i], way[2][i]) = (-r[0], -r[1], -r[2]);
                 (origin[0][i], origin[1][i], origin[2][i]) =
                     (x - back[0], y - back[1], z - back[2]);
             }
         }
         lines
+    }
+
+    /// What all lines of sight share: the origin from a pinhole, or else the way.
+    #[inline(always)]
+    pub fn shared<const PINHOLE: bool>(&self) -> [Row; 3] {
+        let [x, y, z] = match PINHOLE {
+            true => [self.view[0], self.view[1], 0.0],
+            false => (-self.inverse.z_axis).to_array(),
+        };
+        [[x; LANES], [y; LANES], [z; LANES]]
     }
 
     /// The lines of sight through positions in the image, as they meet the surface.
