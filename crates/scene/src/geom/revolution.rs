@@ -75,8 +75,7 @@ impl Revolution {
                 }
             }
         }
-        let rising = rings.is_sorted_by(|a, b| a.y <= b.y);
-        let encloses = rising && rims.iter().all(|rim| !rim.spans.contains(&None));
+        let encloses = rims.iter().all(|rim| !rim.spans.contains(&None)) && is_simple(&rings);
         Revolution { rings, spans, rims, part_count, encloses }
     }
 
@@ -100,8 +99,7 @@ impl Revolution {
         &self.rims
     }
 
-    /// Whether it surely encloses a body, so that its inside does not show from outside of
-    /// that.
+    /// Whether it surely encloses a body, with its normals pointing out of it.
     pub fn encloses(&self) -> bool {
         self.encloses
     }
@@ -110,6 +108,38 @@ impl Revolution {
     pub fn part_count(&self) -> u16 {
         self.part_count
     }
+}
+
+/// Whether a path surely does not cross itself: it goes up, then down again inside.
+fn is_simple(rings: &[Ring]) -> bool {
+    let top = rings.windows(2).position(|pair| pair[1].y < pair[0].y);
+    let top = top.unwrap_or(rings.len().saturating_sub(1));
+    let (Some(outer), Some(inner)) = (rings.get(..=top), rings.get(top..)) else { return false };
+    let up = |ring: &[Ring; 2]| ring[0].y < ring[1].y;
+    if inner.windows(2).any(|pair| pair[0].y < pair[1].y) {
+        return false;
+    }
+    let mut walls = outer.array_windows::<2>().filter(|pair| up(pair)).peekable();
+    let at = |[a, b]: &[Ring; 2], y: f64| a.r + (b.r - a.r) * ((y - a.y) / (b.y - a.y));
+    for [b, a] in inner.array_windows::<2>().rev() {
+        let wall = [*a, *b];
+        if !up(&wall) {
+            continue;
+        }
+        // All outer spans beside this inner one.
+        loop {
+            let Some(other) = walls.peek() else { return false };
+            let ends = [a.y.max(other[0].y), b.y.min(other[1].y)];
+            if ends[0] < ends[1] && ends.iter().any(|y| at(&wall, *y) > at(other, *y)) {
+                return false;
+            }
+            if other[1].y >= b.y {
+                break;
+            }
+            walls.next();
+        }
+    }
+    true
 }
 
 /// The rings of a strip, with normals from central differences.

@@ -94,8 +94,8 @@ impl Cover {
                         let (outer, inner) = if ends[0].r > ends[1].r { (a, b) } else { (b, a) };
                         lists.add(shape, camera, &Outline::disc(outer, inner), 0.0);
                     }
-                    // The inside of what encloses itself does not show.
-                    Shape::Cone(_) if far && surface.encloses() => {}
+                    // Where the path goes down, a body that encloses itself shows the inside.
+                    Shape::Cone(_) if surface.encloses() && far != (ends[1].y < ends[0].y) => {}
                     Shape::Cone(_) => {
                         let (outline, beyond) = Outline::wall(ends, [a, b], sight, far);
                         lists.add(shape, camera, &outline, beyond);

@@ -1,7 +1,7 @@
 //! Depth, parts and normals of a surface of revolution: a line of sight for each pixel
 //! against the cones and level spans that may show there.
 
-use super::cover::{Cover, Patch};
+use super::cover::Cover;
 use super::lanes::LANES;
 use super::rays::Spans;
 use super::scan::{MOST, Scan, centres};
@@ -20,8 +20,8 @@ struct Scratch {
     spans: Spans,
     scan: Scan,
     shading: Shading,
-    /// The patches of a row and their columns there.
-    here: Vec<(Patch, [usize; 4])>,
+    /// The numbers of the patches of a row, and their columns there.
+    here: Vec<(usize, [usize; 4])>,
 }
 
 thread_local! {
@@ -90,18 +90,19 @@ impl Scratch {
         for row in top..bottom {
             here.clear();
             let (mut first, mut end) = (usize::MAX, 0);
-            for patch in &cover.patches {
+            for (number, patch) in cover.patches.iter().enumerate() {
                 if (patch.rows[0] <= row) & (row < patch.rows[1]) {
                     let columns = cover.columns(patch, row);
                     if columns[0] < columns[3] {
                         (first, end) = (first.min(columns[0]), end.max(columns[3]));
-                        here.push((*patch, columns));
+                        here.push((number, columns));
                     }
                 }
             }
             while first < end {
                 scan.begin::<PINHOLE>(sight, row, [first, end]);
-                for (patch, [from, left, right, past]) in here.iter() {
+                for (number, [from, left, right, past]) in here.iter() {
+                    let Some(patch) = cover.patches.get(*number) else { continue };
                     scan.test::<PINHOLE>(patch, [[*from, *left], [*right, *past]]);
                 }
                 finish::<PINHOLE>(scan, shading, sight, row, frame);
@@ -158,12 +159,7 @@ fn finish<const PINHOLE: bool>(
             let (lines, at) = (scan.lines::<PINHOLE>(sight, at), centres(from + at, row));
             let shown = shading.shown::<PINHOLE>(sight, &lines, &at, &seen, there);
             write(&mut frame.part, [first, count], &shown.part);
-            let [x, y, z] = shown.normal;
-            let mut normal = [[0.0; 3]; LANES];
-            for (i, n) in normal.iter_mut().enumerate() {
-                *n = [x[i], y[i], z[i]];
-            }
-            write(&mut frame.normal, [first, count], &normal);
+            write(&mut frame.normal, [first, count], &shown.normal);
         }
         at += LANES;
     }
