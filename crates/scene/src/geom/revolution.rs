@@ -115,28 +115,30 @@ fn is_simple(rings: &[Ring]) -> bool {
     let top = rings.windows(2).position(|pair| pair[1].y < pair[0].y);
     let top = top.unwrap_or(rings.len().saturating_sub(1));
     let (Some(outer), Some(inner)) = (rings.get(..=top), rings.get(top..)) else { return false };
-    let up = |ring: &[Ring; 2]| ring[0].y < ring[1].y;
-    if inner.windows(2).any(|pair| pair[0].y < pair[1].y) {
+    let rises = |pair: &&[Ring]| pair[0].y < pair[1].y;
+    let starts = |rings: &[Ring]| rings.first().map_or(f64::NAN, |ring| ring.y);
+    if inner.windows(2).any(|pair| rises(&pair)) || !(starts(outer) <= inner[inner.len() - 1].y) {
         return false;
     }
-    let mut walls = outer.array_windows::<2>().filter(|pair| up(pair)).peekable();
-    let at = |[a, b]: &[Ring; 2], y: f64| a.r + (b.r - a.r) * ((y - a.y) / (b.y - a.y));
-    for [b, a] in inner.array_windows::<2>().rev() {
-        let wall = [*a, *b];
-        if !up(&wall) {
+    let mut walls = outer.windows(2).filter(rises).peekable();
+    let at = |a: &Ring, b: &Ring, y: f64| a.r + (b.r - a.r) * ((y - a.y) / (b.y - a.y));
+    for (a, b) in inner.windows(2).rev().map(|pair| (&pair[1], &pair[0])) {
+        if a.y == b.y {
             continue;
         }
         // All outer spans beside this inner one.
-        loop {
-            let Some(other) = walls.peek() else { return false };
-            let ends = [a.y.max(other[0].y), b.y.min(other[1].y)];
-            if ends[0] < ends[1] && ends.iter().any(|y| at(&wall, *y) > at(other, *y)) {
+        while let Some([c, d]) = walls.peek() {
+            let ends = [a.y.max(c.y), b.y.min(d.y)];
+            if ends[0] < ends[1] && ends.iter().any(|y| at(a, b, *y) > at(c, d, *y)) {
                 return false;
             }
-            if other[1].y >= b.y {
+            if d.y >= b.y {
                 break;
             }
             walls.next();
+        }
+        if walls.peek().is_none() {
+            return false;
         }
     }
     true

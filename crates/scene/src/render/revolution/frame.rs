@@ -5,7 +5,7 @@ use super::cover::Cover;
 use super::lanes::LANES;
 use super::rays::Spans;
 use super::scan::{MOST, Scan, centres};
-use super::shading::Shading;
+use super::shading::{Shading, Shown};
 use super::sight::Sight;
 use crate::geom::{Affine, Revolution};
 use crate::render::simd::vectorised;
@@ -16,12 +16,8 @@ use wide::f32x8;
 /// Buffers reused from call to call.
 #[derive(Default)]
 struct Scratch {
-    cover: Cover,
-    spans: Spans,
-    scan: Scan,
+    tracer: Tracer,
     shading: Shading,
-    /// The numbers of the patches of a row, and their columns there.
-    here: Vec<(usize, [usize; 4])>,
 }
 
 thread_local! {
@@ -56,35 +52,86 @@ impl Frame {
 
 impl Scratch {
     fn draw(&mut self, surface: &Revolution, sight: &Sight, camera: &Camera, frame: &mut Frame) {
-        let all = !frame.part.is_empty();
+        let Scratch { tracer, shading } = self;
         vectorised(
             #[inline(always)]
             || {
-                if all {
-                    self.shading.set(surface, sight);
+                if !frame.part.is_empty() {
+                    shading.set(surface, sight);
                 }
-                let range = sight.range(surface);
-                if range.near > Camera::NEAR && range.far.is_finite() {
-                    self.cover.set(surface, sight, camera);
-                    match sight.lens.pinhole {
-                        true => self.covered::<true>(sight, frame),
-                        false => self.covered::<false>(sight, frame),
-                    }
-                } else {
-                    self.spans.set(surface);
-                    match sight.lens.pinhole {
-                        true => self.everywhere::<true>(surface, sight, camera, frame),
-                        false => self.everywhere::<false>(surface, sight, camera, frame),
-                    }
-                }
+                tracer.rows(
+                    surface,
+                    sight,
+                    camera,
+                    #[inline(always)]
+                    |scan, row| match sight.lens.pinhole {
+                        true => finish::<true>(scan, shading, sight, row, frame),
+                        false => finish::<false>(scan, shading, sight, row, frame),
+                    },
+                );
             },
         );
     }
+}
 
-    /// Draws where spans may show.
+/// Calls `f` for each pixel that shows a surface, with its number, its depth and the number
+/// of the span.
+pub(super) fn each_seen(
+    surface: &Revolution,
+    sight: &Sight,
+    camera: &Camera,
+    mut f: impl FnMut(usize, f64, usize),
+) {
+    let mut tracer = Tracer::default();
+    tracer.rows(surface, sight, camera, |scan, row| {
+        let [from, past] = scan.window();
+        for at in (0..past - from).step_by(LANES) {
+            let seen = scan.seen(at);
+            let here = (from + at..past).zip(seen.depth).zip(seen.span);
+            for ((column, depth), span) in here.filter(|((_, depth), _)| depth.is_finite()) {
+                f(row * camera.width as usize + column, depth, span as usize);
+            }
+        }
+    });
+}
+
+/// Follows lines of sight, row by row.
+#[derive(Default)]
+struct Tracer {
+    cover: Cover,
+    spans: Spans,
+    scan: Scan,
+    /// The numbers of the patches of a row, and their columns there.
+    here: Vec<(usize, [usize; 4])>,
+}
+
+impl Tracer {
+    /// Calls `done` for each part of a row that may show a surface.
     #[inline(always)]
-    fn covered<const PINHOLE: bool>(&mut self, sight: &Sight, frame: &mut Frame) {
-        let Scratch { cover, scan, shading, here, .. } = self;
+    fn rows(
+        &mut self,
+        surface: &Revolution,
+        sight: &Sight,
+        camera: &Camera,
+        done: impl FnMut(&Scan, usize),
+    ) {
+        let range = sight.range(surface);
+        if range.near > Camera::NEAR && range.far.is_finite() {
+            self.cover.set(surface, sight, camera);
+            match sight.lens.pinhole {
+                true => self.covered::<true>(sight, done),
+                false => self.covered::<false>(sight, done),
+            }
+        } else {
+            self.spans.set(surface);
+            self.everywhere(surface, sight, camera, done);
+        }
+    }
+
+    /// Only where spans may show.
+    #[inline(always)]
+    fn covered<const PINHOLE: bool>(&mut self, sight: &Sight, mut done: impl FnMut(&Scan, usize)) {
+        let Tracer { cover, scan, here, .. } = self;
         let top = cover.patches.iter().map(|p| p.rows[0]).min().unwrap_or(0);
         let bottom = cover.patches.iter().map(|p| p.rows[1]).max().unwrap_or(0);
         for row in top..bottom {
@@ -105,31 +152,34 @@ impl Scratch {
                     let Some(patch) = cover.patches.get(*number) else { continue };
                     scan.test::<PINHOLE>(patch, [[*from, *left], [*right, *past]]);
                 }
-                finish::<PINHOLE>(scan, shading, sight, row, frame);
+                done(scan, row);
                 first += MOST;
             }
         }
     }
 
-    /// Draws a surface that may reach behind the near plane.
+    /// Of a surface that may reach behind the near plane.
     #[inline(always)]
-    fn everywhere<const PINHOLE: bool>(
+    fn everywhere(
         &mut self,
         surface: &Revolution,
         sight: &Sight,
         camera: &Camera,
-        frame: &mut Frame,
+        mut done: impl FnMut(&Scan, usize),
     ) {
         let [columns, rows] = sight.window(surface, camera);
         for row in rows[0]..rows[1] {
             let mut from = columns[0];
             while from < columns[1] {
-                self.scan.begin::<PINHOLE>(sight, row, [from, columns[1]]);
+                match sight.lens.pinhole {
+                    true => self.scan.begin::<true>(sight, row, [from, columns[1]]),
+                    false => self.scan.begin::<false>(sight, row, [from, columns[1]]),
+                }
                 for at in (0..self.scan.window()[1] - from).step_by(LANES) {
                     let rays = sight.rays(centres(from + at, row).each_ref());
                     self.scan.note(at, &self.spans.nearest(&rays));
                 }
-                finish::<PINHOLE>(&self.scan, &self.shading, sight, row, frame);
+                done(&self.scan, row);
                 from += MOST;
             }
         }
@@ -156,8 +206,8 @@ fn finish<const PINHOLE: bool>(
         write(&mut frame.depth, [first, count], &depth);
         let there = f32x8::from(depth).simd_lt(f32x8::splat(f32::INFINITY)).to_bitmask();
         if there != 0 && !frame.part.is_empty() {
-            let (lines, at) = (scan.lines::<PINHOLE>(sight, at), centres(from + at, row));
-            let shown = shading.shown::<PINHOLE>(sight, &lines, &at, &seen, there);
+            let mut shown = Shown::NOTHING;
+            shading.show(sight, &scan.lines::<PINHOLE>(sight, at), &seen, there, &mut shown);
             write(&mut frame.part, [first, count], &shown.part);
             write(&mut frame.normal, [first, count], &shown.normal);
         }

@@ -4,7 +4,7 @@ use super::lanes::{LANES, Row};
 use super::rays::Seen;
 use super::sight::{Lines, Sight};
 use crate::geom::{Revolution, Ring};
-use glam::Vec3;
+use glam::DVec3;
 use wide::f32x4;
 
 /// How the normal changes over a span.
@@ -47,16 +47,19 @@ pub(super) struct Shown {
     pub normal: [[f32; 3]; LANES],
 }
 
+impl Shown {
+    pub const NOTHING: Shown = Shown { part: [u16::MAX; LANES], normal: [[0.0; 3]; LANES] };
+}
+
 /// Points on the surface: cosine and sine of the angle around the axis, radius and height;
-/// and the way to the eye, right and up in the camera's coordinates.
+/// and the way of the line of sight.
 #[derive(Clone, Copy, Default)]
 struct Points {
     cosine: [f32; LANES],
     sine: [f32; LANES],
     radius: [f32; LANES],
     height: [f32; LANES],
-    right: [f32; LANES],
-    up: [f32; LANES],
+    way: [[f32; LANES]; 3],
 }
 
 impl Shading {
@@ -71,17 +74,17 @@ impl Shading {
         self.turn = columns.map(|column| column.map(|v| (v / most) as f32));
     }
 
-    /// The parts and normals of what lines of sight meet, which is something for those
-    /// `there`.
+    /// Replaces all by the parts and normals of what lines of sight meet, which is something
+    /// for those `there`.
     #[inline(always)]
-    pub fn shown<const PINHOLE: bool>(
+    pub fn show(
         &self,
         sight: &Sight,
         Lines { origin: [ox, oy, oz], way: [u, v, w] }: &Lines,
-        at: &[Row; 2],
         seen: &Seen,
         there: u32,
-    ) -> Shown {
+        shown: &mut Shown,
+    ) {
         let mut points = Points::default();
         for i in 0..LANES {
             let d = seen.depth[i];
@@ -91,40 +94,35 @@ impl Shading {
             (points.cosine[i], points.sine[i]) = ((x * per) as f32, (z * per) as f32);
             (points.radius[i], points.height[i]) = (r as f32, y as f32);
         }
-        if PINHOLE {
-            for i in 0..LANES {
-                let [x, y] = sight.slopes([at[0][i], at[1][i]]);
-                (points.right[i], points.up[i]) = (-x as f32, -y as f32);
-            }
+        for i in 0..LANES {
+            points.way[0][i] = u[i] as f32;
+            points.way[1][i] = v[i] as f32;
+            points.way[2][i] = w[i] as f32;
         }
         let mut slopes = [&Slope::NONE; LANES];
-        let mut part = [u16::MAX; LANES];
         for i in 0..LANES {
             slopes[i] = self.slopes.get(seen.span[i] as usize).unwrap_or(&Slope::NONE);
-            part[i] = slopes[i].part;
+            shown.part[i] = slopes[i].part;
         }
         let [a, b, c, d, e, f, g, h] = slopes;
-        let (low, first) = self.normals([a, b, c, d], &points, 0);
-        let (high, last) = self.normals([e, f, g, h], &points, 4);
-        let [a, b, c, d] = low;
-        let [e, f, g, h] = high;
-        let mut normal = [a, b, c, d, e, f, g, h];
+        let first = self.normals([a, b, c, d], &points, 0, &mut shown.normal);
+        let last = self.normals([e, f, g, h], &points, 4, &mut shown.normal);
         let odd = there & !(first | last << 4);
         if odd != 0 {
-            face(&mut normal, odd, &points);
+            face(&mut shown.normal, odd, sight, [u, v, w]);
         }
-        Shown { part, normal }
     }
 
-    /// Unit normals of four points in the camera's coordinates, towards the eye, and which
-    /// of them are known; the others are 0.
+    /// Sets the unit normals of four points in the camera's coordinates, towards the eye, and
+    /// returns which of them are known; the others are 0.
     #[inline(always)]
     fn normals(
         &self,
         [a, b, c, d]: [&Slope; 4],
         points: &Points,
         first: usize,
-    ) -> ([[f32; 3]; 4], u32) {
+        normal: &mut [[f32; 3]; LANES],
+    ) -> u32 {
         let row = |list: &[f32; LANES]| {
             f32x4::new([list[first], list[first + 1], list[first + 2], list[first + 3]])
         };
@@ -140,15 +138,16 @@ impl Shading {
         let y = p * all(a[1]) + q * all(b[1]) + r * all(c[1]);
         let z = p * all(a[2]) + q * all(b[2]) + r * all(c[2]);
         let square = x * x + y * y + z * z;
-        let facing = x * row(&points.right) + y * row(&points.up) + z;
+        let [u, v, w] = [row(&points.way[0]), row(&points.way[1]), row(&points.way[2])];
+        let away = p * u + q * v + r * w;
         let some = square.simd_gt(all(TINY));
-        let per = (all(1.0) / square.sqrt()) ^ (facing & all(-0.0));
+        let per = (all(-1.0) / square.sqrt()) ^ (away & all(-0.0));
         let unit = [(x * per) & some, (y * per) & some, (z * per) & some, all(0.0)];
-        let unit = f32x4::transpose(unit).map(|n| {
+        for (place, n) in normal[first..].iter_mut().zip(f32x4::transpose(unit)) {
             let [x, y, z, _] = n.to_array();
-            [x, y, z]
-        });
-        (unit, some.to_bitmask())
+            *place = [x, y, z];
+        }
+        some.to_bitmask()
     }
 }
 
@@ -157,8 +156,9 @@ const TINY: f32 = 1e-30;
 
 /// Turns some normals to the eye, as they have no direction.
 #[inline(never)]
-fn face(normal: &mut [[f32; 3]; LANES], which: u32, points: &Points) {
+fn face(normal: &mut [[f32; 3]; LANES], which: u32, sight: &Sight, [u, v, w]: [&Row; 3]) {
     for (i, normal) in normal.iter_mut().enumerate().filter(|(i, _)| which >> i & 1 != 0) {
-        *normal = Vec3::new(points.right[i], points.up[i], 1.0).normalize().to_array();
+        let to_eye = sight.m * -DVec3::new(u[i], v[i], w[i]);
+        *normal = to_eye.normalize_or(DVec3::Z).as_vec3().to_array();
     }
 }
