@@ -1,8 +1,7 @@
 //! Benchmarks of rendering, stage by stage: building a mesh, posing a body, depth, all
 //! channels and contours, for a lathe of 2,000 triangles, the shipped human body and a
-//! mesh of 100,352 triangles at 64 to 512 pixels; and for a body of 22 parts (2,420
-//! triangles), some of which move.
-//! move.
+//! mesh of 100,352 triangles at 64 to 512 pixels; for round lathes beside their meshes;
+//! and for a body of 22 parts (2,420 triangles), some of which move.
 //!
 //!     cargo bench --bench render -- "contours/human" --quick
 
@@ -14,8 +13,10 @@ use common::{dense, lathe, pose, short, standing, vase};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use glam::{DVec3, Vec3};
 use pcadlang::geom::armature::{JointPose, Rules};
-use pcadlang::geom::{Affine, Mesh, Solid};
+use pcadlang::geom::{Affine, Caps, Mesh, Profile, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, View};
+use pcadlang::vision::ContourMap;
+use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
 use std::cell::RefCell;
 use std::hint::black_box;
 use std::sync::Arc;
@@ -56,6 +57,49 @@ fn profile(c: &mut Criterion) {
             Contours::of(&solid.placed(pose(&mut step)), &camera)
         })
     });
+}
+
+/// Measures round lathes of 26 rings, closed or with a thick wall, without a mesh and as
+/// meshes of 24 sides in new poses at 128 pixels: contours and their chamfer score, depth,
+/// all channels.
+fn round(c: &mut Criterion) {
+    let camera = Camera::default_for(128, 128);
+    let y: Vec<f64> = (0..26).map(|i| f64::from(i) / 12.5 - 1.0).collect();
+    let r = y.iter().map(|y| 0.75 + 0.25 * (2.5 * y).sin()).collect();
+    let profile = [Profile { y, r }];
+    for (name, wall, caps) in [("closed", 0.0, Caps::Both), ("vessel", 0.1, Caps::Bottom)] {
+        let solid = |sides: u32| match sides {
+            0 => Solid::exact_lathe(&profile, 96, wall, caps).expect("a lathe"),
+            _ => Solid::lathe(&profile, sides, wall, caps).expect("a lathe"),
+        };
+        let seen = Contours::of(&solid(0).placed(pose(&mut 0.0)), &camera);
+        let map = ContourMap {
+            x: seen.x.clone(),
+            y: seen.y.clone(),
+            tx: seen.tx.clone(),
+            ty: seen.ty.clone(),
+            strength: vec![1.0; seen.len()],
+            ..ContourMap::new(128, 128)
+        };
+        let chamfer = Chamfer::prepare(&map, 128, 128, &ChamferOptions::default());
+        let (chamfer, mut scratch) = (chamfer.expect("contours"), Scratch::default());
+        for (what, sides) in [("round", 0), ("mesh of 24 sides", 24)] {
+            let (solid, mut step) = (solid(sides), 0.0);
+            let mut view = || View::new(solid.placed(pose(&mut step)), camera);
+            c.bench_function(&format!("round/{name}, {what}, score"), |b| {
+                b.iter(|| {
+                    let contours = view().contours(128);
+                    chamfer.log_likelihood_with(&contours.slice(), &mut scratch)
+                })
+            });
+            c.bench_function(&format!("round/{name}, {what}, depth"), |b| {
+                b.iter(|| view().depth(128))
+            });
+            c.bench_function(&format!("round/{name}, {what}, frame"), |b| {
+                b.iter(|| view().frame(128))
+            });
+        }
+    }
 }
 
 /// Measures the shipped body: posing and skinning with one joint moved and with all
@@ -134,5 +178,5 @@ fn body(c: &mut Criterion) {
     }
 }
 
-criterion_group! { name = benches; config = short(); targets = meshes, profile, person, body }
+criterion_group! { name = benches; config = short(); targets = meshes, profile, round, person, body }
 criterion_main!(benches);

@@ -67,6 +67,16 @@ const SCENE: &str = "
         scale = <1,0.05>) * scene.group([vase, ball, rest, scene.affine(translate = [0, -1, 0]) * scene.sphere(0.2)]);
     let view = scene.render(placed, camera = eye, detail = <0,0.5>);";
 
+/// A single round surface, drawn without a mesh.
+const ROUND: &str = "
+    let eye = scene.camera(position = [<0,0.1>, <0,0.1>, <8,0.2>], look_at = [<0,0.1>, <0,0.1>, <0,0.3>],
+        up = [<0,0.1>, 1, <0,0.1>], focal = <1.8,0.05>, width = <96,1>, height = <64,1>);
+    let h = linspace(-1, 1, <8,1>);
+    let placed = scene.affine(translate = [<0,0.1>, <0,0.1>, <0,0.1>], rotate = [<0.5,0.1>, <0.2,0.1>, <0.4,0.1>],
+        scale = <0.8,0.05>) * scene.centred(scene.lathe({ y: <1,0.1> * h, r: <0.6,0.1> + 0.25 * sin(2.5 * h) }, sides = 0,
+        thickness = <0.1,0.02>, floor = <0.3,0.1>));
+    let view = scene.render(placed, camera = eye);";
+
 /// The kind of observed data, and the observation with its comparator.
 const COMPARED: [(&str, &str); 6] = [
     (
@@ -95,8 +105,8 @@ const COMPARED: [(&str, &str); 6] = [
     ),
 ];
 
-fn program(kind: &str, compared: &str) -> (Model, usize) {
-    let (text, count) = written(&format!("{SCENE} observe {compared};"));
+fn program(scene: &str, kind: &str, compared: &str) -> (Model, usize) {
+    let (text, count) = written(&format!("{scene} observe {compared};"));
     let data =
         if kind == "image" { "data seen: image;".into() } else { format!("data seen = {kind}();") };
     let text = format!(
@@ -114,12 +124,14 @@ fn put(t: &mut pcadlang::trace::Trace, address: &str, v: Value) {
 /// Changes each argument of cameras, shapes, placements, views and comparators alone.
 #[test]
 fn scores_of_other_arguments() {
-    for (kind, compared) in COMPARED {
-        let (model, count) = program(kind, compared);
+    for (scene, (kind, compared)) in
+        [SCENE, ROUND].into_iter().flat_map(|scene| COMPARED.map(|compared| (scene, compared)))
+    {
+        let (model, count) = program(scene, kind, compared);
         let mut here = model.simulate(1, 0).unwrap_or_else(|e| panic!("{compared}: {e}"));
         let from_scratch = |p: Vec<f64>| {
             afresh(|| {
-                let mut there = program(kind, compared).0.simulate(1, 0).unwrap();
+                let mut there = program(scene, kind, compared).0.simulate(1, 0).unwrap();
                 put(&mut there, "@p", Value::array(p));
                 there.log_likelihood()
             })

@@ -6,7 +6,7 @@ use pcadlang::Program;
 use pcadlang::dist::Datum;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
-use pcadlang::scene::{DepthValue, ImageValue, MaskValue};
+use pcadlang::scene::{DepthValue, ImageValue, MaskValue, ViewValue};
 use pcadlang::trace::{Change, Target, Trace};
 use pcadlang::vision::{ContourMap, DepthMap, Mask, Photo};
 
@@ -96,6 +96,18 @@ fn photo() -> Value {
 
 #[test]
 fn pictures_pull_where_their_score_rises() {
+    let group = "scene.group([scene.lathe(profile), scene.affine(translate = [0, 2 * r, 0]) * scene.sphere(0.2)])";
+    pull(group, false);
+}
+
+#[test]
+fn pictures_of_round_surfaces_pull_where_their_score_rises() {
+    pull("scene.lathe(profile, sides = 0)", true);
+    pull("scene.lathe(profile, sides = 0, thickness = 0.2 * r)", true);
+}
+
+/// Compares the slopes of the scores of an object with differences.
+fn pull(object: &str, round: bool) {
     // Differences over half a pixel, since sums over pieces and pixels change in small
     // steps.
     let half = 0.5 * 4.4 / 64.0;
@@ -121,10 +133,10 @@ fn pictures_pull_where_their_score_rises() {
              assume x ~ uniform(-1, 1); assume y ~ uniform(-1, 1); assume t ~ uniform(-3, 3); assume r ~ uniform(0, 2);
              assume s ~ uniform(0, 20);
              let h = linspace(-1, 1, 12);
-             let vase = scene.lathe({{ y: r * h, r: r * (0.6 + 0.25 * sin(2.5 * h)) }});
-             let solid = scene.centred(scene.group([vase, scene.affine(translate = [0, 2 * r, 0]) * scene.sphere(0.2)]));
+             let profile = {{ y: r * h, r: r * (0.6 + 0.25 * sin(2.5 * h)) }};
+             let solid = scene.centred({object});
              let placed = scene.affine(translate = [x, y, 0], rotate = [t, 0.2, 0.4]) * solid;
-             let view = scene.render(placed); let rough = scene.render(placed, detail = 0.3);
+             assume view = scene.render(placed); let rough = scene.render(placed, detail = 0.3);
              observe {likelihood} = photo as picture;"
         );
         let program = Program::parse(&text).unwrap().observe("photo", seen);
@@ -141,6 +153,9 @@ fn pictures_pull_where_their_score_rises() {
         };
         let mut here = [("x", 0.2), ("y", -0.1), ("t", 0.5), ("r", 0.8), ("s", 4.0)];
         at(&mut trace, &here);
+        let view = trace.global("view", draws()).unwrap().unwrap();
+        let view = &view.downcast::<ViewValue>().unwrap().0;
+        assert_eq!(view.solid().revolution().is_some(), round);
         // If no observation depends on it, s does not exist.
         let targets: Vec<Target> = here.iter().filter_map(|(name, _)| find(&trace, name)).collect();
         let (mut all, mut prior) = (Vec::new(), Vec::new());

@@ -45,6 +45,7 @@ pub struct Revolution {
     spans: Vec<Span>,
     rims: Vec<Rim>,
     part_count: u16,
+    encloses: bool,
 }
 
 impl Revolution {
@@ -74,7 +75,8 @@ impl Revolution {
                 }
             }
         }
-        Revolution { rings, spans, rims, part_count }
+        let encloses = rims.iter().all(|rim| !rim.spans.contains(&None)) && is_simple(&rings);
+        Revolution { rings, spans, rims, part_count, encloses }
     }
 
     /// The rings, along the path.
@@ -97,10 +99,49 @@ impl Revolution {
         &self.rims
     }
 
+    /// Whether it surely encloses a body, with its normals pointing out of it.
+    pub fn encloses(&self) -> bool {
+        self.encloses
+    }
+
     /// The number of parts.
     pub fn part_count(&self) -> u16 {
         self.part_count
     }
+}
+
+/// Whether a path surely does not cross itself: it goes up, then down again inside.
+fn is_simple(rings: &[Ring]) -> bool {
+    let top = rings.windows(2).position(|pair| pair[1].y < pair[0].y);
+    let top = top.unwrap_or(rings.len().saturating_sub(1));
+    let (Some(outer), Some(inner)) = (rings.get(..=top), rings.get(top..)) else { return false };
+    let rises = |pair: &&[Ring]| pair[0].y < pair[1].y;
+    let starts = |rings: &[Ring]| rings.first().map_or(f64::NAN, |ring| ring.y);
+    if inner.windows(2).any(|pair| rises(&pair)) || !(starts(outer) <= inner[inner.len() - 1].y) {
+        return false;
+    }
+    let mut walls = outer.windows(2).filter(rises).peekable();
+    let at = |a: &Ring, b: &Ring, y: f64| a.r + (b.r - a.r) * ((y - a.y) / (b.y - a.y));
+    for (a, b) in inner.windows(2).rev().map(|pair| (&pair[1], &pair[0])) {
+        if a.y == b.y {
+            continue;
+        }
+        // All outer spans beside this inner one.
+        while let Some([c, d]) = walls.peek() {
+            let ends = [a.y.max(c.y), b.y.min(d.y)];
+            if ends[0] < ends[1] && ends.iter().any(|y| at(a, b, *y) > at(c, d, *y)) {
+                return false;
+            }
+            if d.y >= b.y {
+                break;
+            }
+            walls.next();
+        }
+        if walls.peek().is_none() {
+            return false;
+        }
+    }
+    true
 }
 
 /// The rings of a strip, with normals from central differences.

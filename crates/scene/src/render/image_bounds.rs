@@ -1,5 +1,6 @@
 //! The bounding box of a solid in the picture.
 
+use super::pixels::project::ratios;
 use super::{Camera, Projection, View};
 use crate::geom::{PlacedRevolution, Ring};
 use glam::DVec3;
@@ -61,15 +62,6 @@ fn ring_box(r: &PlacedRevolution, ring: &Ring, camera: &Camera) -> Option<Bounds
         }
     };
     Some([cx + scale * left, cy - scale * high, cx + scale * right, cy - scale * low])
-}
-
-/// The least and the greatest ratio of `a` and `b` over all angles, each `n[0] + n[1]
-/// cos(angle) + n[2] sin(angle)`, with `b` above 0: those `t` at which `a - t b` touches 0.
-fn ratios(a: &[f64; 3], b: &[f64; 3]) -> [f64; 2] {
-    let form = |p: &[f64; 3], q: &[f64; 3]| p[0] * q[0] - p[1] * q[1] - p[2] * q[2];
-    let (square, middle, rest) = (form(b, b), form(a, b), form(a, a));
-    let root = (middle * middle - square * rest).max(0.0).sqrt();
-    [(middle - root) / square, (middle + root) / square]
 }
 
 #[cfg(test)]

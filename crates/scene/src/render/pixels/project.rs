@@ -74,6 +74,15 @@ pub(in crate::render) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[
     Some([from, to])
 }
 
+/// The least and the greatest ratio of `a` and `b` over all angles, each `n[0] + n[1]
+/// cos(angle) + n[2] sin(angle)`, with `b` above 0: those `t` at which `a - t b` touches 0.
+pub(in crate::render) fn ratios(a: &[f64; 3], b: &[f64; 3]) -> [f64; 2] {
+    let form = |p: &[f64; 3], q: &[f64; 3]| p[0] * q[0] - p[1] * q[1] - p[2] * q[2];
+    let (square, middle, rest) = (form(b, b), form(a, b), form(a, a));
+    let root = (middle * middle - square * rest).max(0.0).sqrt();
+    [(middle - root) / square, (middle + root) / square]
+}
+
 /// The transform from an instance's mesh to camera coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct Placement {

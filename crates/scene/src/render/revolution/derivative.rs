@@ -1,4 +1,5 @@
-//! How exact contours move with the placement and the path of a surface of revolution.
+//! How exact contours and depth move with the placement and the path of a surface of
+//! revolution.
 //!
 //! A piece moves with the two samples at its ends. A sample moves with its point of the
 //! surface; on a silhouette it also slides, so that the facing there stays 0: by the
@@ -6,11 +7,12 @@
 //! contours pass behind others, the ends of what is visible are held fixed.
 
 use super::drawer::Source;
+use super::frame::each_seen;
 use super::samples::LAST;
 use super::sight::Sight;
 use crate::contours::Contours;
 use crate::geom::{Affine, Revolution, Ring, outer};
-use crate::render::Camera;
+use crate::render::{Camera, Frame};
 use glam::{DMat3, DVec3};
 
 /// Derivatives with respect to a placed surface of revolution.
@@ -22,6 +24,53 @@ pub struct RevolutionGradient {
     pub shift: DVec3,
     /// With respect to the radius and the height of each ring.
     pub rings: Vec<(f64, f64)>,
+}
+
+impl RevolutionGradient {
+    fn zero(surface: &Revolution) -> RevolutionGradient {
+        let rings = vec![(0.0, 0.0); surface.rings().len()];
+        RevolutionGradient { linear: DMat3::ZERO, shift: DVec3::ZERO, rings }
+    }
+}
+
+impl Frame {
+    /// The vector-Jacobian product of the depth of [`Frame::of_revolution`] for the same
+    /// surface, placement and camera, given derivatives with respect to the depth at each
+    /// pixel, row by row. Pixels that do not show the surface are ignored, and which span
+    /// others show is held fixed.
+    pub fn vjp_revolution(
+        surface: &Revolution,
+        affine: &Affine,
+        camera: &Camera,
+        by_depth: &[f64],
+    ) -> RevolutionGradient {
+        let mut out = RevolutionGradient::zero(surface);
+        let Some(sight) = Sight::new(camera, affine) else { return out };
+        let mut back = Back::new(surface, &sight, camera, affine, &mut out);
+        let turn = sight.m.inverse().transpose();
+        each_seen(surface, &sight, camera, |pixel, depth, span| {
+            let by = by_depth.get(pixel).copied().unwrap_or(0.0);
+            let found = surface.spans().get(span);
+            let Some((span, [a, b])) = found.and_then(|s| Some((s, surface.ends(s)?))) else {
+                return;
+            };
+            let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
+            let (origin, way) = sight.line([f64::from(x) + 0.5, f64::from(y) + 0.5]);
+            let p = origin + way * depth;
+            let r = libm::hypot(p.x, p.z);
+            let (c, s) = if r > 0.0 { (p.x / r, p.z / r) } else { (1.0, 0.0) };
+            // Where the surface moves by v, depth grows by v . normal / (way . normal).
+            let (dr, dy) = (b.r - a.r, b.y - a.y);
+            let normal = DVec3::new(dy * c, -dr, dy * s);
+            let g = normal * (by / normal.dot(way));
+            if by == 0.0 || !g.is_finite() {
+                return;
+            }
+            back.place(p, turn * g);
+            back.on_span(span.ring, share([a, b], r, p.y), [c, s], g);
+        });
+        out
+    }
 }
 
 impl Contours {
@@ -36,23 +85,9 @@ impl Contours {
         camera: &Camera,
         by_piece: &[[f64; 4]],
     ) -> RevolutionGradient {
-        let mut out = RevolutionGradient {
-            linear: DMat3::ZERO,
-            shift: DVec3::ZERO,
-            rings: vec![(0.0, 0.0); surface.rings().len()],
-        };
+        let mut out = RevolutionGradient::zero(surface);
         let Some(sight) = Sight::new(camera, affine) else { return out };
-        let turn = DMat3::from_cols(camera.right, camera.up, -camera.forward);
-        let mut back = Back {
-            surface,
-            sight: &sight,
-            to_world: turn,
-            // From turned to the surface's own coordinates.
-            own: affine.0.matrix3.inverse() * turn * sight.m,
-            affine,
-            normals: vec![(0.0, 0.0); surface.rings().len()],
-            out: &mut out,
-        };
+        let mut back = Back::new(surface, &sight, camera, affine, &mut out);
         Contours::sources(surface, &sight, camera, |samples, sources| {
             let mut by_sample = vec![[[0.0; 2]; 2]; samples.count];
             for (source, by) in sources.iter().zip(by_piece) {
@@ -86,6 +121,16 @@ impl Contours {
         back.rotate_normals();
         out
     }
+}
+
+/// The shares of a span's two rings at a point of it.
+fn share([a, b]: [&Ring; 2], r: f64, y: f64) -> [f64; 2] {
+    let (dr, dy) = (b.r - a.r, b.y - a.y);
+    let t = if dr.abs() > dy.abs() { (r - a.r) / dr } else { (y - a.y) / dy };
+    // Rings are met up to rounding.
+    let t = if t < 1e-9 { 0.0 } else { t };
+    let t = if t > 1.0 - 1e-9 { 1.0 } else { t };
+    [1.0 - t, t]
 }
 
 /// Maps the derivatives with respect to a piece to those with respect to the images of the
@@ -126,7 +171,38 @@ struct Back<'a> {
     out: &'a mut RevolutionGradient,
 }
 
-impl Back<'_> {
+impl<'a> Back<'a> {
+    fn new(
+        surface: &'a Revolution,
+        sight: &'a Sight,
+        camera: &Camera,
+        affine: &'a Affine,
+        out: &'a mut RevolutionGradient,
+    ) -> Back<'a> {
+        let to_world = DMat3::from_cols(camera.right, camera.up, -camera.forward);
+        let own = affine.0.matrix3.inverse() * to_world * sight.m;
+        let normals = vec![(0.0, 0.0); surface.rings().len()];
+        Back { surface, sight, to_world, own, affine, normals, out }
+    }
+
+    /// Adds what a point, in turned coordinates, gives to the placement, from derivatives
+    /// with respect to it in camera coordinates.
+    fn place(&mut self, p: DVec3, g: DVec3) {
+        let world = self.to_world * g;
+        self.out.linear += outer(world, self.own * p);
+        self.out.shift += world;
+    }
+
+    /// Adds what a point of a span gives to its two rings.
+    fn on_span(&mut self, first: usize, shares: [f64; 2], [c, s]: [f64; 2], g: DVec3) {
+        for (k, share) in shares.into_iter().enumerate() {
+            if let Some(place) = self.out.rings.get_mut(first + k) {
+                place.0 += share * (g.x * c + g.z * s);
+                place.1 += share * g.y;
+            }
+        }
+    }
+
     /// Adds what a point, in turned coordinates, gives to the placement, from derivatives
     /// with respect to its image. Returns those with respect to the point.
     fn point(&mut self, p: DVec3, [gu, gv]: [f64; 2]) -> DVec3 {
@@ -138,9 +214,7 @@ impl Back<'_> {
             DVec3::new(gu, -gv, 0.0) * lens.scale
         };
         let g = if g.is_finite() { g } else { DVec3::ZERO };
-        let world = self.to_world * g;
-        self.out.linear += outer(world, self.own * p);
-        self.out.shift += world;
+        self.place(p, g);
         self.sight.m.transpose() * g
     }
 
@@ -157,20 +231,11 @@ impl Back<'_> {
         let surface = self.surface;
         let Some(span) = surface.spans().get(span as usize) else { return };
         let Some([a, b]) = surface.ends(span) else { return };
-        let (dr, dy) = (b.r - a.r, b.y - a.y);
         let r = libm::hypot(p.x, p.z);
         let (c, s) = if r > 0.0 { (p.x / r, p.z / r) } else { (1.0, 0.0) };
-        let t = if dr.abs() > dy.abs() { (r - a.r) / dr } else { (p.y - a.y) / dy };
-        // Rings are met up to rounding.
-        let t = if t < 1e-9 { 0.0 } else { t };
-        let t = if t > 1.0 - 1e-9 { 1.0 } else { t };
-        let shares = [1.0 - t, t];
-        for (k, share) in shares.into_iter().enumerate() {
-            if let Some(place) = self.out.rings.get_mut(span.ring + k) {
-                place.0 += share * (g.x * c + g.z * s);
-                place.1 += share * g.y;
-            }
-        }
+        let shares = share([a, b], r, p.y);
+        let t = shares[1];
+        self.on_span(span.ring, shares, [c, s], g);
         let by_facing = self.slide([a, b], span.ring, [t, c, s], g);
         if by_facing.is_finite() && by_facing != 0.0 {
             self.facing([a, b], span.ring, shares, [c, s], by_facing);

@@ -12,12 +12,15 @@
 
 mod chords;
 mod contours;
+mod cover;
 mod derivative;
 mod drawer;
 mod frame;
 mod lanes;
 mod rays;
 mod samples;
+mod scan;
+mod shading;
 mod sight;
 mod silhouettes;
 mod vertices;

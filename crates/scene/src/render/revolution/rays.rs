@@ -6,11 +6,12 @@
 
 use super::lanes::{LANES, Mask, Row, mask};
 use super::sight::Rays;
-use crate::geom::Revolution;
+use crate::geom::{Revolution, Ring};
+use crate::render::Camera;
 
 /// A span that is not level.
 #[derive(Clone, Copy, Debug)]
-struct Cone {
+pub(super) struct Cone {
     /// Heights of the lower and the upper end.
     ends: [f64; 2],
     /// Radius at height 0 of the cone, and its change per height.
@@ -22,11 +23,33 @@ struct Cone {
 
 /// A level span: height and least and greatest squared radius.
 #[derive(Clone, Copy, Debug)]
-struct Level {
+pub(super) struct Level {
     y: f64,
     square: [f64; 2],
     /// The number of the span.
     span: u64,
+}
+
+/// What a span is.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Shape {
+    Cone(Cone),
+    Level(Level),
+}
+
+impl Shape {
+    /// The span of a number between two rings.
+    #[inline(always)]
+    pub fn new([a, b]: [&Ring; 2], span: u64) -> Shape {
+        if a.y == b.y {
+            let (least, most) = (a.r.min(b.r), a.r.max(b.r));
+            return Shape::Level(Level { y: a.y, square: [least * least, most * most], span });
+        }
+        let slope = (b.r - a.r) / (b.y - a.y);
+        let radius = a.r - slope * a.y;
+        let ends = if a.y < b.y { [a.y, b.y] } else { [b.y, a.y] };
+        Shape::Cone(Cone { ends, radius, slope, span })
+    }
 }
 
 /// The spans of a surface.
@@ -51,16 +74,10 @@ impl Spans {
             surface.rings().iter().fold(0.0f64, |m, ring| if ring.r > m { ring.r } else { m });
         self.around = most * most * (1.0 + 1e-9);
         for (span, ends) in (0u64..).zip(surface.spans().iter().map(|s| surface.ends(s))) {
-            let Some([a, b]) = ends else { continue };
-            if a.y == b.y {
-                let (least, most) = (a.r.min(b.r), a.r.max(b.r));
-                let square = [least * least, most * most];
-                self.levels.push(Level { y: a.y, square, span });
-            } else {
-                let slope = (b.r - a.r) / (b.y - a.y);
-                let radius = a.r - slope * a.y;
-                let ends = if a.y < b.y { [a.y, b.y] } else { [b.y, a.y] };
-                self.cones.push(Cone { ends, radius, slope, span });
+            let Some(ends) = ends else { continue };
+            match Shape::new(ends, span) {
+                Shape::Cone(cone) => self.cones.push(cone),
+                Shape::Level(level) => self.levels.push(level),
             }
         }
         self.downwards.clone_from(&self.cones);
@@ -120,15 +137,6 @@ struct Inside {
     high: f64,
 }
 
-impl Cone {
-    /// Whether a part of it lies between two heights.
-    #[inline(always)]
-    fn between(&self, low: f64, high: f64) -> bool {
-        let [least, most] = self.ends;
-        (least <= high) & (most >= low)
-    }
-}
-
 impl Spans {
     #[inline(always)]
     fn inside(&self, rays: &Rays, [from, to]: [&Row; 2]) -> Inside {
@@ -155,22 +163,15 @@ impl Spans {
         Inside { near, far, per, low, high }
     }
 
-    /// What each line of sight meets first beyond a depth.
+    /// What each line of sight meets first beyond the near plane.
     #[inline(always)]
-    pub fn nearest(&self, rays: &Rays, from: f64) -> Seen {
-        let Rays { square: [c, b, a], height: [at, climb] } = rays;
+    pub fn nearest(&self, rays: &Rays) -> Seen {
+        let Rays { height: [at, climb], .. } = rays;
         let Inside { near, far, per, low, high } =
-            self.inside(rays, [&[from; LANES], &[f64::INFINITY; LANES]]);
-        let (mut depth, mut span) = ([f64::INFINITY; LANES], [0; LANES]);
+            self.inside(rays, [&[Camera::NEAR; LANES], &[f64::INFINITY; LANES]]);
+        let mut seen = Seen::NOTHING;
         for level in self.levels.iter().filter(|level| level.y >= low && level.y <= high) {
-            for i in 0..LANES {
-                let d = (level.y - at[i]) * per[i];
-                let square = c[i] + d * (2.0 * b[i] + a[i] * d);
-                let on = (square >= level.square[0]) & (square <= level.square[1]);
-                let first = on & (d >= near[i]) & (d <= far[i]) & (d < depth[i]);
-                depth[i] = if first { d } else { depth[i] };
-                span[i] = if first { level.span } else { span[i] };
-            }
+            level.first(rays, &mut seen);
         }
         // In the order in which lines that climb reach them, or those that descend; lines that
         // differ need all.
@@ -182,46 +183,93 @@ impl Spans {
                 let mut open = false;
                 for i in 0..LANES {
                     let reached = (cone.ends[entry] - at[i]) * per[i];
-                    open |= (near[i] <= far[i]) & (depth[i] > reached);
+                    open |= (near[i] <= far[i]) & (seen.depth[i] > reached);
                 }
                 if !open {
                     break;
                 }
             }
-            let (middle, half) =
-                (0.5 * (cone.ends[0] + cone.ends[1]), 0.5 * (cone.ends[1] - cone.ends[0]).abs());
-            // A little more, so that no line passes between two cones.
-            let half = half * (1.0 + 1e-9) + 1e-12 * middle.abs();
-            for i in 0..LANES {
-                let (g, k) = (cone.radius + cone.slope * at[i], cone.slope * climb[i]);
-                let (c0, b1, a2) = (c[i] - g * g, b[i] - g * k, a[i] - k * k);
-                let inside = b1 * b1 - a2 * c0;
-                let root = (if inside > 0.0 { inside } else { 0.0 }).sqrt();
-                // Without cancellation: Press et al. 2007, section 5.6.
-                let q = -(b1 + if b1 < 0.0 { -root } else { root });
-                let (s, t) = (q / a2, c0 / q);
-                for d in [s, t] {
-                    let height = at[i] + climb[i] * d - middle;
-                    let on = (inside >= 0.0) & (height >= -half) & (height <= half);
-                    let first = on & (d >= from) & (d < depth[i]);
-                    depth[i] = if first { d } else { depth[i] };
-                    span[i] = if first { cone.span } else { span[i] };
-                }
-            }
+            cone.first(rays, &mut seen);
         }
         for i in 0..LANES {
-            depth[i] = if near[i] <= far[i] { depth[i] } else { f64::INFINITY };
+            let inside = near[i] <= far[i];
+            seen.depth[i] = if inside { seen.depth[i] } else { f64::INFINITY };
+            seen.span[i] = if inside { seen.span[i] } else { u64::MAX };
         }
-        Seen { depth, span }
+        seen
     }
 }
 
 /// What lines of sight meet first.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     /// Infinite where there is nothing.
     pub depth: Row,
-    /// The number of the span.
+    /// The number of the span; that of no span where there is nothing.
     pub span: [u64; LANES],
+}
+
+impl Seen {
+    pub const NOTHING: Seen = Seen { depth: [f64::INFINITY; LANES], span: [u64::MAX; LANES] };
+
+    /// Notes a span where it is beyond the near plane and nearer than what was seen.
+    #[inline(always)]
+    fn note(&mut self, i: usize, on: bool, depth: f64, span: u64) {
+        let first = on & (depth >= Camera::NEAR) & (depth < self.depth[i]);
+        self.depth[i] = if first { depth } else { self.depth[i] };
+        self.span[i] = if first { span } else { self.span[i] };
+    }
+}
+
+impl Level {
+    /// Notes where lines of sight meet it before what they have met.
+    #[inline(always)]
+    pub fn first(&self, rays: &Rays, seen: &mut Seen) {
+        let Rays { square: [c, b, a], height: [at, climb] } = rays;
+        for i in 0..LANES {
+            let d = (self.y - at[i]) * (1.0 / climb[i]);
+            let square = c[i] + d * (2.0 * b[i] + a[i] * d);
+            let on = (square >= self.square[0]) & (square <= self.square[1]);
+            seen.note(i, on, d, self.span);
+        }
+    }
+}
+
+impl Cone {
+    /// Whether a part of it lies between two heights.
+    #[inline(always)]
+    fn between(&self, low: f64, high: f64) -> bool {
+        let [least, most] = self.ends;
+        (least <= high) & (most >= low)
+    }
+
+    /// Notes where lines of sight meet it before what they have met.
+    #[inline(always)]
+    pub fn first(&self, rays: &Rays, seen: &mut Seen) {
+        let Rays { square: [c, b, a], height: [at, climb] } = rays;
+        let (middle, half) =
+            (0.5 * (self.ends[0] + self.ends[1]), 0.5 * (self.ends[1] - self.ends[0]).abs());
+        // A little more, so that no line passes between two cones.
+        let half = half * (1.0 + 1e-9) + 1e-12 * middle.abs();
+        let (mut s, mut t) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let (g, k) = (self.radius + self.slope * at[i], self.slope * climb[i]);
+            let (c0, b1, a2) = (c[i] - g * g, b[i] - g * k, a[i] - k * k);
+            let inside = b1 * b1 - a2 * c0;
+            // Without cancellation: Press et al. 2007, section 5.6. Not a number where the
+            // line misses the cone.
+            let q = -(b1 + inside.sqrt().copysign(b1));
+            (s[i], t[i]) = (q / a2, c0 / q);
+        }
+        for i in 0..LANES {
+            let height = at[i] + climb[i] * s[i] - middle;
+            seen.note(i, height.abs() <= half, s[i], self.span);
+        }
+        for i in 0..LANES {
+            let height = at[i] + climb[i] * t[i] - middle;
+            seen.note(i, height.abs() <= half, t[i], self.span);
+        }
+    }
 }
 
 #[inline(always)]

@@ -13,11 +13,35 @@ use glam::{DMat3, DVec3};
 
 /// Lines of sight, by depth: `origin + depth * way` in the surface's turned coordinates.
 #[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Lines {
+    pub origin: [Row; 3],
+    pub way: [Row; 3],
+}
+
+/// Lines of sight as they meet a surface of revolution.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rays {
     /// Squared distance from the axis: `square[0] + 2 square[1] depth + square[2] depth^2`.
     pub square: [Row; 3],
     /// Height: `height[0] + height[1] depth`.
     pub height: [Row; 2],
+}
+
+impl Rays {
+    #[inline(always)]
+    pub fn of(Lines { origin: [x, y, z], way: [u, v, w] }: &Lines) -> Rays {
+        let mut rays = Rays::default();
+        for i in 0..LANES {
+            rays.square[0][i] = x[i] * x[i] + z[i] * z[i];
+            rays.square[1][i] = x[i] * u[i] + z[i] * w[i];
+            rays.square[2][i] = u[i] * u[i] + w[i] * w[i];
+            // Never quite level, so that it meets each height once.
+            let least = 1e-9 * rays.square[2][i].sqrt();
+            rays.height[0][i] = y[i];
+            rays.height[1][i] = if v[i].abs() < least { least } else { v[i] };
+        }
+        rays
+    }
 }
 
 /// A camera and a placed surface of revolution.
@@ -104,37 +128,57 @@ impl Sight {
         [(x - self.lens.cx) * self.per_pixel, (self.lens.cy - y) * self.per_pixel]
     }
 
-    /// The lines of sight through positions in the image.
+    /// The lines of sight through positions in the image; the lens must be that of
+    /// `PINHOLE`.
     #[inline(always)]
-    pub fn rays(&self, [x, y]: [&Row; 2]) -> Rays {
-        let mut rays = Rays::default();
+    pub fn lines<const PINHOLE: bool>(&self, [x, y]: [&Row; 2]) -> Lines {
+        let mut lines = Lines::default();
         let [p, q, r] = self.inverse.to_cols_array_2d();
+        let Lines { origin, way } = &mut lines;
+        *(if PINHOLE { &mut *origin } else { &mut *way }) = self.shared::<PINHOLE>();
         for i in 0..LANES {
             let [a, b] = self.slopes([x[i], y[i]]);
-            let [x, y, z] = [p[0] * a + q[0] * b, p[1] * a + q[1] * b, p[2] * a + q[2] * b];
-            let (way, origin) = if self.lens.pinhole {
-                ([x - r[0], y - r[1], z - r[2]], [self.view[0], self.view[1], 0.0])
+            let x = p[0] * a + q[0] * b;
+            let y = p[1] * a + q[1] * b;
+            let z = p[2] * a + q[2] * b;
+            if PINHOLE {
+                (way[0][i], way[1][i], way[2][i]) = (x - r[0], y - r[1], z - r[2]);
             } else {
                 let back = &self.back;
-                ([-r[0], -r[1], -r[2]], [x - back[0], y - back[1], z - back[2]])
-            };
-            rays.square[0][i] = origin[0] * origin[0] + origin[2] * origin[2];
-            rays.square[1][i] = origin[0] * way[0] + origin[2] * way[2];
-            rays.square[2][i] = way[0] * way[0] + way[2] * way[2];
-            // Never quite level, so that it meets each height once.
-            let least = 1e-9 * rays.square[2][i].sqrt();
-            rays.height[0][i] = origin[1];
-            rays.height[1][i] = if way[1].abs() < least { least } else { way[1] };
+                (origin[0][i], origin[1][i], origin[2][i]) =
+                    (x - back[0], y - back[1], z - back[2]);
+            }
         }
-        rays
+        lines
     }
 
-    /// The point on the surface, in turned coordinates, at a position in the image and a
-    /// depth.
-    pub fn point(&self, at: [f64; 2], depth: f64) -> DVec3 {
-        let [a, b] = self.slopes(at);
-        let way = if self.lens.pinhole { depth } else { 1.0 };
-        self.inverse * (DVec3::new(a * way, b * way, -depth) - self.t)
+    /// The origin and the way of the line of sight through a position in the image.
+    pub fn line(&self, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
+        let at = [&[x; LANES], &[y; LANES]];
+        let Lines { origin, way } = match self.lens.pinhole {
+            true => self.lines::<true>(at),
+            false => self.lines::<false>(at),
+        };
+        (DVec3::from(origin.map(|row| row[0])), DVec3::from(way.map(|row| row[0])))
+    }
+
+    /// What all lines of sight share: the origin from a pinhole, or else the way.
+    #[inline(always)]
+    pub fn shared<const PINHOLE: bool>(&self) -> [Row; 3] {
+        let [x, y, z] = match PINHOLE {
+            true => [self.view[0], self.view[1], 0.0],
+            false => (-self.inverse.z_axis).to_array(),
+        };
+        [[x; LANES], [y; LANES], [z; LANES]]
+    }
+
+    /// The lines of sight through positions in the image, as they meet the surface.
+    #[inline(always)]
+    pub fn rays(&self, at: [&Row; 2]) -> Rays {
+        match self.lens.pinhole {
+            true => Rays::of(&self.lines::<true>(at)),
+            false => Rays::of(&self.lines::<false>(at)),
+        }
     }
 
     /// The columns and rows, from the first to one past the last, outside of which a
@@ -170,7 +214,7 @@ impl Sight {
     }
 
     /// The depths between which a ring lies.
-    fn depths(&self, ring: &Ring) -> DepthRange {
+    pub fn depths(&self, ring: &Ring) -> DepthRange {
         let (middle, reach) = (-(self.t.z + self.m.y_axis.z * ring.y), ring.r * self.turn);
         DepthRange { near: middle - reach, far: middle + reach }
     }

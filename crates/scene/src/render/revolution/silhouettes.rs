@@ -45,7 +45,7 @@ impl Facing {
 
     /// Cosine and sine of the angle at which the facing is 0.
     #[inline(always)]
-    fn edge(&self) -> [f64; 2] {
+    pub fn edge(&self) -> [f64; 2] {
         let c = -self.b / self.a;
         let c = if c > -1.0 { c } else { -1.0 };
         let c = if c < 1.0 { c } else { 1.0 };
