@@ -1,7 +1,7 @@
 //! Buffers of the device that grow, and reading them back.
 
 use bytemuck::Pod;
-use wgpu::{Buffer, BufferUsages, BufferView, Device, MapMode, PollType, Queue};
+use wgpu::{Buffer, BufferUsages, BufferView, Device, MapMode, PollType, Queue, WriteOnly};
 
 /// A buffer that is replaced by a larger one when it becomes too small.
 pub struct Growing {
@@ -52,16 +52,35 @@ pub fn read_back<T>(
     bytes: u64,
     read: impl FnOnce(&BufferView) -> T,
 ) -> Option<T> {
-    let (send, receive) = std::sync::mpsc::channel();
-    buffer.map_async(MapMode::Read, 0..bytes, move |done| {
-        // Nobody waits any more only if the wait below failed.
-        let _ = send.send(done);
-    });
-    device.poll(PollType::wait_indefinitely()).ok()?;
-    receive.recv().ok()?.ok()?;
+    map(device, buffer, MapMode::Read, bytes)?;
     let view = buffer.get_mapped_range(0..bytes).ok()?;
     let out = read(&view);
     drop(view);
     buffer.unmap();
     Some(out)
+}
+
+/// Calls `write` with the bytes of a buffer; `None` if the device failed.
+pub fn write_to(
+    device: &Device,
+    buffer: &Buffer,
+    bytes: u64,
+    write: impl FnOnce(WriteOnly<'_, [u8]>),
+) -> Option<()> {
+    map(device, buffer, MapMode::Write, bytes)?;
+    let mut view = buffer.get_mapped_range_mut(0..bytes).ok()?;
+    write(view.slice(..));
+    drop(view);
+    buffer.unmap();
+    Some(())
+}
+
+fn map(device: &Device, buffer: &Buffer, mode: MapMode, bytes: u64) -> Option<()> {
+    let (send, receive) = std::sync::mpsc::channel();
+    buffer.map_async(mode, 0..bytes, move |done| {
+        // Nobody waits any more only if the wait below failed.
+        let _ = send.send(done);
+    });
+    device.poll(PollType::wait_indefinitely()).ok()?;
+    receive.recv().ok()?.ok()
 }

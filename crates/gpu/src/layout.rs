@@ -126,6 +126,13 @@ pub struct Outcome {
     pub sums: [f32; 4],
 }
 
+impl Outcome {
+    /// Its visible pieces among those of all scenes.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.first as usize..self.first as usize + self.count as usize
+    }
+}
+
 /// Bytes of a workgroup's memory for each piece, and for each vertex.
 pub const PIECE_BYTES: u64 = 48;
 pub const VERTEX_BYTES: u64 = 16;
@@ -151,8 +158,8 @@ pub fn shader([width, height]: [u32; 2]) -> Option<String> {
         include_str!("shaders/main.wgsl"),
     ];
     (fits && words > 0).then(|| {
-        numbers.iter().fold(source.join("\n"), |text, (name, number)| {
-            text.replace(name, &number.to_string())
-        })
+        numbers
+            .iter()
+            .fold(source.join("\n"), |text, (name, number)| text.replace(name, &number.to_string()))
     })
 }

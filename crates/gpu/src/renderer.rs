@@ -1,7 +1,7 @@
 //! The renderer: batch after batch through the device, the rest through the CPU.
 
 use crate::batch::{Batch, size};
-use crate::buffers::{Growing, read_back};
+use crate::buffers::{Growing, read_back, write_to};
 use crate::device::{BINDINGS, Device, NoDevice};
 use crate::layout::{
     DRAWN, FOR_CPU, MOST_PIECES, NO_ROOM, Outcome, PIECE_BYTES, Params, VERTEX_BYTES,
@@ -10,6 +10,7 @@ use crate::topologies::Topologies;
 use pcadlang_numerics::platform::threads::Pool;
 use pcadlang_scene::render::{BatchRenderer, ContourBatch, Contours, Scene};
 use pcadlang_scene::vision::Chamfer;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use wgpu::BufferUsages;
@@ -35,6 +36,7 @@ struct State {
     inputs: [Growing; 6],
     scratch: [Growing; 2],
     outputs: [Growing; 3],
+    staging: Growing,
     readback: Growing,
     pieces_back: Growing,
     /// Visible pieces of a scene, as far as is known.
@@ -61,13 +63,15 @@ impl Gpu {
         let input = storage | BufferUsages::COPY_DST;
         let output = storage | BufferUsages::COPY_SRC;
         let back = || Growing::new(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
-        let inputs = [BufferUsages::UNIFORM | BufferUsages::COPY_DST, input, input, input, input, input];
+        let inputs =
+            [BufferUsages::UNIFORM | BufferUsages::COPY_DST, input, input, input, input, input];
         let state = State {
             device,
             topologies: Topologies::default(),
             inputs: inputs.map(Growing::new),
             scratch: [storage; 2].map(Growing::new),
             outputs: [output, output, output | BufferUsages::COPY_DST].map(Growing::new),
+            staging: Growing::new(BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC),
             readback: back(),
             pieces_back: back(),
             expected: 512,
@@ -116,7 +120,8 @@ impl Gpu {
         while scores.len() < scenes.len() {
             let rest = &scenes[scores.len()..];
             let batch = Batch::of(rest, &mut state.topologies, &self.pool);
-            let written = if sent { state.draw(&batch, size(&rest[0]), params) } else { None };
+            let written =
+                if sent { state.draw(&batch, size(&rest[0]), params, &self.pool) } else { None };
             let outcomes = written.map_or(Vec::new(), |w| w.outcomes);
             let left = self.pool.map(self.left(&batch, &outcomes), |i| {
                 let Scene { solid, camera } = &rest[i];
@@ -144,13 +149,45 @@ impl Gpu {
     }
 
     /// The scenes of a batch that are for the CPU.
-    fn left(&self, batch: &Batch, outcomes: &[Outcome]) -> Vec<usize> {
+    fn left(&self, batch: &Batch<'_>, outcomes: &[Outcome]) -> Vec<usize> {
         let drawn = |i: usize| outcomes.get(i).is_some_and(|o| o.status == DRAWN);
         let left: Vec<usize> =
             (0..batch.items.len()).filter(|&i| batch.for_cpu[i] || !drawn(i)).collect();
         self.by_cpu.fetch_add(left.len(), Ordering::Relaxed);
         left
     }
+}
+
+/// Where the pieces of a scene are.
+enum Part<'a> {
+    Gpu(Range<usize>),
+    Cpu(&'a Contours),
+}
+
+impl Part<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Part::Gpu(range) => range.len(),
+            Part::Cpu(contours) => contours.len(),
+        }
+    }
+}
+
+/// Appends the pieces of scenes, list by list on several cores. `lists` are those that the
+/// device wrote.
+fn append(out: &mut ContourBatch, lists: [&[f32]; 5], parts: &[Part<'_>], pool: &Pool) {
+    let ContourBatch { x, y, tx, ty, length, .. } = out;
+    let more: usize = parts.iter().map(Part::len).sum();
+    let tasks: Vec<_> = [x, y, tx, ty, length].into_iter().zip(lists).enumerate().collect();
+    pool.map(tasks, |(k, (out, list))| {
+        out.reserve(more);
+        for part in parts {
+            out.extend_from_slice(match part {
+                Part::Gpu(range) => &list[range.clone()],
+                Part::Cpu(c) => [&c.x, &c.y, &c.tx, &c.ty, &c.length][k],
+            });
+        }
+    });
 }
 
 impl BatchRenderer for Gpu {
@@ -162,9 +199,9 @@ impl BatchRenderer for Gpu {
             let rest = &scenes[out.ends.len()..];
             let batch = Batch::of(rest, &mut state.topologies, &self.pool);
             let params = Params::default();
-            let mut written = state.draw(&batch, size(&rest[0]), params);
+            let mut written = state.draw(&batch, size(&rest[0]), params, &self.pool);
             if written.as_ref().is_some_and(|w| w.outcomes.iter().any(|o| o.status == NO_ROOM)) {
-                written = state.draw(&batch, size(&rest[0]), params);
+                written = state.draw(&batch, size(&rest[0]), params, &self.pool);
             }
             let outcomes = written.as_ref().map_or(&[][..], |w| &w.outcomes);
             let left = self.pool.map(self.left(&batch, outcomes), |i| {
@@ -172,20 +209,19 @@ impl BatchRenderer for Gpu {
             });
             let mut push = |lists: [&[f32]; 5]| {
                 let mut left = left.iter().peekable();
+                let mut parts = Vec::with_capacity(batch.items.len());
+                let mut end = out.x.len();
                 for (i, scene) in rest[..batch.items.len()].iter().enumerate() {
-                    if let Some((_, contours)) = left.next_if(|(of, _)| *of == i) {
-                        out.push(contours);
-                        continue;
-                    }
-                    let Outcome { first, count, .. } = outcomes[i];
-                    let own = first as usize..(first + count) as usize;
-                    let ContourBatch { x, y, tx, ty, length, .. } = &mut out;
-                    for (list, of) in [x, y, tx, ty, length].into_iter().zip(lists) {
-                        list.extend_from_slice(&of[own.clone()]);
-                    }
-                    out.ends.push(out.x.len());
+                    let part = match left.next_if(|(of, _)| *of == i) {
+                        Some((_, contours)) => Part::Cpu(contours),
+                        None => Part::Gpu(outcomes[i].range()),
+                    };
+                    end += part.len();
+                    out.ends.push(end);
                     out.sizes.push(size(scene));
+                    parts.push(part);
                 }
+                append(&mut out, lists, &parts, &self.pool);
             };
             let drawn = outcomes.len() > left.len();
             match written.as_ref().filter(|_| drawn) {
@@ -227,7 +263,8 @@ impl State {
         }
         let (buffer, is_new) =
             inputs[3].with_bytes(&device.device, bytes.max(4), device.most_bytes);
-        let first = if is_new || topologies.sent > topologies.words.len() { 0 } else { topologies.sent };
+        let first =
+            if is_new || topologies.sent > topologies.words.len() { 0 } else { topologies.sent };
         if first < topologies.words.len() {
             let words = bytemuck::cast_slice(&topologies.words[first..]);
             device.queue.write_buffer(buffer, 4 * first as u64, words);
@@ -238,7 +275,13 @@ impl State {
 
     /// Draws a batch, with contours left on the device if `params` has no distance fields;
     /// `None` if the device cannot.
-    fn draw(&mut self, batch: &Batch, size: [u32; 2], mut params: Params) -> Option<Written> {
+    fn draw(
+        &mut self,
+        batch: &Batch<'_>,
+        size: [u32; 2],
+        mut params: Params,
+        pool: &Pool,
+    ) -> Option<Written> {
         if self.device.error().is_some() {
             return None;
         }
@@ -250,14 +293,21 @@ impl State {
         let groups = MOST_GROUPS.min(scenes).min(most / each).min(SCRATCH / both).max(1);
         let wanted = (self.expected + self.expected / 8) * scenes;
         let room = if params.channels == 0 { wanted.clamp(1, most / OUTPUT_BYTES) } else { 1 };
-        params = Params { scenes: scenes as u32, room: room as u32, vertices: batch.most, ..params };
+        params =
+            Params { scenes: scenes as u32, room: room as u32, vertices: batch.most, ..params };
         self.send(0, &[params])?;
         self.send(1, &batch.items)?;
         self.send(2, &batch.draws)?;
         self.send_topologies()?;
-        self.send(4, &batch.vertices)?;
-        let State { device, inputs, scratch, outputs, readback, .. } = self;
+        let vertex_bytes = batch.vertex_bytes();
+        if vertex_bytes > most {
+            return None;
+        }
+        let State { device, inputs, scratch, outputs, staging, readback, .. } = self;
         let (gpu, queue) = (&device.device, &device.queue);
+        let (staging, _) = staging.with_bytes(gpu, vertex_bytes, most);
+        write_to(gpu, staging, vertex_bytes, |out| batch.write_vertices(out, pool))?;
+        inputs[4].with_bytes(gpu, vertex_bytes, most);
         inputs[5].with_bytes(gpu, 4, most);
         scratch[0].with_bytes(gpu, groups * VERTEX_BYTES * u64::from(batch.most), most);
         scratch[1].with_bytes(gpu, groups * PIECE_BYTES * u64::from(MOST_PIECES), most);
@@ -266,12 +316,17 @@ impl State {
         outputs[1].with_bytes(gpu, room * OUTPUT_BYTES, most);
         outputs[2].with_bytes(gpu, 4, most);
         readback.with_bytes(gpu, outcome_bytes + 4, most);
-        let all: Vec<&wgpu::Buffer> =
-            inputs.iter().chain(scratch.iter()).chain(outputs.iter()).filter_map(Growing::get).collect();
+        let all: Vec<&wgpu::Buffer> = inputs
+            .iter()
+            .chain(scratch.iter())
+            .chain(outputs.iter())
+            .filter_map(Growing::get)
+            .collect();
         let bound: [&wgpu::Buffer; BINDINGS] = all.try_into().ok()?;
-        let [.., outcomes, _, written] = bound;
+        let [_, _, _, _, vertices, .., outcomes, _, written] = bound;
         let group = device.bind(bound);
         let mut commands = gpu.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        commands.copy_buffer_to_buffer(staging, 0, vertices, 0, vertex_bytes);
         commands.clear_buffer(written, 0, Some(4));
         let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&pipeline);

@@ -32,6 +32,8 @@ pub struct Topologies {
     pub sent: usize,
     meshes: FxHashMap<usize, Entry>,
     revolutions: FxHashMap<Vec<u32>, Option<Place>>,
+    /// The surface met last: most differ in their rings only.
+    recent: Option<(Arc<Revolution>, bool, Place)>,
 }
 
 /// An edge: its vertices and faces.
@@ -64,13 +66,28 @@ impl Topologies {
 
     /// The place of a surface of revolution's mesh of [`SIDES`] sides, whose vertices are
     /// numbered ring by ring.
-    pub fn revolution(&mut self, surface: &Revolution) -> Option<Place> {
+    pub fn revolution(&mut self, surface: &Arc<Revolution>) -> Option<Place> {
+        let (rings, spans, rims) = (surface.rings(), surface.spans(), surface.rims());
+        let rising = rings.is_sorted_by(|a, b| a.y <= b.y);
+        if let Some((known, also_rising, place)) = &self.recent
+            && (known.rings().len(), *also_rising) == (rings.len(), rising)
+            && (known.spans(), known.rims()) == (spans, rims)
+        {
+            return Some(*place);
+        }
+        let place = self.new_revolution(surface, rising)?;
+        self.recent = Some((Arc::clone(surface), rising, place));
+        Some(place)
+    }
+
+    fn new_revolution(&mut self, surface: &Revolution, rising: bool) -> Option<Place> {
         let (rings, spans, rims) = (surface.rings(), surface.spans(), surface.rims());
         let number = |i: Option<usize>| i.map_or(NO_FACE, |i| i as u32);
-        let rising = rings.is_sorted_by(|a, b| a.y <= b.y);
         let mut key = vec![u32::from(rising), rings.len() as u32, spans.len() as u32];
         key.extend(spans.iter().map(|s| s.ring as u32));
-        key.extend(rims.iter().flat_map(|r| [r.ring as u32, number(r.spans[0]), number(r.spans[1])]));
+        key.extend(
+            rims.iter().flat_map(|r| [r.ring as u32, number(r.spans[0]), number(r.spans[1])]),
+        );
         if let Some(place) = self.revolutions.get(&key) {
             return *place;
         }
@@ -109,8 +126,11 @@ impl Topologies {
     }
 
     fn add(&mut self, triangles: &[[u32; 3]], lines: &[Vec<Sharp>], flags: u32) -> Option<Place> {
-        let edges: Vec<(usize, &Sharp)> =
-            lines.iter().enumerate().flat_map(|(i, line)| line.iter().map(move |e| (i, e))).collect();
+        let edges: Vec<(usize, &Sharp)> = lines
+            .iter()
+            .enumerate()
+            .flat_map(|(i, line)| line.iter().map(move |e| (i, e)))
+            .collect();
         let faces = triangles.len() as u32;
         let known = |face: u32| face == NO_FACE || face < faces;
         let sound = edges.iter().all(|(_, (_, [a, b]))| known(*a) && known(*b));

@@ -116,7 +116,8 @@ fn scenes_do_not_depend_on_others_and_the_cpu_draws_what_is_left() -> Tested {
         Ok(scenes::lathe(i as u64 % 3, 32, 0.0, Caps::Both)?.placed(random.placement()))
     })?;
     // Behind the camera, around it, far away, in a large picture, without a picture.
-    let moved = |z: f64, scale: f64| Affine::new(DVec3::new(0.0, 0.0, z), DVec3::ZERO, DVec3::splat(scale));
+    let moved =
+        |z: f64, scale: f64| Affine::new(DVec3::new(0.0, 0.0, z), DVec3::ZERO, DVec3::splat(scale));
     scenes[3].solid = scenes[3].solid.placed(moved(20.0, 1.0));
     scenes[4].solid = scenes[4].solid.placed(moved(7.5, 1.0));
     scenes[5].solid = scenes[5].solid.placed(moved(0.0, 1e200));

@@ -53,7 +53,8 @@ pub fn human() -> Result<Arc<Armature>, Box<dyn Error>> {
 /// A pose of the body, at the size of the picture.
 pub fn posed(body: &Arc<Armature>, random: &mut Spread) -> Result<Solid, Box<dyn Error>> {
     let joints = body.rig().joints().len();
-    let pose: Vec<JointPose> = (0..joints).map(|_| JointPose::turned(random.vector(0.25))).collect();
+    let pose: Vec<JointPose> =
+        (0..joints).map(|_| JointPose::turned(random.vector(0.25))).collect();
     Ok(set(&body.posed(&pose, &Rules::default())?, random))
 }
 
@@ -80,7 +81,8 @@ pub fn scenes(
     mut make: impl FnMut(usize, &mut Spread) -> Result<Solid, Box<dyn Error>>,
 ) -> Result<Vec<Scene>, Box<dyn Error>> {
     let mut random = Spread::new(count as u64 + 7);
-    let one = |i| Ok(Scene { solid: make(i, &mut random)?, camera: Camera::default_for(size, size) });
+    let one =
+        |i| Ok(Scene { solid: make(i, &mut random)?, camera: Camera::default_for(size, size) });
     (0..count).map(one).collect()
 }
 
