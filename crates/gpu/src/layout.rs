@@ -1,6 +1,7 @@
 //! What the CPU and the shaders share: structures as `shaders/layout.wgsl` has them, and
 //! limits.
 
+use crate::topologies::Place;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 use pcadlang_scene::geom::Affine;
@@ -109,6 +110,22 @@ impl Draw {
             normal: [0, 1].map(|i| row(cofactor.row(i), 0.0)),
             flags: if sign < 0.0 { MIRRORED } else { 0 },
             ..Draw::default()
+        }
+    }
+}
+
+impl Draw {
+    /// With a topology.
+    pub fn with(self, place: &Place) -> Draw {
+        Draw {
+            triangles: place.triangles,
+            triangle_count: place.triangle_count,
+            edges: place.edges,
+            edge_count: place.edge_count,
+            lines: place.lines,
+            line_count: place.line_count,
+            flags: self.flags | place.flags,
+            ..self
         }
     }
 }

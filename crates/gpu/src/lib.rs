@@ -21,6 +21,7 @@ mod device;
 mod layout;
 mod renderer;
 mod topologies;
+mod vertices;
 
 pub use device::NoDevice;
 pub use layout::SIDES;

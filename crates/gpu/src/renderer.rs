@@ -1,10 +1,10 @@
 //! The renderer: batch after batch through the device, the rest through the CPU.
 
-use crate::batch::{Batch, size};
+use crate::batch::{Batch, TASKS, size};
 use crate::buffers::{Growing, read_back, write_to};
 use crate::device::{BINDINGS, Device, NoDevice};
 use crate::layout::{
-    DRAWN, FOR_CPU, MOST_PIECES, NO_ROOM, Outcome, PIECE_BYTES, Params, VERTEX_BYTES,
+    DRAWN, Draw, FOR_CPU, MOST_PIECES, NO_ROOM, Outcome, PIECE_BYTES, Params, VERTEX_BYTES,
 };
 use crate::topologies::Topologies;
 use pcadlang_numerics::platform::threads::Pool;
@@ -19,6 +19,10 @@ use wgpu::BufferUsages;
 const MOST_GROUPS: u64 = 1024;
 /// Memory for what scenes need while they are drawn.
 const SCRATCH: u64 = 512 << 20;
+/// Bytes of the vertices of a batch, if the device has buffers of that size.
+const VERTEX_MEMORY: u64 = 384 << 20;
+/// Bytes of draws that are written at once.
+const FEW_BYTES: u64 = 1 << 20;
 /// Bytes of a visible piece: five numbers.
 const OUTPUT_BYTES: u64 = 20;
 
@@ -119,7 +123,7 @@ impl Gpu {
         let mut scores = Vec::with_capacity(scenes.len());
         while scores.len() < scenes.len() {
             let rest = &scenes[scores.len()..];
-            let batch = Batch::of(rest, &mut state.topologies, &self.pool);
+            let batch = state.batch(rest, &self.pool);
             let written =
                 if sent { state.draw(&batch, size(&rest[0]), params, &self.pool) } else { None };
             let outcomes = written.map_or(Vec::new(), |w| w.outcomes);
@@ -177,12 +181,28 @@ impl Part<'_> {
 /// device wrote.
 fn append(out: &mut ContourBatch, lists: [&[f32]; 5], parts: &[Part<'_>], pool: &Pool) {
     let ContourBatch { x, y, tx, ty, length, .. } = out;
-    let more: usize = parts.iter().map(Part::len).sum();
-    let tasks: Vec<_> = [x, y, tx, ty, length].into_iter().zip(lists).enumerate().collect();
-    pool.map(tasks, |(k, (out, list))| {
-        out.reserve(more);
+    let (first, more) = (x.len(), parts.iter().map(Part::len).sum::<usize>());
+    let mut tasks = Vec::new();
+    for (k, (out, list)) in [x, y, tx, ty, length].into_iter().zip(lists).enumerate() {
+        if first == 0 {
+            // Zeros that cost nothing before they are written, which is done below.
+            *out = vec![0.0; more];
+        } else {
+            out.resize(first + more, 0.0);
+        }
+        let mut rest = &mut out[first..];
+        for parts in parts.chunks(parts.len().div_ceil(TASKS).max(1)) {
+            let count = parts.iter().map(Part::len).sum();
+            let (own, after) = rest.split_at_mut(count);
+            rest = after;
+            tasks.push((k, list, parts, own));
+        }
+    }
+    pool.map(tasks, |(k, list, parts, mut out)| {
         for part in parts {
-            out.extend_from_slice(match part {
+            let (own, after) = out.split_at_mut(part.len());
+            out = after;
+            own.copy_from_slice(match part {
                 Part::Gpu(range) => &list[range.clone()],
                 Part::Cpu(c) => [&c.x, &c.y, &c.tx, &c.ty, &c.length][k],
             });
@@ -197,7 +217,7 @@ impl BatchRenderer for Gpu {
         let mut out = ContourBatch::default();
         while out.ends.len() < scenes.len() {
             let rest = &scenes[out.ends.len()..];
-            let batch = Batch::of(rest, &mut state.topologies, &self.pool);
+            let batch = state.batch(rest, &self.pool);
             let params = Params::default();
             let mut written = state.draw(&batch, size(&rest[0]), params, &self.pool);
             if written.as_ref().is_some_and(|w| w.outcomes.iter().any(|o| o.status == NO_ROOM)) {
@@ -244,6 +264,32 @@ impl BatchRenderer for Gpu {
 }
 
 impl State {
+    /// The next scenes.
+    fn batch<'a>(&mut self, scenes: &'a [Scene], pool: &Pool) -> Batch<'a> {
+        let most = self.device.most_bytes.min(VERTEX_MEMORY);
+        Batch::of(scenes, &mut self.topologies, most, pool)
+    }
+
+    /// Writes the draws of all tasks.
+    fn send_draws(&mut self, draws: &[Vec<Draw>]) -> Option<()> {
+        let State { device, inputs, .. } = self;
+        let count: usize = draws.iter().map(Vec::len).sum();
+        let bytes = (count * size_of::<Draw>()) as u64;
+        if bytes > device.most_bytes {
+            return None;
+        }
+        let (buffer, _) = inputs[2].with_bytes(&device.device, bytes.max(4), device.most_bytes);
+        // A write has its price, and so has a copy of much.
+        let together = if bytes < FEW_BYTES { vec![draws.concat()] } else { Vec::new() };
+        let lists = if bytes < FEW_BYTES { &together[..] } else { draws };
+        let mut at = 0;
+        for draws in lists.iter().filter(|draws| !draws.is_empty()) {
+            device.queue.write_buffer(buffer, at, bytemuck::cast_slice(draws));
+            at += size_of_val(&draws[..]) as u64;
+        }
+        Some(())
+    }
+
     /// Writes an input.
     fn send<T: bytemuck::Pod>(&mut self, input: usize, list: &[T]) -> Option<()> {
         let State { device, inputs, .. } = self;
@@ -297,16 +343,16 @@ impl State {
             Params { scenes: scenes as u32, room: room as u32, vertices: batch.most, ..params };
         self.send(0, &[params])?;
         self.send(1, &batch.items)?;
-        self.send(2, &batch.draws)?;
+        self.send_draws(&batch.draws)?;
         self.send_topologies()?;
-        let vertex_bytes = batch.vertex_bytes();
+        let vertex_bytes = batch.vertices.bytes();
         if vertex_bytes > most {
             return None;
         }
         let State { device, inputs, scratch, outputs, staging, readback, .. } = self;
         let (gpu, queue) = (&device.device, &device.queue);
         let (staging, _) = staging.with_bytes(gpu, vertex_bytes, most);
-        write_to(gpu, staging, vertex_bytes, |out| batch.write_vertices(out, pool))?;
+        write_to(gpu, staging, vertex_bytes, |out| batch.vertices.write(out, pool))?;
         inputs[4].with_bytes(gpu, vertex_bytes, most);
         inputs[5].with_bytes(gpu, 4, most);
         scratch[0].with_bytes(gpu, groups * VERTEX_BYTES * u64::from(batch.most), most);

@@ -8,6 +8,9 @@ use std::sync::{Arc, Weak};
 /// Words after which everything is forgotten before the next call.
 const MOST_WORDS: usize = 1 << 24;
 
+/// Kinds of surfaces of revolution, likewise: they are searched one by one.
+const MOST_REVOLUTIONS: usize = 64;
+
 /// Where the words of a topology are.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
@@ -31,9 +34,19 @@ pub struct Topologies {
     pub words: Vec<u32>,
     pub sent: usize,
     meshes: FxHashMap<usize, Entry>,
-    revolutions: FxHashMap<Vec<u32>, Option<Place>>,
-    /// The surface met last: most differ in their rings only.
-    recent: Option<(Arc<Revolution>, bool, Place)>,
+    revolutions: Vec<Like>,
+}
+
+/// Surfaces of revolution like this one, which differ in their rings only.
+struct Like {
+    surface: Arc<Revolution>,
+    rising: bool,
+    place: Option<Place>,
+}
+
+/// Whether heights never fall along the path.
+fn is_rising(surface: &Revolution) -> bool {
+    surface.rings().is_sorted_by(|a, b| a.y <= b.y)
 }
 
 /// An edge: its vertices and faces.
@@ -42,16 +55,21 @@ type Sharp = ([u32; 2], [u32; 2]);
 impl Topologies {
     /// Forgets everything if it has become much. Not while places are in use.
     pub fn tidy(&mut self) {
-        if self.words.len() > MOST_WORDS {
+        if self.words.len() > MOST_WORDS || self.revolutions.len() > MOST_REVOLUTIONS {
             *self = Topologies::default();
         }
     }
 
-    /// The place of a mesh's topology; `None` if it cannot be drawn on the device.
-    pub fn mesh(&mut self, topology: &Arc<Topology>) -> Option<Place> {
-        let address = Arc::as_ptr(topology) as usize;
-        if let Some((_, place)) = self.meshes.get(&address) {
-            return *place;
+    /// The place of a mesh's topology, `None` within if it cannot be drawn on the device;
+    /// `None` if it is not known yet.
+    pub fn mesh(&self, topology: &Arc<Topology>) -> Option<Option<Place>> {
+        self.meshes.get(&(Arc::as_ptr(topology) as usize)).map(|(_, place)| *place)
+    }
+
+    /// Adds the topology of a mesh.
+    pub fn add_mesh(&mut self, topology: &Arc<Topology>) {
+        if self.mesh(topology).is_some() {
+            return;
         }
         let lines: Vec<Vec<Sharp>> = topology
             .edges
@@ -60,37 +78,28 @@ impl Topologies {
             .collect();
         let flags = if topology.encloses { ENCLOSES } else { 0 };
         let place = self.add(&topology.triangles, &lines, flags);
+        let address = Arc::as_ptr(topology) as usize;
         self.meshes.insert(address, (Arc::downgrade(topology), place));
-        place
     }
 
     /// The place of a surface of revolution's mesh of [`SIDES`] sides, whose vertices are
-    /// numbered ring by ring.
-    pub fn revolution(&mut self, surface: &Arc<Revolution>) -> Option<Place> {
-        let (rings, spans, rims) = (surface.rings(), surface.spans(), surface.rims());
-        let rising = rings.is_sorted_by(|a, b| a.y <= b.y);
-        if let Some((known, also_rising, place)) = &self.recent
-            && (known.rings().len(), *also_rising) == (rings.len(), rising)
-            && (known.spans(), known.rims()) == (spans, rims)
-        {
-            return Some(*place);
-        }
-        let place = self.new_revolution(surface, rising)?;
-        self.recent = Some((Arc::clone(surface), rising, place));
-        Some(place)
+    /// numbered ring by ring; `None` as for meshes.
+    pub fn revolution(&self, surface: &Revolution) -> Option<Option<Place>> {
+        let like = |known: &Like| {
+            known.rising == is_rising(surface)
+                && known.surface.rings().len() == surface.rings().len()
+                && known.surface.spans() == surface.spans()
+                && known.surface.rims() == surface.rims()
+        };
+        self.revolutions.iter().rev().find(|known| like(known)).map(|known| known.place)
     }
 
-    fn new_revolution(&mut self, surface: &Revolution, rising: bool) -> Option<Place> {
-        let (rings, spans, rims) = (surface.rings(), surface.spans(), surface.rims());
-        let number = |i: Option<usize>| i.map_or(NO_FACE, |i| i as u32);
-        let mut key = vec![u32::from(rising), rings.len() as u32, spans.len() as u32];
-        key.extend(spans.iter().map(|s| s.ring as u32));
-        key.extend(
-            rims.iter().flat_map(|r| [r.ring as u32, number(r.spans[0]), number(r.spans[1])]),
-        );
-        if let Some(place) = self.revolutions.get(&key) {
-            return *place;
+    /// Adds the mesh of a surface of revolution.
+    pub fn add_revolution(&mut self, surface: &Arc<Revolution>) {
+        if self.revolution(surface).is_some() {
+            return;
         }
+        let (spans, rims, rising) = (surface.spans(), surface.rims(), is_rising(surface));
         let vertex = |ring: usize, side: u32| ring as u32 * SIDES + side % SIDES;
         let mut triangles = Vec::with_capacity(2 * SIDES as usize * spans.len());
         for span in spans {
@@ -121,8 +130,7 @@ impl Topologies {
             .collect();
         let closed = rims.iter().all(|r| r.spans.iter().all(Option::is_some));
         let place = self.add(&triangles, &lines, if closed && rising { ENCLOSES } else { 0 });
-        self.revolutions.insert(key, place);
-        place
+        self.revolutions.push(Like { surface: Arc::clone(surface), rising, place });
     }
 
     fn add(&mut self, triangles: &[[u32; 3]], lines: &[Vec<Sharp>], flags: u32) -> Option<Place> {
