@@ -18,7 +18,7 @@ use pcadlang_scene::render::{BatchRenderer, ContourBatch, Contours, Cores, Scene
 use pcadlang_scene::vision::{Chamfer, ChamferOptions, ContourMap};
 use scenes::Spread;
 use std::error::Error;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 type Made = Result<Solid, Box<dyn Error>>;
 
@@ -132,8 +132,15 @@ fn mean_pieces(batch: &ContourBatch) -> f64 {
     batch.x.len() as f64 / batch.len().max(1) as f64
 }
 
-/// Scenes a second, in the best of several calls.
+/// The clock of an idle GPU is low, and takes this long to rise.
+const WARM: Duration = Duration::from_millis(700);
+
+/// Scenes a second, in the best of several calls after it has warmed up.
 fn best(repeats: usize, scenes: &[Scene], mut call: impl FnMut()) -> f64 {
+    let begun = Instant::now();
+    while begun.elapsed() < WARM {
+        call();
+    }
     let times = (0..repeats.max(1)).map(|_| {
         let begun = Instant::now();
         call();

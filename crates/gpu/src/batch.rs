@@ -12,8 +12,6 @@ use pcadlang_scene::render::Scene;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// Scenes of a batch.
-const MOST_SCENES: usize = 4096;
 /// Vertices of a scene.
 const MOST_VERTICES: u32 = 1 << 18;
 /// Tasks for the cores.
@@ -22,6 +20,8 @@ pub const TASKS: usize = 64;
 /// Consecutive scenes with pictures of one size.
 #[derive(Default)]
 pub struct Batch<'a> {
+    /// The size of the pictures.
+    pub size: [u32; 2],
     pub items: Vec<Item>,
     /// The draws of each task, one after the other.
     pub draws: Vec<Vec<Draw>>,
@@ -33,7 +33,7 @@ pub struct Batch<'a> {
 }
 
 /// The size of a scene's picture.
-pub fn size(scene: &Scene) -> [u32; 2] {
+fn size(scene: &Scene) -> [u32; 2] {
     [scene.camera.width, scene.camera.height]
 }
 
@@ -47,7 +47,7 @@ impl<'a> Batch<'a> {
         pool: &Pool,
     ) -> Batch<'a> {
         let Some(first) = scenes.first() else { return Batch::default() };
-        let same = scenes.iter().take_while(|s| size(s) == size(first)).take(MOST_SCENES);
+        let same = scenes.iter().take_while(|s| size(s) == size(first));
         let scenes = &scenes[..same.count()];
         let gather = |topologies: &Topologies| -> Vec<Task<'a>> {
             let tasks = scenes.chunks(scenes.len().div_ceil(TASKS)).collect();
@@ -64,7 +64,7 @@ impl<'a> Batch<'a> {
             });
             tasks = gather(topologies);
         }
-        let mut batch = Batch::default();
+        let mut batch = Batch { size: size(first), ..Batch::default() };
         let mut placed = Vec::new();
         let mut draws = 0;
         for mut task in tasks {

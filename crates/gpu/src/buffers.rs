@@ -1,7 +1,9 @@
 //! Buffers of the device that grow, and reading them back.
 
 use bytemuck::Pod;
-use wgpu::{Buffer, BufferUsages, BufferView, Device, MapMode, PollType, Queue, WriteOnly};
+use wgpu::{
+    Buffer, BufferUsages, BufferView, Device, MapMode, PollType, Queue, SubmissionIndex, WriteOnly,
+};
 
 /// A buffer that is replaced by a larger one when it becomes too small.
 pub struct Growing {
@@ -44,15 +46,16 @@ impl Growing {
     }
 }
 
-/// Waits for the bytes of a buffer, and calls `read` with them; `None` if the device
+/// Waits for the bytes of a buffer, last used by `after`, and calls `read` with them; `None` if the device
 /// failed.
 pub fn read_back<T>(
     device: &Device,
     buffer: &Buffer,
     bytes: u64,
+    after: Option<&SubmissionIndex>,
     read: impl FnOnce(&BufferView) -> T,
 ) -> Option<T> {
-    map(device, buffer, MapMode::Read, bytes)?;
+    map(device, (buffer, bytes), MapMode::Read, after)?;
     let view = buffer.get_mapped_range(0..bytes).ok()?;
     let out = read(&view);
     drop(view);
@@ -60,14 +63,15 @@ pub fn read_back<T>(
     Some(out)
 }
 
-/// Calls `write` with the bytes of a buffer; `None` if the device failed.
+/// Calls `write` with the bytes of a buffer, last used by `after`; `None` if the device failed.
 pub fn write_to(
     device: &Device,
     buffer: &Buffer,
     bytes: u64,
+    after: Option<&SubmissionIndex>,
     write: impl FnOnce(WriteOnly<'_, [u8]>),
 ) -> Option<()> {
-    map(device, buffer, MapMode::Write, bytes)?;
+    map(device, (buffer, bytes), MapMode::Write, after)?;
     let mut view = buffer.get_mapped_range_mut(0..bytes).ok()?;
     write(view.slice(..));
     drop(view);
@@ -75,12 +79,21 @@ pub fn write_to(
     Some(())
 }
 
-fn map(device: &Device, buffer: &Buffer, mode: MapMode, bytes: u64) -> Option<()> {
+fn map(
+    device: &Device,
+    (buffer, bytes): (&Buffer, u64),
+    mode: MapMode,
+    after: Option<&SubmissionIndex>,
+) -> Option<()> {
     let (send, receive) = std::sync::mpsc::channel();
     buffer.map_async(mode, 0..bytes, move |done| {
         // Nobody waits any more only if the wait below failed.
         let _ = send.send(done);
     });
-    device.poll(PollType::wait_indefinitely()).ok()?;
-    receive.recv().ok()?.ok()
+    let poll = match after {
+        Some(index) => PollType::Wait { submission_index: Some(index.clone()), timeout: None },
+        None => PollType::Poll,
+    };
+    device.poll(poll).ok()?;
+    receive.try_recv().ok()?.ok()
 }

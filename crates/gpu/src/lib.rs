@@ -18,6 +18,7 @@
 mod batch;
 mod buffers;
 mod device;
+mod drawing;
 mod layout;
 mod renderer;
 mod topologies;
