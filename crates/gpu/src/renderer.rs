@@ -159,12 +159,12 @@ impl Gpu {
 impl BatchRenderer for Gpu {
     /// As the CPU's within the tolerance that this crate states.
     fn contours(&self, scenes: &[Scene]) -> ContourBatch {
-        let mut out = ContourBatch::default();
+        let (mut out, mut end, all) = (ContourBatch::default(), 0, scenes.len());
         self.each(scenes, Params::default(), &[0.0], |scenes, batch, drawn| {
             let on_cpu = |scene: &Scene| Contours::of(&scene.solid, &scene.camera);
             let left = self.left(scenes, batch, drawn, on_cpu);
             let mut left = left.iter().peekable();
-            let mut end = out.x.len();
+            let first = end;
             let part = |i: usize| {
                 let part = match (left.next_if(|(of, _)| *of == i), drawn.outcome(i)) {
                     (None, Some(outcome)) => Part::Gpu(outcome.range()),
@@ -176,8 +176,11 @@ impl BatchRenderer for Gpu {
                 part
             };
             let parts: Vec<Part<'_>> = (0..scenes.len()).map(part).collect();
-            append(&mut out, drawn.lists, &parts, &self.pool);
+            let each = end as f64 / out.ends.len() as f64;
+            let likely = (1.05 * each * all as f64) as usize;
+            write(&mut out, first..end, likely, drawn.lists, &parts, &self.pool);
         });
+        lists(&mut out).into_iter().for_each(|list| list.truncate(end));
         out
     }
 }
@@ -197,19 +200,30 @@ impl Part<'_> {
     }
 }
 
-/// Appends the pieces of scenes, on several cores. `lists` are those that the device wrote.
-fn append(out: &mut ContourBatch, lists: [&[f32]; 5], parts: &[Part<'_>], pool: &Pool) {
-    let ContourBatch { x, y, tx, ty, length, .. } = out;
-    let (first, more) = (x.len(), parts.iter().map(Part::len).sum::<usize>());
+fn lists(of: &mut ContourBatch) -> [&mut Vec<f32>; 5] {
+    let ContourBatch { x, y, tx, ty, length, .. } = of;
+    [x, y, tx, ty, length]
+}
+
+/// Writes the pieces of scenes to some places of the lists, on several cores. `written` are
+/// the lists that the device wrote; `likely` is how many pieces there will be in the end.
+fn write(
+    out: &mut ContourBatch,
+    to: Range<usize>,
+    likely: usize,
+    written: [&[f32]; 5],
+    parts: &[Part<'_>],
+    pool: &Pool,
+) {
     let mut tasks = Vec::new();
-    for (k, (out, list)) in [x, y, tx, ty, length].into_iter().zip(lists).enumerate() {
-        if first == 0 {
-            // Zeros that cost nothing before they are written, which is done below.
-            *out = vec![0.0; more];
-        } else {
-            out.resize(first + more, 0.0);
+    for (k, (out, list)) in lists(out).into_iter().zip(written).enumerate() {
+        if to.start == 0 {
+            // Zeros that cost nothing before they are overwritten.
+            *out = vec![0.0; to.end.max(likely)];
+        } else if out.len() < to.end {
+            out.resize(to.end.max(likely), 0.0);
         }
-        let mut rest = &mut out[first..];
+        let mut rest = &mut out[to.clone()];
         for parts in parts.chunks(parts.len().div_ceil(TASKS).max(1)) {
             let count = parts.iter().map(Part::len).sum();
             let (own, after) = rest.split_at_mut(count);
