@@ -141,6 +141,24 @@ impl ChamferSums {
     }
 }
 
+/// What the sums of one direction are computed from, for a device that computes them.
+#[derive(Debug, Clone, Copy)]
+pub struct DistanceField<'a> {
+    /// Distances in percent of the diagonal, row by row; one field, or one for each of as
+    /// many orientations of the tangent, from 0 to PI.
+    pub channels: &'a [Vec<f32>],
+    /// Samples of a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples per pixel of the frame, across and down.
+    pub scale: [f32; 2],
+    /// Percent of the diagonal per pixel of the frame.
+    pub percent: f64,
+    /// Upper bound of distances, in percent.
+    pub truncate: Option<f64>,
+}
+
 impl Chamfer {
     /// Prepares the observed contours for frames of `width` x `height` pixels. A map
     /// without contours is at the largest distance from everything.
@@ -223,6 +241,26 @@ impl Chamfer {
         self.count(&step.moving.slice(), 1, &mut steps);
         let back = self.reverse.as_ref().and_then(|_| self.back(&whole(), scratch));
         self.score(steps.sums(), back)
+    }
+
+    /// The fields of distances to the observed contours; `None` if the distance is
+    /// symmetric, for which they are not enough.
+    pub fn distance_field(&self) -> Option<DistanceField<'_>> {
+        self.reverse.is_none().then_some(DistanceField {
+            channels: &self.fields,
+            width: self.grid.width,
+            height: self.grid.height,
+            scale: [self.grid.sx, self.grid.sy],
+            percent: self.percent,
+            truncate: self.options.truncate,
+        })
+    }
+
+    /// The [`Chamfer::log_likelihood`] of contours given by their sums, unless symmetric:
+    /// length in percent of the diagonal, length times distance, and length times squared
+    /// distance.
+    pub fn log_likelihood_of(&self, [length, first, second]: [f64; 3]) -> f64 {
+        self.score(ChamferSums { length, first, second }, None)
     }
 
     fn mean(&self, forward: ChamferSums, back: Option<ChamferSums>) -> f64 {

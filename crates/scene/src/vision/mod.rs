@@ -26,7 +26,7 @@ pub mod region;
 mod testing;
 
 pub use crate::contours::{ContourChange, ContourSlice};
-pub use chamfer::{Chamfer, ChamferOptions};
+pub use chamfer::{Chamfer, ChamferOptions, DistanceField};
 pub use contour_ratio::{ContourRatio, ContourRatioOptions};
 pub use depth::{DepthLikelihood, DepthMap};
 pub use detect::detector::{ContourDetector, GradientDetector};
