@@ -1,12 +1,12 @@
 //! Measures scenes a second on the GPU beside all cores of the CPU, and how far the two
 //! differ.
 //!
-//!     cargo run --release --example batch -- [SCENES [SIZE [REPEATS]]]     (such as 256,4096 128 7)
+//!     cargo run --release --example batch -- [SCENES [SIZE [REPEATS]]]
 //!
-//! Prints one line for each shape and number of scenes: the time of contours that are read
-//! back, and that of scores against one picture, for which they are not. Each is the best
-//! of several calls; the scenes exist before. Then the differences of the contours, and
-//! the greatest one of the scores' distances.
+//! Such as `256,4096 128 7`. For each shape and number of scenes: scenes a second with
+//! contours that are read back, and with scores against one picture, for which they are
+//! not. Each is the best of several calls; the scenes exist before. Then the differences
+//! of the contours and of their distances from the picture.
 
 #[path = "../tests/scenes/mod.rs"]
 mod scenes;
@@ -21,6 +21,8 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 type Made = Result<Solid, Box<dyn Error>>;
+/// Makes the object of a scene, somewhere in its picture.
+type Make<'a> = &'a mut dyn FnMut(usize, &mut Spread) -> Made;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -35,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let still = body.posed(&[], &Default::default())?;
     // Closed forms are divided into other pieces than meshes are, so theirs are compared by
     // less than a piece's length.
-    let shapes: [(&str, f32, &mut dyn FnMut(usize, &mut Spread) -> Made); 4] = [
+    let shapes: [(&str, f32, Make<'_>); 4] = [
         ("lathe, other profiles", 0.8, &mut |i, random| {
             Ok(scenes::lathe(i as u64, 0, 0.0, Caps::Both)?.placed(random.placement()))
         }),

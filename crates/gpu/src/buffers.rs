@@ -46,8 +46,8 @@ impl Growing {
     }
 }
 
-/// Waits for the bytes of a buffer, last used by `after`, and calls `read` with them; `None` if the device
-/// failed.
+/// Waits for the bytes of a buffer, last used by `after`, and calls `read` with them;
+/// `None` if the device failed.
 pub fn read_back<T>(
     device: &Device,
     buffer: &Buffer,

@@ -115,22 +115,22 @@ impl Gpu {
                 (own, batch, slot, sent)
             });
             if let Some((own, batch, slot, mut sent)) = before.take() {
-                let mut again = |sent: &Sent, drawing: &mut Drawing, last: bool| {
-                    let once = |drawn: Drawn<'_>| {
-                        let again = !last && drawn.lacks_room();
-                        if !again {
+                // Whether there was room, and so everything was read.
+                let mut collect = |sent: &Sent, drawing: &mut Drawing, is_last: bool| {
+                    drawing.collect(sent, |drawn| {
+                        let fits = is_last || !drawn.lacks_room();
+                        if fits {
                             read(own, &batch, drawn);
                         }
-                        again
-                    };
-                    drawing.collect(sent, once)
+                        fits
+                    })
                 };
-                let mut done = sent.as_ref().and_then(|s| again(s, &mut drawing, false));
-                if done == Some(true) {
+                let mut done = sent.as_ref().and_then(|s| collect(s, &mut drawing, false));
+                if done == Some(false) {
                     sent = drawing.submit(&batch, slot, params, &self.pool);
-                    done = sent.as_ref().and_then(|s| again(s, &mut drawing, true));
+                    done = sent.as_ref().and_then(|s| collect(s, &mut drawing, true));
                 }
-                if done.is_none() {
+                if done != Some(true) {
                     read(own, &batch, Drawn::default());
                 }
             }

@@ -102,7 +102,8 @@ fn draw_depth(lane: u32, scene: Scene, projections: u32) {
         let faces = draws[d].triangle_count;
         for (var face = (lane - turn) % LANES; face < faces; face += LANES) {
             let v = corners(d, face);
-            fill(scene, projected[base + v.x].xyz, projected[base + v.y].xyz, projected[base + v.z].xyz, back);
+            let a = projected[base + v.x].xyz;
+            fill(scene, a, projected[base + v.y].xyz, projected[base + v.z].xyz, back);
         }
         turn += faces;
     }

@@ -100,7 +100,8 @@ struct Result {
 @group(0) @binding(3) var<storage, read> topology: array<u32>;
 @group(0) @binding(4) var<storage, read> vertices: array<f32>;
 @group(0) @binding(5) var<storage, read> fields: array<f32>;
-@group(0) @binding(6) var<storage, read_write> projected: array<vec4<f32>>; // x, y, nearness, facing
+// x, y, nearness, facing
+@group(0) @binding(6) var<storage, read_write> projected: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read_write> pieces: array<Piece>;
 @group(0) @binding(8) var<storage, read_write> results: array<Result>;
 @group(0) @binding(9) var<storage, read_write> output: array<f32>;

@@ -68,7 +68,8 @@ fn image(scene: Scene, c: vec3<f32>, d: vec3<f32>, s: ptr<function, Segment>) {
         let q = -1.0 / c.z;
         let other = -1.0 / (c.z + d.z);
         let dq = d.z * q * other;
-        (*s).a = vec3<f32>(scene.lens.y + scene.lens.x * q * c.x, scene.lens.z - scene.lens.x * q * c.y, q);
+        let k = scene.lens.x * q;
+        (*s).a = vec3<f32>(scene.lens.y + k * c.x, scene.lens.z - k * c.y, q);
         let moved = scene.lens.x * (d.xy * other + c.xy * dq);
         (*s).d = vec3<f32>(moved.x, -moved.y, dq);
     } else {
@@ -91,10 +92,9 @@ fn silhouette(scene: Scene, d: u32, base: u32, face: u32, open: bool) -> Segment
     var s: Segment;
     s.both = open;
     var v = corners(d, face);
-    let facing = vec3<f32>(projected[base + v.x].w, projected[base + v.y].w, projected[base + v.z].w);
-    let front = facing >= vec3<f32>(0.0);
+    var f = vec3<f32>(projected[base + v.x].w, projected[base + v.y].w, projected[base + v.z].w);
+    let front = f >= vec3<f32>(0.0);
     // Begins with the corner whose sign differs from the others'.
-    var f = facing;
     if front.x == front.y {
         v = v.zxy;
         f = f.zxy;
@@ -107,7 +107,8 @@ fn silhouette(scene: Scene, d: u32, base: u32, face: u32, open: bool) -> Segment
     let p = position(d, v.x);
     let q = position(d, v.y) - p;
     let r = position(d, v.z) - p;
-    image(scene, to_camera(d, vec4<f32>(p + q * u, 1.0)), to_camera(d, vec4<f32>(r * w - q * u, 0.0)), &s);
+    let along = to_camera(d, vec4<f32>(r * w - q * u, 0.0));
+    image(scene, to_camera(d, vec4<f32>(p + q * u, 1.0)), along, &s);
     let long = length(s.d.xy);
     if !(long > 1e-9) {
         return s;
@@ -133,7 +134,14 @@ fn silhouette(scene: Scene, d: u32, base: u32, face: u32, open: bool) -> Segment
 }
 
 // A crease or boundary; `faces.y` may be missing.
-fn sharp(scene: Scene, d: u32, base: u32, ends: vec2<u32>, faces: vec2<u32>, open: bool) -> Segment {
+fn sharp(
+    scene: Scene,
+    d: u32,
+    base: u32,
+    ends: vec2<u32>,
+    faces: vec2<u32>,
+    open: bool,
+) -> Segment {
     var s: Segment;
     s.both = true;
     let p = position(d, ends.x);
@@ -317,7 +325,8 @@ fn extract(lane: u32, scene: Scene, d: u32, projections: u32, pool: u32, already
             let line = topology[at + 4u];
             if (atomicLoad(&specks[line >> 5u]) & (1u << (line & 31u))) == 0u {
                 let ends = vec2<u32>(topology[at], topology[at + 1u]);
-                s = sharp(scene, d, base, ends, vec2<u32>(topology[at + 2u], topology[at + 3u]), open);
+                let faces = vec2<u32>(topology[at + 2u], topology[at + 3u]);
+                s = sharp(scene, d, base, ends, faces, open);
             }
         }
         let sums = scan(lane, s.count);

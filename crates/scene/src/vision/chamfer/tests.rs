@@ -299,3 +299,30 @@ fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
         assert!(options.symmetric || asked < 39, "{asked}");
     }
 }
+
+#[test]
+fn sums_of_a_device_give_the_same_score() {
+    let seen = clutter(128, 128, 12, 3);
+    let drawn = Contours::new(128, 128).circle(0.5, 0.45, 0.3);
+    for options in variants() {
+        let chamfer = Chamfer::prepare(&seen.map(), 128, 128, &options).unwrap();
+        let Some(field) = chamfer.distance_field() else {
+            assert!(options.symmetric);
+            continue;
+        };
+        let samples = field.width as usize * field.height as usize;
+        assert!(field.channels.iter().all(|channel| channel.len() == samples));
+        assert_eq!(field.channels.len(), if options.oriented.is_some() { CHANNELS } else { 1 });
+        assert_eq!(field.scale, [field.width as f32 / 128.0, field.height as f32 / 128.0]);
+        let mut sums = [0.0; 3];
+        for e in drawn.slice().in_view() {
+            let length = f64::from(e.length * e.weight) * field.percent;
+            let distance = f64::from(chamfer.read(&e).0).min(field.truncate.unwrap_or(f64::MAX));
+            let terms = [length, length * distance, length * distance * distance];
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+        let (got, wanted) =
+            (chamfer.log_likelihood_of(sums), chamfer.log_likelihood(&drawn.slice()));
+        assert!((got - wanted).abs() < 1e-6 * wanted.abs().max(1.0), "{got} {wanted}");
+    }
+}
