@@ -305,7 +305,7 @@ fn sums_of_a_device_give_the_same_score() {
     let seen = clutter(128, 128, 12, 3);
     let drawn = Contours::new(128, 128).circle(0.5, 0.45, 0.3);
     for options in variants() {
-        let chamfer = Chamfer::prepare(&seen, 128, 128, &options).unwrap();
+        let chamfer = Chamfer::prepare(&seen.map(), 128, 128, &options).unwrap();
         let Some(field) = chamfer.distance_field() else {
             assert!(options.symmetric);
             continue;
