@@ -160,8 +160,9 @@ fn scores_of_other_arguments() {
             );
         }
         // A few arguments do not change this picture's score: the depth of the look-at
-        // point, a translation along the line of sight, levels of detail.
+        // point, a translation along the line of sight, levels of detail; the wall of a vessel
+        // does not change its mask.
         println!("{shows} of {count} show: {compared}");
-        assert!(shows + 5 >= count, "{compared}: {shows} of {count} arguments change the score");
+        assert!(shows + 7 >= count, "{compared}: {shows} of {count} arguments change the score");
     }
 }

@@ -116,7 +116,9 @@ impl View {
     pub fn depth(&self, size: u32) -> Arc<Frame> {
         self.depth_drawn(size).unwrap_or_else(|| {
             let contours = self.expects_contours(size);
-            let on_canvas = !contours || self.change_on_canvas(size).is_some();
+            // The canvas has meshes only.
+            let on_canvas = self.solid.revolution().is_none()
+                && (!contours || self.change_on_canvas(size).is_some());
             once(&self.depths, size, || {
                 let Scene { solid, camera } = self.scene(size);
                 let drawn = || self.canvas.depth(&solid, &camera, contours);

@@ -171,11 +171,11 @@ fn depth_follows_the_placement_and_the_profile() {
                         along += g.y[i] * (p.y[i] - q.y[i]) * 5e5;
                     }
                 }
-                wrong = wrong.max((along - slope).abs() - 5e-3 * size);
+                wrong = wrong.max((along - slope).abs() - 0.015 * size);
             }
         }
     }
     assert!(counted > 200_000, "{counted}");
-    // The depths are rounded to single precision.
+    // Depths are rounded to single precision, and slopes on two sides of a ring differ.
     assert!(wrong < 0.05, "{wrong}");
 }

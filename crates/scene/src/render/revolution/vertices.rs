@@ -141,6 +141,14 @@ mod tests {
         assert!(other.change(96).all_move());
         let next = view(0.0).after(&other);
         assert_eq!(*next.contours(96), *wanted);
+        // Views of depth alone that follow one another.
+        let moved = [[0.0; 8], [0.1; 8], [0.0; 8], [0.0; 8]].map(placed);
+        let mut last = view(0.0);
+        for solid in moved {
+            let wanted = View::new(solid.clone(), camera).depth(96);
+            last = View::new(solid, camera).after(&last);
+            assert_eq!(last.depth(96).depth, wanted.depth);
+        }
         // Beside something else, it is drawn by its mesh.
         let solid = placed([0.0; 8]);
         let pair = Solid::group(&[solid.clone(), solid.clone()]);
