@@ -60,19 +60,19 @@ impl Builder {
         (self.ops.len(), self.terms.as_ref().map_or(0, Terms::len))
     }
 
-    /// Returns where the score recorded since `mark` is; `None` if there is none, an error if
-    /// it is in several places.
-    pub fn scored(&self, mark: (usize, usize)) -> Result<Option<Scored>, ()> {
+    /// Returns where the score recorded since `mark` is, if any was recorded; `None` if it is in
+    /// several places.
+    pub fn scored(&self, mark: (usize, usize)) -> Option<Option<Scored>> {
         let terms = self.terms.as_ref().map(|terms| &terms[mark.1..]);
-        match (&self.ops[mark.0..], terms) {
-            ([], None | Some([])) => Ok(None),
-            ([], Some([t])) => Ok(Some(Scored::Numbers(t.column.at..t.column.at + 1, false))),
+        Some(match (&self.ops[mark.0..], terms) {
+            ([], None | Some([])) => None,
+            ([], Some([t])) => Some(Scored::Numbers(t.column.at..t.column.at + 1, false)),
             ([Op::Density { x, n, out: Some(at), .. }], Some(_)) => {
-                Ok(Some(Scored::Numbers(*at..at + n, *n != 1 || x.step != 0)))
+                Some(Scored::Numbers(*at..at + n, *n != 1 || x.step != 0))
             }
-            ([_], _) => Ok(Some(Scored::Operation(mark.0))),
-            _ => Err(()),
-        }
+            ([_], _) => Some(Scored::Operation(mark.0)),
+            _ => return None,
+        })
     }
 
     /// From here on, scores are numbers in the buffer, which `end_terms`

@@ -242,9 +242,9 @@ impl Recorder<'_> {
     /// Notes where the score of a node is: what was recorded since `mark`.
     fn note_score(&mut self, n: NodeId, mark: (usize, usize)) {
         match self.recorded.tape.scored(mark) {
-            Ok(Some(scored)) => self.scored.push((n, scored)),
-            Ok(None) => {}
-            Err(()) => self.recorded.in_place = None,
+            Some(Some(scored)) => self.scored.push((n, scored)),
+            Some(None) => {}
+            None => self.recorded.in_place = None,
         }
     }
 

@@ -116,8 +116,8 @@ fn is_simple(rings: &[Ring]) -> bool {
     let top = top.unwrap_or(rings.len().saturating_sub(1));
     let (Some(outer), Some(inner)) = (rings.get(..=top), rings.get(top..)) else { return false };
     let rises = |pair: &&[Ring]| pair[0].y < pair[1].y;
-    let starts = |rings: &[Ring]| rings.first().map_or(f64::NAN, |ring| ring.y);
-    if inner.windows(2).any(|pair| rises(&pair)) || !(starts(outer) <= inner[inner.len() - 1].y) {
+    let ends_above = matches!((outer.first(), inner.last()), (Some(a), Some(b)) if a.y <= b.y);
+    if inner.windows(2).any(|pair| rises(&pair)) || !ends_above {
         return false;
     }
     let mut walls = outer.windows(2).filter(rises).peekable();
