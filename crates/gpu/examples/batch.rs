@@ -15,7 +15,7 @@ use pcadlang_gpu::Gpu;
 use pcadlang_numerics::platform::threads::Pool;
 use pcadlang_scene::geom::{Caps, Solid};
 use pcadlang_scene::render::{BatchRenderer, ContourBatch, Contours, Cores, Scene};
-use pcadlang_scene::vision::{Chamfer, ChamferOptions, ContourMap};
+use pcadlang_scene::vision::{Chamfer, ChamferOptions};
 use scenes::Spread;
 use std::error::Error;
 use std::time::{Duration, Instant};
@@ -119,14 +119,7 @@ fn measure(
 /// What the first scene shows, as a picture's contours.
 fn observed(scene: &Scene) -> Result<Chamfer, Box<dyn Error>> {
     let seen = Contours::of(&scene.solid, &scene.camera);
-    let map = ContourMap {
-        x: seen.x.clone(),
-        y: seen.y.clone(),
-        tx: seen.tx.clone(),
-        ty: seen.ty.clone(),
-        strength: vec![1.0; seen.len()],
-        ..ContourMap::new(seen.width, seen.height)
-    };
+    let map = scenes::observed(&seen.slice());
     Ok(Chamfer::prepare(&map, seen.width, seen.height, &ChamferOptions::default())?)
 }
 

@@ -39,6 +39,14 @@ pub(in crate::trace) struct SummedChoices {
     pub sweep: usize,
 }
 
+impl SummedChoices {
+    /// The choices with the values that have these indices.
+    fn at<'a>(&'a self, indices: &'a [usize]) -> impl Iterator<Item = (Target, &'a Datum)> {
+        let values = self.values.iter().zip(indices).map(|(values, i)| &values[*i]);
+        self.sites.iter().copied().zip(values)
+    }
+}
+
 impl Trace {
     /// Records the log density as a function of the unconstrained coordinates of some
     /// continuous choices, to be evaluated many times without proposals; `None` if it
@@ -97,9 +105,7 @@ impl Recording {
             return false;
         }
         let drawn = self.tape.draw(rng);
-        for ((t, values), i) in self.summed.sites.iter().zip(&self.summed.values).zip(drawn) {
-            out.push((*t, Change::Set(values[i].clone())));
-        }
+        out.extend(self.summed.at(&drawn).map(|(t, x)| (t, Change::Set(x.clone()))));
         true
     }
 
@@ -193,11 +199,8 @@ impl Recording {
             return false;
         }
         let drawn = self.tape.draw(rng);
-        let all = self.summed.sites.iter().zip(&self.summed.values).zip(&drawn);
-        let changes: Vec<(Target, Change)> = all
-            .filter(|((t, values), i)| trace.stored(**t).as_ref() != Some(&values[**i]))
-            .map(|((t, values), i)| (*t, Change::Set(values[*i].clone())))
-            .collect();
+        let changed = self.summed.at(&drawn).filter(|(t, x)| trace.stored(*t).as_ref() != Some(*x));
+        let changes: Vec<_> = changed.map(|(t, x)| (t, Change::Set(x.clone()))).collect();
         if !changes.is_empty() {
             // Where the trace is, these values may be impossible.
             let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();

@@ -8,6 +8,7 @@
 
 use super::partition::Partition;
 use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::trace::gradient::Given;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -153,9 +154,17 @@ impl<'a> Reader<'a> {
         Reader { graph, code, own, partition, seen, labels, found, sets: None }
     }
 
-    /// Returns the choices that the value of a node depends on, if sets are kept; `None` if
-    /// its existence depends on some, or on too many to tell.
-    pub fn reads(&mut self, n: NodeId) -> Option<&[u32]> {
+    /// Returns through which of their values, given by their indices, the choices determine
+    /// each node, if sets are kept; `None` for nodes whose existence depends on some, or that
+    /// depend on too many to tell.
+    pub fn given(&mut self, indices: &[usize]) -> FxHashMap<NodeId, Option<Given>> {
+        let exists = |n: &NodeId| self.graph.nodes[*n as usize].state == State::Clean;
+        let all: Vec<NodeId> = (0..self.graph.nodes.len() as NodeId).filter(exists).collect();
+        let at = |x: &u32| (*x, indices[*x as usize] as u32);
+        all.into_iter().map(|n| (n, self.reads(n).map(|x| x.iter().map(at).collect()))).collect()
+    }
+
+    fn reads(&mut self, n: NodeId) -> Option<&[u32]> {
         let (label, placed) = (self.visit(n), self.placed(n).0);
         let sets = self.sets.as_ref().filter(|s| !s.overflow && placed.site == NONE)?;
         Some(sets.members(label.set))

@@ -127,11 +127,11 @@ impl Trace {
                 if found.structure_moves || found.anywhere || found.unclear {
                     return None;
                 }
-                if sites.widen(&found.factors, sets) {
+                if widen(&mut sites.scopes, &found.factors, sets) {
                     recorded = None;
                 }
                 let Some(before) = recorded.take() else { continue };
-                let given = self.given(sites, &indices, &choices);
+                let given = reader.given(&indices);
                 let scores = self.scores_by_factor(&sites.scopes, &choices);
                 let record = RecordState {
                     given: &given,
@@ -179,28 +179,6 @@ impl Trace {
         }
         self.commit();
         Some(())
-    }
-
-    /// Returns through which of their values in a state the choices determine each node, and
-    /// `None` for nodes that exist for some of their values only.
-    fn given(
-        &self,
-        sites: &Sites,
-        indices: &[usize],
-        choices: &[NodeId],
-    ) -> FxHashMap<NodeId, Option<Given>> {
-        let mut partition = Partition::default();
-        partition.grow(sites.targets.len());
-        let mut reader = Reader::new(&self.graph, &self.code, &sites.own, &mut partition);
-        reader.sets = Some(Sets::singletons(sites.targets.len()));
-        reader.read_all(choices.iter().copied());
-        let nodes = 0..self.graph.nodes.len() as NodeId;
-        let exists = |n: &NodeId| self.graph.nodes[*n as usize].state == State::Clean;
-        let at = |x: &u32| (*x, indices[*x as usize] as u32);
-        nodes
-            .filter(exists)
-            .map(|n| (n, reader.reads(n).map(|read| read.iter().map(at).collect())))
-            .collect()
     }
 
     /// Returns all nodes with scores, each with the factor that it is part of.
@@ -366,22 +344,26 @@ impl Sites {
             .collect();
         self.colours.iter().zip(&self.values).map(|(c, v)| by_colour[*c] % v.len()).collect()
     }
+}
 
-    /// Adds what factors depend on; true if any depends on more than was known.
-    fn widen(&mut self, factors: &[(NodeId, u32)], sets: &Sets) -> bool {
-        let mut wider = false;
-        for (n, set) in factors {
-            let scope = self.scopes.entry(*n).or_insert_with(|| {
+/// Adds what factors depend on; true if any depends on more than was known.
+fn widen(
+    scopes: &mut BTreeMap<NodeId, Vec<usize>>,
+    factors: &[(NodeId, u32)],
+    sets: &Sets,
+) -> bool {
+    let mut wider = false;
+    for (n, set) in factors {
+        let scope = scopes.entry(*n).or_insert_with(|| {
+            wider = true;
+            Vec::new()
+        });
+        for x in sets.members(*set) {
+            if let Err(place) = scope.binary_search(&(*x as usize)) {
+                scope.insert(place, *x as usize);
                 wider = true;
-                Vec::new()
-            });
-            for x in sets.members(*set) {
-                if let Err(place) = scope.binary_search(&(*x as usize)) {
-                    scope.insert(place, *x as usize);
-                    wider = true;
-                }
             }
         }
-        wider
     }
+    wider
 }

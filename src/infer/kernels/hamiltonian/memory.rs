@@ -211,18 +211,7 @@ impl Memory {
     /// Moves the trace to a point in place, without a proposal. False, with the trace
     /// unchanged, if only a proposal can do that.
     pub fn move_to(&mut self, trace: &mut Trace, to: &Point, power: f64) -> bool {
-        self.here = None;
-        let mut here = self.point();
-        let (Some(point), Some((tape, _))) = (Arc::get_mut(&mut here), &mut self.tape) else {
-            return false;
-        };
-        point.log_density = 0.0;
-        let moved = tape.move_to(trace, &to.y, &mut point.y);
-        if moved && tape.gradient(&point.y, power, &mut point.gradient) {
-            self.here = Some((Arc::clone(&here), power));
-        }
-        self.keep(&here);
-        moved
+        self.end_in_place(Some(power), |tape, here| tape.move_to(trace, &to.y, here))
     }
 
     /// Draws the choices that are summed out at a point, or where the trace is, and moves the
@@ -235,21 +224,37 @@ impl Memory {
         at: &StepContext,
         rng: &mut Stream,
     ) -> bool {
+        let y = to.map(|to| &to.y[..]);
+        let draws = at.draws(0);
+        self.end_in_place(y.map(|_| at.power), |tape, here| {
+            tape.draw_and_move_to(trace, y, here, rng, draws)
+        })
+    }
+
+    /// Ends a step in place by `go`, which tells whether it could, and where the trace then
+    /// is. If the step moves, it gives the power for which the force there is kept.
+    fn end_in_place(
+        &mut self,
+        moves: Option<f64>,
+        go: impl FnOnce(&mut Recording, &mut Vec<f64>) -> bool,
+    ) -> bool {
+        if moves.is_some() {
+            self.here = None;
+        }
         let mut here = self.point();
         let (Some(point), Some((tape, _))) = (Arc::get_mut(&mut here), &mut self.tape) else {
             return false;
         };
         point.log_density = 0.0;
-        let y = to.map(|to| &to.y[..]);
-        let moved = tape.draw_and_move_to(trace, y, &mut point.y, rng, at.draws(0));
-        if to.is_some() {
-            self.here = None;
-        }
-        if moved && to.is_some() && tape.gradient(&point.y, at.power, &mut point.gradient) {
-            self.here = Some((Arc::clone(&here), at.power));
+        let done = go(tape, &mut point.y);
+        if let Some(power) = moves
+            && done
+            && tape.gradient(&point.y, power, &mut point.gradient)
+        {
+            self.here = Some((Arc::clone(&here), power));
         }
         self.keep(&here);
-        moved
+        done
     }
 
     /// Updates the tape after a commit of these choices.
