@@ -8,8 +8,8 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::Model;
 use pcadlang::trace::{Change, Draws, Target, Trace};
+use pcadlang::{Model, Program};
 use std::error::Error;
 
 /// Programs that include their data.
@@ -45,7 +45,7 @@ fn cost(mut call: impl FnMut(usize) -> Result<(), Box<dyn Error>>) -> Result<f64
     for _ in 0..5 {
         let (begun, mut calls) = (processor_seconds(), 0);
         while processor_seconds() - begun < 0.05 {
-            for _ in 0..200 {
+            for _ in 0..20 {
                 call(calls)?;
                 calls += 1;
             }
@@ -55,12 +55,26 @@ fn cost(mut call: impl FnMut(usize) -> Result<(), Box<dyn Error>>) -> Result<f64
     Ok(least)
 }
 
+/// `human.pcad` with the joints of the skier, and with a mask of them by the detector.
+fn body(joints: bool) -> Result<Model, Box<dyn Error>> {
+    let image = |name: &str| format!("{}/examples/images/{name}", env!("CARGO_MANIFEST_DIR"));
+    let program = Program::open("human.pcad")?.observe_file("photo", &image("skier.jpg"))?;
+    Ok(match joints {
+        true => program.observe_file("points", &image("skier.keypoints.json"))?.compile()?,
+        false => program.compile()?,
+    })
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
+    let plain = PROGRAMS.iter().map(|(name, text)| Ok((*name, Model::from_text(text)?)));
+    let mut models = plain.collect::<Result<Vec<_>, Box<dyn Error>>>()?;
+    models.push(("a body with joints", body(true)?));
+    models.push(("… with depths and a mask", body(false)?));
     println!("{:<28} {:>12} {:>12} {:>8}", "", "by trace, us", "by tape, us", "ratio");
-    for (name, text) in PROGRAMS {
-        let model = Model::from_text(text)?;
+    for (name, model) in models {
         let mut trace: Trace = model.simulate(1, 0)?;
-        let targets: Vec<Target> = trace.all_targets().to_vec();
+        let continuous = |t: &Target| trace.free(*t).is_some_and(|(y, _)| !y.is_empty());
+        let targets: Vec<Target> = trace.all_targets().iter().copied().filter(continuous).collect();
         let mut tape = trace.record(&targets).ok_or("no tape")?;
         let mut here = Vec::new();
         if !tape.begin(&trace, &mut here) {

@@ -8,4 +8,5 @@ mod incremental;
 mod last_bit;
 mod operations;
 mod tape;
+mod tape_scenes;
 mod updates;

@@ -8,8 +8,10 @@ use super::form::{Form, Made};
 use super::log_sum_exp::{Term, Terms};
 use super::op::{Op, Scored};
 use super::summed::Summed;
+use super::values::{Adjoints, Values};
 use super::{Input, Tape, lanes};
 use crate::dist::{Batch, Dist, Support, batch, batch_of_mixture};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{
     Binary, Builtin, CovarianceValue, Derivative, Kind, PreviousEvaluation, Reduction, Scalar,
 };
@@ -21,7 +23,7 @@ use std::sync::Arc;
 /// A tape under construction.
 #[derive(Debug, Default)]
 pub struct Builder {
-    pub(super) values: Vec<f64>,
+    pub(super) values: Values,
     inputs: Vec<Input>,
     pub(super) ops: Vec<Op>,
     /// The choices summed out.
@@ -51,7 +53,9 @@ impl Builder {
         if !tape.summed.is_empty() {
             lanes::merge(&mut tape);
         }
-        tape.adjoints = vec![0.0; tape.values.len()];
+        let (numbers, objects) = (tape.values.numbers.len(), tape.values.objects.len());
+        tape.adjoints =
+            Adjoints { numbers: vec![0.0; numbers], objects: vec![Adjoint::Zero; objects] };
         tape
     }
 
@@ -109,9 +113,7 @@ impl Builder {
     }
 
     pub(super) fn reserve(&mut self, n: usize) -> usize {
-        let at = self.values.len();
-        self.values.resize(at + n, f64::NAN);
-        at
+        self.values.reserve(n)
     }
 
     /// Allocates a value in the buffer, initialised with these numbers; `None` if it
@@ -119,12 +121,12 @@ impl Builder {
     pub fn place(&mut self, now: &Value) -> Option<Form> {
         Some(match now {
             Value::Num(x) => {
-                self.values.push(*x);
-                Form::Num(self.values.len() - 1)
+                self.values.numbers.push(*x);
+                Form::Num(self.values.numbers.len() - 1)
             }
             Value::Array(xs) => {
-                let at = self.values.len();
-                self.values.extend(xs.iter());
+                let at = self.values.numbers.len();
+                self.values.numbers.extend(xs.iter());
                 Form::Array(at, xs.len())
             }
             Value::List(xs) => Form::List(xs.iter().map(|x| self.place(x)).collect::<Option<_>>()?),
@@ -149,17 +151,17 @@ impl Builder {
             Form::Num(at) => Some(Column { at: *at, step: 0, live: true }),
             Form::Array(at, _) => Some(Column { at: *at, step: 1, live: true }),
             Form::Fixed(v @ (Value::Num(_) | Value::Bool(_))) => {
-                let at = self.values.len();
-                self.values.extend(v.numbers());
+                let at = self.values.numbers.len();
+                self.values.numbers.extend(v.numbers());
                 Some(Column { at, step: 0, live: false })
             }
             Form::Fixed(v @ (Value::Array(_) | Value::List(_))) => {
-                let (at, n) = (self.values.len(), v.len()?);
+                let (at, n) = (self.values.numbers.len(), v.len()?);
                 let plain = |x: Value| matches!(x, Value::Num(_) | Value::Bool(_));
                 if !(0..n).all(|i| v.element(i).is_some_and(plain)) {
                     return None;
                 }
-                self.values.extend(v.numbers());
+                self.values.numbers.extend(v.numbers());
                 Some(Column { at, step: 1, live: false })
             }
             _ => None,
@@ -189,32 +191,66 @@ impl Builder {
         {
             return None;
         }
-        if numeric(now) {
-            let out = self.place(now)?;
-            self.ops.push(Op::Call {
-                builtin: builtin.clone(),
-                args: args.into(),
-                out: out.clone(),
-                before: None,
-                keeps: self.keeps,
-            });
-            return Some(out);
-        }
-        // Results that are expensive to build are better built once.
+        // Cheap values that are not numbers are made where they are needed.
         let cheap = match now {
             Value::Object(_) => now.downcast::<CovarianceValue>().is_some(),
             Value::Bool(_) | Value::Dist(_) | Value::Str(_) => true,
             Value::List(xs) => xs.iter().all(|x| matches!(x, Value::Bool(_) | Value::Dist(_))),
             _ => false,
         };
-        cheap.then(|| Form::Made(Arc::new(Made { builtin: builtin.clone(), args: args.into() })))
+        if cheap {
+            return Some(Form::Made(Arc::new(Made {
+                builtin: builtin.clone(),
+                args: args.into(),
+            })));
+        }
+        let out = match now {
+            Value::Object(_) | Value::Likelihood(_) => self.object(now),
+            _ => self.place(now)?,
+        };
+        self.ops.push(Op::Call {
+            builtin: builtin.clone(),
+            args: args.into(),
+            out: out.clone(),
+            before: None,
+            keeps: self.keeps,
+        });
+        Some(out)
     }
 
-    /// The last recorded call may start from this evaluation.
-    pub fn start_from(&mut self, evaluation: &Arc<PreviousEvaluation>) {
-        if let Some(Op::Call { before, .. }) = self.ops.last_mut() {
-            *before = Some(Arc::clone(evaluation));
+    /// Allocates an object or a likelihood.
+    fn object(&mut self, now: &Value) -> Form {
+        self.values.objects.push(now.clone());
+        Form::Object(self.values.objects.len() - 1, self.reserve(1))
+    }
+
+    /// Records the value of a choice that is stored as white noise, whose distribution
+    /// currently is `now`; `None` if the noise is not an array.
+    pub fn coloured(&mut self, dist: Form, now: &Dist, noise: &Form) -> Option<Form> {
+        let (n, last) = (noise.len()?, Some(now.clone()));
+        if dist.is_fixed() && noise.is_fixed() {
+            return None;
         }
+        let out = self.reserve(n);
+        self.ops.push(Op::Coloured { dist, noise: noise.clone(), out, n, last });
+        Some(Form::Array(out, n))
+    }
+
+    /// Records a family with these arguments, which currently gives `now`.
+    pub fn made_dist(builtin: &Builtin, args: Vec<Form>, now: &Dist) -> Form {
+        match args.iter().all(Form::is_fixed) {
+            true => Form::Fixed(Value::Dist(Arc::new(now.clone()))),
+            false => Form::Made(Arc::new(Made { builtin: builtin.clone(), args: args.into() })),
+        }
+    }
+
+    /// The last recorded call, of an incremental function, may start from this evaluation.
+    /// Returns where [`Tape::evaluation`] finds its later ones.
+    pub fn start_from(&mut self, evaluation: &Arc<PreviousEvaluation>) -> Option<Scored> {
+        let place = self.ops.len().checked_sub(1)?;
+        let Some(Op::Call { before, .. }) = self.ops.last_mut() else { return None };
+        *before = Some(Arc::clone(evaluation));
+        Some(Scored::Operation(place))
     }
 
     fn unary(&mut self, f: fn(f64) -> f64, slope: fn(f64, f64) -> f64, x: &Form) -> Option<Form> {
@@ -275,12 +311,12 @@ impl Builder {
     /// The product of a fixed matrix and a vector.
     fn matrix(&mut self, args: &[Form]) -> Option<Form> {
         let [Form::Fixed(Value::List(list)), Form::Array(x, width)] = args else { return None };
-        let rows = self.values.len();
+        let rows = self.values.numbers.len();
         for row in list.iter() {
             let Value::Array(xs) = row else { return None };
-            self.values.extend(xs.iter());
+            self.values.numbers.extend(xs.iter());
         }
-        if self.values.len() != rows + list.len() * width {
+        if self.values.numbers.len() != rows + list.len() * width {
             return None;
         }
         let out = self.reserve(list.len());
@@ -378,11 +414,7 @@ impl Builder {
         {
             return Some(());
         }
-        let dist = match args.iter().all(Form::is_fixed) {
-            true => Form::Fixed(Value::Dist(Arc::new(dist.clone()))),
-            false => Form::Made(Arc::new(Made { builtin: builtin.clone(), args: args.into() })),
-        };
-        self.score(dist, x.clone(), observed)
+        self.score(Builder::made_dist(builtin, args, dist), x.clone(), observed)
     }
 
     /// Records the log density of a value under a distribution or likelihood, which

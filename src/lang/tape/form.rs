@@ -1,5 +1,6 @@
-//! Forms: where the numbers of a value are on a tape, or how it is computed.
+//! Forms: where a value is on a tape, or how it is computed.
 
+use super::values::{Adjoints, Values};
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, Builtin, Kind, PreviousEvaluation};
@@ -21,6 +22,10 @@ pub enum Form {
     List(Arc<[Form]>),
     /// A record.
     Record(Arc<[(Arc<str>, Form)]>),
+    /// A value of another kind (an object, a likelihood) in the list of them: its index,
+    /// and the index of a number that stands for it where operations are ordered by the
+    /// numbers they read.
+    Object(usize, usize),
     /// The result of a call that is not stored in the buffer (a boolean, a distribution,
     /// a covariance) and is computed when it is needed.
     Made(Arc<Made>),
@@ -46,7 +51,7 @@ impl Form {
 
     /// Returns the value, if it is fixed.
     pub fn fixed(&self) -> Option<Value> {
-        self.is_fixed().then(|| self.value(&[])).flatten()
+        self.is_fixed().then(|| self.value(&Values::default())).flatten()
     }
 
     /// Returns the number of elements, for arrays.
@@ -88,40 +93,45 @@ impl Form {
     }
 
     /// Returns the value, from the numbers in the buffer; `None` if a call fails.
-    pub(super) fn value(&self, buffer: &[f64]) -> Option<Value> {
+    pub(super) fn value(&self, at: &Values) -> Option<Value> {
         Some(match self {
             Form::Fixed(v) => v.clone(),
-            Form::Num(at) => Value::Num(buffer[*at]),
-            Form::Array(at, n) => Value::Array(buffer[*at..at + n].into()),
+            Form::Num(i) => Value::Num(at.numbers[*i]),
+            Form::Array(i, n) => Value::Array(at.numbers[*i..i + n].into()),
             Form::List(all) => {
-                Value::from_elements(all.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?)
+                Value::from_elements(all.iter().map(|f| f.value(at)).collect::<Option<_>>()?)
             }
             Form::Record(all) => {
-                let fields = all.iter().map(|(name, f)| Some((Arc::clone(name), f.value(buffer)?)));
+                let fields = all.iter().map(|(name, f)| Some((Arc::clone(name), f.value(at)?)));
                 Value::Record(Arc::new(fields.collect::<Option<_>>()?))
             }
-            Form::Made(m) => call(&m.builtin, &m.args, buffer)?.1,
+            Form::Object(i, _) => at.objects[*i].clone(),
+            Form::Made(m) => call(&m.builtin, &m.args, at)?.1,
         })
     }
 
-    /// Writes a value of this form into the buffer; false if it has another form.
-    pub(super) fn write(&self, buffer: &mut [f64], value: &Value) -> bool {
+    /// Writes a value of this form to its place; false if it has another form.
+    pub(super) fn write(&self, to: &mut Values, value: &Value) -> bool {
         match (self, value) {
             (Form::Num(at), Value::Num(x)) => {
-                buffer[*at] = *x;
+                to.numbers[*at] = *x;
                 true
             }
             (Form::Array(at, n), Value::Array(xs)) if xs.len() == *n => {
-                buffer[*at..at + n].copy_from_slice(xs);
+                to.numbers[*at..at + n].copy_from_slice(xs);
                 true
             }
             (Form::List(all), Value::List(xs)) if xs.len() == all.len() => {
-                all.iter().zip(xs.iter()).all(|(f, x)| f.write(buffer, x))
+                all.iter().zip(xs.iter()).all(|(f, x)| f.write(to, x))
             }
             (Form::Record(all), Value::Record(r)) if r.len() == all.len() => all
                 .iter()
                 .zip(r.iter())
-                .all(|((name, f), (other, x))| name == other && f.write(buffer, x)),
+                .all(|((name, f), (other, x))| name == other && f.write(to, x)),
+            (Form::Object(i, _), x) => {
+                to.objects[*i] = x.clone();
+                true
+            }
             (Form::Fixed(v), x) => v.same(x),
             _ => false,
         }
@@ -139,7 +149,7 @@ impl Form {
                 builtin: m.builtin.clone(),
                 args: m.args.iter().map(|f| f.with_places(to)).collect(),
             })),
-            Form::Fixed(_) | Form::Array(..) => self.clone(),
+            Form::Fixed(_) | Form::Array(..) | Form::Object(..) => self.clone(),
         }
     }
 
@@ -158,79 +168,91 @@ impl Form {
     pub(super) fn each_number(&self, f: &mut impl FnMut(usize)) {
         match self {
             Form::Made(m) => m.args.iter().for_each(|a| a.each_number(f)),
+            Form::Object(_, at) => f(*at),
             Form::List(all) => all.iter().for_each(|one| one.each_number(f)),
             Form::Record(all) => all.iter().for_each(|(_, one)| one.each_number(f)),
             plain => plain.each_place(f),
         }
     }
 
-    /// Returns the adjoint of a value that is stored in the buffer.
-    pub(super) fn adjoint(&self, adjoints: &[f64]) -> Adjoint {
+    /// Takes the adjoint of a value that has a place.
+    pub(super) fn take_adjoint(&self, adjoints: &mut Adjoints) -> Adjoint {
         match self {
-            Form::Num(at) => Adjoint::Num(adjoints[*at]),
-            Form::Array(at, n) => Adjoint::Array(adjoints[*at..at + n].to_vec()),
-            Form::List(all) => Adjoint::List(all.iter().map(|f| f.adjoint(adjoints)).collect()),
+            Form::Num(at) => Adjoint::Num(adjoints.numbers[*at]),
+            Form::Array(at, n) => Adjoint::Array(adjoints.numbers[*at..at + n].to_vec()),
+            Form::List(all) => {
+                Adjoint::List(all.iter().map(|f| f.take_adjoint(adjoints)).collect())
+            }
             Form::Record(all) => Adjoint::Record(
-                all.iter().map(|(n, f)| (Arc::clone(n), f.adjoint(adjoints))).collect(),
+                all.iter().map(|(n, f)| (Arc::clone(n), f.take_adjoint(adjoints))).collect(),
             ),
+            Form::Object(i, _) => std::mem::take(&mut adjoints.objects[*i]),
             _ => Adjoint::Zero,
         }
     }
 
-    /// Adds an adjoint to those of the numbers that this is computed from; false if a
+    /// Adds an adjoint to those of the values that this is computed from; false if a
     /// derivative is not known.
-    pub(super) fn vjp(&self, by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
+    pub(super) fn vjp(&self, by: Adjoint, values: &Values, adjoints: &mut Adjoints) -> bool {
         if by.is_zero() || self.is_fixed() {
+            return true;
+        }
+        if let Form::Object(i, _) = self {
+            // Unknown parts matter only if the argument that they belong to moves.
+            adjoints.objects[*i].add(by);
             return true;
         }
         if by.is_unknown() {
             return false;
         }
         match self {
-            Form::Fixed(_) => true,
+            Form::Fixed(_) | Form::Object(..) => true,
             Form::Num(at) => {
-                adjoints[*at] += by.number();
+                adjoints.numbers[*at] += by.number();
                 true
             }
             Form::Array(at, n) => {
-                match by {
+                let own = &mut adjoints.numbers[*at..at + n];
+                match &by {
                     Adjoint::Array(gs) if gs.len() == *n => {
-                        adjoints[*at..at + n].iter_mut().zip(gs).for_each(|(a, g)| *a += g);
+                        own.iter_mut().zip(gs).for_each(|(a, g)| *a += g);
                     }
-                    _ => (0..*n).for_each(|i| adjoints[at + i] += by.element(i).number()),
+                    _ => {
+                        own.iter_mut().enumerate().for_each(|(i, a)| *a += by.element(i).number());
+                    }
                 }
                 true
             }
             Form::List(all) => {
-                all.iter().enumerate().all(|(i, f)| f.vjp(&by.element(i), buffer, adjoints))
+                all.iter().enumerate().all(|(i, f)| f.vjp(by.element(i), values, adjoints))
             }
             Form::Record(all) => {
-                all.iter().all(|(name, f)| f.vjp(&by.field(name), buffer, adjoints))
+                all.iter().all(|(name, f)| f.vjp(by.field(name), values, adjoints))
             }
-            Form::Made(m) => match call(&m.builtin, &m.args, buffer) {
-                Some((_, value)) => vjp_call(&m.builtin, &m.args, value, by, buffer, adjoints),
+            Form::Made(m) => match call(&m.builtin, &m.args, values) {
+                Some((_, value)) => vjp_call(&m.builtin, &m.args, value, &by, values, adjoints),
                 None => false,
             },
         }
     }
 
     /// Propagates the derivatives with respect to the parameters of a distribution, and
-    /// to a covariance among its arguments, to the numbers it is computed from.
+    /// to a covariance among its arguments, to the values it is computed from.
     pub(super) fn vjp_dist(
         &self,
         dist: &Dist,
         params: Vec<f64>,
         by_matrix: impl FnOnce(&Args) -> Option<Adjoint>,
-        buffer: &[f64],
-        adjoints: &mut [f64],
+        values: &Values,
+        adjoints: &mut Adjoints,
     ) -> bool {
         let Form::Made(m) = self else {
-            return self.vjp(&Adjoint::Array(params), buffer, adjoints);
+            return self.vjp(Adjoint::Array(params), values, adjoints);
         };
-        let values: Option<SmallVec<[Value; 4]>> = m.args.iter().map(|f| f.value(buffer)).collect();
-        let Some(values) = values else { return false };
-        let values: SmallVec<[&Value; 4]> = values.iter().collect();
-        let a = Args { builtin: &m.builtin, values: &values };
+        let args: Option<SmallVec<[Value; 4]>> = m.args.iter().map(|f| f.value(values)).collect();
+        let Some(args) = args else { return false };
+        let args: SmallVec<[&Value; 4]> = args.iter().collect();
+        let a = Args { builtin: &m.builtin, values: &args };
         let mut pulled = density::by_arguments(&a, dist, &params);
         if let Some(i) = density::matrix(dist, a.values)
             && let Some(p) = pulled.get_mut(i)
@@ -243,7 +265,7 @@ impl Form {
                 }
             }
         }
-        m.args.iter().zip(&pulled).all(|(f, by)| f.vjp(by, buffer, adjoints))
+        m.args.iter().zip(pulled).all(|(f, by)| f.vjp(by, values, adjoints))
     }
 }
 
@@ -251,10 +273,9 @@ impl Form {
 pub(super) fn call(
     builtin: &Builtin,
     args: &[Form],
-    buffer: &[f64],
+    at: &Values,
 ) -> Option<(SmallVec<[Value; 4]>, Value)> {
-    let values: SmallVec<[Value; 4]> =
-        args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
+    let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(at)).collect::<Option<_>>()?;
     let value = builtin.apply(&values.iter().collect::<SmallVec<[&Value; 4]>>()).ok()?;
     Some((values, value))
 }
@@ -264,12 +285,11 @@ pub(super) fn call(
 pub(super) fn call_from(
     builtin: &Builtin,
     args: &[Form],
-    buffer: &[f64],
+    at: &Values,
     before: &mut Option<Arc<PreviousEvaluation>>,
     keeps: bool,
 ) -> Option<Value> {
-    let values: SmallVec<[Value; 4]> =
-        args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
+    let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(at)).collect::<Option<_>>()?;
     let values: SmallVec<[&Value; 4]> = values.iter().collect();
     match builtin.resume(&values, before.as_deref().filter(|_| keeps)) {
         None => builtin.apply(&values).ok(),
@@ -286,10 +306,10 @@ pub(super) fn vjp_call(
     args: &[Form],
     value: Value,
     by: &Adjoint,
-    buffer: &[f64],
-    adjoints: &mut [f64],
+    at: &Values,
+    adjoints: &mut Adjoints,
 ) -> bool {
-    let values: Option<SmallVec<[Value; 4]>> = args.iter().map(|f| f.value(buffer)).collect();
+    let values: Option<SmallVec<[Value; 4]>> = args.iter().map(|f| f.value(at)).collect();
     let Some(values) = values else { return false };
     let refs: SmallVec<[&Value; 4]> = values.iter().collect();
     let a = Args { builtin, values: &refs };
@@ -303,5 +323,5 @@ pub(super) fn vjp_call(
             None => return false,
         },
     };
-    args.iter().zip(&pulled).all(|(f, by)| f.vjp(by, buffer, adjoints))
+    args.iter().zip(pulled).all(|(f, by)| f.vjp(by, at, adjoints))
 }

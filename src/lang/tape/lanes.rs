@@ -91,6 +91,11 @@ fn each_run(op: &Op, f: &mut dyn FnMut(usize, usize, bool)) {
             args.iter().for_each(|a| form(a, false, f));
             form(out, true, f);
         }
+        Op::Coloured { dist, noise, out, n, .. } => {
+            form(dist, false, f);
+            form(noise, false, f);
+            f(*out, *n, true);
+        }
         Op::Guard { form: g, .. } => form(g, false, f),
         Op::Density { x, params, out, n, .. } => {
             std::iter::once(x).chain(params).for_each(|c| column(c, *n, f));
@@ -195,10 +200,10 @@ impl Moved {
 /// Merges the operations of a tape.
 pub(super) fn merge(tape: &mut Tape) {
     let ops = std::mem::take(&mut tape.ops);
-    let groups = groups(&ops, tape.values.len());
+    let groups = groups(&ops, tape.values.numbers.len());
     let mut old: Vec<Option<Op>> = ops.into_iter().map(Some).collect();
     let mut merger = Merger {
-        values: &mut tape.values,
+        values: &mut tape.values.numbers,
         moved: FxHashMap::default(),
         ops: Vec::new(),
         scores: vec![Scored::Operation(0); old.len()],
@@ -221,7 +226,7 @@ const GAP: usize = 128;
 
 /// Returns the runs of numbers whose adjoints are used, and of few others.
 fn used(tape: &Tape) -> Vec<Range<usize>> {
-    let mut is_used = vec![false; tape.values.len()];
+    let mut is_used = vec![false; tape.values.numbers.len()];
     for op in &tape.ops {
         each_run(op, &mut |at, n, _| is_used[at..at + n].fill(true));
     }

@@ -19,6 +19,7 @@ mod log_sum_exp;
 mod op;
 mod sum_out;
 mod summed;
+mod values;
 
 pub use build::Builder;
 pub use form::Form;
@@ -26,12 +27,16 @@ pub use op::{ScoreSums, ScoreTerms, Scored};
 pub use sum_out::{Entry, Factor};
 
 use crate::dist::{Datum, Support};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::PreviousEvaluation;
 use crate::lang::value::Value;
 use crate::rng::Stream;
 use op::Op;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
+use std::sync::Arc;
 use summed::Summed;
+use values::{Adjoints, Values};
 
 /// An input of a tape: a value that is the image of unconstrained coordinates under its
 /// support.
@@ -45,8 +50,8 @@ struct Input {
 /// A recorded log density.
 #[derive(Debug, Default)]
 pub struct Tape {
-    values: Vec<f64>,
-    adjoints: Vec<f64>,
+    values: Values,
+    adjoints: Adjoints,
     inputs: Vec<Input>,
     ops: Vec<Op>,
     sums: ScoreSums,
@@ -59,6 +64,8 @@ pub struct Tape {
     power: Power,
     /// The runs of numbers that operations use; empty if they use all.
     used: Vec<Range<usize>>,
+    /// The coordinates at which it was last run; empty if they are not known.
+    last: Vec<f64>,
 }
 
 /// A power of the likelihood.
@@ -85,6 +92,7 @@ impl Tape {
         y: &mut Vec<f64>,
     ) -> bool {
         self.sums = ScoreSums::default();
+        self.last.clear();
         y.clear();
         for (i, input) in self.inputs.iter().enumerate() {
             let (x, from) = (value(i), y.len());
@@ -105,8 +113,13 @@ impl Tape {
     /// Runs it with the images of a point of unconstrained space as values of its inputs:
     /// as [`Tape::run_at_values`], with their coordinates in `here`.
     pub fn run_at_images(&mut self, y: &[f64], here: &mut Vec<f64>) -> bool {
-        self.sums = ScoreSums::default();
         here.clear();
+        if self.last == y && self.is_own_image(y) {
+            here.extend_from_slice(y);
+            return true;
+        }
+        self.sums = ScoreSums::default();
+        self.last.clear();
         let mut rest = y;
         for input in &self.inputs {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
@@ -115,7 +128,7 @@ impl Tape {
                 (Form::Num(at), [y]) => {
                     let x = input.support.from_free_scalar(*y).0;
                     let back = input.support.to_free_scalar(x);
-                    self.values[*at] = x;
+                    self.values.numbers[*at] = x;
                     here.push(back);
                     input.support.from_free_scalar(back).1
                 }
@@ -133,9 +146,39 @@ impl Tape {
         self.forward()
     }
 
+    /// Whether coordinates are those of their images, which they need not be to the last
+    /// bit.
+    fn is_own_image(&self, y: &[f64]) -> bool {
+        let (mut rest, mut back) = (y, Vec::new());
+        self.inputs.iter().all(|input| {
+            let (own, after) = rest.split_at(input.dimension.min(rest.len()));
+            rest = after;
+            match (&input.support, own) {
+                (Support::Real, _) => true,
+                (support, [y]) if matches!(input.form, Form::Num(_)) => {
+                    support.to_free_scalar(support.from_free_scalar(*y).0) == *y
+                }
+                (support, own) => {
+                    back.clear();
+                    support.to_free(&support.from_free(own).0, &mut back);
+                    back == own
+                }
+            }
+        })
+    }
+
     /// Runs it at a point of unconstrained space. False if it cannot evaluate the program
     /// there.
     pub fn run(&mut self, y: &[f64]) -> bool {
+        self.last.clear();
+        let there = self.run_there(y);
+        if there {
+            self.last.extend_from_slice(y);
+        }
+        there
+    }
+
+    fn run_there(&mut self, y: &[f64]) -> bool {
         self.sums = ScoreSums::default();
         let mut rest = y;
         for input in &self.inputs {
@@ -144,12 +187,12 @@ impl Tape {
             let jacobian = match (&input.form, own) {
                 (Form::Num(at), [y]) if matches!(input.support, Support::Real) => {
                     // Its Jacobian is 1: there is nothing to add.
-                    self.values[*at] = input.support.from_free_scalar(*y).0;
+                    self.values.numbers[*at] = input.support.from_free_scalar(*y).0;
                     continue;
                 }
                 (Form::Num(at), [y]) => {
                     let (x, jacobian) = input.support.from_free_scalar(*y);
-                    self.values[*at] = x;
+                    self.values.numbers[*at] = x;
                     jacobian
                 }
                 (form, own) => {
@@ -183,8 +226,8 @@ impl Tape {
     /// Returns the numbers of a form in the buffer at the last run; `None` for others.
     pub fn numbers(&self, form: &Form) -> Option<&[f64]> {
         match form {
-            Form::Num(at) => self.values.get(*at..*at + 1),
-            Form::Array(at, n) => self.values.get(*at..at + n),
+            Form::Num(at) => self.values.numbers.get(*at..*at + 1),
+            Form::Array(at, n) => self.values.numbers.get(*at..at + n),
             _ => None,
         }
     }
@@ -210,11 +253,11 @@ impl Tape {
     ) -> Option<ScoreTerms> {
         each.clear();
         match scored {
-            Scored::Operation(op) => self.ops.get(*op)?.terms(&self.values, each),
+            Scored::Operation(op) => self.ops.get(*op)?.terms(&self.values.numbers, each),
             Scored::Member(op, place, is_array) => {
                 let column = columns.entry(*op).or_insert_with(|| {
                     let mut column = Vec::new();
-                    self.ops.get(*op).and_then(|op| op.terms(&self.values, &mut column));
+                    self.ops.get(*op).and_then(|op| op.terms(&self.values.numbers, &mut column));
                     column
                 });
                 let term = column.get(*place).copied()?;
@@ -224,11 +267,22 @@ impl Tape {
                 each.push(term);
                 Some(ScoreTerms::Each)
             }
-            Scored::Numbers(at, false) => self.values.get(at.start).copied().map(ScoreTerms::One),
+            Scored::Numbers(at, false) => {
+                self.values.numbers.get(at.start).copied().map(ScoreTerms::One)
+            }
             Scored::Numbers(at, true) => {
-                each.extend_from_slice(self.values.get(at.clone())?);
+                each.extend_from_slice(self.values.numbers.get(at.clone())?);
                 Some(ScoreTerms::Each)
             }
+        }
+    }
+
+    /// Returns the evaluation of an incremental function in the last run, from which its
+    /// next one may start.
+    pub fn evaluation(&self, call: &Scored) -> Option<&Arc<PreviousEvaluation>> {
+        match call {
+            Scored::Operation(op) => self.ops.get(*op)?.evaluation(),
+            _ => None,
         }
     }
 
@@ -255,13 +309,15 @@ impl Tape {
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         out.clear();
         if self.used.is_empty() {
-            self.adjoints.fill(0.0);
+            self.adjoints.numbers.fill(0.0);
         }
-        self.used.iter().for_each(|run| self.adjoints[run.clone()].fill(0.0));
+        self.adjoints.objects.fill(Adjoint::Zero);
+        self.used.iter().for_each(|run| self.adjoints.numbers[run.clone()].fill(0.0));
         let (values, adjoints, scratch) = (&self.values, &mut self.adjoints, &mut self.scratch);
         if !self.ops.iter().rev().all(|op| op.reverse(values, adjoints, power, scratch)) {
             return false;
         }
+        let adjoints = &self.adjoints.numbers;
         let mut rest = y;
         for input in &self.inputs {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };

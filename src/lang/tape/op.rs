@@ -2,7 +2,9 @@
 
 use super::form::{Form, call_from, vjp_call};
 use super::log_sum_exp::LogSumExp;
-use crate::dist::{Batch, Dist};
+use super::values::{Adjoints, Values};
+use crate::dist::{Batch, Datum, Dist};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Binary, Builtin, PreviousEvaluation, Reduction, times};
 use crate::lang::density;
 use crate::lang::value::Value;
@@ -62,7 +64,7 @@ pub(super) enum Op {
     Matrix { rows: usize, x: usize, width: usize, out: usize, n: usize },
     /// Numbers gathered from anywhere into an array.
     Gather { from: Box<[usize]>, out: usize },
-    /// A call of any built-in whose result is stored in the buffer.
+    /// A call of any built-in whose result has a place.
     Call {
         builtin: Builtin,
         args: Box<[Form]>,
@@ -70,6 +72,8 @@ pub(super) enum Op {
         before: Option<Arc<PreviousEvaluation>>,
         keeps: bool,
     },
+    /// The value of a choice that is stored as white noise.
+    Coloured { dist: Form, noise: Form, out: usize, n: usize, last: Option<Dist> },
     /// A value that must be the same as when the tape was recorded.
     Guard { form: Form, value: Value },
     /// The log densities of numbers: added to the sums of scores, or numbers in the buffer.
@@ -102,7 +106,8 @@ pub(super) enum Op {
 
 impl Op {
     /// Runs it; false if the tape cannot evaluate the program here.
-    pub fn forward(&mut self, v: &mut [f64], sums: &mut ScoreSums, power: f64) -> bool {
+    pub fn forward(&mut self, values: &mut Values, sums: &mut ScoreSums, power: f64) -> bool {
+        let v = &mut values.numbers[..];
         match self {
             Op::Unary { f, x, out, n, .. } => {
                 let (before, y) = v.split_at_mut(*out);
@@ -132,18 +137,33 @@ impl Op {
                 true
             }
             Op::Call { builtin, args, out, before, keeps } => {
-                match call_from(builtin, args, v, before, *keeps) {
-                    Some(value) => out.write(v, &value),
+                match call_from(builtin, args, values, before, *keeps) {
+                    Some(value) => out.write(values, &value),
                     None => false,
                 }
             }
-            Op::Guard { form, value } => form.value(v).is_some_and(|now| now.same(value)),
+            Op::Coloured { dist, noise, out, n, last } => {
+                let Some(Value::Dist(d)) = dist.value(values) else { return false };
+                let Some(z) = noise.value(values).and_then(|z| z.to_datum()) else { return false };
+                let there = match d.from_noncentred(&z) {
+                    Datum::Vec(x) if x.len() == *n => {
+                        values.numbers[*out..*out + *n].copy_from_slice(&x);
+                        true
+                    }
+                    _ => false,
+                };
+                *last = Some(Dist::clone(&d));
+                there
+            }
+            Op::Guard { form, value } => form.value(values).is_some_and(|now| now.same(value)),
             Op::Density { batch, x, params, n, observed, out, .. } => match out {
                 Some(out) => batch.score_each(v, *x, params, *n, *out),
                 None => batch.score(v, *x, params, *n, sums.of(*observed)),
             },
             Op::Score { dist, x, observed, out, last } => {
-                let (Some(dist), Some(x)) = (dist.value(v), x.value(v)) else { return false };
+                let (Some(dist), Some(x)) = (dist.value(values), x.value(values)) else {
+                    return false;
+                };
                 let Some(found) = score(&dist, &x, *observed) else { return false };
                 let mut own = ExactSum::default();
                 let sum = if out.is_some() { &mut own } else { sums.of(*observed) };
@@ -152,7 +172,7 @@ impl Op {
                     density::Score::Sum(scores) => sum.merge(scores),
                 }
                 if let Some(out) = out {
-                    v[*out] = own.value();
+                    values.numbers[*out] = own.value();
                 }
                 *last = Some((dist, found));
                 true
@@ -170,7 +190,14 @@ impl Op {
     }
 
     /// Propagates adjoints backwards; false if a derivative is not known.
-    pub fn reverse(&self, v: &[f64], g: &mut [f64], power: f64, scratch: &mut Vec<f64>) -> bool {
+    pub fn reverse(
+        &self,
+        values: &Values,
+        adjoints: &mut Adjoints,
+        power: f64,
+        scratch: &mut Vec<f64>,
+    ) -> bool {
+        let (v, g) = (&values.numbers[..], &mut adjoints.numbers[..]);
         let weight = |observed: bool| if observed { power } else { 1.0 };
         match self {
             Op::Unary { slope, x, out, n, .. } => {
@@ -207,8 +234,16 @@ impl Op {
                 true
             }
             Op::Call { builtin, args, out, .. } => {
-                let by = out.adjoint(g);
-                out.value(v).is_some_and(|value| vjp_call(builtin, args, value, &by, v, g))
+                let by = out.take_adjoint(adjoints);
+                by.is_zero()
+                    || out
+                        .value(values)
+                        .is_some_and(|value| vjp_call(builtin, args, value, &by, values, adjoints))
+            }
+            Op::Coloured { dist, noise, out, n, last } => {
+                let Some(d) = last else { return false };
+                let by = g[*out..*out + *n].to_vec();
+                vjp_coloured((dist, d), noise, by, values, adjoints).unwrap_or(false)
             }
             Op::Guard { .. } => true,
             Op::Density { batch, x, params, n, observed, out, .. } => {
@@ -222,7 +257,8 @@ impl Op {
                 let Some((made, _)) = last else { return false };
                 let weight = out.map_or(weight(*observed), |out| g[out]);
                 weight == 0.0
-                    || vjp_score((dist, made), x, *observed, v, g, weight).unwrap_or(false)
+                    || vjp_score((dist, made), x, *observed, values, adjoints, weight)
+                        .unwrap_or(false)
             }
             Op::Factor { x } => {
                 g[*x] += power;
@@ -241,6 +277,14 @@ impl Op {
 }
 
 impl Op {
+    /// Returns the last evaluation of an incremental function.
+    pub fn evaluation(&self) -> Option<&Arc<PreviousEvaluation>> {
+        match self {
+            Op::Call { before, .. } => before.as_ref(),
+            _ => None,
+        }
+    }
+
     /// Returns the terms that it added to the sums in the last run, and appends them to
     /// `each` if they are separate; `None` if it added none.
     pub fn terms(&self, v: &[f64], each: &mut Vec<f64>) -> Option<ScoreTerms> {
@@ -305,17 +349,23 @@ fn vjp_score(
     (dist, made): (&Form, &Value),
     x: &Form,
     observed: bool,
-    v: &[f64],
-    g: &mut [f64],
+    at: &Values,
+    adjoints: &mut Adjoints,
     weight: f64,
 ) -> Option<bool> {
-    let value = x.value(v)?;
+    let value = x.value(at)?;
     if let Value::Likelihood(l) = made {
         let mut by = l.gradient(&value)?;
         by.scale(weight);
-        return Some(dist.vjp(&by, v, g));
+        return Some(dist.vjp(by, at, adjoints));
     }
     let Value::Dist(d) = made else { return None };
+    if !observed && d.is_stored_whitened() {
+        // White noise has a density of its own.
+        let mut by = Adjoint::Array(d.gradient_stored(&value.to_datum()?)?.x);
+        by.scale(weight);
+        return Some(x.vjp(by, at, adjoints));
+    }
     let (mut by_x, mut params) = density::gradient(d, &value)?;
     by_x.scale(weight);
     params.iter_mut().for_each(|p| *p *= weight);
@@ -328,5 +378,27 @@ fn vjp_score(
         by.scale(weight);
         Some(by)
     };
-    Some(x.vjp(&by_x, v, g) && dist.vjp_dist(d, params, by_matrix, v, g))
+    Some(x.vjp(by_x, at, adjoints) && dist.vjp_dist(d, params, by_matrix, at, adjoints))
+}
+
+/// Propagates the adjoint of a value stored as white noise to the noise and to the
+/// parameters: value = mean + L noise.
+fn vjp_coloured(
+    (dist, d): (&Form, &Dist),
+    noise: &Form,
+    by: Vec<f64>,
+    at: &Values,
+    adjoints: &mut Adjoints,
+) -> Option<bool> {
+    let by_noise = Adjoint::Array(d.from_noncentred_vjp(&by)?);
+    if !noise.vjp(by_noise, at, adjoints) {
+        return Some(false);
+    }
+    if dist.is_fixed() {
+        return Some(true);
+    }
+    let stored = noise.value(at)?.to_datum()?;
+    let by_factor = density::by_factor(d, &stored, &by);
+    let by_matrix = |a: &crate::lang::builtins::Args| density::by_matrix(a, d, &by_factor?);
+    Some(dist.vjp_dist(d, by, by_matrix, at, adjoints))
 }

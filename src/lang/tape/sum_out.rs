@@ -142,7 +142,7 @@ impl Builder {
         for (x, observed) in entry.fixed.into_iter().zip([false, true]) {
             if x != 0.0 {
                 let at = self.reserve(1);
-                self.values[at] = x;
+                self.values.numbers[at] = x;
                 terms.push(Term { column: Column { at, step: 0, live: false }, observed });
             }
         }

@@ -448,6 +448,15 @@ impl Graph {
         }
     }
 
+    /// Returns the stored form of a choice as a value of the language.
+    pub(crate) fn stored_value(&self, n: NodeId) -> Value {
+        let node = &self.nodes[n as usize];
+        match node.side.as_deref() {
+            Some(Side::Choice(ChoiceSide { stored: Some(s), .. })) => Value::from_datum(s),
+            _ => node.value.clone(),
+        }
+    }
+
     pub(crate) fn is_whitened(&self, n: NodeId) -> bool {
         matches!(
             self.nodes[n as usize].side.as_deref(),

@@ -23,6 +23,8 @@ pub(in crate::trace) type Given = SmallVec<[(u32, u32); 2]>;
 #[derive(Debug, Default)]
 pub(in crate::trace) struct InPlace {
     values: Vec<(Given, NodeId, Form)>,
+    /// What else of a node moves.
+    besides: Vec<(Given, NodeId, Besides)>,
     /// Nodes that contribute to the score, and where their terms are on the tape.
     scores: Vec<(Given, NodeId, Scored)>,
     each: Vec<f64>,
@@ -30,29 +32,45 @@ pub(in crate::trace) struct InPlace {
     columns: FxHashMap<usize, Vec<f64>>,
 }
 
+/// What a node keeps besides its value, and where that is on a tape.
+#[derive(Clone, Debug)]
+pub(in crate::trace) enum Besides {
+    Nothing,
+    /// The last evaluation of an incremental function.
+    Evaluation(Scored),
+    /// The white noise that a choice is stored as.
+    Noise(Form),
+}
+
 impl InPlace {
-    /// Adds the value of a node whose inputs move; false if the node keeps anything else
-    /// that moves.
+    /// Adds the value of a node whose inputs move, and what moves besides it; false if the
+    /// node keeps anything else that moves.
     pub fn add_value(
         &mut self,
         (graph, code): (&Graph, &Code),
         n: NodeId,
         given: Given,
         form: Form,
+        besides: Besides,
         is_fixed: impl Fn(FrameId, Operand) -> bool,
     ) -> bool {
         let node = &graph.nodes[n as usize];
         let op = graph.op(code, n);
         let fits = match node.side.as_deref() {
             None | Some(Side::Deps(_) | Side::Child(_) | Side::MemoCall(_)) => true,
-            Some(Side::Choice(c)) => c.stored.is_none(),
+            // Noise that is not given stays.
+            Some(Side::Choice(_)) => true,
             Some(Side::Total(_)) => matches!(op, Op::Observe { .. }),
             Some(Side::Loop(_)) => match op {
                 Op::Map { over, .. } | Op::Fold { over, .. } => is_fixed(node.frame, *over),
                 _ => false,
             },
-            Some(Side::Kept(_) | Side::Table(_) | Side::Memo(_)) => false,
+            Some(Side::Kept(_)) => matches!(besides, Besides::Evaluation(_)),
+            Some(Side::Table(_) | Side::Memo(_)) => false,
         };
+        if fits && !matches!(besides, Besides::Nothing) {
+            self.besides.push((given.clone(), n, besides));
+        }
         if fits && !form.is_fixed() {
             self.values.push((given, n, form));
         }
@@ -68,6 +86,11 @@ impl InPlace {
     pub fn on(mut self, tape: &Tape) -> InPlace {
         self.values.iter_mut().for_each(|(_, _, form)| *form = tape.place_of(form));
         self.scores.iter_mut().for_each(|(_, _, at)| *at = tape.place_of_score(at));
+        self.besides.iter_mut().for_each(|(_, _, besides)| match besides {
+            Besides::Evaluation(call) => *call = tape.place_of_score(call),
+            Besides::Noise(form) => *form = tape.place_of(form),
+            Besides::Nothing => {}
+        });
         self
     }
 
@@ -124,6 +147,22 @@ impl InPlace {
                 (Some([x]), Form::Num(_)) => *value = Value::Num(*x),
                 (Some(xs), _) => put(value, xs),
                 (None, _) => *value = made.next().unwrap_or_default(),
+            }
+        }
+        for (given, n, besides) in &self.besides {
+            if !holds(graph, given, *n, values) {
+                continue;
+            }
+            match (graph.nodes[*n as usize].side.as_deref_mut(), besides) {
+                (Some(Side::Kept(kept)), Besides::Evaluation(call)) => {
+                    if let Some(evaluation) = tape.evaluation(call) {
+                        kept.before = Arc::clone(evaluation);
+                    }
+                }
+                (Some(Side::Choice(c)), Besides::Noise(form)) => {
+                    c.stored = tape.value(form).and_then(|noise| noise.to_datum());
+                }
+                _ => {}
             }
         }
         let (mut old, mut new) = (ScoreSums::default(), ScoreSums::default());

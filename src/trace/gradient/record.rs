@@ -6,7 +6,7 @@
 //! depends on something that moves, the tape has a guard that detects a change, or there
 //! is no tape at all. Nothing is evaluated, and the trace does not change.
 
-use super::in_place::{Given, InPlace};
+use super::in_place::{Besides, Given, InPlace};
 use super::{Inputs, Reverse};
 use crate::dist::Dist;
 use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
@@ -17,6 +17,7 @@ use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::sync::Arc;
 
 impl Graph {
     /// Returns the nodes that an update of these choices may run.
@@ -116,13 +117,15 @@ impl Graph {
             scores,
             moving: Vec::new(),
             scored: Vec::new(),
+            evaluations: FxHashMap::default(),
+            noise: FxHashMap::default(),
         }
     }
 }
 
 /// What has been recorded so far.
 pub(in crate::trace) struct Recorded {
-    /// The values of the choices that move.
+    /// The choices that move: their values, or the noise that is stored.
     placed: FxHashMap<NodeId, Form>,
     /// The forms of the nodes recorded so far.
     pub forms: FxHashMap<NodeId, Form>,
@@ -156,19 +159,20 @@ pub(in crate::trace) struct Recorder<'a> {
     moving: Vec<NodeId>,
     /// Where the scores are that have been recorded.
     scored: Vec<(NodeId, Scored)>,
+    /// Where the evaluations of incremental functions are, and the noise of choices that
+    /// are stored as such.
+    evaluations: FxHashMap<NodeId, Scored>,
+    noise: FxHashMap<NodeId, Form>,
 }
 
 impl Recorder<'_> {
     fn place(&mut self, t: Target) -> Option<()> {
         let (graph, code) = (self.view.graph, self.view.code);
         let dist = graph.dist_of(code, t.node)?;
-        if dist.is_stored_whitened() || graph.is_whitened(t.node) {
-            return None;
-        }
         let whole = match self.recorded.placed.get(&t.node) {
             Some(form) => form.clone(),
             None => {
-                let form = self.recorded.tape.place(&graph.nodes[t.node as usize].value)?;
+                let form = self.recorded.tape.place(&graph.stored_value(t.node))?;
                 self.recorded.placed.insert(t.node, form.clone());
                 form
             }
@@ -223,11 +227,20 @@ impl Recorder<'_> {
             let Some(given) = given(*n) else { return false };
             let of = (self.view.graph, self.view.code);
             !known.insert((*n, given.clone()))
-                || in_place.add_value(of, *n, given, self.form(*n), is_fixed)
+                || in_place.add_value(of, *n, given, self.form(*n), self.besides(*n), is_fixed)
         });
         self.moving.clear();
         self.recorded.known = known;
         self.recorded.in_place = fits.then_some(in_place);
+    }
+
+    /// What else of a node moves than its value.
+    fn besides(&self, n: NodeId) -> Besides {
+        match (self.evaluations.get(&n), self.noise.get(&n)) {
+            (Some(call), _) => Besides::Evaluation(call.clone()),
+            (_, Some(noise)) => Besides::Noise(noise.clone()),
+            _ => Besides::Nothing,
+        }
     }
 
     /// Does the same with the scores recorded since the last call, which are these for
@@ -311,10 +324,7 @@ impl Recorder<'_> {
             Op::Prim { builtin, args } => {
                 let args = self.operands(frame, args);
                 let form = self.recorded.tape.call(code.builtins.get(*builtin), args, &now)?;
-                let has_place = !matches!(form, Form::Fixed(_) | Form::Made(_));
-                if let Some(before) = graph.kept(n).filter(|_| has_place) {
-                    self.recorded.tape.start_from(before);
-                }
+                self.start_from_kept(n, &form);
                 Some(form)
             }
             Op::Array(items) => {
@@ -365,7 +375,9 @@ impl Recorder<'_> {
                     None => Form::Fixed(Value::Unit),
                 };
                 let args = order.iter().map(argument).collect();
-                self.recorded.tape.call(builtin, args, &now)
+                let form = self.recorded.tape.call(builtin, args, &now)?;
+                self.start_from_kept(n, &form);
+                Some(form)
             }
             Op::Call { .. } => self.record_call(n),
             Op::If { cond, .. } => {
@@ -429,6 +441,18 @@ impl Recorder<'_> {
         }
     }
 
+    /// Lets the call of an incremental function start from its evaluation in the trace.
+    fn start_from_kept(&mut self, n: NodeId, form: &Form) {
+        if matches!(form, Form::Fixed(_) | Form::Made(_)) {
+            return;
+        }
+        if let Some(before) = self.view.graph.kept(n)
+            && let Some(call) = self.recorded.tape.start_from(before)
+        {
+            self.evaluations.insert(n, call);
+        }
+    }
+
     fn guard(&mut self, frame: FrameId, o: Operand) -> Option<()> {
         let form = self.operand(frame, o);
         self.recorded.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
@@ -454,8 +478,9 @@ impl Recorder<'_> {
         let (graph, code) = (self.view.graph, self.view.code);
         let frame = graph.nodes[n as usize].frame;
         let dist = graph.dist_of(code, n)?;
-        // White noise is scored itself, and the value moves with the parameters.
-        if dist.is_stored_whitened() || !self.operands(frame, keys).iter().all(Form::is_fixed) {
+        if dist.is_stored_whitened() != graph.is_whitened(n)
+            || !self.operands(frame, keys).iter().all(Form::is_fixed)
+        {
             return None;
         }
         let params = self.operands(frame, spec.operands());
@@ -466,12 +491,33 @@ impl Recorder<'_> {
         }
         let x = match self.recorded.placed.get(&n) {
             Some(form) => form.clone(),
-            None => Form::Fixed(graph.nodes[n as usize].value.clone()),
+            None => Form::Fixed(graph.stored_value(n)),
         };
-        if self.scores {
-            self.record_score(n, spec, &x, false)?;
+        if !dist.is_stored_whitened() {
+            if self.scores {
+                self.record_score(n, spec, &x, false)?;
+            }
+            return Some(x);
         }
-        Some(x)
+        // White noise is scored itself, whatever the parameters; the value moves with them.
+        let now = Value::Dist(Arc::new(dist.clone()));
+        if self.scores {
+            let mark = self.recorded.tape.mark();
+            self.recorded.tape.distribution(&Form::Fixed(now.clone()), &now, &x, false)?;
+            self.note_score(n, mark);
+        }
+        let made = match spec {
+            DistSpec::Value(o) => self.operand(frame, *o),
+            DistSpec::Family { builtin, args } => {
+                let args = self.operands(frame, args);
+                Builder::made_dist(code.builtins.get(*builtin), args, &dist)
+            }
+        };
+        let value = self.recorded.tape.coloured(made, &dist, &x)?;
+        if self.recorded.placed.contains_key(&n) {
+            self.noise.insert(n, x);
+        }
+        Some(value)
     }
 
     fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {

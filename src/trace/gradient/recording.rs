@@ -24,6 +24,8 @@ pub struct Recording {
     revision: u64,
     /// The sums of scores in the state to which densities are relative.
     start: ScoreSums,
+    /// The coordinates of that state, if the tape was last run there.
+    here: Option<Vec<f64>>,
     summed: SummedChoices,
 }
 
@@ -74,6 +76,7 @@ impl Recording {
             identity: Arc::clone(&trace.identity),
             revision: trace.graph.revision,
             start: ScoreSums::default(),
+            here: None,
             summed,
         }
     }
@@ -101,6 +104,7 @@ impl Recording {
         if self.summed.sites.is_empty() {
             return true;
         }
+        self.here = None;
         if !self.tape.run(y) {
             return false;
         }
@@ -123,11 +127,15 @@ impl Recording {
     /// returns its coordinates in `y`. False if the recording does not cover that state,
     /// because a guarded condition has changed.
     pub fn begin(&mut self, trace: &Trace, y: &mut Vec<f64>) -> bool {
+        if let Some(here) = self.here.as_ref().filter(|_| self.holds(trace)) {
+            y.clone_from(here);
+            return true;
+        }
         let targets = &self.targets;
         let now = |i: usize| {
             let t = targets[i];
-            match (&trace.graph.nodes[t.node as usize].value, t.element) {
-                (v, NONE) => v.clone(),
+            match (trace.graph.stored_value(t.node), t.element) {
+                (v, NONE) => v,
                 (v, i) => v.element(i as usize).unwrap_or_default(),
             }
         };
@@ -139,6 +147,7 @@ impl Recording {
     /// Returns the weight of a proposal of these coordinates; `None` if only an actual
     /// proposal can give it.
     pub fn weigh(&mut self, y: &[f64]) -> Option<Weight> {
+        self.here = None;
         if !self.tape.run(y) {
             return None;
         }
@@ -167,6 +176,7 @@ impl Recording {
     /// only a proposal can do that.
     pub fn move_to(&mut self, trace: &mut Trace, y: &[f64], here: &mut Vec<f64>) -> bool {
         trace.rollback();
+        self.here = None;
         let Some(in_place) = &mut self.in_place else { return false };
         let moved = self.tape.run_at_images(y, here)
             && in_place.fits(&trace.graph, &trace.code, &self.tape, &[]);
@@ -174,6 +184,7 @@ impl Recording {
             in_place.apply(&mut trace.graph, &trace.code, &self.tape, &[], Some(&self.start));
             self.start.clone_from(self.tape.sums());
             self.revision = trace.graph.revision;
+            self.here = Some(here.clone());
         }
         moved
     }
@@ -191,6 +202,7 @@ impl Recording {
         draws: Draws,
     ) -> bool {
         trace.rollback();
+        self.here = None;
         let there = match y {
             Some(y) => self.tape.run_at_images(y, here),
             None => self.begin(trace, here),
@@ -222,6 +234,7 @@ impl Recording {
         }
         trace.commit();
         self.revision = trace.graph.revision;
+        self.here = Some(here.clone());
         true
     }
 

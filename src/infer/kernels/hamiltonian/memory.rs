@@ -92,6 +92,8 @@ pub(super) struct Memory {
     /// Where the trace is, with the force there, if a step of this tape led there; and the
     /// power of the likelihood for which the force is.
     here: Option<(Arc<Point>, f64)>,
+    /// The coordinates at which the last step ended in place.
+    ended: Vec<f64>,
     changes: Vec<(Target, Change)>,
     points: Vec<Arc<Point>>,
     lists: Vec<Arc<Vec<f64>>>,
@@ -210,8 +212,8 @@ impl Memory {
 
     /// Moves the trace to a point in place, without a proposal. False, with the trace
     /// unchanged, if only a proposal can do that.
-    pub fn move_to(&mut self, trace: &mut Trace, to: &Point, power: f64) -> bool {
-        self.end_in_place(Some(power), |tape, here| tape.move_to(trace, &to.y, here))
+    pub fn move_to(&mut self, trace: &mut Trace, to: &Point) -> bool {
+        self.end_in_place(true, |tape, here| tape.move_to(trace, &to.y, here))
     }
 
     /// Draws the choices that are summed out at a point, or where the trace is, and moves the
@@ -226,35 +228,22 @@ impl Memory {
     ) -> bool {
         let y = to.map(|to| &to.y[..]);
         let draws = at.draws(0);
-        self.end_in_place(y.map(|_| at.power), |tape, here| {
+        self.end_in_place(y.is_some(), |tape, here| {
             tape.draw_and_move_to(trace, y, here, rng, draws)
         })
     }
 
-    /// Ends a step in place by `go`, which tells whether it could, and where the trace then
-    /// is. If the step moves, it gives the power for which the force there is kept.
+    /// Ends a step in place by `go`, which tells whether it could. The force where the trace
+    /// then is is computed when the next step begins there, if one does.
     fn end_in_place(
         &mut self,
-        moves: Option<f64>,
+        moves: bool,
         go: impl FnOnce(&mut Recording, &mut Vec<f64>) -> bool,
     ) -> bool {
-        if moves.is_some() {
+        if moves {
             self.here = None;
         }
-        let mut here = self.point();
-        let (Some(point), Some((tape, _))) = (Arc::get_mut(&mut here), &mut self.tape) else {
-            return false;
-        };
-        point.log_density = 0.0;
-        let done = go(tape, &mut point.y);
-        if let Some(power) = moves
-            && done
-            && tape.gradient(&point.y, power, &mut point.gradient)
-        {
-            self.here = Some((Arc::clone(&here), power));
-        }
-        self.keep(&here);
-        done
+        self.tape.as_mut().is_some_and(|(tape, _)| go(tape, &mut self.ended))
     }
 
     /// Updates the tape after a commit of these choices.
