@@ -1,7 +1,7 @@
 //! Measures a log density with its gradient, the main cost of a leapfrog step: by a
 //! proposal and a reverse pass through the trace, and by a tape.
 //!
-//!     cargo run --release --example leapfrog_cost
+//!     cargo run --release --example leapfrog_cost [-- PART_OF_A_NAME]
 //!
 //! Prints processor microseconds for each.
 
@@ -71,7 +71,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     models.push(("a body with joints", body(true)?));
     models.push(("… with depths and a mask", body(false)?));
     println!("{:<28} {:>12} {:>12} {:>8}", "", "by trace, us", "by tape, us", "ratio");
+    let only = std::env::args().nth(1);
     for (name, model) in models {
+        if only.as_ref().is_some_and(|only| !name.contains(only.as_str())) {
+            continue;
+        }
         let mut trace: Trace = model.simulate(1, 0)?;
         let continuous = |t: &Target| trace.free(*t).is_some_and(|(y, _)| !y.is_empty());
         let targets: Vec<Target> = trace.all_targets().iter().copied().filter(continuous).collect();

@@ -17,7 +17,7 @@ use crate::lang::value::{Likelihood, Located, Value};
 use crate::render::{Camera, View};
 use crate::rng::Stream;
 use crate::vision::keypoints::{
-    Detection, KeypointLikelihood, KeypointOptions, Keypoints, Unit, matching,
+    Detection, DetectionConstants, KeypointLikelihood, KeypointOptions, Keypoints, Unit, matching,
 };
 use glam::DVec3;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -157,6 +157,7 @@ struct Matched {
 struct MatchedTerm {
     model: Arc<KeypointLikelihood>,
     seen: Detection,
+    constants: DetectionConstants,
     landmark: usize,
     point: usize,
 }
@@ -215,7 +216,9 @@ impl Likelihood for KeypointsOf {
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let mut sum = 0.0;
-        self.each(observed, |term| sum += term.model.log_density(term.seen, term.joint))?;
+        self.each(observed, |term| {
+            sum += term.model.log_density_with(term.constants, term.seen, term.joint)
+        })?;
         Ok(sum)
     }
 
@@ -278,7 +281,7 @@ impl Likelihood for KeypointsOf {
         let mut all = vec![DVec3::ZERO; landmarks.len()];
         let add = |term: Term| {
             let Some(joint) = term.joint else { return };
-            let by = term.model.gradient(term.seen, joint);
+            let by = term.model.gradient_with(term.constants, term.seen, joint);
             let by = [by[0] * term.scale[0], by[1] * term.scale[1]];
             all[term.landmark] += camera.vjp_point(landmarks[term.landmark].position, by);
         };
@@ -291,6 +294,7 @@ impl Likelihood for KeypointsOf {
 struct Term<'a> {
     model: &'a KeypointLikelihood,
     seen: &'a Detection,
+    constants: &'a DetectionConstants,
     landmark: usize,
     /// The index of the detection.
     point: usize,
@@ -312,11 +316,12 @@ impl KeypointsOf {
         let size = matched.size;
         let whole = (f64::from(size.0), f64::from(size.1));
         let scale = [whole.0 / f64::from(camera.width), whole.1 / f64::from(camera.height)];
-        for MatchedTerm { model, seen, landmark, point } in &matched.terms {
+        for MatchedTerm { model, seen, constants, landmark, point } in &matched.terms {
             let Some(l) = landmarks.get(*landmark) else { continue };
             f(Term {
                 model,
                 seen,
+                constants,
                 landmark: *landmark,
                 point: *point,
                 joint: project(l, camera, size),
@@ -392,7 +397,8 @@ impl KeypointsOf {
             let own = self.model.by_joint.iter().find(|(name, _)| *name == p.name);
             let own = own.map(|(_, sd)| model(*sd)).transpose()?;
             let model = own.unwrap_or_else(|| Arc::clone(&usual));
-            terms.push(MatchedTerm { model, seen: detection, landmark, point });
+            let constants = model.constants(&detection);
+            terms.push(MatchedTerm { model, seen: detection, constants, landmark, point });
         }
         Ok(terms)
     }

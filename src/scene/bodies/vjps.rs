@@ -17,11 +17,12 @@ use std::sync::Arc;
 /// rotation vectors.
 pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let body = armature(a).ok()?;
-    let by = BySolid::read(by, &posed.downcast::<SolidValue>()?.0);
+    let solid = &posed.downcast::<SolidValue>()?.0;
+    let by = BySolid::read(by, solid);
     let vertices = if by.vertices.is_empty() { Vec::new() } else { body.vjp_parts(&by.vertices) };
     let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool_or(3, false).ok()? };
     let pose = pose(a, body).ok()?;
-    if let Some(g) = body.vjp_posed(&pose, &rules, &by.landmarks, &vertices).ok()? {
+    if let Some(g) = body.vjp_posed(&pose, &rules, &by.landmarks, &vertices, solid.joints()).ok()? {
         let turned = |turn: DVec3| JointGradient { turn, ..JointGradient::default() };
         let by_pose = by_pose(a, body, &g.turns.into_iter().map(turned).collect::<Vec<_>>())?;
         return Some(smallvec![armature_adjoint(&g.rest), by_pose]);

@@ -232,7 +232,7 @@ impl<T: Real> M3<T> {
             (1.0 - q / 6.0, -1.0 / 6.0 + q / 60.0, 0.5 - q / 24.0, -1.0 / 24.0 + q / 360.0)
         } else {
             let a = q.sqrt();
-            let (sin, cos) = (libm::sin(a), libm::cos(a));
+            let (sin, cos) = libm::sincos(a);
             let (s, c) = (sin / a, (1.0 - cos) / q);
             (s, 0.5 * (cos - s) / q, c, 0.5 * (s - 2.0 * c) / q)
         };

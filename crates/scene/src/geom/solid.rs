@@ -11,7 +11,7 @@ use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::posed_skin::PosedSkin;
 use super::revolution::Revolution;
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
-use glam::{DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::{Arc, LazyLock, Weak};
@@ -60,6 +60,8 @@ pub struct Solid {
     lazy_depth: u32,
     /// The surface that its only mesh stands for.
     revolution: Option<PlacedRevolution>,
+    /// The transforms of the joints of a body in a pose.
+    joints: Option<Arc<[DAffine3]>>,
 }
 
 /// A placed surface of revolution.
@@ -198,6 +200,7 @@ impl Solid {
             landmarks: ready(Arc::default()),
             lazy_depth: 0,
             revolution: None,
+            joints: None,
         }
     }
 
@@ -234,9 +237,28 @@ impl Solid {
         Solid { landmarks: later(move || unique(make())), ..self }
     }
 
+    /// As [`Solid::with_landmarks_of`], with landmarks whose names all differ.
+    #[must_use]
+    pub(super) fn with_distinct_landmarks_of(
+        self,
+        make: impl FnOnce() -> Arc<[Landmark]> + Send + 'static,
+    ) -> Solid {
+        Solid { landmarks: later(make), ..self }
+    }
+
     /// The landmarks, in world coordinates.
     pub fn landmarks(&self) -> &[Landmark] {
         &self.landmarks
+    }
+
+    /// Notes the transforms of the joints of the body that this is.
+    pub(super) fn with_joints(self, joints: Arc<[DAffine3]>) -> Solid {
+        Solid { joints: Some(joints), ..self }
+    }
+
+    /// The transforms of the joints, if this is a body in a pose that has not been placed.
+    pub fn joints(&self) -> Option<&[DAffine3]> {
+        self.joints.as_deref()
     }
 
     /// A solid of placed meshes that are computed on first use, which saves the work if
@@ -247,7 +269,7 @@ impl Solid {
     {
         let instances = Meshes(later(move || make().into_iter().collect()));
         let landmarks = ready(Arc::default());
-        Solid { instances, group: None, landmarks, lazy_depth: 1, revolution: None }
+        Solid { instances, group: None, landmarks, lazy_depth: 1, revolution: None, joints: None }
     }
 
     /// The placed meshes.
@@ -270,7 +292,8 @@ impl Solid {
             .as_ref()
             .map(|r| PlacedRevolution { surface: Arc::clone(&r.surface), affine: by * r.affine });
         let lazy_depth = self.lazy_depth + 1;
-        Solid { instances, group: None, landmarks, lazy_depth, revolution }.forced_if_deep()
+        Solid { instances, group: None, landmarks, lazy_depth, revolution, joints: None }
+            .forced_if_deep()
     }
 
     /// Computes the lists now if they are nested too deeply.
@@ -315,8 +338,15 @@ impl Solid {
         let landmarks =
             later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
         let lazy_depth = solids.iter().map(|s| s.lazy_depth).max().unwrap_or(0) + 1;
-        Solid { instances, group: Some(group), landmarks, lazy_depth, revolution: None }
-            .forced_if_deep()
+        Solid {
+            instances,
+            group: Some(group),
+            landmarks,
+            lazy_depth,
+            revolution: None,
+            joints: None,
+        }
+        .forced_if_deep()
     }
 
     /// The number of meshes.

@@ -53,6 +53,9 @@ impl Rig {
         pose: &[JointPose],
         rules: &Rules,
     ) -> Result<Vec<DAffine3>, GeomError> {
+        if !rules.inherit_scale && pose.iter().all(JointPose::only_turns) {
+            return self.turned(pose);
+        }
         let motions = self.motions(pose, |x| x)?;
         let places = places(self, motions, rules, false);
         let affine = |p: &Place<f64>| DAffine3 {
@@ -60,6 +63,32 @@ impl Rig {
             translation: DVec3::from_array(p.shift.0),
         };
         Ok(places.iter().map(affine).collect())
+    }
+
+    /// The transforms of a pose in which joints only turn, as [`places`] has them to the
+    /// last bit, without its lists.
+    fn turned(&self, pose: &[JointPose]) -> Result<Vec<DAffine3>, GeomError> {
+        let mut unscaled: Vec<Place<f64>> = Vec::with_capacity(self.joints().len());
+        let mut transforms = Vec::with_capacity(self.joints().len());
+        for (j, joint) in self.joints().iter().enumerate() {
+            let p = pose.get(j).unwrap_or(&JointPose::REST);
+            p.check(&joint.name)?;
+            // Where no handle pulls the head, 0 is added to it.
+            let (head, to) = (V3(joint.head.to_array()), V3((joint.head + DVec3::ZERO).to_array()));
+            let own = p.rotation();
+            let (linear, fixed) = match joint.parent {
+                Some(up) => (unscaled[up].linear.times(own), unscaled[up].point(to)),
+                None => (own, to),
+            };
+            let place = Place { linear, shift: fixed - linear.apply(head) };
+            let shift = place.point(head) - linear.apply(head);
+            transforms.push(DAffine3 {
+                matrix3: DMat3::from_cols_array_2d(&linear.transposed().0),
+                translation: DVec3::from_array(shift.0),
+            });
+            unscaled.push(place);
+        }
+        Ok(transforms)
     }
 
     /// The vector-Jacobian product of [`Rig::transforms`]: pulls derivatives with respect

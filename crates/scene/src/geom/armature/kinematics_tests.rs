@@ -223,3 +223,26 @@ fn poses_that_are_not_finite_are_refused() {
         assert!(rig().transforms(&pose, &Rules::default()).unwrap().iter().all(|t| t.is_finite()));
     }
 }
+
+/// The short way for poses of rotations, against the general one.
+#[test]
+fn poses_that_only_turn_are_those_of_the_general_computation() {
+    let (rig, rules) = (rig(), Rules::default());
+    for k in 0..200 {
+        let mut pose = some_pose(f64::from(k) * 0.37);
+        for p in &mut pose {
+            (p.location, p.scale) = (DVec3::ZERO, DVec3::ONE);
+        }
+        pose[1].turn = Turn::Angles(DVec3::new(0.1, -0.2, 1.5));
+        pose.truncate(7 - k as usize % 3);
+        let motions = rig.motions(&pose, |x| x).unwrap();
+        let places = places(&rig, motions, &rules, false);
+        let found = rig.transforms(&pose, &rules).unwrap();
+        assert_eq!(found.len(), places.len());
+        for (t, p) in found.iter().zip(&places) {
+            let expected = p.linear.transposed().0.concat().into_iter().chain(p.shift.0);
+            let bits = |x: f64| x.to_bits();
+            assert!(t.to_cols_array().map(bits).into_iter().eq(expected.map(bits)), "{k}");
+        }
+    }
+}

@@ -37,6 +37,16 @@ impl JointPose {
         JointPose { turn: Turn::Vector(v), ..JointPose::REST }
     }
 
+    /// Whether the joint is neither pulled nor scaled.
+    pub(super) fn only_turns(&self) -> bool {
+        self.location == DVec3::ZERO && self.scale == DVec3::ONE
+    }
+
+    /// The rotation as a matrix of plain numbers.
+    pub(super) fn rotation(&self) -> M3<f64> {
+        self.motion(|x| x).turn
+    }
+
     pub(super) fn check(&self, name: &str) -> Result<(), GeomError> {
         let turn = match self.turn {
             Turn::Vector(v) | Turn::Angles(v) => v.is_finite(),

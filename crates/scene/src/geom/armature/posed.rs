@@ -91,21 +91,26 @@ impl Armature {
         rules: &Rules,
         before: Option<&Posed>,
     ) -> Result<(Solid, Posed), GeomError> {
-        let transforms = self.rig().transforms(pose, rules)?;
+        let transforms: Arc<[DAffine3]> = self.rig().transforms(pose, rules)?.into();
         let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
         if !single.iter().all(|t| t.is_finite()) {
             return Err(GeomError::domain("the pose moves the body too far away"));
         }
         let (posed, parts) = Posed::new(self, single, before);
-        let body = Arc::clone(self);
-        let solid = Solid::of_parts(parts).with_landmarks_of(move || {
-            let keypoints = body.rig().keypoints().iter();
+        let (body, of) = (Arc::clone(self), Arc::clone(&transforms));
+        let landmarks = move || -> Arc<[Landmark]> {
             let landmark = |k: &Keypoint| Landmark {
                 name: Arc::clone(&k.name),
-                position: transforms[k.joint].transform_point3(k.rest),
+                position: of[k.joint].transform_point3(k.rest),
             };
-            keypoints.map(landmark).collect::<Vec<_>>()
-        });
+            body.rig().keypoints().iter().map(landmark).collect()
+        };
+        let solid = Solid::of_parts(parts).with_joints(transforms);
+        // A rig's keypoints have different names; `#` starts the numbers of others.
+        let solid = match self.rig().keypoints().iter().any(|k| k.name.contains('#')) {
+            true => solid.with_landmarks_of(move || landmarks().to_vec()),
+            false => solid.with_distinct_landmarks_of(landmarks),
+        };
         Ok((solid, posed))
     }
 }

@@ -4,7 +4,7 @@
 
 use super::{Armature, Influence, JointPose, RestGradient, Rules, Turn};
 use crate::geom::GeomError;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// Derivatives with respect to the inputs of posing.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,8 @@ impl Armature {
     /// The vector-Jacobian product of [`Armature::posed`] for rotation vectors, given the
     /// derivatives with respect to the posed keypoints and vertices (in the order of
     /// [`Armature::positions`]; empty if nothing depends on them). `None` if the pose has
-    /// anything but rotation vectors, or if scales are inherited.
+    /// anything but rotation vectors, or if scales are inherited. `joints` are the
+    /// transforms of the pose, if they are known.
     ///
     /// # Errors
     /// A pose that is not finite.
@@ -29,6 +30,7 @@ impl Armature {
         rules: &Rules,
         by_keypoint: &[DVec3],
         by_vertex: &[DVec3],
+        joints: Option<&[DAffine3]>,
     ) -> Result<Option<BodyGradient>, GeomError> {
         let rig = self.rig();
         let plain = |p: &JointPose| {
@@ -37,8 +39,15 @@ impl Armature {
         if rules.inherit_scale || !pose.iter().all(plain) {
             return Ok(None);
         }
-        let transforms = rig.transforms(pose, rules)?;
         let count = rig.joints().len();
+        let made: Vec<DAffine3>;
+        let transforms = match joints.filter(|joints| joints.len() == count) {
+            Some(joints) => joints,
+            None => {
+                made = rig.transforms(pose, rules)?;
+                &made
+            }
+        };
         // For each joint, sums over everything attached to it: the derivatives (forces),
         // and p x g (torques about the origin).
         let (mut force, mut torque) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);

@@ -108,6 +108,15 @@ pub struct KeypointLikelihood {
     log_area: f64,
 }
 
+/// What the density of a detection needs, wherever the joint is.
+#[derive(Clone, Debug)]
+pub struct DetectionConstants {
+    /// Per position, the logs of its components at the joint.
+    peaks: Logs,
+    /// The log of the component of outliers.
+    off: f64,
+}
+
 /// Per position: as a good detection, and of a missed joint.
 type Logs = SmallVec<[[f64; 2]; 3]>;
 
@@ -191,57 +200,88 @@ impl KeypointLikelihood {
         1.0 - confidence * (1.0 - self.outlier)
     }
 
-    /// Returns the logs of the components of the density, without the factor for the
-    /// other positions: one for each position, and one for an outlier.
-    fn parts(&self, seen: &Detection, joint: Option<[f64; 2]>) -> (Logs, f64) {
+    /// Returns what the density of a detection needs, wherever the joint is.
+    pub fn constants(&self, seen: &Detection) -> DetectionConstants {
         let e = self.outlier(seen.confidence);
-        let off = libm::log(e) - self.log_area;
-        let Some([x, y]) = joint.filter(|j| j.iter().all(|c| c.is_finite())) else {
-            return (seen.places.iter().map(|_| [f64::NEG_INFINITY; 2]).collect(), off);
-        };
         let logs = [1.0 - self.misses, self.misses / (MISS * MISS)]
             .map(|share| libm::log(share) + self.log_peak);
-        let near = |(at, share): &([f64; 2], f64)| {
-            let (dx, dy) = ((at[0] - x) / self.sd, (at[1] - y) / self.sd);
-            let (good, r2) = (libm::log1p(-e) + libm::log(*share), 0.5 * (dx * dx + dy * dy));
-            [good + logs[0] - r2, good + logs[1] - r2 / (MISS * MISS)]
+        let peak = |(_, share): &([f64; 2], f64)| {
+            let good = libm::log1p(-e) + libm::log(*share);
+            logs.map(|log| good + log)
         };
-        (seen.places.iter().map(near).collect(), off)
+        DetectionConstants {
+            peaks: seen.places.iter().map(peak).collect(),
+            off: libm::log(e) - self.log_area,
+        }
+    }
+
+    /// Returns the logs of the components of the density, without the factor for the
+    /// other positions, one for each position; `known` has that for an outlier.
+    fn parts(&self, known: &DetectionConstants, seen: &Detection, joint: Option<[f64; 2]>) -> Logs {
+        let Some([x, y]) = joint.filter(|j| j.iter().all(|c| c.is_finite())) else {
+            return seen.places.iter().map(|_| [f64::NEG_INFINITY; 2]).collect();
+        };
+        let near = |((at, _), peaks): (&([f64; 2], f64), &[f64; 2])| {
+            let (dx, dy) = ((at[0] - x) / self.sd, (at[1] - y) / self.sd);
+            let r2 = 0.5 * (dx * dx + dy * dy);
+            [peaks[0] - r2, peaks[1] - r2 / (MISS * MISS)]
+        };
+        seen.places.iter().zip(&known.peaks).map(near).collect()
     }
 
     /// Returns the probability that each position belongs to the joint, well or as a
     /// miss, and that none does.
-    fn shares(&self, seen: &Detection, joint: [f64; 2]) -> (Logs, f64) {
-        let (mut near, off) = self.parts(seen, Some(joint));
-        let sum = log_sum(&near, off);
+    fn shares(&self, known: &DetectionConstants, seen: &Detection, joint: [f64; 2]) -> (Logs, f64) {
+        let mut near = self.parts(known, seen, Some(joint));
+        let sum = log_sum(&near, known.off);
         near.iter_mut().flatten().for_each(|n| *n = libm::exp(*n - sum));
-        (near, libm::exp(off - sum))
+        (near, libm::exp(known.off - sum))
     }
 
     /// Returns the log density of a detection. `joint` is the model's position; if it has
     /// none (behind the camera), every detection is an outlier.
     pub fn log_density(&self, seen: &Detection, joint: Option<[f64; 2]>) -> f64 {
-        let (near, off) = self.parts(seen, joint);
-        log_sum(&near, off) - (near.len() - 1) as f64 * self.log_area
+        self.log_density_with(&self.constants(seen), seen, joint)
+    }
+
+    /// [`KeypointLikelihood::log_density`] with the constants of the detection.
+    pub fn log_density_with(
+        &self,
+        known: &DetectionConstants,
+        seen: &Detection,
+        joint: Option<[f64; 2]>,
+    ) -> f64 {
+        let near = self.parts(known, seen, joint);
+        log_sum(&near, known.off) - (near.len() - 1) as f64 * self.log_area
     }
 
     /// Returns the derivative of the log density with respect to the joint's position.
     pub fn gradient(&self, seen: &Detection, joint: [f64; 2]) -> [f64; 2] {
-        let (shares, _) = self.shares(seen, joint);
-        let mut sum = [0.0; 2];
+        self.gradient_with(&self.constants(seen), seen, joint)
+    }
+
+    /// [`KeypointLikelihood::gradient`] with the constants of the detection.
+    pub fn gradient_with(
+        &self,
+        known: &DetectionConstants,
+        seen: &Detection,
+        joint: [f64; 2],
+    ) -> [f64; 2] {
+        let (shares, _) = self.shares(known, seen, joint);
+        let mut slope = [0.0; 2];
         for ((at, _), [well, miss]) in seen.places.iter().zip(shares) {
             let pull = well + miss / (MISS * MISS);
             if pull > 0.0 {
-                (0..2).for_each(|i| sum[i] += pull * (at[i] - joint[i]) / (self.sd * self.sd));
+                (0..2).for_each(|i| slope[i] += pull * (at[i] - joint[i]) / (self.sd * self.sd));
             }
         }
-        sum
+        slope
     }
 
     /// Returns the mean position of the true joint given a detection and the model's
     /// position, and the variance along an axis (averaged over the two).
     pub fn located(&self, seen: &Detection, joint: [f64; 2]) -> ([f64; 2], f64) {
-        let (shares, off) = self.shares(seen, joint);
+        let (shares, off) = self.shares(&self.constants(seen), seen, joint);
         let between = self.offset * self.offset;
         let own = (self.sd * self.sd - between).max(0.0);
         // The variance of the mixture of hits, misses and outliers: within each
@@ -266,7 +306,7 @@ impl KeypointLikelihood {
 
     /// Returns the position of a detection that most probably belongs to the joint.
     pub fn meant(&self, seen: &Detection, joint: [f64; 2]) -> [f64; 2] {
-        let (shares, _) = self.shares(seen, joint);
+        let (shares, _) = self.shares(&self.constants(seen), seen, joint);
         let all = seen.places.iter().zip(shares).map(|((at, _), [well, miss])| (*at, well + miss));
         all.reduce(|a, b| if b.1 > a.1 { b } else { a }).map_or(joint, |(at, _)| at)
     }

@@ -36,7 +36,7 @@ mod relative_depth;
 mod calibration_tests;
 
 pub use error::KeypointsError;
-pub use likelihood::{Detection, KeypointLikelihood, KeypointOptions, Unit};
+pub use likelihood::{Detection, DetectionConstants, KeypointLikelihood, KeypointOptions, Unit};
 pub use matching::matching;
 pub use names::{COCO, MEDIAPIPE};
 pub use people::{People, split_id};
