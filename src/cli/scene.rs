@@ -26,10 +26,12 @@ pub fn loaded(model: &Model, saved: &SavedTrace) -> Result<Trace, SaveError> {
     Trace::load(Arc::clone(model.code()), model.hash(), saved, model.limits().clone())
 }
 
-/// Returns the operand of the program's view: the last top-level name that is a view.
+/// Returns the operand of the program's view: the last top-level name that is a view, of
+/// those that the state has, or else of all.
 pub fn view_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
     let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
-    let is_view =
-        |values: Vec<Value>| values.first().is_some_and(|v| v.downcast::<ViewValue>().is_some());
-    globals.into_iter().find(|o| trace.query(&[*o], draws).is_ok_and(is_view))
+    let is_view = |value: &Value| value.downcast::<ViewValue>().is_some();
+    let known = globals.iter().find(|o| trace.evaluated(**o).is_some_and(is_view)).copied();
+    let is_one = |values: Vec<Value>| values.first().is_some_and(is_view);
+    known.or_else(|| globals.into_iter().find(|o| trace.query(&[*o], draws).is_ok_and(is_one)))
 }

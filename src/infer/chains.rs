@@ -4,7 +4,7 @@
 use super::draws::Sink;
 use super::init::draw_once;
 use super::parallel::in_parallel;
-use super::plan::run_chain;
+use super::plan::{SharedStart, run_chain};
 use super::run::{ChainError, ChainResult, Progress, RunOptions};
 use crate::lang::code::Code;
 use crate::lang::plan::Plan;
@@ -24,20 +24,28 @@ pub fn run_chains(
     sinks: Vec<Box<dyn Sink>>,
 ) -> Vec<Result<ChainResult, ChainError>> {
     let rounds = sinks.len().div_ceil(threads.max(1)).max(1) as u32;
-    let time = options.time.map(|t| share(code, options, t, rounds));
+    let shared = SharedStart::default();
+    let prepare = || shared.prepare(code, plan, options);
+    let time = options.time.map(|t| share(code, options, t, rounds, prepare));
     let options = &RunOptions { time, ..options.clone() };
     let run = |(chain, mut sink): (usize, Box<dyn Sink>)| {
-        run_chain(code, plan, options, progress, &mut *sink, chain as u32)
+        run_chain(code, plan, options, progress, &mut *sink, chain as u32, &shared)
     };
     let work: Vec<_> = sinks.into_iter().enumerate().collect();
     in_parallel(threads, work, run)
 }
 
 /// The time limit of a chain, when chains run in `rounds` rounds. Values that are
-/// computed once, such as the people in a photograph, are computed before the chains
-/// begin; otherwise the first chain of each thread would pay for them and have less time
-/// than later ones.
-fn share(code: &Arc<Code>, options: &RunOptions, time: Duration, rounds: u32) -> Duration {
+/// computed once, such as the people in a photograph or what chains start from, are computed
+/// before the chains begin; otherwise the first chain of each thread would pay for them and
+/// have less time than later ones.
+fn share(
+    code: &Arc<Code>,
+    options: &RunOptions,
+    time: Duration,
+    rounds: u32,
+    prepare: impl FnOnce(),
+) -> Duration {
     if rounds == 1 {
         return time;
     }
@@ -48,5 +56,6 @@ fn share(code: &Arc<Code>, options: &RunOptions, time: Duration, rounds: u32) ->
         options.seed,
         Limits { stop: limits.stop.clone().or_within(Some(time)), ..limits },
     );
+    prepare();
     time.saturating_sub(begun.elapsed()) / rounds
 }

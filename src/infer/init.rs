@@ -9,7 +9,8 @@ use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::span::Span;
-use crate::trace::{Draws, Limits, Trace, TraceResult};
+use crate::trace::{Change, Constraint, Draws, Limits, Target, Trace, TraceResult};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
@@ -114,7 +115,8 @@ pub fn starts(
 }
 
 /// As [`starts`], but each draw is moved to what a kernel of the program proposes from
-/// it.
+/// it. If that does not depend on the draw, the draw is made with the values that the
+/// kernel proposes, so that each is compared with the observations once.
 pub(crate) fn starts_from(
     code: &Arc<Code>,
     (seed, chain): (u64, u32),
@@ -122,20 +124,14 @@ pub(crate) fn starts_from(
     from: Option<&ProgramKernel>,
     limits: Limits,
 ) -> Result<Vec<Trace>, StartError> {
-    let (key, mut begun) = (StreamKey::new(seed, chain, Purpose::START), Instant::now());
-    let drawn = |attempt: u64| -> TraceResult<Option<Trace>> {
-        let draws = Draws { key, step: attempt, substream: 0 };
-        let mut trace = Trace::simulate(Arc::clone(code), draws, limits.clone())?;
-        let Some(from) = from else { return Ok(Some(trace)) };
-        // Steps of the plan count from 0: this part is distinct from all of them.
-        let at = StepContext::new(seed, chain, attempt).within(u64::MAX - 1);
-        Ok(from.leap(&mut trace, &at)?.map(|()| trace))
-    };
+    let mut begun = Instant::now();
+    let key = StreamKey::new(seed, chain, Purpose::START);
+    let mut source = Source { code, seed, chain, key, from, limits: &limits, last: None };
     let mut best: Vec<Trace> = Vec::new();
     let mut found = 0;
     let mut last = None;
     for attempt in 0..how.draws.saturating_add(RETRIES) {
-        let draw = drawn(attempt);
+        let draw = source.draw(attempt);
         if attempt == 0 {
             // One-time preparation, such as the analysis of a photograph, does not count
             // against the time limit.
@@ -147,11 +143,12 @@ pub(crate) fn starts_from(
                 found += 1;
                 let place = best.partition_point(|b| b.log_joint() >= t.log_joint());
                 if place < how.keep.max(1) {
-                    best.insert(place, t);
+                    best.insert(place, t.into_owned());
                     best.truncate(how.keep.max(1));
                 }
             }
-            Ok(Some(t)) => last = Some(Ok(t)),
+            Ok(Some(t)) if found == 0 => last = Some(Ok(t.into_owned())),
+            Ok(Some(_)) => {}
             Err(e) if e.is_recoverable() => last = Some(Err(e)),
             Err(e) => return Err(StartError::Run(e)),
         }
@@ -172,6 +169,63 @@ pub(crate) fn starts_from(
     }
 }
 
+/// Where draws come from.
+struct Source<'a> {
+    code: &'a Arc<Code>,
+    seed: u64,
+    chain: u32,
+    key: StreamKey,
+    from: Option<&'a ProgramKernel>,
+    limits: &'a Limits,
+    /// The last draw, of which the next is an update, if the kernel's proposal does not
+    /// depend on the draw.
+    last: Option<Trace>,
+}
+
+impl Source<'_> {
+    /// Makes a draw; `None` if the program is undefined where the kernel leads.
+    fn draw(&mut self, attempt: u64) -> TraceResult<Option<Cow<'_, Trace>>> {
+        let draws = Draws { key: self.key, step: attempt, substream: 0 };
+        let simulate = || Trace::simulate(Arc::clone(self.code), draws, self.limits.clone());
+        let Some(from) = self.from else { return Ok(Some(Cow::Owned(simulate()?))) };
+        // Steps of the plan count from 0: this part is distinct from all of them.
+        let at = StepContext::new(self.seed, self.chain, attempt).within(u64::MAX - 1);
+        let Some(mut last) = self.last.take() else {
+            let mut trace = simulate()?;
+            if from.ignores_the_state() {
+                self.last = Some(trace.clone());
+            }
+            return Ok(from.leap(&mut trace, &at)?.map(|()| Cow::Owned(trace)));
+        };
+        let given = from.proposal(&mut last, &at)?;
+        if !redrawn(&mut last, &given, draws) {
+            last = Trace::generate(Arc::clone(self.code), given, draws, self.limits.clone())?.0;
+        }
+        Ok(Some(Cow::Borrowed(self.last.insert(last))))
+    }
+}
+
+/// Draws all choices of a trace again, except for those that are given, by an update with the
+/// same result as [`Trace::generate`]; false, with the trace as it was, if the update fails.
+fn redrawn(trace: &mut Trace, given: &[(u64, Constraint)], draws: Draws) -> bool {
+    let change = |t: &Target| {
+        let hash = trace.address_hash(*t);
+        match given.iter().find(|(of, _)| *of == hash) {
+            Some((_, Constraint::Value(x))) => (*t, Change::Value(x.clone())),
+            Some((_, Constraint::Stored(x))) => (*t, Change::Set(x.clone())),
+            None => (*t, Change::Resample),
+        }
+    };
+    let changes: Vec<_> = trace.all_targets().iter().map(change).collect();
+    let done = trace.propose(&changes, draws).is_ok();
+    if done {
+        trace.commit()
+    } else {
+        trace.rollback()
+    }
+    done
+}
+
 /// The terms of a trace that have zero probability.
 fn explain(t: &Trace) -> NoStart {
     let mut outside: HashMap<Address, String> = t.outside_support().into_iter().collect();
@@ -185,5 +239,56 @@ fn explain(t: &Trace) -> NoStart {
     NoStart {
         terms: zero.collect(),
         drawn: t.choices().into_iter().filter_map(single).take(6).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+
+    /// Draws by updates of the draw before are those from scratch, also of choices that
+    /// appear and vanish.
+    #[test]
+    fn draws_by_updates_are_those_from_scratch() {
+        let text = "assume open ~ flip(0.5);
+            fn wall() { thick ~ normal(0, 1); floor ~ iid(beta(2, 2), 3); thick + floor[0] }
+            assume inside = if open { wall() } else { 0 };
+            assume f ~ gp(mean = 0, cov = sq_exp(1, 0.5), at = [0, 0.5, 1]);
+            assume x ~ normal(inside, 1);
+            observe normal(f + x, 0.5) = [1, 2, 0];
+            kernel near(m) { propose s ~ flip(0.5); propose @x ~ normal(m + (if s { 1 } else { 0 }), 0.1);
+              propose @f ~ mv_normal([0, m, 0], chol = 0.1 * identity(3)); propose @open ~ flip(0.7); }
+            infer { init(best_of(30, keep = 5, from = near(2))); repeat 1 { drift(@x); } }";
+        let model = Model::from_text(text).unwrap();
+        let (plan, _) = model.plan().unwrap();
+        let kernels: Arc<[_]> = Arc::clone(&plan.kernels);
+        let from = ProgramKernel::new(kernels, 0, vec![Value::Num(2.0)], Instant::now());
+        assert!(from.ignores_the_state());
+        let key = StreamKey::new(7, 0, Purpose::START);
+        let limits = Limits::default();
+        let (code, from) = (model.code(), Some(&from));
+        let mut source = Source { code, seed: 7, chain: 0, key, from, limits: &limits, last: None };
+        let mut opened = 0;
+        for attempt in 0..40 {
+            let found = source.draw(attempt).unwrap().unwrap().into_owned();
+            let draws = Draws { key, step: attempt, substream: 0 };
+            if attempt == 0 {
+                continue;
+            }
+            let at = StepContext::new(7, 0, attempt).within(u64::MAX - 1);
+            let given = from.unwrap().proposal(&mut found.clone(), &at).unwrap();
+            let scratch =
+                Trace::generate(Arc::clone(code), given, draws, limits.clone()).unwrap().0;
+            let choices = |t: &Trace| {
+                let mut all = t.constraints();
+                all.sort_by_key(|(hash, _)| *hash);
+                all
+            };
+            assert_eq!(choices(&found), choices(&scratch), "{attempt}");
+            assert_eq!(found.log_joint().to_bits(), scratch.log_joint().to_bits(), "{attempt}");
+            opened += u32::from(found.constraints().len() > 3);
+        }
+        assert!(opened > 10 && opened < 39, "{opened}");
     }
 }

@@ -2,7 +2,7 @@
 //! surrogates of observations. Choices drawn for a query are discarded afterwards.
 
 use super::graph::Graph;
-use super::node::{Arguments, Deps, Frame, FrameId};
+use super::node::{Arguments, Deps, Frame, FrameId, State};
 use super::{Address, Draws, Trace, TraceResult};
 use crate::lang::code::{BlockId, Code, Operand};
 use crate::lang::value::Value;
@@ -18,6 +18,13 @@ impl Trace {
     #[doc(hidden)]
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
         self.asked(|graph, code| graph.query(code, 0, operands), draws, |_, values| Ok(values))
+    }
+
+    /// Returns the value of a top-level expression, if the state has it.
+    #[doc(hidden)]
+    pub fn evaluated(&self, operand: Operand) -> Option<&Value> {
+        let node = &self.graph.nodes[self.graph.resolve(0, operand)? as usize];
+        (node.state == State::Clean).then_some(&node.value)
     }
 
     /// Evaluates a function of the program, which sees the present state, with these

@@ -176,6 +176,9 @@ impl Callback for Joints {
         };
         let Ok(values) = trace.query(&[at], draws) else { return };
         let Some(view) = values.first().and_then(|v| v.downcast::<ViewValue>()) else { return };
+        if view.0.solid().landmarks().is_empty() {
+            return;
+        }
         let found = trace.located();
         let (width, height) = self.pixels(view);
         let (width, height) = (f64::from(width), f64::from(height));

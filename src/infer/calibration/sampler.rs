@@ -3,7 +3,7 @@
 use crate::infer::callback::Callback;
 use crate::infer::draws::Discard;
 use crate::infer::kernel::{Kernel, StepContext};
-use crate::infer::plan::run_chain;
+use crate::infer::plan::{SharedStart, run_chain};
 use crate::infer::run::{ChainError, Progress, RunOptions};
 use crate::infer::{Start, starts};
 use crate::lang::code::Code;
@@ -52,7 +52,9 @@ impl Sampler for PlanSampler<'_> {
             callback: Some(callback),
             ..self.options.clone()
         };
-        let done = run_chain(code, self.plan, &options, self.progress, &mut Discard, chain)?;
+        let shared = SharedStart::default();
+        let done =
+            run_chain(code, self.plan, &options, self.progress, &mut Discard, chain, &shared)?;
         Ok(done.steps)
     }
 }

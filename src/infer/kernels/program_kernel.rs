@@ -13,13 +13,15 @@ use crate::dist::{Datum, Dist};
 use crate::infer::calls::error::fail;
 use crate::infer::calls::formula::{Moved, PlanEnv, address, evaluate};
 use crate::infer::kernel::{Kernel, Outcome, StepContext, accept_or_reject, accepts, recoverable};
-use crate::lang::plan::{DeclaredKernel, Formula, Path, Step, StepKind};
+use crate::lang::plan::{
+    DeclaredKernel, Formula, FormulaKind, Given, Path, PathKey, PathSegment, Step, StepKind,
+};
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::syntax::ast::Name;
 use crate::syntax::span::Span;
-use crate::trace::{Address, Change, Draws, Limits, Target, Trace, TraceResult};
+use crate::trace::{Address, Change, Constraint, Draws, Limits, Target, Trace, TraceResult};
 use std::sync::Arc;
 
 /// A kernel declared by the program, with its arguments.
@@ -134,6 +136,57 @@ impl ProgramKernel {
         let moved: Vec<(Address, Value)> = moved.collect::<Option<_>>()?;
         let moved = Moved { choices: &moved, aside };
         self.play(trace, at, Source::Given(auxiliaries), Some(moved)).ok()
+    }
+
+    /// Whether what the body proposes depends on its arguments alone, not on the state.
+    pub fn ignores_the_state(&self) -> bool {
+        fn given(g: &Given) -> bool {
+            matches!(g, Given::Variable(_))
+        }
+        fn formula(f: &Formula) -> bool {
+            match &f.kind {
+                FormulaKind::Const(_) => true,
+                FormulaKind::Given(g) => given(g),
+                FormulaKind::Function { given: all, is_closed, .. } => {
+                    *is_closed && all.iter().all(given)
+                }
+            }
+        }
+        fn path(p: &Path) -> bool {
+            p.segments.iter().all(|s| match s {
+                PathSegment::Deep => true,
+                PathSegment::Named(_, _, keys) => keys.iter().all(|k| match k {
+                    PathKey::Computed(f) => formula(f),
+                    PathKey::Any | PathKey::Fixed(_) => true,
+                }),
+            })
+        }
+        fn step(s: &Step) -> bool {
+            match &s.kind {
+                StepKind::Let(_, f) | StepKind::Draw(_, _, f) => formula(f),
+                StepKind::Propose(p, f) => path(p) && formula(f),
+                StepKind::For(items, _, body) => formula(items) && body.iter().all(step),
+                _ => false,
+            }
+        }
+        self.declared().steps.iter().all(step)
+    }
+
+    /// Returns values that the body proposes, for choices that a trace has.
+    ///
+    /// # Errors
+    /// As [`Kernel::step`].
+    pub fn proposal(
+        &self,
+        trace: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<Vec<(u64, Constraint)>> {
+        let mut rng = at.stream();
+        let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
+        let value = |p: &Proposed| {
+            (trace.address_hash(p.target), Constraint::Value(p.dist.sample(&mut rng)))
+        };
+        Ok(forth.all.iter().map(value).collect())
     }
 
     /// Moves the trace to a proposal of the body without an acceptance test, for initial

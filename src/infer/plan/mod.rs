@@ -10,7 +10,7 @@ mod start;
 mod warmup;
 
 use super::draws::Sink;
-use super::init::starts_from;
+use super::init::{Start, starts_from};
 use super::population::Population;
 use super::run::{ChainError, ChainResult, Progress, RunOptions};
 use crate::lang::code::Code;
@@ -18,11 +18,13 @@ use crate::lang::plan::Plan;
 use crate::platform::clock::Instant;
 use crate::trace::{Limits, Trace};
 use runner::Runner;
+pub(crate) use start::SharedStart;
 use start::start_of;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Runs one chain of a plan, or resumes it from the checkpoint of its sink.
+/// Runs one chain of a plan, or resumes it from the checkpoint of its sink. Chains share
+/// how they start.
 ///
 /// # Errors
 /// If the chain cannot start, the program or the sink fails, or the checkpoint belongs to
@@ -34,6 +36,7 @@ pub(crate) fn run_chain(
     progress: &Progress,
     sink: &mut dyn Sink,
     chain: u32,
+    shared: &SharedStart,
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
     let options = &stoppable(options, progress);
@@ -41,7 +44,9 @@ pub(crate) fn run_chain(
         banks::check(code, &plan.steps, options)?;
         return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run();
     }
-    let (how, from) = start_of(code, plan, options)?;
+    let (how, from) = shared.get(|| start_of(code, plan, options))?;
+    // Under a time limit a quarter of it is for the start, as much as that leaves to warm-up.
+    let how = Start { within: options.time.map(|t| t / 4), ..how };
     banks::check(code, &plan.steps, options)?;
     let mut begun =
         starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())

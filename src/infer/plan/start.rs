@@ -11,11 +11,33 @@ use crate::lang::error::RunError;
 use crate::lang::plan::{BestOf, Callee, Formula, KernelCall, Plan, StepKind};
 use crate::lang::value::Value;
 use crate::trace::{Draws, Trace};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// How chains start, which is the same for all of them: worked out by the first.
+#[derive(Debug, Default)]
+pub(crate) struct SharedStart(Mutex<Option<(Start, Option<ProgramKernel>)>>);
+
+impl SharedStart {
+    /// Works it out. A failure is ignored: the chains will report it.
+    pub fn prepare(&self, code: &Arc<Code>, plan: &Plan, options: &RunOptions) {
+        let _ = self.get(|| start_of(code, plan, options));
+    }
+
+    /// Returns it, from the first call of `make` that succeeds.
+    pub(super) fn get(
+        &self,
+        make: impl FnOnce() -> Result<(Start, Option<ProgramKernel>), ChainError>,
+    ) -> Result<(Start, Option<ProgramKernel>), ChainError> {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*known {
+            Some(start) => Ok(start.clone()),
+            None => Ok(known.insert(make()?).clone()),
+        }
+    }
+}
 
 /// Reads the `init` statement of a plan: how to start, and the kernel it proposes from
-/// (`from = …`), if any. Under a time limit it gets a quarter of that, as much as it
-/// leaves to warm-up.
+/// (`from = …`), if any.
 pub(super) fn start_of(
     code: &Arc<Code>,
     plan: &Plan,
@@ -33,8 +55,7 @@ pub(super) fn start_of(
     let draws = count(draws, &mut env)?;
     let keep = keep.as_ref().map_or(Ok(1), |f| count(f, &mut env))?;
     let from = from.as_ref().map(|call| own(plan, call, &mut env)).transpose()?;
-    let within = options.time.map(|t| t / 4);
-    Ok((Start { draws, keep: keep.min(draws) as usize, within }, from))
+    Ok((Start { draws, keep: keep.min(draws) as usize, within: None }, from))
 }
 
 fn count(f: &Formula, env: &mut PlanEnv) -> Result<u64, Box<RunError>> {
