@@ -257,8 +257,9 @@ mod tests {
             assume f ~ gp(mean = 0, cov = sq_exp(1, 0.5), at = [0, 0.5, 1]);
             assume x ~ normal(inside, 1);
             observe normal(f + x, 0.5) = [1, 2, 0];
+            let n = 2 + 1;
             kernel near(m) { propose s ~ flip(0.5); propose @x ~ normal(m + (if s { 1 } else { 0 }), 0.1);
-              propose @f ~ mv_normal([0, m, 0], chol = 0.1 * identity(3)); propose @open ~ flip(0.7); }
+              propose @f ~ mv_normal([0, m, 0], chol = 0.1 * identity(n)); propose @open ~ flip(0.7); }
             infer { init(best_of(30, keep = 5, from = near(2))); repeat 1 { drift(@x); } }";
         let model = Model::from_text(text).unwrap();
         let (plan, _) = model.plan().unwrap();
@@ -269,6 +270,11 @@ mod tests {
         let limits = Limits::default();
         let (code, from) = (model.code(), Some(&from));
         let mut source = Source { code, seed: 7, chain: 0, key, from, limits: &limits, last: None };
+        // What depends on a choice is another matter.
+        let other = text.replace("normal(m +", "normal(m + x +");
+        let (plan, _) = Model::from_text(&other).unwrap().plan().unwrap();
+        let own = ProgramKernel::new(Arc::clone(&plan.kernels), 0, Vec::new(), Instant::now());
+        assert!(!own.ignores_the_state());
         let mut opened = 0;
         for attempt in 0..40 {
             let found = source.draw(attempt).unwrap().unwrap().into_owned();

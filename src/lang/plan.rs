@@ -301,6 +301,8 @@ pub enum FormulaKind {
         given: Box<[Given]>,
         /// Whether it reads nothing else of the state.
         is_closed: bool,
+        /// Whether what else it reads depends on no choice.
+        is_settled: bool,
     },
 }
 

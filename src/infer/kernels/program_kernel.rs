@@ -147,8 +147,8 @@ impl ProgramKernel {
             match &f.kind {
                 FormulaKind::Const(_) => true,
                 FormulaKind::Given(g) => given(g),
-                FormulaKind::Function { given: all, is_closed, .. } => {
-                    *is_closed && all.iter().all(given)
+                FormulaKind::Function { given: all, is_settled, .. } => {
+                    *is_settled && all.iter().all(given)
                 }
             }
         }

@@ -69,10 +69,14 @@ pub(super) fn numeric(
         (Value::Array(xs), Value::Array(ys)) if xs.len() == ys.len() => {
             Ok(Value::Array(xs.iter().zip(ys.iter()).map(|(x, y)| f(*x, *y)).collect()))
         }
-        _ => broadcast(a, x, y, &|x, y| match (x, y) {
-            (Value::Num(x), Value::Num(y)) => Ok(Value::Num(f(*x, *y))),
-            _ => other(x, y),
-        }),
+        _ => match common_len(a, x, y)? {
+            None => other(x, y),
+            // Rows of a matrix are arrays of numbers again.
+            Some(n) => {
+                let rows = (0..n).map(|i| numeric(a, &part(x, i), &part(y, i), f, other));
+                rows.collect::<Result<Vec<_>, _>>().map(Value::from_elements)
+            }
+        },
     }
 }
 

@@ -8,7 +8,18 @@ use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Slot};
 use crate::lang::plan::{Argument, Formula, FormulaKind, Given, Path, PathSegment, Selection};
 use crate::syntax::ast::{Arg, Expr};
 use crate::syntax::span::Span;
+use rustc_hash::FxHashSet;
 use std::sync::Arc;
+
+/// What a function reads.
+struct Reads {
+    /// Its own slots.
+    own: Vec<Slot>,
+    /// Whether it reads nothing of the state.
+    is_closed: bool,
+    /// Whether what it reads of the state depends on no choice.
+    is_settled: bool,
+}
 
 impl Lowerer<'_> {
     /// Lowers an expression of an inference block.
@@ -50,7 +61,7 @@ impl Lowerer<'_> {
     /// The form of an expression whose function is lowered: parameters that it does not
     /// read go, and a function that only passes on a value is not needed.
     fn finished(&mut self, block: BlockId, given: Vec<Given>) -> FormulaKind {
-        let (read, is_closed) = self.reads(block);
+        let Reads { own: read, is_closed, is_settled } = self.reads(block);
         // A block behind it may be that of a computed key.
         let is_last = self.code.blocks.len() == block as usize + 1;
         let b = &mut self.code.blocks[block as usize];
@@ -80,13 +91,13 @@ impl Lowerer<'_> {
                 *index = kept.len() as u16 - 1;
             }
         }
-        FormulaKind::Function { block, given: kept.into(), is_closed }
+        FormulaKind::Function { block, given: kept.into(), is_closed, is_settled }
     }
 
-    /// The slots of a function that are read in it and the blocks inside of it, and
-    /// whether these read nothing of the state.
-    fn reads(&self, function: BlockId) -> (Vec<Slot>, bool) {
-        let (mut read, mut is_closed) = (Vec::new(), true);
+    /// What a function and the blocks inside of it read.
+    fn reads(&self, function: BlockId) -> Reads {
+        let mut reads = Reads { own: Vec::new(), is_closed: true, is_settled: true };
+        let mut settled = FxHashSet::default();
         for (id, block) in (function..).zip(&self.code.blocks[function as usize..]) {
             let mut operand = |o: Operand| {
                 let (at, slot) = match o {
@@ -97,9 +108,12 @@ impl Lowerer<'_> {
                         ((0..up).fold(id, out), slot)
                     }
                 };
-                is_closed &= at >= function;
+                if at < function {
+                    reads.is_closed = false;
+                    reads.is_settled &= at == 0 && self.is_settled(slot, &mut settled);
+                }
                 if at == function {
-                    read.push(slot);
+                    reads.own.push(slot);
                 }
             };
             block.ops.iter().for_each(|op| op.operands(&mut operand));
@@ -107,9 +121,34 @@ impl Lowerer<'_> {
             // Functions that it calls may read the state.
             let calls = |op: &Op| matches!(op, Op::Call { .. } | Op::Map { .. } | Op::Fold { .. });
             let opens = |op: &Op| calls(op) || matches!(op, Op::Probe(_) | Op::Mem { .. });
-            is_closed &= !block.ops.iter().any(opens);
+            if block.ops.iter().any(opens) {
+                (reads.is_closed, reads.is_settled) = (false, false);
+            }
         }
-        (read, is_closed)
+        reads
+    }
+
+    /// Whether a value of the top level is computed without choices and without calls of
+    /// functions of the program. `known` are some that are.
+    fn is_settled(&self, slot: Slot, known: &mut FxHashSet<Slot>) -> bool {
+        if known.contains(&slot) {
+            return true;
+        }
+        let op = &self.code.blocks[0].ops[slot as usize];
+        let mut settled =
+            matches!(op, Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. });
+        op.operands(&mut |o| {
+            settled = settled
+                && match o {
+                    Operand::Const(_) => true,
+                    Operand::Local(slot) => self.is_settled(slot, known),
+                    Operand::Outer { .. } => false,
+                };
+        });
+        if settled {
+            known.insert(slot);
+        }
+        settled
     }
 
     /// Lowers a built-in of inference blocks within an expression: the plan supplies its
