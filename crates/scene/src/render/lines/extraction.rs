@@ -11,7 +11,30 @@ use crate::render::lines::silhouette::{self, Crossed};
 use crate::render::lines::visibility::{Image, Piece, TestSides};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Fronts, Lens, Placement, Vertices, beyond_near};
+use crate::render::rigid::Posed;
+use crate::render::rigid::crossed::Found;
 use crate::render::simd::vectorised;
+
+/// The vertices of a mesh in the image, all of them or each when it is asked for.
+pub(in crate::render) trait Points {
+    /// A vertex, as [`Vertices::point`].
+    fn point(&self, v: u32) -> Point;
+
+    /// Whether a whole line of edges is too small to be seen, as its width plus height is
+    /// less than [`SPECK`].
+    fn is_speck(&self, line: &[Edge]) -> bool;
+}
+
+impl Points for Vertices<'_> {
+    #[inline(always)]
+    fn point(&self, v: u32) -> Point {
+        Vertices::point(self, v)
+    }
+
+    fn is_speck(&self, line: &[Edge]) -> bool {
+        self.whole && self.span(line.iter().flat_map(|e| e.vertices)) < SPECK
+    }
+}
 
 /// Whether a point is usable and beyond the near plane.
 fn usable(p: &Point) -> bool {
@@ -41,6 +64,8 @@ pub(in crate::render) struct Origin {
 pub(in crate::render) struct Room {
     fronts: Fronts,
     crossed: Crossed,
+    /// Of meshes that keep their shape.
+    pub found: Found,
 }
 
 /// Calls `out` for every piece of a mesh, in the order of its faces and then its edges.
@@ -50,18 +75,15 @@ pub(in crate::render) fn extract_mesh(
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
-    Room { fronts, crossed }: &mut Room,
+    Room { fronts, crossed, .. }: &mut Room,
     out: impl FnMut(Piece, &Origin),
 ) {
     let Some(image) = Image::new(camera.width, camera.height) else { return };
     let size = [f64::from(camera.width), f64::from(camera.height)];
     fronts.find(mesh, placement);
     let lens = Lens::new(camera);
-    let mut tracer = Extractor { mesh, placement, vertices, open: true, lens, image, size, out };
-    // Nothing can be seen through holes that are too small to be visible.
-    let hole =
-        |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
-    tracer.open = mesh.topology.edges.open() && mesh.topology.edges.lines().any(hole);
+    let open = is_open(mesh, vertices);
+    let mut tracer = Extractor { mesh, placement, vertices, open, lens, image, size, out };
     let signs = (&fronts.facing[..], &fronts.front[..]);
     vectorised(
         #[inline(always)]
@@ -74,9 +96,42 @@ pub(in crate::render) fn extract_mesh(
     tracer.edges();
 }
 
+/// As [`extract_mesh`] for a mesh that keeps its shape.
+pub(in crate::render) fn extract_posed(
+    posed: &Posed<'_>,
+    camera: &Camera,
+    Room { crossed, found, .. }: &mut Room,
+    out: impl FnMut(Piece, &Origin),
+) {
+    let Some(image) = Image::new(camera.width, camera.height) else { return };
+    let size = [f64::from(camera.width), f64::from(camera.height)];
+    let (lens, Posed { mesh, placement, .. }) = (Lens::new(camera), posed);
+    let open = is_open(mesh, posed);
+    let mut tracer = Extractor { mesh, placement, vertices: posed, open, lens, image, size, out };
+    vectorised(
+        #[inline(always)]
+        || {
+            found.find(posed);
+            crossed.each_of(&found.corners, mesh, placement, &lens, |batch, count| {
+                tracer.silhouettes(batch, count)
+            })
+        },
+    );
+    tracer.edges();
+}
+
+/// Whether a mesh has boundaries through which something can be seen, unlike holes that
+/// are too small to be visible.
+fn is_open(mesh: &Mesh, vertices: &impl Points) -> bool {
+    let edges = &mesh.topology.edges;
+    let hole =
+        |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !vertices.is_speck(line);
+    edges.open() && edges.lines().any(hole)
+}
+
 /// Lines of edges, such as the rims of holes, are left out if their width plus height is
 /// less than this, in pixels.
-const SPECK: f32 = 0.1;
+pub(in crate::render) const SPECK: f32 = 0.1;
 
 /// Segments of this length or longer, in pixels, are divided.
 pub(in crate::render) const LONGEST: f64 = 1.5;
@@ -84,10 +139,10 @@ pub(in crate::render) const LONGEST: f64 = 1.5;
 /// A segment's corners and ends, as in [`Origin`].
 type Segment = ([u32; 3], [[f64; 3]; 2]);
 
-struct Extractor<'a, F> {
+struct Extractor<'a, V, F> {
     mesh: &'a Mesh,
     placement: &'a Placement,
-    vertices: &'a Vertices<'a>,
+    vertices: &'a V,
     /// Whether the mesh has visible boundaries, so that the insides of faces may be
     /// visible.
     open: bool,
@@ -98,7 +153,7 @@ struct Extractor<'a, F> {
     out: F,
 }
 
-impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
+impl<V: Points, F: FnMut(Piece, &Origin)> Extractor<'_, V, F> {
     /// Makes the pieces of a batch of silhouettes.
     #[inline(always)]
     fn silhouettes(&mut self, batch: &silhouette::Batch, count: usize) {
@@ -138,15 +193,10 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
     /// Makes the pieces of creases and boundaries.
     fn edges(&mut self) {
         for line in self.mesh.topology.edges.lines() {
-            if !self.is_speck(line) {
+            if !self.vertices.is_speck(line) {
                 line.iter().for_each(|edge| self.edge(edge.vertices, edge.faces));
             }
         }
-    }
-
-    /// Whether a whole line of edges is too small to be seen.
-    fn is_speck(&self, line: &[Edge]) -> bool {
-        self.vertices.whole && self.vertices.span(line.iter().flat_map(|e| e.vertices)) < SPECK
     }
 
     /// Makes the pieces of a crease or boundary edge.

@@ -42,6 +42,12 @@ fn units(place: Place, point: &Point) -> [i64; 2] {
     })
 }
 
+/// Whether products of two differences of coordinates fit into 64 bits.
+#[inline(always)]
+fn is_small(corners: &[[i64; 2]; 3]) -> bool {
+    corners.as_flattened().iter().all(|v| v.abs() < 1 << 29)
+}
+
 /// Orientation of near positions in the image: positive for clockwise, negative for
 /// counter-clockwise, 0 without area.
 #[inline(always)]
@@ -105,13 +111,34 @@ impl Coverage {
         })
     }
 
+    /// Whether it covers a pixel.
+    #[inline(always)]
+    pub fn covers(&self, points: &[Point; 3], column: usize, row: usize) -> bool {
+        let Coverage { columns, rows, .. } = *self;
+        if !(columns[0]..columns[1]).contains(&column) || !(rows[0]..rows[1]).contains(&row) {
+            return false;
+        }
+        let (corners, at) = (self.corners(points), [centre(column), centre(row)]);
+        match is_small(&corners) {
+            true => self.edges(corners, at.map(i64::from)).iter().all(|edge| edge[0] >= 0),
+            false => {
+                let corners = corners.map(|p| p.map(i128::from));
+                self.edges(corners, at.map(i128::from)).iter().all(|edge| edge[0] >= 0)
+            }
+        }
+    }
+
+    /// The corners in units.
+    #[inline(always)]
+    fn corners(&self, points: &[Point; 3]) -> [[i64; 2]; 3] {
+        std::array::from_fn(|i| units(self.places[i], &points[i]))
+    }
+
     /// Calls `draw` for every row's run of pixels: row, first column, one past the last
     /// column.
     pub fn runs(&self, points: &[Point; 3], draw: impl FnMut(usize, usize, usize)) {
-        // Products of two differences must fit into the integer type.
-        let corners: [[i64; 2]; 3] = std::array::from_fn(|i| units(self.places[i], &points[i]));
-        let near = corners.as_flattened().iter().all(|v| v.abs() < 1 << 29);
-        if near {
+        let corners = self.corners(points);
+        if is_small(&corners) {
             self.runs_in(corners, draw)
         } else {
             self.runs_in(corners.map(|p| p.map(i128::from)), draw)

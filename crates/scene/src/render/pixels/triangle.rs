@@ -179,6 +179,23 @@ impl Triangle {
         });
     }
 
+    /// Nearness at a pixel; `None` if the triangle does not cover it.
+    #[inline(always)]
+    pub fn nearness_at(&self, column: usize, row: usize) -> Option<f32> {
+        let Plane { step, origin, limits, .. } = self.plane;
+        let covered = self.coverage.covers(&self.points, column, row);
+        let own = || Run {
+            row,
+            from: column,
+            to: column + 1,
+            nearness: self.plane.row(row),
+            step,
+            origin,
+            limits,
+        };
+        covered.then(|| own().nearness(column))
+    }
+
     /// Merges the triangle into the rows of an area, keeping the nearer value. With a set
     /// of marked pixels, only these are sure to be drawn, and the area must be the whole
     /// image.
