@@ -3,6 +3,7 @@
 use super::super::Mesh;
 use super::tree::{Builder, Item, Node, WIDE};
 use glam::DVec3;
+use wide::f32x8;
 
 /// A tree of a mesh's faces by their place.
 pub(crate) struct SurfaceTree {
@@ -18,9 +19,9 @@ pub(crate) struct SurfaceTree {
 #[repr(align(32))]
 pub(crate) struct Faces {
     /// The coordinates of each corner along each axis; NaN where there is no face.
-    pub corners: [[[f32; WIDE]; 3]; 3],
+    pub corners: [[f32x8; 3]; 3],
     /// At least the longest edge of each face (its sum of absolute coordinates).
-    pub size: [f32; WIDE],
+    pub size: f32x8,
     /// The numbers of the faces.
     pub faces: [u32; WIDE],
 }
@@ -36,17 +37,18 @@ impl SurfaceTree {
         let mut leaves = Vec::with_capacity(items.len().div_ceil(WIDE));
         let leaf = |items: &[Item<3>]| {
             let nowhere = [[[f32::NAN; WIDE]; 3]; 3];
-            let mut own = Faces { corners: nowhere, size: [0.0; WIDE], faces: [0; WIDE] };
+            let (mut rows, mut size, mut faces) = (nowhere, [0.0; WIDE], [0; WIDE]);
             for (i, item) in items.iter().enumerate() {
                 let corners = corners(item.id);
-                for (own, corner) in own.corners.iter_mut().zip(corners) {
+                for (own, corner) in rows.iter_mut().zip(corners) {
                     (0..3).for_each(|axis| own[axis][i] = corner[axis]);
                 }
                 let edge = |k: usize| (corners[(k + 1) % 3] - corners[k]).abs().element_sum();
-                own.size[i] = 1.000_001 * edge(0).max(edge(1)).max(edge(2));
-                own.faces[i] = item.id;
+                size[i] = 1.000_001 * edge(0).max(edge(1)).max(edge(2));
+                faces[i] = item.id;
             }
-            leaves.push(own);
+            let corners = rows.map(|corner| corner.map(f32x8::new));
+            leaves.push(Faces { corners, size: f32x8::new(size), faces });
             Some(leaves.len() as u32 - 1)
         };
         let mut builder = Builder { nodes: Vec::new(), weights: [1.0; 3], most: WIDE, leaf };

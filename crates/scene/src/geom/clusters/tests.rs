@@ -12,7 +12,7 @@ fn leaves<const D: usize>(nodes: &[Node<D>], at: u32, out: &mut Vec<u32>) {
     }
     let node = &nodes[at as usize];
     for i in 0..WIDE {
-        if node.sides[0][0][i] <= node.sides[1][0][i] {
+        if node.sides[0][0].to_array()[i] <= node.sides[1][0].to_array()[i] {
             leaves(nodes, node.children[i], out);
         }
     }
@@ -28,30 +28,34 @@ fn every_face_is_in_one_leaf_inside_of_all_boxes() {
     leaves(&trees.surface.nodes, trees.surface.root, &mut below);
     assert_eq!(below.len(), trees.surface.leaves.len());
     for leaf in &trees.surface.leaves {
-        for i in (0..WIDE).filter(|i| !leaf.corners[0][0][*i].is_nan()) {
+        for i in (0..WIDE).filter(|i| !leaf.corners[0][0].to_array()[*i].is_nan()) {
             seen[leaf.faces[i] as usize] += 1;
             let corners = mesh.topology.triangles[leaf.faces[i] as usize];
             for (own, v) in leaf.corners.iter().zip(corners) {
-                assert_eq!(
-                    [own[0][i], own[1][i], own[2][i]],
-                    mesh.positions[v as usize].to_array()
-                );
+                assert_eq!(own.map(|row| row.to_array()[i]), mesh.positions[v as usize].to_array());
             }
         }
     }
     assert!(seen.iter().all(|n| *n == 1));
     for node in &trees.surface.nodes {
         for (i, child) in node.children.iter().enumerate() {
-            if node.sides[0][0][i] > node.sides[1][0][i] {
+            if node.sides[0][0].to_array()[i] > node.sides[1][0].to_array()[i] {
                 continue;
             }
             let mut own = Vec::new();
             leaves(&trees.surface.nodes, *child, &mut own);
             for (axis, (low, high)) in node.sides[0].iter().zip(&node.sides[1]).enumerate() {
                 let corners = own.iter().flat_map(|leaf| {
-                    trees.surface.leaves[*leaf as usize].corners.iter().flat_map(|c| c[axis])
+                    trees.surface.leaves[*leaf as usize]
+                        .corners
+                        .iter()
+                        .flat_map(|c| c[axis].to_array())
                 });
-                assert!(corners.filter(|v| !v.is_nan()).all(|v| (low[i]..=high[i]).contains(&v)));
+                assert!(
+                    corners
+                        .filter(|v| !v.is_nan())
+                        .all(|v| (low.to_array()[i]..=high.to_array()[i]).contains(&v))
+                );
             }
         }
     }

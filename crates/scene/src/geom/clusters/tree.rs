@@ -1,5 +1,7 @@
 //! Trees of boxes, eight to a node, over boxes of any dimension.
 
+use wide::f32x8;
+
 /// The number of children of a node.
 pub(crate) const WIDE: usize = 8;
 /// Added to the numbers of leaves among children.
@@ -10,7 +12,7 @@ pub(crate) const LEAF: u32 = 1 << 31;
 pub(crate) struct Node<const D: usize> {
     /// The least coordinates along each axis, then the greatest. Where there is no child
     /// the least are infinite and the greatest negative infinite.
-    pub sides: [[[f32; WIDE]; D]; 2],
+    pub sides: [[f32x8; D]; 2],
     /// Nodes, or [`LEAF`] plus the number of a leaf.
     pub children: [u32; WIDE],
 }
@@ -68,20 +70,18 @@ impl<const D: usize, L: FnMut(&[Item<D>]) -> Option<u32>> Builder<D, L> {
         let mut parts = Vec::with_capacity(WIDE);
         self.split(items, unit, &mut parts);
         let at = self.nodes.len();
-        self.nodes.push(Node {
-            sides: [[[f32::INFINITY; WIDE]; D], [[f32::NEG_INFINITY; WIDE]; D]],
-            children: [LEAF; WIDE],
-        });
+        let mut sides = [[[f32::INFINITY; WIDE]; D], [[f32::NEG_INFINITY; WIDE]; D]];
+        let mut children = [LEAF; WIDE];
+        self.nodes.push(Node { sides: [[f32x8::ZERO; D]; 2], children });
         for (i, part) in parts.into_iter().enumerate() {
             let around = Item::around(0, part.iter().flat_map(|item| [item.low, item.high]));
-            let child = self.add(part);
-            let node = &mut self.nodes[at];
-            node.children[i] = child;
+            children[i] = self.add(part);
             for axis in 0..D {
-                node.sides[0][axis][i] = around.low[axis];
-                node.sides[1][axis][i] = around.high[axis];
+                sides[0][axis][i] = around.low[axis];
+                sides[1][axis][i] = around.high[axis];
             }
         }
+        self.nodes[at] = Node { sides: sides.map(|rows| rows.map(f32x8::new)), children };
         at as u32
     }
 

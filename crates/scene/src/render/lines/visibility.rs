@@ -124,7 +124,11 @@ impl Image {
     #[inline(always)]
     fn side(&self, x: f64, y: f64, slack: f64) -> Side {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
-        let index = |v: f64, side: usize| v.max(0.0).min((side - 1) as f64) as i32 as usize;
+        // One comparison each, unlike `max` and `min`; NaN becomes 0.
+        let index = |v: f64, side: usize| {
+            let (v, last) = (if v > 0.0 { v } else { 0.0 }, (side - 1) as f64);
+            (if v < last { v } else { last }) as i32 as usize
+        };
         Side {
             pixel: (index(y, self.height) * self.width + index(x, self.width)) as u32,
             inside,

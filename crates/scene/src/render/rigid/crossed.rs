@@ -90,7 +90,7 @@ fn undecided(node: &Node<4>, factors: &[f32; 4], margin: f32) -> u32 {
     let (mut least, mut most) = (f32x8::ZERO, f32x8::ZERO);
     for (axis, factor) in factors.iter().enumerate() {
         let turned = usize::from(*factor < 0.0);
-        let side = |side: usize| f32x8::new(node.sides[side][axis]) * f32x8::splat(*factor);
+        let side = |side: usize| node.sides[side][axis] * f32x8::splat(*factor);
         least += side(turned);
         most += side(1 - turned);
     }

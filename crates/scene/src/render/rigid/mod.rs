@@ -9,8 +9,10 @@
 
 pub(in crate::render) mod crossed;
 pub(in crate::render) mod hiding;
+mod lanes;
 pub(in crate::render) mod points;
 pub(in crate::render) mod range;
+mod rays;
 
 use crate::geom::{Mesh, Solid, Trees};
 use crate::render::Camera;

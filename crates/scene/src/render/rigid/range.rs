@@ -31,7 +31,8 @@ impl Posed<'_> {
             }
             if at >= LEAF {
                 let Some(leaf) = tree.leaves.get((at - LEAF) as usize) else { continue };
-                for [x, y, z] in &leaf.corners {
+                for corner in &leaf.corners {
+                    let [x, y, z] = corner.map(|row| row.to_array());
                     for i in 0..WIDE {
                         let [x, y, z] = [x[i], y[i], z[i]].map(f64::from);
                         let depth = -(x * a + y * b + z * c + t) * sign;
@@ -43,10 +44,10 @@ impl Posed<'_> {
             let Some(node) = tree.nodes.get(at as usize) else { continue };
             // Boxes that may hold a lesser one, the most promising last.
             let first = count;
+            let sides = [0, 1, 2].map(|axis| node.sides[usize::from(rows[axis] < 0.0)][axis]);
+            let sides = sides.map(|side| side.to_array());
             for i in 0..WIDE {
-                let side = |axis: usize| {
-                    f64::from(node.sides[usize::from(rows[axis] < 0.0)][axis][i]) * rows[axis]
-                };
+                let side = |axis: usize| f64::from(sides[axis][i]) * rows[axis];
                 let lowest = side(0) + side(1) + side(2) - sign * t - margin;
                 // False for NaN, where there is no child.
                 if !(lowest <= least && lowest < f64::INFINITY) {
