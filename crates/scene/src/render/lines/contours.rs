@@ -9,11 +9,12 @@
 
 use crate::contours::Contours;
 use crate::geom::Solid;
-use crate::render::lines::extraction::{Room, extract_mesh, extract_posed};
+use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{Depths, Piece};
 use crate::render::pixels::project::{DepthRange, Placement, Projected, project};
 use crate::render::pixels::sparse_depth::SparseDepth;
 use crate::render::rigid::hiding::Hiding;
+use crate::render::rigid::pieces::{Found, extract_posed};
 use crate::render::rigid::{Posed, posed};
 use crate::render::{Camera, work};
 use std::cell::RefCell;
@@ -23,6 +24,7 @@ use std::cell::RefCell;
 struct Scratch {
     projected: Projected,
     room: Room,
+    found_faces: Found,
     looked: SparseDepth,
     hiding: Hiding,
     /// Pieces, hidden or not.
@@ -76,6 +78,13 @@ impl Contours {
         let room = || Vec::with_capacity(found + found / 8 + 16);
         let (width, height) = (camera.width, camera.height);
         Contours { x: room(), y: room(), tx: room(), ty: room(), length: room(), width, height }
+    }
+
+    /// As many pieces, all of them zero.
+    fn with_length(camera: &Camera, count: usize) -> Contours {
+        let list = || vec![0.0; count];
+        let (width, height) = (camera.width, camera.height);
+        Contours { x: list(), y: list(), tx: list(), ty: list(), length: list(), width, height }
     }
 
     /// Adds a visible piece.
@@ -162,7 +171,7 @@ impl Scratch {
     /// The contours of meshes that keep their shape.
     fn of_posed(&mut self, posed: &[Posed<'_>], camera: &Camera) -> Contours {
         work::count(|work| work.whole += 1);
-        let Scratch { room, hiding, pieces, hidden, found, .. } = self;
+        let Scratch { room, found_faces, hiding, pieces, hidden, found, .. } = self;
         pieces.clear();
         let mut range = DepthRange::EMPTY;
         for posed in posed {
@@ -172,15 +181,22 @@ impl Scratch {
                 continue;
             }
             work::drawn(posed.mesh);
-            extract_posed(posed, camera, room, |piece, _| pieces.push(piece));
+            let tools = (&mut *found_faces, &mut room.crossed);
+            extract_posed(posed, camera, tools, |piece, _| pieces.push(piece));
         }
         hidden.clear();
         hidden.resize(pieces.len(), true);
         for side in 0..2 {
             hiding.test(posed, camera, range.extent(), (side, pieces, hidden));
         }
+        *found = hidden.iter().filter(|hidden| !**hidden).count();
+        let mut out = Contours::with_length(camera, *found);
+        let lists = out.x.iter_mut().zip(&mut out.y).zip(&mut out.tx).zip(&mut out.ty);
         let visible = pieces.iter().zip(&*hidden).filter(|(_, hidden)| !**hidden);
-        seen(visible.map(|(piece, _)| piece), camera, found)
+        for (((((x, y), tx), ty), length), (piece, _)) in lists.zip(&mut out.length).zip(visible) {
+            (*x, *y, *tx, *ty, *length) = (piece.x, piece.y, piece.tx, piece.ty, piece.length);
+        }
+        out
     }
 }
 

@@ -2,6 +2,7 @@
 //! facing, for many faces at a time.
 
 use crate::geom::{Mesh, Patches, Run, Topology};
+use crate::render::lines::visibility::{BESIDE, LONGEST};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Lens, Placement, Vertices, beyond_near};
 use glam::DVec3;
@@ -82,6 +83,60 @@ impl Default for Batch {
             camera: [three; 2],
             normal: three,
         }
+    }
+}
+
+/// Where the segments of a batch are tested for visibility.
+pub(in crate::render) struct Located {
+    /// Whether a segment is a single piece: short and wholly inside of the image.
+    pub single: [bool; MOST],
+    /// On the outer and the inner side: the pixel nearest to the position tested, and whether
+    /// it contains it. The inner side only if both are tested.
+    pub pixels: [[u32; MOST]; 2],
+    pub inside: [[bool; MOST]; 2],
+}
+
+impl Located {
+    /// For the first `count` segments in an image of some size.
+    #[inline(always)]
+    pub fn new(batch: &Batch, count: usize, [width, height]: [f64; 2], both: bool) -> Located {
+        let mut located =
+            Located { single: [false; MOST], pixels: [[0; MOST]; 2], inside: [[false; MOST]; 2] };
+        let Batch { ends: [from, to], length, middle, outward, depth, .. } = batch;
+        let (last, across) = ([width - 1.0, height - 1.0], width as i32);
+        // NaN becomes 0.
+        let index = |v: f64, last: f64| {
+            let v = if v > 0.0 { v } else { 0.0 };
+            (if v < last { v } else { last }) as i32
+        };
+        for start in (0..count.min(MOST)).step_by(FEW) {
+            for i in start..start + FEW {
+                let within = |end: &[Row; 3]| {
+                    (end[0][i] >= 0.0)
+                        & (end[1][i] >= 0.0)
+                        & (end[0][i] <= width)
+                        & (end[1][i] <= height)
+                };
+                located.single[i] = (length[i] < LONGEST)
+                    & within(from)
+                    & within(to)
+                    & (depth[i].abs() < f64::INFINITY);
+            }
+            for (side, sign) in [(0, BESIDE), (1, -BESIDE)] {
+                if side == 1 && !both {
+                    continue;
+                }
+                for i in start..start + FEW {
+                    let x = middle[0][i] + sign * outward[0][i];
+                    let y = middle[1][i] + sign * outward[1][i];
+                    located.inside[side][i] = (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height);
+                    located.pixels[side][i] =
+                        index(y, last[1]).wrapping_mul(across).wrapping_add(index(x, last[0]))
+                            as u32;
+                }
+            }
+        }
+        located
     }
 }
 

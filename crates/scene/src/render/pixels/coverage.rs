@@ -30,6 +30,7 @@ fn centre(pixel: usize) -> i32 {
 }
 
 /// A corner in units, even if its rounded position was clamped.
+#[inline(always)]
 fn units(place: Place, point: &Point) -> [i64; 2] {
     let [x, y, ..] = place.to_array();
     if is_near(place) {
@@ -101,14 +102,15 @@ impl Coverage {
         // A counter-clockwise triangle's edges run the other way. Branch-free, since a
         // branch would be unpredictable.
         let way = N::from(2 * i32::from(self.clockwise) - 1);
-        std::array::from_fn(|i| {
-            let (p, q) = (corners[i], corners[(i + 1) % 3]);
+        let edge = |p: [N; 2], q: [N; 2]| {
             let (dx, dy) = ((q[0] - p[0]) * way, (q[1] - p[1]) * way);
             // Centres on left and top edges count as inside.
             let has = (dy < zero) | ((dy == zero) & (dx > zero));
             let at = dx * (y - p[1]) - dy * (x - p[0]) + N::from(i32::from(has)) - one;
             [at, (zero - dy) * unit, dx * unit]
-        })
+        };
+        let [a, b, c] = corners;
+        [edge(a, b), edge(b, c), edge(c, a)]
     }
 
     /// Whether it covers a pixel.
@@ -120,7 +122,10 @@ impl Coverage {
         }
         let (corners, at) = (self.corners(points), [centre(column), centre(row)]);
         match is_small(&corners) {
-            true => self.edges(corners, at.map(i64::from)).iter().all(|edge| edge[0] >= 0),
+            true => {
+                let [a, b, c] = self.edges(corners, [i64::from(at[0]), i64::from(at[1])]);
+                (a[0] | b[0] | c[0]) >= 0
+            }
             false => {
                 let corners = corners.map(|p| p.map(i128::from));
                 self.edges(corners, at.map(i128::from)).iter().all(|edge| edge[0] >= 0)
@@ -131,7 +136,8 @@ impl Coverage {
     /// The corners in units.
     #[inline(always)]
     fn corners(&self, points: &[Point; 3]) -> [[i64; 2]; 3] {
-        std::array::from_fn(|i| units(self.places[i], &points[i]))
+        let ([p, q, r], [a, b, c]) = (points, self.places);
+        [units(a, p), units(b, q), units(c, r)]
     }
 
     /// Calls `draw` for every row's run of pixels: row, first column, one past the last

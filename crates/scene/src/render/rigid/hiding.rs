@@ -41,8 +41,10 @@ pub(super) struct Asked {
 
 const UNASKED: Asked = Asked { all: 0.0, any: f64::INFINITY };
 
-/// Pixels in a square of this side are looked up together.
-const TILE: u32 = 8;
+/// Pixels in a square of this side are looked up together: fewer if the clusters are smaller
+/// than this, in pixels.
+const TILES: [u32; 2] = [4, 8];
+const FINE: f64 = 3.0;
 
 /// Pixels looked up at a time.
 pub(super) const GROUP: usize = 8;
@@ -56,12 +58,14 @@ impl Hiding {
         extent: f64,
         (side, pieces, hidden): (usize, &[Piece], &mut [bool]),
     ) {
-        let (pixels, across) = (camera.pixels(), camera.width.div_ceil(TILE));
+        let fine = posed.iter().any(|posed| posed.grain < FINE);
+        let tile_side = TILES[usize::from(!fine)];
+        let (pixels, across) = (camera.pixels(), camera.width.div_ceil(tile_side));
         if self.asked.len() < pixels {
             self.asked.resize(pixels, UNASKED);
             self.depth.resize(pixels, f32::INFINITY);
         }
-        let tiles = (across * camera.height.div_ceil(TILE)) as usize;
+        let tiles = (across * camera.height.div_ceil(tile_side)) as usize;
         if self.tiles.len() < tiles {
             self.tiles.resize(tiles, 0);
         }
@@ -81,7 +85,7 @@ impl Hiding {
             let Some(asked) = asked.get_mut(pixel as usize) else { continue };
             if *asked == UNASKED {
                 let (row, column) = (pixel / camera.width, pixel % camera.width);
-                let tile = row / TILE * across + column / TILE;
+                let tile = row / tile_side * across + column / tile_side;
                 if let Some(first) = tiles.get_mut(tile as usize) {
                     if *first == 0 {
                         used.push(tile);

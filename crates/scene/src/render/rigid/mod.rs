@@ -7,11 +7,12 @@
 //! left is computed by the same arithmetic. Where the margins are not known to suffice
 //! ([`Posed::new`]), nothing is drawn this way.
 
-pub(in crate::render) mod crossed;
+mod crossed;
 pub(in crate::render) mod hiding;
 mod lanes;
-pub(in crate::render) mod points;
-pub(in crate::render) mod range;
+pub(in crate::render) mod pieces;
+mod points;
+mod range;
 mod rays;
 
 use crate::geom::{Mesh, Solid, Trees};
@@ -44,6 +45,8 @@ pub(in crate::render) struct Posed<'a> {
     /// How far a line of sight may pass from a face that covers the pixel, along each axis
     /// of the mesh, rounding included.
     pad: f64,
+    /// About how wide the boxes of the smallest clusters are in the image, in pixels.
+    grain: f64,
     /// Whether it is beside the picture by at least half a pixel.
     pub outside: bool,
 }
@@ -103,6 +106,8 @@ impl<'a> Posed<'a> {
         if !(most < FARTHEST && error < 0.1 * BLUR) {
             return None;
         }
+        let faces = mesh.topology.triangles.len() as f64;
+        let grain = (16.0 * (high[0] - low[0]) * (high[1] - low[1]) / faces).sqrt();
         let outside = (0..2).any(|i| low[i] > size[i] + 1.0 || high[i] < -1.0);
         let inverse = placement.matrix().inverse();
         // How far it is from the inverse.
@@ -128,7 +133,17 @@ impl<'a> Posed<'a> {
             && (1e-12..1e12).contains(&near)
             && far < 1e12
             && pad < 1e12;
-        sound.then_some(Posed { mesh, trees, placement, lens, facing, inverse, pad, outside })
+        sound.then_some(Posed {
+            mesh,
+            trees,
+            placement,
+            lens,
+            facing,
+            inverse,
+            pad,
+            grain,
+            outside,
+        })
     }
 }
 

@@ -17,9 +17,15 @@ impl Posed<'_> {
 }
 
 impl Points for Posed<'_> {
+    #[inline(always)]
     fn point(&self, v: u32) -> Point {
         let nowhere = Point { x: f64::NAN, y: f64::NAN, nearness: f64::NAN };
         self.vertex(v).map_or(nowhere, |(point, _)| point)
+    }
+
+    #[inline(always)]
+    fn whole(&self) -> bool {
+        true
     }
 
     fn is_speck(&self, line: &[Edge]) -> bool {

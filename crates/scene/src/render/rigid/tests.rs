@@ -1,7 +1,9 @@
 use super::hiding::Hiding;
+use super::pieces::{Found, extract_posed};
 use super::*;
 use crate::geom::{Affine, Caps, Profile};
-use crate::render::lines::extraction::{Room, extract_mesh, extract_posed};
+use crate::render::lines::extraction::{Room, extract_mesh};
+use crate::render::lines::silhouette::Crossed;
 use crate::render::pixels::project::{Projected, project};
 use crate::render::testing::{Uniform, cuboid, lathe, solid, sphere};
 use crate::render::{Camera, Channels, Contours, Frame, Projection};
@@ -138,7 +140,8 @@ fn pieces_and_ranges_are_those_of_the_plain_way() {
             let (mut room, vertices) = (Room::default(), projected.mesh(0));
             assert!(vertices.whole && (!posed[0].outside || vertices.outside(&camera)));
             let (mut with, mut without) = (Vec::new(), Vec::new());
-            extract_posed(&posed[0], &camera, &mut room, |piece, from| {
+            let tools = (&mut Found::default(), &mut Crossed::default());
+            extract_posed(&posed[0], &camera, tools, |piece, from| {
                 with.push(format!("{piece:?} {from:?}"))
             });
             let placement = &posed[0].placement;
@@ -209,14 +212,15 @@ fn most_faces_are_skipped() {
     let faces = solid.instances()[0].mesh.topology.triangles.len();
     let camera = Camera::default_for(128, 128);
     let mut random = Uniform(74);
-    let (mut hiding, mut room) = (Hiding::default(), Room::default());
+    let (mut hiding, mut found) = (Hiding::default(), Found::default());
     let rounds = 20;
     for round in 0..rounds {
         let affine = placement(&mut random, &solid.instances()[0].mesh, 7 * round);
         let placed = solid.placed(affine);
         let posed = posed(&placed, &camera).unwrap();
         let mut pieces = Vec::new();
-        extract_posed(&posed[0], &camera, &mut room, |piece, _| pieces.push(piece));
+        let tools = (&mut found, &mut Crossed::default());
+        extract_posed(&posed[0], &camera, tools, |piece, _| pieces.push(piece));
         assert!(pieces.len() > 200);
         let mut hidden = vec![true; pieces.len()];
         for side in 0..2 {
@@ -225,7 +229,7 @@ fn most_faces_are_skipped() {
         }
     }
     let share = |count: usize| count as f64 / (faces * rounds) as f64;
-    let shares = [share(room.found.faced), share(hiding.tested), share(hiding.drawn)];
+    let shares = [share(found.faced), share(hiding.tested), share(hiding.drawn)];
     assert!(shares[0] < 0.2 && shares[1] < 0.3 && shares[2] < 0.02, "{shares:?}");
 }
 
