@@ -8,6 +8,7 @@
 use super::super::Mesh;
 use super::tree::{Builder, Item, Node};
 use glam::{DVec3, Vec3};
+use wide::f32x8;
 
 /// The tree of a mesh's faces by the planes (normal, distance from `middle` along it) of
 /// their vertices.
@@ -23,15 +24,17 @@ pub(crate) struct FacingTree {
     pub reach: DVec3,
 }
 
-/// A few faces with copies of their vertices.
-#[repr(align(32))]
+/// A few faces with the planes of their vertices.
+#[repr(align(64))]
 pub(crate) struct Few {
-    pub positions: [[f32; Few::MOST]; 3],
-    pub normals: [[f32; Few::MOST]; 3],
-    /// The corners of each face, as numbers of these vertices; all 0 where there is no
-    /// face.
-    pub corners: [[u8; 3]; Few::MOST],
+    /// The planes, by coordinate; a vertex may be there more than once.
+    pub planes: [[f32x8; 2]; 4],
+    /// The corners of each face, as numbers of these vertices, four bits each; all 0 where
+    /// there is no face.
+    pub corners: [u16; Few::MOST],
     pub faces: [u32; Few::MOST],
+    /// The numbers of the vertices in the mesh.
+    pub vertices: [u32; Few::MOST],
 }
 
 impl Few {
@@ -39,29 +42,30 @@ impl Few {
     pub const MOST: usize = 16;
 
     /// `None` if there are too many vertices.
-    fn new(mesh: &Mesh, faces: impl Iterator<Item = u32>) -> Option<Few> {
-        let mut own: Vec<u32> = Vec::with_capacity(Few::MOST);
-        let (mut corners, mut numbers) = ([[0; 3]; Few::MOST], [0; Few::MOST]);
+    fn new(
+        mesh: &Mesh,
+        faces: impl Iterator<Item = u32>,
+        plane: impl Fn(u32) -> [f32; 4],
+    ) -> Option<Few> {
+        let (mut vertices, mut count) = ([0; Few::MOST], 0);
+        let (mut corners, mut numbers) = ([0; Few::MOST], [0; Few::MOST]);
         for (i, face) in faces.enumerate() {
             numbers[i] = face;
             for (k, v) in mesh.topology.triangles[face as usize].into_iter().enumerate() {
-                let at = own.iter().position(|w| *w == v).unwrap_or(own.len());
-                if at == Few::MOST {
-                    return None;
-                }
-                own.truncate(own.len().max(at));
-                if at == own.len() {
-                    own.push(v);
-                }
-                corners[i][k] = at as u8;
+                let at = vertices[..count].iter().position(|w| *w == v).unwrap_or(count);
+                *vertices.get_mut(at)? = v;
+                count = count.max(at + 1);
+                corners[i] |= (at as u16) << (4 * k);
             }
         }
-        let vertex = |i: usize| own.get(i).or(own.first()).map_or(0, |v| *v as usize);
-        let rows = |list: &[Vec3]| {
-            std::array::from_fn(|axis| std::array::from_fn(|i| list[vertex(i)][axis]))
+        let first = vertices[0];
+        vertices[count..].fill(first);
+        let planes = vertices.map(plane);
+        let row = |axis: usize, half: usize| {
+            f32x8::new(std::array::from_fn(|i| planes[8 * half + i][axis]))
         };
-        let (positions, normals) = (rows(&mesh.positions), rows(&mesh.normals));
-        Some(Few { positions, normals, corners, faces: numbers })
+        let planes = std::array::from_fn(|axis| [row(axis, 0), row(axis, 1)]);
+        Some(Few { planes, corners, faces: numbers, vertices })
     }
 }
 
@@ -75,11 +79,12 @@ impl FacingTree {
         let plane = |v: u32| {
             let [p, n] = [positions, normals].map(|list| list[v as usize].as_dvec3());
             let along = n.dot(p - middle);
-            (normals[v as usize].to_array(), along as f32)
+            let [x, y, z] = normals[v as usize].to_array();
+            [x, y, z, along as f32]
         };
         let around = |face: u32| {
             let planes = topology.triangles[face as usize].map(plane);
-            let ends = planes.into_iter().flat_map(|([x, y, z], along)| {
+            let ends = planes.into_iter().flat_map(|[x, y, z, along]| {
                 // Rounded outwards.
                 [[x, y, z, along.next_down()], [x, y, z, along.next_up()]]
             });
@@ -88,7 +93,7 @@ impl FacingTree {
         let mut items: Vec<Item<4>> = (0..topology.triangles.len() as u32).map(around).collect();
         let mut leaves = Vec::new();
         let leaf = |items: &[Item<4>]| {
-            leaves.push(Few::new(mesh, items.iter().map(|item| item.id))?);
+            leaves.push(Few::new(mesh, items.iter().map(|item| item.id), plane)?);
             Some(leaves.len() as u32 - 1)
         };
         // Seen from some radii away a normal's change counts more than a step along it.

@@ -73,13 +73,16 @@ fn faces_by_facing_have_their_vertices() {
     leaves(&trees.facing.nodes, trees.facing.root, &mut below);
     assert_eq!(below.len(), trees.facing.leaves.len());
     for leaf in &trees.facing.leaves {
-        for (corners, face) in leaf.corners.iter().zip(&leaf.faces).filter(|(c, _)| **c != [0; 3]) {
+        for (corners, face) in leaf.corners.iter().zip(&leaf.faces).filter(|(c, _)| **c != 0) {
             seen[*face as usize] += 1;
             for (k, v) in mesh.topology.triangles[*face as usize].into_iter().enumerate() {
-                let at =
-                    |rows: &[[f32; Few::MOST]; 3]| rows.map(|row| row[usize::from(corners[k])]);
-                assert_eq!(at(&leaf.positions), mesh.positions[v as usize].to_array());
-                assert_eq!(at(&leaf.normals), mesh.normals[v as usize].to_array());
+                let own = usize::from(corners >> (4 * k) & 15);
+                assert_eq!(leaf.vertices[own], v);
+                let plane = leaf.planes.map(|row| row[own / 8].to_array()[own % 8]);
+                let (p, n) = (mesh.positions[v as usize], mesh.normals[v as usize]);
+                assert_eq!(plane[..3], n.to_array());
+                let along = n.as_dvec3().dot(p.as_dvec3() - trees.facing.middle);
+                assert_eq!(plane[3], along as f32);
             }
         }
     }

@@ -3,9 +3,9 @@
 //! of them, are not looked at.
 
 use super::Posed;
-#[cfg(target_arch = "x86_64")]
-use super::lanes::with_avx;
-use super::lanes::{Lanes, Plain};
+#[cfg(test)]
+use super::lanes::Plain;
+use super::lanes::{Lanes, Work, widest};
 use super::rays::Rays;
 use crate::render::Camera;
 use crate::render::lines::visibility::{Depths, Piece};
@@ -99,7 +99,7 @@ impl Hiding {
         }
         let mut rays: SmallVec<[Rays<'_>; 1]> =
             posed.iter().filter(|p| !p.outside).map(|p| Rays::new(p, camera)).collect();
-        LookUp { tiles, used, list, asked, depth, width: camera.width }.run(&mut rays);
+        widest(LookUp { tiles, used, list, asked, depth, width: camera.width, rays: &mut rays });
         for rays in rays {
             (*tested, *drawn) = (*tested + rays.tested, *drawn + rays.drawn);
         }
@@ -113,32 +113,22 @@ impl Hiding {
 }
 
 /// The pixels asked for, and where their depth goes.
-struct LookUp<'a> {
+struct LookUp<'a, 'b> {
     tiles: &'a mut [u32],
     used: &'a [u32],
     list: &'a [(u32, u32)],
     asked: &'a mut [Asked],
     depth: &'a mut [f32],
     width: u32,
+    rays: &'a mut [Rays<'b>],
 }
 
-impl LookUp<'_> {
-    /// Looks all pixels up, and makes `asked` and `tiles` what they are between images.
-    fn run(mut self, rays: &mut [Rays<'_>]) {
-        #[cfg(target_arch = "x86_64")]
-        if with_avx(
-            #[inline(always)]
-            |lanes| self.run_by(lanes, rays),
-        )
-        .is_some()
-        {
-            return;
-        }
-        self.run_by(Plain, rays);
-    }
+impl Work for LookUp<'_, '_> {
+    type Out = ();
 
+    /// Looks all pixels up, and makes `asked` and `tiles` what they are between images.
     #[inline(always)]
-    fn run_by<L: Lanes>(&mut self, lanes: L, rays: &mut [Rays<'_>]) {
+    fn run<L: Lanes>(self, lanes: L) {
         for tile in self.used {
             let Some(first) = self.tiles.get_mut(*tile as usize) else { continue };
             let mut next = std::mem::take(first);
@@ -155,7 +145,7 @@ impl LookUp<'_> {
                     }
                     next = *after;
                 }
-                for rays in &mut *rays {
+                for rays in &mut *self.rays {
                     rays.nearest(lanes, &mut group, count, self.width);
                 }
                 for (pixel, _, own) in &group[..count] {
@@ -185,10 +175,11 @@ pub(super) fn depth(posed: &Posed<'_>, camera: &Camera, step: u32, plain: bool) 
         asked: &mut asked,
         depth: &mut depth,
         width: camera.width,
+        rays: &mut rays,
     };
     match plain {
-        true => { look_up }.run_by(Plain, &mut rays),
-        false => look_up.run(&mut rays),
+        true => look_up.run(Plain),
+        false => widest(look_up),
     }
     depth
 }

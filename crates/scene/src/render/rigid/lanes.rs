@@ -29,6 +29,26 @@ pub(super) trait Lanes: Copy {
     fn at_most(self, a: Self::Row, b: Self::Row) -> u32;
 }
 
+/// Something to be done with eight numbers at a time.
+pub(super) trait Work: Sized {
+    type Out;
+
+    fn run<L: Lanes>(self, lanes: L) -> Self::Out;
+}
+
+/// Does some work with the processor's widest instructions.
+#[inline(always)]
+pub(super) fn widest<W: Work>(work: W) -> W::Out {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v3) = pulp::x86::V3::try_new() {
+        return v3.vectorize(
+            #[inline(always)]
+            || work.run(v3),
+        );
+    }
+    work.run(Plain)
+}
+
 /// On any processor.
 #[derive(Clone, Copy)]
 pub(super) struct Plain;
@@ -83,25 +103,12 @@ impl Lanes for Plain {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub(super) use avx::with_avx;
-
-#[cfg(target_arch = "x86_64")]
 mod avx {
     use super::Lanes;
     use pulp::bytemuck::cast;
     use pulp::x86::V3;
     use std::arch::x86_64::{__m256, _CMP_LE_OQ};
     use wide::f32x8;
-
-    /// Runs `work` compiled for AVX, if the processor has it.
-    #[inline]
-    pub(in super::super) fn with_avx<R>(work: impl FnOnce(V3) -> R) -> Option<R> {
-        let v3 = V3::try_new()?;
-        Some(v3.vectorize(
-            #[inline(always)]
-            || work(v3),
-        ))
-    }
 
     impl Lanes for V3 {
         type Row = __m256;

@@ -18,10 +18,10 @@ pub(in crate::render) fn extract_posed(
 ) {
     let Posed { mesh, placement, lens, .. } = posed;
     let Some(mut extractor) = Extractor::new(mesh, placement, camera, posed, out) else { return };
+    found.find(posed);
     vectorised(
         #[inline(always)]
         || {
-            found.find(posed);
             crossed.each_of(
                 &found.corners,
                 mesh,
