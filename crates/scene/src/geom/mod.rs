@@ -30,7 +30,7 @@ mod sphere;
 pub use affine::Affine;
 pub use bounds::Bounds;
 pub use clusters::Clusters;
-pub(crate) use clusters::{Faces, Few, LEAF, Node, Trees, WIDE};
+pub(crate) use clusters::{Faces, Few, LEAF, Node, Shape, Trees, WIDE};
 pub use cuboid::{cuboid, vjp_cuboid};
 pub use detail::{Coarse, Detail};
 pub use error::GeomError;

@@ -5,7 +5,7 @@
 //! the planes of some faces gives the least and greatest facing of their vertices, exactly
 //! for the box; silhouettes are where a hyperplane cuts the surface of all planes.
 
-use super::super::Mesh;
+use super::shape::Shape;
 use super::tree::{Builder, Item, Node};
 use glam::{DVec3, Vec3};
 use wide::f32x8;
@@ -43,7 +43,7 @@ impl Few {
 
     /// `None` if there are too many vertices.
     fn new(
-        mesh: &Mesh,
+        mesh: Shape<'_>,
         faces: impl Iterator<Item = u32>,
         plane: impl Fn(u32) -> [f32; 4],
     ) -> Option<Few> {
@@ -51,7 +51,7 @@ impl Few {
         let (mut corners, mut numbers) = ([0; Few::MOST], [0; Few::MOST]);
         for (i, face) in faces.enumerate() {
             numbers[i] = face;
-            for (k, v) in mesh.topology.triangles[face as usize].into_iter().enumerate() {
+            for (k, v) in mesh.triangles[face as usize].into_iter().enumerate() {
                 let at = vertices[..count].iter().position(|w| *w == v).unwrap_or(count);
                 *vertices.get_mut(at)? = v;
                 count = count.max(at + 1);
@@ -71,8 +71,8 @@ impl Few {
 
 impl FacingTree {
     /// All corners of the mesh's faces must exist.
-    pub(super) fn new(mesh: &Mesh) -> FacingTree {
-        let Mesh { positions, normals, topology, .. } = mesh;
+    pub(super) fn new(mesh: Shape<'_>) -> FacingTree {
+        let Shape { positions, normals, triangles } = mesh;
         let all = Item::around(0, positions.iter().map(|p| p.to_array()));
         let [low, high] = [all.low, all.high].map(|p| DVec3::from_array(p.map(f64::from)));
         let middle = (low + high) * 0.5;
@@ -83,14 +83,14 @@ impl FacingTree {
             [x, y, z, along as f32]
         };
         let around = |face: u32| {
-            let planes = topology.triangles[face as usize].map(plane);
+            let planes = triangles[face as usize].map(plane);
             let ends = planes.into_iter().flat_map(|[x, y, z, along]| {
                 // Rounded outwards.
                 [[x, y, z, along.next_down()], [x, y, z, along.next_up()]]
             });
             Item::around(face, ends)
         };
-        let mut items: Vec<Item<4>> = (0..topology.triangles.len() as u32).map(around).collect();
+        let mut items: Vec<Item<4>> = (0..triangles.len() as u32).map(around).collect();
         let mut leaves = Vec::new();
         let leaf = |items: &[Item<4>]| {
             leaves.push(Few::new(mesh, items.iter().map(|item| item.id), plane)?);

@@ -5,20 +5,21 @@
 //! drawn several times: meshes with new vertices each time never get any.
 
 mod facing;
+mod shape;
 mod surface;
 mod tree;
 
 pub(crate) use facing::{FacingTree, Few};
+pub(crate) use shape::Shape;
 pub(crate) use surface::{Faces, SurfaceTree};
 pub(crate) use tree::{LEAF, Node, WIDE};
 
-use super::Mesh;
 use std::fmt;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Drawings of a mesh before its trees are made: they cost about as much.
-const DRAWINGS: u32 = 12;
+const DRAWINGS: u32 = 24;
 /// Meshes with fewer faces are drawn as quickly without.
 const FEWEST: usize = 256;
 /// Trees take some 80 bytes a face, so larger meshes do without.
@@ -62,7 +63,7 @@ impl PartialEq for Clusters {
 impl Clusters {
     /// Counts a drawing of the mesh, and returns its trees if it has been drawn often and
     /// has any. `mesh` must be the mesh that this belongs to.
-    pub(crate) fn drawn(&self, mesh: &Mesh) -> Option<&Trees> {
+    pub(crate) fn drawn(&self, mesh: Shape<'_>) -> Option<&Trees> {
         let trees = match self.trees.get() {
             Some(trees) => trees,
             // While one thread makes them, others draw without.
@@ -71,37 +72,25 @@ impl Clusters {
             }
             None => return None,
         };
-        trees.as_deref().filter(|trees| trees.made_from == lists(mesh))
+        trees.as_deref().filter(|trees| trees.made_from == mesh.lists())
     }
 
     /// Makes the trees now, for tests.
     #[cfg(test)]
-    pub(crate) fn make(&self, mesh: &Mesh) -> Option<&Trees> {
+    pub(crate) fn make(&self, mesh: Shape<'_>) -> Option<&Trees> {
         self.trees.get_or_init(|| Trees::new(mesh).map(Box::new)).as_deref()
     }
 }
 
-/// Where a mesh's lists are and how long they are: they differ if they were replaced.
-fn lists(mesh: &Mesh) -> [(usize, usize); 3] {
-    let Mesh { positions, normals, topology, .. } = mesh;
-    let triangles = &topology.triangles;
-    [
-        (positions.as_ptr() as usize, positions.len()),
-        (normals.as_ptr() as usize, normals.len()),
-        (triangles.as_ptr() as usize, triangles.len()),
-    ]
-}
-
 impl Trees {
     /// `None` for a mesh that is too small, too large or not sound.
-    fn new(mesh: &Mesh) -> Option<Trees> {
-        let Mesh { positions, normals, topology, .. } = mesh;
-        if !(FEWEST..=MOST).contains(&topology.triangles.len()) || positions.len() != normals.len()
-        {
+    fn new(mesh: Shape<'_>) -> Option<Trees> {
+        let Shape { positions, normals, triangles } = mesh;
+        if !(FEWEST..=MOST).contains(&triangles.len()) || positions.len() != normals.len() {
             return None;
         }
         let mut used = vec![false; positions.len()];
-        for v in topology.triangles.as_flattened() {
+        for v in triangles.as_flattened() {
             *used.get_mut(*v as usize)? = true;
         }
         // The depth range is that of all vertices, with a face or not.
@@ -113,7 +102,7 @@ impl Trees {
         let made = || Trees {
             facing: FacingTree::new(mesh),
             surface: SurfaceTree::new(mesh),
-            made_from: lists(mesh),
+            made_from: mesh.lists(),
         };
         sound.then(made)
     }

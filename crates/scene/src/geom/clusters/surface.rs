@@ -1,6 +1,6 @@
 //! A tree of boxes around faces, for finding those that a line of sight meets.
 
-use super::super::Mesh;
+use super::shape::Shape;
 use super::tree::{Builder, Item, Node, WIDE};
 use glam::DVec3;
 use wide::f32x8;
@@ -28,8 +28,8 @@ pub(crate) struct Faces {
 
 impl SurfaceTree {
     /// All corners of the mesh's faces must exist.
-    pub(super) fn new(mesh: &Mesh) -> SurfaceTree {
-        let triangles = &mesh.topology.triangles;
+    pub(super) fn new(mesh: Shape<'_>) -> SurfaceTree {
+        let triangles = mesh.triangles;
         let corners = |face: u32| triangles[face as usize].map(|v| mesh.positions[v as usize]);
         let mut items: Vec<Item<3>> = (0..triangles.len() as u32)
             .map(|face| Item::around(face, corners(face).map(|p| p.to_array())))

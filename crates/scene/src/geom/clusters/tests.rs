@@ -1,5 +1,5 @@
 use super::*;
-use crate::geom::Solid;
+use crate::geom::{Mesh, Solid};
 
 fn ball() -> Solid {
     Solid::sphere(1.0, 50).unwrap()
@@ -22,7 +22,7 @@ fn leaves<const D: usize>(nodes: &[Node<D>], at: u32, out: &mut Vec<u32>) {
 fn every_face_is_in_one_leaf_inside_of_all_boxes() {
     let solid = ball();
     let mesh = &solid.instances()[0].mesh;
-    let trees = Trees::new(mesh).unwrap();
+    let trees = Trees::new(mesh.shape()).unwrap();
     let count = mesh.topology.triangles.len();
     let (mut below, mut seen) = (Vec::new(), vec![0; count]);
     leaves(&trees.surface.nodes, trees.surface.root, &mut below);
@@ -67,7 +67,7 @@ fn every_face_is_in_one_leaf_inside_of_all_boxes() {
 fn faces_by_facing_have_their_vertices() {
     let solid = ball();
     let mesh = &solid.instances()[0].mesh;
-    let trees = Trees::new(mesh).unwrap();
+    let trees = Trees::new(mesh.shape()).unwrap();
     let mut seen = vec![0; mesh.topology.triangles.len()];
     let mut below = Vec::new();
     leaves(&trees.facing.nodes, trees.facing.root, &mut below);
@@ -94,23 +94,23 @@ fn faces_by_facing_have_their_vertices() {
 fn unsound_meshes_have_no_trees() {
     let solid = ball();
     let mesh = &solid.instances()[0].mesh;
-    assert!(Trees::new(mesh).is_some());
+    assert!(Trees::new(mesh.shape()).is_some());
     let mut few = Mesh::clone(mesh);
     few.normals.pop();
-    assert!(Trees::new(&few).is_none());
+    assert!(Trees::new(few.shape()).is_none());
     let mut unused = Mesh::clone(mesh);
     unused.positions.push(glam::Vec3::ZERO);
     unused.normals.push(glam::Vec3::Y);
-    assert!(Trees::new(&unused).is_none());
+    assert!(Trees::new(unused.shape()).is_none());
     let mut far = Mesh::clone(mesh);
     far.positions[3].x = f32::INFINITY;
-    assert!(Trees::new(&far).is_none());
+    assert!(Trees::new(far.shape()).is_none());
     let mut other = Mesh::clone(mesh);
     other.normals[3].y = f32::NAN;
-    assert!(Trees::new(&other).is_none());
+    assert!(Trees::new(other.shape()).is_none());
     // Made for other lists than these.
     let made = Mesh::clone(mesh);
-    assert!(made.clusters.make(&made).is_some() && made.clusters.drawn(&made).is_some());
+    assert!(made.clusters.make(made.shape()).is_some() && made.drawn().is_some());
     let moved = Mesh { positions: made.positions.clone(), ..made };
-    assert!(moved.clusters.drawn(&moved).is_none());
+    assert!(moved.drawn().is_none());
 }

@@ -58,6 +58,12 @@ impl Contours {
         Scratch::default().of_any(solid, camera)
     }
 
+    /// As [`Contours::of`], with trees.
+    #[cfg(test)]
+    pub(in crate::render) fn of_posed(posed: &[Posed<'_>], camera: &Camera) -> Contours {
+        Scratch::default().of_posed(posed, camera)
+    }
+
     /// As [`Contours::of`], with the depth image of the same solid and camera already
     /// drawn.
     pub(in crate::render) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {

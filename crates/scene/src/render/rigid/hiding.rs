@@ -6,7 +6,7 @@ use super::Posed;
 #[cfg(test)]
 use super::lanes::Plain;
 use super::lanes::{Lanes, Work, widest};
-use super::rays::Rays;
+use super::rays::{Asked, GROUP, Rays};
 use crate::render::Camera;
 use crate::render::lines::visibility::{Depths, Piece};
 use smallvec::SmallVec;
@@ -31,23 +31,12 @@ pub(in crate::render) struct Hiding {
     pub drawn: usize,
 }
 
-/// What the tests at a pixel ask: the least depth at which all of them pass, and the least
-/// at which any does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Asked {
-    pub all: f64,
-    pub any: f64,
-}
-
 const UNASKED: Asked = Asked { all: 0.0, any: f64::INFINITY };
 
 /// Pixels in a square of this side are looked up together: fewer if the clusters are smaller
 /// than this, in pixels.
 const TILES: [u32; 2] = [4, 8];
 const FINE: f64 = 3.0;
-
-/// Pixels looked up at a time.
-pub(super) const GROUP: usize = 8;
 
 impl Hiding {
     /// Clears `hidden` for the pieces that pass their test on a side, of those that are set.

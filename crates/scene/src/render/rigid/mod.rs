@@ -28,6 +28,8 @@ const BLUR: f64 = 1e-3;
 /// Projected meshes that reach farther than this, in pixels, are drawn the plain way:
 /// rounded positions are bounded there.
 const FARTHEST: f64 = 16_000.0;
+/// Clusters of coarse meshes are wider than this in the image, in pixels.
+const COARSE: f64 = 16.0;
 /// Rounding errors of single precision, with a margin, relative to the largest number.
 const ROUNDING: f64 = 4e-6;
 
@@ -51,13 +53,20 @@ pub(in crate::render) struct Posed<'a> {
     pub outside: bool,
 }
 
-/// The meshes of a solid, if all of them can be drawn this way.
+/// The meshes of a solid, if all of them can be drawn this way and it pays: of coarse meshes,
+/// drawing all faces costs less than looking up pixels.
 pub(in crate::render) fn posed<'a>(
     solid: &'a Solid,
     camera: &Camera,
 ) -> Option<SmallVec<[Posed<'a>; 1]>> {
+    let pays = |posed: &Posed<'_>| posed.grain < COARSE || posed.outside;
+    all_posed(solid, camera).filter(|list| list.iter().all(pays))
+}
+
+/// The meshes of a solid, if all of them can be drawn this way.
+fn all_posed<'a>(solid: &'a Solid, camera: &Camera) -> Option<SmallVec<[Posed<'a>; 1]>> {
     let one = |instance: &'a crate::geom::Instance| {
-        let trees = instance.mesh.clusters.drawn(&instance.mesh)?;
+        let trees = instance.mesh.drawn()?;
         Posed::new(&instance.mesh, trees, Placement::new(camera, &instance.affine), camera)
     };
     solid.instances().iter().map(one).collect()

@@ -1,7 +1,6 @@
 //! Lines of sight through the tree of a mesh's faces, a few close ones at a time.
 
 use super::Posed;
-use super::hiding::{Asked, GROUP};
 use super::lanes::Lanes;
 use crate::geom::{Faces, LEAF, Node, WIDE};
 use crate::render::Camera;
@@ -11,6 +10,17 @@ use crate::render::pixels::raster::back_of;
 use crate::render::pixels::triangle::{Triangle, bits};
 use glam::{DVec3, Vec3, Vec4};
 use wide::f32x8;
+
+/// Pixels looked up at a time.
+pub(super) const GROUP: usize = 8;
+
+/// What the tests at a pixel ask: the least depth at which all of them pass, and the least
+/// at which any does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Asked {
+    pub all: f64,
+    pub any: f64,
+}
 
 /// Lines of sight through the tree of a mesh.
 pub(super) struct Rays<'a> {
