@@ -63,7 +63,9 @@ impl Hiding {
         else {
             return;
         };
-        (used.clear(), list.clear(), least.clear());
+        used.clear();
+        list.clear();
+        least.clear();
         for (hidden, piece) in hidden.iter().zip(pieces) {
             if !*hidden {
                 least.push(f64::INFINITY);

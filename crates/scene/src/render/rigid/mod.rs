@@ -29,7 +29,7 @@ const BLUR: f64 = 1e-3;
 /// rounded positions are bounded there.
 const FARTHEST: f64 = 16_000.0;
 /// Clusters of coarse meshes are wider than this in the image, in pixels.
-const COARSE: f64 = 16.0;
+const COARSE: f64 = 24.0;
 /// Rounding errors of single precision, with a margin, relative to the largest number.
 const ROUNDING: f64 = 4e-6;
 
