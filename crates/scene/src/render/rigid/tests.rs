@@ -86,11 +86,11 @@ fn placement(random: &mut Uniform, mesh: &Mesh, round: usize) -> Affine {
     if round % 3 == 1 {
         // Sheared, flattened, perhaps mirrored.
         let scale = DVec3::from([(); 3].map(|()| random.between(0.3, 1.5)));
-        matrix *= DMat3::from_diagonal(scale * if round % 2 == 0 { 1.0 } else { -1.0 });
+        matrix *= DMat3::from_diagonal(scale * if round.is_multiple_of(2) { 1.0 } else { -1.0 });
         matrix *= DMat3::from_cols(DVec3::X, DVec3::new(0.4, 1.0, 0.0), DVec3::Z);
     }
     let depth = [3.0, 1.5, 6.0, 0.9, 2.0, 40.0, 0.2][round % 7];
-    let aside = random.between(-0.5, 0.5) * if round % 11 == 0 { 8.0 } else { 1.0 };
+    let aside = random.between(-0.5, 0.5) * if round.is_multiple_of(11) { 8.0 } else { 1.0 };
     let shift = DVec3::new(aside, random.between(-0.4, 0.4), 3.0 - depth) - matrix * middle;
     Affine(glam::DAffine3 { matrix3: matrix, translation: shift })
 }
